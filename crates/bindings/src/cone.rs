@@ -1,0 +1,84 @@
+//! The cone estimator.
+
+use etendue_lightfield::View;
+use etendue_lightfield::cone::{Cone as CoreCone, cone_sums as core_cone_sums};
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::run::interruptible;
+use crate::scan::tally_dict;
+use crate::source::with_source;
+
+/// A view with its acceptances, as Python hands it over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Cone {
+    eye: [f64; 3],
+    target: [f64; 3],
+    right: [f64; 3],
+    up: [f64; 3],
+    normal: [f64; 3],
+    width: f64,
+    height: f64,
+    columns: u32,
+    rows: u32,
+    acceptances: Vec<f64>,
+}
+
+impl Cone {
+    fn core(&self) -> CoreCone {
+        let view = View {
+            eye: self.eye.into(),
+            target: self.target.into(),
+            right: self.right.into(),
+            up: self.up.into(),
+            normal: self.normal.into(),
+            width: self.width,
+            height: self.height,
+            columns: self.columns,
+            rows: self.rows,
+        };
+        CoreCone {
+            view,
+            acceptances: self.acceptances.clone(),
+        }
+    }
+}
+
+type SumArrays<'py> = (
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray3<u64>>,
+);
+
+/// For each cone the sums (Σ w, Σ w², number of rays), each of shape (acceptances, rows, columns), and the tally.
+#[pyfunction]
+#[pyo3(signature = (source, cones, threads=None, progress=None))]
+pub fn cone_sums<'py>(
+    py: Python<'py>,
+    source: &Bound<'py, PyAny>,
+    cones: Vec<Cone>,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(Vec<SumArrays<'py>>, Bound<'py, PyDict>)> {
+    let core: Vec<CoreCone> = cones.iter().map(Cone::core).collect();
+    let (sums, tally) = with_source(source, |source| {
+        interruptible(py, threads, progress, |pool, tick| {
+            core_cone_sums(source, &core, pool, tick)
+        })
+    })?;
+    let arrays = sums
+        .into_iter()
+        .zip(&cones)
+        .map(|(sum, cone)| {
+            let shape = [cone.acceptances.len(), cone.rows as usize, cone.columns as usize];
+            Ok((
+                PyArray1::from_vec(py, sum.flux).reshape(shape)?,
+                PyArray1::from_vec(py, sum.flux_squared).reshape(shape)?,
+                PyArray1::from_vec(py, sum.rays).reshape(shape)?,
+            ))
+        })
+        .collect::<PyResult<_>>()?;
+    Ok((arrays, tally_dict(py, &tally)?))
+}

@@ -1,0 +1,25 @@
+//! The compiled half of étendue as the Python module `etendue._core`: arrays in, arrays out.
+//!
+//! Nothing is computed here. Each file converts one noun, releases the interpreter while the core works, and comes back
+//! between rounds of batches to report progress and to honour Ctrl-C.
+
+mod cone;
+mod run;
+mod scan;
+mod source;
+mod subset;
+
+use pyo3::prelude::*;
+
+/// The compiled core of étendue.
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<source::RayTable>()?;
+    module.add_class::<source::RingSource>()?;
+    module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;
+    module.add_function(wrap_pyfunction!(scan::scan, module)?)?;
+    module.add_function(wrap_pyfunction!(cone::cone_sums, module)?)?;
+    module.add_function(wrap_pyfunction!(subset::select_subset, module)?)?;
+    module.add_function(wrap_pyfunction!(subset::deal_parts, module)?)?;
+    Ok(())
+}

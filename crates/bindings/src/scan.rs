@@ -1,0 +1,43 @@
+//! The statistics of a ray set.
+
+use etendue_geometry::Tally;
+use etendue_geometry::scan::{Scan, scan as core_scan};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::run::interruptible;
+use crate::source::with_source;
+
+/// A tally as a dictionary.
+pub fn tally_dict<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("rays", tally.rays)?;
+    dict.set_item("defects", tally.defects)?;
+    dict.set_item("flux", tally.flux)?;
+    dict.set_item("flux_squared", tally.flux_squared)?;
+    dict.set_item("norm_error", tally.norm_error)?;
+    Ok(dict)
+}
+
+/// One pass over a source: (tally, moments), both dictionaries.
+#[pyfunction]
+#[pyo3(signature = (source, threads=None, progress=None))]
+pub fn scan<'py>(
+    py: Python<'py>,
+    source: &Bound<'py, PyAny>,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyDict>)> {
+    let scan: Scan = with_source(source, |source| {
+        interruptible(py, threads, progress, |pool, tick| core_scan(source, pool, tick))
+    })?;
+    let moments = PyDict::new(py);
+    moments.set_item("zero_flux", scan.zero_flux)?;
+    moments.set_item("flux_range", scan.flux_range)?;
+    moments.set_item("bounds", scan.bounds)?;
+    moments.set_item("weighted_position", scan.weighted_position)?;
+    moments.set_item("weighted_direction", scan.weighted_direction)?;
+    moments.set_item("weighted_outer", scan.weighted_outer)?;
+    moments.set_item("focus_rhs", scan.focus_rhs)?;
+    Ok((tally_dict(py, &scan.tally)?, moments))
+}

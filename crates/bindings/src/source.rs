@@ -1,0 +1,155 @@
+//! Sources of rays as Python objects.
+
+use std::ops::Range;
+
+use etendue_geometry::table::{Float, Layout, RayTable as CoreTable};
+use etendue_geometry::{RayBatch, RaySource};
+use etendue_optics::source::{Ring, RingSource as CoreRings};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Ray records over the bytes of an array: in memory, or mapped from a file.
+#[pyclass(frozen, module = "etendue._core")]
+pub struct RayTable {
+    bytes: Py<PyArray1<u8>>,
+    layout: Layout,
+}
+
+#[pymethods]
+impl RayTable {
+    #[new]
+    #[pyo3(signature = (bytes, stride, position, direction, flux, double, length_scale))]
+    fn new(
+        bytes: &Bound<'_, PyArray1<u8>>,
+        stride: usize,
+        position: Option<usize>,
+        direction: usize,
+        flux: usize,
+        double: bool,
+        length_scale: f64,
+    ) -> PyResult<Self> {
+        let float = if double { Float::F64 } else { Float::F32 };
+        let layout = Layout {
+            stride,
+            position,
+            direction,
+            flux,
+            float,
+            length_scale,
+        };
+        let readonly = bytes.readonly();
+        let slice = readonly.as_slice()?;
+        CoreTable::new(slice, layout)
+            .ok_or_else(|| PyValueError::new_err(format!("{} bytes are not a table of {layout:?}", slice.len())))?;
+        Ok(Self {
+            bytes: bytes.clone().unbind(),
+            layout,
+        })
+    }
+
+    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
+        Ok(self.bytes.bind(py).len()? / self.layout.stride)
+    }
+}
+
+/// The three-ring source, or any other set of concentric Lambertian rings.
+#[pyclass(frozen, module = "etendue._core")]
+pub struct RingSource(CoreRings);
+
+#[pymethods]
+impl RingSource {
+    #[new]
+    fn new(rings: Vec<(f64, f64, f64, u64)>, runs: u64, seed: u64) -> PyResult<Self> {
+        let rings = rings
+            .into_iter()
+            .map(|(inner, outer, flux, rays)| Ring {
+                inner,
+                outer,
+                flux,
+                rays,
+            })
+            .collect();
+        CoreRings::new(rings, runs, seed)
+            .map(Self)
+            .ok_or_else(|| PyValueError::new_err("a ring source needs at least one ray, and fewer than 2^64"))
+    }
+
+    fn __len__(&self) -> PyResult<usize> {
+        Ok(usize::try_from(self.0.len())?)
+    }
+}
+
+/// Either source, borrowed for the time of a call.
+pub enum Source<'a> {
+    Table(CoreTable<'a>),
+    Rings(&'a CoreRings),
+}
+
+impl RaySource for Source<'_> {
+    fn len(&self) -> u64 {
+        match self {
+            Self::Table(table) => table.len(),
+            Self::Rings(rings) => rings.len(),
+        }
+    }
+
+    fn fill(&self, range: Range<u64>, batch: &mut RayBatch) {
+        match self {
+            Self::Table(table) => table.fill(range, batch),
+            Self::Rings(rings) => rings.fill(range, batch),
+        }
+    }
+}
+
+/// Calls `body` with the core's view of a Python source.
+pub fn with_source<R>(source: &Bound<'_, PyAny>, body: impl FnOnce(&Source<'_>) -> PyResult<R>) -> PyResult<R> {
+    if let Ok(table) = source.cast::<RayTable>() {
+        let table = table.get();
+        let bytes = table.bytes.bind(source.py()).readonly();
+        let core = CoreTable::new(bytes.as_slice()?, table.layout)
+            .ok_or_else(|| PyValueError::new_err("the ray table changed its size"))?;
+        body(&Source::Table(core))
+    } else {
+        body(&Source::Rings(&source.cast::<RingSource>()?.get().0))
+    }
+}
+
+type RayArrays<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+/// Rays `start..stop` as (position (n, 3) \[mm\], unit direction (n, 3), flux (n,)).
+#[pyfunction]
+pub fn read_rays<'py>(py: Python<'py>, source: &Bound<'py, PyAny>, start: u64, stop: u64) -> PyResult<RayArrays<'py>> {
+    with_source(source, |source| {
+        if start > stop || stop > source.len() {
+            return Err(PyValueError::new_err(format!(
+                "rays {start}..{stop} of {}",
+                source.len()
+            )));
+        }
+        let n = usize::try_from(stop - start)?;
+        let (mut position, mut direction, mut flux) = (vec![0.0; 3 * n], vec![0.0; 3 * n], vec![0.0; n]);
+        py.detach(|| {
+            let mut at = 0;
+            source.for_each_block(start..stop, |_, batch| {
+                for i in 0..batch.len {
+                    for axis in 0..3 {
+                        position[3 * (at + i) + axis] = batch.position[axis][i];
+                        direction[3 * (at + i) + axis] = batch.direction[axis][i];
+                    }
+                }
+                flux[at..at + batch.len].copy_from_slice(&batch.flux[..batch.len]);
+                at += batch.len;
+            });
+        });
+        Ok((
+            PyArray1::from_vec(py, position).reshape([n, 3])?,
+            PyArray1::from_vec(py, direction).reshape([n, 3])?,
+            PyArray1::from_vec(py, flux),
+        ))
+    })
+}

@@ -1,0 +1,203 @@
+//! Ray records in memory, or in a mapped file: fixed stride, little-endian columns of one float type.
+
+use std::ops::Range;
+
+use crate::batch::RayBatch;
+use crate::source::RaySource;
+
+/// The float type of a table's columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Float {
+    /// IEEE-754 binary32, as ray files have it.
+    F32,
+    /// IEEE-754 binary64, as sets made in memory have it.
+    F64,
+}
+
+impl Float {
+    const fn size(self) -> usize {
+        match self {
+            Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+/// Where the columns lie in a record \[bytes\], and what turns them into millimetres.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout {
+    /// Bytes from one record to the next.
+    pub stride: usize,
+    /// Offset of x, y, z; None for far-field records, which have no position.
+    pub position: Option<usize>,
+    /// Offset of the direction's three components.
+    pub direction: usize,
+    /// Offset of the flux.
+    pub flux: usize,
+    /// Type of all these columns.
+    pub float: Float,
+    /// Millimetres per unit of position.
+    pub length_scale: f64,
+}
+
+/// Records over borrowed bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct RayTable<'a> {
+    bytes: &'a [u8],
+    layout: Layout,
+}
+
+impl<'a> RayTable<'a> {
+    /// A table over `bytes`; None if a column would reach past the record or the bytes are no whole number of records.
+    #[must_use]
+    pub fn new(bytes: &'a [u8], layout: Layout) -> Option<Self> {
+        let width = layout.float.size();
+        let fits = |offset: usize, columns: usize| {
+            offset
+                .checked_add(columns * width)
+                .is_some_and(|end| end <= layout.stride)
+        };
+        let valid = layout.stride > 0
+            && bytes.len() % layout.stride == 0
+            && layout.position.is_none_or(|offset| fits(offset, 3))
+            && fits(layout.direction, 3)
+            && fits(layout.flux, 1);
+        valid.then_some(Self { bytes, layout })
+    }
+}
+
+fn read_f32(record: &[u8], offset: usize) -> f64 {
+    f64::from(f32::from_le_bytes([
+        record[offset],
+        record[offset + 1],
+        record[offset + 2],
+        record[offset + 3],
+    ]))
+}
+
+fn read_f64(record: &[u8], offset: usize) -> f64 {
+    let b = &record[offset..offset + 8];
+    f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]])
+}
+
+/// One pass over the records with the column reader known at compile time.
+fn decode(records: &[u8], layout: &Layout, batch: &mut RayBatch, width: usize, read: impl Fn(&[u8], usize) -> f64) {
+    let [px, py, pz] = &mut batch.position;
+    let [kx, ky, kz] = &mut batch.direction;
+    let scale = layout.length_scale;
+    for (i, record) in records.chunks_exact(layout.stride).enumerate() {
+        if let Some(p) = layout.position {
+            px[i] = read(record, p) * scale;
+            py[i] = read(record, p + width) * scale;
+            pz[i] = read(record, p + 2 * width) * scale;
+        } else {
+            (px[i], py[i], pz[i]) = (0.0, 0.0, 0.0);
+        }
+        kx[i] = read(record, layout.direction);
+        ky[i] = read(record, layout.direction + width);
+        kz[i] = read(record, layout.direction + 2 * width);
+        batch.flux[i] = read(record, layout.flux);
+    }
+}
+
+impl RaySource for RayTable<'_> {
+    fn len(&self) -> u64 {
+        (self.bytes.len() / self.layout.stride) as u64
+    }
+
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "indices lie inside a slice that is in memory"
+    )]
+    fn fill(&self, range: Range<u64>, batch: &mut RayBatch) {
+        let (start, stop) = (range.start as usize, range.end as usize);
+        let records = &self.bytes[start * self.layout.stride..stop * self.layout.stride];
+        batch.len = stop - start;
+        match self.layout.float {
+            Float::F32 => decode(records, &self.layout, batch, 4, read_f32),
+            Float::F64 => decode(records, &self.layout, batch, 8, read_f64),
+        }
+        batch.settle();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout() -> Layout {
+        Layout {
+            stride: 30,
+            position: Some(1),
+            direction: 13,
+            flux: 25,
+            float: Float::F32,
+            length_scale: 25.4,
+        }
+    }
+
+    #[test]
+    fn reads_unaligned_records_in_any_column_order() {
+        let mut bytes = Vec::new();
+        for record in [
+            [1.0, 2.0, 3.0, 0.0, 0.6, 0.8, 5.0_f32],
+            [-1.0, 0.5, 0.25, 0.0, 3.0, 4.0, 7.0],
+        ] {
+            bytes.push(0xAA);
+            record.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+            bytes.push(0xBB);
+        }
+        let table = RayTable::new(&bytes, layout()).expect("valid");
+        let mut batch = RayBatch::default();
+        assert_eq!(table.len(), 2);
+        table.fill(0..2, &mut batch);
+        assert!((batch.position(1).y - 12.7).abs() < 1e-12);
+        assert!((batch.direction(1).z - 0.8).abs() < 1e-15 && (batch.norm_error - 4.0).abs() < 1e-15);
+        assert_eq!(batch.flux[..2], [5.0, 7.0]);
+    }
+
+    #[test]
+    fn refuses_columns_outside_the_record() {
+        assert!(RayTable::new(&[0; 60], Layout { flux: 27, ..layout() }).is_none());
+        assert!(
+            RayTable::new(
+                &[0; 60],
+                Layout {
+                    position: Some(usize::MAX - 3),
+                    ..layout()
+                }
+            )
+            .is_none()
+        );
+        assert!(RayTable::new(&[0; 61], layout()).is_none());
+        assert!(RayTable::new(&[], Layout { stride: 0, ..layout() }).is_none());
+    }
+
+    #[test]
+    fn counts_rays_that_cannot_be_used() {
+        let rays = [
+            [f32::NAN, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0],
+            [0.0, 0.0, 0.0, 0.0, f32::INFINITY, 1.0, 1.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0],
+        ];
+        let bytes: Vec<u8> = rays.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
+        let layout = Layout {
+            stride: 28,
+            position: Some(0),
+            direction: 12,
+            flux: 24,
+            float: Float::F32,
+            length_scale: 1.0,
+        };
+        let table = RayTable::new(&bytes, layout).expect("valid");
+        let mut batch = RayBatch::default();
+        table.fill(0..5, &mut batch);
+        assert_eq!(batch.defects, [2, 1, 1]);
+        assert_eq!(
+            (0..5).map(|i| batch.usable(i)).collect::<Vec<_>>(),
+            [false, false, false, false, true]
+        );
+    }
+}

@@ -1,0 +1,132 @@
+//! An observer and the pixel grid through which he looks.
+
+use etendue_math::Vec3;
+
+/// A pixel grid in space, seen from a point. Lengths in mm.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Where the observer stands.
+    pub eye: Vec3,
+    /// Centre of the grid.
+    pub target: Vec3,
+    /// Unit vector along the rows, to the right.
+    pub right: Vec3,
+    /// Unit vector along the columns, upwards.
+    pub up: Vec3,
+    /// Unit normal of the grid.
+    pub normal: Vec3,
+    /// Extent along `right`.
+    pub width: f64,
+    /// Extent along `up`.
+    pub height: f64,
+    /// Pixels along `right`.
+    pub columns: u32,
+    /// Pixels along `up`; row 0 is the top.
+    pub rows: u32,
+}
+
+impl View {
+    /// Number of pixels.
+    #[must_use]
+    pub fn pixels(&self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+
+    /// The pixel (row · columns + column) through which the line `x + t k` crosses the grid, if it does.
+    ///
+    /// The whole line counts, before and behind `x`: in free space luminance is constant along it.
+    #[inline]
+    #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "inside 0..columns and 0..rows by the test"
+    )]
+    pub fn pixel(&self, x: Vec3, k: Vec3) -> Option<u32> {
+        let t = (self.target - x).dot(self.normal) / k.dot(self.normal);
+        let hit = x + k * t - self.target;
+        let column = (hit.dot(self.right) / self.width + 0.5) * f64::from(self.columns);
+        let row = (0.5 - hit.dot(self.up) / self.height) * f64::from(self.rows);
+        // A line parallel to the grid gives ±∞ or NaN, which fails the test too.
+        let inside = column >= 0.0 && column < f64::from(self.columns) && row >= 0.0 && row < f64::from(self.rows);
+        inside.then(|| row as u32 * self.columns + column as u32)
+    }
+
+    /// The unit vector from the centre of a pixel to the observer.
+    #[inline]
+    #[must_use]
+    pub fn to_eye(&self, pixel: u32) -> Vec3 {
+        let (row, column) = (pixel / self.columns, pixel % self.columns);
+        let u = ((f64::from(column) + 0.5) / f64::from(self.columns) - 0.5) * self.width;
+        let v = (0.5 - (f64::from(row) + 0.5) / f64::from(self.rows)) * self.height;
+        (self.eye - self.target - self.right * u - self.up * v).normalized()
+    }
+
+    /// Unit vector from the target to the observer, and the largest angle \[rad\] between it and the line from any point
+    /// of the grid to the observer.
+    ///
+    /// Points of a plane that are seen within an angle of a given line form a convex set, so a corner is the extreme.
+    #[must_use]
+    pub fn field(&self) -> (Vec3, f64) {
+        let axis = (self.eye - self.target).normalized();
+        let half = |sx: f64, sy: f64| {
+            let corner = self.right * (sx * self.width / 2.0) + self.up * (sy * self.height / 2.0);
+            (self.eye - self.target - corner)
+                .normalized()
+                .dot(axis)
+                .clamp(-1.0, 1.0)
+                .acos()
+        };
+        let angle = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(a, b)| half(a, b));
+        (axis, angle.into_iter().fold(0.0, f64::max))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view() -> View {
+        View {
+            eye: Vec3::new(30.0, -20.0, 100.0),
+            target: Vec3::new(1.0, 2.0, 3.0),
+            right: Vec3::new(1.0, 0.0, 0.0),
+            up: Vec3::new(0.0, 1.0, 0.0),
+            normal: Vec3::new(0.0, 0.0, 1.0),
+            width: 7.0,
+            height: 3.0,
+            columns: 7,
+            rows: 6,
+        }
+    }
+
+    #[test]
+    fn a_line_meets_the_pixel_it_was_aimed_at_from_before_and_behind() {
+        let v = view();
+        for pixel in 0..42 {
+            let k = v.to_eye(pixel);
+            let centre = v.eye - k * ((v.eye - v.target).dot(v.normal) / k.dot(v.normal));
+            for t in [-50.0, 0.0, 20.0, 300.0] {
+                assert_eq!(v.pixel(centre + k * t, k), Some(pixel));
+            }
+        }
+        // Row 0 is the top, column 0 the left; edges belong to the pixel on the right and below.
+        let up = Vec3::new(0.0, 0.0, 1.0);
+        assert_eq!(v.pixel(Vec3::new(-2.4, 3.4, 0.0), up), Some(0));
+        assert_eq!(v.pixel(Vec3::new(4.5, 2.0, 0.0), up), None);
+        assert_eq!(v.pixel(Vec3::new(-2.5, 3.5, 0.0), up), Some(0));
+    }
+
+    #[test]
+    fn a_parallel_line_meets_no_pixel() {
+        assert_eq!(view().pixel(Vec3::new(0.0, 0.0, 3.0), Vec3::new(1.0, 0.0, 0.0)), None);
+        assert_eq!(view().pixel(Vec3::new(0.0, 0.0, 9.0), Vec3::new(1.0, 0.0, 0.0)), None);
+    }
+
+    #[test]
+    fn no_pixel_is_seen_outside_the_field() {
+        let (axis, angle) = view().field();
+        let widest = (0..42).map(|p| view().to_eye(p).dot(axis).acos()).fold(0.0, f64::max);
+        assert!(widest <= angle && widest > 0.8 * angle);
+    }
+}

@@ -1,0 +1,5 @@
+//! Sources of rays.
+
+mod rings;
+
+pub use rings::{Ring, RingSource};

@@ -1,0 +1,88 @@
+//! Fixed batches, ordered merge: the same bits for any number of threads, and a chance to stop between rounds.
+
+use std::ops::ControlFlow;
+use std::ops::Range;
+
+pub use rayon::ThreadPool;
+use rayon::prelude::*;
+
+/// Rays in one unit of work. Fixed: partial sums are formed per batch, so their bits depend on it.
+pub const BATCH: u64 = 1 << 16;
+
+/// Batches between two calls of the progress function: some 10 ms to 100 ms of work.
+const ROUND: u64 = 64;
+
+/// A pool of `threads` threads, or of one per core for 0.
+///
+/// # Errors
+/// The system's reason, if it grants no threads.
+pub fn pool(threads: usize) -> Result<ThreadPool, rayon::ThreadPoolBuildError> {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build()
+}
+
+/// Runs `work` over `0..n` in batches of [`BATCH`] on the pool, and hands each result to `merge` in batch order.
+///
+/// `merge` and `progress` run on the calling thread, which is where an interpreter looks for signals.
+/// `progress` is told how many items are done after each round; [`ControlFlow::Break`] ends the run early. Returns the
+/// number of items done. At most `ROUND` results wait to be merged at any time, which bounds the memory.
+pub fn run<T: Send>(
+    pool: &ThreadPool,
+    n: u64,
+    work: impl Fn(Range<u64>) -> T + Sync,
+    mut merge: impl FnMut(T),
+    mut progress: impl FnMut(u64) -> ControlFlow<()>,
+) -> u64 {
+    let batches = n.div_ceil(BATCH);
+    let mut first = 0;
+    while first < batches {
+        let last = (first + ROUND).min(batches);
+        let results: Vec<T> = pool.install(|| {
+            (first..last)
+                .into_par_iter()
+                .map(|b| work(b * BATCH..((b + 1) * BATCH).min(n)))
+                .collect()
+        });
+        results.into_iter().for_each(&mut merge);
+        first = last;
+        if progress((first * BATCH).min(n)).is_break() {
+            break;
+        }
+    }
+    (first * BATCH).min(n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn merges_in_order_for_any_number_of_threads() {
+        let n = 10 * BATCH + 17;
+        let sum = |threads| {
+            let pool = pool(threads).expect("pool");
+            let mut parts = Vec::new();
+            let harmonic = |r: Range<u64>| r.map(|i| 1.0 / (i as f64 + 1.0)).sum::<f64>();
+            let done = run(&pool, n, harmonic, |s| parts.push(s), |_| ControlFlow::Continue(()));
+            assert_eq!(done, n);
+            parts.iter().sum::<f64>().to_bits()
+        };
+        let one = sum(1);
+        assert_eq!(one, sum(2));
+        assert_eq!(one, sum(7));
+    }
+
+    #[test]
+    fn stops_when_asked() {
+        let mut seen = 0;
+        let pool = pool(2).expect("pool");
+        let done = run(
+            &pool,
+            200 * BATCH,
+            |r| r.end - r.start,
+            |k| seen += k,
+            |_| ControlFlow::Break(()),
+        );
+        assert_eq!(done, 64 * BATCH);
+        assert_eq!(seen, done);
+    }
+}

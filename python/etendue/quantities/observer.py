@@ -1,0 +1,194 @@
+"""Who looks, and through which pixel grid."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, UnknownNameError
+
+Plane = Literal["view", "xy"]
+PLANES: tuple[str, ...] = get_args(Plane)
+Vector = npt.NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Observer:
+    """The point from which a source is looked at.
+
+    The observer stands at ``target + distance · (sin θ cos φ, sin θ sin φ, cos θ)`` and looks at the target.
+
+    Parameters
+    ----------
+    theta : float
+        Polar angle θ from +Z [°], 0 to 180.
+    phi : float
+        Azimuth φ from +X towards +Y [°].
+    distance : float
+        From target to observer [mm], > 0 and finite.
+    target : tuple of 3 floats
+        The point looked at [mm].
+
+    Raises
+    ------
+    ArgumentError
+        If an angle, the distance or the target is out of its domain.
+
+    Examples
+    --------
+    >>> Observer(theta=90, phi=0, distance=1000).position.round(9).tolist()
+    [1000.0, 0.0, 0.0]
+    """
+
+    theta: float
+    phi: float
+    distance: float
+    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.theta <= 180.0:
+            raise ArgumentError(f"Observer: theta is {self.theta}°; it is measured from +Z and lies in 0..180°.")
+        if not math.isfinite(self.phi):
+            raise ArgumentError(f"Observer: phi is {self.phi}°; give a finite azimuth.")
+        if not (math.isfinite(self.distance) and self.distance > 0.0):
+            raise ArgumentError(f"Observer: distance is {self.distance} mm; give a finite distance > 0.")
+        target = tuple(float(c) for c in self.target)
+        if len(target) != 3 or not all(map(math.isfinite, target)):
+            raise ArgumentError(f"Observer: target is {self.target}; give three finite coordinates in mm.")
+        object.__setattr__(self, "target", target)
+
+    @property
+    def direction(self) -> Vector:
+        """Unit vector from the target to the observer, shape (3,)."""
+        return self._rotation()[2]
+
+    @property
+    def position(self) -> Vector:
+        """Where the observer stands [mm], shape (3,)."""
+        return np.asarray(self.target) + self.distance * self.direction
+
+    def _rotation(self) -> npt.NDArray[np.float64]:
+        """Images of +X, +Y, +Z under the shortest rotation that takes +Z to the observer, as rows (3, 3).
+
+        R = Rz(φ) Ry(θ) Rz(-φ): a turn by θ about the axis (-sin φ, cos φ, 0). At θ = 180° the shortest rotation is not
+        unique; this form stays continuous and lets φ choose the axis.
+        """
+        # Exact values at the quarter turns, so that φ = 90° gives exactly +Y and not 6e-17 of +X.
+        c, s = _cos_sin_degrees(self.phi)
+        ct, st = _cos_sin_degrees(self.theta)
+        right = (ct * c * c + s * s, (ct - 1.0) * c * s, -st * c)
+        up = ((ct - 1.0) * c * s, ct * s * s + c * c, -st * s)
+        toward = (st * c, st * s, ct)
+        return np.array([right, up, toward])
+
+
+def _cos_sin_degrees(angle: float) -> tuple[float, float]:
+    quarter, rest = divmod(angle, 90.0)
+    c, s = math.cos(math.radians(rest)), math.sin(math.radians(rest))
+    for _ in range(int(quarter) % 4):
+        c, s = -s, c
+    return c, s
+
+
+@dataclasses.dataclass(frozen=True)
+class Screen:
+    """The pixel grid through the observer's target.
+
+    Parameters
+    ----------
+    width, height : float
+        Extent of the grid [mm], > 0.
+    columns, rows : int
+        Number of pixels, ≥ 1. Row 0 is the top, column 0 the left.
+    plane : {"view", "xy"}
+        ``"view"``: perpendicular to the line of sight; its axes are +X (right) and +Y (up) turned by the shortest
+        rotation that takes +Z to the observer. ``"xy"``: fixed parallel to the source's XY plane (the ray collecting
+        surface of [Audenaert2014]_ 2.2.1); the apparent pixel area then carries its cosine.
+
+    Raises
+    ------
+    ArgumentError
+        If a size is not positive.
+
+    Examples
+    --------
+    >>> Screen(25, 25, 128, 128).pixel_area
+    0.03814697265625
+    """
+
+    width: float
+    height: float
+    columns: int
+    rows: int
+    plane: Plane = "view"
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ArgumentError(f"Screen: {name} is {value} mm; give a finite size > 0.")
+        for name in ("columns", "rows"):
+            value = getattr(self, name)
+            if int(value) != value or not 1 <= value <= 65536:
+                raise ArgumentError(f"Screen: {name} is {value}; give a whole number of pixels, 1 to 65536.")
+            object.__setattr__(self, name, int(value))
+        if self.plane not in PLANES:
+            raise UnknownNameError("screen plane", self.plane, PLANES)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        return self.rows, self.columns
+
+    @property
+    def pixel_area(self) -> float:
+        """Area of one pixel [mm²]."""
+        return (self.width / self.columns) * (self.height / self.rows)
+
+    @property
+    def x(self) -> Vector:
+        """Pixel centres along the right axis, from the target [mm], shape (columns,), rising."""
+        return (np.arange(self.columns) + 0.5) * (self.width / self.columns) - self.width / 2
+
+    @property
+    def y(self) -> Vector:
+        """Pixel centres along the up axis, from the target [mm], shape (rows,), falling: row 0 is the top."""
+        return self.height / 2 - (np.arange(self.rows) + 0.5) * (self.height / self.rows)
+
+    def axes(self, observer: Observer) -> tuple[Vector, Vector, Vector]:
+        """Unit vectors right, up and normal of the grid for this observer, each of shape (3,).
+
+        Raises
+        ------
+        ArgumentError
+            If ``plane="xy"`` and the observer stands in that plane (θ = 90°): every pixel's apparent area is zero.
+        """
+        if self.plane == "view":
+            right, up, normal = observer._rotation()  # noqa: SLF001 - the screen's axes are the observer's
+            return right, up, normal
+        if observer.direction[2] == 0.0:
+            raise ArgumentError(
+                "Screen: plane='xy' seen from theta = 90° has no apparent area; use plane='view' or another theta."
+            )
+        return np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+
+    def cosine(self, observer: Observer) -> npt.NDArray[np.float64]:
+        """Cosine between the grid's normal and the line from each pixel centre to the observer, shape (rows, columns).
+
+        This is |cos θ_p| of eq. 2.3 of [Audenaert2014]_; times the pixel area it is the apparent pixel area.
+        """
+        right, up, normal = self.axes(observer)
+        to_eye = observer.distance * observer.direction
+        a, b, h = (float(to_eye @ axis) for axis in (right, up, normal))
+        du = a - self.x[None, :]
+        dv = b - self.y[:, None]
+        return np.abs(h) / np.sqrt(du * du + dv * dv + h * h)
+
+
+def observer_from_dict(data: dict[str, Any]) -> Observer:
+    """Rebuild an observer from `dataclasses.asdict`."""
+    return Observer(**{**data, "target": tuple(data["target"])})

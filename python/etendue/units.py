@@ -1,0 +1,40 @@
+"""Units at the door: the only module that holds conversion factors.
+
+Inside: millimetre, steradian, lumen or watt, nanometre, radian. A factor that is not here is a defect.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+FluxUnit = Literal["lm", "W"]
+FLUX_UNITS: tuple[str, ...] = get_args(FluxUnit)
+
+MM2_PER_M2 = 1e6
+"""Square millimetres in a square metre: turns flux per (mm² sr) into cd/m² or W/(m² sr)."""
+
+NM_PER_UM = 1e3
+"""Nanometres in a micrometre (Zemax wavelengths)."""
+
+LUMINOUS_EFFICACY_MAX = 683.0
+"""K_m [lm/W]: maximum luminous efficacy of photopic vision, CIE 018:2019."""
+
+RADIANCE_WHITE_EFFICACY = 179.0
+"""WHTEFFICACY [lm/W] of Radiance's color.h: cd/m² = 179 · (W/(m² sr)) in Radiance pictures."""
+
+MM_PER_LENGTH_UNIT: dict[str, float] = {
+    "nm": 1e-6,
+    "um": 1e-3,
+    "mm": 1.0,
+    "cm": 10.0,
+    "m": 1000.0,
+    "inch": 25.4,
+    "feet": 304.8,
+}
+"""Millimetres in one of each length unit that a ray file may use."""
+
+LUMINANCE_UNIT: dict[FluxUnit, str] = {"lm": "cd/m²", "W": "W/(m² sr)"}
+"""Unit of a map that was made from flux in the given unit."""
+
+LUMINANCE_NAME: dict[FluxUnit, str] = {"lm": "luminance", "W": "radiance"}
+"""Name of the quantity whose unit is `LUMINANCE_UNIT`."""
