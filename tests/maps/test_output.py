@@ -33,10 +33,15 @@ def test_failure_leaves_the_old_file_and_no_litter(
     target = tmp_path / "map.csv"
     if existing:
         target.write_text("old")
-    with pytest.raises(failure), atomic_output(target) as temporary:
+    with pytest.raises(failure):
+        _write_and_fail(target, failure)
+    assert [path.read_text() for path in tmp_path.iterdir()] == (["old"] if existing else [])
+
+
+def _write_and_fail(target: Path, failure: type[BaseException]) -> None:
+    with atomic_output(target) as temporary:
         temporary.write_text("new")
         raise failure
-    assert [path.read_text() for path in tmp_path.iterdir()] == (["old"] if existing else [])
 
 
 def test_failure_of_the_replacement_itself_leaves_no_litter(tmp_path: Path) -> None:

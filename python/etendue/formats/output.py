@@ -14,7 +14,7 @@ from etendue.errors import ArgumentError
 
 @contextlib.contextmanager
 def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Write a file so that `path` holds either what it held before or the whole new content.
+    r"""Write a file so that `path` holds either what it held before or the whole new content.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
     >>> with TemporaryDirectory() as folder:
     ...     target = Path(folder) / "map.csv"
     ...     with atomic_output(target) as temporary:
-    ...         _ = temporary.write_text("row,column\\n")
+    ...         _ = temporary.write_text("row,column\n")
     ...     target.read_text(), len(list(target.parent.iterdir()))
-    ('row,column\\n', 1)
+    ('row,column\n', 1)
     """
     target = _destination(Path(path))
     temporary = _temporary_beside(target)
@@ -49,7 +49,7 @@ def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield temporary
         _flush(temporary)
         _keep_permissions(target, temporary)
-        os.replace(temporary, target)
+        temporary.replace(target)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
@@ -84,9 +84,9 @@ def _temporary_beside(target: Path) -> Path:
 
 
 def _keep_permissions(target: Path, temporary: Path) -> None:
-    """A file that is replaced keeps the permissions it had."""
+    """Give a file that is replaced the permissions it had."""
     with contextlib.suppress(FileNotFoundError):
-        os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
+        temporary.chmod(stat.S_IMODE(target.stat().st_mode))
 
 
 def _flush(path: Path) -> None:

@@ -1,0 +1,245 @@
+"""Filters of thesis 2.2.3 against loops written straight from eqs 2.5 and 2.6."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy import ndimage, stats
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.luminance.filters import FILTERS, filter_map, kernel
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.provenance import Provenance
+
+Array = npt.NDArray[np.float64]
+FIG_2_3_RIGHT = [[1, 2, 4, 2, 1], [2, 4, 8, 4, 2], [4, 8, 16, 8, 4], [2, 4, 8, 4, 2], [1, 2, 4, 2, 1]]
+SIZES = [1, 3, 5, 7, (3, 5), (7, 1), (1, 3), (21, 31)]
+
+
+def make_map(values: Any, error: Any = None, rays: Any = None, **fields: Any) -> LuminanceMap:
+    values = np.asarray(values, dtype=float)
+    error = 0.1 * values if error is None else error
+    rays = np.where(np.isnan(values), 0, 10) if rays is None else rays
+    height, width = values.shape
+    screen = Screen(2.0 * width, 3.0 * height, width, height)
+    return LuminanceMap(values, error, rays, Observer(20, 30, 500), screen, provenance=Provenance(), **fields)
+
+
+def random_map(shape: tuple[int, int], seed: int, dead: float = 0.15) -> LuminanceMap:
+    """Steps and noise without any symmetry, with dead pixels and rays that differ everywhere."""
+    rng = np.random.default_rng(seed)
+    base = np.where(np.add.outer(np.arange(shape[0]), 2 * np.arange(shape[1])) % 7 < 3, 100.0, 300.0)
+    values = base * rng.gamma(20.0, 1 / 20.0, shape)
+    values[rng.random(shape) < dead] = np.nan
+    error = values * rng.uniform(0.05, 0.2, shape)
+    return make_map(values, error, np.where(np.isnan(values), 0, rng.integers(1, 1000, shape)))
+
+
+def weight(name: str, s: int, t: int) -> float:
+    return 2.0 ** (-abs(s) - abs(t)) if "weighted" in name else 1.0
+
+
+def by_hand(lmap: LuminanceMap, name: str, size: Any, gamma: float) -> tuple[Array, Array, npt.NDArray[np.int64]]:
+    """Eqs 2.5 and 2.6, pixel by pixel and neighbour by neighbour."""
+    rows, columns = lmap.values.shape
+    high, wide = (size, size) if isinstance(size, int) else size
+    values, error, rays = (np.full(lmap.values.shape, np.nan) for _ in range(3))
+    for x in range(rows):
+        for y in range(columns):
+            f = 0.0 if math.isnan(lmap.values[x, y]) else lmap.values[x, y]
+            used = []
+            for s in range(-(high // 2), high // 2 + 1):
+                for t in range(-(wide // 2), wide // 2 + 1):
+                    if not (0 <= x + s < rows and 0 <= y + t < columns):
+                        continue
+                    dead = math.isnan(lmap.values[x + s, y + t])
+                    neighbour = 0.0 if dead else lmap.values[x + s, y + t]
+                    if "selective" in name and not abs(neighbour - f) < gamma * f:
+                        continue
+                    sigma = 0.0 if dead else lmap.standard_error[x + s, y + t]
+                    used.append((weight(name, s, t), neighbour, sigma, lmap.rays[x + s, y + t]))
+            rays[x, y] = sum(u[3] for u in used)
+            if rays[x, y] > 0:
+                total = math.fsum(u[0] for u in used)
+                values[x, y] = math.fsum(u[0] * u[1] for u in used) / total
+                error[x, y] = math.sqrt(math.fsum((u[0] * u[2]) ** 2 for u in used)) / total
+    return values, error, rays.astype(np.int64)
+
+
+def test_the_registry_holds_the_four_filters_of_the_thesis() -> None:
+    assert set(FILTERS) == {"average", "weighted", "selective", "selective-weighted"}
+    assert all(name == kind.name for name, kind in FILTERS.items())
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", FILTERS)
+def test_equals_the_loops(name: str, size: Any) -> None:
+    lmap = random_map((9, 14), seed=3)
+    values, error, rays = by_hand(lmap, name, size, 0.35)
+    filtered = filter_map(lmap, name, size, gamma=0.35)
+    np.testing.assert_allclose(filtered.values, values, rtol=1e-13)
+    np.testing.assert_allclose(filtered.standard_error, error, rtol=1e-13)
+    np.testing.assert_array_equal(filtered.rays, rays)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_equals_the_loops_across_bands(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bands that the selective filters work in leave no seam."""
+    monkeypatch.setattr("etendue.luminance.filters.PIXELS_AT_ONCE", 20)
+    lmap = random_map((23, 9), seed=4)
+    values, error, rays = by_hand(lmap, name, 7, 0.5)
+    filtered = filter_map(lmap, name, 7, gamma=0.5)
+    np.testing.assert_allclose(filtered.values, values, rtol=1e-13)
+    np.testing.assert_allclose(filtered.standard_error, error, rtol=1e-13)
+    np.testing.assert_array_equal(filtered.rays, rays)
+
+
+@pytest.mark.parametrize("name", ["average", "weighted"])
+def test_interior_equals_scipy(name: str) -> None:
+    """Away from the border and without dead pixels a linear filter is a plain correlation."""
+    lmap = random_map((40, 31), seed=5, dead=0.0)
+    weights = np.array(FIG_2_3_RIGHT) / 100.0 if name == "weighted" else np.full((5, 5), 1 / 25)
+    expected = ndimage.correlate(lmap.values, weights)[2:-2, 2:-2]
+    np.testing.assert_allclose(filter_map(lmap, name).values[2:-2, 2:-2], expected, rtol=1e-13)
+
+
+def test_kernels_are_the_printed_ones() -> None:
+    """Fig. 2.3."""
+    np.testing.assert_array_equal(kernel("average", 3), np.full((3, 3), 1 / 9))
+    np.testing.assert_array_equal(kernel("weighted", 5), np.array(FIG_2_3_RIGHT) / 100.0)
+    np.testing.assert_array_equal(kernel("selective-weighted", 5), kernel("weighted", 5))
+
+
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("size", [*SIZES, (2001, 2001)])
+def test_a_constant_map_stays_constant(name: str, size: Any) -> None:
+    filtered = filter_map(make_map(np.full((6, 4), 7.5)), name, size)
+    np.testing.assert_allclose(filtered.values, 7.5, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["selective", "selective-weighted"])
+def test_the_selection_is_strict(name: str) -> None:
+    """Eq. 2.6: a neighbour that differs by exactly γ f is left out. All the numbers here are exact in binary."""
+    filtered = filter_map(make_map([[64.0, 80.0]]), name, 3, gamma=0.25)
+    assert filtered.values[0, 0] == 64.0
+    assert 64.0 < filtered.values[0, 1] < 80.0
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_dead_pixels(name: str) -> None:
+    """A dead pixel counts as 0; it revives in a linear filter only, and only if a ray came near it."""
+    nan = np.nan
+    lmap = make_map([[10.0, nan, nan, nan, nan]])
+    filtered = filter_map(lmap, name, (1, 3))
+    if name == "average":
+        np.testing.assert_array_equal(filtered.values, [[5.0, 10.0 / 3, nan, nan, nan]])
+    elif name == "weighted":
+        np.testing.assert_array_equal(filtered.values, [[10.0 / 1.5, 2.5, nan, nan, nan]])
+    else:
+        np.testing.assert_array_equal(filtered.values, lmap.values)
+    np.testing.assert_array_equal(np.isnan(filtered.standard_error), np.isnan(filtered.values))
+    assert (filtered.rays[np.isnan(filtered.values)] == 0).all()
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_a_map_without_any_ray_stays_dead(name: str) -> None:
+    filtered = filter_map(make_map(np.full((3, 4), np.nan)), name)
+    assert filtered.dead_pixels == 12
+    assert filtered.notes[0].endswith("intensity 0 → 0 cd; dead pixels 12 → 12")
+
+
+@pytest.mark.parametrize("name", ["selective", "selective-weighted"])
+@pytest.mark.parametrize("gamma", [0.2, 3.0])
+def test_a_dark_pixel_keeps_its_value(name: str, gamma: float) -> None:
+    """Eq. 2.6 selects nothing around a pixel of 0 cd/m², not even itself."""
+    filtered = filter_map(make_map([[0.0, 5.0, 0.0]]), name, 3, gamma=gamma)
+    assert filtered.values[0, 0] == 0.0
+    assert filtered.rays[0, 0] == 10
+
+
+def test_unknown_errors_and_counts_spread_to_those_who_use_them() -> None:
+    values = np.array([[100.0, 100.0, 100.0, 900.0, 900.0]])
+    error = np.array([[np.nan, 1.0, 1.0, 1.0, np.nan]])
+    rays = np.array([[-1, 5, 6, 7, -1]])
+    linear = filter_map(make_map(values, error, rays), "average", (1, 3))
+    np.testing.assert_array_equal(np.isnan(linear.standard_error), [[True, True, False, True, True]])
+    np.testing.assert_array_equal(linear.rays, [[-1, -1, 18, -1, -1]])
+    selective = filter_map(make_map(values, error, rays), "selective", (1, 3))
+    np.testing.assert_array_equal(np.isnan(selective.standard_error), [[True, True, False, True, True]])
+    np.testing.assert_array_equal(selective.rays, [[-1, -1, 11, -1, -1]])
+    assert selective.standard_error[0, 2] == pytest.approx(math.sqrt(2) / 2, rel=1e-14)
+
+
+@pytest.mark.parametrize("name", ["average", "weighted"])
+def test_propagated_errors_are_right(name: str) -> None:
+    """4000 noisy maps: variance of g over variance claimed, each pixel χ²(3999), Bonferroni over pixels at 1e-6."""
+    rng = np.random.default_rng(11)
+    truth = rng.uniform(50.0, 400.0, (6, 5))
+    sigma = truth * rng.uniform(0.02, 0.1, truth.shape)
+    claimed = filter_map(make_map(truth, sigma), name, (3, 5)).standard_error
+    n = 4000
+    seen = np.array(
+        [filter_map(make_map(truth + sigma * z, sigma), name, (3, 5)).values for z in rng.normal(size=(n, 6, 5))]
+    )
+    statistic = (n - 1) * seen.var(axis=0, ddof=1) / claimed**2
+    tail = 0.5e-6 / truth.size
+    low, high = stats.chi2.ppf([tail, 1 - tail], n - 1)
+    assert high / (n - 1) < 1.13
+    assert ((statistic > low) & (statistic < high)).all()
+
+
+def test_selective_errors_are_optimistic_on_pure_noise_as_the_note_says() -> None:
+    """18 % noise against γ = 0.2: the scatter of g exceeds the claimed error (zone 3 of the thesis' example)."""
+    rng = np.random.default_rng(12)
+    ratios = []
+    for _ in range(30):
+        noisy = make_map(100.0 * (1 + 0.18 * rng.normal(size=(40, 40))), np.full((40, 40), 18.0))
+        filtered = filter_map(noisy, "selective")
+        ratios.append(np.sqrt(np.mean(((filtered.values - 100.0) / filtered.standard_error) ** 2)))
+    assert np.mean(ratios) > 1.5
+    assert "optimistic" in filtered.notes[1]
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_flux_before_and_after_is_told(name: str) -> None:
+    lmap = make_map([[100.0, 119.0, 90.0]], notes=("first",))
+    filtered = filter_map(lmap, name, 3)
+    label = f"{name} 3×3" + (", γ = 0.2" if "selective" in name else "")
+    change = f"{100 * (filtered.intensity / lmap.intensity - 1):+.2f} %".replace("-", "−")
+    assert filtered.notes[0] == "first"
+    assert filtered.notes[1] == f"{label}: intensity {lmap.intensity:.5g} → {filtered.intensity:.5g} cd ({change})"
+    assert filtered.provenance.steps == (*lmap.provenance.steps, f"filter {label}")
+
+
+def test_radiance_maps_say_watts() -> None:
+    assert "W/sr" in filter_map(make_map([[1.0, 2.0]], flux_unit="W"), "average").notes[0]
+
+
+def test_the_map_itself_is_not_changed() -> None:
+    lmap = random_map((5, 6), seed=6)
+    before = lmap.values.copy()
+    filter_map(lmap, "selective")
+    np.testing.assert_array_equal(lmap.values, before)
+
+
+@pytest.mark.parametrize("size", [0, -3, 2, 4.0, "5", (3,), (3, 4), (3, 3, 3), None])
+def test_sizes_that_are_not_odd_numbers_are_refused(size: Any) -> None:
+    with pytest.raises(ArgumentError, match="odd number"):
+        filter_map(make_map([[1.0]]), "average", size)
+
+
+@pytest.mark.parametrize("gamma", [0.0, -0.1, math.nan, math.inf])
+def test_gamma_outside_its_domain_is_refused(gamma: float) -> None:
+    with pytest.raises(ArgumentError, match="gamma"):
+        filter_map(make_map([[1.0]]), "selective", gamma=gamma)
+
+
+@pytest.mark.parametrize("function", [lambda name: filter_map(make_map([[1.0]]), name), kernel])
+def test_unknown_names_get_a_suggestion(function: Any) -> None:
+    with pytest.raises(UnknownNameError, match="Did you mean 'selective-weighted'"):
+        function("selective-weigthed")
