@@ -64,15 +64,16 @@ class Observer:
     @property
     def direction(self) -> Vector:
         """Unit vector from the target to the observer, shape (3,)."""
-        return self._rotation()[2]
+        _, _, toward = self._rotation()
+        return toward
 
     @property
     def position(self) -> Vector:
         """Where the observer stands [mm], shape (3,)."""
         return np.asarray(self.target) + self.distance * self.direction
 
-    def _rotation(self) -> npt.NDArray[np.float64]:
-        """Images of +X, +Y, +Z under the shortest rotation that takes +Z to the observer, as rows (3, 3).
+    def _rotation(self) -> tuple[Vector, Vector, Vector]:
+        """Images of +X, +Y, +Z under the shortest rotation that takes +Z to the observer.
 
         R = Rz(φ) Ry(θ) Rz(-φ): a turn by θ about the axis (-sin φ, cos φ, 0). At θ = 180° the shortest rotation is not
         unique; this form stays continuous and lets φ choose the axis.
@@ -83,7 +84,7 @@ class Observer:
         right = (ct * c * c + s * s, (ct - 1.0) * c * s, -st * c)
         up = ((ct - 1.0) * c * s, ct * s * s + c * c, -st * s)
         toward = (st * c, st * s, ct)
-        return np.array([right, up, toward])
+        return np.array(right), np.array(up), np.array(toward)
 
 
 def _cos_sin_degrees(angle: float) -> tuple[float, float]:
@@ -152,12 +153,12 @@ class Screen:
     @property
     def x(self) -> Vector:
         """Pixel centres along the right axis, from the target [mm], shape (columns,), rising."""
-        return (np.arange(self.columns) + 0.5) * (self.width / self.columns) - self.width / 2
+        return (np.arange(self.columns, dtype=np.float64) + 0.5) * (self.width / self.columns) - self.width / 2
 
     @property
     def y(self) -> Vector:
         """Pixel centres along the up axis, from the target [mm], shape (rows,), falling: row 0 is the top."""
-        return self.height / 2 - (np.arange(self.rows) + 0.5) * (self.height / self.rows)
+        return self.height / 2 - (np.arange(self.rows, dtype=np.float64) + 0.5) * (self.height / self.rows)
 
     def axes(self, observer: Observer) -> tuple[Vector, Vector, Vector]:
         """Unit vectors right, up and normal of the grid for this observer, each of shape (3,).
@@ -168,8 +169,7 @@ class Screen:
             If ``plane="xy"`` and the observer stands in that plane (θ = 90°): every pixel's apparent area is zero.
         """
         if self.plane == "view":
-            right, up, normal = observer._rotation()  # noqa: SLF001 - the screen's axes are the observer's
-            return right, up, normal
+            return observer._rotation()  # noqa: SLF001 - the screen's axes are the observer's
         if observer.direction[2] == 0.0:
             raise ArgumentError(
                 "Screen: plane='xy' seen from theta = 90° has no apparent area; use plane='view' or another theta."
@@ -186,7 +186,8 @@ class Screen:
         a, b, h = (float(to_eye @ axis) for axis in (right, up, normal))
         du = a - self.x[None, :]
         dv = b - self.y[:, None]
-        return np.abs(h) / np.sqrt(du * du + dv * dv + h * h)
+        cosine: Vector = np.abs(h) / np.sqrt(du * du + dv * dv + h * h)
+        return cosine
 
 
 def observer_from_dict(data: dict[str, Any]) -> Observer:

@@ -1,0 +1,15 @@
+"""What a luminaire looks like before it exists: luminance maps from ray files, with an error bar in every pixel.
+
+>>> import etendue as et
+>>> source = et.RingSource(rays=200_000)
+>>> round(source.total_flux)
+600
+"""
+
+from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.spectrum import Spectrum
+from etendue.sources.ring_source import RingSource
+
+__all__ = ["LuminanceMap", "Observer", "RaySet", "RingSource", "Screen", "Spectrum"]

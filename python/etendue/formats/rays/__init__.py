@@ -1,0 +1,142 @@
+"""Ray files: found by content, read without copying, written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.formats.output import atomic_output
+from etendue.formats.rays import (
+    ascii_table,
+    asap,
+    lighttools,
+    lighttools_text,
+    refused,
+    speos,
+    speos_text,
+    tm25,
+    tracepro,
+    zemax,
+    zemax_text,
+)
+from etendue.formats.rays.ray_format import Head, RayFormat
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import RayStream
+from etendue.units import FluxUnit
+
+RAY_FORMATS: tuple[RayFormat, ...] = (
+    tm25.FORMAT,
+    lighttools.FORMAT,
+    zemax.FORMAT,
+    speos.FORMAT,
+    asap.FORMAT,
+    lighttools_text.FORMAT,
+    tracepro.FORMAT,
+    zemax_text.FORMAT,
+    speos_text.FORMAT,
+    ascii_table.FORMAT,
+)
+"""Every format, in the order in which a file is tested: magic numbers first, bare columns of numbers last."""
+
+
+def detect_format(path: str | os.PathLike[str]) -> RayFormat:
+    """The format of a ray file, from its content.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If the file is of a format that étendue refuses by name.
+    FormatError
+        If it is of no known format.
+    """
+    head = Head.of(Path(path))
+    for candidate in RAY_FORMATS:
+        if candidate.recognise(head):
+            return candidate
+    refused.refuse(head)
+    known = ", ".join(f.title for f in RAY_FORMATS)
+    raise FormatError(
+        path, "byte 0", f"{head.data[:16]!r} begins no ray file that étendue knows", f"Known formats: {known}."
+    )
+
+
+def read_rays(
+    path: str | os.PathLike[str], *, flux: float | None = None, flux_unit: FluxUnit | None = None
+) -> RaySet:
+    """Read a ray file. Its format is found from the content, never from the extension.
+
+    Binary files are mapped, not read: opening 28 GB takes no memory. Files whose per-ray values are relative (TM-25,
+    LightTools, Speos) are scaled to the header's total flux.
+
+    Parameters
+    ----------
+    path : path
+    flux : float, optional
+        Total flux that overrides the file's [`flux_unit`].
+    flux_unit : {"lm", "W"}, optional
+        Unit of `flux`; the file's own if None.
+
+    Returns
+    -------
+    RaySet
+        Its `complaints` tell everything that is wrong with the file.
+
+    Raises
+    ------
+    FormatError
+        With file, place, what was found and what to do.
+    OSError
+        If the file cannot be opened.
+    """
+    path = Path(path)
+    rays = detect_format(path).read(path)
+    if flux is None and flux_unit is not None:
+        raise ArgumentError("read_rays: flux_unit is the unit of `flux`, which is missing; RaySet.in_unit converts.")
+    return rays if flux is None else rays.with_total_flux(flux, flux_unit)
+
+
+def write_rays(path: str | os.PathLike[str], rays: RayStream, format: str | None = None) -> tuple[str, ...]:  # noqa: A002
+    """Write a ray file: completely, or not at all.
+
+    Parameters
+    ----------
+    path : path
+    rays : RayStream
+        A ray set, or a source that draws its rays on demand.
+    format : str, optional
+        ``tm25 | zemax | zemax-text | lighttools | lighttools-text | speos | speos-text | asap | tracepro | csv``;
+        from the extension if None.
+
+    Returns
+    -------
+    tuple of str
+        What the format could not express, one sentence each.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such format, or the extension belongs to none or to several.
+    """
+    path = Path(path)
+    chosen = _format_named(format) if format is not None else _format_for(path)
+    if len(rays) == 0:
+        raise ArgumentError(f"{path}: there are no rays to write.")
+    with atomic_output(path) as temporary:
+        return chosen.write(rays, temporary)
+
+
+def _format_named(name: str) -> RayFormat:
+    for candidate in RAY_FORMATS:
+        if candidate.name == name:
+            return candidate
+    raise UnknownNameError("ray format", name, [f.name for f in RAY_FORMATS])
+
+
+def _format_for(path: Path) -> RayFormat:
+    fitting = [f for f in RAY_FORMATS if path.suffix.lower() in f.extensions]
+    if len(fitting) == 1:
+        return fitting[0]
+    names = [f.name for f in fitting or RAY_FORMATS]
+    reason = "belongs to several formats" if fitting else "belongs to no ray format"
+    raise ArgumentError(f"{path}: the extension {path.suffix!r} {reason}; name one: {', '.join(names)}.")

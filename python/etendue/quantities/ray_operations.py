@@ -1,0 +1,490 @@
+"""What can be done to a ray set. Every operation streams, and returns a new set."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError, UnitError, UnknownNameError
+from etendue.quantities.report import Complaint
+from etendue.quantities.spectrum import photopic_efficiency
+from etendue.quantities.spool import spool
+from etendue.units import FLUX_UNITS, LUMINOUS_EFFICACY_MAX, FluxUnit
+
+if TYPE_CHECKING:
+    from etendue.quantities.ray_set import RaySet
+
+Records = npt.NDArray[Any]
+FloatArray = npt.NDArray[np.float64]
+
+CHUNK = 1 << 18
+"""Records per stretch of a streamed operation."""
+
+SINGULAR = 1e-6
+"""Smallest eigenvalue, as a fraction of the largest, below which a virtual focus is not determined."""
+
+
+@dataclasses.dataclass(frozen=True)
+class VirtualFocus:
+    """The point that the rays, prolonged backwards, come closest to.
+
+    Parameters
+    ----------
+    point : tuple of 3 floats
+        [mm]
+    determined : bool
+        False if the rays are collimated, so that no point is preferred along them; `point` is then the flux-weighted
+        centroid of the start points.
+    """
+
+    point: tuple[float, float, float]
+    determined: bool
+
+
+class RayOperations:
+    """The operations of `etendue.RaySet`."""
+
+    def subset(self: RaySet, n: int, seed: int) -> RaySet:  # type: ignore[misc]
+        """`n` rays drawn at random without replacement, in file order, rescaled to the total flux of the whole set.
+
+        Never the first n: vendors' files may be sorted. Every n-subset is equally likely (Knuth, TAOCP 2, 3.4.2,
+        algorithm S); choice i is a function of (seed, i).
+
+        Raises
+        ------
+        ArgumentError
+            If `n` is below 1 or above the number of rays.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> rays = et.RingSource(rays=1000).ray_set()
+        >>> part = rays.subset(10, seed=1)
+        >>> len(part), round(part.total_flux, 9)
+        (10, 600.0)
+        """
+        total = len(self)
+        if not 1 <= n <= total:
+            raise ArgumentError(f"subset: {n} rays of {total:,}; ask for 1 to {total:,}.")
+
+        def parts() -> Iterator[Records]:
+            taken = 0
+            for start in range(0, total, CHUNK):
+                stop = min(start + CHUNK, total)
+                chosen = _core.select_subset(start, stop, total, n, taken, seed)
+                taken += len(chosen)
+                yield self.records[start:stop][(chosen - np.uint64(start)).astype(np.intp)]
+
+        return self._with_records(
+            spool(parts(), self.records.dtype),
+            f"random subset of {n} of {total} rays, seed {seed}",
+            declared_flux=self.total_flux,
+        )
+
+    def thin(self: RaySet, parts: int, seed: int) -> tuple[RaySet, ...]:  # type: ignore[misc]
+        """Deal the rays at random into independent parts, each scaled by `parts` to stand for the whole.
+
+        If the set is a sample of a Poisson process, the parts are independent samples of the same luminance, each with
+        1/`parts` of the rays (thinning, [Neufeld2024]_). The factor is `parts`, not what would restore the total: a
+        part's total varies as a Poisson count does, and that variation is its error.
+
+        Raises
+        ------
+        ArgumentError
+            If `parts` is below 2.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> a, b = et.RingSource(rays=1000).ray_set().thin(2, seed=1)
+        >>> len(a) + len(b)
+        1000
+        """
+        if parts < 2:
+            raise ArgumentError(f"thin: {parts} parts; ask for 2 or more.")
+        scale = self.flux_scale * parts
+
+        def part(index: int) -> Iterator[Records]:
+            for start in range(0, len(self), CHUNK):
+                stop = min(start + CHUNK, len(self))
+                yield self.records[start:stop][_core.deal_parts(start, stop, parts, seed) == index]
+
+        return tuple(
+            self._with_records(
+                spool(part(index), self.records.dtype),
+                f"part {index + 1} of {parts} by thinning, seed {seed}",
+                declared_flux=None,
+                stored_flux_scale=scale,
+            )
+            for index in range(parts)
+        )
+
+    def with_total_flux(self: RaySet, flux: float, unit: FluxUnit | None = None) -> RaySet:  # type: ignore[misc]
+        """The same rays sharing a total flux, in proportion to what they carry now.
+
+        Parameters
+        ----------
+        flux : float
+            New total [`unit`], > 0.
+        unit : {"lm", "W"}, optional
+            The set's own if None. Another unit states that the flux distribution over the rays is the same in both,
+            which is true if all rays have the same spectrum.
+
+        Raises
+        ------
+        ArgumentError
+            If `flux` is not finite or not above 0.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> rays = et.RaySet([[0, 0, 0], [1, 0, 0]], [[0, 0, 1], [0, 0, 1]], [1.0, 3.0])
+        >>> rays.with_total_flux(337).flux.tolist()
+        [84.25, 252.75]
+        """
+        if not (math.isfinite(flux) and flux > 0):
+            raise ArgumentError(f"total flux {flux}; give a finite flux > 0.")
+        unit = unit or self.flux_unit
+        if unit not in FLUX_UNITS:
+            raise UnknownNameError("flux unit", unit, FLUX_UNITS)
+        # The header's total has been overruled by its user: it must not be complained about any more.
+        header = {("overruled_total_flux" if k == "total_flux" else k): v for k, v in self.header.items()}
+        step = f"total flux set to {flux:.9g} {unit}"
+        return self.replace(
+            declared_flux=float(flux), flux_unit=unit, header=header, provenance=self.provenance.then(step)
+        )
+
+    def scaled(self: RaySet, factor: float) -> RaySet:  # type: ignore[misc]
+        """Positions multiplied by `factor` (> 0); directions and flux stay, so luminance falls by its square."""
+        if not (math.isfinite(factor) and factor > 0):
+            raise ArgumentError(f"scale factor {factor}; give a finite factor > 0.")
+        meaning = self.meaning
+        return self.replace(
+            length_scale=meaning.length_scale * factor, provenance=self.provenance.then(f"scaled by {factor:.9g}")
+        )
+
+    def moved(self: RaySet, offset: Sequence[float]) -> RaySet:  # type: ignore[misc]
+        """Positions shifted by `offset`, three components [mm].
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> et.RaySet([[1, 2, 3]], [[0, 0, 1]], [1.0]).moved((0, 0, -3)).position.tolist()
+        [[1.0, 2.0, 0.0]]
+        """
+        shift = _vector(offset, "offset")
+        return self._transformed(lambda x, k: (x + shift, k), f"moved by {shift.tolist()} mm")
+
+    def rotated(self: RaySet, axis: Sequence[float], angle: float) -> RaySet:  # type: ignore[misc]
+        """Turned about an axis through the origin by `angle` [°], right-handed.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> et.RaySet([[1, 0, 0]], [[1, 0, 0]], [1.0]).rotated((0, 0, 1), 90).position.round(12).tolist()
+        [[0.0, 1.0, 0.0]]
+        """
+        a = _vector(axis, "axis")
+        norm = float(np.linalg.norm(a))
+        if norm == 0:
+            raise ArgumentError("rotated: the axis has no length.")
+        if not math.isfinite(angle):
+            raise ArgumentError(f"rotated: angle is {angle}°.")
+        a = a / norm
+        c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+        # Rodrigues' rotation formula.
+        rotation = c * np.eye(3) + s * cross + (1 - c) * np.outer(a, a)
+        return self._transformed(
+            lambda x, k: (x @ rotation.T, k @ rotation.T), f"rotated by {angle:.9g}° about {a.tolist()}"
+        )
+
+    def propagated_to_plane(  # type: ignore[misc]
+        self: RaySet, point: Sequence[float], normal: Sequence[float] = (0.0, 0.0, 1.0)
+    ) -> RaySet:
+        """Start points moved along the rays, forwards or backwards, onto the plane through `point` [mm].
+
+        Rays parallel to the plane never meet it: they are left out, and the number and flux are complained about.
+        """
+        p, n = _vector(point, "point"), _vector(normal, "normal")
+        if not n.any():
+            raise ArgumentError("propagated_to_plane: the normal has no length.")
+
+        def move(x: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatArray]:
+            slope = k @ n
+            parallel = np.abs(slope) < 1e-12 * np.linalg.norm(n)
+            t = ((p - x) @ n) / np.where(parallel, np.nan, slope)
+            return x + t[:, None] * k, k
+
+        return self._transformed(move, f"propagated to the plane through {p.tolist()} mm with normal {n.tolist()}")
+
+    def propagated_to_sphere(self: RaySet, centre: Sequence[float], radius: float) -> RaySet:  # type: ignore[misc]
+        """Start points moved along the rays, forwards or backwards, to where they leave a sphere [mm].
+
+        Rays whose line misses the sphere are left out, and the number and flux are complained about.
+        """
+        c = _vector(centre, "centre")
+        if not (math.isfinite(radius) and radius > 0):
+            raise ArgumentError(f"propagated_to_sphere: radius is {radius} mm; give a finite radius > 0.")
+
+        def move(x: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatArray]:
+            along = np.einsum("ij,ij->i", c - x, k)
+            foot = x + along[:, None] * k
+            # Measured at the foot of the perpendicular: no cancellation for start points far away.
+            half_chord2 = radius**2 - np.einsum("ij,ij->i", foot - c, foot - c)
+            half_chord = np.sqrt(np.where(half_chord2 >= 0, half_chord2, np.nan))
+            return foot + half_chord[:, None] * k, k
+
+        return self._transformed(move, f"propagated to the sphere about {c.tolist()} mm of radius {radius:.9g} mm")
+
+    @property
+    def virtual_focus(self: RaySet) -> VirtualFocus:  # type: ignore[misc]
+        """The point F with the least Σ w |distance of F to the ray's line|² ([Muschaweck2019]_).
+
+        The normal equations A F = b with A = Σ w (1 - k kᵀ), b = Σ w (1 - k kᵀ) x; vendors print F in their data sheets.
+        """
+        flux, moments = self.tally.flux, self.moments()
+        if flux <= 0 or not self.has_position:
+            return VirtualFocus((0.0, 0.0, 0.0), determined=False)
+        xx, xy, xz, yy, yz, zz = moments.weighted_outer
+        a = flux * np.eye(3) - np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        values = np.linalg.eigvalsh(a)
+        if values[0] <= SINGULAR * values[-1]:
+            x, y, z = moments.weighted_position / flux
+            return VirtualFocus((float(x), float(y), float(z)), determined=False)
+        x, y, z = np.linalg.solve(a, moments.focus_rhs)
+        return VirtualFocus((float(x), float(y), float(z)), determined=True)
+
+    def in_unit(self: RaySet, unit: FluxUnit) -> RaySet:  # type: ignore[misc]
+        """The set with its flux in lumens or watts, through its spectrum: Φ_v = K_m ∫ Φ_e,λ V(λ) dλ.
+
+        Raises
+        ------
+        UnitError
+            If the set does not know the spectrum of its rays; the message says what would help.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> rays = et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0], flux_unit="W", wavelength=[555.0])
+        >>> round(rays.in_unit("lm").total_flux, 6)
+        683.0
+        """
+        if unit not in FLUX_UNITS:
+            raise UnknownNameError("flux unit", unit, FLUX_UNITS)
+        if unit == self.flux_unit:
+            return self
+        # A radiant-flux column beside a luminous one is the better truth: it is used before any spectrum.
+        if unit == "W" and "radiant_flux" in self.columns:
+            return self._with_flux(lambda rows: self.column("radiant_flux", rows), unit, "the file's radiant flux column")
+        efficacy = self._efficacy()
+        scale = self.flux_scale
+        if unit == "lm":
+            return self._with_flux(
+                lambda rows: self.records["flux"][rows].astype(np.float64) * scale * efficacy(rows), unit, "its spectrum"
+            )
+        dark = any(not (efficacy(rows) > 0).all() for rows in self._stretches())
+        if dark:
+            raise UnitError(
+                f"{self.provenance.source}: lumens cannot become watts: some rays have a wavelength at which V(λ) is 0, "
+                "so their radiant flux is not determined. State it: with_total_flux(value, 'W')."
+            )
+        return self._with_flux(
+            lambda rows: self.records["flux"][rows].astype(np.float64) * scale / efficacy(rows), unit, "its spectrum"
+        )
+
+    def _efficacy(self: RaySet) -> Callable[[slice], FloatArray]:  # type: ignore[misc]
+        """Luminous efficacy of radiation [lm/W] of a stretch of rays."""
+        if "wavelength" in self.columns:
+            return lambda rows: LUMINOUS_EFFICACY_MAX * photopic_efficiency(self.column("wavelength", rows))
+        single = self.meaning.single_wavelength
+        if single is not None:
+            constant = LUMINOUS_EFFICACY_MAX * float(photopic_efficiency([single])[0])
+            return lambda rows: np.full(len(self.records[rows]), constant)
+        if "spectrum_index" in self.columns and self.spectra:
+            table = np.array([spectrum.luminous_efficacy for spectrum in self.spectra])
+
+            def indexed(rows: slice) -> FloatArray:
+                index = self.column("spectrum_index", rows)
+                if ((index < 1) | (index > len(table))).any():
+                    raise UnitError(
+                        f"{self.provenance.source}: a ray points to a spectrum outside 1..{len(table)}; "
+                        "its lumens are not determined."
+                    )
+                chosen: FloatArray = table[index - 1]
+                return chosen
+
+            return indexed
+        if len(self.spectra) == 1:
+            k = self.spectra[0].luminous_efficacy
+            return lambda rows: np.full(len(self.records[rows]), k)
+        other = "lumens" if self.flux_unit == "W" else "watts"
+        raise UnitError(
+            f"{self.provenance.source}: {self.flux_unit} cannot become {other}: the rays carry no wavelength and the file "
+            "no spectrum. Ask for a set with wavelengths, give the spectrum (RaySet.with_spectrum), or state the total "
+            f"(with_total_flux(value, {'lm' if self.flux_unit == 'W' else 'W'!r})) if all rays share one spectrum."
+        )
+
+    def with_spectrum(self: RaySet, *spectra: Any) -> RaySet:  # type: ignore[misc]
+        """The same rays with one known spectrum for all (`etendue.Spectrum`)."""
+        step = "spectrum given by the user"
+        return self.replace(spectra=tuple(spectra), provenance=self.provenance.then(step))
+
+    # --- how the above is done -------------------------------------------------------------------------------------------
+
+    def _stretches(self: RaySet) -> Iterator[slice]:  # type: ignore[misc]
+        return (slice(start, min(start + CHUNK, len(self))) for start in range(0, len(self), CHUNK))
+
+    def _with_records(self: RaySet, records: Records, step: str, **changes: Any) -> RaySet:  # type: ignore[misc]
+        meaning = dataclasses.replace(self.meaning, provenance=self.provenance.then(step), **changes)
+        header = {k: v for k, v in meaning.header.items() if k != "total_flux"}
+        return type(self).from_records(records, dataclasses.replace(meaning, header=header))
+
+    def _with_flux(self: RaySet, flux: Callable[[slice], FloatArray], unit: FluxUnit, how: str) -> RaySet:  # type: ignore[misc]
+        dtype = _double(self.records.dtype)
+
+        def parts() -> Iterator[Records]:
+            for rows in self._stretches():
+                part = self.records[rows].astype(dtype)
+                part["flux"] = flux(rows)
+                yield part
+
+        return self._with_records(
+            spool(parts(), dtype),
+            f"{self.flux_unit} to {unit} through {how}",
+            flux_unit=unit,
+            declared_flux=None,
+            stored_flux_scale=1.0,
+        )
+
+    def _transformed(  # type: ignore[misc]
+        self: RaySet, move: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]], step: str
+    ) -> RaySet:
+        """Rays with new positions and directions; a NaN position leaves a ray out."""
+        if not self.has_position:
+            raise ArgumentError(f"{self.provenance.source}: far-field rays have no position and cannot be moved.")
+        dtype = _double(self.records.dtype)
+        scale = self.flux_scale
+        lost_rays, lost_flux = 0, 0.0
+
+        def parts() -> Iterator[Records]:
+            nonlocal lost_rays, lost_flux
+            for batch in self.batches(CHUNK):
+                part = self.records[batch.start : batch.start + CHUNK][batch.usable].astype(dtype)
+                part["position"], part["direction"] = move(batch.position, batch.direction)
+                part["flux"] = batch.flux
+                kept = np.isfinite(part["position"]).all(axis=1)
+                lost_rays += int((~kept).sum())
+                lost_flux += float(batch.flux[~kept].sum())
+                yield part[kept]
+
+        records = spool(parts(), dtype)
+        complaints = self.meaning.complaints
+        if lost_rays:
+            share = lost_flux / (self.tally.flux * scale)
+            found = f"{lost_rays:,} rays with {share:.3%} of the flux never meet it; they are left out"
+            complaints = (*complaints, Complaint("error", step, found))
+        return self._with_records(
+            records, step, declared_flux=None, stored_flux_scale=1.0, length_scale=1.0, complaints=complaints
+        )
+
+    @classmethod
+    def merge(cls, sets: Sequence[RaySet], flux: Sequence[float] | None = None) -> RaySet:
+        """One set of all rays: a white LED from its blue and its yellow file.
+
+        Parameters
+        ----------
+        sets : sequence of RaySet
+            With the same flux unit, in the same coordinates.
+        flux : sequence of float, optional
+            Total flux of each set [their unit]; their own if None.
+
+        Returns
+        -------
+        RaySet
+            Columns that all sets have are kept. Sets with one spectrum each get a ``spectrum_index``, so that the merged
+            set still knows the spectrum of every ray.
+
+        Raises
+        ------
+        ArgumentError
+            If units differ, a set is a far-field set, or the numbers of sets and fluxes differ.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> blue = et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0])
+        >>> yellow = et.RaySet([[0, 0, 0]], [[0, 1, 0]], [1.0])
+        >>> et.RaySet.merge([blue, yellow], flux=[23.0, 314.0]).flux.tolist()
+        [23.0, 314.0]
+        """
+        if not sets:
+            raise ArgumentError("merge: no ray sets.")
+        units = {rays.flux_unit for rays in sets}
+        if len(units) > 1:
+            raise ArgumentError("merge: one set is in lm, another in W; convert with in_unit first.")
+        if not all(rays.has_position for rays in sets):
+            raise ArgumentError("merge: a far-field set has no positions.")
+        if flux is not None:
+            if len(flux) != len(sets):
+                raise ArgumentError(f"merge: {len(flux)} fluxes for {len(sets)} sets.")
+            sets = [rays.with_total_flux(value) for rays, value in zip(sets, flux, strict=True)]
+        shared = [c for c in sets[0].columns if all(c in rays.columns for rays in sets) and c != "spectrum_index"]
+        indexed = all(rays.spectra for rays in sets)
+        fields: list[Any] = [("position", "<f8", 3), ("direction", "<f8", 3), ("flux", "<f8")]
+        fields += [(name, "<f8", sets[0].records.dtype[name].shape) for name in shared]
+        shared = [c for c in shared if len({rays.records.dtype[c].shape for rays in sets}) == 1]
+        fields = [f for f in fields if f[0] in ("position", "direction", "flux", *shared)]
+        dtype = np.dtype(fields + ([("spectrum_index", "<i4")] if indexed else []))
+
+        def parts() -> Iterator[Records]:
+            before = 0
+            for rays in sets:
+                for batch in rays.batches(CHUNK):
+                    part = np.zeros(len(batch.flux), dtype)
+                    rows = slice(batch.start, batch.start + CHUNK)
+                    part["position"], part["direction"], part["flux"] = batch.position, batch.direction, batch.flux
+                    for name in shared:
+                        part[name] = rays.column(name, rows)[batch.usable]
+                    if indexed:
+                        own = rays.column("spectrum_index", rows)[batch.usable] if "spectrum_index" in rays.columns else 1
+                        part["spectrum_index"] = before + own
+                    yield part
+                before += len(rays.spectra)
+
+        names = " + ".join(rays.provenance.source for rays in sets)
+        first = sets[0].meaning
+        meaning = dataclasses.replace(
+            first,
+            declared_flux=None,
+            stored_flux_scale=1.0,
+            length_scale=1.0,
+            wavelength_scale=1.0,
+            spectra=tuple(s for rays in sets for s in rays.spectra) if indexed else (),
+            single_wavelength=first.single_wavelength
+            if len({rays.meaning.single_wavelength for rays in sets}) == 1
+            else None,
+            header={},
+            complaints=tuple(c for rays in sets for c in rays.meaning.complaints),
+            provenance=dataclasses.replace(first.provenance, source=names, steps=("merged",)),
+        )
+        return sets[0].from_records(spool(parts(), dtype), meaning)
+
+
+def _double(dtype: np.dtype[Any]) -> np.dtype[Any]:
+    """The record type with f8 for position, direction and flux; other columns keep theirs."""
+    wide = {"position", "direction", "flux"}
+    return np.dtype([(n, "<f8" if n in wide else dtype[n].base, dtype[n].shape) for n in dtype.names or ()])
+
+
+def _vector(value: Sequence[float], name: str) -> FloatArray:
+    vector = np.asarray(value, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ArgumentError(f"{name} is {value}; give three finite components.")
+    return vector

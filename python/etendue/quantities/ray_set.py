@@ -1,0 +1,386 @@
+"""A ray set: positions, directions and fluxes, from a file or from arrays."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_operations import RayOperations
+from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally
+from etendue.quantities.report import Complaint, RayFileWarning
+from etendue.quantities.spectrum import Spectrum
+from etendue.units import FLUX_UNITS, FluxUnit
+
+GEOMETRY_COLUMNS = ("position", "direction", "flux")
+
+EXTRA_COLUMNS: dict[str, str] = {
+    "wavelength": "nm",
+    "radiant_flux": "W",
+    "stokes": "1",
+    "polarisation_axis": "1",
+    "tristimulus_x": "lm",
+    "tristimulus_z": "lm",
+    "spectrum_index": "1",
+    "additional": "1",
+}
+"""Further columns a ray may have, with their units. ``spectrum_index`` counts from 1 into `RaySet.spectra`."""
+
+FLUX_TOLERANCE = 1e-3
+"""Relative disagreement between a header's total flux and the sum over its rays that becomes a warning."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Moments:
+    """What a full pass over a ray set tells beside the tally; see `RaySet.moments`."""
+
+    zero_flux: int
+    flux_range: tuple[float, float]
+    bounds: FloatArray
+    weighted_position: FloatArray
+    weighted_direction: FloatArray
+    weighted_outer: FloatArray
+    focus_rhs: FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class RaySetMeaning:
+    """What the columns of a ray set's records mean.
+
+    Parameters
+    ----------
+    flux_unit : {"lm", "W"}
+    declared_flux : float or None
+        Total flux [`flux_unit`] that the rays share in proportion to their stored flux; None: the stored flux times
+        `stored_flux_scale` is absolute.
+    stored_flux_scale : float
+        Factor from stored to absolute flux when `declared_flux` is None.
+    length_scale : float
+        Millimetres per stored unit of length.
+    wavelength_scale : float
+        Nanometres per stored unit of wavelength.
+    spectra : tuple of Spectrum
+        One for the whole set, or those that ``spectrum_index`` counts.
+    single_wavelength : float or None
+        [nm], of all rays.
+    header : mapping
+        Facts of the file's header under plain names, for people: creator, date, labels, header totals.
+    complaints : tuple of Complaint
+        What the reader had to say.
+    provenance : Provenance
+    """
+
+    flux_unit: FluxUnit = "lm"
+    declared_flux: float | None = None
+    stored_flux_scale: float = 1.0
+    length_scale: float = 1.0
+    wavelength_scale: float = 1.0
+    spectra: tuple[Spectrum, ...] = ()
+    single_wavelength: float | None = None
+    header: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    complaints: tuple[Complaint, ...] = ()
+    provenance: Provenance = dataclasses.field(default_factory=Provenance)
+
+
+class RaySet(RayOperations, RayStream):
+    """A sample of a source's light: rays with position, direction and flux.
+
+    The rays stay where they are, in memory or in a mapped file; properties copy what is asked for, `batches` streams.
+
+    Parameters
+    ----------
+    position : array_like, shape (n, 3)
+        Start points [mm].
+    direction : array_like, shape (n, 3)
+        Directions; normalised on use.
+    flux : array_like, shape (n,)
+        Flux of each ray [`flux_unit`], ≥ 0.
+    flux_unit : {"lm", "W"}
+    wavelength : array_like, shape (n,), optional
+        [nm]
+    spectra : sequence of Spectrum
+        One for all rays.
+
+    Raises
+    ------
+    ArgumentError
+        If shapes disagree.
+
+    Examples
+    --------
+    >>> rays = RaySet([[0, 0, 0], [1, 0, 0]], [[0, 0, 1], [0, 3, 4]], [1.0, 2.0])
+    >>> len(rays), rays.total_flux, rays.direction[1].tolist()
+    (2, 3.0, [0.0, 0.6, 0.8])
+    """
+
+    def __init__(
+        self,
+        position: npt.ArrayLike,
+        direction: npt.ArrayLike,
+        flux: npt.ArrayLike,
+        *,
+        flux_unit: FluxUnit = "lm",
+        wavelength: npt.ArrayLike | None = None,
+        spectra: tuple[Spectrum, ...] = (),
+        provenance: Provenance | None = None,
+    ) -> None:
+        columns = {"position": position, "direction": direction, "flux": flux}
+        if wavelength is not None:
+            columns["wavelength"] = wavelength
+        arrays = {name: np.asarray(value, dtype=np.float64) for name, value in columns.items()}
+        n = arrays["flux"].size
+        for name, array in arrays.items():
+            expected = (n, 3) if name in ("position", "direction") else (n,)
+            if array.shape != expected:
+                raise ArgumentError(f"RaySet: {name} has shape {array.shape}; with {n} rays it must be {expected}.")
+        records = np.zeros(n, dtype=[(name, "<f8", array.shape[1:]) for name, array in arrays.items()])
+        for name, array in arrays.items():
+            records[name] = array
+        meaning = RaySetMeaning(flux_unit=flux_unit, spectra=tuple(spectra), provenance=provenance or Provenance())
+        self._adopt(records, meaning)
+
+    @classmethod
+    def from_records(cls, records: npt.NDArray[Any], meaning: RaySetMeaning) -> RaySet:
+        """A ray set over structured records, without copying.
+
+        Parameters
+        ----------
+        records : structured array, shape (n,), contiguous
+            Little-endian fields ``direction`` (3,), ``flux`` and, but for far-field sets, ``position`` (3,), all f4 or
+            all f8, and any of `EXTRA_COLUMNS`. It may be a memory map.
+        meaning : RaySetMeaning
+            What the fields mean.
+
+        Raises
+        ------
+        ArgumentError
+            If a field is missing, unknown or of another type.
+        """
+        rays = cls.__new__(cls)
+        rays._adopt(records, meaning)
+        return rays
+
+    def _adopt(self, records: npt.NDArray[Any], meaning: RaySetMeaning) -> None:
+        fields: Mapping[str, Any] = records.dtype.fields or {}
+        if meaning.flux_unit not in FLUX_UNITS:
+            raise UnknownNameError("flux unit", meaning.flux_unit, FLUX_UNITS)
+        for name in fields:
+            if name not in GEOMETRY_COLUMNS and name not in EXTRA_COLUMNS:
+                raise UnknownNameError("ray column", name, (*GEOMETRY_COLUMNS, *EXTRA_COLUMNS))
+        if "direction" not in fields or "flux" not in fields:
+            raise ArgumentError("RaySet: records need the fields 'direction' and 'flux'.")
+        floats = {fields[name][0].base for name in GEOMETRY_COLUMNS if name in fields}
+        if len(floats) != 1 or floats.isdisjoint({np.dtype("<f4"), np.dtype("<f8")}):
+            raise ArgumentError("RaySet: position, direction and flux must be all '<f4' or all '<f8'.")
+        self._records = records
+        self._meaning = meaning
+        self._tally: Tally | None = None
+        self._moments: Moments | None = None
+
+    def replace(self, **changes: Any) -> RaySet:
+        """A set over the same records with some fields of its meaning changed."""
+        return RaySet.from_records(self._records, dataclasses.replace(self._meaning, **changes))
+
+    def __len__(self) -> int:
+        """Number of rays, usable or not."""
+        return int(self._records.shape[0])
+
+    def __repr__(self) -> str:
+        """Say what a person wants to know, without a pass over the rays."""
+        return f"<RaySet of {len(self):,} rays in {self.flux_unit} from {self.provenance.source}>"
+
+    # --- what the rays are -------------------------------------------------------------------------------------------
+
+    @property
+    def records(self) -> npt.NDArray[Any]:
+        """The structured records as stored, shape (n,)."""
+        return self._records
+
+    @property
+    def meaning(self) -> RaySetMeaning:
+        """What the records mean."""
+        return self._meaning
+
+    @property
+    def flux_unit(self) -> FluxUnit:
+        """``"lm"`` or ``"W"``."""
+        return self._meaning.flux_unit
+
+    @property
+    def provenance(self) -> Provenance:
+        """Where the rays come from."""
+        return self._meaning.provenance
+
+    @property
+    def spectra(self) -> tuple[Spectrum, ...]:
+        """One spectrum for the whole set, or those that the column ``spectrum_index`` counts from 1; may be empty."""
+        return self._meaning.spectra
+
+    @property
+    def header(self) -> Mapping[str, Any]:
+        """Facts of the file's header under plain names."""
+        return self._meaning.header
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns beside position, direction and flux; see `EXTRA_COLUMNS`."""
+        return tuple(name for name in self._records.dtype.names or () if name not in GEOMETRY_COLUMNS)
+
+    @property
+    def has_position(self) -> bool:
+        """False for far-field sets, whose rays have directions only."""
+        return "position" in (self._records.dtype.names or ())
+
+    @property
+    def position(self) -> FloatArray:
+        """Start points [mm], shape (n, 3); zero for far-field sets."""
+        if not self.has_position:
+            return np.zeros((len(self), 3))
+        return self._records["position"].astype(np.float64) * self._meaning.length_scale
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit directions, shape (n, 3); rays whose direction cannot be used keep what is stored."""
+        stored = self._records["direction"].astype(np.float64)
+        norm = np.sqrt(np.einsum("ij,ij->i", stored, stored))[:, None]
+        unit: FloatArray = np.divide(stored, norm, out=stored, where=norm >= 1e-6)
+        return unit
+
+    @property
+    def flux(self) -> FloatArray:
+        """Flux of each ray [`flux_unit`], shape (n,), scaled to the total."""
+        return self._records["flux"].astype(np.float64) * self.flux_scale
+
+    @property
+    def wavelength(self) -> FloatArray | None:
+        """Wavelength of each ray [nm], shape (n,), or None if the set does not know it."""
+        if "wavelength" in self.columns:
+            return self.column("wavelength")
+        if self._meaning.single_wavelength is not None:
+            return np.full(len(self), self._meaning.single_wavelength)
+        return None
+
+    def column(self, name: str, rows: slice = slice(None)) -> npt.NDArray[Any]:
+        """Values of a further column [unit as in `EXTRA_COLUMNS`], shape (n,) or (n, k).
+
+        Raises
+        ------
+        UnknownNameError
+            If the set has no such column.
+        """
+        if name not in self.columns:
+            raise UnknownNameError("ray column", name, self.columns)
+        values = self._records[name][rows]
+        if name == "spectrum_index":
+            return values.astype(np.int64)
+        if name == "wavelength":
+            return values.astype(np.float64) * self._meaning.wavelength_scale
+        return values.astype(np.float64)
+
+    # --- passes over all rays ------------------------------------------------------------------------------------------
+
+    def core_source(self) -> Any:
+        """The records as the compiled core takes them."""
+        fields = self._records.dtype.fields
+        assert fields is not None  # noqa: S101 - checked on adoption
+        return _core.RayTable(
+            self._records.view(np.uint8).reshape(-1),
+            self._records.dtype.itemsize,
+            fields["position"][1] if "position" in fields else None,
+            fields["direction"][1],
+            fields["flux"][1],
+            fields["flux"][0] == np.dtype("<f8"),
+            self._meaning.length_scale,
+        )
+
+    def accept_tally(self, tally: Tally) -> float:
+        """Take note of a pass over all rays; warns once if the header's total contradicts the rays."""
+        first = self._tally is None
+        self._tally = tally
+        if first:
+            for complaint in self._tally_complaints(tally):
+                if complaint.severity != "note":
+                    warnings.warn(f"{self.provenance.source}: {complaint}", RayFileWarning, stacklevel=3)
+        return self.flux_scale
+
+    @property
+    def tally(self) -> Tally:
+        """The flux account as stored; costs one pass over the rays the first time."""
+        return self._tally if self._tally is not None else self.pass_over()
+
+    def moments(self, progress: Progress | None = None, threads: int | None = None) -> Moments:
+        """Bounding box, centroid, mean direction and the sums behind the virtual focus; one pass the first time."""
+        if self._moments is None:
+            tally, moments = _core.scan(self.core_source(), threads, progress)
+            self.accept_tally(Tally.from_core(tally))
+            arrays = {k: np.array(v) for k, v in moments.items() if k not in ("zero_flux", "flux_range")}
+            low, high = moments["flux_range"]
+            self._moments = Moments(moments["zero_flux"], (low, high), **arrays)
+        return self._moments
+
+    @property
+    def flux_scale(self) -> float:
+        """Factor from stored flux to `flux_unit`; costs one pass if the set's total is declared."""
+        declared = self._meaning.declared_flux
+        if declared is None:
+            return self._meaning.stored_flux_scale
+        stored = self.tally.flux
+        return declared / stored if stored > 0 else 0.0
+
+    @property
+    def total_flux(self) -> float:
+        """Flux of all usable rays [`flux_unit`]."""
+        declared = self._meaning.declared_flux
+        if declared is not None and self.tally.flux > 0:
+            return declared
+        return self.tally.flux * self.flux_scale
+
+    @property
+    def complaints(self) -> tuple[Complaint, ...]:
+        """All that is to be said of the set: by its reader, and by a pass over its rays."""
+        return (*self._meaning.complaints, *self._tally_complaints(self.tally))
+
+    def _tally_complaints(self, tally: Tally) -> list[Complaint]:
+        found: list[Complaint] = []
+        reasons: list[tuple[int, str]] = [
+            (tally.not_finite, "have a coordinate, direction or flux that is not finite"),
+            (tally.no_direction, "have no direction"),
+            (tally.negative_flux, "have negative flux"),
+        ]
+        found.extend(
+            Complaint("error", "rays", f"{count:,} of {tally.rays:,} rays {why}; they are left out")
+            for count, why in reasons
+            if count
+        )
+        # Sets made in memory may give directions of any length; a file states unit vectors.
+        if tally.norm_error > 1e-3 and self.provenance.format != "memory":
+            found.append(
+                Complaint("warning", "rays", f"direction lengths differ from 1 by up to {tally.norm_error:.2g}; normalised")
+            )
+        stated = self.header.get("total_flux")
+        if isinstance(stated, float) and math.isfinite(stated) and stated > 0 and tally.flux > 0:
+            stored = tally.flux * self._meaning.stored_flux_scale
+            if abs(stated / stored - 1) > FLUX_TOLERANCE:
+                rule = (
+                    "the rays' values are relative and are scaled to the header's total"
+                    if self._meaning.declared_flux is not None
+                    else "the rays' sum is kept"
+                )
+                found.append(
+                    Complaint(
+                        "warning",
+                        "total flux",
+                        f"the header says {stated:.7g} {self.flux_unit}, the rays sum to {stored:.7g}; {rule}",
+                    )
+                )
+        return found
+
+

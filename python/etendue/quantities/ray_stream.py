@@ -1,0 +1,155 @@
+"""What every source of rays offers: rays in batches, and one pass over them all."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.quantities.provenance import Provenance
+from etendue.units import FluxUnit
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[int], None]
+"""Called between rounds of batches with the number of rays done."""
+
+BATCH = 1 << 18
+"""Rays per batch: some 14 MB of f64, far above the cost of a call and far below any memory limit."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Tally:
+    """The flux account of a pass over rays, before any scaling.
+
+    Parameters
+    ----------
+    rays : int
+        Rays looked at.
+    not_finite, no_direction, negative_flux : int
+        Rays that cannot be used, by reason; they carry nothing.
+    flux, flux_squared : float
+        Σ w and Σ w² over the usable rays as stored, [flux unit as stored].
+    norm_error : float
+        Largest ``| |k| - 1 |`` of the stored directions.
+    """
+
+    rays: int
+    not_finite: int
+    no_direction: int
+    negative_flux: int
+    flux: float
+    flux_squared: float
+    norm_error: float
+
+    @classmethod
+    def from_core(cls, data: Mapping[str, Any]) -> Tally:
+        """From the dictionary that the core returns."""
+        not_finite, no_direction, negative_flux = data["defects"]
+        sums = {name: data[name] for name in ("rays", "flux", "flux_squared", "norm_error")}
+        return cls(not_finite=not_finite, no_direction=no_direction, negative_flux=negative_flux, **sums)
+
+    @property
+    def unusable(self) -> int:
+        """Rays that cannot be used."""
+        return self.not_finite + self.no_direction + self.negative_flux
+
+    @property
+    def effective_rays(self) -> float:
+        """(Σ w)²/Σ w²: the number of equal rays with the same relative error of the total."""
+        return self.flux**2 / self.flux_squared if self.flux_squared > 0 else 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class RayBatch:
+    """A stretch of a source's usable rays.
+
+    Parameters
+    ----------
+    start : int
+        Index of the stretch's first record.
+    usable : array of bool, shape (m,)
+        Which of the stretch's records the arrays below hold.
+    position : array, shape (k, 3)
+        [mm]; k is the number of usable rays.
+    direction : array, shape (k, 3)
+        Unit vectors.
+    flux : array, shape (k,)
+        [flux unit of the source], scaled.
+    """
+
+    start: int
+    usable: npt.NDArray[np.bool_]
+    position: FloatArray
+    direction: FloatArray
+    flux: FloatArray
+
+
+class RayStream(abc.ABC):
+    """A finite sequence of rays that is read in batches and never needs to be in memory as a whole."""
+
+    @property
+    @abc.abstractmethod
+    def flux_unit(self) -> FluxUnit:
+        """``"lm"`` or ``"W"``."""
+
+    @property
+    @abc.abstractmethod
+    def provenance(self) -> Provenance:
+        """Where the rays come from."""
+
+    @property
+    @abc.abstractmethod
+    def has_position(self) -> bool:
+        """False for far-field sets, whose rays have directions only."""
+
+    @property
+    @abc.abstractmethod
+    def total_flux(self) -> float:
+        """Flux of all usable rays [`flux_unit`]."""
+
+    @abc.abstractmethod
+    def core_source(self) -> Any:
+        """The source as the compiled core takes it."""
+
+    @abc.abstractmethod
+    def accept_tally(self, tally: Tally) -> float:
+        """Take note of a pass over all rays, and return the factor from stored flux to `flux_unit`."""
+
+    @abc.abstractmethod
+    def __len__(self) -> int:
+        """Number of rays, usable or not."""
+
+    def pass_over(self, progress: Progress | None = None, threads: int | None = None) -> Tally:
+        """One pass over all rays for the flux account."""
+        tally, _ = _core.scan(self.core_source(), threads, progress)
+        result = Tally.from_core(tally)
+        self.accept_tally(result)
+        return result
+
+    @property
+    @abc.abstractmethod
+    def flux_scale(self) -> float:
+        """Factor from stored flux to `flux_unit`."""
+
+    def batches(self, size: int = BATCH) -> Iterator[RayBatch]:
+        """The usable rays in order, `size` records at a time.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> [len(b.flux) for b in et.RingSource(rays=10).batches(size=4)]
+        [4, 4, 2]
+        """
+        source, scale = self.core_source(), self.flux_scale
+        for start in range(0, len(self), size):
+            position, direction, flux = _core.read_rays(source, start, min(start + size, len(self)))
+            usable: npt.NDArray[np.bool_] = np.any(direction != 0.0, axis=1)
+            if usable.all():
+                yield RayBatch(start, usable, position, direction, flux * scale)
+            else:
+                yield RayBatch(start, usable, position[usable], direction[usable], flux[usable] * scale)

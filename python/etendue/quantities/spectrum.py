@@ -1,0 +1,110 @@
+"""A spectrum as a function of wavelength, and what turns watts into lumens."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+from etendue.units import LUMINOUS_EFFICACY_MAX
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Relative spectral radiant flux: linear between the tabulated wavelengths, 0 outside them.
+
+    A table of one pair is a line: all flux at that wavelength.
+
+    Parameters
+    ----------
+    wavelength : array, shape (n,)
+        Rising wavelengths [nm].
+    weight : array, shape (n,)
+        Spectral radiant flux per nm, on any scale, ≥ 0.
+
+    Raises
+    ------
+    ArgumentError
+        If the arrays differ in length, are empty or not finite, wavelengths do not rise, or a weight is negative.
+
+    Examples
+    --------
+    >>> line = Spectrum([555.0], [1.0])
+    >>> round(line.luminous_efficacy)
+    683
+    """
+
+    wavelength: FloatArray
+    weight: FloatArray
+
+    def __post_init__(self) -> None:
+        wavelength = np.array(self.wavelength, dtype=np.float64)
+        weight = np.array(self.weight, dtype=np.float64)
+        if wavelength.ndim != 1 or wavelength.shape != weight.shape or wavelength.size == 0:
+            raise ArgumentError(
+                f"Spectrum: {wavelength.shape} wavelengths and {weight.shape} weights; give two equally long rows."
+            )
+        if not (np.isfinite(wavelength).all() and np.isfinite(weight).all()):
+            raise ArgumentError("Spectrum: a wavelength or weight is not finite.")
+        if wavelength[0] <= 0 or (np.diff(wavelength) <= 0).any() or (weight < 0).any():
+            raise ArgumentError("Spectrum: wavelengths must be above 0 nm and rise, weights must not be negative.")
+        for name, array in (("wavelength", wavelength), ("weight", weight)):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def total(self) -> float:
+        """∫ of the weight over wavelength; for a line its weight."""
+        return float(np.trapezoid(self.weight, self.wavelength)) if self.wavelength.size > 1 else float(self.weight[0])
+
+    @property
+    def luminous_efficacy(self) -> float:
+        """K = K_m ∫ S V dλ / ∫ S dλ [lm/W] (CIE S 017, 17-21-090).
+
+        The product of the two piecewise linear functions is integrated exactly, by Simpson's rule between the union of
+        their nodes.
+        """
+        if self.total == 0.0:
+            return 0.0
+        if self.wavelength.size == 1:
+            return LUMINOUS_EFFICACY_MAX * float(photopic_efficiency(self.wavelength)[0])
+        nodes, _ = _photopic_table()
+        inside = nodes[(nodes > self.wavelength[0]) & (nodes < self.wavelength[-1])]
+        at = np.union1d(self.wavelength, inside)
+        middle = (at[1:] + at[:-1]) / 2
+        product = np.interp(at, self.wavelength, self.weight) * photopic_efficiency(at)
+        product_middle = np.interp(middle, self.wavelength, self.weight) * photopic_efficiency(middle)
+        integral = float(np.sum(np.diff(at) / 6 * (product[1:] + 4 * product_middle + product[:-1])))
+        return LUMINOUS_EFFICACY_MAX * integral / self.total
+
+
+def photopic_efficiency(wavelength: npt.ArrayLike) -> FloatArray:
+    """V(λ), the CIE 1924 spectral luminous efficiency function for photopic vision (CIE 018:2019).
+
+    Linear between the table's 1 nm steps, 0 outside 360 nm to 830 nm.
+
+    Parameters
+    ----------
+    wavelength : array_like, shape (n,)
+        [nm]
+
+    Examples
+    --------
+    >>> photopic_efficiency([555.0, 300.0]).tolist()
+    [1.0, 0.0]
+    """
+    nodes, values = _photopic_table()
+    return np.interp(np.asarray(wavelength, dtype=np.float64), nodes, values, left=0.0, right=0.0)
+
+
+@functools.cache
+def _photopic_table() -> tuple[FloatArray, FloatArray]:
+    import colour  # noqa: PLC0415 - takes a second to import and is needed only to turn watts into lumens
+
+    table = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]
+    return np.asarray(table.wavelengths, dtype=np.float64), np.asarray(table.values, dtype=np.float64)

@@ -1,0 +1,160 @@
+"""The three-ring source of [Audenaert2014]_ section 2.3, as a stream of rays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import RayStream, Tally
+from etendue.units import MM2_PER_M2, FluxUnit
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def allocate_rays(rays: int, weights: Sequence[float]) -> tuple[int, ...]:
+    """Share a number of rays in proportion to weights, to the nearest ray, with exactly that total.
+
+    Eqs. 2.7 and 2.8 of [Audenaert2014]_ with weights Φ·A. Largest remainder: each share is rounded down, and the rays
+    left over go to the largest remainders.
+
+    Examples
+    --------
+    >>> allocate_rays(50_000_000, [300 * 1, 200 * 3, 100 * 5])
+    (10714286, 21428571, 17857143)
+    """
+    total = math.fsum(weights)
+    exact = [rays * w / total for w in weights]
+    shares = [math.floor(e) for e in exact]
+    by_remainder = sorted(range(len(weights)), key=lambda i: shares[i] - exact[i])
+    for i in by_remainder[: rays - sum(shares)]:
+        shares[i] += 1
+    return tuple(shares)
+
+
+class RingSource(RayStream):
+    """Concentric Lambertian rings in the plane z = 0 that emit towards +Z, each with its own luminance.
+
+    The defaults are the source of [Audenaert2014]_ section 2.3: radii 10, 20, 30 mm, 300, 200, 100 lm.
+
+    Parameters
+    ----------
+    radii : sequence of float
+        Outer radius of each ring [mm], rising; the first ring is a disk.
+    flux : sequence of float
+        Flux of each ring [lm], > 0.
+    rays : int
+        Rays per run; shared between rings in proportion to Φ·A (eqs. 2.7, 2.8).
+    runs : int
+        Runs with seeds ``seed``, ``seed + 1`` …, which together carry the flux.
+    seed : int
+        0 to 2⁶⁴ - 1.
+
+    Raises
+    ------
+    ArgumentError
+        If a parameter is out of its domain.
+
+    Examples
+    --------
+    >>> source = RingSource(rays=50_000_000, runs=28)
+    >>> len(source), source.allocation
+    (1400000000, (10714286, 21428571, 17857143))
+    >>> [round(value) for value in source.zone_luminance]
+    [303964, 67547, 20264]
+    """
+
+    def __init__(
+        self,
+        radii: Sequence[float] = (10.0, 20.0, 30.0),
+        flux: Sequence[float] = (300.0, 200.0, 100.0),
+        rays: int = 1_000_000,
+        runs: int = 1,
+        seed: int = 1,
+    ) -> None:
+        edges = (0.0, *map(float, radii))
+        if len(edges) < 2 or any(not b > a or not math.isfinite(b) for a, b in zip(edges, edges[1:], strict=False)):
+            raise ArgumentError(f"RingSource: radii {tuple(radii)} mm; give rising radii > 0.")
+        if len(flux) != len(radii) or any(not (math.isfinite(f) and f > 0) for f in flux):
+            raise ArgumentError(f"RingSource: flux {tuple(flux)} lm; give one finite flux > 0 for each of {len(radii)} rings.")
+        if rays < 1 or runs < 1 or rays * runs >= 2**63:
+            raise ArgumentError(f"RingSource: {rays} rays in {runs} runs; give at least one, and fewer than 2^63 in all.")
+        if not 0 <= seed < 2**64:
+            raise ArgumentError(f"RingSource: seed {seed}; give 0 to 2^64 - 1.")
+        self.edges = edges
+        self.ring_flux = tuple(map(float, flux))
+        self.runs = runs
+        self.seed = seed
+        self.allocation = allocate_rays(rays, [f * a for f, a in zip(flux, self.ring_area, strict=True)])
+        if min(self.allocation) == 0:
+            raise ArgumentError(f"RingSource: {rays} rays leave a ring without any ({self.allocation}); give more.")
+        rings = zip(edges, edges[1:], self.ring_flux, self.allocation, strict=False)
+        self._core = _core.RingSource(list(rings), runs, seed)
+
+    @property
+    def ring_area(self) -> tuple[float, ...]:
+        """Area of each ring [mm²]."""
+        return tuple(math.pi * (b * b - a * a) for a, b in zip(self.edges, self.edges[1:], strict=False))
+
+    @property
+    def zone_luminance(self) -> tuple[float, ...]:
+        """Luminance of each ring [cd/m²], Φ/(π A) (eq. 2.9)."""
+        return tuple(f / (math.pi * a) * MM2_PER_M2 for f, a in zip(self.ring_flux, self.ring_area, strict=True))
+
+    def luminance(self, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
+        """Luminance at points of the plane [mm], in any direction above it [cd/m²]; 0 outside the rings."""
+        r = np.hypot(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        zone = np.searchsorted(self.edges[1:], r, side="left")
+        return np.append(self.zone_luminance, 0.0)[zone]
+
+    def __len__(self) -> int:
+        """Rays of all runs."""
+        return len(self._core)
+
+    @property
+    def flux_unit(self) -> FluxUnit:
+        """Lumens."""
+        return "lm"
+
+    @property
+    def has_position(self) -> bool:
+        """Rays start on the rings."""
+        return True
+
+    @property
+    def total_flux(self) -> float:
+        """Sum over the rings [lm]."""
+        return math.fsum(self.ring_flux)
+
+    @property
+    def flux_scale(self) -> float:
+        """Rays are drawn with their flux in lm."""
+        return 1.0
+
+    @property
+    def provenance(self) -> Provenance:
+        """The parameters, which are all that is needed to draw the same rays again."""
+        rings = ", ".join(f"{f:g} lm to r = {r:g} mm" for f, r in zip(self.ring_flux, self.edges[1:], strict=True))
+        step = f"{sum(self.allocation)} rays x {self.runs} runs, seed {self.seed}"
+        return Provenance(source=f"ring source ({rings})", format="synthetic", steps=(step,))
+
+    def core_source(self) -> Any:
+        """The source as the compiled core takes it."""
+        return self._core
+
+    def accept_tally(self, tally: Tally) -> float:
+        """Nothing is learnt from a pass: the flux is known."""
+        del tally
+        return 1.0
+
+    def ray_set(self) -> RaySet:
+        """All rays as a ray set, for sets that fit into memory."""
+        position, direction, flux = _core.read_rays(self._core, 0, len(self))
+        return RaySet(position, direction, flux, provenance=self.provenance)
