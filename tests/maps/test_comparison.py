@@ -263,6 +263,8 @@ def test_text_and_plain_data() -> None:
     assert data["region_mm"] == {"left": -2, "right": 2, "bottom": -3, "top": 3}
     assert data["reference"]["uniformity"] == pytest.approx(0.4)
     assert data["test"] == dataclasses.asdict(result.test_statistics)
+    black = make_map([[0, 0]])
+    assert compare(black, black).to_dict()["ncc"] is None
 
 
 VALUES = np.array([[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0], [9.0, 10.0, 11.0, NAN]])

@@ -189,18 +189,31 @@ class Comparison:
         return "\n".join((agreement, significance, *figures, *(f"note: {note}" for note in self.notes)))
 
     def to_dict(self) -> dict[str, Any]:
-        """Every number as plain data: all but the maps and the difference image."""
-        skipped = {"difference", "test", "reference", "region", "test_statistics", "reference_statistics", "notes"}
-        plain = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name not in skipped}
-        return plain | {
-            "intensity_ratio": self.intensity_ratio,
-            "median_difference_percent": self.median_difference,
+        """Every number as plain data for JSON (undefined numbers are None): all but the maps and the image."""
+        measures = (
+            "ncc",
+            "nrmse_thesis",
+            "nrmse",
+            "reduced_chi_square",
+            "chi_square_pixels",
+            "pixels",
+            "intensity_ratio",
+        )
+        return {
+            **{name: _defined(getattr(self, name)) for name in measures},
+            "median_difference_percent": _defined(self.median_difference),
             "unit": self.reference.unit,
-            "test": dataclasses.asdict(self.test_statistics),
-            "reference": dataclasses.asdict(self.reference_statistics),
+            "test": {name: _defined(figure) for name, figure in dataclasses.asdict(self.test_statistics).items()},
+            "reference": {
+                name: _defined(figure) for name, figure in dataclasses.asdict(self.reference_statistics).items()
+            },
             "region_mm": dataclasses.asdict(self.region) if self.region else None,
             "notes": list(self.notes),
         }
+
+
+def _defined(number: float) -> float | None:
+    return None if math.isnan(number) else number
 
 
 def compare(
