@@ -6,10 +6,11 @@
 600
 """
 
+from etendue.luminance.estimate import luminance_map
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
 from etendue.sources.ring_source import RingSource
 
-__all__ = ["LuminanceMap", "Observer", "RaySet", "RingSource", "Screen", "Spectrum"]
+__all__ = ["LuminanceMap", "Observer", "RaySet", "RingSource", "Screen", "Spectrum", "luminance_map"]

@@ -1,0 +1,71 @@
+"""The program `etendue`: its verbs, and what happens when one of them fails."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import Annotated
+
+import typer
+
+from etendue.cli import compare, convert, demo, filter_, info, luminance
+from etendue.cli.terminal import complain
+from etendue.errors import EtendueError
+from etendue.quantities.provenance import version
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it (128 + SIGINT)."""
+
+app = typer.Typer(
+    help="Luminance maps of light sources and luminaires from ray files, with an error bar in every pixel.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+VERBS = {
+    "demo": demo.demo,
+    "info": info.info,
+    "convert": convert.convert,
+    "luminance": luminance.luminance,
+    "filter": filter_.filter_,
+    "compare": compare.compare,
+}
+for _name, _verb in VERBS.items():
+    app.command(_name)(_verb)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"etendue {version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    _version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the program; the exit status is 0, 1 for an error of the data, 2 for one of usage, 130 after Ctrl-C."""
+    # Complaints about files are printed by the verbs, once and in full.
+    warnings.simplefilter("ignore")
+    try:
+        status = app(standalone_mode=False)
+    except (EtendueError, OSError) as error:
+        complain(f"error: {error}")
+        sys.exit(1)
+    except (KeyboardInterrupt, typer.Abort):
+        complain("stopped; nothing was written")
+        sys.exit(INTERRUPTED)
+    except Exception as error:
+        # The parser's own errors know how to show themselves, with the nearest name.
+        show = getattr(error, "show", None)
+        if show is None:
+            raise
+        show()
+        sys.exit(getattr(error, "exit_code", 2))
+    sys.exit(status if isinstance(status, int) else 0)

@@ -1,0 +1,66 @@
+"""``etendue compare``: how well a map agrees with a reference."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from etendue.cli.terminal import check_outputs, numbers, print_json, say
+from etendue.formats.maps import read_map
+from etendue.luminance.comparison import DEAD_RULES, Region, cross_section
+from etendue.luminance.comparison import compare as compare_maps
+from etendue.plot import plot_comparison, plot_cross_sections
+
+
+def compare(
+    test: Annotated[Path, typer.Argument(help="The map to judge.")],
+    reference: Annotated[Path, typer.Argument(help="The map it is judged by.")],
+    region: Annotated[
+        str | None, typer.Option("--region", help="Part of the screen, in mm.", metavar="LEFT,RIGHT,BOTTOM,TOP")
+    ] = None,
+    dead: Annotated[str, typer.Option("--dead", help="What a dead pixel counts as: zero, or exclude.")] = "zero",
+    ignore_geometry: Annotated[
+        bool, typer.Option("--ignore-geometry", help="Compare pixel by pixel even if observer or screen differ.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Picture of both maps and their difference (eq. 3.4), .png")
+    ] = None,
+    section_y: Annotated[
+        float | None, typer.Option("--section-y", help="Cut both maps along the row at this height in mm.")
+    ] = None,
+    section_x: Annotated[
+        float | None, typer.Option("--section-x", help="Cut both maps along the column at this position in mm.")
+    ] = None,
+    section_output: Annotated[
+        Path | None, typer.Option("--section-output", help="Picture of the cross sections, .png")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """NCC (3.5), NRMSE as printed (3.6), true RMSE over the reference's maximum, difference image (3.4), cross sections."""
+    if dead not in DEAD_RULES:
+        raise typer.BadParameter(f"--dead {dead!r}: give one of {', '.join(DEAD_RULES)}")
+    if (section_output is None) != (section_x is None and section_y is None):
+        raise typer.BadParameter("--section-output goes with --section-x or --section-y")
+    check_outputs([p for p in (output, section_output) if p], (".png",))
+    limits = None
+    if region is not None:
+        limits = Region(*numbers(region, 4, "--region", "-5,5,-2,2"))
+    a, b = read_map(test), read_map(reference)
+    result = compare_maps(
+        a, b, region=limits, dead="zero" if dead == "zero" else "exclude", ignore_geometry=ignore_geometry
+    )
+    if output is not None:
+        plot_comparison(result, output)
+    if section_output is not None:
+        cuts = {name: cross_section(m, x=section_x, y=section_y) for name, m in (("test", a), ("reference", b))}
+        plot_cross_sections(cuts, section_output)
+    if json:
+        print_json(result.to_dict() | {"outputs": [p for p in (output, section_output) if p]})
+        return
+    for line in result.summary().splitlines():
+        say(line)
+    for path in (output, section_output):
+        if path is not None:
+            say(f"  {path}")

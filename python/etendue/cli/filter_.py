@@ -1,0 +1,37 @@
+"""``etendue filter``: smooth a map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from etendue.cli.luminance import print_map, summary
+from etendue.cli.terminal import check_outputs, complain, print_json, say
+from etendue.formats.maps import MAP_EXTENSIONS, read_map
+from etendue.luminance.filters import FILTERS, filter_map
+
+
+def filter_(
+    file: Annotated[Path, typer.Argument(help="A map written by étendue.")],
+    kind: Annotated[str, typer.Option("--kind", help=f"{', '.join(FILTERS)}.")],
+    output: Annotated[list[Path], typer.Option("-o", "--output", help="Map to write; several are allowed.")],
+    size: Annotated[int, typer.Option("--size", help="Pixels along each side of the kernel, odd.")] = 5,
+    gamma: Annotated[
+        float, typer.Option("--gamma", help="Largest relative deviation of a neighbour (eq. 2.6); selective filters.")
+    ] = 0.2,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Smooth a map with one of the four filters of the thesis; the flux before and after is printed."""
+    check_outputs(output, MAP_EXTENSIONS)
+    smooth = filter_map(read_map(file), kind, size=size, gamma=gamma)
+    losses = [note for path in output for note in smooth.save(path)]
+    if json:
+        print_json(summary(smooth) | {"outputs": output, "losses": losses})
+        return
+    for note in losses:
+        complain(f"note: {note}")
+    print_map(smooth)
+    for path in output:
+        say(f"  {path}")

@@ -1,0 +1,149 @@
+"""``etendue info``: what is in a ray file, and what is wrong with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from etendue.cli.terminal import complain, print_json, progress_bar, say
+from etendue.errors import EtendueError
+from etendue.formats.rays import detect_format, read_rays
+from etendue.quantities.ray_set import RaySet
+
+
+def info(
+    files: Annotated[list[Path], typer.Argument(help="Ray files of any format.")],
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Format, rays, flux by header and by sum, bounding box, virtual focus, wavelengths, and every complaint."""
+    described: list[dict[str, Any]] = []
+    failed = False
+    for file in files:
+        try:
+            described.append(describe(file))
+        except (EtendueError, OSError) as error:
+            failed = True
+            described.append({"file": str(file), "error": str(error)})
+    if json:
+        print_json(described)
+    else:
+        for number, facts in enumerate(described):
+            if number:
+                say()
+            _print(facts)
+    if failed:
+        raise typer.Exit(1)
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """Everything that `info` prints about one file, as plain data: lengths in mm, wavelengths in nm."""
+    rays = read_rays(path)
+    with progress_bar(path.name, len(rays)) as progress:
+        moments = rays.moments(progress)
+    focus = rays.virtual_focus
+    low, high = moments.flux_range
+    known = len(rays) > rays.tally.unusable
+    return {
+        "file": str(path),
+        "format": rays.provenance.format,
+        "title": detect_format(path).title,
+        "rays": len(rays),
+        "usable_rays": len(rays) - rays.tally.unusable,
+        "flux_unit": rays.flux_unit,
+        "total_flux": rays.total_flux,
+        "header_flux": rays.header.get("total_flux"),
+        "sum_flux": rays.tally.flux * rays.meaning.stored_flux_scale,
+        "effective_rays": rays.tally.effective_rays,
+        "flux_per_ray": [low * rays.flux_scale, high * rays.flux_scale] if known else None,
+        "bounding_box": moments.bounds.tolist() if known and rays.has_position else None,
+        "virtual_focus": list(focus.point) if focus.determined else None,
+        "mean_direction": _mean_direction(moments.weighted_direction),
+        "spectrum": _spectrum(rays),
+        "columns": list(rays.columns),
+        "header": dict(rays.header),
+        "complaints": [complaint.to_dict() for complaint in rays.complaints],
+        "complaint_lines": [str(complaint) for complaint in rays.complaints],
+    }
+
+
+def _mean_direction(weighted: np.ndarray[Any, np.dtype[np.float64]]) -> list[float] | None:
+    length = float(np.linalg.norm(weighted))
+    return [float(c) / length for c in weighted] if length > 0 else None
+
+
+def _spectrum(rays: RaySet) -> str:
+    if "wavelength" in rays.columns:
+        lows, highs = [], []
+        for start in range(0, len(rays), 1 << 18):
+            part = rays.column("wavelength", slice(start, start + (1 << 18)))
+            lows.append(part.min())
+            highs.append(part.max())
+        return f"wavelength per ray, {min(lows):.4g} to {max(highs):.4g} nm" if lows else "wavelength per ray"
+    if rays.meaning.single_wavelength is not None:
+        return f"single wavelength {rays.meaning.single_wavelength:.4g} nm"
+    if "spectrum_index" in rays.columns:
+        return f"one of {len(rays.spectra)} spectra per ray"
+    if rays.spectra:
+        nodes = rays.spectra[0].wavelength
+        return f"one spectrum for all rays, {nodes[0]:.4g} to {nodes[-1]:.4g} nm"
+    if "tristimulus_x" in rays.columns:
+        return "tristimulus values per ray"
+    return "unknown"
+
+
+def _print(facts: dict[str, Any]) -> None:
+    if "error" in facts:
+        complain(f"{facts['file']}: error: {facts['error']}")
+        return
+    unit = facts["flux_unit"]
+    say(f"{facts['file']}")
+    header = facts["header_flux"]
+    rows = [
+        ("format", facts["title"]),
+        ("rays", f"{facts['rays']:,}" + _unusable(facts)),
+        ("flux", f"{facts['total_flux']:.7g} {unit}"),
+        ("", f"header {header:.7g} {unit}, sum over the rays {facts['sum_flux']:.7g} {unit}"
+             if isinstance(header, float) else f"no total in the header; sum over the rays {facts['sum_flux']:.7g} {unit}"),
+        ("per ray", _range(facts["flux_per_ray"], unit) + f"; as good as {facts['effective_rays']:,.0f} equal rays"),
+        ("bounding box", _box(facts["bounding_box"])),
+        ("virtual focus", _point(facts["virtual_focus"], "mm") or "not determined (the rays are collimated, or have no position)"),
+        ("mean direction", _point(facts["mean_direction"], "") or "none"),
+        ("spectrum", facts["spectrum"]),
+    ]  # fmt: skip
+    rows += [(key.replace("_", " "), _short(value)) for key, value in facts["header"].items() if value not in ("", None)]
+    for label, value in rows:
+        say(f"  {label:<22} {value}")
+    if not facts["complaint_lines"]:
+        say(f"  {'complaints':<22} none")
+    for number, line in enumerate(facts["complaint_lines"]):
+        say(f"  {'complaints' if number == 0 else '':<22} {line}")
+
+
+def _unusable(facts: dict[str, Any]) -> str:
+    missing = facts["rays"] - facts["usable_rays"]
+    return f", {missing:,} of them cannot be used" if missing else ""
+
+
+def _range(pair: list[float] | None, unit: str) -> str:
+    if pair is None:
+        return "none"
+    low, high = pair
+    return f"{low:.4g} {unit} each" if low == high else f"{low:.4g} to {high:.4g} {unit}"
+
+
+def _box(bounds: list[list[float]] | None) -> str:
+    if bounds is None:
+        return "none (far-field data)"
+    return ", ".join(f"{axis} {low:.5g} to {high:.5g}" for axis, (low, high) in zip("xyz", bounds, strict=True)) + " mm"
+
+
+def _point(point: list[float] | None, unit: str) -> str | None:
+    return None if point is None else f"({', '.join(f'{c:.4f}' for c in point)}) {unit}".rstrip()
+
+
+def _short(value: Any) -> str:
+    text = f"{value:.7g}" if isinstance(value, float) else str(value)
+    return text if len(text) <= 100 else text[:97] + "..."

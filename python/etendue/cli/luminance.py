@@ -1,0 +1,119 @@
+"""``etendue luminance``: what the source looks like from where an observer stands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from etendue.cli.convert import in_unit, with_flux
+from etendue.cli.terminal import check_outputs, complain, numbers, print_json, progress_bar, say
+from etendue.errors import ArgumentError
+from etendue.formats.maps import MAP_EXTENSIONS
+from etendue.formats.rays import read_rays
+from etendue.luminance.estimate import METHODS, luminance_map
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.observer import PLANES, Observer, Screen
+
+
+def luminance(
+    file: Annotated[Path, typer.Argument(help="A ray file of any format.")],
+    observer: Annotated[
+        list[str], typer.Option("--observer", help="θ,φ in degrees; may be given several times.", metavar="THETA,PHI")
+    ],
+    size: Annotated[str, typer.Option("--size", help="Width and height of the screen in mm.", metavar="W,H")],
+    output: Annotated[
+        list[Path],
+        typer.Option("-o", "--output", help="Map to write; several are allowed. {theta} and {phi} are filled in."),
+    ],
+    distance: Annotated[float, typer.Option("--distance", help="From target to observer in mm.")] = 1000.0,
+    target: Annotated[str, typer.Option("--target", help="Point looked at, in mm.", metavar="X,Y,Z")] = "0,0,0",
+    pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
+    plane: Annotated[str, typer.Option("--plane", help="view or xy.")] = "view",
+    method: Annotated[str, typer.Option("--method", help="auto or cone.")] = "auto",
+    acceptance: Annotated[
+        float | None, typer.Option("--acceptance", help="Half-angle of the cone in degrees [1.5].", show_default=False)
+    ] = None,
+    flux: Annotated[str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")] = None,
+    unit: Annotated[str | None, typer.Option("--unit", help="lm or W: convert through the file's spectrum.")] = None,
+    threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Luminance maps with a standard error per pixel, for any number of observers in one pass over the rays."""
+    if method not in METHODS:
+        raise typer.BadParameter(f"--method {method!r}: give one of {', '.join(METHODS)}")
+    if plane not in PLANES:
+        raise typer.BadParameter(f"--plane {plane!r}: give one of {', '.join(PLANES)}")
+    x, y, z = numbers(target, 3, "--target", "0,0,0")
+    observers = [Observer(*numbers(text, 2, "--observer", "30,0"), distance, (x, y, z)) for text in observer]
+    width, height = numbers(size, 2, "--size", "25,25")
+    columns, rows = numbers(pixels, 2, "--pixels", "128,128")
+    screen = Screen(width, height, int(columns), int(rows), "xy" if plane == "xy" else "view")
+    targets = [[_named(path, o) for path in output] for o in observers]
+    everything = [path for paths in targets for path in paths]
+    if len(set(everything)) < len(everything):
+        raise ArgumentError("several observers would write to the same file; put {theta} and {phi} into its name.")
+    check_outputs(everything, MAP_EXTENSIONS)
+
+    rays = in_unit(with_flux(read_rays(file), flux), unit)
+    # The first pass over the rays is this one; with method="auto" a second one may follow for large screens.
+    with progress_bar("rays", len(rays)) as progress:
+        maps = luminance_map(
+            rays,
+            observers,
+            screen,
+            method="cone" if method == "cone" else "auto",
+            acceptance=acceptance,
+            threads=threads,
+            progress=progress,
+        )
+    losses = [note for lmap, paths in zip(maps, targets, strict=True) for path in paths for note in lmap.save(path)]
+    complaints = [str(c) for c in rays.complaints]
+    if json:
+        summaries = [summary(lmap) | {"outputs": paths} for lmap, paths in zip(maps, targets, strict=True)]
+        print_json({"file": file, "maps": summaries, "complaints": complaints, "notes": losses})
+        return
+    for line in (*complaints, *(f"note: {note}" for note in losses)):
+        complain(line)
+    for lmap, paths in zip(maps, targets, strict=True):
+        print_map(lmap)
+        for path in paths:
+            say(f"  {path}")
+
+
+def _named(path: Path, observer: Observer) -> Path:
+    text = str(path).replace("{theta}", f"{observer.theta:g}").replace("{phi}", f"{observer.phi:g}")
+    return Path(text)
+
+
+def summary(lmap: LuminanceMap) -> dict[str, Any]:
+    """A map in figures, as plain data [unit of the map]."""
+    live = ~np.isnan(lmap.values)
+    values = lmap.values[live]
+    return {
+        "quantity": lmap.quantity,
+        "unit": lmap.unit,
+        "observer": lmap.header()["observer"],
+        "screen": lmap.header()["screen"],
+        "mean_of_live_pixels": float(values.mean()) if live.any() else None,
+        "maximum": float(values.max()) if live.any() else None,
+        "intensity": lmap.intensity,
+        "rays": int(lmap.rays[lmap.rays > 0].sum()),
+        "dead_pixels": lmap.dead_pixels,
+        "pixels": lmap.values.size,
+        "notes": list(lmap.notes),
+    }
+
+
+def print_map(lmap: LuminanceMap) -> None:
+    """A map in figures, for people."""
+    facts = summary(lmap)
+    where = lmap.observer
+    say(f"{facts['quantity']} from θ = {where.theta:g}°, φ = {where.phi:g}°, {where.distance:g} mm")
+    if facts["maximum"] is not None:
+        say(f"  mean of live pixels {facts['mean_of_live_pixels']:.5g} {lmap.unit}, maximum {facts['maximum']:.5g}")
+        say(f"  intensity towards the observer {facts['intensity']:.5g} {'cd' if lmap.flux_unit == 'lm' else 'W/sr'}")
+    for note in lmap.notes:
+        say(f"  {note}")

@@ -1,0 +1,98 @@
+"""What the verbs share: how arguments are read, progress is shown and results are printed."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from etendue.errors import ArgumentError
+from etendue.quantities.ray_stream import Progress as ProgressFunction
+
+output = Console(soft_wrap=True, highlight=False)
+"""Results, on standard output."""
+
+errors = Console(stderr=True, soft_wrap=True, highlight=False)
+"""Complaints and progress, on standard error."""
+
+
+def complain(message: str) -> None:
+    """Print one line to standard error."""
+    errors.print(message, markup=False)
+
+
+def say(message: str = "") -> None:
+    """Print one line to standard output."""
+    output.print(message, markup=False)
+
+
+def print_json(data: Any) -> None:
+    """Print one JSON document; NaN, which JSON does not have, becomes null."""
+    sys.stdout.write(json.dumps(_plain(data), ensure_ascii=False, indent=2, allow_nan=False) + "\n")
+
+
+def _plain(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {str(k): _plain(v) for k, v in data.items()}
+    if isinstance(data, list | tuple):
+        return [_plain(v) for v in data]
+    if isinstance(data, float) and not math.isfinite(data):
+        return None
+    if data is None or isinstance(data, str | int | float | bool):
+        return data
+    return str(data)
+
+
+@contextlib.contextmanager
+def progress_bar(title: str, total: int) -> Iterator[ProgressFunction | None]:
+    """A bar over `total` rays while the block runs; nothing when standard error is no terminal."""
+    if not errors.is_terminal:
+        yield None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=errors, transient=True) as bar:
+        task = bar.add_task(title, total=total)
+        yield lambda done: bar.update(task, completed=done)
+
+
+def numbers(text: str, count: int, option: str, example: str) -> tuple[float, ...]:
+    """Comma-separated numbers of an option, e.g. ``30,0``.
+
+    Raises
+    ------
+    typer.BadParameter
+        If there are not `count` of them, or one is no number.
+    """
+    parts = text.split(",")
+    try:
+        values = tuple(float(part) for part in parts)
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        raise typer.BadParameter(f"{text!r}: give {count} numbers separated by commas, e.g. {option} {example}")
+    return values
+
+
+def check_outputs(paths: list[Path], extensions: tuple[str, ...]) -> None:
+    """Refuse, before any work is done, outputs that could not be written afterwards.
+
+    Raises
+    ------
+    ArgumentError
+        If an extension is unknown or a folder does not exist.
+    """
+    for path in paths:
+        if path.suffix.lower() not in extensions:
+            raise ArgumentError(
+                f"{path}: the extension {path.suffix!r} is none of the known ones: {', '.join(extensions)}."
+            )
+        if not path.parent.is_dir():
+            raise ArgumentError(f"{path}: the folder {path.parent} does not exist; create it first.")

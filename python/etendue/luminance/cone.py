@@ -1,0 +1,126 @@
+"""The cone estimator: luminance from the rays that head for the observer ([Audenaert2014]_ chapter 2)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.ray_stream import Progress, RayStream, Tally
+from etendue.units import MM2_PER_M2
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def cone_solid_angle(acceptance: float) -> float:
+    """Solid angle of a cone, 2π(1 - cos α) [sr], α in degrees.
+
+    Written as 4π sin²(α/2), which does not cancel for narrow cones.
+
+    Examples
+    --------
+    >>> round(cone_solid_angle(1.5), 9)
+    0.002153091
+    """
+    return 4.0 * math.pi * math.sin(math.radians(acceptance) / 2.0) ** 2
+
+
+def check_acceptance(acceptance: float) -> float:
+    """The half-angle if it is one; `ArgumentError` if it is not in 0° < α ≤ 90°."""
+    if not 0.0 < acceptance <= 90.0:
+        raise ArgumentError(f"acceptance is {acceptance}°; give a half-angle above 0° and at most 90°.")
+    return float(acceptance)
+
+
+@dataclasses.dataclass(frozen=True)
+class ConeView:
+    """An observer, his screen, and the acceptance half-angles [°], rising, under which rays are counted at once."""
+
+    observer: Observer
+    screen: Screen
+    acceptances: tuple[float, ...]
+
+    def etendue(self) -> FloatArray:
+        """ΔΩ_o ΔA_p cos θ_p of eq. 2.3 [m² sr], shape (acceptances, rows, columns)."""
+        apparent = self.screen.pixel_area / MM2_PER_M2 * self.screen.cosine(self.observer)
+        solid_angles = np.array([cone_solid_angle(a) for a in self.acceptances])
+        product: FloatArray = solid_angles[:, None, None] * apparent
+        return product
+
+
+@dataclasses.dataclass(frozen=True)
+class ConeEstimate:
+    """What a pass leaves for one view; all arrays of shape (acceptances, rows, columns).
+
+    Parameters
+    ----------
+    luminance : array
+        Eq. 2.4 [cd/m² or W/(m² sr)]; 0 where no ray was seen.
+    variance : array
+        Of `luminance`: Σ w² over the étendue squared, for a Poisson process of weighted rays.
+    rays : array of int64
+        Rays seen.
+    etendue : array
+        [m² sr]
+    """
+
+    view: ConeView
+    luminance: FloatArray
+    variance: FloatArray
+    rays: npt.NDArray[np.int64]
+    etendue: FloatArray
+
+
+def cone_estimates(
+    rays: RayStream, views: Sequence[ConeView], threads: int | None = None, progress: Progress | None = None
+) -> tuple[list[ConeEstimate], Tally]:
+    """Eqs. 2.2 to 2.4 of [Audenaert2014]_ for any number of views in one pass over the rays.
+
+    A ray is carried along its line to the screen; if it crosses pixel p and its direction is within the acceptance of the
+    line from p's centre to the observer (eq. 2.2), its flux counts for p. For a Lambertian source the expectation is
+    L (1 + cos α)/2: the cone's solid angle stands where its projected solid angle would be exact, 0.017 % at α = 1.5°.
+
+    Raises
+    ------
+    ArgumentError
+        If the rays have no position.
+    """
+    if not rays.has_position:
+        raise ArgumentError(
+            f"{rays.provenance.source}: the rays have no position (far-field data), so they have no luminance. "
+            "Ask for a near-field ray file."
+        )
+    cones = [_core_cone(view) for view in views]
+    sums, raw_tally = _core.cone_sums(rays.core_source(), cones, threads, progress)
+    tally = Tally.from_core(raw_tally)
+    scale = rays.accept_tally(tally)
+    estimates = []
+    for view, (flux, flux_squared, counts) in zip(views, sums, strict=True):
+        etendue = view.etendue()
+        factor = scale / etendue
+        estimates.append(
+            ConeEstimate(view, flux * factor, flux_squared * factor**2, counts.astype(np.int64), etendue)
+        )
+    return estimates, tally
+
+
+def _core_cone(view: ConeView) -> _core._Cone:
+    right, up, normal = view.screen.axes(view.observer)
+    return {
+        "eye": view.observer.position.tolist(),
+        "target": view.observer.target,
+        "right": right.tolist(),
+        "up": up.tolist(),
+        "normal": normal.tolist(),
+        "width": float(view.screen.width),
+        "height": float(view.screen.height),
+        "columns": view.screen.columns,
+        "rows": view.screen.rows,
+        "acceptances": [math.radians(a) for a in view.acceptances],
+    }
