@@ -6,6 +6,7 @@
 600
 """
 
+from etendue.luminance.combination import combine_maps
 from etendue.luminance.estimate import luminance_map
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.luminance_map import LuminanceMap
@@ -13,4 +14,4 @@ from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
 from etendue.sources.ring_source import RingSource
 
-__all__ = ["LuminanceMap", "Observer", "RaySet", "RingSource", "Screen", "Spectrum", "luminance_map"]
+__all__ = ["LuminanceMap", "Observer", "RaySet", "RingSource", "Screen", "Spectrum", "combine_maps", "luminance_map"]

@@ -1,0 +1,30 @@
+"""Maps of independent runs joined into one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import etendue as et
+from etendue.errors import ArgumentError
+
+VIEW = (et.Observer(20, 40, 150), et.Screen(70, 50, 14, 10))
+
+
+def test_runs_joined_equal_the_source_with_all_runs() -> None:
+    """Second route: the core draws the same rays as one source of three runs, with a third of the flux each."""
+    runs = [et.luminance_map(et.RingSource(rays=300_000, seed=s), *VIEW, method="cone") for s in (5, 6, 7)]
+    joined = et.combine_maps(runs)
+    whole = et.luminance_map(et.RingSource(rays=300_000, runs=3, seed=5), *VIEW, method="cone")
+    np.testing.assert_array_equal(joined.rays, whole.rays)
+    np.testing.assert_allclose(joined.values, whole.values, rtol=1e-12)
+    np.testing.assert_allclose(joined.standard_error, whole.standard_error, rtol=1e-12)
+    assert np.isnan(joined.values).sum() == joined.dead_pixels < sum(m.dead_pixels for m in runs) / 3
+
+
+def test_other_views_are_refused() -> None:
+    a = et.luminance_map(et.RingSource(rays=1000), *VIEW, method="cone")
+    with pytest.raises(ArgumentError, match="observer differs"):
+        et.combine_maps([a, a.replace(observer=et.Observer(21, 40, 150))])
+    with pytest.raises(ArgumentError, match="no maps"):
+        et.combine_maps([])
