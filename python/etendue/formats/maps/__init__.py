@@ -1,0 +1,108 @@
+"""Files that hold luminance maps: one module per format, one registry, found by content."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from etendue.errors import FormatError, UnknownNameError
+from etendue.formats.maps import csv, exr, hdr, npz, tiff
+from etendue.formats.maps.map_format import MapFormat
+from etendue.formats.output import atomic_output
+from etendue.quantities.luminance_map import SAVE_MAP, LuminanceMap
+
+MAP_FORMATS: dict[str, MapFormat] = {module.FORMAT.name: module.FORMAT for module in (exr, hdr, tiff, npz, csv)}
+"""Every format by name."""
+
+PICTURE_EXTENSIONS = (".png", ".pdf")
+"""Extensions that are drawn instead of written: a picture for people, which no program reads back."""
+
+SNIFFED_BYTES = 64
+
+
+def read_map(path: str | os.PathLike[str]) -> LuminanceMap:
+    """Read a luminance map that `save_map` wrote; the format is found from the content.
+
+    Parameters
+    ----------
+    path : path
+        A file of any of `MAP_FORMATS`.
+
+    Returns
+    -------
+    LuminanceMap
+        The map. From .npz and .csv exactly the one that was saved; from .exr and .tif rounded to float32; from .hdr
+        to 8 bits, without standard errors and ray counts.
+
+    Raises
+    ------
+    FormatError
+        If it is none of the formats, was not written by étendue (observer, screen and unit would be missing), or has
+        changed since: a checksum seals header and pixels.
+    OSError
+        If the file cannot be opened.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tempfile import TemporaryDirectory
+    >>> from etendue.quantities.observer import Observer, Screen
+    >>> from etendue.quantities.provenance import Provenance
+    >>> lmap = LuminanceMap([[3.0, np.nan]], [[0.1, np.nan]], [[900, 0]], Observer(0, 0, 1000), Screen(2, 1, 2, 1),
+    ...                     provenance=Provenance(software="example"))
+    >>> with TemporaryDirectory() as folder:
+    ...     lost = save_map(lmap, Path(folder) / "map.npz")
+    ...     read_map(Path(folder) / "map.npz").values.tolist(), lost
+    ([[3.0, nan]], ())
+    """
+    path = Path(path)
+    with path.open("rb") as stream:
+        head = stream.read(SNIFFED_BYTES)
+    for candidate in MAP_FORMATS.values():
+        if candidate.sniff(head):
+            return candidate.read(path)
+    found = f"no map format begins with {head[:8]!r}" if head else "the file is empty"
+    raise FormatError(path, "first bytes", found, f"étendue reads the maps it wrote: {', '.join(_extensions())}.")
+
+
+def save_map(lmap: LuminanceMap, path: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Write a luminance map; the format follows the extension.
+
+    The file appears whole or not at all, and the same map gives the same bytes.
+
+    Parameters
+    ----------
+    lmap : LuminanceMap
+        The map.
+    path : path
+        Ends with an extension of one of `MAP_FORMATS`, or with one of `PICTURE_EXTENSIONS` for a picture.
+
+    Returns
+    -------
+    tuple of str
+        What the format could not express, one sentence each; empty when it holds everything.
+
+    Raises
+    ------
+    UnknownNameError
+        If no format has the extension.
+    ArgumentError
+        If the directory does not exist or a number is too large for the format.
+    """
+    path = Path(path)
+    extension = path.suffix.lower()
+    if extension in PICTURE_EXTENSIONS:
+        lmap.plot(path)
+        return ("a picture is for the eye: the numbers of the map cannot be read back from it",)
+    for candidate in MAP_FORMATS.values():
+        if extension in candidate.extensions:
+            with atomic_output(path) as temporary:
+                return candidate.write(lmap, temporary)
+    raise UnknownNameError("extension of a map file", extension, (*_extensions(), *PICTURE_EXTENSIONS))
+
+
+def _extensions() -> list[str]:
+    return [extension for candidate in MAP_FORMATS.values() for extension in candidate.extensions]
+
+
+SAVE_MAP[:] = [save_map]

@@ -1,0 +1,81 @@
+"""Comma-separated text: the exact map, for spreadsheets and for eyes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from etendue.errors import FormatError
+from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
+from etendue.formats.maps.map_format import DAMAGED, MapFormat, parsing
+from etendue.quantities.luminance_map import LuminanceMap
+
+TITLE = "# etendue luminance map"
+COLUMNS = {
+    "row": np.int64,
+    "column": np.int64,
+    "x_mm": np.float64,
+    "y_mm": np.float64,
+    "value": np.float64,
+    "standard_error": np.float64,
+    "rays": np.int64,
+}
+
+
+def write(lmap: LuminanceMap, path: Path) -> tuple[str, ...]:
+    """Write a title, the JSON header behind ``#``, the column names and one line per pixel; nothing is lost.
+
+    Numbers have as many digits as it takes to read the same float64 back; ``nan`` stands for a dead pixel.
+    """
+    with path.open("w", encoding="ascii", newline="\n") as stream:
+        stream.write(f"{TITLE}\n# {header_text(lmap)}\n{','.join(COLUMNS)}\n")
+        stream.writelines(_rows(lmap))
+    return ()
+
+
+def _rows(lmap: LuminanceMap) -> Iterator[str]:
+    """The lines of one row of pixels at a time."""
+    x = lmap.screen.x.tolist()
+    for row, y in enumerate(lmap.screen.y.tolist()):
+        pixels = zip(x, *(array[row].tolist() for array in (lmap.values, lmap.standard_error, lmap.rays)), strict=True)
+        yield "".join(
+            f"{row},{column},{x_mm!r},{y!r},{value!r},{error!r},{rays}\n"
+            for column, (x_mm, value, error, rays) in enumerate(pixels)
+        )
+
+
+def read(path: Path) -> LuminanceMap:
+    """Read what `write` wrote; line ends may have become those of another system."""
+    with path.open("rb") as stream:
+        top = [stream.readline().rstrip(b"\r\n") for _ in range(3)]
+        lines, ended = _count_lines(stream)
+    if top[0] != TITLE.encode("ascii") or not top[1].startswith(b"# "):
+        raise FormatError(path, "lines 1 and 2", "not the title and header of an étendue map", FOREIGN)
+    if top[2] != ",".join(COLUMNS).encode("ascii"):
+        raise FormatError(path, "line 3", f"found {top[2][:80]!r}", f"It must be {','.join(COLUMNS)!r}.")
+    header = MapHeader.parse(path, "line 2", top[1][2:].decode("ascii", errors="replace"))
+    if lines != header.pixels or not ended:
+        found = f"{lines} whole lines of pixels, {header.pixels} expected" + ("" if ended else ", and a line cut short")
+        raise FormatError(path, "pixels", found, DAMAGED)
+    with parsing(path, "pixels"), path.open(encoding="ascii") as stream:
+        table = np.loadtxt(stream, dtype=list(COLUMNS.items()), delimiter=",", comments=None, skiprows=3, ndmin=1)
+    row, column = np.divmod(np.arange(header.pixels), header.columns)
+    if len(table) != header.pixels or (table["row"] != row).any() or (table["column"] != column).any():
+        raise FormatError(path, "pixels", "rows and columns do not count up", "Restore the order they were written in.")
+    value, error, rays = (table[name].reshape(header.shape) for name in ("value", "standard_error", "rays"))
+    return header.restore(value, error, rays)
+
+
+def _count_lines(stream: BinaryIO) -> tuple[int, bool]:
+    """Number of line ends from here on, and whether the file stops with one."""
+    lines, last = 0, b"\n"
+    while block := stream.read(1 << 20):
+        lines += block.count(b"\n")
+        last = block[-1:]
+    return lines, last == b"\n"
+
+
+FORMAT = MapFormat("csv", (".csv",), lambda head: head.startswith(TITLE.encode("ascii")), read, write)
