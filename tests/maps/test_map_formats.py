@@ -8,7 +8,9 @@ import io
 import json
 import math
 import pkgutil
+import struct
 import tracemalloc
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -190,28 +192,60 @@ def test_damage_gives_a_format_error_or_the_right_map(name: str, data: st.DataOb
     assert peak < 50e6
 
 
-@ALL
-def test_a_header_that_claims_absurdly_many_pixels(name: str, tmp_path: Path) -> None:
-    """The screen of the JSON header is altered in place, as an editor might do; memory must not follow it."""
+def claim(path: Path, name: str, rows: int, columns: int) -> None:
+    """Alter a file of 11 x 12 pixels so that it claims another size wherever a size is written."""
+    content = path.read_bytes()
+    for key, old, new in (("rows", 11, rows), ("columns", 12, columns)):
+        text = f'"{key}": {old}'.encode()
+        assert content.count(text) == 1
+        # Blanks elsewhere make room, so that lengths stored in the file stay true.
+        content = content.replace(text, f'"{key}":{new}'.encode())
+        content = content.replace(b', "', b',"', len(str(new)) - len(str(old)) - 1)
+    if name == "hdr":
+        assert content.count(b"-Y 11 +X 12") == 1
+        content = content.replace(b"-Y 11 +X 12", f"-Y {rows} +X {columns}".encode())
+    elif name == "exr":
+        window = struct.pack("<4i", 0, 0, 11, 10)
+        assert content.count(window) == 2
+        content = content.replace(window, struct.pack("<4i", 0, 0, columns - 1, rows - 1))
+    elif name == "tiff":
+        for tag, old, new in ((256, 12, columns), (257, 11, rows), (278, 11, rows)):
+            entry = struct.pack("<HHII", tag, 4, 1, old)
+            assert content.count(entry) == 3
+            content = content.replace(entry, struct.pack("<HHII", tag, 4, 1, new))
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("name", sorted(set(MAP_FORMATS) - {"npz"}))
+def test_sizes_that_the_file_cannot_hold_set_no_memory_aside(name: str, tmp_path: Path) -> None:
     path = path_of(name, tmp_path)
-    text = {"rows": 11111, "columns": 22222}
-    save_map(make_map((11, 12), screen=Screen(1, 1, 12, 11)), path)
-    if name == "npz":
-        with np.load(path) as archive:
-            arrays = dict(archive)
-        header = json.loads(arrays["header"].item())
-        header["screen"] |= text
-        np.savez_compressed(path, **(arrays | {"header": np.array(json.dumps(header))}))
-    else:
-        content = path.read_bytes()
-        for key, value in (("rows", 11), ("columns", 12)):
-            old = f'"{key}": {value}'.encode()
-            assert content.count(old) == 1
-            # Blanks elsewhere make room, so that lengths stored in the file stay true.
-            content = content.replace(old, f'"{key}":{text[key]}'.encode()).replace(b", ", b",", 2)
-        path.write_bytes(content)
+    save_map(make_map((11, 12)), path)
+    claim(path, name, rows=11111, columns=22222)
     tracemalloc.start()
-    with pytest.raises(FormatError):
+    with pytest.raises(FormatError, match="246908642"):
+        read_map(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 20e6
+
+
+def test_npz_sizes_that_the_file_cannot_hold_set_no_memory_aside(tmp_path: Path) -> None:
+    """An archive whose directory, array headers and JSON header agree on 2 GB that are not there."""
+    path = tmp_path / "map.npz"
+    save_map(make_map((11, 12)), path)
+    with np.load(path) as archive:
+        header = json.loads(archive["header"].item())
+    header["screen"] |= {"rows": 11111, "columns": 22222}
+    arrays = io.BytesIO()
+    np.lib.format.write_array_header_1_0(arrays, {"shape": (11111, 22222), "fortran_order": False, "descr": "<f8"})
+    text = io.BytesIO()
+    np.save(text, np.array(json.dumps(header)))
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("header.npy", text.getvalue())
+        for name in ("values", "standard_error", "rays"):
+            archive.writestr(f"{name}.npy", arrays.getvalue())
+    tracemalloc.start()
+    with pytest.raises(FormatError, match=r"array 'values'|zip archive"):
         read_map(path)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
@@ -241,6 +275,18 @@ def test_altered_headers_are_refused(name: str, old: str, new: str, tmp_path: Pa
         assert content.count(old.encode()) == 1
         path.write_bytes(content.replace(old.encode(), new.ljust(len(old)).encode()))
     with pytest.raises(FormatError, match="update it" if "etendue_map" in old else "checksum"):
+        read_map(path)
+
+
+@pytest.mark.parametrize("field", ["value", "standard_error", "rays"])
+def test_the_checksum_covers_every_array(field: str, tmp_path: Path) -> None:
+    path = tmp_path / "map.csv"
+    save_map(make_map(), path)
+    *lines, last = path.read_text("ascii").splitlines()
+    cells = dict(zip(lines[2].split(","), last.split(","), strict=True))
+    cells[field] = "1" + cells[field]
+    path.write_text("\n".join((*lines, ",".join(cells.values()), "")), "ascii")
+    with pytest.raises(FormatError, match="checksum"):
         read_map(path)
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
-from etendue.formats.maps.map_format import DAMAGED, DEFLATE_RATIO, MapFormat, check_room, parsing
+from etendue.formats.maps.map_format import DAMAGED, DEFLATE_RATIO, MapFormat, parsing
 from etendue.quantities.luminance_map import LuminanceMap
 
 ARRAYS = {"values": np.dtype("<f8"), "standard_error": np.dtype("<f8"), "rays": np.dtype("<i8")}
@@ -34,7 +34,6 @@ def read(path: Path) -> LuminanceMap:
             raise FormatError(path, "zip archive", f"no {', '.join(missing)} in it", FOREIGN)
         text = _member(archive, path, "header", (), np.dtype(str))
         header = MapHeader.parse(path, "array 'header'", str(text.item()))
-        check_room(path, header.pixels, sum(dtype.itemsize for dtype in ARRAYS.values()))
         arrays = {name: _member(archive, path, name, header.shape, dtype) for name, dtype in ARRAYS.items()}
     return header.restore(arrays["values"], arrays["standard_error"], arrays["rays"])
 
