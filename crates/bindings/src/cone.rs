@@ -64,8 +64,8 @@ pub fn cone_sums<'py>(
 ) -> PyResult<(Vec<SumArrays<'py>>, Bound<'py, PyDict>)> {
     let core: Vec<CoreCone> = cones.iter().map(Cone::core).collect();
     let (sums, tally) = with_source(source, |source| {
-        interruptible(py, threads, progress, |pool, tick| {
-            core_cone_sums(source, &core, pool, tick)
+        interruptible(py, threads, progress, |threads, tick| {
+            core_cone_sums(source, &core, threads, tick)
         })
     })?;
     let arrays = sums

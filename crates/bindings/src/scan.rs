@@ -29,7 +29,7 @@ pub fn scan<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyDict>)> {
     let scan: Scan = with_source(source, |source| {
-        interruptible(py, threads, progress, |pool, tick| core_scan(source, pool, tick))
+        interruptible(py, threads, progress, |threads, tick| core_scan(source, threads, tick))
     })?;
     let moments = PyDict::new(py);
     moments.set_item("zero_flux", scan.zero_flux)?;

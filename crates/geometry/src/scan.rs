@@ -2,7 +2,7 @@
 
 use std::ops::{ControlFlow, Range};
 
-use etendue_sampling::ordered::{self, ThreadPool};
+use etendue_sampling::ordered;
 
 use crate::batch::RayBatch;
 use crate::source::RaySource;
@@ -99,10 +99,10 @@ fn widen(range: &mut [f64; 2], value: f64) {
 }
 
 /// Scans a whole source. Ends early, with the sums so far, if `progress` breaks.
-pub fn scan(source: &impl RaySource, pool: &ThreadPool, progress: impl FnMut(u64) -> ControlFlow<()>) -> Scan {
+pub fn scan(source: &impl RaySource, threads: usize, progress: impl FnMut(u64) -> ControlFlow<()>) -> Scan {
     let mut total = Scan::default();
     ordered::run(
-        pool,
+        threads,
         source.len(),
         |range| Scan::of_range(source, range),
         |part| total.merge(&part),
@@ -145,8 +145,7 @@ mod tests {
             length_scale: 1.0,
         };
         let table = RayTable::new(&bytes, layout).expect("valid");
-        let pool = ordered::pool(2).expect("pool");
-        let scanned = scan(&table, &pool, |_| ControlFlow::Continue(()));
+        let scanned = scan(&table, 2, |_| ControlFlow::Continue(()));
         let plain = |f: &dyn Fn(&[f64; 7]) -> f64| rays.iter().map(f).sum::<f64>();
         assert_eq!(scanned.tally.rays, n);
         assert!((scanned.tally.flux / plain(&|r| r[6]) - 1.0).abs() < 1e-12);

@@ -58,7 +58,7 @@ impl<'a> RayTable<'a> {
                 .is_some_and(|end| end <= layout.stride)
         };
         let valid = layout.stride > 0
-            && bytes.len() % layout.stride == 0
+            && bytes.len().is_multiple_of(layout.stride)
             && layout.position.is_none_or(|offset| fits(offset, 3))
             && fits(layout.direction, 3)
             && fits(layout.flux, 1);

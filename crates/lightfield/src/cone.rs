@@ -7,7 +7,8 @@
 use std::ops::{ControlFlow, Range};
 
 use etendue_geometry::{RayBatch, RaySource, Tally};
-use etendue_sampling::ordered::{self, ThreadPool};
+use etendue_sampling::ordered;
+use multiversion::multiversion;
 
 use crate::view::View;
 
@@ -74,12 +75,8 @@ impl Prepared {
 
     fn collect(&self, batch: &RayBatch, cosine: &mut [f64], hits: &mut Vec<Hit>) {
         let n = batch.len;
-        let [ax, ay, az] = self.axis;
         let [kx, ky, kz] = &batch.direction;
-        // Split from the search so that it runs several rays at a time.
-        for (((c, x), y), z) in cosine[..n].iter_mut().zip(&kx[..n]).zip(&ky[..n]).zip(&kz[..n]) {
-            *c = x * ax + y * ay + z * az;
-        }
+        cosines(self.axis, [&kx[..n], &ky[..n], &kz[..n]], &mut cosine[..n]);
         for (i, &c) in cosine[..n].iter().enumerate() {
             if c >= self.cos_field && batch.flux[i] > 0.0 {
                 let k = batch.direction(i);
@@ -100,6 +97,15 @@ impl Prepared {
     }
 }
 
+/// Cosine of each direction to `axis`: several rays at a time, the same bits on every instruction set.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn cosines(axis: [f64; 3], directions: [&[f64]; 3], cosine: &mut [f64]) {
+    let [kx, ky, kz] = directions;
+    for (((c, x), y), z) in cosine.iter_mut().zip(kx).zip(ky).zip(kz) {
+        *c = x * axis[0] + y * axis[1] + z * axis[2];
+    }
+}
+
 /// Sums of the seen rays for any number of cones, in one pass over the source.
 ///
 /// Each pixel's sums run in ray order, whatever the number of threads: threads only find the hits, which are then added
@@ -107,7 +113,7 @@ impl Prepared {
 pub fn cone_sums(
     source: &impl RaySource,
     cones: &[Cone],
-    pool: &ThreadPool,
+    threads: usize,
     progress: impl FnMut(u64) -> ControlFlow<()>,
 ) -> (Vec<Sums>, Tally) {
     let prepared: Vec<Prepared> = cones.iter().map(Prepared::new).collect();
@@ -142,7 +148,7 @@ pub fn cone_sums(
             }
         }
     };
-    ordered::run(pool, source.len(), work, merge, progress);
+    ordered::run(threads, source.len(), work, merge, progress);
     (sums, tally)
 }
 
@@ -207,13 +213,7 @@ mod tests {
     fn equals_a_plain_loop_without_the_quick_rejection() {
         let (bytes, cone) = (bytes(300_000), cone());
         let table = RayTable::new(&bytes, layout()).expect("valid");
-        let pool = ordered::pool(2).expect("pool");
-        let (sums, tally) = cone_sums(
-            &table,
-            std::slice::from_ref(&cone),
-            &pool,
-            |_| ControlFlow::Continue(()),
-        );
+        let (sums, tally) = cone_sums(&table, std::slice::from_ref(&cone), 2, |_| ControlFlow::Continue(()));
         let mut expected = Sums::new(60);
         table.for_each_block(0..300_000, |_, batch| {
             for i in 0..batch.len {
@@ -239,8 +239,7 @@ mod tests {
         let bytes = bytes(500_000);
         let table = RayTable::new(&bytes, layout()).expect("valid");
         let run = |threads| {
-            let pool = ordered::pool(threads).expect("pool");
-            let (sums, tally) = cone_sums(&table, &[cone()], &pool, |_| ControlFlow::Continue(()));
+            let (sums, tally) = cone_sums(&table, &[cone()], threads, |_| ControlFlow::Continue(()));
             let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
             (bits(&sums[0].flux), bits(&sums[0].flux_squared), tally.flux.to_bits())
         };

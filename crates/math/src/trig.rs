@@ -7,7 +7,7 @@
 ///
 /// The turn is folded to a quarter `q` and a remainder `r` with |2πr| ≤ π/4, where the Taylor series of sine and cosine
 /// (to x¹⁵ and x¹⁶; first term left out < 3e-17) hold to rounding.
-#[inline]
+#[inline(always)] // into loops that are compiled for several instruction sets
 #[must_use]
 pub fn sin_cos_turns(u: f64) -> (f64, f64) {
     let q = (4.0 * u).round();

@@ -3,7 +3,6 @@
 use std::ops::ControlFlow;
 use std::ops::Range;
 
-pub use rayon::ThreadPool;
 use rayon::prelude::*;
 
 /// Rays in one unit of work. Fixed: partial sums are formed per batch, so their bits depend on it.
@@ -12,43 +11,46 @@ pub const BATCH: u64 = 1 << 16;
 /// Batches between two calls of the progress function: some 10 ms to 100 ms of work.
 const ROUND: u64 = 64;
 
-/// A pool of `threads` threads, or of one per core for 0.
+/// Runs `work` over `0..n` in batches of [`BATCH`] on `threads` threads (0: one per core), and hands each result to
+/// `merge` in batch order.
 ///
-/// # Errors
-/// The system's reason, if it grants no threads.
-pub fn pool(threads: usize) -> Result<ThreadPool, rayon::ThreadPoolBuildError> {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build()
-}
-
-/// Runs `work` over `0..n` in batches of [`BATCH`] on the pool, and hands each result to `merge` in batch order.
-///
-/// `merge` and `progress` run on the calling thread, which is where an interpreter looks for signals.
-/// `progress` is told how many items are done after each round; [`ControlFlow::Break`] ends the run early. Returns the
-/// number of items done. At most `ROUND` results wait to be merged at any time, which bounds the memory.
+/// `merge` and `progress` run on the calling thread, which is where an interpreter looks for signals. `progress` is told
+/// how many items are done after each round; [`ControlFlow::Break`] ends the run early. Returns the number of items done.
+/// At most [`ROUND`] results wait to be merged at any time, which bounds the memory. The threads live as long as the call:
+/// a process may fork afterwards. A single batch, or a system that grants no threads, is served by the calling thread.
 pub fn run<T: Send>(
-    pool: &ThreadPool,
+    threads: usize,
     n: u64,
     work: impl Fn(Range<u64>) -> T + Sync,
     mut merge: impl FnMut(T),
     mut progress: impl FnMut(u64) -> ControlFlow<()>,
 ) -> u64 {
     let batches = n.div_ceil(BATCH);
-    let mut first = 0;
-    while first < batches {
-        let last = (first + ROUND).min(batches);
-        let results: Vec<T> = pool.install(|| {
-            (first..last)
-                .into_par_iter()
-                .map(|b| work(b * BATCH..((b + 1) * BATCH).min(n)))
-                .collect()
-        });
-        results.into_iter().for_each(&mut merge);
-        first = last;
-        if progress((first * BATCH).min(n)).is_break() {
-            break;
+    let batch = |b: u64| work(b * BATCH..((b + 1) * BATCH).min(n));
+    let mut rounds = |pool: Option<&rayon::ThreadPool>| {
+        let mut first = 0;
+        while first < batches {
+            let last = (first + ROUND).min(batches);
+            match pool {
+                Some(pool) => {
+                    let results: Vec<T> = pool.install(|| (first..last).into_par_iter().map(batch).collect());
+                    results.into_iter().for_each(&mut merge);
+                }
+                None => (first..last).map(batch).for_each(&mut merge),
+            }
+            first = last;
+            if progress((first * BATCH).min(n)).is_break() {
+                break;
+            }
         }
+        (first * BATCH).min(n)
+    };
+    if batches <= 1 || threads == 1 {
+        return rounds(None);
     }
-    (first * BATCH).min(n)
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    let done = builder.build_scoped(rayon::ThreadBuilder::run, |pool| rounds(Some(pool)));
+    done.unwrap_or_else(|_| rounds(None))
 }
 
 #[cfg(test)]
@@ -59,10 +61,9 @@ mod tests {
     fn merges_in_order_for_any_number_of_threads() {
         let n = 10 * BATCH + 17;
         let sum = |threads| {
-            let pool = pool(threads).expect("pool");
             let mut parts = Vec::new();
             let harmonic = |r: Range<u64>| r.map(|i| 1.0 / (i as f64 + 1.0)).sum::<f64>();
-            let done = run(&pool, n, harmonic, |s| parts.push(s), |_| ControlFlow::Continue(()));
+            let done = run(threads, n, harmonic, |s| parts.push(s), |_| ControlFlow::Continue(()));
             assert_eq!(done, n);
             parts.iter().sum::<f64>().to_bits()
         };
@@ -74,9 +75,8 @@ mod tests {
     #[test]
     fn stops_when_asked() {
         let mut seen = 0;
-        let pool = pool(2).expect("pool");
         let done = run(
-            &pool,
+            2,
             200 * BATCH,
             |r| r.end - r.start,
             |k| seen += k,
