@@ -144,7 +144,7 @@ mod tests {
             [-1.0, 0.5, 0.25, 0.0, 3.0, 4.0, 7.0],
         ] {
             bytes.push(0xAA);
-            record.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+            bytes.extend(record.iter().flat_map(|v| v.to_le_bytes()));
             bytes.push(0xBB);
         }
         let table = RayTable::new(&bytes, layout()).expect("valid");
