@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError
+from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
 from etendue.quantities.provenance import Provenance
-from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
+from etendue.units import FLUX_UNITS, LUMINANCE_NAME, LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
 
 MapValues = npt.NDArray[np.float64]
 
@@ -50,6 +50,8 @@ class LuminanceMap:
     ------
     ArgumentError
         If the arrays do not have the screen's shape.
+    UnknownNameError
+        If there is no such unit of flux.
 
     Examples
     --------
@@ -71,6 +73,8 @@ class LuminanceMap:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.flux_unit not in FLUX_UNITS:
+            raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)
         for name, dtype in (("values", np.float64), ("standard_error", np.float64), ("rays", np.int64)):
             array = np.array(getattr(self, name), dtype=dtype)
             if array.shape != self.screen.shape:

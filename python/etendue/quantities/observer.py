@@ -134,7 +134,7 @@ class Screen:
                 raise ArgumentError(f"Screen: {name} is {value} mm; give a finite size > 0.")
         for name in ("columns", "rows"):
             value = getattr(self, name)
-            if int(value) != value or not 1 <= value <= 65536:
+            if not 1 <= value <= 65536 or int(value) != value:  # in this order: NaN and infinity have no int
                 raise ArgumentError(f"Screen: {name} is {value}; give a whole number of pixels, 1 to 65536.")
             object.__setattr__(self, name, int(value))
         if self.plane not in PLANES:

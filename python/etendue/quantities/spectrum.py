@@ -60,7 +60,9 @@ class Spectrum:
     @property
     def total(self) -> float:
         """∫ of the weight over wavelength; for a line its weight."""
-        return float(np.trapezoid(self.weight, self.wavelength)) if self.wavelength.size > 1 else float(self.weight[0])
+        if self.wavelength.size == 1:
+            return float(self.weight[0])
+        return float(np.sum(np.diff(self.wavelength) * (self.weight[1:] + self.weight[:-1])) / 2)
 
     @property
     def luminous_efficacy(self) -> float:
@@ -74,8 +76,10 @@ class Spectrum:
         if self.wavelength.size == 1:
             return LUMINOUS_EFFICACY_MAX * float(photopic_efficiency(self.wavelength)[0])
         nodes, _ = _photopic_table()
-        inside = nodes[(nodes > self.wavelength[0]) & (nodes < self.wavelength[-1])]
-        at = np.union1d(self.wavelength, inside)
+        at = np.union1d(self.wavelength, nodes)
+        # Only where both are defined: at the ends of its table V steps to 0, and Simpson's rule must not straddle a step.
+        low, high = max(nodes[0], self.wavelength[0]), min(nodes[-1], self.wavelength[-1])
+        at = at[(at >= low) & (at <= high)]
         middle = (at[1:] + at[:-1]) / 2
         product = np.interp(at, self.wavelength, self.weight) * photopic_efficiency(at)
         product_middle = np.interp(middle, self.wavelength, self.weight) * photopic_efficiency(middle)

@@ -60,5 +60,6 @@ def spool(
 
 def _flush(held: list[npt.NDArray[Any]], file: Any) -> None:
     for part in held:
-        part.tofile(file)
+        # Not ndarray.tofile, which closes its own buffer without looking whether the last bytes found room.
+        file.write(part.view(np.uint8).data)
     held.clear()
