@@ -16,14 +16,13 @@ import time
 from pathlib import Path
 from typing import Any
 
+import etendue as et
 import numpy as np
 import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-
-import etendue as et
 
 ACCEPTANCE = 1.5  # α of section 2.3.2 [°]
 OBSERVER = et.Observer(theta=0, phi=0, distance=150)
@@ -46,9 +45,7 @@ def trace(source: et.RingSource, seeds: int) -> Runs:
     halves = []
     for first, count in ((1, seeds // 2), (1 + seeds // 2, seeds - seeds // 2)):
         runs = et.RingSource(rays=sum(source.allocation), runs=count, seed=first)
-        halves.append(
-            et.luminance_map(runs, [OBSERVER] * 2, [FINE, COARSE], method="cone", acceptance=ACCEPTANCE)
-        )
+        halves.append(et.luminance_map(runs, [OBSERVER] * 2, [FINE, COARSE], method="cone", acceptance=ACCEPTANCE))
     if seeds % 2:
         raise SystemExit("give an even number of seeds: figure 2.10 compares half of them with all")
     (half, half_coarse), (other, other_coarse) = halves
@@ -89,7 +86,8 @@ def measured_noise(source: et.RingSource, lmap: et.LuminanceMap) -> list[float]:
 def print_tables(source: et.RingSource, runs: Runs, smooth: dict[str, et.LuminanceMap], seeds: int) -> None:
     print("\nTable 2.1: rays per run, eqs. 2.7 and 2.8")
     for zone, (flux, area, rays) in enumerate(zip(source.ring_flux, source.ring_area, source.allocation, strict=True)):
-        print(f"  zone {zone + 1}: {flux:.0f} lm, {area * 1e-6:.6f} m², {rays:,} rays, L = {source.zone_luminance[zone]:,.0f} cd/m²")
+        luminance = source.zone_luminance[zone]
+        print(f"  zone {zone + 1}: {flux:.0f} lm, {area * 1e-6:.6f} m², {rays:,} rays, L = {luminance:,.0f} cd/m²")
     print("\nPixel noise, measured / exact Poisson prediction, zones 1, 2, 3")
     for title, lmap, count in (
         (f"{seeds // 2} seeds, 128 × 128", runs.half, seeds // 2),
@@ -186,7 +184,8 @@ def main() -> None:
     runs = trace(source, options.seeds)
     total = options.rays * options.seeds
     seconds = time.perf_counter() - start
-    print(f"{total:,} rays drawn and mapped at two resolutions in {seconds:.1f} s: {total / seconds / 1e6:.1f} million rays/s")
+    rate = total / seconds / 1e6
+    print(f"{total:,} rays drawn and mapped at two resolutions in {seconds:.1f} s: {rate:.1f} million rays/s")
     smooth = {kind: et.filter_map(runs.fine, kind, size=5, gamma=0.2) for kind in FILTERS}
     print_tables(source, runs, smooth, options.seeds)
     truth = true_map(source, runs.fine)

@@ -1,13 +1,13 @@
 """The compiled core. Arrays in, arrays out; lengths in mm, angles in radians, fluxes as stored."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypedDict, final
+from typing import Any, TypeAlias, TypedDict, final
 
 import numpy as np
 import numpy.typing as npt
 
-_Floats = npt.NDArray[np.float64]
-_Progress = Callable[[int], Any]
+_Floats: TypeAlias = npt.NDArray[np.float64]
+_Progress: TypeAlias = Callable[[int], Any]
 
 class _Tally(TypedDict):
     rays: int
@@ -76,9 +76,7 @@ def cone_sums(
 ) -> tuple[list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]], _Tally]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the tally."""
 
-def select_subset(
-    start: int, stop: int, n: int, k: int, taken: int, seed: int
-) -> npt.NDArray[np.uint64]:
+def select_subset(start: int, stop: int, n: int, k: int, taken: int, seed: int) -> npt.NDArray[np.uint64]:
     """Indices in ``start..stop`` of a random k-subset of n, of which `taken` were taken before."""
 
 def deal_parts(start: int, stop: int, parts: int, seed: int) -> npt.NDArray[np.uint32]:

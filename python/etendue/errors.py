@@ -45,7 +45,3 @@ class UnsupportedFormatError(FormatError):
 
 class UnitError(EtendueError, ValueError):
     """A conversion between units that the data does not support (watts to lumens without a spectrum)."""
-
-
-class Cancelled(EtendueError):
-    """Long work was stopped on request before it had any result worth keeping."""

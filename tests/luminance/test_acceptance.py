@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
-
-import etendue as et
 from etendue.luminance.acceptance import LADDER, choose_acceptance, comparison_screen
 from etendue.luminance.cone import ConeView, cone_estimates
 
@@ -38,7 +37,8 @@ def lobed_truth(screen: et.Screen, observer: et.Observer, exponent: float) -> np
 
 
 @pytest.mark.parametrize(
-    ("n", "exponent", "pixels"), [(2_000_000, 400.0, 16), (200_000, 400.0, 16), (2_000_000, 5.0, 32), (100_000, 60.0, 8)]
+    ("n", "exponent", "pixels"),
+    [(2_000_000, 400.0, 16), (200_000, 400.0, 16), (2_000_000, 5.0, 32), (100_000, 60.0, 8)],
 )
 def test_the_chosen_acceptance_is_nearly_the_best(n: int, exponent: float, pixels: int) -> None:
     """Root mean square error within 25 % of the best rung's, which only the truth knows; narrow lobes and wide ones."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import etendue as et
 import numpy as np
 import pytest
-
-import etendue as et
 from etendue.errors import ArgumentError
 
 VIEW = (et.Observer(20, 40, 150), et.Screen(70, 50, 14, 10))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 
+import etendue as et
 import numpy as np
 import numpy.typing as npt
-
-import etendue as et
 
 Array = npt.NDArray[np.float64]
 
@@ -58,15 +57,19 @@ class Quadrilateral:
         inside = (np.abs(a) < 0.5) & (np.abs(b) < 0.5) & (slope > 0)
         return np.where(inside, np.array(self.quarters)[(a > 0).astype(int) + 2 * (b > 0).astype(int)], 0.0)
 
-    def cone_expectation(self, observer: et.Observer, screen: et.Screen, acceptance: float, fineness: int = 12) -> Array:
+    def cone_expectation(
+        self, observer: et.Observer, screen: et.Screen, acceptance: float, fineness: int = 12
+    ) -> Array:
         """Expected value of eq. 2.4 by quadrature over each pixel and its cone, written from vectors alone."""
         theta, phi = np.radians([observer.theta, observer.phi])
         toward = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
         eye = np.array(observer.target) + observer.distance * toward
         if screen.plane == "view":
-            axis = np.array([-np.sin(phi), np.cos(phi), 0.0])
-            turn = lambda e: e * np.cos(theta) + np.cross(axis, e) * np.sin(theta) + axis * (axis @ e) * (1 - np.cos(theta))  # noqa: E731
-            right, up = turn(np.array([1.0, 0, 0])), turn(np.array([0, 1.0, 0]))
+            pole = np.array([-np.sin(phi), np.cos(phi), 0.0])
+            right, up = (
+                e * np.cos(theta) + np.cross(pole, e) * np.sin(theta) + pole * (pole @ e) * (1 - np.cos(theta))
+                for e in (np.array([1.0, 0, 0]), np.array([0, 1.0, 0]))
+            )
         else:
             right, up = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
         normal = np.cross(right, up)

@@ -15,9 +15,11 @@ from etendue.units import FLUX_UNITS, FluxUnit
 
 
 def convert(
-    inputs: Annotated[list[Path], typer.Argument(help="One ray file, or several to merge (a white LED: blue and yellow).")],
+    inputs: Annotated[
+        list[Path], typer.Argument(help="One ray file, or several to merge (a white LED: blue and yellow).")
+    ],
     output: Annotated[Path, typer.Argument(help="The file to write.")],
-    format: Annotated[  # noqa: A002 - the option's name
+    format: Annotated[
         str | None, typer.Option("--format", help="Format to write; from the extension of OUTPUT if not given.")
     ] = None,
     flux: Annotated[
@@ -34,7 +36,8 @@ def convert(
     """Read one or more ray files and write one; complaints and losses are printed."""
     if flux and len(flux) != len(inputs):
         raise typer.BadParameter(f"--flux was given {len(flux)} times for {len(inputs)} input files")
-    sets = [with_flux(read_rays(path), text) for path, text in zip(inputs, flux or [None] * len(inputs), strict=True)]
+    fluxes: list[str | None] = [*flux] if flux else [None] * len(inputs)
+    sets = [with_flux(read_rays(path), text) for path, text in zip(inputs, fluxes, strict=True)]
     rays = RaySet.merge(sets) if len(sets) > 1 else sets[0]
     rays = in_unit(rays, unit)
     if subset is not None:

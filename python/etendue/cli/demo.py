@@ -54,7 +54,9 @@ def zone_results(source: RingSource, lmap: LuminanceMap) -> list[ZoneResult]:
 
 
 def demo(
-    picture: Annotated[Path, typer.Option("-o", "--output", help="The picture to write, .png")] = Path("etendue-demo.png"),
+    picture: Annotated[Path, typer.Option("-o", "--output", help="The picture to write, .png")] = Path(
+        "etendue-demo.png"
+    ),
     rays: Annotated[int, typer.Option("--rays", help="Rays to draw.", min=1000)] = 100_000_000,
     seed: Annotated[int, typer.Option("--seed", help="Seed of the rays.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
@@ -75,7 +77,9 @@ def demo(
         return
     say(f"Three Lambertian rings (300, 200, 100 lm; radii 10, 20, 30 mm), {len(source):,} rays in {seconds:.1f} s,")
     say(f"seen face on from {observer.distance:g} mm within {DEFAULT_ACCEPTANCE}°:")
-    table = Table("ring", "truth Φ/(πA)", "estimate", "standard error", "deviation", "rays seen", box=None, pad_edge=False)
+    table = Table(
+        "ring", "truth Φ/(πA)", "estimate", "standard error", "deviation", "rays seen", box=None, pad_edge=False
+    )
     for column in table.columns[1:]:
         column.justify = "right"
     for r in results:

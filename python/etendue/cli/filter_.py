@@ -9,7 +9,7 @@ import typer
 
 from etendue.cli.luminance import print_map, summary
 from etendue.cli.terminal import check_outputs, complain, print_json, say
-from etendue.formats.maps import MAP_EXTENSIONS, read_map
+from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS, read_map
 from etendue.luminance.filters import FILTERS, filter_map
 
 
@@ -24,7 +24,7 @@ def filter_(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Smooth a map with one of the four filters of the thesis; the flux before and after is printed."""
-    check_outputs(output, MAP_EXTENSIONS)
+    check_outputs(output, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
     smooth = filter_map(read_map(file), kind, size=size, gamma=gamma)
     losses = [note for path in output for note in smooth.save(path)]
     if json:

@@ -101,19 +101,21 @@ def _print(facts: dict[str, Any]) -> None:
     unit = facts["flux_unit"]
     say(f"{facts['file']}")
     header = facts["header_flux"]
+    stated = f"header {header:.7g} {unit}" if isinstance(header, float) else "no total in the header"
     rows = [
         ("format", facts["title"]),
         ("rays", f"{facts['rays']:,}" + _unusable(facts)),
         ("flux", f"{facts['total_flux']:.7g} {unit}"),
-        ("", f"header {header:.7g} {unit}, sum over the rays {facts['sum_flux']:.7g} {unit}"
-             if isinstance(header, float) else f"no total in the header; sum over the rays {facts['sum_flux']:.7g} {unit}"),
+        ("", f"{stated}; sum over the rays {facts['sum_flux']:.7g} {unit}"),
         ("per ray", _range(facts["flux_per_ray"], unit) + f"; as good as {facts['effective_rays']:,.0f} equal rays"),
         ("bounding box", _box(facts["bounding_box"])),
-        ("virtual focus", _point(facts["virtual_focus"], "mm") or "not determined (the rays are collimated, or have no position)"),
+        ("virtual focus", _point(facts["virtual_focus"], "mm") or "not determined (collimated rays, or far-field data)"),
         ("mean direction", _point(facts["mean_direction"], "") or "none"),
         ("spectrum", facts["spectrum"]),
     ]  # fmt: skip
-    rows += [(key.replace("_", " "), _short(value)) for key, value in facts["header"].items() if value not in ("", None)]
+    rows += [
+        (key.replace("_", " "), _short(value)) for key, value in facts["header"].items() if value not in ("", None)
+    ]
     for label, value in rows:
         say(f"  {label:<22} {value}")
     if not facts["complaint_lines"]:

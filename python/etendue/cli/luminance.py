@@ -11,7 +11,7 @@ import typer
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.terminal import check_outputs, complain, numbers, print_json, progress_bar, say
 from etendue.errors import ArgumentError
-from etendue.formats.maps import MAP_EXTENSIONS
+from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import read_rays
 from etendue.luminance.estimate import METHODS, luminance_map
 from etendue.quantities.luminance_map import LuminanceMap
@@ -36,7 +36,9 @@ def luminance(
     acceptance: Annotated[
         float | None, typer.Option("--acceptance", help="Half-angle of the cone in degrees [1.5].", show_default=False)
     ] = None,
-    flux: Annotated[str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")] = None,
+    flux: Annotated[
+        str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")
+    ] = None,
     unit: Annotated[str | None, typer.Option("--unit", help="lm or W: convert through the file's spectrum.")] = None,
     threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
@@ -47,7 +49,8 @@ def luminance(
     if plane not in PLANES:
         raise typer.BadParameter(f"--plane {plane!r}: give one of {', '.join(PLANES)}")
     x, y, z = numbers(target, 3, "--target", "0,0,0")
-    observers = [Observer(*numbers(text, 2, "--observer", "30,0"), distance, (x, y, z)) for text in observer]
+    angles = [numbers(text, 2, "--observer", "30,0") for text in observer]
+    observers = [Observer(theta, phi, distance, (x, y, z)) for theta, phi in angles]
     width, height = numbers(size, 2, "--size", "25,25")
     columns, rows = numbers(pixels, 2, "--pixels", "128,128")
     screen = Screen(width, height, int(columns), int(rows), "xy" if plane == "xy" else "view")
@@ -55,7 +58,7 @@ def luminance(
     everything = [path for paths in targets for path in paths]
     if len(set(everything)) < len(everything):
         raise ArgumentError("several observers would write to the same file; put {theta} and {phi} into its name.")
-    check_outputs(everything, MAP_EXTENSIONS)
+    check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
 
     rays = in_unit(with_flux(read_rays(file), flux), unit)
     # The first pass over the rays is this one; with method="auto" a second one may follow for large screens.

@@ -1,0 +1,1 @@
+"""Published file formats: bytes to quantities and back, with every complaint."""

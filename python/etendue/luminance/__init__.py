@@ -1,0 +1,1 @@
+"""Luminance from rays: the cone estimator, filters, comparison."""

@@ -11,8 +11,10 @@ from etendue.luminance.cone import ConeEstimate
 from etendue.quantities.observer import Screen
 
 LADDER: tuple[float, ...] = tuple(0.25 * math.sqrt(2.0) ** k for k in range(12))
-"""Acceptances tried [°]: 0.25° to 11.3°, each with twice the solid angle of the one before. Wider cones would misstate even a
-Lambertian source by more than 1 %, which no error bar shows."""
+"""Acceptances tried [°]: 0.25° to 11.3°, each with twice the solid angle of the one before.
+
+Wider cones would misstate even a Lambertian source by more than 1 %, which no error bar shows.
+"""
 
 COARSE_PIXELS = 1 << 16
 """Most pixels of the grid on which acceptances are compared."""

@@ -104,9 +104,7 @@ def cone_estimates(
     for view, (flux, flux_squared, counts) in zip(views, sums, strict=True):
         etendue = view.etendue()
         factor = scale / etendue
-        estimates.append(
-            ConeEstimate(view, flux * factor, flux_squared * factor**2, counts.astype(np.int64), etendue)
-        )
+        estimates.append(ConeEstimate(view, flux * factor, flux_squared * factor**2, counts.astype(np.int64), etendue))
     return estimates, tally
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -82,12 +83,16 @@ class RingSource(RayStream):
         seed: int = 1,
     ) -> None:
         edges = (0.0, *map(float, radii))
-        if len(edges) < 2 or any(not b > a or not math.isfinite(b) for a, b in zip(edges, edges[1:], strict=False)):
+        if len(edges) < 2 or any(not b > a or not math.isfinite(b) for a, b in itertools.pairwise(edges)):
             raise ArgumentError(f"RingSource: radii {tuple(radii)} mm; give rising radii > 0.")
         if len(flux) != len(radii) or any(not (math.isfinite(f) and f > 0) for f in flux):
-            raise ArgumentError(f"RingSource: flux {tuple(flux)} lm; give one finite flux > 0 for each of {len(radii)} rings.")
+            raise ArgumentError(
+                f"RingSource: flux {tuple(flux)} lm; give one finite flux > 0 for each of {len(radii)} rings."
+            )
         if rays < 1 or runs < 1 or rays * runs >= 2**63:
-            raise ArgumentError(f"RingSource: {rays} rays in {runs} runs; give at least one, and fewer than 2^63 in all.")
+            raise ArgumentError(
+                f"RingSource: {rays} rays in {runs} runs; give at least one, and fewer than 2^63 in all."
+            )
         if not 0 <= seed < 2**64:
             raise ArgumentError(f"RingSource: seed {seed}; give 0 to 2^64 - 1.")
         self.edges = edges
@@ -103,7 +108,7 @@ class RingSource(RayStream):
     @property
     def ring_area(self) -> tuple[float, ...]:
         """Area of each ring [mm²]."""
-        return tuple(math.pi * (b * b - a * a) for a, b in zip(self.edges, self.edges[1:], strict=False))
+        return tuple(math.pi * (b * b - a * a) for a, b in itertools.pairwise(self.edges))
 
     @property
     def zone_luminance(self) -> tuple[float, ...]:
@@ -124,7 +129,9 @@ class RingSource(RayStream):
         of the step of luminance. The observer must be above the plane of the rings.
         """
         if observer.position[2] <= 0:
-            raise ArgumentError("RingSource: the observer is not above the plane z = 0, and the rings emit upwards only.")
+            raise ArgumentError(
+                "RingSource: the observer is not above the plane z = 0, and the rings emit upwards only."
+            )
         fine = dataclasses.replace(screen, columns=screen.columns * subdivision, rows=subdivision)
         right, up, _ = screen.axes(observer)
         eye, target = observer.position, np.asarray(observer.target)

@@ -17,6 +17,9 @@ MAP_FORMATS: dict[str, MapFormat] = {module.FORMAT.name: module.FORMAT for modul
 PICTURE_EXTENSIONS = (".png", ".pdf")
 """Extensions that are drawn instead of written: a picture for people, which no program reads back."""
 
+MAP_EXTENSIONS: tuple[str, ...] = tuple(extension for f in MAP_FORMATS.values() for extension in f.extensions)
+"""Extensions of files that hold a map and can be read back."""
+
 SNIFFED_BYTES = 64
 
 
@@ -62,7 +65,7 @@ def read_map(path: str | os.PathLike[str]) -> LuminanceMap:
         if candidate.sniff(head):
             return candidate.read(path)
     found = f"no map format begins with {head[:8]!r}" if head else "the file is empty"
-    raise FormatError(path, "first bytes", found, f"étendue reads the maps it wrote: {', '.join(_extensions())}.")
+    raise FormatError(path, "first bytes", found, f"étendue reads the maps it wrote: {', '.join(MAP_EXTENSIONS)}.")
 
 
 def save_map(lmap: LuminanceMap, path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -98,11 +101,7 @@ def save_map(lmap: LuminanceMap, path: str | os.PathLike[str]) -> tuple[str, ...
         if extension in candidate.extensions:
             with atomic_output(path) as temporary:
                 return candidate.write(lmap, temporary)
-    raise UnknownNameError("extension of a map file", extension, (*_extensions(), *PICTURE_EXTENSIONS))
-
-
-def _extensions() -> list[str]:
-    return [extension for candidate in MAP_FORMATS.values() for extension in candidate.extensions]
+    raise UnknownNameError("extension of a map file", extension, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
 
 
 SAVE_MAP[:] = [save_map]

@@ -8,8 +8,8 @@ from pathlib import Path
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.output import atomic_output
 from etendue.formats.rays import (
-    ascii_table,
     asap,
+    ascii_table,
     lighttools,
     lighttools_text,
     refused,
@@ -61,9 +61,7 @@ def detect_format(path: str | os.PathLike[str]) -> RayFormat:
     )
 
 
-def read_rays(
-    path: str | os.PathLike[str], *, flux: float | None = None, flux_unit: FluxUnit | None = None
-) -> RaySet:
+def read_rays(path: str | os.PathLike[str], *, flux: float | None = None, flux_unit: FluxUnit | None = None) -> RaySet:
     """Read a ray file. Its format is found from the content, never from the extension.
 
     Binary files are mapped, not read: opening 28 GB takes no memory. Files whose per-ray values are relative (TM-25,
@@ -71,7 +69,8 @@ def read_rays(
 
     Parameters
     ----------
-    path : path
+    path : str or path
+        Of the file.
     flux : float, optional
         Total flux that overrides the file's [`flux_unit`].
     flux_unit : {"lm", "W"}, optional
@@ -96,12 +95,13 @@ def read_rays(
     return rays if flux is None else rays.with_total_flux(flux, flux_unit)
 
 
-def write_rays(path: str | os.PathLike[str], rays: RayStream, format: str | None = None) -> tuple[str, ...]:  # noqa: A002
+def write_rays(path: str | os.PathLike[str], rays: RayStream, format: str | None = None) -> tuple[str, ...]:
     """Write a ray file: completely, or not at all.
 
     Parameters
     ----------
-    path : path
+    path : str or path
+        Of the file; its folder must exist.
     rays : RayStream
         A ray set, or a source that draws its rays on demand.
     format : str, optional
