@@ -1,0 +1,31 @@
+"""Every example runs, with few rays, and writes the pictures it promises."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+RUNS = {
+    "chapter_2.py": (["--rays", "200000", "--seeds", "4"], 4),
+    "first_picture.py": (["--rays", "500000", "--output", "picture.png"], 1),
+}
+
+
+def test_every_example_is_run() -> None:
+    assert {path.name for path in EXAMPLES.glob("*.py")} == set(RUNS)
+
+
+@pytest.mark.parametrize("name", sorted(RUNS))
+def test_runs_and_draws(name: str, tmp_path: Path) -> None:
+    options, pictures = RUNS[name]
+    command = [sys.executable, str(EXAMPLES / name), *options]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    drawn = list(tmp_path.rglob("*.png"))
+    assert len(drawn) == pictures
+    assert all(path.stat().st_size > 5000 for path in drawn)
+    assert result.stdout.count("\n") > 3
