@@ -1,15 +1,19 @@
 """What a luminaire looks like before it exists: luminance maps from ray files, with an error bar in every pixel.
 
 >>> import etendue as et
->>> source = et.RingSource(rays=200_000)
->>> round(source.total_flux)
-600
+>>> rays = et.RingSource(rays=200_000)                   # or et.read_rays("led.tm25ray")
+>>> lmap = et.luminance_map(rays, et.Observer(theta=30, phi=0, distance=1000), et.Screen(80, 80, 16, 16))
+>>> lmap.values.shape, lmap.unit
+((16, 16), 'cd/m²')
 """
 
+from etendue.formats.maps import read_map
+from etendue.formats.rays import read_rays, write_rays
 from etendue.luminance.combination import combine_maps
 from etendue.luminance.comparison import Region, compare, cross_section
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
+from etendue.plot import plot_comparison, plot_cross_sections, plot_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
@@ -29,4 +33,10 @@ __all__ = [
     "cross_section",
     "filter_map",
     "luminance_map",
+    "plot_comparison",
+    "plot_cross_sections",
+    "plot_map",
+    "read_map",
+    "read_rays",
+    "write_rays",
 ]
