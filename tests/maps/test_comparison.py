@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy import stats
-
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.luminance.comparison import Region, compare, cross_section
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
 
 NAN = math.nan
 
@@ -288,6 +287,7 @@ def test_cross_section(where: dict[str, float], position: Any, values: Any, at: 
     np.testing.assert_array_equal(line.values, values)
     np.testing.assert_allclose(line.standard_error, 0.1 * np.asarray(values))
     assert line.at == pytest.approx(at, abs=1e-12)
+    assert line.pitch == (2.0 if "y" in where else 3.0)
     assert line.axis == ("x" if "y" in where else "y")
     assert (line.quantity, line.unit) == ("luminance", "cd/m²")
 

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy import ndimage, stats
-
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.luminance.filters import FILTERS, filter_map, kernel
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
+from scipy import ndimage, stats
 
 Array = npt.NDArray[np.float64]
 FIG_2_3_RIGHT = [[1, 2, 4, 2, 1], [2, 4, 8, 4, 2], [4, 8, 16, 8, 4], [2, 4, 8, 4, 2], [1, 2, 4, 2, 1]]

@@ -14,20 +14,19 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import etendue.formats.maps
 import numpy as np
 import numpy.typing as npt
 import OpenEXR
 import pytest
 import tifffile
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-
-import etendue.formats.maps
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.maps import MAP_FORMATS, read_map, rgbe, save_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 NAN = math.nan
 ALL = pytest.mark.parametrize("name", MAP_FORMATS)

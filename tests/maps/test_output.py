@@ -8,7 +8,6 @@ import threading
 from pathlib import Path
 
 import pytest
-
 from etendue.errors import ArgumentError
 from etendue.formats.output import atomic_output
 

@@ -57,20 +57,20 @@ def demo(
     picture: Annotated[Path, typer.Option("-o", "--output", help="The picture to write, .png")] = Path(
         "etendue-demo.png"
     ),
-    rays: Annotated[int, typer.Option("--rays", help="Rays to draw.", min=1000)] = 100_000_000,
+    rays: Annotated[int, typer.Option("--rays", help="Rays to draw.", min=1000)] = 200_000_000,
     seed: Annotated[int, typer.Option("--seed", help="Seed of the rays.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Make the three-ring source of thesis 2.3, map it, print truth beside estimate, and write a picture."""
     check_outputs([picture], (".png",))
     source = RingSource(rays=rays, seed=seed)
-    observer, screen = Observer(theta=0, phi=0, distance=150), Screen(70, 70, 128, 128)
+    observer, screen = Observer(theta=0, phi=0, distance=150), Screen(70, 70, 64, 64)
     start = time.perf_counter()
     with progress_bar("rays", len(source)) as progress:
         lmap = luminance_map(source, observer, screen, method="cone", progress=progress)
     seconds = time.perf_counter() - start
     results = zone_results(source, lmap)
-    lmap.plot(picture, title="Three Lambertian rings, 300 / 200 / 100 lm")
+    lmap.plot(picture, title="Three Lambertian rings, 300 / 200 / 100 lm", scale="log")
     if json:
         zones = [dataclasses.asdict(r) | {"deviation": r.deviation} for r in results]
         print_json({"rays": len(source), "seconds": seconds, "zones": zones, "unit": lmap.unit, "picture": picture})

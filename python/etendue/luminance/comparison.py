@@ -416,6 +416,8 @@ class CrossSection:
         Centre of that row or column on the other axis [mm].
     position : array, shape (n,)
         Pixel centres along `axis`, from the target [mm], rising.
+    pitch : float
+        Extent of a pixel along `axis` [mm].
     values, standard_error : array, shape (n,)
         Of those pixels, in `unit`; NaN where dead (and where the error is unknown).
     quantity, unit : str
@@ -425,6 +427,7 @@ class CrossSection:
     axis: Literal["x", "y"]
     at: float
     position: Array
+    pitch: float
     values: Array
     standard_error: Array
     quantity: str
@@ -470,14 +473,14 @@ def cross_section(lmap: LuminanceMap, *, x: float | None = None, y: float | None
     axis: Literal["x", "y"]
     if y is not None:
         row = _pixel_index(-y, screen.height, screen.rows, f"y = {y} mm")
-        axis, position, at = "x", screen.x, screen.y[row]
+        axis, position, pitch, at = "x", screen.x, screen.width / screen.columns, screen.y[row]
         values, error = lmap.values[row], lmap.standard_error[row]
     elif x is not None:
         column = _pixel_index(x, screen.width, screen.columns, f"x = {x} mm")
         # From the bottom up, so that positions rise.
-        axis, position, at = "y", screen.y[::-1], screen.x[column]
+        axis, position, pitch, at = "y", screen.y[::-1], screen.height / screen.rows, screen.x[column]
         values, error = lmap.values[::-1, column], lmap.standard_error[::-1, column]
-    return CrossSection(axis, float(at), position, values, error, lmap.quantity, lmap.unit)
+    return CrossSection(axis, float(at), position, pitch, values, error, lmap.quantity, lmap.unit)
 
 
 def _pixel_index(coordinate: float, extent: float, count: int, name: str) -> int:

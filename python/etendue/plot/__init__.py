@@ -1,0 +1,12 @@
+"""Pictures of maps and of their comparison; matplotlib is imported when the first one is drawn."""
+
+from __future__ import annotations
+
+from etendue.plot.comparison_picture import plot_comparison
+from etendue.plot.cross_section_picture import plot_cross_sections
+from etendue.plot.map_picture import plot_map
+from etendue.quantities.luminance_map import PLOT_MAP
+
+__all__ = ["plot_comparison", "plot_cross_sections", "plot_map"]
+
+PLOT_MAP[:] = [plot_map]

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnitError, UnknownNameError
+from etendue.quantities.ray_merge import merged
 from etendue.quantities.report import Complaint
-from etendue.quantities.spectrum import photopic_efficiency
+from etendue.quantities.spectrum import Spectrum, photopic_efficiency
 from etendue.quantities.spool import spool
 from etendue.units import FLUX_UNITS, LUMINOUS_EFFICACY_MAX, FluxUnit
 
@@ -25,6 +26,9 @@ FloatArray = npt.NDArray[np.float64]
 
 CHUNK = 1 << 18
 """Records per stretch of a streamed operation."""
+
+FLUX_COLUMNS = ("radiant_flux", "tristimulus_x", "tristimulus_z")
+"""Columns that are stored on the scale of the flux: whatever scales a ray's flux scales them."""
 
 SINGULAR = 1e-6
 """Smallest eigenvalue, as a fraction of the largest, below which a virtual focus is not determined."""
@@ -59,7 +63,7 @@ class RayOperations:
         Raises
         ------
         ArgumentError
-            If `n` is below 1 or above the number of rays.
+            If `n` is below 1 or above the number of rays, or the seed is not in 0..2⁶⁴ - 1.
 
         Examples
         --------
@@ -72,6 +76,7 @@ class RayOperations:
         total = len(self)
         if not 1 <= n <= total:
             raise ArgumentError(f"subset: {n} rays of {total:,}; ask for 1 to {total:,}.")
+        _check_seed(seed)
 
         def parts() -> Iterator[Records]:
             taken = 0
@@ -97,7 +102,7 @@ class RayOperations:
         Raises
         ------
         ArgumentError
-            If `parts` is below 2.
+            If `parts` is below 2 or above 2³² - 1, or the seed is not in 0..2⁶⁴ - 1.
 
         Examples
         --------
@@ -106,8 +111,9 @@ class RayOperations:
         >>> len(a) + len(b)
         1000
         """
-        if parts < 2:
-            raise ArgumentError(f"thin: {parts} parts; ask for 2 or more.")
+        if not 2 <= parts < 2**32:
+            raise ArgumentError(f"thin: {parts} parts; ask for 2 to 4294967295.")
+        _check_seed(seed)
         scale = self.flux_scale * parts
 
         def part(index: int) -> Iterator[Records]:
@@ -134,7 +140,7 @@ class RayOperations:
             New total [`unit`], > 0.
         unit : {"lm", "W"}, optional
             The set's own if None. Another unit states that the flux distribution over the rays is the same in both,
-            which is true if all rays have the same spectrum.
+            which is true if all rays have the same spectrum; columns of `FLUX_COLUMNS` are then left out.
 
         Raises
         ------
@@ -155,10 +161,15 @@ class RayOperations:
             raise UnknownNameError("flux unit", unit, FLUX_UNITS)
         # The header's total has been overruled by its user: it must not be complained about any more.
         header = {("overruled_total_flux" if k == "total_flux" else k): v for k, v in self.header.items()}
-        step = f"total flux set to {flux:.9g} {unit}"
-        return self.replace(
-            declared_flux=float(flux), flux_unit=unit, header=header, provenance=self.provenance.then(step)
-        )
+        changes = {
+            "declared_flux": float(flux),
+            "flux_unit": unit,
+            "header": header,
+            "provenance": self.provenance.then(f"total flux set to {flux:.9g} {unit}"),
+        }
+        if unit == self.flux_unit:
+            return self.replace(**changes)
+        return self._without(*FLUX_COLUMNS).replace(**changes)
 
     def scaled(self: RaySet, factor: float) -> RaySet:  # type: ignore[misc]
         """Positions multiplied by `factor` (> 0); directions and flux stay, so luminance falls by its square."""
@@ -202,7 +213,7 @@ class RayOperations:
         # Rodrigues' rotation formula.
         rotation = c * np.eye(3) + s * cross + (1 - c) * np.outer(a, a)
         return self._transformed(
-            lambda x, k: (x @ rotation.T, k @ rotation.T), f"rotated by {angle:.9g}° about {a.tolist()}"
+            lambda x, k: (x @ rotation.T, k @ rotation.T), f"rotated by {angle:.9g}° about {a.tolist()}", rotation
         )
 
     def propagated_to_plane(  # type: ignore[misc]
@@ -249,7 +260,8 @@ class RayOperations:
 
         The normal equations A F = b with A = Σ w (1 - k kᵀ), b = Σ w (1 - k kᵀ) x; vendors print F in their data sheets.
         """
-        flux, moments = self.tally.flux, self.moments()
+        moments = self.moments()
+        flux = self.tally.flux
         if flux <= 0 or not self.has_position:
             return VirtualFocus((0.0, 0.0, 0.0), determined=False)
         xx, xy, xz, yy, yz, zz = moments.weighted_outer
@@ -282,12 +294,16 @@ class RayOperations:
             return self
         # A radiant-flux column beside a luminous one is the better truth: it is used before any spectrum.
         if unit == "W" and "radiant_flux" in self.columns:
-            return self._with_flux(lambda rows: self.column("radiant_flux", rows), unit, "the file's radiant flux column")
+            return self._with_flux(
+                lambda rows: self.column("radiant_flux", rows), unit, "the file's radiant flux column"
+            )
         efficacy = self._efficacy()
         scale = self.flux_scale
         if unit == "lm":
             return self._with_flux(
-                lambda rows: self.records["flux"][rows].astype(np.float64) * scale * efficacy(rows), unit, "its spectrum"
+                lambda rows: self.records["flux"][rows].astype(np.float64) * scale * efficacy(rows),
+                unit,
+                "its spectrum",
             )
         dark = any(not (efficacy(rows) > 0).all() for rows in self._stretches())
         if dark:
@@ -331,28 +347,53 @@ class RayOperations:
             f"(with_total_flux(value, {'lm' if self.flux_unit == 'W' else 'W'!r})) if all rays share one spectrum."
         )
 
-    def with_spectrum(self: RaySet, *spectra: Any) -> RaySet:  # type: ignore[misc]
-        """The same rays with one known spectrum for all (`etendue.Spectrum`)."""
+    def with_spectrum(self: RaySet, spectrum: Spectrum) -> RaySet:  # type: ignore[misc]
+        """The same rays with one spectrum for all, in place of whatever was known of their spectra and wavelengths.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> rays = et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0], flux_unit="W", wavelength=[450.0])
+        >>> round(rays.with_spectrum(et.Spectrum([555.0], [1.0])).in_unit("lm").total_flux)
+        683
+        """
         step = "spectrum given by the user"
-        return self.replace(spectra=tuple(spectra), provenance=self.provenance.then(step))
+        return self._without("wavelength", "spectrum_index").replace(
+            spectra=(spectrum,), single_wavelength=None, provenance=self.provenance.then(step)
+        )
 
     # --- how the above is done -------------------------------------------------------------------------------------------
 
     def _stretches(self: RaySet) -> Iterator[slice]:  # type: ignore[misc]
         return (slice(start, min(start + CHUNK, len(self))) for start in range(0, len(self), CHUNK))
 
+    def _without(self: RaySet, *columns: str) -> RaySet:  # type: ignore[misc]
+        """The set less some columns, not copied."""
+        names = list(self.records.dtype.names or ())
+        kept = [name for name in names if name not in columns]
+        return self if kept == names else type(self).from_records(self.records[kept], self.meaning)
+
     def _with_records(self: RaySet, records: Records, step: str, **changes: Any) -> RaySet:  # type: ignore[misc]
-        meaning = dataclasses.replace(self.meaning, provenance=self.provenance.then(step), **changes)
-        header = {k: v for k, v in meaning.header.items() if k != "total_flux"}
-        return type(self).from_records(records, dataclasses.replace(meaning, header=header))
+        # The header's total is that of the old rays: the new ones are not measured by it, but its contradiction stays.
+        header = {k: v for k, v in self.header.items() if k != "total_flux"}
+        contradiction = self._total_complaints(self.tally) if "total_flux" in self.header else []
+        facts: dict[str, Any] = {
+            "header": header,
+            "complaints": (*self.meaning.complaints, *contradiction),
+            "provenance": self.provenance.then(step),
+        }
+        return type(self).from_records(records, dataclasses.replace(self.meaning, **(facts | changes)))
 
     def _with_flux(self: RaySet, flux: Callable[[slice], FloatArray], unit: FluxUnit, how: str) -> RaySet:  # type: ignore[misc]
         dtype = _double(self.records.dtype)
+        scale = self.flux_scale
 
         def parts() -> Iterator[Records]:
             for rows in self._stretches():
-                part = self.records[rows].astype(dtype)
-                part["flux"] = flux(rows)
+                part = _on_scale(self.records[rows].astype(dtype), scale)
+                # Rays that cannot be used stay so: infinity times 0 is no number.
+                with np.errstate(invalid="ignore", over="ignore"):
+                    part["flux"] = flux(rows)
                 yield part
 
         return self._with_records(
@@ -364,9 +405,12 @@ class RayOperations:
         )
 
     def _transformed(  # type: ignore[misc]
-        self: RaySet, move: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]], step: str
+        self: RaySet,
+        move: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
+        step: str,
+        rotation: FloatArray | None = None,
     ) -> RaySet:
-        """Rays with new positions and directions; a NaN position leaves a ray out."""
+        """Rays with new positions and directions; a NaN position leaves a ray out. `rotation` turns other vectors."""
         if not self.has_position:
             raise ArgumentError(f"{self.provenance.source}: far-field rays have no position and cannot be moved.")
         dtype = _double(self.records.dtype)
@@ -377,17 +421,21 @@ class RayOperations:
             nonlocal lost_rays, lost_flux
             for batch in self.batches(CHUNK):
                 part = self.records[batch.start : batch.start + CHUNK][batch.usable].astype(dtype)
+                part = _on_scale(part, scale)
                 part["position"], part["direction"] = move(batch.position, batch.direction)
                 part["flux"] = batch.flux
+                if rotation is not None and "polarisation_axis" in self.columns:
+                    part["polarisation_axis"] = part["polarisation_axis"] @ rotation.T
                 kept = np.isfinite(part["position"]).all(axis=1)
                 lost_rays += int((~kept).sum())
                 lost_flux += float(batch.flux[~kept].sum())
                 yield part[kept]
 
         records = spool(parts(), dtype)
-        complaints = self.meaning.complaints
+        # Rays that cannot be used are not among the new records, which therefore cannot tell of them.
+        complaints = self.complaints
         if lost_rays:
-            share = lost_flux / (self.tally.flux * scale)
+            share = lost_flux / self.total_flux if lost_flux > 0 else 0.0
             found = f"{lost_rays:,} rays with {share:.3%} of the flux never meet it; they are left out"
             complaints = (*complaints, Complaint("error", step, found))
         return self._with_records(
@@ -408,8 +456,8 @@ class RayOperations:
         Returns
         -------
         RaySet
-            Columns that all sets have are kept. Sets with one spectrum each get a ``spectrum_index``, so that the merged
-            set still knows the spectrum of every ray.
+            Columns that all sets have are kept. The merged set knows the wavelength of every ray if each set does, and
+            the spectrum of every ray, by ``spectrum_index``, if each set does.
 
         Raises
         ------
@@ -424,63 +472,26 @@ class RayOperations:
         >>> et.RaySet.merge([blue, yellow], flux=[23.0, 314.0]).flux.tolist()
         [23.0, 314.0]
         """
-        if not sets:
-            raise ArgumentError("merge: no ray sets.")
-        units = {rays.flux_unit for rays in sets}
-        if len(units) > 1:
-            raise ArgumentError("merge: one set is in lm, another in W; convert with in_unit first.")
-        if not all(rays.has_position for rays in sets):
-            raise ArgumentError("merge: a far-field set has no positions.")
-        if flux is not None:
-            if len(flux) != len(sets):
-                raise ArgumentError(f"merge: {len(flux)} fluxes for {len(sets)} sets.")
-            sets = [rays.with_total_flux(value) for rays, value in zip(sets, flux, strict=True)]
-        shared = [c for c in sets[0].columns if all(c in rays.columns for rays in sets) and c != "spectrum_index"]
-        indexed = all(rays.spectra for rays in sets)
-        fields: list[Any] = [("position", "<f8", 3), ("direction", "<f8", 3), ("flux", "<f8")]
-        fields += [(name, "<f8", sets[0].records.dtype[name].shape) for name in shared]
-        shared = [c for c in shared if len({rays.records.dtype[c].shape for rays in sets}) == 1]
-        fields = [f for f in fields if f[0] in ("position", "direction", "flux", *shared)]
-        dtype = np.dtype(fields + ([("spectrum_index", "<i4")] if indexed else []))
-
-        def parts() -> Iterator[Records]:
-            before = 0
-            for rays in sets:
-                for batch in rays.batches(CHUNK):
-                    part = np.zeros(len(batch.flux), dtype)
-                    rows = slice(batch.start, batch.start + CHUNK)
-                    part["position"], part["direction"], part["flux"] = batch.position, batch.direction, batch.flux
-                    for name in shared:
-                        part[name] = rays.column(name, rows)[batch.usable]
-                    if indexed:
-                        own = rays.column("spectrum_index", rows)[batch.usable] if "spectrum_index" in rays.columns else 1
-                        part["spectrum_index"] = before + own
-                    yield part
-                before += len(rays.spectra)
-
-        names = " + ".join(rays.provenance.source for rays in sets)
-        first = sets[0].meaning
-        meaning = dataclasses.replace(
-            first,
-            declared_flux=None,
-            stored_flux_scale=1.0,
-            length_scale=1.0,
-            wavelength_scale=1.0,
-            spectra=tuple(s for rays in sets for s in rays.spectra) if indexed else (),
-            single_wavelength=first.single_wavelength
-            if len({rays.meaning.single_wavelength for rays in sets}) == 1
-            else None,
-            header={},
-            complaints=tuple(c for rays in sets for c in rays.meaning.complaints),
-            provenance=dataclasses.replace(first.provenance, source=names, steps=("merged",)),
-        )
-        return sets[0].from_records(spool(parts(), dtype), meaning)
+        return merged(sets, flux)
 
 
 def _double(dtype: np.dtype[Any]) -> np.dtype[Any]:
     """The record type with f8 for position, direction and flux; other columns keep theirs."""
     wide = {"position", "direction", "flux"}
     return np.dtype([(n, "<f8" if n in wide else dtype[n].base, dtype[n].shape) for n in dtype.names or ()])
+
+
+def _on_scale(part: Records, scale: float) -> Records:
+    """Own records with the columns that share the flux's scale made absolute."""
+    for name in FLUX_COLUMNS:
+        if name in (part.dtype.names or ()):
+            part[name] *= scale
+    return part
+
+
+def _check_seed(seed: int) -> None:
+    if not 0 <= seed < 2**64:
+        raise ArgumentError(f"seed {seed}; give 0 to 2^64 - 1.")
 
 
 def _vector(value: Sequence[float], name: str) -> FloatArray:

@@ -14,13 +14,14 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.provenance import Provenance
-from etendue.quantities.ray_operations import RayOperations
+from etendue.quantities.ray_operations import FLUX_COLUMNS, RayOperations
 from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally
 from etendue.quantities.report import Complaint, RayFileWarning
 from etendue.quantities.spectrum import Spectrum
 from etendue.units import FLUX_UNITS, FluxUnit
 
-GEOMETRY_COLUMNS = ("position", "direction", "flux")
+GEOMETRY_COLUMNS = {"position": (3,), "direction": (3,), "flux": ()}
+"""The columns of every ray, with the shape of each value."""
 
 EXTRA_COLUMNS: dict[str, str] = {
     "wavelength": "nm",
@@ -32,7 +33,8 @@ EXTRA_COLUMNS: dict[str, str] = {
     "spectrum_index": "1",
     "additional": "1",
 }
-"""Further columns a ray may have, with their units. ``spectrum_index`` counts from 1 into `RaySet.spectra`."""
+"""Further columns a ray may have, with their units. ``spectrum_index`` counts from 1 into `RaySet.spectra`; those of
+`FLUX_COLUMNS` are stored on the scale of the flux."""
 
 FLUX_TOLERANCE = 1e-3
 """Relative disagreement between a header's total flux and the sum over its rays that becomes a warning."""
@@ -162,10 +164,12 @@ class RaySet(RayOperations, RayStream):
         Raises
         ------
         ArgumentError
-            If a field is missing, unknown or of another type.
+            If the records are not one contiguous row, or a field is missing or of another type or shape.
+        UnknownNameError
+            If a field or the flux unit is unknown.
         """
         rays = cls.__new__(cls)
-        rays._adopt(records, meaning)
+        rays._adopt(records, meaning)  # noqa: SLF001 - an alternative constructor
         return rays
 
     def _adopt(self, records: npt.NDArray[Any], meaning: RaySetMeaning) -> None:
@@ -177,6 +181,16 @@ class RaySet(RayOperations, RayStream):
                 raise UnknownNameError("ray column", name, (*GEOMETRY_COLUMNS, *EXTRA_COLUMNS))
         if "direction" not in fields or "flux" not in fields:
             raise ArgumentError("RaySet: records need the fields 'direction' and 'flux'.")
+        if records.ndim != 1 or not records.flags.c_contiguous:
+            raise ArgumentError(
+                f"RaySet: records of shape {records.shape} and strides {records.strides} are not one contiguous row; "
+                "copy them with numpy.ascontiguousarray, flat."
+            )
+        for name, shape in GEOMETRY_COLUMNS.items():
+            if name in fields and fields[name][0].shape != shape:
+                raise ArgumentError(
+                    f"RaySet: the field {name!r} has shape {fields[name][0].shape}; it must be {shape}."
+                )
         floats = {fields[name][0].base for name in GEOMETRY_COLUMNS if name in fields}
         if len(floats) != 1 or floats.isdisjoint({np.dtype("<f4"), np.dtype("<f8")}):
             raise ArgumentError("RaySet: position, direction and flux must be all '<f4' or all '<f8'.")
@@ -250,8 +264,9 @@ class RaySet(RayOperations, RayStream):
     def direction(self) -> FloatArray:
         """Unit directions, shape (n, 3); rays whose direction cannot be used keep what is stored."""
         stored = self._records["direction"].astype(np.float64)
-        norm = np.sqrt(np.einsum("ij,ij->i", stored, stored))[:, None]
-        unit: FloatArray = np.divide(stored, norm, out=stored, where=norm >= 1e-6)
+        with np.errstate(over="ignore", invalid="ignore"):
+            norm = np.sqrt(np.einsum("ij,ij->i", stored, stored))[:, None]
+        unit: FloatArray = np.divide(stored, norm, out=stored, where=(norm >= 1e-6) & np.isfinite(norm))
         return unit
 
     @property
@@ -271,6 +286,8 @@ class RaySet(RayOperations, RayStream):
     def column(self, name: str, rows: slice = slice(None)) -> npt.NDArray[Any]:
         """Values of a further column [unit as in `EXTRA_COLUMNS`], shape (n,) or (n, k).
 
+        Those of `FLUX_COLUMNS` are scaled as the flux is: what a ray has in watts for each lumen stays as stored.
+
         Raises
         ------
         UnknownNameError
@@ -283,7 +300,7 @@ class RaySet(RayOperations, RayStream):
             return values.astype(np.int64)
         if name == "wavelength":
             return values.astype(np.float64) * self._meaning.wavelength_scale
-        return values.astype(np.float64)
+        return values.astype(np.float64) * (self.flux_scale if name in FLUX_COLUMNS else 1.0)
 
     # --- passes over all rays ------------------------------------------------------------------------------------------
 
@@ -349,6 +366,9 @@ class RaySet(RayOperations, RayStream):
         return (*self._meaning.complaints, *self._tally_complaints(self.tally))
 
     def _tally_complaints(self, tally: Tally) -> list[Complaint]:
+        return [*self._ray_complaints(tally), *self._total_complaints(tally)]
+
+    def _ray_complaints(self, tally: Tally) -> list[Complaint]:
         found: list[Complaint] = []
         reasons: list[tuple[int, str]] = [
             (tally.not_finite, "have a coordinate, direction or flux that is not finite"),
@@ -363,24 +383,23 @@ class RaySet(RayOperations, RayStream):
         # Sets made in memory may give directions of any length; a file states unit vectors.
         if tally.norm_error > 1e-3 and self.provenance.format != "memory":
             found.append(
-                Complaint("warning", "rays", f"direction lengths differ from 1 by up to {tally.norm_error:.2g}; normalised")
+                Complaint(
+                    "warning", "rays", f"direction lengths differ from 1 by up to {tally.norm_error:.2g}; normalised"
+                )
             )
-        stated = self.header.get("total_flux")
-        if isinstance(stated, float) and math.isfinite(stated) and stated > 0 and tally.flux > 0:
-            stored = tally.flux * self._meaning.stored_flux_scale
-            if abs(stated / stored - 1) > FLUX_TOLERANCE:
-                rule = (
-                    "the rays' values are relative and are scaled to the header's total"
-                    if self._meaning.declared_flux is not None
-                    else "the rays' sum is kept"
-                )
-                found.append(
-                    Complaint(
-                        "warning",
-                        "total flux",
-                        f"the header says {stated:.7g} {self.flux_unit}, the rays sum to {stored:.7g}; {rule}",
-                    )
-                )
         return found
 
-
+    def _total_complaints(self, tally: Tally) -> list[Complaint]:
+        stated = self.header.get("total_flux")
+        if not (isinstance(stated, float) and math.isfinite(stated) and stated > 0 and tally.flux > 0):
+            return []
+        stored = tally.flux * self._meaning.stored_flux_scale
+        if abs(stated / stored - 1) <= FLUX_TOLERANCE:
+            return []
+        rule = (
+            "the rays' values are relative and are scaled to the header's total"
+            if self._meaning.declared_flux is not None
+            else "the rays' sum is kept"
+        )
+        found = f"the header says {stated:.7g} {self.flux_unit}, the rays sum to {stored:.7g}; {rule}"
+        return [Complaint("warning", "total flux", found)]

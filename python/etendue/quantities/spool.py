@@ -50,7 +50,7 @@ def spool(
                 _flush(held, file)
                 held_bytes = 0
         if file.tell() == 0:
-            gathered = np.concatenate(held) if held else np.zeros(0, dtype)
+            gathered = np.concatenate(held, dtype=dtype) if held else np.zeros(0, dtype)
             gathered.setflags(write=False)
             return gathered
         _flush(held, file)

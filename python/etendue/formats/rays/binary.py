@@ -137,7 +137,7 @@ def whole_records(path: Path, start: int, width: int, stated: int, clause: str) 
     count, stray = divmod(body, width)
     found = (
         f"the header describes {described}, but the file ends after {count:,} of them and {stray} bytes of the next; "
-        f"{stated - count:,} rays are missing"
+        f"rays missing: {stated - count:,}"
     )
     return count, (Complaint("error", f"byte {size}", found, clause),)
 
