@@ -1,0 +1,112 @@
+"""Several ray sets as one: a white LED from its blue and its yellow file."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_stream import BATCH, RayBatch
+from etendue.quantities.report import Complaint
+from etendue.quantities.spool import spool
+
+if TYPE_CHECKING:
+    from etendue.quantities.ray_set import RaySet
+
+
+def merged(sets: Sequence[RaySet], flux: Sequence[float] | None) -> RaySet:
+    """One set of all usable rays; see `etendue.RaySet.merge`."""
+    if not sets:
+        raise ArgumentError("merge: no ray sets.")
+    if len({rays.flux_unit for rays in sets}) > 1:
+        raise ArgumentError("merge: one set is in lm, another in W; convert with in_unit first.")
+    if not all(rays.has_position for rays in sets):
+        raise ArgumentError("merge: a far-field set has no positions.")
+    if flux is not None:
+        if len(flux) != len(sets):
+            raise ArgumentError(f"merge: {len(flux)} fluxes for {len(sets)} sets.")
+        sets = [rays.with_total_flux(value) for rays, value in zip(sets, flux, strict=True)]
+
+    single, by_ray = _wavelengths(sets)
+    indexed = all(_knows_spectra(rays) for rays in sets)
+    shared = [
+        name
+        for name in sets[0].columns
+        if name not in ("wavelength", "spectrum_index")
+        and all(name in rays.columns for rays in sets)
+        and len({rays.records.dtype[name].shape for rays in sets}) == 1
+    ]
+    fields: list[Any] = [("position", "<f8", 3), ("direction", "<f8", 3), ("flux", "<f8")]
+    fields += [(name, "<f8", sets[0].records.dtype[name].shape) for name in shared]
+    fields += [("wavelength", "<f8")] if by_ray else []
+    fields += [("spectrum_index", "<i4")] if indexed else []
+    dtype = np.dtype(fields)
+
+    def parts() -> Iterator[npt.NDArray[Any]]:
+        before = 0
+        for rays in sets:
+            for batch in rays.batches():
+                part = np.zeros(len(batch.flux), dtype)
+                part["position"], part["direction"], part["flux"] = batch.position, batch.direction, batch.flux
+                for name in shared:
+                    part[name] = _column(rays, name, batch)
+                if by_ray:
+                    part["wavelength"] = _column(rays, "wavelength", batch, rays.meaning.single_wavelength)
+                if indexed:
+                    own = _column(rays, "spectrum_index", batch, 1)
+                    # 0 is no spectrum: an index that was wrong in its file must not point into another's spectra.
+                    part["spectrum_index"] = np.where((own >= 1) & (own <= len(rays.spectra)), before + own, 0)
+                yield part
+            before += len(rays.spectra)
+
+    meaning = dataclasses.replace(
+        sets[0].meaning,
+        declared_flux=None,
+        stored_flux_scale=1.0,
+        length_scale=1.0,
+        wavelength_scale=1.0,
+        spectra=tuple(s for rays in sets for s in rays.spectra) if indexed else (),
+        single_wavelength=single,
+        header={},
+        complaints=tuple(_placed(complaint, rays) for rays in sets for complaint in rays.complaints),
+        provenance=_provenance([rays.provenance for rays in sets]),
+    )
+    return type(sets[0]).from_records(spool(parts(), dtype), meaning)
+
+
+def _wavelengths(sets: Sequence[RaySet]) -> tuple[float | None, bool]:
+    """The wavelength that all sets share [nm], or whether each ray has one of its own."""
+    singles = {None if "wavelength" in rays.columns else rays.meaning.single_wavelength for rays in sets}
+    if len(singles) == 1 and None not in singles:
+        return singles.pop(), False
+    return None, all("wavelength" in rays.columns or rays.meaning.single_wavelength is not None for rays in sets)
+
+
+def _knows_spectra(rays: RaySet) -> bool:
+    return len(rays.spectra) == 1 or (bool(rays.spectra) and "spectrum_index" in rays.columns)
+
+
+def _column(rays: RaySet, name: str, batch: RayBatch, otherwise: float | None = None) -> npt.NDArray[Any]:
+    """Values of a column for a batch's rays, or one value for all if the set does not have it."""
+    if name not in rays.columns:
+        return np.full(len(batch.flux), otherwise)
+    return rays.column(name, slice(batch.start, batch.start + BATCH))[batch.usable]
+
+
+def _placed(complaint: Complaint, rays: RaySet) -> Complaint:
+    """The complaint with the name of the set that it is about."""
+    return dataclasses.replace(complaint, place=f"{rays.provenance.source}, {complaint.place}")
+
+
+def _provenance(origins: list[Provenance]) -> Provenance:
+    return Provenance(
+        source=" + ".join(origin.source for origin in origins),
+        format=" + ".join(dict.fromkeys(origin.format for origin in origins)),
+        fingerprint=" + ".join(origin.fingerprint for origin in origins if origin.fingerprint),
+        steps=(*(f"{origin.source}: {step}" for origin in origins for step in origin.steps), "merged"),
+    )
