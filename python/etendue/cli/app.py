@@ -56,8 +56,11 @@ def main() -> None:
     warnings.simplefilter("ignore")
     try:
         status = app(standalone_mode=False)
-    except (EtendueError, OSError) as error:
+    except EtendueError as error:
         complain(f"error: {error}")
+        sys.exit(1)
+    except OSError as error:
+        complain(f"error: {error.filename}: {error.strerror}" if error.filename else f"error: {error}")
         sys.exit(1)
     except (KeyboardInterrupt, typer.Abort):
         complain("stopped; nothing was written")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from etendue.cli.terminal import check_outputs, numbers, print_json, say
-from etendue.formats.maps import read_map
+from etendue.formats.maps import PICTURE_EXTENSIONS, read_map
 from etendue.luminance.comparison import DEAD_RULES, Region, cross_section
 from etendue.luminance.comparison import compare as compare_maps
 from etendue.plot import plot_comparison, plot_cross_sections
@@ -43,7 +43,7 @@ def compare(
         raise typer.BadParameter(f"--dead {dead!r}: give one of {', '.join(DEAD_RULES)}")
     if (section_output is None) != (section_x is None and section_y is None):
         raise typer.BadParameter("--section-output goes with --section-x or --section-y")
-    check_outputs([p for p in (output, section_output) if p], (".png",))
+    check_outputs([p for p in (output, section_output) if p], PICTURE_EXTENSIONS)
     limits = None
     if region is not None:
         limits = Region(*numbers(region, 4, "--region", "-5,5,-2,2"))
@@ -52,10 +52,10 @@ def compare(
         a, b, region=limits, dead="zero" if dead == "zero" else "exclude", ignore_geometry=ignore_geometry
     )
     if output is not None:
-        plot_comparison(result, output)
+        plot_comparison(result, output, labels=(test.name, reference.name))
     if section_output is not None:
-        cuts = {name: cross_section(m, x=section_x, y=section_y) for name, m in (("test", a), ("reference", b))}
-        plot_cross_sections(cuts, section_output)
+        cuts = [cross_section(lmap, x=section_x, y=section_y) for lmap in (a, b)]
+        plot_cross_sections(cuts, section_output, labels=[test.name, reference.name])
     if json:
         print_json(result.to_dict() | {"outputs": [p for p in (output, section_output) if p]})
         return

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.luminance import print_map, summary
+from etendue.cli.luminance import check_scale, print_map, summary, write_map
 from etendue.cli.terminal import check_outputs, complain, print_json, say
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS, read_map
 from etendue.luminance.filters import FILTERS, filter_map
@@ -21,12 +21,14 @@ def filter_(
     gamma: Annotated[
         float, typer.Option("--gamma", help="Largest relative deviation of a neighbour (eq. 2.6); selective filters.")
     ] = 0.2,
+    scale: Annotated[str, typer.Option("--scale", help="Colours of a picture: linear or log.")] = "linear",
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Smooth a map with one of the four filters of the thesis; the flux before and after is printed."""
+    check_scale(scale)
     check_outputs(output, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
     smooth = filter_map(read_map(file), kind, size=size, gamma=gamma)
-    losses = [note for path in output for note in smooth.save(path)]
+    losses = write_map(smooth, output, scale)
     if json:
         print_json(summary(smooth) | {"outputs": output, "losses": losses})
         return

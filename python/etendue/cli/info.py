@@ -26,7 +26,8 @@ def info(
             described.append(describe(file))
         except (EtendueError, OSError) as error:
             failed = True
-            described.append({"file": str(file), "error": str(error)})
+            reason = error.strerror if isinstance(error, OSError) else error
+            described.append({"file": str(file), "error": str(reason)})
     if json:
         print_json(described)
     else:
@@ -96,7 +97,11 @@ def _spectrum(rays: RaySet) -> str:
 
 def _print(facts: dict[str, Any]) -> None:
     if "error" in facts:
-        complain(f"{facts['file']}: error: {facts['error']}")
+        complain(
+            f"error: {facts['error']}"
+            if facts["file"] in facts["error"]
+            else f"error: {facts['file']}: {facts['error']}"
+        )
         return
     unit = facts["flux_unit"]
     say(f"{facts['file']}")

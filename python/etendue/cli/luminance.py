@@ -14,6 +14,7 @@ from etendue.errors import ArgumentError
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import read_rays
 from etendue.luminance.estimate import METHODS, luminance_map
+from etendue.plot.map_picture import SCALES, plot_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import PLANES, Observer, Screen
 
@@ -40,6 +41,7 @@ def luminance(
         str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")
     ] = None,
     unit: Annotated[str | None, typer.Option("--unit", help="lm or W: convert through the file's spectrum.")] = None,
+    scale: Annotated[str, typer.Option("--scale", help="Colours of a picture: linear or log.")] = "linear",
     threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
@@ -48,6 +50,7 @@ def luminance(
         raise typer.BadParameter(f"--method {method!r}: give one of {', '.join(METHODS)}")
     if plane not in PLANES:
         raise typer.BadParameter(f"--plane {plane!r}: give one of {', '.join(PLANES)}")
+    check_scale(scale)
     x, y, z = numbers(target, 3, "--target", "0,0,0")
     angles = [numbers(text, 2, "--observer", "30,0") for text in observer]
     observers = [Observer(theta, phi, distance, (x, y, z)) for theta, phi in angles]
@@ -72,7 +75,7 @@ def luminance(
             threads=threads,
             progress=progress,
         )
-    losses = [note for lmap, paths in zip(maps, targets, strict=True) for path in paths for note in lmap.save(path)]
+    losses = [note for lmap, paths in zip(maps, targets, strict=True) for note in write_map(lmap, paths, scale)]
     complaints = [str(c) for c in rays.complaints]
     if json:
         summaries = [summary(lmap) | {"outputs": paths} for lmap, paths in zip(maps, targets, strict=True)]
@@ -80,10 +83,30 @@ def luminance(
         return
     for line in (*complaints, *(f"note: {note}" for note in losses)):
         complain(line)
+    if all(lmap.dead_pixels == lmap.values.size for lmap in maps):
+        centre = ",".join(f"{c:.4g}" for c in rays.moments().bounds.mean(axis=1))
+        complain(f"hint: the rays start around {centre} mm, the screen is centred on {target}: try --target {centre}")
     for lmap, paths in zip(maps, targets, strict=True):
         print_map(lmap)
         for path in paths:
             say(f"  {path}")
+
+
+def check_scale(scale: str) -> None:
+    """Refuse a scale of colours that does not exist, before any work is done."""
+    if scale not in SCALES:
+        raise typer.BadParameter(f"--scale {scale!r}: give one of {', '.join(SCALES)}")
+
+
+def write_map(lmap: LuminanceMap, paths: list[Path], scale: str) -> list[str]:
+    """Write a map to files, or draw it, by extension; returns what the formats could not express."""
+    notes: list[str] = []
+    for path in paths:
+        if path.suffix.lower() in PICTURE_EXTENSIONS:
+            plot_map(lmap, path, "log" if scale == "log" else "linear")
+        else:
+            notes.extend(f"{path}: {note}" for note in lmap.save(path))
+    return notes
 
 
 def _named(path: Path, observer: Observer) -> Path:

@@ -16,6 +16,9 @@ LADDER: tuple[float, ...] = tuple(0.25 * math.sqrt(2.0) ** k for k in range(12))
 Wider cones would misstate even a Lambertian source by more than 1 %, which no error bar shows.
 """
 
+ENOUGH_RAYS = 100
+"""Rays that a rung must have seen before its difference to the next one is taken as evidence of blur."""
+
 COARSE_PIXELS = 1 << 16
 """Most pixels of the grid on which acceptances are compared."""
 
@@ -66,7 +69,8 @@ def choose_acceptance(estimate: ConeEstimate, screen: Screen) -> AcceptanceChoic
     :math:`\mathrm{var}(L_{j-1})\,G_{j-1}/G_j` with étendues G. Where luminance varies smoothly with angle, bias grows
     with the solid angle, which doubles from rung to rung: :math:`b_j = 2(b_j - b_{j-1})`. The squared bias of rung j is
     therefore taken as :math:`4 D_j`, or four times any :math:`D_i` of a narrower rung that stands out of its own noise by
-    two standard deviations, whichever is larger: blur does not go away by widening the cone further.
+    two standard deviations, whichever is larger: blur does not go away by widening the cone further. A rung
+    that saw fewer than `ENOUGH_RAYS` rays is no evidence of blur.
 
     Parameters
     ----------
@@ -83,6 +87,8 @@ def choose_acceptance(estimate: ConeEstimate, screen: Screen) -> AcceptanceChoic
     lum, variance, etendue = estimate.luminance, estimate.variance, estimate.etendue
     step_variance = variance[1:] + variance[:-1] * (1.0 - 2.0 * etendue[:-1] / etendue[1:])
     step = (np.diff(lum, axis=0) ** 2 - step_variance).sum(axis=(1, 2))
+    # A handful of rays that happen to share a pixel look like structure; they prove nothing.
+    step = np.where(seen[:-1] >= ENOUGH_RAYS, step, 0.0)
     # A square of a normal variable has twice the square of its variance as variance.
     noise = np.sqrt(2.0 * (step_variance**2).sum(axis=(1, 2)))
     proven = np.maximum.accumulate(np.maximum(step - 2.0 * noise, 0.0))
