@@ -1,0 +1,1 @@
+"""Guards of the documentation: pages as data, and the tests over them."""
