@@ -1,0 +1,163 @@
+"""Cross sections of maps in one diagram, each with its error band."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.luminance.comparison import CrossSection
+from etendue.plot import style
+from etendue.plot.map_picture import SCALES, Scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+
+WIDTH, HEIGHT, LEFT = 6.4, 3.9, 0.85
+"""Of the figure with one line of legend, and of the diagram's left side [inches]."""
+
+LEGEND_ROOM = 80
+"""Characters in one line of the legend."""
+
+DASHES = ("-", "--", ":")
+"""Told apart by colour first, then by dashes."""
+
+
+def plot_cross_sections(
+    sections: Sequence[CrossSection],
+    path: str | os.PathLike[str] | None = None,
+    scale: Scale = "linear",
+    *,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Draw cross sections over position, as steps as wide as the pixels, with a band of ± one standard error.
+
+    Parameters
+    ----------
+    sections : sequence of CrossSection
+        At least one; all along the same axis and in the same unit.
+    path : path, optional
+        Where to write the picture, .png or .pdf.
+    scale : {"linear", "log"}
+        Scale of the luminance.
+    labels : sequence of str, optional
+        One name per section; by default where it was cut.
+    title : str, optional
+        First line; "Cross section" if not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure, not registered with pyplot. A line breaks where a pixel is dead.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no section, the sections differ in axis or unit, or the labels in number.
+    UnknownNameError
+        If `scale` or the extension of `path` does not exist.
+
+    Examples
+    --------
+    >>> line = CrossSection("x", 0.0, np.arange(3.0), 1.0, np.array([1.0, 3.0, 2.0]), np.full(3, 0.1), "luminance", "cd/m²")
+    >>> plot_cross_sections([line]).axes[0].get_ylabel()
+    'luminance [cd/m²]'
+    """
+    _check(sections, labels, scale)
+    first = sections[0]
+    other = "y" if first.axis == "x" else "x"
+    names = labels if labels is not None else [f"{other} = {style.plain(section.at)} mm" for section in sections]
+    legend_columns = max(1, min(len(names), LEGEND_ROOM // (max(map(len, names)) + 6)))
+    height = HEIGHT + 0.18 * (-(-len(names) // legend_columns) - 1)
+    figure = style.new_figure(WIDTH, height)
+    axes = style.add_axes(figure, LEFT, 0.55, WIDTH - LEFT - 0.2, HEIGHT - 1.2)
+    _prepare(axes, sections, scale)
+    for number, (section, name) in enumerate(zip(sections, names, strict=True)):
+        _draw(axes, section, name, number)
+    axes.set(xlabel=f"{first.axis} [mm]", ylabel=f"{first.quantity} [{first.unit}]")
+    heading = title if title is not None else "Cross section" + ("s" if len(sections) > 1 else "")
+    style.add_text(figure, LEFT, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=legend_columns,
+        frameon=False,
+        fontsize=style.TICK_SIZE,
+        labelcolor=style.INK,
+        handlelength=1.6,
+        columnspacing=1.4,
+        borderaxespad=0.2,
+        borderpad=0.0,
+    )
+    return style.finish(figure, path)
+
+
+def _prepare(axes: Axes, sections: Sequence[CrossSection], scale: str) -> None:
+    """Limits and scales, before anything is drawn."""
+    style.dress(axes)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    axes.grid(visible=True, axis="y", color=style.RULE, linewidth=0.4)
+    axes.set_axisbelow(True)
+    edges = np.concatenate([_edges(section) for section in sections])
+    axes.set_xlim(edges.min(), edges.max())
+    shown = np.concatenate([section.values for section in sections])
+    bands = np.concatenate([_band(section)[1] for section in sections])
+    shown = shown[np.isfinite(shown)]
+    top = float(np.max(bands, where=np.isfinite(bands), initial=shown.max(initial=0.0)))
+    if scale == "log":
+        axes.set_yscale("log", nonpositive="mask")
+        positive = shown[shown > 0.0]
+        if positive.size:
+            low, high = positive.min() / 2.0, 2.0 * top
+            axes.set_ylim(low, high)
+            for place in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+                place(style.log_formatter(low, high))
+    else:
+        low = min(0.0, float(shown.min(initial=0.0)))
+        axes.set_ylim(low, top + 0.05 * (top - low) if top > low else low + 1.0)
+        axes.yaxis.set_major_formatter(style.number_formatter())
+
+
+def _draw(axes: Axes, section: CrossSection, name: str, number: int) -> None:
+    """One section. A pixel holds the mean over its extent, so it is drawn over its extent."""
+    colour = style.LINES[number % len(style.LINES)]
+    dashes = DASHES[number // len(style.LINES) % len(DASHES)]
+    edges = _edges(section)
+    low, high = _band(section)
+    if axes.get_yscale() == "log":
+        low = np.where(np.isnan(low), np.nan, np.maximum(low, axes.get_ylim()[0]))
+    axes.stairs(high, edges, baseline=low, fill=True, color=colour, alpha=0.22, linewidth=0.0)
+    axes.stairs(section.values, edges, baseline=None, color=colour, linestyle=dashes, linewidth=1.1, label=name)
+
+
+def _band(section: CrossSection) -> tuple[Array, Array]:
+    """Plus and minus one standard error; NaN where there is none."""
+    error = np.where(np.isfinite(section.values), section.standard_error, np.nan)
+    return section.values - error, section.values + error
+
+
+def _edges(section: CrossSection) -> Array:
+    return np.append(section.position - section.pitch / 2, section.position[-1] + section.pitch / 2)
+
+
+def _check(sections: Sequence[CrossSection], labels: Sequence[str] | None, scale: str) -> None:
+    if scale not in SCALES:
+        raise UnknownNameError("scale", scale, SCALES)
+    if not sections:
+        raise ArgumentError("plot_cross_sections: no section was given; make some with cross_section(map, y=0).")
+    kinds = sorted({f"{section.quantity} [{section.unit}] along {section.axis}" for section in sections})
+    if len(kinds) > 1:
+        raise ArgumentError(f"plot_cross_sections: cannot share axes: {'; '.join(kinds)}. Draw them one by one.")
+    if labels is not None and len(labels) != len(sections):
+        raise ArgumentError(
+            f"plot_cross_sections: {len(labels)} labels for {len(sections)} sections; give one for each."
+        )

@@ -1,0 +1,161 @@
+"""One look for all pictures: colours, type sizes, layout in inches, and files whose bytes repeat."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import textwrap
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from etendue.errors import UnknownNameError
+from etendue.formats.output import atomic_output
+from etendue.quantities.observer import Observer
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
+
+INK = "#1c1c22"
+"""Titles and labels."""
+FAINT = "#6b6b76"
+"""Captions, ticks and frames."""
+RULE = "#c9c9d1"
+"""Grid lines and thin frames."""
+DEAD = "#8fa3ad"
+"""Pixels without a number: a cold grey that no colour map here contains."""
+LINES = ("#1f5aa6", "#d1622b", "#3c8d5a", "#8a4fa3", "#b8942b", "#5b6770")
+"""Lines in one diagram, in this order."""
+
+COLOUR_MAPS = {"value": "inferno", "error": "viridis", "difference": "magma"}
+"""Perceptually uniform, each for one kind of number."""
+
+TITLE_SIZE, LABEL_SIZE, TICK_SIZE, CAPTION_SIZE = 11.0, 9.0, 8.0, 7.5
+DPI = 200
+
+SEPARATOR = "  ·  "
+"""Between the facts of a caption."""
+
+FILE_TYPES: dict[str, dict[str, Any]] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}}
+"""File types of pictures, each with what keeps its bytes the same from run to run."""
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [inches] outside matplotlib's global state."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def add_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    """Axes at a place given in inches from the lower left corner."""
+    across, up = figure.get_size_inches()
+    return figure.add_axes((left / across, bottom / up, width / across, height / up))
+
+
+def add_text(figure: Figure, x: float, y: float, text: str, **properties: Any) -> None:
+    """Text at a place given in inches from the lower left corner, its baseline on y."""
+    across, up = figure.get_size_inches()
+    figure.text(x / across, y / up, text, **({"va": "baseline", "ha": "left"} | properties))
+
+
+def dress(axes: Axes) -> None:
+    """Give axes the house look: thin frame, faint ticks."""
+    for spine in axes.spines.values():
+        spine.set(color=RULE, linewidth=0.6)
+    axes.tick_params(which="both", labelsize=TICK_SIZE, color=RULE, labelcolor=FAINT, width=0.6, length=3)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.label.set(size=LABEL_SIZE, color=INK)
+        axis.get_offset_text().set(size=TICK_SIZE, color=FAINT)
+
+
+def finish(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
+    """Write the figure, if a path is given, whole or not at all, and return it."""
+    if path is not None:
+        suffix = Path(path).suffix.lower()
+        if suffix not in FILE_TYPES:
+            raise UnknownNameError("extension of a picture", suffix, FILE_TYPES)
+        with atomic_output(path) as temporary:
+            figure.savefig(temporary, format=suffix[1:], metadata=FILE_TYPES[suffix])
+    return figure
+
+
+def locator_for(inches: float) -> MaxNLocator:
+    """Round numbers for ticks, as many as fit on an axis of this length."""
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(int(min(7, max(1, inches * 1.8))), steps=[1, 2, 2.5, 5, 10])
+
+
+def number_formatter() -> ScalarFormatter:
+    """Ticks as plain numbers in groups of three digits, powers of ten only where it must be."""
+    from matplotlib.ticker import ScalarFormatter
+
+    class Grouped(ScalarFormatter):
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            return grouped(super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$"))
+
+    formatter = Grouped(useMathText=True)
+    formatter.set_powerlimits((-3, 7))
+    return formatter
+
+
+def log_formatter(low: float, high: float) -> LogFormatter:
+    """Ticks of a logarithmic axis from `low` to `high`, as plain numbers if these are neither tiny nor huge."""
+    from matplotlib.ticker import LogFormatterSciNotation
+
+    class Plain(LogFormatterSciNotation):
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            # The empty text marks ticks for which there is no room.
+            return plain(x) if super().__call__(x, pos) else ""
+
+    thresholds = (1.5, 0.6)
+    if low >= 1e-3 and high < 1e7:
+        return Plain(minor_thresholds=thresholds)
+    return LogFormatterSciNotation(minor_thresholds=thresholds)
+
+
+def grouped(text: str) -> str:
+    """A number of five digits or more with thin spaces between groups of three, other texts as they are."""
+    match = re.fullmatch(r"([^\d]?)(\d{5,})(\..*)?", text)
+    return f"{match[1]}{int(match[2]):,}{match[3] or ''}".replace(",", "\u2009") if match else text
+
+
+def plain(number: float) -> str:
+    """A number to four digits, in powers of ten only if it is very small or very large."""
+    if not math.isfinite(number):
+        return "undefined"
+    rounded = f"{number:.4g}"
+    small_or_large = number != 0.0 and not 1e-4 <= abs(number) < 1e10
+    return (rounded if small_or_large else grouped(f"{float(rounded):.10g}")).replace("-", "−")
+
+
+def percent(number: float) -> str:
+    """A share to two digits, never in powers of ten."""
+    return f"{number:.0f} %" if abs(number) >= 9.95 else f"{number:.2g} %"
+
+
+def describe_observer(observer: Observer) -> str:
+    """The observer in a few words."""
+    place = f"θ = {observer.theta:g}°, φ = {observer.phi:g}°, from {grouped(f'{observer.distance:.10g}')} mm"
+    if any(observer.target):
+        place += f" of ({', '.join(f'{c:g}' for c in observer.target)}) mm"
+    return place.replace("-", "−")
+
+
+def wrapped(facts: Iterable[str], inches: float) -> list[str]:
+    """Lines of a caption that fit into a width; a fact is not broken unless it is longer than a line."""
+    room = int(inches * 16.5)
+    lines: list[str] = []
+    for fact in facts:
+        if lines and len(lines[-1]) + len(SEPARATOR) + len(fact) <= room:
+            lines[-1] += SEPARATOR + fact
+        else:
+            lines.extend(textwrap.wrap(fact, room))
+    return lines
