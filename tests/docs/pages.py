@@ -11,7 +11,10 @@ ROOT = Path(__file__).resolve().parents[2]
 
 PAGES = [
     *sorted((ROOT / "docs").rglob("*.md")),
-    *(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")),
+    *(
+        ROOT / name
+        for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")
+    ),
 ]
 
 _FENCE = re.compile(r" {0,3}(`{3,}|~{3,})\s*(.*)")

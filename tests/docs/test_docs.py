@@ -9,7 +9,7 @@ from pathlib import Path
 import etendue as et
 import pytest
 from etendue.cli.app import VERBS
-from etendue.formats.maps import MAP_FORMATS, PICTURE_EXTENSIONS
+from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import RAY_FORMATS
 from etendue.luminance.filters import FILTERS
 
@@ -126,11 +126,15 @@ def test_architecture_names_every_crate_and_module() -> None:
     assert modules == set(re.findall(r"^\| `(etendue\.[\w.]+)` \|", text, re.MULTILINE))
 
 
-def test_format_pages_name_every_format() -> None:
-    rays, maps = (page(f"formats/{name}.md").read_text(encoding="utf-8") for name in ("ray-files", "maps"))
-    assert {f.name for f in RAY_FORMATS} == set(re.findall(r"^\| `([a-z0-9-]+)` \|", rays, re.MULTILINE))
-    extensions = [*PICTURE_EXTENSIONS, *(e for f in MAP_FORMATS.values() for e in f.extensions)]
-    assert not [extension for extension in extensions if f"`{extension}`" not in maps]
+def test_the_page_of_ray_files_lists_every_format_with_its_extensions() -> None:
+    rows = re.findall(r"^\| `([a-z0-9-]+)` \|[^|]*\|([^|]*)\|", prose(page("formats/ray-files.md")), re.MULTILINE)
+    listed = {name: tuple(re.findall(r"`(\.\w+)`", cell)) for name, cell in rows}
+    assert listed == {f.name: f.extensions for f in RAY_FORMATS}
+
+
+def test_the_page_of_map_files_lists_every_extension() -> None:
+    listed = re.findall(r"^\| (`\.[^|]*)\|", prose(page("formats/maps.md")), re.MULTILINE)
+    assert set(re.findall(r"\.\w+", " ".join(listed))) == {*MAP_EXTENSIONS, *PICTURE_EXTENSIONS}
 
 
 def test_theory_names_every_filter() -> None:
