@@ -9,7 +9,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError, UnitError
-from etendue.formats.rays import detect_format, read_rays, speos_text
+from etendue.formats.rays import detect_format, read_rays, speos_text, text_output
 
 Read = Callable[[str], et.RaySet]
 
@@ -112,6 +112,16 @@ def test_lumens_become_watts(tmp_path: Path) -> None:
 def test_rays_without_wavelength_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match="wavelength of every ray"):
         speos_text.write(et.RingSource(rays=100), tmp_path / "rings.txt")
+
+
+def test_rays_are_counted_over_stretches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(text_output, "STRETCH", 2)
+    n = 5
+    direction = np.tile([0.0, 0.0, 1.0], (n, 1))
+    rays = et.RaySet(np.zeros((n, 3)), direction, np.ones(n), flux_unit="W", wavelength=np.full(n, 500.0))
+    speos_text.write(rays, tmp_path / "led.txt")
+    rows = (tmp_path / "led.txt").read_text().split("\n")[1:-1]
+    assert [row.split()[0] for row in rows] == ["1", "2", "3", "4", "5"]
 
 
 def test_rays_without_flux_are_written(tmp_path: Path) -> None:

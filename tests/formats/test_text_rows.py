@@ -54,6 +54,7 @@ PLAIN = b"1 2.5 -3 .25\n4. -5.5 6e-016 7.0E+5\n0.125 8 -9.75 10\n"
         PLAIN[:-1] + b"\x1a",
         PLAIN[:-1] + b"\r",
         PLAIN.replace(b"7.0E+5", b"7.0D+05"),
+        PLAIN.replace(b"7.0E+5", b"7.0D5"),
         PLAIN.replace(b"7.0E+5", b".7d6").replace(b"6e-016", b"0.6-015"),
         PLAIN.replace(b"4.", b'"4"'),
     ],

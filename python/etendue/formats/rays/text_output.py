@@ -51,6 +51,7 @@ def write_rows(
     file : binary file
         At the beginning of the first row.
     rays : RayStream
+        Their unusable rays are left out.
     columns : callable
         The columns of a batch's rows, each of shape (k,) or (k, m).
     separator, end_of_line : str

@@ -214,7 +214,9 @@ def read_rows(path: Path, layout: RowLayout, *, offset: int, line: int) -> Rows:
     Parameters
     ----------
     path : Path
+        Of the file.
     layout : RowLayout
+        How its rows are written.
     offset, line : int
         Byte and line number at which the rows begin.
 
