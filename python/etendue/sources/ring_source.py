@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -33,8 +33,9 @@ def allocate_rays(rays: int, weights: Sequence[float]) -> tuple[int, ...]:
     >>> allocate_rays(50_000_000, [300 * 1, 200 * 3, 100 * 5])
     (10714286, 21428571, 17857143)
     """
-    total = math.fsum(weights)
-    exact = [rays * w / total for w in weights]
+    # In fractions: above 2^53 rays, floats would not add up to the number asked for.
+    exact_weights = [Fraction(w) for w in weights]
+    exact = [rays * w / sum(exact_weights) for w in exact_weights]
     shares = [math.floor(e) for e in exact]
     by_remainder = sorted(range(len(weights)), key=lambda i: shares[i] - exact[i])
     for i in by_remainder[: rays - sum(shares)]:
@@ -132,13 +133,14 @@ class RingSource(RayStream):
             raise ArgumentError(
                 "RingSource: the observer is not above the plane z = 0, and the rings emit upwards only."
             )
-        fine = dataclasses.replace(screen, columns=screen.columns * subdivision, rows=subdivision)
+        columns = screen.columns * subdivision
+        x = (np.arange(columns) + 0.5) * (screen.width / columns) - screen.width / 2
+        within = (0.5 - (np.arange(subdivision) + 0.5) / subdivision) * (screen.height / screen.rows)
         right, up, _ = screen.axes(observer)
         eye, target = observer.position, np.asarray(observer.target)
         rows = []
         for centre in screen.y:
-            y = centre + fine.y / screen.rows
-            points = target + fine.x[None, :, None] * right + y[:, None, None] * up
+            points = target + x[None, :, None] * right + (centre + within)[:, None, None] * up
             sight = points - eye
             along = -eye[2] / np.where(sight[..., 2] < 0, sight[..., 2], np.nan)
             seen = self.luminance(eye[0] + along * sight[..., 0], eye[1] + along * sight[..., 1])
