@@ -328,7 +328,7 @@ def test_comparisons_of_every_map(which: str, scale: Any) -> None:
 def test_comparison_shows_both_maps_alike_and_where_they_differ(tmp_path: Path) -> None:
     reference = make_map([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     test = reference.replace(values=reference.values * [[1, 2, 1], [1, 1, 3]])
-    result = compare(test, reference, Region(-2, 3, -2, 2))
+    result = compare(test, reference, Region(-1, 3, -2, 1))
     figure = plot_comparison(result, tmp_path / "cmp.png", labels=("mine", "theirs"), title="Mine against theirs")
     images = [axes.images[0] for axes in figure.axes[:3]]
     np.testing.assert_array_equal(images[0].get_array(), test.values)
@@ -336,7 +336,7 @@ def test_comparison_shows_both_maps_alike_and_where_they_differ(tmp_path: Path) 
     np.testing.assert_array_equal(images[2].get_array().mask, np.isnan(result.difference))
     assert images[0].get_clim() == images[1].get_clim() == (0.0, 18.0)
     outline = figure.axes[0].patches[0]
-    assert (*outline.get_xy(), outline.get_width(), outline.get_height()) == (-2, -2, 5, 4)
+    assert (*outline.get_xy(), outline.get_width(), outline.get_height()) == (-1, -2, 4, 3)
     assert [axes.get_title(loc="left") for axes in figure.axes[:3]] == ["mine", "theirs", "difference"]
     text = words(figure)
     assert f"NCC {100 * result.ncc:.4g} %" in text
