@@ -14,16 +14,15 @@ import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 import pytest
-from matplotlib.colors import LogNorm, Normalize, to_rgb
-from matplotlib.figure import Figure
-from matplotlib.image import imread
-
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.luminance.comparison import Region, compare, cross_section
 from etendue.plot import plot_comparison, plot_cross_sections, plot_map, style
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
+from matplotlib.colors import LogNorm, Normalize, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.image import imread
 
 NAN = math.nan
 
