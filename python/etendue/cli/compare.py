@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.terminal import check_outputs, numbers, print_json, say
+from etendue.cli.terminal import check_outputs, numbers, one_of, print_json, say
 from etendue.formats.maps import PICTURE_EXTENSIONS, read_map
 from etendue.luminance.comparison import DEAD_RULES, Region, cross_section
 from etendue.luminance.comparison import compare as compare_maps
@@ -39,8 +39,7 @@ def compare(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """NCC (3.5), NRMSE as printed (3.6), true RMSE over the reference's maximum, difference image (3.4), cross sections."""
-    if dead not in DEAD_RULES:
-        raise typer.BadParameter(f"--dead {dead!r}: give one of {', '.join(DEAD_RULES)}")
+    one_of(dead, DEAD_RULES, "--dead")
     if (section_output is None) != (section_x is None and section_y is None):
         raise typer.BadParameter("--section-output goes with --section-x or --section-y")
     check_outputs([p for p in (output, section_output) if p], PICTURE_EXTENSIONS)

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.terminal import complain, print_json, say
-from etendue.formats.rays import read_rays, write_rays
+from etendue.cli.terminal import check_folder, complain, one_of, print_json, say
+from etendue.formats.rays import RAY_FORMATS, read_rays, write_rays
 from etendue.quantities.ray_set import RaySet
 from etendue.units import FLUX_UNITS, FluxUnit
 
@@ -34,6 +34,9 @@ def convert(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Read one or more ray files and write one; complaints and losses are printed."""
+    if format is not None:
+        one_of(format, [f.name for f in RAY_FORMATS], "--format")
+    check_folder(output)
     if flux and len(flux) != len(inputs):
         raise typer.BadParameter(f"--flux was given {len(flux)} times for {len(inputs)} input files")
     fluxes: list[str | None] = [*flux] if flux else [None] * len(inputs)
@@ -72,6 +75,5 @@ def in_unit(rays: RaySet, unit: str | None) -> RaySet:
     """The set in the unit that an option names."""
     if unit is None:
         return rays
-    if unit not in FLUX_UNITS:
-        raise typer.BadParameter(f"{unit!r} is no unit of flux; give one of {', '.join(FLUX_UNITS)}")
+    one_of(unit, FLUX_UNITS, "--unit")
     return rays.in_unit("lm" if unit == "lm" else "W")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from pathlib import Path
 from typing import Annotated
@@ -31,8 +32,8 @@ class ZoneResult:
 
     @property
     def deviation(self) -> float:
-        """(estimate - truth) / standard error."""
-        return (self.estimate - self.truth) / self.standard_error
+        """(estimate - truth) / standard error; NaN if no ray was seen."""
+        return (self.estimate - self.truth) / self.standard_error if self.rays else math.nan
 
 
 def zone_results(source: RingSource, lmap: LuminanceMap) -> list[ZoneResult]:
@@ -57,7 +58,7 @@ def demo(
     picture: Annotated[Path, typer.Option("-o", "--output", help="The picture to write, .png")] = Path(
         "etendue-demo.png"
     ),
-    rays: Annotated[int, typer.Option("--rays", help="Rays to draw.", min=1000)] = 200_000_000,
+    rays: Annotated[int, typer.Option("--rays", help="Rays to draw.", min=100_000)] = 200_000_000,
     seed: Annotated[int, typer.Option("--seed", help="Seed of the rays.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
@@ -85,7 +86,7 @@ def demo(
     for r in results:
         table.add_row(
             str(r.zone), f"{r.truth:,.0f} cd/m²", f"{r.estimate:,.0f}", f"± {r.standard_error:,.0f}",
-            f"{r.deviation:+.2f} σ", f"{r.rays:,}",
+            f"{r.deviation:+.2f} σ" if r.rays else "not seen", f"{r.rays:,}",
         )  # fmt: skip
     output.print(table)
     for note in lmap.notes:

@@ -7,10 +7,11 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.luminance import check_scale, print_map, summary, write_map
-from etendue.cli.terminal import check_outputs, complain, print_json, say
+from etendue.cli.luminance import print_map, summary, write_map
+from etendue.cli.terminal import check_outputs, complain, one_of, print_json, say
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS, read_map
 from etendue.luminance.filters import FILTERS, filter_map
+from etendue.plot.map_picture import SCALES
 
 
 def filter_(
@@ -25,7 +26,8 @@ def filter_(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Smooth a map with one of the four filters of the thesis; the flux before and after is printed."""
-    check_scale(scale)
+    one_of(kind, FILTERS, "--kind")
+    one_of(scale, SCALES, "--scale")
     check_outputs(output, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
     smooth = filter_map(read_map(file), kind, size=size, gamma=gamma)
     losses = write_map(smooth, output, scale)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,8 +10,8 @@ import numpy as np
 import typer
 
 from etendue.cli.convert import in_unit, with_flux
-from etendue.cli.terminal import check_outputs, complain, numbers, print_json, progress_bar, say
-from etendue.errors import ArgumentError
+from etendue.cli.terminal import check_outputs, complain, numbers, one_of, print_json, progress_bar, say, whole_numbers
+from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import read_rays
 from etendue.luminance.estimate import METHODS, luminance_map
@@ -42,21 +43,19 @@ def luminance(
     ] = None,
     unit: Annotated[str | None, typer.Option("--unit", help="lm or W: convert through the file's spectrum.")] = None,
     scale: Annotated[str, typer.Option("--scale", help="Colours of a picture: linear or log.")] = "linear",
-    threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.")] = None,
+    threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Luminance maps with a standard error per pixel, for any number of observers in one pass over the rays."""
-    if method not in METHODS:
-        raise typer.BadParameter(f"--method {method!r}: give one of {', '.join(METHODS)}")
-    if plane not in PLANES:
-        raise typer.BadParameter(f"--plane {plane!r}: give one of {', '.join(PLANES)}")
-    check_scale(scale)
+    one_of(method, METHODS, "--method")
+    one_of(plane, PLANES, "--plane")
+    one_of(scale, SCALES, "--scale")
     x, y, z = numbers(target, 3, "--target", "0,0,0")
     angles = [numbers(text, 2, "--observer", "30,0") for text in observer]
     observers = [Observer(theta, phi, distance, (x, y, z)) for theta, phi in angles]
     width, height = numbers(size, 2, "--size", "25,25")
-    columns, rows = numbers(pixels, 2, "--pixels", "128,128")
-    screen = Screen(width, height, int(columns), int(rows), "xy" if plane == "xy" else "view")
+    columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
+    screen = Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")
     targets = [[_named(path, o) for path in output] for o in observers]
     everything = [path for paths in targets for path in paths]
     if len(set(everything)) < len(everything):
@@ -84,18 +83,14 @@ def luminance(
     for line in (*complaints, *(f"note: {note}" for note in losses)):
         complain(line)
     if all(lmap.dead_pixels == lmap.values.size for lmap in maps):
-        centre = ",".join(f"{c:.4g}" for c in rays.moments().bounds.mean(axis=1))
-        complain(f"hint: the rays start around {centre} mm, the screen is centred on {target}: try --target {centre}")
+        middle = rays.moments().bounds.mean(axis=1)
+        if np.linalg.norm(middle - (x, y, z)) > max(width, height) / 2:
+            centre = ",".join(f"{c:.4g}" for c in middle)
+            complain(f"hint: the rays start around {centre} mm, off the screen about {target}: try --target {centre}")
     for lmap, paths in zip(maps, targets, strict=True):
         print_map(lmap)
         for path in paths:
             say(f"  {path}")
-
-
-def check_scale(scale: str) -> None:
-    """Refuse a scale of colours that does not exist, before any work is done."""
-    if scale not in SCALES:
-        raise typer.BadParameter(f"--scale {scale!r}: give one of {', '.join(SCALES)}")
 
 
 def write_map(lmap: LuminanceMap, paths: list[Path], scale: str) -> list[str]:
@@ -110,8 +105,14 @@ def write_map(lmap: LuminanceMap, paths: list[Path], scale: str) -> list[str]:
 
 
 def _named(path: Path, observer: Observer) -> Path:
-    text = str(path).replace("{theta}", f"{observer.theta:g}").replace("{phi}", f"{observer.phi:g}")
-    return Path(text)
+    angles = {"theta": f"{observer.theta:g}", "phi": f"{observer.phi:g}"}
+
+    def value(match: re.Match[str]) -> str:
+        if match[1] not in angles:
+            raise UnknownNameError(f"placeholder in the output {path}", match[1], angles)
+        return angles[match[1]]
+
+    return Path(re.sub(r"\{(\w*)\}", value, str(path)))
 
 
 def summary(lmap: LuminanceMap) -> dict[str, Any]:

@@ -6,15 +6,16 @@ import contextlib
 import json
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from etendue.errors import ArgumentError
+from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.ray_stream import Progress as ProgressFunction
 
 output = Console(soft_wrap=True, highlight=False)
@@ -44,6 +45,8 @@ def _plain(data: Any) -> Any:
         return {str(k): _plain(v) for k, v in data.items()}
     if isinstance(data, list | tuple):
         return [_plain(v) for v in data]
+    if isinstance(data, np.generic):
+        return _plain(data.item())
     if isinstance(data, float) and not math.isfinite(data):
         return None
     if data is None or isinstance(data, str | int | float | bool):
@@ -81,6 +84,46 @@ def numbers(text: str, count: int, option: str, example: str) -> tuple[float, ..
     return values
 
 
+def whole_numbers(text: str, count: int, option: str, example: str) -> tuple[int, ...]:
+    """Like `numbers`, for counts: a fraction is refused, never cut off.
+
+    Raises
+    ------
+    typer.BadParameter
+        If there are not `count` of them, or one is no whole number.
+    """
+    values = numbers(text, count, option, example)
+    if not all(value.is_integer() for value in values):
+        raise typer.BadParameter(f"{text!r}: give {count} whole numbers, e.g. {option} {example}")
+    return tuple(int(value) for value in values)
+
+
+def one_of(value: str, known: Iterable[str], option: str) -> str:
+    """The value of an option that has a few.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it is none of them; suggests the nearest.
+    """
+    known = list(known)
+    if value not in known:
+        raise typer.BadParameter(str(UnknownNameError(f"value of {option}", value, known)))
+    return value
+
+
+def check_folder(path: Path) -> None:
+    """Refuse, before any work is done, an output whose folder does not exist.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+    """
+    if not path.parent.is_dir():
+        raise ArgumentError(f"{path}: the folder {path.parent} does not exist; create it first.")
+
+
 def check_outputs(paths: list[Path], extensions: tuple[str, ...]) -> None:
     """Refuse, before any work is done, outputs that could not be written afterwards.
 
@@ -94,5 +137,4 @@ def check_outputs(paths: list[Path], extensions: tuple[str, ...]) -> None:
             raise ArgumentError(
                 f"{path}: the extension {path.suffix!r} is none of the known ones: {', '.join(extensions)}."
             )
-        if not path.parent.is_dir():
-            raise ArgumentError(f"{path}: the folder {path.parent} does not exist; create it first.")
+        check_folder(path)
