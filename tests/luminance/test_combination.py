@@ -27,3 +27,17 @@ def test_other_views_are_refused() -> None:
         et.combine_maps([a, a.replace(observer=et.Observer(21, 40, 150))])
     with pytest.raises(ArgumentError, match="no maps"):
         et.combine_maps([])
+    with pytest.raises(ArgumentError, match="map 2 has the same origin"):
+        et.combine_maps([a, a.replace(notes=())])
+
+
+def test_what_is_unknown_stays_unknown() -> None:
+    a, b = (et.luminance_map(et.RingSource(rays=300_000, seed=s), *VIEW, method="cone") for s in (1, 2))
+    live = ~np.isnan(a.values)
+    unknown = a.replace(standard_error=np.full(a.values.shape, np.nan), rays=np.full(a.values.shape, -1))
+    both = et.combine_maps([unknown, b])
+    assert np.isnan(both.standard_error[live]).all()
+    assert (both.rays == -1).all()
+    dead_in_a = ~live & ~np.isnan(b.values)
+    assert dead_in_a.any()
+    np.testing.assert_allclose(both.standard_error[dead_in_a], b.standard_error[dead_in_a] / 2)

@@ -207,6 +207,9 @@ def test_refusals_say_what_to_do() -> None:
         et.luminance_map(rays, front, screen, acceptance=2.0)
     with pytest.raises(ArgumentError, match="no apparent area"):
         et.luminance_map(rays, et.Observer(90, 0, 1000), et.Screen(2, 2, 1, 1, "xy"), method="cone")
+    for bad_threads in (0, -1, 1.5, 10**9):
+        with pytest.raises(ArgumentError, match="threads"):
+            et.luminance_map(rays, front, screen, threads=bad_threads)  # type: ignore[call-overload]
     with pytest.raises(ArgumentError, match="2 observers and 3 screens"):
         et.luminance_map(rays, [front] * 2, [screen] * 3)
     far = np.zeros(1, dtype=[("direction", "<f4", 3), ("flux", "<f4")])

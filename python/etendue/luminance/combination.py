@@ -16,7 +16,7 @@ def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
 
     This is how [Audenaert2014]_ section 2.3.1 joins the incident ray tables of 28 runs: the flux of a ray is divided by
     the number of runs. Each map weighs the same; a pixel that is dead in one run counts there as 0, and is dead in the
-    result if it is dead in all. Standard errors add in squares.
+    result if it is dead in all. Standard errors add in squares; an unknown one stays unknown.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
     Raises
     ------
     ArgumentError
-        If there is no map, or they differ in observer, screen or unit.
+        If there is no map, they differ in observer, screen or unit, or two have the same origin.
 
     Examples
     --------
@@ -47,13 +47,23 @@ def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
                     f"combine_maps: {name} differs: {getattr(first, name)} and {getattr(other, name)}. "
                     "Only maps of the same view can be combined."
                 )
+    for index, lmap in enumerate(maps):
+        if lmap.provenance.format != "memory" and lmap.provenance in [m.provenance for m in maps[:index]]:
+            raise ArgumentError(
+                f"combine_maps: map {index + 1} has the same origin as an earlier one ({lmap.provenance.source}: "
+                f"{'; '.join(lmap.provenance.steps)}). Only independent maps can be combined."
+            )
     n = len(maps)
-    rays = np.sum([m.rays for m in maps], axis=0)
-    dead = np.all([np.isnan(m.values) for m in maps], axis=0)
+    missing = [np.isnan(m.values) for m in maps]
+    dead = np.all(missing, axis=0)
     values = np.sum([np.nan_to_num(m.values) for m in maps], axis=0) / n
-    error = np.sqrt(np.sum([np.nan_to_num(m.standard_error) ** 2 for m in maps], axis=0)) / n
+    # A dead pixel adds nothing; the unknown error of a live one stays unknown, and so does an unknown number of rays.
+    variances = [np.where(gone, 0.0, m.standard_error**2) for m, gone in zip(maps, missing, strict=True)]
+    error = np.sqrt(np.sum(variances, axis=0)) / n
+    unknown = np.any([m.rays < 0 for m in maps], axis=0)
+    rays = np.where(unknown, -1, np.sum([m.rays for m in maps], axis=0))
     notes = (
-        f"mean of {n} independent maps, {rays.sum():,} rays in all",
+        f"mean of {n} independent maps" + ("" if unknown.any() else f", {rays.sum():,} rays in all"),
         f"{int(dead.sum()):,} of {dead.size:,} pixels are dead (no ray): NaN",
     )
     sources = tuple(m.provenance for m in maps)

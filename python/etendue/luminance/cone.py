@@ -12,7 +12,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.quantities.observer import Observer, Screen
-from etendue.quantities.ray_stream import Progress, RayStream, Tally
+from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 from etendue.units import MM2_PER_M2
 
 FloatArray = npt.NDArray[np.float64]
@@ -97,7 +97,7 @@ def cone_estimates(
             "Ask for a near-field ray file."
         )
     cones = [_core_cone(view) for view in views]
-    sums, raw_tally = _core.cone_sums(rays.core_source(), cones, threads, progress)
+    sums, raw_tally = _core.cone_sums(rays.core_source(), cones, checked_threads(threads), progress)
     tally = Tally.from_core(raw_tally)
     scale = rays.accept_tally(tally)
     estimates = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -139,8 +140,9 @@ class RayOperations:
         flux : float
             New total [`unit`], > 0.
         unit : {"lm", "W"}, optional
-            The set's own if None. Another unit states that the flux distribution over the rays is the same in both,
-            which is true if all rays have the same spectrum; columns of `FLUX_COLUMNS` are then left out.
+            The set's own if None. For another unit the rays are converted first (`in_unit`) if their spectrum is known.
+            If it is not, the call states that the flux is distributed over the rays in the same way in both units, which
+            is true if they all have the same spectrum; columns of `FLUX_COLUMNS` are then left out.
 
         Raises
         ------
@@ -159,6 +161,10 @@ class RayOperations:
         unit = unit or self.flux_unit
         if unit not in FLUX_UNITS:
             raise UnknownNameError("flux unit", unit, FLUX_UNITS)
+        if unit != self.flux_unit and self.knows_spectrum:
+            # Lumens of rays that the eye does not see cannot become watts; then the statement below is all there is.
+            with contextlib.suppress(UnitError):
+                return self.in_unit(unit).with_total_flux(flux)
         # The header's total has been overruled by its user: it must not be complained about any more.
         header = {("overruled_total_flux" if k == "total_flux" else k): v for k, v in self.header.items()}
         changes = {
@@ -313,6 +319,17 @@ class RayOperations:
             )
         return self._with_flux(
             lambda rows: self.records["flux"][rows].astype(np.float64) * scale / efficacy(rows), unit, "its spectrum"
+        )
+
+    @property
+    def knows_spectrum(self: RaySet) -> bool:  # type: ignore[misc]
+        """Whether every ray has a wavelength or a spectrum, so that watts and lumens can be converted."""
+        indexed = "spectrum_index" in self.columns and bool(self.spectra)
+        return (
+            "wavelength" in self.columns
+            or self.meaning.single_wavelength is not None
+            or indexed
+            or len(self.spectra) == 1
         )
 
     def _efficacy(self: RaySet) -> Callable[[slice], FloatArray]:  # type: ignore[misc]

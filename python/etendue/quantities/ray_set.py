@@ -15,7 +15,7 @@ from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_operations import FLUX_COLUMNS, RayOperations
-from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally
+from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally, checked_threads
 from etendue.quantities.report import Complaint, RayFileWarning
 from etendue.quantities.spectrum import Spectrum
 from etendue.units import FLUX_UNITS, FluxUnit
@@ -336,7 +336,7 @@ class RaySet(RayOperations, RayStream):
     def moments(self, progress: Progress | None = None, threads: int | None = None) -> Moments:
         """Bounding box, centroid, mean direction and the sums behind the virtual focus; one pass the first time."""
         if self._moments is None:
-            tally, moments = _core.scan(self.core_source(), threads, progress)
+            tally, moments = _core.scan(self.core_source(), checked_threads(threads), progress)
             self.accept_tally(Tally.from_core(tally))
             arrays = {k: np.array(v) for k, v in moments.items() if k not in ("zero_flux", "flux_range")}
             low, high = moments["flux_range"]

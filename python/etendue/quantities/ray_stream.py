@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
+from etendue.errors import ArgumentError
 from etendue.quantities.provenance import Provenance
 from etendue.units import FluxUnit
 
@@ -20,6 +21,13 @@ Progress = Callable[[int], None]
 
 BATCH = 1 << 18
 """Rays per batch: some 14 MB of f64, far above the cost of a call and far below any memory limit."""
+
+
+def checked_threads(threads: int | None) -> int | None:
+    """A number of threads the core can take; `ArgumentError` if it is none."""
+    if threads is not None and not (isinstance(threads, int) and 1 <= threads <= 4096):
+        raise ArgumentError(f"threads is {threads!r}; give a whole number from 1 to 4096, or None for one per core.")
+    return threads
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,7 +134,7 @@ class RayStream(abc.ABC):
 
     def pass_over(self, progress: Progress | None = None, threads: int | None = None) -> Tally:
         """One pass over all rays for the flux account."""
-        tally, _ = _core.scan(self.core_source(), threads, progress)
+        tally, _ = _core.scan(self.core_source(), checked_threads(threads), progress)
         result = Tally.from_core(tally)
         self.accept_tally(result)
         return result
