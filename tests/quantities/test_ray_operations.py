@@ -668,10 +668,10 @@ def test_far_field_rays_cannot_be_moved() -> None:
 
 def test_a_total_in_another_unit_goes_through_the_spectrum_if_it_is_known() -> None:
     """Lumens stated for a set in watts are shared by what each wavelength is worth, not by the watts."""
-    rays = et.RaySet([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, [1.0, 1.0], flux_unit="W", wavelength=[555.0, 610.0])
+    rays = RaySet([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, [1.0, 1.0], flux_unit="W", wavelength=[555.0, 610.0])
     stated = rays.with_total_flux(100.0, "lm")
     assert stated.total_flux == 100.0
     v_610 = 0.503  # CIE 018:2019, V(610 nm)
     np.testing.assert_allclose(stated.flux, [100 / (1 + v_610), 100 * v_610 / (1 + v_610)], rtol=1e-9)
-    invisible = et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0], wavelength=[300.0])
+    invisible = RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0], wavelength=[300.0])
     assert invisible.with_total_flux(5.0, "W").total_flux == 5.0

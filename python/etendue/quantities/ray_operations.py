@@ -164,7 +164,7 @@ class RayOperations:
         if unit != self.flux_unit and self.knows_spectrum:
             # Lumens of rays that the eye does not see cannot become watts; then the statement below is all there is.
             with contextlib.suppress(UnitError):
-                return self.in_unit(unit).with_total_flux(flux)
+                return self.in_unit(unit)._without(*FLUX_COLUMNS).with_total_flux(flux)
         # The header's total has been overruled by its user: it must not be complained about any more.
         header = {("overruled_total_flux" if k == "total_flux" else k): v for k, v in self.header.items()}
         changes = {
