@@ -58,9 +58,9 @@ def comparison_screen(screen: Screen) -> Screen:
 def choose_acceptance(estimate: ConeEstimate, screen: Screen) -> AcceptanceChoice:
     r"""Pick the acceptance with the least estimated mean square error over the map.
 
-    A narrow cone sees few rays (variance), a wide one blurs over angle (bias). The variance of each rung j of the ladder
-    is known from the flux weights. The bias shows in the difference between a rung and the next narrower one, which for
-    a Poisson process is noise only if there is none:
+    A narrow cone sees few rays (variance), a wide one blurs over angle (bias); the rung with the least sum of both is
+    taken (theory eq. 15). The variance of each rung j of the ladder is known from the flux weights. The bias shows in
+    the difference between a rung and the next narrower one, which for a Poisson process is noise only if there is none:
 
     .. math:: D_j = \sum_p \left[(L_j - L_{j-1})^2 - \mathrm{var}(L_j - L_{j-1})\right], \qquad
               \mathrm{E} D_j = \sum_p (b_j - b_{j-1})^2

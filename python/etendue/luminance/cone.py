@@ -47,7 +47,7 @@ class ConeView:
     acceptances: tuple[float, ...]
 
     def etendue(self) -> FloatArray:
-        """ΔΩ_o ΔA_p cos θ_p of eq. 2.3 [m² sr], shape (acceptances, rows, columns)."""
+        """ΔΩ_o ΔA_p cos θ_p of eq. 2.3 (theory eq. 6) [m² sr], shape (acceptances, rows, columns)."""
         apparent = self.screen.pixel_area / MM2_PER_M2 * self.screen.cosine(self.observer)
         solid_angles = np.array([cone_solid_angle(a) for a in self.acceptances])
         product: FloatArray = solid_angles[:, None, None] * apparent
@@ -63,7 +63,7 @@ class ConeEstimate:
     luminance : array
         Eq. 2.4 [cd/m² or W/(m² sr)]; 0 where no ray was seen.
     variance : array
-        Of `luminance`: Σ w² over the étendue squared, for a Poisson process of weighted rays.
+        Of `luminance`: Σ w² over the étendue squared, for a Poisson process of weighted rays (theory eq. 8).
     rays : array of int64
         Rays seen.
     etendue : array
@@ -84,7 +84,8 @@ def cone_estimates(
 
     A ray is carried along its line to the screen; if it crosses pixel p and its direction is within the acceptance of the
     line from p's centre to the observer (eq. 2.2), its flux counts for p. For a Lambertian source the expectation is
-    L (1 + cos α)/2: the cone's solid angle stands where its projected solid angle would be exact, 0.017 % at α = 1.5°.
+    L (1 + cos α)/2 (theory eq. 9): the cone's solid angle stands where its projected solid angle would be exact, 0.017 %
+    at α = 1.5°.
 
     Raises
     ------

@@ -164,7 +164,7 @@ class RayOperations:
         if unit != self.flux_unit and self.knows_spectrum:
             # Lumens of rays that the eye does not see cannot become watts; then the statement below is all there is.
             with contextlib.suppress(UnitError):
-                return self.in_unit(unit)._without(*FLUX_COLUMNS).with_total_flux(flux)
+                return self.in_unit(unit)._without(*FLUX_COLUMNS).with_total_flux(flux)  # noqa: SLF001 - its own kind
         # The header's total has been overruled by its user: it must not be complained about any more.
         header = {("overruled_total_flux" if k == "total_flux" else k): v for k, v in self.header.items()}
         changes = {
@@ -264,7 +264,8 @@ class RayOperations:
     def virtual_focus(self: RaySet) -> VirtualFocus:  # type: ignore[misc]
         """The point F with the least Σ w |distance of F to the ray's line|² ([Muschaweck2019]_).
 
-        The normal equations A F = b with A = Σ w (1 - k kᵀ), b = Σ w (1 - k kᵀ) x; vendors print F in their data sheets.
+        The normal equations (theory eq. 24) A F = b with A = Σ w (1 - k kᵀ), b = Σ w (1 - k kᵀ) x; vendors print F in their
+        data sheets.
         """
         moments = self.moments()
         flux = self.tally.flux

@@ -67,7 +67,7 @@ class Spectrum:
 
     @property
     def luminous_efficacy(self) -> float:
-        """K = K_m ∫ S V dλ / ∫ S dλ [lm/W] (CIE S 017, 17-21-090).
+        """K = K_m ∫ S V dλ / ∫ S dλ [lm/W] (theory eq. 25) (CIE S 017, 17-21-090).
 
         The product of the two piecewise linear functions is integrated exactly, by Simpson's rule between the union of
         their nodes.
