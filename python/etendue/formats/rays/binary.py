@@ -263,7 +263,8 @@ def batch_rows(batch: RayBatch) -> slice:
 def own_rows(batch: RayBatch, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The values of a whole column that belong to a batch's usable rays, as f64 if they are floats."""
     values = column[batch_rows(batch)][batch.usable]
-    return values.astype(np.float64) if values.dtype.kind == "f" else values
+    with np.errstate(invalid="ignore"):  # a signalling NaN is as good as a quiet one
+        return values.astype(np.float64) if values.dtype.kind == "f" else values
 
 
 class Colour(enum.Enum):

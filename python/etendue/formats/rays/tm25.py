@@ -246,8 +246,8 @@ def _find_rays(path: Path, header: _Header, tables_end: int, size: int) -> tuple
 
 def _directions_are_unit(records: Records) -> bool:
     """Whether most of the first directions are unit vectors; they are not if the columns are shifted."""
-    k = records["direction"][:1024].astype(np.float64)
     with np.errstate(all="ignore"):
+        k = records["direction"][:1024].astype(np.float64)
         norm = np.sqrt(np.einsum("ij,ij->i", k, k))
     return bool(np.mean(np.abs(norm - 1) < 1e-3) > 0.5)
 
@@ -263,7 +263,9 @@ def _with_integer_index(records: Records, tables: int) -> tuple[Records, tuple[C
     if ((stored >= 1) & (stored <= tables)).all():
         return records, ()
     floats = np.ascontiguousarray(stored).view("<f4")
-    if ((floats >= 1) & (floats <= tables) & (floats == np.floor(floats))).all():
+    with np.errstate(invalid="ignore"):
+        whole = (floats >= 1) & (floats <= tables) & (floats == np.floor(floats))
+    if whole.all():
         converted = spool(_converted(records), records.dtype)
         found = "the spectrum indices are stored as floats, not as integers"
         return converted, (Complaint("warning", "rays", found, "TM-25 4.8.1.18"),)
@@ -302,7 +304,8 @@ def _spectra(header: _Header, tables: list[Records]) -> tuple[tuple[Spectrum, ..
     spectra = []
     for number, table in enumerate(tables, 1):
         try:
-            spectra.append(Spectrum(table[:, 0], table[:, 1]))
+            with np.errstate(invalid="ignore"):  # NaN is refused by Spectrum, whether it signals or not
+                spectra.append(Spectrum(table[:, 0], table[:, 1]))
         except ArgumentError as error:
             found = f"spectral table {number} is unusable, so all are left out: {error}"
             return (), [*complaints, Complaint("warning", place, found, clause)]
