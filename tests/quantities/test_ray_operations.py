@@ -593,6 +593,7 @@ def test_a_wrong_index_does_not_point_into_the_spectra_of_another_set() -> None:
 def test_spectra_that_one_set_does_not_know_are_not_invented(ignorant: RaySet) -> None:
     both = RaySet.merge([spectral(n=2, spectra=(A,)), ignorant])
     assert both.spectra == ()
+    assert [c.found.rsplit(": ")[-1] for c in both.complaints] == ["spectrum"] * (1 + bool(ignorant.spectra))
     with pytest.raises(UnitError, match="no spectrum"):
         both.in_unit("lm")
 
@@ -604,7 +605,10 @@ def test_wavelengths_that_every_set_knows_are_kept() -> None:
     assert rgb.wavelength.tolist() == [620, 530, 460]
     assert RaySet.merge([red, red]).meaning.single_wavelength == 620.0
     assert RaySet.merge([red, red]).columns == ()
-    assert RaySet.merge([red, spectral(n=1)]).wavelength is None
+    dull = RaySet.merge([red, spectral(n=1)])
+    assert dull.wavelength is None
+    assert [c.found.rsplit(": ")[-1] for c in dull.complaints] == ["wavelength"]
+    assert rgb.complaints == RaySet.merge([red, red]).complaints == ()
     mixed = RaySet.merge([radiometric(2, wavelength_scale=0.5), red])
     assert mixed.wavelength is not None
     assert mixed.wavelength.tolist() == pytest.approx([*(0.5 * uneven(2).column("wavelength")), 620.0])
@@ -618,7 +622,13 @@ def test_columns_that_not_all_sets_have_alike_are_left_out() -> None:
     wide = np.zeros(2, [("position", "<f8", 3), ("direction", "<f8", 3), ("flux", "<f8"), ("additional", "<f4", 5)])
     wide["direction"] = (0, 0, 1)
     assert RaySet.merge([uneven(3), RaySet.from_records(other, RaySetMeaning())]).columns == ("stokes",)
-    assert RaySet.merge([uneven(3), RaySet.from_records(wide, RaySetMeaning())]).columns == ()
+    both = RaySet.merge([uneven(3, meaning=RaySetMeaning(provenance=FILE)), RaySet.from_records(wide, RaySetMeaning())])
+    assert both.columns == ()
+    reason = "left out, because not every merged set has it alike"
+    assert [str(c) for c in both.complaints] == [
+        f"note: led.ray, columns: {reason}: wavelength, radiant_flux, stokes, polarisation_axis, additional",
+        f"note: memory, columns: {reason}: additional",
+    ]
 
 
 def test_a_merged_set_knows_where_it_comes_from() -> None:

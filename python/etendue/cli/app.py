@@ -63,8 +63,7 @@ def main() -> None:
         complain(f"error: {error.filename}: {error.strerror}" if error.filename else f"error: {error}")
         sys.exit(1)
     except (KeyboardInterrupt, typer.Abort):
-        complain("stopped; nothing was written")
-        sys.exit(INTERRUPTED)
+        status = INTERRUPTED
     except Exception as error:
         # The parser's own errors know how to show themselves, with the nearest name.
         show = getattr(error, "show", None)
@@ -72,4 +71,7 @@ def main() -> None:
             raise
         show()
         sys.exit(getattr(error, "exit_code", 2))
+    # The parser returns this status for Ctrl-C as well.
+    if status == INTERRUPTED:
+        complain("stopped; no file was left half-written")
     sys.exit(status if isinstance(status, int) else 0)

@@ -73,7 +73,9 @@ def merged(sets: Sequence[RaySet], flux: Sequence[float] | None) -> RaySet:
         spectra=tuple(s for rays in sets for s in rays.spectra) if indexed else (),
         single_wavelength=single,
         header={},
-        complaints=tuple(_placed(complaint, rays) for rays in sets for complaint in rays.complaints),
+        complaints=tuple(
+            _placed(complaint, rays) for rays in sets for complaint in (*rays.complaints, *_losses(rays, dtype, single))
+        ),
         provenance=_provenance([rays.provenance for rays in sets]),
     )
     return type(sets[0]).from_records(spool(parts(), dtype), meaning)
@@ -96,6 +98,18 @@ def _column(rays: RaySet, name: str, batch: RayBatch, otherwise: float | None = 
     if name not in rays.columns:
         return np.full(len(batch.flux), otherwise)
     return rays.column(name, slice(batch.start, batch.start + BATCH))[batch.usable]
+
+
+def _losses(rays: RaySet, dtype: np.dtype[Any], single: float | None) -> list[Complaint]:
+    """What a set knows that records of `dtype` do not hold, because another set does not know it."""
+    kept = dtype.names or ()
+    lost = [name for name in rays.columns if name not in kept]
+    if rays.meaning.single_wavelength not in (None, single) and "wavelength" not in (*kept, *lost):
+        lost.append("wavelength")
+    if rays.spectra and "spectrum_index" not in (*kept, *lost):
+        lost.append("spectrum")
+    found = f"left out, because not every merged set has it alike: {', '.join(lost)}"
+    return [Complaint("note", "columns", found)] if lost else []
 
 
 def _placed(complaint: Complaint, rays: RaySet) -> Complaint:
