@@ -1,0 +1,275 @@
+"""The plan of the house, read out of the source: imports go down, floors do not mix, and what is public is explained."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import functools
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import etendue
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "python" / "etendue"
+CRATES = ROOT / "crates"
+
+
+def project() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text())
+
+
+@dataclasses.dataclass(frozen=True)
+class Module:
+    """A module of the package as its syntax tree."""
+
+    name: str
+    path: Path
+    tree: ast.Module
+
+    def names(self) -> Iterator[tuple[str, int]]:
+        """Everything of the package that the module imports, as dotted names, with the line."""
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Import):
+                yield from ((alias.name, node.lineno) for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                assert node.level == 0, f"{self.path}:{node.lineno}: a relative import hides where it leads"
+                yield from ((f"{node.module}.{alias.name}", node.lineno) for alias in node.names)
+
+
+@functools.cache
+def modules() -> tuple[Module, ...]:
+    found = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        found.append(Module(name, path, ast.parse(path.read_text(), filename=str(path))))
+    return tuple(found)
+
+
+def is_within(name: str, place: str) -> bool:
+    return name == place or name.startswith(f"{place}.")
+
+
+# --- Python floors ---------------------------------------------------------------------------------------------------
+
+
+def layers() -> list[list[str]]:
+    """The layers of the import contract, top first; the compiled core stands beside the lowest."""
+    (contract,) = (c for c in project()["tool"]["importlinter"]["contracts"] if c["type"] == "layers")
+    floors = [[part.strip() for part in layer.split("|")] for layer in contract["layers"]]
+    floors[-1] = sorted({*floors[-1], "etendue._core"})
+    return floors
+
+
+def place(name: str) -> tuple[int, str] | None:
+    """Number of the floor (0 is the top) and part of it that a dotted name belongs to."""
+    found = [(floor, part) for floor, parts in enumerate(layers()) for part in parts if is_within(name, part)]
+    assert len(found) <= 1, f"{name} stands on several floors: {found}"
+    return found[0] if found else None
+
+
+def test_the_contract_is_the_plan() -> None:
+    order = ["cli", "plot", "luminance", "formats", "quantities", "units"]
+    floors = [place(f"etendue.{name}") for name in order]
+    assert [floor for floor, _ in filter(None, floors)] == sorted({floor for floor, _ in filter(None, floors)})
+    assert None not in floors
+
+
+def test_every_module_stands_on_one_floor() -> None:
+    assert len(modules()) > 20
+    homeless = [m.name for m in modules() if place(m.name) is None]
+    assert homeless == ["etendue"]  # the front door, through which users come in at the top
+
+
+def test_imports_go_down_only() -> None:
+    known = {m.name for m in modules()} | {"etendue._core"}
+    imports = 0
+    for module in modules():
+        here = place(module.name)
+        if here is None:
+            continue
+        for name, line in module.names():
+            if not is_within(name, "etendue"):
+                continue
+            target = max((k for k in known if is_within(name, k)), key=len)
+            there = place(target)
+            where = f"{module.path.relative_to(ROOT)}:{line}: {name}"
+            assert there is not None, f"{where}: the front door is for users; import from the module itself"
+            assert there[0] > here[0] or there == here, f"{where}: an import upwards or sideways"
+            imports += 1
+    assert imports > 100
+
+
+def test_only_the_command_line_prints() -> None:
+    looked = 0
+    for module in modules():
+        if is_within(module.name, "etendue.cli"):
+            continue
+        looked += 1
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.Call):
+                called = ast.unparse(node.func)
+                assert called != "print", f"{module.path}:{node.lineno}"
+                assert not called.startswith(("sys.stdout", "sys.stderr")), f"{module.path}:{node.lineno}"
+    assert looked > 20
+
+
+def test_no_memory_is_used_before_it_is_filled() -> None:
+    banned = {f"{package}.{name}" for package in ("np", "numpy") for name in ("empty", "empty_like", "ndarray")}
+    seen = 0
+    for module in modules():
+        assert not {"numpy.empty", "numpy.empty_like"} & {name for name, _ in module.names()}
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.Call):
+                called = ast.unparse(node.func)
+                seen += called.startswith("np.")
+                assert called not in banned, (
+                    f"{module.path}:{node.lineno}: {called} is filled with what was there before"
+                )
+    assert seen > 100
+
+
+# --- words -----------------------------------------------------------------------------------------------------------
+
+WITHOUT_EXAMPLE = {
+    "etendue.cli": "a verb explains itself by --help, and docs/how-to.md runs it",
+    "etendue.errors": "raised by the package, never called by users",
+    "etendue.plot.style": "how pictures are put together; plot_map, plot_comparison and plot_cross_sections are the door",
+    "etendue.plot.map_picture": "likewise",
+    "etendue.formats.maps.csv": "one map format; LuminanceMap.save and read_map are the door",
+    "etendue.formats.maps.exr": "likewise",
+    "etendue.formats.maps.hdr": "likewise",
+    "etendue.formats.maps.header": "likewise",
+    "etendue.formats.maps.map_format": "likewise",
+    "etendue.formats.maps.narrow": "likewise",
+    "etendue.formats.maps.npz": "likewise",
+    "etendue.formats.maps.rgbe": "likewise",
+    "etendue.formats.maps.tiff": "likewise",
+    "etendue.formats.maps.save_map": "LuminanceMap.save is the door",
+    "etendue.formats.rays": "ray formats live on files, which docs/how-to.md writes and reads",
+    "etendue.luminance.acceptance": "what luminance_map does with method='auto'; its notes show the result",
+    "etendue.luminance.cone": "what luminance_map does with method='cone'",
+    "etendue.luminance.comparison.MapStatistics": "a part of what compare returns, shown in its example",
+    "etendue.luminance.comparison.Comparison": "what compare returns, shown in its example",
+    "etendue.luminance.comparison.CrossSection": "what cross_section returns, shown in its example",
+    "etendue.luminance.filters.FilterKind": "a row of the registry of filter_map",
+    "etendue.quantities.observer.observer_from_dict": "for readers of files",
+    "etendue.quantities.provenance.version": "the version, whatever it is",
+    "etendue.quantities.ray_merge.merged": "RaySet.merge is the door",
+    "etendue.quantities.ray_operations.RayOperations": "a half of RaySet; each operation has an example of its own",
+    "etendue.quantities.ray_operations.VirtualFocus": "what RaySet.virtual_focus returns",
+    "etendue.quantities.ray_set.Moments": "what RaySet.moments returns",
+    "etendue.quantities.ray_set.RaySetMeaning": "for readers of files",
+    "etendue.quantities.ray_stream": "what ray sets and sources share; RaySet and RingSource show it",
+    "etendue.quantities.report.RayFileWarning": "a category of warnings",
+}
+"""Public things whose docstring may do without an example, with the reason."""
+
+
+def public_things() -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
+    for module in modules():
+        for node in module.tree.body:
+            if not isinstance(node, ast.FunctionDef | ast.ClassDef) or node.name.startswith("_"):
+                continue
+            if any(ast.unparse(decorator) == "overload" for decorator in node.decorator_list):
+                continue
+            yield f"{module.name}.{node.name}", node
+
+
+def test_everything_public_is_explained_and_shown() -> None:
+    things = dict(public_things())
+    assert len(things) > 100
+    shown, excused = set(), set()
+    for name, node in things.items():
+        text = ast.get_docstring(node)
+        assert text, f"{name} has no docstring"
+        if ">>>" in text:
+            shown.add(name)
+            continue
+        reasons = {excuse for excuse in WITHOUT_EXAMPLE if is_within(name, excuse)}
+        assert reasons, f"{name}: give an example in the docstring, or a reason here"
+        excused |= reasons
+    assert excused == set(WITHOUT_EXAMPLE), "an excuse that nobody needs any more"
+    assert len(shown) > 25
+
+
+def test_whatever_users_import_is_explained() -> None:
+    for name in etendue.__all__:
+        thing = getattr(etendue, name)
+        assert (thing.__doc__ or "").strip(), name
+        for member, value in vars(thing).items() if isinstance(thing, type) else ():
+            if callable(value) and not member.startswith("_"):
+                assert value.__doc__, f"{name}.{member}"
+            if isinstance(value, property):
+                assert value.__doc__, f"{name}.{member}"
+
+
+# --- Rust floors -----------------------------------------------------------------------------------------------------
+
+FLOORS = ("math", "sampling", "geometry", "lightfield", "optics", "trace", "bindings")
+"""Lowest first. A crate may name crates of lower floors only."""
+
+
+def crates() -> dict[str, dict[str, Any]]:
+    return {path.parent.name: tomllib.loads(path.read_text()) for path in sorted(CRATES.glob("*/Cargo.toml"))}
+
+
+def dependencies(manifest: dict[str, Any]) -> dict[str, Any]:
+    kinds = ("dependencies", "dev-dependencies", "build-dependencies")
+    tables = [manifest, *manifest.get("target", {}).values()]
+    return {name: value for table in tables for kind in kinds for name, value in table.get(kind, {}).items()}
+
+
+def test_every_crate_names_crates_of_lower_floors_only() -> None:
+    assert len(crates()) >= 6
+    assert set(crates()) <= set(FLOORS)
+    named = 0
+    for folder, manifest in crates().items():
+        assert manifest["package"]["name"] == f"etendue-{folder}"
+        for name in dependencies(manifest):
+            if name.startswith("etendue-"):
+                below = name.removeprefix("etendue-")
+                assert FLOORS.index(below) < FLOORS.index(folder), f"{folder} names {below}"
+                named += 1
+    assert named >= 10
+
+
+def test_only_the_bindings_know_python() -> None:
+    for folder, manifest in crates().items():
+        knows = {"pyo3", "numpy"} & set(dependencies(manifest))
+        assert bool(knows) == (folder == "bindings"), f"{folder}: {knows}"
+
+
+def test_every_crate_takes_the_lints_of_the_workspace() -> None:
+    workspace = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]
+    assert workspace["lints"]["rust"]["unsafe_code"] in ("deny", "forbid")
+    for folder, manifest in crates().items():
+        assert manifest["lints"] == {"workspace": True}, folder
+
+
+def without_comments(source: str) -> str:
+    """Rust without comments and strings, as far as looking for a word needs it."""
+    source = re.sub(r"//[^\n]*", "", source)
+    source = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
+    return re.sub(r'"(?:\\.|[^"\\])*"', '""', source)
+
+
+def test_no_crate_is_unsafe_prints_or_opens_files() -> None:
+    sources = sorted(CRATES.rglob("*.rs"))
+    assert len(sources) > 10
+    for path in sources:
+        code = without_comments(path.read_text())
+        for word in (r"\bunsafe\b", r"\bunsafe_code\b", r"\be?println!", r"\bdbg!", r"\bstd::fs\b", r"\bstatic mut\b"):
+            assert not re.search(word, code), f"{path.relative_to(ROOT)}: {word}"
+
+
+@pytest.mark.parametrize(
+    "source", ["let x = 1; // unsafe\n", "/* unsafe\n unsafe */ fn f() {}", 'let s = "unsafe \\" x";']
+)
+def test_comments_and_strings_are_not_code(source: str) -> None:
+    assert "unsafe" not in without_comments(source)
