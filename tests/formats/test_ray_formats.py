@@ -20,7 +20,7 @@ from etendue.formats import rays as package
 from etendue.formats.rays import RAY_FORMATS, detect_format, read_rays, write_rays
 from etendue.formats.rays.ray_format import Head, RayFormat
 from etendue.quantities.ray_set import RaySetMeaning
-from etendue.quantities.ray_stream import RayBatch
+from etendue.quantities.ray_stream import BATCH, RayBatch
 from etendue.quantities.report import RayFileWarning
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -157,6 +157,22 @@ def test_stream_is_written_in_batches(ray_format: RayFormat, tmp_path: Path) -> 
         return
     write_rays(tmp_path / "a", source, ray_format.name)
     assert_same_rays(read_rays(tmp_path / "a"), source.ray_set())
+
+
+@pytest.mark.parametrize("name", BINARY)
+def test_columns_stay_together_over_several_batches(name: str, tmp_path: Path) -> None:
+    n = BATCH + 1000
+    rays = asymmetric(n)
+    records = rays.records.copy()
+    records["direction"][: BATCH // 2 : 7] = 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RayFileWarning)
+        write_rays(tmp_path / "a", et.RaySet.from_records(records, rays.meaning), name)
+    back = read_rays(tmp_path / "a")
+    left = et.RaySet.from_records(records[records["direction"].any(axis=1)], rays.meaning)
+    assert_same_rays(back, left)
+    if back.wavelength is not None:
+        assert np.allclose(back.wavelength, left.wavelength, rtol=1e-6)
 
 
 @every_format

@@ -454,6 +454,19 @@ def test_damaged_file_with_all_blocks(tmp_path: Path, damage: dict[int, int], cu
         assert all(complaint.place for complaint in rays.complaints)
 
 
+def test_tables_that_fill_gigabytes_are_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "a.tm25ray"
+    path.write_bytes(tm25_bytes((), spectral=3, table_count=1, count=3) + struct.pack("<i", 1 << 27))
+    with path.open("rb+") as file:
+        file.truncate(36288 + 4 + 8 * (1 << 27) + 28 + 3 * 28)  # sparse: takes no room on the disk
+    tracemalloc.start()
+    with pytest.raises(FormatError, match="spectral table 1"):
+        read_rays(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 4e6
+
+
 # --- writing ---------------------------------------------------------------------------------------------------------
 
 
@@ -628,6 +641,8 @@ def test_facts_survive_a_round_trip(made: Callable[..., et.RaySet], tmp_path: Pa
     # The ratio of the two totals holds for another current, too, but not for some of the rays.
     header, _, _ = written(tmp_path / "b.tm25ray", rays.with_total_flux(16.0))
     assert (header["lumens"], header["watts"]) == (16.0, 0.5)
+    header, _, _ = written(tmp_path / "b.tm25ray", rays.moved((0, 0, 1)))
+    assert header["start"] == 0  # wherever they start now, it is not what the file said
     header, _, _ = written(tmp_path / "b.tm25ray", rays.subset(2, seed=1))
     assert math.isnan(header["watts"])
     assert rays.subset(2, seed=1).provenance.steps[0] in read_rays(tmp_path / "b.tm25ray").header["information"]

@@ -95,6 +95,13 @@ def test_single_wavelength_is_in_micrometres(tmp_path: Path, stored: float, nm: 
     assert single == (None if nm is None else pytest.approx(nm, rel=1e-7))
 
 
+def test_nanometres_in_the_place_of_micrometres(tmp_path: Path) -> None:
+    rays = read(tmp_path, wavelength=550.0)
+    assert (rays.meaning.single_wavelength, places(rays, "warning")) == (550.0, ["byte 116"])
+    rays = read(tmp_path, [(*row, 550.0) for row in ROWS], kind=2, flux_type=0)
+    assert places(rays, "warning") == ["byte 236"]
+
+
 def test_sum_is_kept_and_header_reported(tmp_path: Path) -> None:
     rays = read(tmp_path, fluxes=(5.0, 1.0))
     with pytest.warns(RayFileWarning, match=r"header says 1 lm, the rays sum to 8; the rays' sum is kept"):

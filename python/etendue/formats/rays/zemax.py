@@ -44,6 +44,9 @@ DIMENSION_UNITS = ("m", "inch", "cm", "feet", "mm")
 
 FLUX_ONLY, SPECTRAL = 0, 2
 RECORD_BYTES = {FLUX_ONLY: 28, SPECTRAL: 32}
+LONGEST_WAVELENGTH = 100.0
+"""[µm]; whoever wrote a longer one meant nanometres."""
+
 MAX_RAYS = 4_000_000_000
 """Largest number of rays that OpticStudio reads."""
 
@@ -81,7 +84,8 @@ def read(path: Path) -> RaySet:
         raise FormatError(
             path, "byte 192", f"record format {kind} does not exist", f"Known: 0 flux only, 2 spectral. [{CLAUSE}]"
         )
-    complaints = list(_header_complaints(kind, flux_type, placement))
+    single, wavelength_complaint = _single_wavelength(kind, wavelength)
+    complaints = [*_header_complaints(kind, flux_type, placement), *wavelength_complaint]
     rays, tail = whole_records(path, HEADER.size, RECORD_BYTES[kind], count, CLAUSE)
     records = map_records(path, _record(kind), HEADER.size, rays)
     total = stated_total(data[112:116])
@@ -97,17 +101,33 @@ def read(path: Path) -> RaySet:
         "location": tuple(placement[:3]),
         "rotation": tuple(placement[3:]),
     }
-    single = kind == FLUX_ONLY and np.isfinite(wavelength) and wavelength > 0
     meaning = RaySetMeaning(
         flux_unit=_flux_unit(kind, flux_type),
         length_scale=MM_PER_LENGTH_UNIT[DIMENSION_UNITS[unit]],
         wavelength_scale=NM_PER_UM,
-        single_wavelength=float(wavelength) * NM_PER_UM if single else None,
+        single_wavelength=single,
         header=header,
-        complaints=(*complaints, *tail, *wavelength_complaints(records, CLAUSE)),
+        complaints=(*complaints, *tail, *wavelength_complaints(records, CLAUSE), *_unit_of_wavelength(records)),
         provenance=file_provenance(path, "zemax"),
     )
     return RaySet.from_records(records, meaning)
+
+
+def _single_wavelength(kind: int, stored: float) -> tuple[float | None, list[Complaint]]:
+    """The wavelength [nm] of all rays, if they have but one."""
+    if kind == SPECTRAL or not (np.isfinite(stored) and stored > 0):
+        return None, []
+    if stored > LONGEST_WAVELENGTH:
+        # A public converter writes nanometres here.
+        found = f"a wavelength of {stored:g}, which would be µm; taken as nm"
+        return float(stored), [Complaint("warning", "byte 116", found, CLAUSE)]
+    return float(stored) * NM_PER_UM, []
+
+
+def _unit_of_wavelength(records: Records) -> Iterator[Complaint]:
+    if "wavelength" in (records.dtype.names or ()) and records["wavelength"][0] > LONGEST_WAVELENGTH:
+        found = f"a wavelength of {records['wavelength'][0]:g} µm, in which the column is by definition; is it in nm?"
+        yield Complaint("warning", f"byte {HEADER.size + 28}", found, CLAUSE)
 
 
 def _flux_unit(kind: int, flux_type: int) -> FluxUnit:
