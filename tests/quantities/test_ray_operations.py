@@ -512,14 +512,22 @@ def test_a_column_of_watts_is_better_than_a_spectrum() -> None:
     assert watts.total_flux == pytest.approx(2.0, rel=1e-6)
 
 
-def test_rays_without_a_finite_wavelength_are_left_out_of_the_lumens() -> None:
+@pytest.mark.parametrize("wavelength", [math.nan, 0.0, -450.0])
+def test_the_ray_whose_wavelength_is_missing_is_named(wavelength: float) -> None:
+    watts = radiometric(ray_operations.CHUNK + 10)
+    watts.records["wavelength"][ray_operations.CHUNK + 3] = wavelength
+    with pytest.raises(
+        UnitError, match=rf"led\.ray: ray 262,148 has the wavelength {wavelength:g} nm.*with_total_flux"
+    ):
+        watts.in_unit("lm")
+
+
+def test_flux_that_is_no_number_stays_none_in_another_unit() -> None:
     watts = radiometric(10)
-    watts.records["wavelength"][3] = math.nan
     watts.records["flux"][4] = math.inf
     watts.records["wavelength"][4] = 100.0  # infinity times 0
-    lumens = watts.in_unit("lm")
-    with pytest.warns(RayFileWarning, match="2 of 10 rays have a coordinate, direction or flux that is not finite"):
-        assert lumens.tally.not_finite == 2
+    with pytest.warns(RayFileWarning, match="1 of 10 rays have a coordinate, direction or flux that is not finite"):
+        assert watts.in_unit("lm").tally.not_finite == 1
 
 
 @pytest.mark.parametrize(
@@ -685,3 +693,9 @@ def test_a_total_in_another_unit_goes_through_the_spectrum_if_it_is_known() -> N
     np.testing.assert_allclose(stated.flux, [100 / (1 + v_610), 100 * v_610 / (1 + v_610)], rtol=1e-9)
     invisible = RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0], wavelength=[300.0])
     assert invisible.with_total_flux(5.0, "W").total_flux == 5.0
+
+
+def test_rays_without_a_wavelength_have_no_lumens() -> None:
+    rays = RaySet([[0, 0, 0]] * 3, [[0, 0, 1]] * 3, [1.0] * 3, flux_unit="W", wavelength=[555.0, 0.0, 610.0])
+    with pytest.raises(UnitError, match="ray 2 has the wavelength 0 nm"):
+        rays.in_unit("lm")

@@ -220,6 +220,13 @@ def test_a_total_that_contradicts_the_rays_is_complained_about_with_both_numbers
     assert [c.place for c in rays.complaints] == ["total flux"]
 
 
+def test_a_total_is_only_noted_where_the_format_has_relative_values() -> None:
+    meaning = RaySetMeaning(declared_flux=50.0, relative_by_format=True, header={"total_flux": 50.0})
+    (complaint,) = RaySet.from_records(records(LAYOUTS["f8 packed"]), meaning).complaints  # and warns of nothing
+    assert (complaint.severity, complaint.place) == ("note", "total flux")
+    assert "50 lm" in complaint.found
+
+
 @pytest.mark.parametrize("stated", [math.nan, math.inf, 0.0, -3.0, None, "337"])
 def test_a_header_without_a_usable_total_contradicts_nothing(stated: Any) -> None:
     rays = RaySet.from_records(records(LAYOUTS["f8 packed"]), RaySetMeaning(header={"total_flux": stated}))
@@ -230,6 +237,7 @@ def test_rays_without_any_flux_cannot_share_a_total() -> None:
     rays = RaySet(np.zeros((2, 3)), np.ones((2, 3)), [0.0, 0.0]).with_total_flux(5.0)
     assert rays.total_flux == 0.0
     assert rays.flux.tolist() == [0.0, 0.0]
+    assert rays.flux_scale == 0.0
 
 
 # --- complaints ------------------------------------------------------------------------------------------------------
@@ -324,3 +332,14 @@ def test_meaning_and_spectra_are_kept() -> None:
     assert rays.spectra == (spectrum,)
     assert rays.provenance == FILE
     assert dataclasses.replace(rays.meaning, spectra=()) == RaySetMeaning(flux_unit="W", provenance=FILE)
+
+
+def test_a_signalling_nan_passes_in_silence_and_is_counted() -> None:
+    """Damaged files hold them; numpy would warn at every conversion."""
+    records = np.zeros(2, [("position", "<f4", 3), ("direction", "<f4", 3), ("flux", "<f4")])
+    records["direction"] = (0, 0, 1)
+    records["flux"] = np.array([0x7F800001, 0x3F800000], "<u4").view("<f4")
+    rays = RaySet.from_records(records, RaySetMeaning())
+    assert np.isnan(rays.flux[0])
+    with pytest.warns(RayFileWarning, match="1 of 2 rays have a coordinate"):
+        assert rays.total_flux == 1.0

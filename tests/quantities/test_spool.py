@@ -116,6 +116,6 @@ for n in (100_001, 100_700, 104_000, 300_000):
     except OSError as error:
         print(type(error).__name__, end=' ')
 """
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)  # noqa: S603
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["OSError"] * 4

@@ -271,10 +271,11 @@ def test_a_screen_of_many_columns_is_seen_in_full() -> None:
 
 def test_lines_of_sight_that_miss_the_plane_see_nothing() -> None:
     source = RingSource(rays=1000)
-    # Right of this steep screen is down (-Z); the eye is 1.7 mm above the plane, so 4 mm to the left is above the horizon.
-    seen = source.pixel_luminance(Observer(89, 0, 100), Screen(60, 10, 30, 2))
-    assert (seen[:, :13] == 0).all()
-    assert seen.max() > 0
+    # The eye is 2.5 mm above the rings. Left on this screen is up: lines through its left 12 mm rise from the eye to the
+    # screen, and it is behind the eye that they meet the rings.
+    seen = source.pixel_luminance(Observer(60, 0, 5), Screen(30, 4, 30, 2))
+    assert (seen[:, :12] == 0).all()
+    assert (seen[:, 13:] > 0).all()
 
 
 @pytest.mark.parametrize("observer", [Observer(90, 0, 100), Observer(120, 0, 100), Observer(0, 0, 5, (0, 0, -5))])
