@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import math
 import os
@@ -593,7 +594,7 @@ def test_ctrl_c_ends_long_work_with_status_130_and_no_file(tmp_path: Path) -> No
     parent, child = os.openpty()
     try:
         command = [sys.executable, "-c", "from etendue.cli import main; main()"]
-        process = subprocess.Popen(  # noqa: S603
+        process = subprocess.Popen(
             [*command, "demo", "--rays", "5000000000000", "-o", "d.png"],
             cwd=tmp_path,
             stdout=subprocess.PIPE,
@@ -632,6 +633,26 @@ def test_ctrl_c_in_any_verb(run: Run, folder: Path, tmp_path: Path, monkeypatch:
     assert outcome.status == 130
     assert "stopped" in outcome.err
     assert files(tmp_path) == []
+
+
+# --- terminals that do not know Greek --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
+def test_letters_that_the_output_does_not_have_do_no_harm(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, encoding: str
+) -> None:
+    """As on Windows, where output that goes to a file is in cp1252: it has ² and °, but neither θ nor φ."""
+    arguments = ["luminance", folder / "led.tm25ray", *VIEW, "-o", "a.npz"]
+    documents = []
+    for options in ([], ["--json"]):
+        stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+        monkeypatch.setattr(sys, "stdout", stream)
+        assert run(*arguments, *options).status == 0
+        stream.flush()
+        documents.append(stream.buffer.getvalue().decode(encoding))  # type: ignore[attr-defined]
+    assert ("from θ = 25°" if encoding == "utf-8" else "from \\u03b8 = 25") in documents[0]
+    assert json.loads(documents[1])["maps"][0]["unit"] == "cd/m²"
 
 
 # --- pieces ----------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from etendue.cli import compare, convert, demo, filter_, info, luminance
-from etendue.cli.terminal import complain
+from etendue.cli.terminal import complain, spell_out_unknown_letters
 from etendue.errors import EtendueError
 from etendue.quantities.provenance import version
 
@@ -54,6 +54,7 @@ def main() -> None:
     """Run the program; the exit status is 0, 1 for an error of the data, 2 for one of usage, 130 after Ctrl-C."""
     # Complaints about files are printed by the verbs, once and in full.
     warnings.simplefilter("ignore")
+    spell_out_unknown_letters()
     try:
         status = app(standalone_mode=False)
     except EtendueError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import math
 import sys
@@ -35,9 +36,18 @@ def say(message: str = "") -> None:
     output.print(message, markup=False)
 
 
+def spell_out_unknown_letters() -> None:
+    r"""Let a terminal or file that has no θ or ² show ``\u03b8`` or ``\xb2``: an answer is worth more than its letters."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def print_json(data: Any) -> None:
     """Print one JSON document; NaN, which JSON does not have, becomes null."""
-    sys.stdout.write(json.dumps(_plain(data), ensure_ascii=False, indent=2, allow_nan=False) + "\n")
+    # JSON has an escape of its own for letters that the output does not have.
+    narrow = not (sys.stdout.encoding or "").lower().startswith("utf")
+    sys.stdout.write(json.dumps(_plain(data), ensure_ascii=narrow, indent=2, allow_nan=False) + "\n")
 
 
 def _plain(data: Any) -> Any:
