@@ -12,12 +12,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import etendue as et
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-
-import etendue as et
 
 OBSERVERS = [et.Observer(0, 0, 500), et.Observer(45, 0, 500), et.Observer(65, 120, 500)]
 SCREEN = et.Screen(66, 66, 128, 128)

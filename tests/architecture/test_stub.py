@@ -136,5 +136,5 @@ def test_type_checkers_find_nothing_to_object_to() -> None:
     """mypy's own comparison of stub and module; the tests above stand where mypy is not installed."""
     if importlib.util.find_spec("mypy") is not None:
         command = [sys.executable, "-m", "mypy.stubtest", "etendue._core"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=STUB.parents[2])  # noqa: S603
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=STUB.parents[2])
         assert done.returncode == 0, done.stdout

@@ -12,7 +12,6 @@ import pytest
 from etendue.errors import ArgumentError, FormatError, UnitError, UnsupportedFormatError
 from etendue.formats.rays import read_rays, write_rays
 from etendue.quantities.ray_set import RaySetMeaning
-from etendue.quantities.report import RayFileWarning
 
 ROWS = (
     (1.0, -2.0, 0.5, 0.6, 0.0, 0.8, 450.5, 0.125),
@@ -51,8 +50,10 @@ def test_columns(tmp_path: Path) -> None:
 
 def test_energies_are_relative(tmp_path: Path) -> None:
     rays = read(tmp_path, speos_bytes(watts=5.5))
-    with pytest.warns(RayFileWarning, match=r"header says 5.5 W"):
-        assert rays.flux.tolist() == [0.5, 1.0, 4.0]
+    assert rays.flux.tolist() == [0.5, 1.0, 4.0]
+    # Relative by the format's definition: both numbers are told, but nothing is wrong with the file.
+    assert [(c.severity, c.place) for c in rays.complaints] == [("note", "total flux")]
+    assert "the header says 5.5 W, the rays sum to 1.375" in rays.complaints[0].found
 
 
 def test_header_without_totals(tmp_path: Path) -> None:

@@ -308,7 +308,7 @@ class RayOperations:
         scale = self.flux_scale
         if unit == "lm":
             return self._with_flux(
-                lambda rows: self.records["flux"][rows].astype(np.float64) * scale * efficacy(rows),
+                lambda rows: self._stored("flux", rows) * scale * efficacy(rows),
                 unit,
                 "its spectrum",
             )
@@ -318,9 +318,7 @@ class RayOperations:
                 f"{self.provenance.source}: lumens cannot become watts: some rays have a wavelength at which V(λ) is 0, "
                 "so their radiant flux is not determined. State it: with_total_flux(value, 'W')."
             )
-        return self._with_flux(
-            lambda rows: self.records["flux"][rows].astype(np.float64) * scale / efficacy(rows), unit, "its spectrum"
-        )
+        return self._with_flux(lambda rows: self._stored("flux", rows) * scale / efficacy(rows), unit, "its spectrum")
 
     @property
     def knows_spectrum(self: RaySet) -> bool:  # type: ignore[misc]
@@ -336,7 +334,20 @@ class RayOperations:
     def _efficacy(self: RaySet) -> Callable[[slice], FloatArray]:  # type: ignore[misc]
         """Luminous efficacy of radiation [lm/W] of a stretch of rays."""
         if "wavelength" in self.columns:
-            return lambda rows: LUMINOUS_EFFICACY_MAX * photopic_efficiency(self.column("wavelength", rows))
+
+            def monochromatic(rows: slice) -> FloatArray:
+                wavelength = self.column("wavelength", rows)
+                unknown = ~(wavelength > 0)
+                if unknown.any():
+                    at = rows.start + int(np.argmax(unknown))
+                    raise UnitError(
+                        f"{self.provenance.source}: ray {at + 1:,} has the wavelength {wavelength[at - rows.start]:g} nm, "
+                        "so its lumens are not determined. Ask for a file with a wavelength for every ray, or state the "
+                        "total: with_total_flux(value, unit)."
+                    )
+                return LUMINOUS_EFFICACY_MAX * photopic_efficiency(wavelength)
+
+            return monochromatic
         single = self.meaning.single_wavelength
         if single is not None:
             constant = LUMINOUS_EFFICACY_MAX * float(photopic_efficiency([single])[0])

@@ -16,7 +16,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_operations import FLUX_COLUMNS, RayOperations
 from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally, checked_threads
-from etendue.quantities.report import Complaint, RayFileWarning
+from etendue.quantities.report import Complaint, RayFileWarning, Severity
 from etendue.quantities.spectrum import Spectrum
 from etendue.units import FLUX_UNITS, FluxUnit
 
@@ -63,6 +63,8 @@ class RaySetMeaning:
     declared_flux : float or None
         Total flux [`flux_unit`] that the rays share in proportion to their stored flux; None: the stored flux times
         `stored_flux_scale` is absolute.
+    relative_by_format : bool
+        Whether the format defines its flux values as relative, so that no agreement with `declared_flux` is expected.
     stored_flux_scale : float
         Factor from stored to absolute flux when `declared_flux` is None.
     length_scale : float
@@ -82,6 +84,7 @@ class RaySetMeaning:
 
     flux_unit: FluxUnit = "lm"
     declared_flux: float | None = None
+    relative_by_format: bool = False
     stored_flux_scale: float = 1.0
     length_scale: float = 1.0
     wavelength_scale: float = 1.0
@@ -258,12 +261,12 @@ class RaySet(RayOperations, RayStream):
         """Start points [mm], shape (n, 3); zero for far-field sets."""
         if not self.has_position:
             return np.zeros((len(self), 3))
-        return self._records["position"].astype(np.float64) * self._meaning.length_scale
+        return self._stored("position") * self._meaning.length_scale
 
     @property
     def direction(self) -> FloatArray:
         """Unit directions, shape (n, 3); rays whose direction cannot be used keep what is stored."""
-        stored = self._records["direction"].astype(np.float64)
+        stored = self._stored("direction")
         with np.errstate(over="ignore", invalid="ignore"):
             norm = np.sqrt(np.einsum("ij,ij->i", stored, stored))[:, None]
         unit: FloatArray = np.divide(stored, norm, out=stored, where=(norm >= 1e-6) & np.isfinite(norm))
@@ -272,7 +275,7 @@ class RaySet(RayOperations, RayStream):
     @property
     def flux(self) -> FloatArray:
         """Flux of each ray [`flux_unit`], shape (n,), scaled to the total."""
-        return self._records["flux"].astype(np.float64) * self.flux_scale
+        return self._stored("flux") * self.flux_scale
 
     @property
     def wavelength(self) -> FloatArray | None:
@@ -295,12 +298,16 @@ class RaySet(RayOperations, RayStream):
         """
         if name not in self.columns:
             raise UnknownNameError("ray column", name, self.columns)
-        values = self._records[name][rows]
         if name == "spectrum_index":
-            return values.astype(np.int64)
+            return self._records[name][rows].astype(np.int64)
         if name == "wavelength":
-            return values.astype(np.float64) * self._meaning.wavelength_scale
-        return values.astype(np.float64) * (self.flux_scale if name in FLUX_COLUMNS else 1.0)
+            return self._stored(name, rows) * self._meaning.wavelength_scale
+        return self._stored(name, rows) * (self.flux_scale if name in FLUX_COLUMNS else 1.0)
+
+    def _stored(self, name: str, rows: slice = slice(None)) -> FloatArray:
+        """A field of the records as f8, unscaled; the signalling NaN of damaged files pass in silence."""
+        with np.errstate(invalid="ignore"):
+            return self._records[name][rows].astype(np.float64)
 
     # --- passes over all rays ------------------------------------------------------------------------------------------
 
@@ -402,4 +409,5 @@ class RaySet(RayOperations, RayStream):
             else "the rays' sum is kept"
         )
         found = f"the header says {stated:.7g} {self.flux_unit}, the rays sum to {stored:.7g}; {rule}"
-        return [Complaint("warning", "total flux", found)]
+        severity: Severity = "note" if self._meaning.relative_by_format else "warning"
+        return [Complaint(severity, "total flux", found)]

@@ -116,12 +116,21 @@ def write_rays(path: str | os.PathLike[str], rays: RayStream, format: str | None
     Raises
     ------
     UnknownNameError
-        If there is no such format, or the extension belongs to none or to several.
+        If there is no such format.
+    ArgumentError
+        If the extension belongs to none or to several, there are no rays, or they have no position and the format
+        needs one.
     """
     path = Path(path)
     chosen = _format_named(format) if format is not None else _format_for(path)
     if len(rays) == 0:
         raise ArgumentError(f"{path}: there are no rays to write.")
+    if not (rays.has_position or chosen.far_field):
+        able = ", ".join(f.name for f in RAY_FORMATS if f.far_field)
+        raise ArgumentError(
+            f"{path}: {chosen.title} holds a position for every ray, and far-field rays have none; "
+            f"at the origin they would look like a point source. Formats for far-field rays: {able}."
+        )
     with atomic_output(path) as temporary:
         return chosen.write(rays, temporary)
 

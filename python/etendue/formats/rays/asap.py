@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError
-from etendue.formats.rays.binary import (
-    NO_POSITION,
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.shared import (
     RayColour,
     losses,
     read_bytes,
@@ -25,7 +25,6 @@ from etendue.formats.rays.binary import (
     whole_records,
     write_records,
 )
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import RayStream
 from etendue.quantities.report import Complaint
@@ -212,8 +211,6 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         file.seek(0)
         file.write(_header_bytes(rays, written.rays, written.totals["flux"]))
     notes = list(losses(rays, written, RayColour.of(rays), colour_kept=False))
-    if not rays.has_position:
-        notes.append(NO_POSITION)
     if rays.flux_unit == "W":
         notes.append("ASAP's header has no agreed place for the unit of flux; this file says W after the length unit.")
     return tuple(notes)

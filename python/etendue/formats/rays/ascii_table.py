@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import NoReturn
 
 from etendue.errors import FormatError
-from etendue.formats.rays.binary import FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.column_names import ColumnName, column_name
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.rays.shared import FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.text_output import geometry, usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
 from etendue.quantities.provenance import version
@@ -290,5 +290,5 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return losses(rays, written, colour, colour_kept=colour.has_wavelengths)
 
 
-FORMAT = RayFormat("csv", "ray table", (".csv",), recognise, read, write)
+FORMAT = RayFormat("csv", "ray table", (".csv",), recognise, read, write, far_field=True)
 """Ray tables. They are read from ``.asc`` and ``.txt`` too, which are not theirs alone."""

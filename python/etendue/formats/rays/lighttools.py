@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import FormatError, UnsupportedFormatError
-from etendue.formats.rays.binary import (
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.shared import (
     Colour,
     RayColour,
     Records,
@@ -24,7 +25,6 @@ from etendue.formats.rays.binary import (
     wavelength_complaints,
     write_records,
 )
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.report import Complaint
@@ -209,5 +209,5 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return tuple(notes)
 
 
-FORMAT = RayFormat("lighttools", "LightTools binary ray file (LTRF)", (".ray",), recognise, read, write)
+FORMAT = RayFormat("lighttools", "LightTools binary ray file (LTRF)", (".ray",), recognise, read, write, far_field=True)
 """LightTools binary ray files."""

@@ -14,8 +14,8 @@ from typing import NoReturn
 import numpy as np
 
 from etendue.errors import FormatError
-from etendue.formats.rays.binary import Colour, FloatArray, RayColour, losses, own_rows, wavelength_complaints
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.rays.shared import Colour, FloatArray, RayColour, losses, own_rows, wavelength_complaints
 from etendue.formats.rays.text_output import geometry, usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
 from etendue.quantities.provenance import version
@@ -285,5 +285,5 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return tuple(notes)
 
 
-FORMAT = RayFormat("lighttools-text", "LightTools text ray file", (), recognise, read, write)
+FORMAT = RayFormat("lighttools-text", "LightTools text ray file", (), recognise, read, write, far_field=True)
 """LightTools text ray files. Their extensions, ``.ray`` and ``.txt``, belong to other formats as well."""

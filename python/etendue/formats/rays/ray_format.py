@@ -74,6 +74,8 @@ class RayFormat:
     write : callable
         Writes a stream to a path (of a temporary file; the caller moves it) and returns what the format could not
         express, one sentence each.
+    far_field : bool
+        Whether it can hold rays without positions.
     """
 
     name: str
@@ -82,6 +84,7 @@ class RayFormat:
     recognise: Callable[[Head], bool]
     read: Callable[[Path], RaySet]
     write: Callable[[RayStream, Path], tuple[str, ...]]
+    far_field: bool = False
 
 
 def map_records(path: Path, dtype: np.dtype[Any], offset: int, count: int) -> npt.NDArray[Any]:

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError, UnsupportedFormatError
-from etendue.formats.rays.binary import (
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.shared import (
     LARGEST_FLOAT,
-    NO_POSITION,
     RayColour,
     Records,
     losses,
@@ -24,7 +24,6 @@ from etendue.formats.rays.binary import (
     wavelength_complaints,
     write_records,
 )
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.report import Complaint
@@ -84,6 +83,7 @@ def read(path: Path) -> RaySet:
     meaning = RaySetMeaning(
         flux_unit="W",
         declared_flux=watts,
+        relative_by_format=True,
         header=header,
         complaints=(*complaints, *wavelength_complaints(records, CLAUSE)),
         provenance=file_provenance(path, "speos"),
@@ -134,8 +134,6 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         file.seek(0)
         file.write(HEADER.pack(written.totals["flux"] / scale, *(MARKER,) * 5, min(lumens, LARGEST_FLOAT)))
     notes += losses(rays, written, colour, colour_kept=True, kept=("radiant_flux",))
-    if not rays.has_position:
-        notes.append(NO_POSITION)
     return tuple(notes)
 
 

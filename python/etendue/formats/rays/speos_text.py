@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError
-from etendue.formats.rays.binary import NO_POSITION, FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.rays.shared import FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.text_output import usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
@@ -115,8 +115,6 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         written = write_rows(file, rays, columns)
     notes.append(f"The total flux, {rays.total_flux:.7g} W, has no place in the file; enter it in Speos.")
     notes += losses(rays, written, colour, colour_kept=True, kept=("radiant_flux",))
-    if not rays.has_position:
-        notes.append(NO_POSITION)
     return tuple(notes)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.formats.rays.binary import Written
+from etendue.formats.rays.shared import Written
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayBatch, RayStream
 

@@ -14,7 +14,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError
-from etendue.formats.rays.binary import (
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.shared import (
     CHECKED_RAYS,
     STRETCH,
     Records,
@@ -24,7 +25,6 @@ from etendue.formats.rays.binary import (
     wavelength_complaints,
     whole_records,
 )
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
 from etendue.formats.rays.tm25_layout import (
     BLOCK,
     CREATION_METHODS,

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import UnitError
-from etendue.formats.rays.binary import (
+from etendue.formats.rays.shared import (
     LARGEST_FLOAT,
-    NO_POSITION,
     Colour,
     RayColour,
     Records,
@@ -111,8 +110,6 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         )  # fmt: skip
     kept = (*columns.widths, *(() if columns.luminous else ("radiant_flux",)))
     notes += losses(rays, written, colour, colour_kept=spectral == SPECTRAL[colour.kind], kept=kept)
-    if not rays.has_position:
-        notes.append(NO_POSITION)
     return tuple(notes)
 
 

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from etendue.errors import FormatError
-from etendue.formats.rays.binary import NO_POSITION, FloatArray, RayColour, losses
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.rays.shared import FloatArray, RayColour, losses
 from etendue.formats.rays.text_output import usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
@@ -143,8 +143,6 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         written = write_rows(file, rays, columns)
     notes = [f"The file does not say that the flux is in {rays.flux_unit}; choose it in TracePro."]
     notes += losses(rays, written, RayColour.of(rays), colour_kept=False)
-    if not rays.has_position:
-        notes.append(NO_POSITION)
     return tuple(notes)
 
 

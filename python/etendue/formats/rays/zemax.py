@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError
-from etendue.formats.rays.binary import (
-    NO_POSITION,
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.shared import (
     Colour,
     RayColour,
     Records,
@@ -26,7 +26,6 @@ from etendue.formats.rays.binary import (
     whole_records,
     write_records,
 )
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
 from etendue.quantities.provenance import version
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import RayBatch, RayStream
@@ -187,8 +186,6 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         notes.append("Zemax files hold wavelengths only beside watts; convert with RaySet.in_unit('W') to keep them.")
     if colour.kind is Colour.ONE_SPECTRUM:
         notes.append("OpticStudio takes the spectrum from a .spcd file (µm, weight) that is chosen with the source.")
-    if not rays.has_position:
-        notes.append(NO_POSITION)
     if written.dark_rays:
         notes.append(f"{written.dark_rays:,} rays carry no flux, which OpticStudio may refuse.")
     return tuple(notes)

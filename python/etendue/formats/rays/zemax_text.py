@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from etendue.errors import FormatError
-from etendue.formats.rays.binary import NO_POSITION, Colour, FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.rays.shared import Colour, FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.text_output import usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
@@ -174,8 +174,6 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         notes.append("Zemax files hold wavelengths only beside watts; convert with RaySet.in_unit('W') to keep them.")
     if colour.kind is Colour.ONE_SPECTRUM:
         notes.append("OpticStudio takes the spectrum from a .spcd file (µm, weight) that is chosen with the source.")
-    if not rays.has_position:
-        notes.append(NO_POSITION)
     if written.dark_rays:
         notes.append(f"{written.dark_rays:,} rays carry no flux, which OpticStudio may refuse.")
     return tuple(notes)

@@ -1,6 +1,6 @@
 """What ray formats share: totals that may be unknown, counts that must fit the file, records written in stretches.
 
-Most of it serves the binary formats; the colour of rays and the account of what a file does not say serve all.
+Also what the colour of rays is, and the account of what a file does not say.
 """
 
 from __future__ import annotations
@@ -380,7 +380,3 @@ def losses(
     if lost:
         notes.append(f"Not written, because the format has no place for it: {', '.join(lost)}.")
     return tuple(notes)
-
-
-NO_POSITION = "The set has directions only; in the file all its rays start at the origin."
-"""Note of the formats that must give a start point to far-field rays."""
