@@ -312,6 +312,13 @@ def test_refuses_a_source_outside_the_domain(arguments: dict[str, Any], message:
         RingSource(**arguments)
 
 
+@pytest.mark.parametrize("name", ["rays", "runs", "seed"])
+def test_counts_are_integers_of_any_type(name: str) -> None:
+    with pytest.raises(TypeError, match="'float' object cannot be interpreted as an integer"):
+        RingSource(**{name: 1e6})  # type: ignore[arg-type]
+    assert len(RingSource(**({"rays": 500} | {name: np.uint16(500)}))) == (250_000 if name == "runs" else 500)
+
+
 def test_the_longest_source_is_read_at_its_end() -> None:
     source = RingSource(rays=2**62, runs=1)
     assert len(source) == 2**62

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
@@ -65,6 +66,8 @@ class RingSource(RayStream):
     ------
     ArgumentError
         If a parameter is out of its domain.
+    TypeError
+        If a number of rays, runs or the seed is no integer.
 
     Examples
     --------
@@ -90,6 +93,8 @@ class RingSource(RayStream):
             raise ArgumentError(
                 f"RingSource: flux {tuple(flux)} lm; give one finite flux > 0 for each of {len(radii)} rings."
             )
+        # Python's own TypeError for 1e6, which would become a share of rays with a fraction.
+        rays, runs, seed = map(operator.index, (rays, runs, seed))
         if rays < 1 or runs < 1 or rays * runs >= 2**63:
             raise ArgumentError(
                 f"RingSource: {rays} rays in {runs} runs; give at least one, and fewer than 2^63 in all."
