@@ -522,12 +522,25 @@ def test_the_ray_whose_wavelength_is_missing_is_named(wavelength: float) -> None
         watts.in_unit("lm")
 
 
-def test_flux_that_is_no_number_stays_none_in_another_unit() -> None:
-    watts = radiometric(10)
-    watts.records["flux"][4] = math.inf
-    watts.records["wavelength"][4] = 100.0  # infinity times 0
-    with pytest.warns(RayFileWarning, match="1 of 10 rays have a coordinate, direction or flux that is not finite"):
-        assert watts.in_unit("lm").tally.not_finite == 1
+@pytest.mark.filterwarnings("ignore::etendue.quantities.report.RayFileWarning")
+@pytest.mark.parametrize("unit", ["W", "lm"])
+def test_rays_that_cannot_be_used_need_neither_wavelength_nor_spectrum(unit: str) -> None:
+    """All bits of a damaged record may be set: as binary32 that is NaN, even a signalling one."""
+    table = np.zeros(6, [("direction", "<f4", 3), ("flux", "<f4"), ("wavelength", "<f4"), ("radiant_flux", "<f4")])
+    table["direction"], table["flux"], table["wavelength"], table["radiant_flux"] = (0, 0, 1), 2, 555, 2 / 683
+    table[["direction", "wavelength"]][4] = ((0, 0, 0), -1)
+    table["flux"][1] = math.inf
+    table["wavelength"][1] = 100  # V is 0, and infinity times 0 is no number
+    table.view("<u4").reshape(6, -1)[2] = 0x7FA0_0000
+    rays = RaySet.from_records(table[["direction", "flux", "wavelength"]], RaySetMeaning(flux_unit=unit))
+    other = rays.in_unit("lm" if unit == "W" else "W")
+    expected = 2 * 683 if unit == "W" else 2 / 683
+    assert [b.flux.tolist() for b in other.batches(3)] == [[pytest.approx(expected)], [pytest.approx(expected)] * 2]
+    assert (other.tally.not_finite, other.tally.no_direction) == (2, 1)
+    if unit == "lm":
+        radiant = RaySet.from_records(table, RaySetMeaning()).in_unit("W")
+        assert radiant.total_flux == pytest.approx(3 * expected)
+        assert radiant.tally.unusable == 3
 
 
 @pytest.mark.parametrize(

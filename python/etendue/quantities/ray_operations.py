@@ -14,6 +14,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError, UnitError, UnknownNameError
 from etendue.quantities.ray_merge import merged
+from etendue.quantities.ray_stream import RayBatch
 from etendue.quantities.report import Complaint
 from etendue.quantities.spectrum import Spectrum, photopic_efficiency
 from etendue.quantities.spool import spool
@@ -302,23 +303,18 @@ class RayOperations:
         # A radiant-flux column beside a luminous one is the better truth: it is used before any spectrum.
         if unit == "W" and "radiant_flux" in self.columns:
             return self._with_flux(
-                lambda rows: self.column("radiant_flux", rows), unit, "the file's radiant flux column"
+                lambda batch: self._column_of(batch, "radiant_flux"), unit, "the file's radiant flux column"
             )
         efficacy = self._efficacy()
-        scale = self.flux_scale
         if unit == "lm":
-            return self._with_flux(
-                lambda rows: self._stored("flux", rows) * scale * efficacy(rows),
-                unit,
-                "its spectrum",
-            )
-        dark = any(not (efficacy(rows) > 0).all() for rows in self._stretches())
+            return self._with_flux(lambda batch: batch.flux * efficacy(batch), unit, "its spectrum")
+        dark = any(not (efficacy(batch) > 0).all() for batch in self.batches(CHUNK))
         if dark:
             raise UnitError(
                 f"{self.provenance.source}: lumens cannot become watts: some rays have a wavelength at which V(λ) is 0, "
                 "so their radiant flux is not determined. State it: with_total_flux(value, 'W')."
             )
-        return self._with_flux(lambda rows: self._stored("flux", rows) * scale / efficacy(rows), unit, "its spectrum")
+        return self._with_flux(lambda batch: batch.flux / efficacy(batch), unit, "its spectrum")
 
     @property
     def knows_spectrum(self: RaySet) -> bool:  # type: ignore[misc]
@@ -331,17 +327,18 @@ class RayOperations:
             or len(self.spectra) == 1
         )
 
-    def _efficacy(self: RaySet) -> Callable[[slice], FloatArray]:  # type: ignore[misc]
-        """Luminous efficacy of radiation [lm/W] of a stretch of rays."""
+    def _efficacy(self: RaySet) -> Callable[[RayBatch], FloatArray]:  # type: ignore[misc]
+        """Luminous efficacy of radiation [lm/W] of the rays of a batch."""
         if "wavelength" in self.columns:
 
-            def monochromatic(rows: slice) -> FloatArray:
-                wavelength = self.column("wavelength", rows)
+            def monochromatic(batch: RayBatch) -> FloatArray:
+                wavelength = self._column_of(batch, "wavelength")
                 unknown = ~(wavelength > 0)
                 if unknown.any():
-                    at = rows.start + int(np.argmax(unknown))
+                    first = int(np.argmax(unknown))
+                    at = batch.start + int(np.flatnonzero(batch.usable)[first])
                     raise UnitError(
-                        f"{self.provenance.source}: ray {at + 1:,} has the wavelength {wavelength[at - rows.start]:g} nm, "
+                        f"{self.provenance.source}: ray {at + 1:,} has the wavelength {wavelength[first]:g} nm, "
                         "so its lumens are not determined. Ask for a file with a wavelength for every ray, or state the "
                         "total: with_total_flux(value, unit)."
                     )
@@ -351,12 +348,12 @@ class RayOperations:
         single = self.meaning.single_wavelength
         if single is not None:
             constant = LUMINOUS_EFFICACY_MAX * float(photopic_efficiency([single])[0])
-            return lambda rows: np.full(len(self.records[rows]), constant)
+            return lambda batch: np.full(len(batch.flux), constant)
         if "spectrum_index" in self.columns and self.spectra:
             table = np.array([spectrum.luminous_efficacy for spectrum in self.spectra])
 
-            def indexed(rows: slice) -> FloatArray:
-                index = self.column("spectrum_index", rows)
+            def indexed(batch: RayBatch) -> FloatArray:
+                index = self._column_of(batch, "spectrum_index")
                 if ((index < 1) | (index > len(table))).any():
                     raise UnitError(
                         f"{self.provenance.source}: a ray points to a spectrum outside 1..{len(table)}; "
@@ -368,7 +365,7 @@ class RayOperations:
             return indexed
         if len(self.spectra) == 1:
             k = self.spectra[0].luminous_efficacy
-            return lambda rows: np.full(len(self.records[rows]), k)
+            return lambda batch: np.full(len(batch.flux), k)
         other = "lumens" if self.flux_unit == "W" else "watts"
         raise UnitError(
             f"{self.provenance.source}: {self.flux_unit} cannot become {other}: the rays carry no wavelength and the file "
@@ -393,8 +390,9 @@ class RayOperations:
 
     # --- how the above is done -------------------------------------------------------------------------------------------
 
-    def _stretches(self: RaySet) -> Iterator[slice]:  # type: ignore[misc]
-        return (slice(start, min(start + CHUNK, len(self))) for start in range(0, len(self), CHUNK))
+    def _column_of(self: RaySet, batch: RayBatch, name: str) -> Records:  # type: ignore[misc]
+        """A further column of a batch's usable rays."""
+        return self.column(name, slice(batch.start, batch.start + len(batch.usable)))[batch.usable]
 
     def _without(self: RaySet, *columns: str) -> RaySet:  # type: ignore[misc]
         """The set less some columns, not copied."""
@@ -413,16 +411,18 @@ class RayOperations:
         }
         return type(self).from_records(records, dataclasses.replace(self.meaning, **(facts | changes)))
 
-    def _with_flux(self: RaySet, flux: Callable[[slice], FloatArray], unit: FluxUnit, how: str) -> RaySet:  # type: ignore[misc]
+    def _with_flux(self: RaySet, flux: Callable[[RayBatch], FloatArray], unit: FluxUnit, how: str) -> RaySet:  # type: ignore[misc]
+        """The set with another flux for each usable ray; the others stay as they are, and out."""
         dtype = _double(self.records.dtype)
         scale = self.flux_scale
 
         def parts() -> Iterator[Records]:
-            for rows in self._stretches():
-                part = _on_scale(self.records[rows].astype(dtype), scale)
-                # Rays that cannot be used stay so: infinity times 0 is no number.
-                with np.errstate(invalid="ignore", over="ignore"):
-                    part["flux"] = flux(rows)
+            for batch in self.batches(CHUNK):
+                rows = self.records[batch.start : batch.start + len(batch.usable)]
+                # Damaged records may hold signalling NaN, which pass in silence.
+                with np.errstate(invalid="ignore"):
+                    part = _on_scale(rows.astype(dtype), scale)
+                part["flux"][batch.usable] = flux(batch)
                 yield part
 
         return self._with_records(
