@@ -315,6 +315,16 @@ def test_info_counts_and_names_defects(run: Run, folder: Path) -> None:
     assert "1 of 50 rays have negative flux" in outcome.out
 
 
+def test_info_tells_the_wavelengths_that_are_known(run: Run, tmp_path: Path, folder: Path) -> None:
+    data = bytearray((folder / "watts.tm25ray").read_bytes())
+    rays = et.read_rays(folder / "watts.tm25ray").records
+    first = len(data) - rays.nbytes + rays.dtype.fields["wavelength"][1]  # type: ignore[index]
+    for index, stored in ((0, math.nan), (7, math.inf)):
+        data[first + index * rays.itemsize : first + index * rays.itemsize + 4] = np.float32(stored).tobytes()
+    (tmp_path / "odd.tm25ray").write_bytes(data)
+    assert "wavelength per ray, 450 to 650 nm" in run("info", "odd.tm25ray").out
+
+
 # --- convert ---------------------------------------------------------------------------------------------------------
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -77,12 +78,12 @@ def _mean_direction(weighted: np.ndarray[Any, np.dtype[np.float64]]) -> list[flo
 
 def _spectrum(rays: RaySet) -> str:
     if "wavelength" in rays.columns:
-        lows, highs = [], []
+        low, high = math.inf, -math.inf
         for start in range(0, len(rays), 1 << 18):
             part = rays.column("wavelength", slice(start, start + (1 << 18)))
-            lows.append(part.min())
-            highs.append(part.max())
-        return f"wavelength per ray, {min(lows):.4g} to {max(highs):.4g} nm" if lows else "wavelength per ray"
+            part = part[np.isfinite(part)]
+            low, high = min(low, part.min(initial=math.inf)), max(high, part.max(initial=-math.inf))
+        return f"wavelength per ray, {low:.4g} to {high:.4g} nm" if low <= high else "wavelength per ray, none known"
     if rays.meaning.single_wavelength is not None:
         return f"single wavelength {rays.meaning.single_wavelength:.4g} nm"
     if "spectrum_index" in rays.columns:
