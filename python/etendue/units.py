@@ -38,3 +38,15 @@ LUMINANCE_UNIT: dict[FluxUnit, str] = {"lm": "cd/m²", "W": "W/(m² sr)"}
 
 LUMINANCE_NAME: dict[FluxUnit, str] = {"lm": "luminance", "W": "radiance"}
 """Name of the quantity whose unit is `LUMINANCE_UNIT`."""
+
+INTENSITY_UNIT: dict[FluxUnit, str] = {"lm": "cd", "W": "W/sr"}
+"""Unit of an intensity that was made from flux in the given unit."""
+
+INTENSITY_NAME: dict[FluxUnit, str] = {"lm": "luminous intensity", "W": "radiant intensity"}
+"""Name of the quantity whose unit is `INTENSITY_UNIT`."""
+
+LUMENS_PER_KILOLUMEN = 1e3
+"""Turns the cd/klm of EULUMDAT into cd."""
+
+WATTS_PER_FILE_UNIT: dict[str, float] = {"w/sr": 1.0, "mw/sr": 1e-3, "uw/sr": 1e-6, "µw/sr": 1e-6, "μw/sr": 1e-6}
+"""Watts per steradian in one of each unit that an IES file may name under [_INTENSITYUNITS], lower case."""

@@ -1,0 +1,132 @@
+"""Files of luminous intensity distributions: one module per format, one registry, found by content."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from etendue.errors import FormatError, UnknownNameError
+from etendue.formats.intensity import eulumdat, lm63
+from etendue.formats.intensity.intensity_format import IntensityFormat
+from etendue.formats.output import atomic_output
+from etendue.formats.rays.ray_format import Head
+from etendue.quantities.intensity import Intensity
+
+INTENSITY_FORMATS: dict[str, IntensityFormat] = {module.FORMAT.name: module.FORMAT for module in (lm63, eulumdat)}
+"""Every format by name, in the order in which a file is tested."""
+
+INTENSITY_EXTENSIONS: tuple[str, ...] = tuple(f.extension for f in INTENSITY_FORMATS.values())
+"""Extensions that choose a format for writing."""
+
+
+def detect_intensity_format(path: str | os.PathLike[str]) -> IntensityFormat | None:
+    """The format of an intensity file, from its content; None if it is none of them.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be opened.
+    """
+    head = Head.of(Path(path))
+    return next((f for f in INTENSITY_FORMATS.values() if f.recognise(head)), None)
+
+
+def read_intensity(path: str | os.PathLike[str]) -> Intensity:
+    """Read an IES LM-63 or EULUMDAT file; the format is found from the content.
+
+    The planes C are the file's own. The two formats count them from different sides of a luminaire (C of EULUMDAT is C of
+    IES + 90°), and both count them from above, against the axis; `Intensity.rotated_about_axis` and `Intensity.mirrored`
+    lead from one to the other, and nothing does so unasked.
+
+    Parameters
+    ----------
+    path : path
+        Of the file.
+
+    Returns
+    -------
+    Intensity
+        Absolute, over all planes whatever the symmetry of the file. Its `complaints` tell everything that is wrong with
+        the file, `luminaire` what else it says.
+
+    Raises
+    ------
+    FormatError
+        With file, place, what was found and what to do.
+    OSError
+        If the file cannot be opened.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> narrow = Intensity(c=[0], gamma=[0, 10, 90], values=[[1000, 10, 0]])
+    >>> with TemporaryDirectory() as folder:
+    ...     lost = write_intensity(Path(folder) / "spot.ies", narrow)
+    ...     read_intensity(Path(folder) / "spot.ies").values.tolist(), lost
+    ([[1000.0, 10.0, 0.0]], ())
+    """
+    found = detect_intensity_format(path)
+    if found is None:
+        known = ", ".join(f"{f.title} ({f.extension})" for f in INTENSITY_FORMATS.values())
+        raise FormatError(path, "first lines", "this is no intensity distribution", f"Known formats: {known}.")
+    return found.read(Path(path))
+
+
+def write_intensity(
+    path: str | os.PathLike[str],
+    intensity: Intensity,
+    format: str | None = None,
+    *,
+    rotate: float = 0.0,
+    mirror: bool = False,
+) -> tuple[str, ...]:
+    """Write an IES LM-63-2002 or EULUMDAT file: completely, or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Of the file; its folder must exist.
+    intensity : Intensity
+        Planes and angles are written as they are, with only as many planes as its symmetry needs.
+    format : {"lm63", "eulumdat"}, optional
+        From the extension if None.
+    rotate : float
+        [°] Turn the source about its axis first: what is at C is written at C + `rotate`. 90 turns the planes of IES
+        into those of EULUMDAT, -90 the other way.
+    mirror : bool
+        Write what is at C at -C first: from counting about the direction of emission (étendue) to counting from above.
+
+    Returns
+    -------
+    tuple of str
+        What the format could not express, one sentence each.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such format or extension.
+    ArgumentError
+        If the format cannot hold the distribution at all.
+    """
+    path = Path(path)
+    by_extension = {f.extension: f for f in INTENSITY_FORMATS.values()}
+    if format is not None:
+        if format not in INTENSITY_FORMATS:
+            raise UnknownNameError("intensity format", format, INTENSITY_FORMATS)
+        chosen = INTENSITY_FORMATS[format]
+    elif path.suffix.lower() in by_extension:
+        chosen = by_extension[path.suffix.lower()]
+    else:
+        raise UnknownNameError("extension of an intensity file", path.suffix.lower(), by_extension)
+    other = intensity.provenance.format in INTENSITY_FORMATS and intensity.provenance.format != chosen.name
+    kept: tuple[str, ...] = ()
+    if other and rotate == 0.0:
+        turn = 90 if chosen.name == "eulumdat" else -90
+        origin = INTENSITY_FORMATS[intensity.provenance.format].title
+        kept = (f"C planes were kept as {origin} counts them; rotate={turn} turns them to those of {chosen.title}",)
+    if mirror:
+        intensity = intensity.mirrored()
+    if rotate != 0.0:
+        intensity = intensity.rotated_about_axis(rotate)
+    with atomic_output(path) as temporary:
+        return (*chosen.write(intensity, temporary), *kept)

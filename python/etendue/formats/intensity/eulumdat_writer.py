@@ -1,0 +1,130 @@
+"""EULUMDAT (.ldt): the writer. See docs/formats/intensity.md."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from etendue.errors import ArgumentError
+from etendue.formats.intensity.intensity_format import decimal, fitted, general_losses
+from etendue.formats.intensity.symmetry import Array, folded, unfolded, whole_hemispheres
+from etendue.quantities.intensity import Intensity, Symmetry
+from etendue.units import LUMENS_PER_KILOLUMEN
+
+MOST_PLANES, MOST_GAMMAS = 721, 361
+TEXT = 78
+DIGITS = 6
+
+NUMBER_OF_SYMMETRY: dict[Symmetry, int] = {"none": 0, "rotational": 1, "C0-C180": 2, "C90-C270": 3, "both": 4}
+SHAPES = {"point", "circle", "rectangle", "box", "vertical cylinder"}
+
+
+def write(intensity: Intensity, path: Path) -> tuple[str, ...]:
+    """Write the planes that symmetry leaves, in candela per kilolumen of the lamps, or of the luminaire if absolute."""
+    if intensity.flux_unit != "lm":
+        raise ArgumentError(
+            f"EULUMDAT knows luminous intensity only, and this is {intensity.quantity} [{intensity.unit}]. "
+            "Convert the rays to lumens first (RaySet.in_unit), or write an .ies file."
+        )
+    whole, notes = whole_hemispheres(intensity)
+    flux = whole.flux
+    if not flux > 0.0:
+        raise ArgumentError(f"EULUMDAT states intensity per lumen, and this source has a flux of {flux:g} lm.")
+    symmetry = whole.symmetry()
+    values = _stored(whole, symmetry)
+    planes = unfolded(*folded(whole, symmetry), symmetry)[0]
+    if planes.size > MOST_PLANES or whole.gamma.size > MOST_GAMMAS:
+        raise ArgumentError(
+            f"EULUMDAT holds at most {MOST_PLANES} planes of {MOST_GAMMAS} angles, not {planes.size} of "
+            f"{whole.gamma.size}. Use fewer, or write an .ies file."
+        )
+    facts = whole.luminaire
+    lamp_flux = float(facts.get("lamp_flux", 0.0))
+    absolute = not lamp_flux > 0.0
+    lamp_flux = flux if absolute else lamp_flux
+    table = values * (LUMENS_PER_KILOLUMEN / lamp_flux)
+    lines = [
+        *_identity(whole, symmetry, planes),
+        *_sizes(facts),
+        *(decimal(n, DIGITS) for n in (100.0 * _downward(whole) / flux, 100.0 * flux / lamp_flux)),
+        *("1", "0", "1"),
+        str(-1 if absolute else max(1, int(facts.get("lamps", 1)))),
+        _text(facts.get("lamp", "")),
+        decimal(lamp_flux, 9),
+        *("", ""),
+        decimal(float(facts.get("input_power", 0.0)), DIGITS),
+        *["0"] * 10,
+        *(decimal(angle, 9) for angle in (*planes, *whole.gamma)),
+        *(decimal(value, DIGITS) for value in table.ravel()),
+    ]
+    path.write_bytes("".join(f"{line}\r\n" for line in lines).encode("latin-1"))
+    return (*notes, *general_losses(intensity), *_losses(facts))
+
+
+def _stored(whole: Intensity, symmetry: Symmetry) -> Array:
+    """Values in the order of the file: C90-C270 symmetry goes from 270° over 0° to 90°, all others rise from 0°."""
+    values = folded(whole, symmetry)[1]
+    # Plane C is the mirror image of 180° - C, so that 90° up to 270° reads backwards as 270°, 280°, … 360°, … 90°.
+    return values[::-1] if symmetry == "C90-C270" else values
+
+
+def _identity(intensity: Intensity, symmetry: Symmetry, planes: Array) -> Iterator[str]:
+    """Lines 1 to 12."""
+    facts, provenance = intensity.luminaire, intensity.provenance
+    kind = 1 if symmetry == "rotational" else 2 if facts.get("linear") else 3
+    yield _text(facts.get("manufacturer") or provenance.software)
+    yield str(kind)
+    yield str(NUMBER_OF_SYMMETRY[symmetry])
+    for angles, whole_turn in ((planes, True), (intensity.gamma, False)):
+        yield str(angles.size)
+        yield decimal(_step(angles, whole_turn), 9)
+    yield _text(facts.get("test_report", ""))
+    yield _text(facts.get("luminaire") or provenance.source)
+    yield _text(facts.get("catalogue_number", ""))
+    yield _text(provenance.source)
+    yield _text(facts.get("issue_date", ""))
+
+
+def _step(angles: Array, whole_turn: bool) -> float:
+    """The step of equidistant angles, 0 for others."""
+    steps = np.diff(np.append(angles, angles[0] + 360.0)) if whole_turn else np.diff(angles)
+    return float(steps.mean()) if angles.size > 1 and np.allclose(steps, steps.mean(), rtol=0.0, atol=1e-6) else 0.0
+
+
+def _sizes(facts: Mapping[str, Any]) -> Iterator[str]:
+    """Lines 13 to 21 [mm]: length along C90-C270, width along C0-C180, 0 for a circle."""
+    known = facts.get("opening_shape") in SHAPES
+    opening = {axis: float(facts.get(f"opening_{axis}", 0.0)) if known else 0.0 for axis in "xyz"}
+    housing = {axis: float(facts.get(f"housing_{axis}", opening[axis])) for axis in "xyz"}
+    round_ = facts.get("opening_shape") in {"circle", "vertical cylinder"} and opening["x"] == opening["y"]
+    for size in (housing["y"], housing["x"], housing["z"], opening["y"], 0.0 if round_ else opening["x"]):
+        yield decimal(size, DIGITS)
+    yield from [decimal(opening["z"], DIGITS)] * 4
+
+
+def _losses(facts: Mapping[str, Any]) -> Iterator[str]:
+    shape = facts.get("opening_shape", "point")
+    if shape not in SHAPES:
+        yield f"the luminous opening, {shape!r}, is none that EULUMDAT knows"
+    if len(facts.get("lamp_sets", ())) > 1:
+        yield "of several lamp sets only the one that the intensity is stated with was written"
+    if "keywords" in facts:
+        yield "keywords of the IES file without a line of their own are not kept"
+
+
+def _downward(intensity: Intensity) -> float:
+    """Flux at γ below 90°, exact: the table is cut there with a node that it has, or gets by interpolation."""
+    gamma = intensity.gamma
+    if gamma[0] >= 90.0:
+        return 0.0
+    below = gamma[gamma < 90.0]
+    edge = intensity.at(intensity.c, 90.0)[:, None]
+    values = np.concatenate([intensity.values[:, : below.size], edge], axis=1)
+    return Intensity(intensity.c, np.append(below, 90.0), values).flux
+
+
+def _text(value: object) -> str:
+    return fitted(str(value), "latin-1", TEXT).strip()

@@ -1,0 +1,100 @@
+"""What a format for intensity distributions is, and what its readers and writers share."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from etendue.errors import FormatError
+from etendue.formats.rays.ray_format import Head
+from etendue.quantities.intensity import Intensity
+
+MOST_BYTES = 1 << 27
+"""Largest file that is read: a table of 0.1° by 0.1° over the whole sphere has half as much."""
+
+DAMAGED = "The file is damaged or cut short; ask for it again."
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
+
+
+@dataclasses.dataclass(frozen=True)
+class IntensityFormat:
+    """One published format for luminous intensity distributions.
+
+    Parameters
+    ----------
+    name : str
+        As users type it: ``"lm63"``.
+    title : str
+        As people read it.
+    extension : str
+        Lower case with the dot; it chooses the format for writing, never for reading.
+    recognise : callable
+        Whether a file that begins with this `Head` is of this format.
+    read : callable
+        From a path to the distribution. Raises `FormatError` for whatever is wrong with the file.
+    write : callable
+        Writes a distribution to a path and returns what the format could not express, one sentence each.
+    """
+
+    name: str
+    title: str
+    extension: str
+    recognise: Callable[[Head], bool]
+    read: Callable[[Path], Intensity]
+    write: Callable[[Intensity, Path], tuple[str, ...]]
+
+
+def read_lines(path: Path) -> list[str]:
+    """The lines of a text file, UTF-8 or else Latin-1, without a byte-order mark.
+
+    The last one is what follows the last line end: empty if the file ends with one.
+
+    Raises
+    ------
+    FormatError
+        If the file is larger than any distribution, or no text.
+    """
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise FormatError(path, "size", f"{size:,} bytes, far more than a distribution", "Give an intensity file.")
+    data = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+    if b"\0" in data:
+        raise FormatError(path, f"byte {data.index(0)}", "a zero byte in a text", DAMAGED)
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    # A DOS end-of-file mark is no text.
+    return re.split(r"\r\n|\n|\r", text.removesuffix("\x1a"))
+
+
+def number(word: str) -> float | None:
+    """What a word of a file says, if it is a finite number; Python's own reading takes ``nan`` and ``1_000`` as well."""
+    if not _NUMBER.fullmatch(word):
+        return None
+    value = float(word.replace("d", "e").replace("D", "e"))
+    return value if np.isfinite(value) else None
+
+
+def decimal(value: float, digits: int) -> str:
+    """A number to so many significant digits without a power of ten, which readers of these formats may not know."""
+    return np.format_float_positional(value, precision=digits, unique=False, fractional=False, trim="-")
+
+
+def fitted(text: str, encoding: str, length: int) -> str:
+    """One line of printable text that an encoding and a format have room for; ``?`` where a letter does not exist."""
+    printable = "".join(letter if letter.isprintable() else " " for letter in text)
+    return printable.encode(encoding, errors="replace").decode(encoding)[:length]
+
+
+def general_losses(intensity: Intensity) -> Iterator[str]:
+    """What files of intensity have no place for, one sentence each."""
+    if np.isfinite(intensity.standard_error).any():
+        yield "standard errors are not kept"
+    if "tilt" in intensity.luminaire:
+        yield "the lamp factors over tilt are not kept"

@@ -1,0 +1,368 @@
+"""A luminous intensity distribution: what a source sends into every direction, seen from afar."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.provenance import Provenance
+from etendue.quantities.report import Complaint
+from etendue.units import FLUX_UNITS, INTENSITY_NAME, INTENSITY_UNIT, FluxUnit
+
+Array = npt.NDArray[np.float64]
+Symmetry = Literal["none", "C0-C180", "C90-C270", "both", "rotational"]
+SYMMETRIES: tuple[str, ...] = get_args(Symmetry)
+
+ROUNDING = 1e-9
+"""Degrees by which γ may lie outside the table and still belong to its edge: angles that were computed."""
+
+LUMINAIRE_FACTS: dict[str, str] = {
+    "manufacturer": "name",
+    "luminaire": "name or description",
+    "catalogue_number": "of the luminaire",
+    "lamp": "description",
+    "test_report": "number or description",
+    "laboratory": "that tested",
+    "issue_date": "of the data, as the file spells it",
+    "lamps": "number of lamps",
+    "lamp_flux": "flux of all lamps together [lm]; missing for absolute photometry",
+    "stated_flux": "flux of the luminaire [flux unit] that a file states, if it does",
+    "input_power": "[W]",
+    "linear": "whether the luminaire is a linear one (EULUMDAT type 2)",
+    "opening_shape": "luminous opening: point, rectangle, box, circle, ellipse, sphere, …",
+    "opening_x": "its extent along C0-C180 [mm]",
+    "opening_y": "its extent along C90-C270 [mm]",
+    "opening_z": "its extent along the axis [mm]",
+    "housing_x": "extent of the luminaire along C0-C180 [mm]",
+    "housing_y": "extent of the luminaire along C90-C270 [mm]",
+    "housing_z": "extent of the luminaire along the axis [mm]",
+    "lamp_sets": "every lamp set of an EULUMDAT file, one mapping each",
+    "tilt": "lamp factors over the tilt of the luminaire, of an IES file; not applied",
+    "keywords": "every keyword line of an IES file, as pairs",
+}
+"""What may be known of the luminaire beside its intensity, with its meaning."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Intensity:
+    """Intensity over all directions in C-γ coordinates, with its standard error.
+
+    The table stands for *one* function on the sphere: bilinear in (C, γ) between the nodes, periodic in C, and 0 where γ
+    lies outside the table. With a single plane it does not depend on C. γ is the angle from +Z, C the azimuth from +X
+    towards +Y: the direction is (sin γ cos C, sin γ sin C, cos γ).
+
+    Parameters
+    ----------
+    c : array, shape (n_c,)
+        Planes [°], rising, 0 ≤ C < 360.
+    gamma : array, shape (n_gamma,)
+        [°], rising, at least two, 0 to 180.
+    values : array, shape (n_c, n_gamma)
+        [cd], or [W/sr] when `flux_unit` is ``"W"``.
+    standard_error : array, shape (n_c, n_gamma), optional
+        Same unit; one number stands for all. NaN where unknown, which is everywhere if not given.
+    flux_unit : {"lm", "W"}
+    luminaire : mapping
+        What else is known; keys of `LUMINAIRE_FACTS`.
+    provenance : Provenance
+    notes : tuple of str
+        What the user should know.
+    complaints : tuple of Complaint
+        What the reader of a file had to say.
+
+    Raises
+    ------
+    ArgumentError
+        If shapes disagree, angles do not rise or leave their range, or a value is not finite.
+    UnknownNameError
+        If the unit of flux or a fact about the luminaire is unknown.
+
+    Examples
+    --------
+    >>> half = Intensity(c=[0, 90, 180, 270], gamma=[0, 90], values=[[4.0, 0], [4, 2], [4, 0], [4, 0]])
+    >>> half.at(45, [45, 90, 91]).tolist(), half.unit
+    ([2.5, 1.0, 0.0], 'cd')
+    >>> half.in_direction([[0, 0, 1], [0, 1, 0]]).tolist()
+    [4.0, 2.0]
+    >>> half.symmetry()
+    'C90-C270'
+    """
+
+    c: Array
+    gamma: Array
+    values: Array
+    standard_error: Array = dataclasses.field(default_factory=lambda: np.array(np.nan))
+    flux_unit: FluxUnit = "lm"
+    luminaire: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    provenance: Provenance = dataclasses.field(default_factory=Provenance)
+    notes: tuple[str, ...] = ()
+    complaints: tuple[Complaint, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.flux_unit not in FLUX_UNITS:
+            raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)
+        for fact in self.luminaire:
+            if fact not in LUMINAIRE_FACTS:
+                raise UnknownNameError("fact about a luminaire", fact, LUMINAIRE_FACTS)
+        if np.ndim(self.standard_error) == 0:
+            object.__setattr__(self, "standard_error", np.full(np.shape(self.values), self.standard_error))
+        for name in ("c", "gamma", "values", "standard_error"):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "luminaire", dict(self.luminaire))
+        self._check()
+
+    def _check(self) -> None:
+        for name, angles, fewest in (("c", self.c, 1), ("gamma", self.gamma, 2)):
+            if angles.ndim != 1 or angles.size < fewest:
+                raise ArgumentError(
+                    f"Intensity: {name} has shape {angles.shape}; give a row of at least {fewest} angles."
+                )
+            if not (np.isfinite(angles).all() and (np.diff(angles) > 0.0).all()):
+                raise ArgumentError(f"Intensity: the angles {name} must rise strictly.")
+        if self.c[0] < 0.0 or self.c[-1] >= 360.0:
+            raise ArgumentError(f"Intensity: C runs from {self.c[0]:g}° to {self.c[-1]:g}°; it must be 0 ≤ C < 360.")
+        if self.gamma[0] < 0.0 or self.gamma[-1] > 180.0:
+            raise ArgumentError(
+                f"Intensity: γ runs from {self.gamma[0]:g}° to {self.gamma[-1]:g}°; it must be 0 to 180."
+            )
+        shape = (self.c.size, self.gamma.size)
+        for name, array in (("values", self.values), ("standard_error", self.standard_error)):
+            if array.shape != shape:
+                raise ArgumentError(f"Intensity: {name} has shape {array.shape}; (planes, γ) is {shape}.")
+        if not np.isfinite(self.values).all():
+            raise ArgumentError("Intensity: a value is not finite.")
+
+    # --- the function --------------------------------------------------------------------------------------------------
+
+    @property
+    def unit(self) -> str:
+        """``"cd"`` or ``"W/sr"``."""
+        return INTENSITY_UNIT[self.flux_unit]
+
+    @property
+    def quantity(self) -> str:
+        """``"luminous intensity"`` or ``"radiant intensity"``."""
+        return INTENSITY_NAME[self.flux_unit]
+
+    def planes(self, c: npt.ArrayLike) -> Array:
+        """Values of the half planes C, which need not be nodes.
+
+        Parameters
+        ----------
+        c : array_like, shape (m,)
+            [°], any finite number; 370 is 10.
+
+        Returns
+        -------
+        array, shape (m, n_gamma)
+            [`unit`] at the nodes γ.
+        """
+        first, second, share = self._between_planes(_finite("C", c))
+        share = share[..., None]
+        return (1.0 - share) * self.values[first] + share * self.values[second]
+
+    def at(self, c: npt.ArrayLike, gamma: npt.ArrayLike) -> Array:
+        """Intensity in the directions (C, γ), bilinear between the nodes.
+
+        Parameters
+        ----------
+        c, gamma : array_like
+            [°]; they are broadcast against each other.
+
+        Returns
+        -------
+        array
+            [`unit`]; 0 where γ is outside the table.
+
+        Raises
+        ------
+        ArgumentError
+            If an angle is not finite, or γ is not within 0 to 180.
+        """
+        c, gamma = np.broadcast_arrays(_finite("C", c), _finite("γ", gamma))
+        if ((gamma < -ROUNDING) | (gamma > 180.0 + ROUNDING)).any():
+            raise ArgumentError("Intensity: γ is the angle from the axis, 0° to 180°.")
+        inside = (gamma >= self.gamma[0] - ROUNDING) & (gamma <= self.gamma[-1] + ROUNDING)
+        gamma = gamma.clip(self.gamma[0], self.gamma[-1])
+        row = (np.searchsorted(self.gamma, gamma, side="right") - 1).clip(0, self.gamma.size - 2)
+        up = (gamma - self.gamma[row]) / (self.gamma[row + 1] - self.gamma[row])
+        first, second, share = self._between_planes(c)
+        low = (1.0 - share) * self.values[first, row] + share * self.values[second, row]
+        high = (1.0 - share) * self.values[first, row + 1] + share * self.values[second, row + 1]
+        return np.asarray(np.where(inside, (1.0 - up) * low + up * high, 0.0))
+
+    def in_direction(self, directions: npt.ArrayLike) -> Array:
+        """Intensity along directions in the source's axes: γ from +Z, C from +X towards +Y.
+
+        Parameters
+        ----------
+        directions : array_like, shape (..., 3)
+            Of any length above 0.
+
+        Raises
+        ------
+        ArgumentError
+            If the shape is another, or a direction has no length.
+        """
+        d = _finite("a direction", directions)
+        if d.ndim == 0 or d.shape[-1] != 3 or not d.any(axis=-1).all():
+            raise ArgumentError(f"Intensity: directions of shape {d.shape}; give (..., 3), none of them zero.")
+        x, y, z = np.moveaxis(d, -1, 0)
+        return self.at(np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(np.hypot(x, y), z)))
+
+    def _between_planes(self, c: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
+        """The planes before and after each C, and how far it is on the way to the latter, 0 to 1."""
+        turned = np.mod(c, 360.0)
+        first = (np.searchsorted(self.c, turned, side="right") - 1) % self.c.size
+        second = (first + 1) % self.c.size
+        gap = self._gaps[first]
+        return first, second, np.mod(turned - self.c[first], 360.0) / gap
+
+    @property
+    def _gaps(self) -> Array:
+        """Degrees from each plane to the next one, around the circle."""
+        return np.append(np.diff(self.c), 360.0 - (self.c[-1] - self.c[0]))
+
+    # --- what follows from it ------------------------------------------------------------------------------------------
+
+    @property
+    def node_solid_angle(self) -> Array:
+        """Weight of each node in the integral over the sphere [sr], shape (n_c, n_gamma): exact for this function.
+
+        Along γ it is the closed form of ∫ (hat function of the node) sin γ dγ, along C the periodic trapezium rule, which
+        is exact for what is linear between the planes.
+        """
+        gamma = np.radians(self.gamma)
+        half, middle = np.diff(gamma) / 2.0, (gamma[1:] + gamma[:-1]) / 2.0
+        even = np.sin(middle) * np.sin(half)
+        odd = np.cos(middle) * (np.cos(half) - np.sin(half) / half)
+        weights = np.zeros(gamma.size)
+        weights[:-1] += even + odd
+        weights[1:] += even - odd
+        gaps = np.radians(self._gaps)
+        return np.outer((gaps + np.roll(gaps, 1)) / 2.0, weights)
+
+    @property
+    def flux(self) -> float:
+        """Exact integral of the function over the sphere [`flux_unit`]."""
+        return float((self.values * self.node_solid_angle).sum())
+
+    @property
+    def maximum(self) -> float:
+        """Largest intensity [`unit`]; a bilinear function has it at a node."""
+        return float(self.values.max())
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """(C, γ) of the first node that has the largest intensity [°]; C is 0 at the poles and for a single plane."""
+        plane, row = np.unravel_index(int(self.values.argmax()), self.values.shape)
+        gamma = float(self.gamma[row])
+        return (0.0 if gamma in (0.0, 180.0) or self.c.size == 1 else float(self.c[plane])), gamma
+
+    def symmetry(self, tolerance: float = 1e-9) -> Symmetry:
+        """The strongest symmetry that the function has.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest difference between mirrored directions, as a share of the maximum.
+
+        Returns
+        -------
+        {"none", "C0-C180", "C90-C270", "both", "rotational"}
+            The plane(s) about which it is its own mirror image; ``"rotational"`` if it does not depend on C.
+        """
+        limit = tolerance * float(np.abs(self.values).max())
+        if float(np.ptp(self.values, axis=0).max()) <= limit:
+            return "rotational"
+        # A function that is linear between its planes equals its mirror image if it does so at its own planes.
+        about_0 = bool(np.abs(self.values - self.planes(-self.c)).max() <= limit)
+        about_90 = bool(np.abs(self.values - self.planes(180.0 - self.c)).max() <= limit)
+        names: dict[tuple[bool, bool], Symmetry] = {(True, True): "both", (True, False): "C0-C180"}
+        return names.get((about_0, about_90), "C90-C270" if about_90 else "none")
+
+    # --- other distributions ---------------------------------------------------------------------------------------------
+
+    def replace(self, **changes: Any) -> Intensity:
+        """A copy with some fields changed (`dataclasses.replace`)."""
+        return dataclasses.replace(self, **changes)
+
+    def scaled(self, factor: float) -> Intensity:
+        """`factor` times this distribution, for instance for another lamp; the facts of the luminaire stay as they are.
+
+        Raises
+        ------
+        ArgumentError
+            If the factor is negative or not finite.
+        """
+        if not (np.isfinite(factor) and factor >= 0.0):
+            raise ArgumentError(f"Intensity: cannot be scaled by {factor}; give a finite factor ≥ 0.")
+        provenance = self.provenance.then(f"intensity times {factor:.9g}")
+        return self.replace(
+            values=self.values * factor, standard_error=self.standard_error * factor, provenance=provenance
+        )
+
+    def rotated_about_axis(self, angle: float) -> Intensity:
+        """The source turned about its axis: what was at C is at C + `angle`.
+
+        Parameters
+        ----------
+        angle : float
+            [°], from +X towards +Y. Extents along x and y in `luminaire` change places for odd multiples of 90°, and are
+            dropped for what is no multiple.
+        """
+        if not np.isfinite(angle):
+            raise ArgumentError(f"Intensity: cannot be turned by {angle}°.")
+        return self._with_planes_at(
+            self.c + angle, f"turned by {angle:.9g}° about the axis", _turned(self.luminaire, angle)
+        )
+
+    def mirrored(self) -> Intensity:
+        """The mirror image in the plane C0-C180: what was at C is at -C.
+
+        Luminaire files count C counter-clockwise *from above*, looking against a z axis from which the light goes away;
+        étendue counts it about the direction in which sources emit. This is what leads from one to the other.
+        """
+        return self._with_planes_at(-self.c, "mirrored: C became -C", self.luminaire)
+
+    def _with_planes_at(self, c: Array, step: str, luminaire: Mapping[str, Any]) -> Intensity:
+        if self.c.size == 1:
+            return self.replace(provenance=self.provenance.then(step), luminaire=luminaire)
+        turned = np.mod(c, 360.0)
+        turned[turned == 360.0] = 0.0  # the remainder of -1e-20 is rounded up to the divisor
+        order = np.argsort(turned)
+        return self.replace(
+            c=turned[order],
+            values=self.values[order],
+            standard_error=self.standard_error[order],
+            luminaire=luminaire,
+            provenance=self.provenance.then(step),
+        )
+
+
+def _finite(name: str, numbers: npt.ArrayLike) -> Array:
+    array = np.asarray(numbers, dtype=np.float64)
+    if not np.isfinite(array).all():
+        raise ArgumentError(f"Intensity: {name} is not finite.")
+    return array
+
+
+def _turned(facts: Mapping[str, Any], angle: float) -> dict[str, Any]:
+    """Extents along x and y after a turn about the axis."""
+    quarters = round(angle / 90.0)
+    result = dict(facts)
+    for what in ("opening", "housing"):
+        x, y = result.pop(f"{what}_x", None), result.pop(f"{what}_y", None)
+        if abs(angle - 90.0 * quarters) < ROUNDING or x == y:
+            x, y = (y, x) if quarters % 2 else (x, y)
+            result |= {f"{what}_{axis}": extent for axis, extent in (("x", x), ("y", y)) if extent is not None}
+        elif what == "opening":
+            result.pop("opening_shape", None)
+    return result
