@@ -7,13 +7,17 @@
 ((16, 16), 'cd/m²')
 """
 
+from etendue.formats.intensity import read_intensity, write_intensity
 from etendue.formats.maps import read_map
 from etendue.formats.rays import read_rays, write_rays
+from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.luminance.combination import combine_maps
 from etendue.luminance.comparison import Region, compare, cross_section
+from etendue.luminance.denoising import denoise_map
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
-from etendue.plot import plot_comparison, plot_cross_sections, plot_map
+from etendue.plot import plot_comparison, plot_cross_sections, plot_intensity, plot_map
+from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
@@ -21,6 +25,7 @@ from etendue.quantities.spectrum import Spectrum
 from etendue.sources.ring_source import RingSource
 
 __all__ = [
+    "Intensity",
     "LuminanceMap",
     "Observer",
     "RaySet",
@@ -31,12 +36,17 @@ __all__ = [
     "combine_maps",
     "compare",
     "cross_section",
+    "denoise_map",
     "filter_map",
+    "intensity_distribution",
     "luminance_map",
     "plot_comparison",
     "plot_cross_sections",
+    "plot_intensity",
     "plot_map",
+    "read_intensity",
     "read_map",
     "read_rays",
+    "write_intensity",
     "write_rays",
 ]

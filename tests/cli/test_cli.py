@@ -95,7 +95,7 @@ def verbs() -> dict[str, Any]:
 def test_help_names_every_verb_with_what_it_does(run: Run) -> None:
     outcome = run("--help")
     assert outcome.status == 0
-    assert set(verbs()) == {"demo", "info", "convert", "luminance", "filter", "compare"}
+    assert set(verbs()) == {"demo", "info", "convert", "luminance", "intensity", "filter", "compare"}
     for name, verb in verbs().items():
         assert f" {name} " in outcome.out
         assert verb.help

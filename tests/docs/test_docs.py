@@ -9,6 +9,7 @@ from pathlib import Path
 import etendue as et
 import pytest
 from etendue.cli.app import VERBS
+from etendue.formats.intensity import INTENSITY_FORMATS
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import RAY_FORMATS
 from etendue.luminance.filters import FILTERS
@@ -116,7 +117,7 @@ def test_architecture_names_every_crate_and_module() -> None:
     assert crates == set(re.findall(r"^\| `(crates/\w+)` \|", text, re.MULTILINE))
     package = ROOT / "python" / "etendue"
     # Families of like modules (formats, verbs) are named as a whole.
-    families = {"formats/rays", "formats/maps", "cli", "plot"}
+    families = {"formats/rays", "formats/maps", "formats/intensity", "cli", "plot"}
     modules = {
         "etendue." + name.removesuffix(".py").replace("/", ".")
         for name in (path.relative_to(package).as_posix() for path in package.rglob("*.py"))
@@ -130,6 +131,11 @@ def test_the_page_of_ray_files_lists_every_format_with_its_extensions() -> None:
     rows = re.findall(r"^\| `([a-z0-9-]+)` \|[^|]*\|([^|]*)\|", prose(page("formats/ray-files.md")), re.MULTILINE)
     listed = {name: tuple(re.findall(r"`(\.\w+)`", cell)) for name, cell in rows}
     assert listed == {f.name: f.extensions for f in RAY_FORMATS}
+
+
+def test_the_page_of_intensity_files_lists_every_format_with_its_extension() -> None:
+    rows = re.findall(r"^\| `([a-z0-9]+)` \|[^|]*\| `(\.\w+)` \|", prose(page("formats/intensity.md")), re.MULTILINE)
+    assert dict(rows) == {name: f.extension for name, f in INTENSITY_FORMATS.items()}
 
 
 def test_the_page_of_map_files_lists_every_extension() -> None:

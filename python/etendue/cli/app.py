@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli import compare, convert, demo, filter_, info, luminance
+from etendue.cli import compare, convert, demo, filter_, info, intensity, luminance
 from etendue.cli.terminal import complain, spell_out_unknown_letters
 from etendue.errors import EtendueError
 from etendue.quantities.provenance import version
@@ -28,6 +28,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "info": info.info,
     "convert": convert.convert,
     "luminance": luminance.luminance,
+    "intensity": intensity.intensity,
     "filter": filter_.filter_,
     "compare": compare.compare,
 }

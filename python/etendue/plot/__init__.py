@@ -1,12 +1,13 @@
-"""Pictures of maps and of their comparison; matplotlib is imported when the first one is drawn."""
+"""Pictures of maps, comparisons and intensities; matplotlib is imported when the first one is drawn."""
 
 from __future__ import annotations
 
 from etendue.plot.comparison_picture import plot_comparison
 from etendue.plot.cross_section_picture import plot_cross_sections
+from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
 from etendue.quantities.luminance_map import PLOT_MAP
 
-__all__ = ["plot_comparison", "plot_cross_sections", "plot_map"]
+__all__ = ["plot_comparison", "plot_cross_sections", "plot_intensity", "plot_map"]
 
 PLOT_MAP[:] = [plot_map]

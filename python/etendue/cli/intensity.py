@@ -1,0 +1,118 @@
+"""``etendue intensity``: how much a source sends into every direction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from etendue.cli.convert import in_unit, with_flux
+from etendue.cli.terminal import check_outputs, complain, one_of, print_json, progress_bar, say
+from etendue.formats.intensity import (
+    INTENSITY_EXTENSIONS,
+    detect_intensity_format,
+    read_intensity,
+    write_intensity,
+)
+from etendue.formats.maps import PICTURE_EXTENSIONS
+from etendue.formats.rays import read_rays
+from etendue.goniophotometry.far_field import Cells, intensity_distribution
+from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
+from etendue.quantities.intensity import Intensity
+
+
+def intensity(
+    file: Annotated[Path, typer.Argument(help="A ray file of any format, or an IES or EULUMDAT file.")],
+    output: Annotated[
+        list[Path] | None,
+        typer.Option("-o", "--output", help="Distribution (.ies, .ldt) or picture (.png, .pdf); several are allowed."),
+    ] = None,
+    c_planes: Annotated[
+        int | None, typer.Option("--c-planes", help="Half planes C made of rays [36].", min=1, show_default=False)
+    ] = None,
+    gamma_step: Annotated[
+        float | None, typer.Option("--gamma-step", help="Step of γ made of rays, in degrees [2.5].", show_default=False)
+    ] = None,
+    flux: Annotated[
+        str | None, typer.Option("--flux", help="Total flux that overrides the ray file's: 337, 337lm.")
+    ] = None,
+    unit: Annotated[
+        str | None, typer.Option("--unit", help="lm or W: convert through the ray file's spectrum.")
+    ] = None,
+    rotate: Annotated[
+        float, typer.Option("--rotate", help="Turn about the axis: C becomes C + this, in degrees.")
+    ] = 0.0,
+    mirror: Annotated[bool, typer.Option("--mirror", help="C becomes -C (before --rotate).")] = False,
+    kind: Annotated[str, typer.Option("--kind", help="Picture: polar or cartesian.")] = "polar",
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Far-field intensity of rays, or of an intensity file: in figures, as a file, as a picture."""
+    outputs = output or []
+    one_of(kind, INTENSITY_KINDS, "--kind")
+    check_outputs(outputs, (*INTENSITY_EXTENSIONS, *PICTURE_EXTENSIONS))
+    if detect_intensity_format(file) is None:
+        cells = Cells(36 if c_planes is None else c_planes, 2.5 if gamma_step is None else gamma_step)
+        rays = in_unit(with_flux(read_rays(file), flux), unit)
+        with progress_bar("rays", len(rays)) as progress:
+            result = intensity_distribution(rays, cells.c_planes, cells.gamma_step, progress=progress)
+        complaints = [str(c) for c in rays.complaints]
+    else:
+        given = {"--c-planes": c_planes, "--gamma-step": gamma_step, "--flux": flux, "--unit": unit}
+        needless = [option for option, value in given.items() if value is not None]
+        if needless:
+            raise typer.BadParameter(f"{', '.join(needless)}: for ray files; {file} is an intensity distribution")
+        result = read_intensity(file)
+        complaints = [str(c) for c in result.complaints]
+    shown = result.mirrored() if mirror else result
+    shown = shown.rotated_about_axis(rotate) if rotate else shown
+    losses = []
+    for path in outputs:
+        if path.suffix.lower() in PICTURE_EXTENSIONS:
+            plot_intensity(shown, path, "cartesian" if kind == "cartesian" else "polar")
+        else:
+            losses += [f"{path}: {note}" for note in write_intensity(path, result, rotate=rotate, mirror=mirror)]
+    if json:
+        print_json({"file": file, **summary(shown), "outputs": outputs, "complaints": complaints, "losses": losses})
+        return
+    for line in (*complaints, *(f"note: {note}" for note in losses)):
+        complain(line)
+    print_intensity(shown)
+    for path in outputs:
+        say(f"  {path}")
+
+
+def summary(distribution: Intensity) -> dict[str, Any]:
+    """A distribution in figures, as plain data [its unit, °]."""
+    c, gamma = distribution.peak
+    return {
+        "quantity": distribution.quantity,
+        "unit": distribution.unit,
+        "format": distribution.provenance.format,
+        "flux": distribution.flux,
+        "flux_unit": distribution.flux_unit,
+        "maximum": distribution.maximum,
+        "maximum_at": {"c": c, "gamma": gamma},
+        "symmetry": distribution.symmetry(),
+        "planes": distribution.c.size,
+        "gammas": distribution.gamma.size,
+        "gamma_range": [float(distribution.gamma[0]), float(distribution.gamma[-1])],
+        "luminaire": distribution.luminaire,
+        "notes": list(distribution.notes),
+    }
+
+
+def print_intensity(distribution: Intensity) -> None:
+    """A distribution in figures, for people."""
+    facts = summary(distribution)
+    low, high = facts["gamma_range"]
+    say(f"{facts['quantity']}, {facts['planes']} planes, {facts['gammas']} angles γ from {low:g}° to {high:g}°")
+    say(f"  flux {distribution.flux:.6g} {distribution.flux_unit}, symmetry {facts['symmetry']}")
+    where = facts["maximum_at"]
+    say(f"  maximum {distribution.maximum:.6g} {distribution.unit} at C = {where['c']:g}°, γ = {where['gamma']:g}°")
+    for name, value in distribution.luminaire.items():
+        if name not in {"keywords", "lamp_sets", "tilt"}:
+            text = f"{value:.7g}" if isinstance(value, float) else str(value)
+            say(f"  {name.replace('_', ' ')}: {text[:100]}")
+    for note in distribution.notes:
+        say(f"  {note}")

@@ -1,0 +1,255 @@
+"""An intensity distribution as the curves of its principal planes, polar or Cartesian."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import UnknownNameError
+from etendue.plot import style
+from etendue.quantities.intensity import Intensity
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+IntensityKind = Literal["polar", "cartesian"]
+INTENSITY_KINDS: tuple[str, ...] = get_args(IntensityKind)
+
+WIDTH = 5.6
+"""Of the figure [inches]."""
+
+STEP = 0.5
+"""Degrees between the points of a curve, beside the nodes: a straight line in a table is none in a polar diagram."""
+
+DARK = 1e-3
+"""Share of the maximum below which the backward half of the sphere is not worth half of the picture."""
+
+ABOVE = {"polar": 0.92, "cartesian": 0.72}
+"""Height of the heading [inches]."""
+
+
+class _Curve(NamedTuple):
+    """The cut of the distribution with a plane through the axis: C on the right, C + 180° on the left."""
+
+    label: str
+    gamma: Array  # [°] from -180 (the left half plane) to 180
+    values: Array
+    error: Array
+
+
+def plot_intensity(
+    intensity: Intensity,
+    path: str | os.PathLike[str] | None = None,
+    kind: IntensityKind = "polar",
+    *,
+    title: str | None = None,
+) -> Figure:
+    """Draw the curves of C0-C180, of C90-C270 and of the plane of the maximum, with a band of ± one standard error.
+
+    Parameters
+    ----------
+    intensity : Intensity
+        The distribution.
+    path : path, optional
+        Where to write the picture, .png or .pdf. The same distribution gives the same bytes.
+    kind : {"polar", "cartesian"}
+        The diagram of a data sheet, γ = 0° pointing down; or intensity over γ.
+    title : str, optional
+        First line; "Luminous intensity" or "Radiant intensity" if not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure, not registered with pyplot. The half γ > 90° is left out if it is dark.
+
+    Raises
+    ------
+    ArgumentError
+        If the directory of `path` does not exist.
+    UnknownNameError
+        If `kind` or the extension of `path` does not exist.
+
+    Examples
+    --------
+    >>> lambertian = Intensity(c=[0], gamma=range(91), values=[np.cos(np.radians(range(91)))])
+    >>> [line.get_label() for line in plot_intensity(lambertian, kind="cartesian").axes[0].lines]
+    ['all C']
+    """
+    if kind not in INTENSITY_KINDS:
+        raise UnknownNameError("kind of diagram", kind, INTENSITY_KINDS)
+    reach = _reach(intensity)
+    curves = list(_curves(intensity, reach))
+    facts = style.wrapped(_facts(intensity), WIDTH - 0.6)
+    below = 0.3 + 0.15 * len(facts)
+    draw, high = (_polar, (4.5 if reach > 90.0 else 2.55)) if kind == "polar" else (_cartesian, 3.0)
+    left, bottom = (0.3, below) if kind == "polar" else (0.85, below + 0.42)
+    height = bottom + high + ABOVE[kind]
+    figure = style.new_figure(WIDTH, height)
+    axes = style.add_axes(figure, left, bottom, WIDTH - left - (0.3 if kind == "polar" else 0.25), high)
+    draw(axes, curves, intensity, reach)
+    heading = title if title is not None else intensity.quantity.capitalize()
+    style.add_text(figure, 0.3, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
+    for number, line in enumerate(reversed(facts)):
+        style.add_text(figure, 0.3, 0.14 + 0.15 * number, line, size=style.CAPTION_SIZE, color=style.FAINT)
+    handles = axes.get_legend_handles_labels()
+    figure.legend(
+        *handles,
+        loc="upper left",
+        bbox_to_anchor=(0.3 / WIDTH, (height - 0.4) / height),
+        ncols=3,
+        frameon=False,
+        fontsize=style.TICK_SIZE,
+        labelcolor=style.INK,
+        handlelength=1.6,
+        columnspacing=1.4,
+        borderaxespad=0.0,
+        borderpad=0.0,
+    )
+    return style.finish(figure, path)
+
+
+def _reach(intensity: Intensity) -> float:
+    """The largest γ that is drawn [°]."""
+    behind = intensity.values[:, intensity.gamma > 90.0]
+    return 180.0 if behind.max(initial=0.0) > DARK * intensity.maximum else 90.0
+
+
+def _curves(intensity: Intensity, reach: float) -> Iterator[_Curve]:
+    """The principal planes, and that of the maximum if it is another."""
+    if intensity.symmetry() == "rotational":
+        yield _curve(intensity, 0.0, reach, "all C")
+        return
+    for c in (0.0, 90.0):
+        yield _curve(intensity, c, reach, f"C{c:g} – C{c + 180:g}")
+    c, row = _peak(intensity)
+    if intensity.gamma[row] not in (0.0, 180.0) and intensity.c[c] % 90.0 != 0.0:
+        plane = float(intensity.c[c]) % 180.0
+        yield _curve(intensity, plane, reach, f"C{plane:g} – C{plane + 180:g} (maximum)")
+
+
+def _peak(intensity: Intensity) -> tuple[int, int]:
+    """Plane and row of the largest intensity that is sure: small cells about the poles are bright by noise."""
+    sure = intensity.values - 2.0 * np.nan_to_num(intensity.standard_error)
+    plane, row = np.unravel_index(int(sure.argmax()), sure.shape)
+    return int(plane), int(row)
+
+
+def _curve(intensity: Intensity, c: float, reach: float, label: str) -> _Curve:
+    gamma = np.union1d(np.arange(0.0, reach + STEP / 2, STEP), intensity.gamma)
+    gamma = gamma[gamma <= reach]
+    # Beside the end of the table the function is 0; the drop shall be seen as one.
+    end = intensity.gamma[-1]
+    gamma = np.sort(np.append(gamma, end + 1e-6)) if end < reach else gamma
+    # Between the nodes the error of the mean of two is at most the mean of their errors.
+    uncertain = intensity.replace(values=np.nan_to_num(intensity.standard_error))
+    both = [
+        np.concatenate([function.at(c + 180.0, gamma[::-1]), function.at(c, gamma)])
+        for function in (intensity, uncertain)
+    ]
+    return _Curve(label, np.concatenate([-gamma[::-1], gamma]), *both)
+
+
+def _polar(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: float) -> None:
+    """Circles of equal intensity, spokes of equal γ, and the curves, on plain axes of equal scale."""
+    top = max(float((curve.values + curve.error).max()) for curve in curves)
+    circles = _circles(top)
+    rim = circles[-1]
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+    axes.set_xlim(-1.16 * rim, 1.16 * rim)
+    axes.set_ylim(-1.12 * rim, 1.12 * rim if reach > 90.0 else 0.12 * rim)
+    arc = np.radians(np.linspace(-reach, reach, 361))
+    for radius in circles:
+        axes.plot(
+            radius * np.sin(arc),
+            -radius * np.cos(arc),
+            color=style.RULE,
+            linewidth=0.8 if radius == rim else 0.4,
+            zorder=1,
+        )
+        label = style.plain(radius) + (f" {intensity.unit}" if radius == rim else "")
+        axes.text(
+            radius, 0.015 * rim, label, size=style.TICK_SIZE - 0.5, color=style.FAINT, ha="center", va="bottom", zorder=4,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6},
+        )  # fmt: skip
+    for degrees in np.arange(-reach, reach + 1, 15.0):
+        x, y = np.sin(np.radians(degrees)), -np.cos(np.radians(degrees))
+        axes.plot([0, rim * x], [0, rim * y], color=style.RULE, linewidth=0.4 if degrees % 30 == 0 else 0.2, zorder=1)
+        if degrees % 30 == 0 and abs(degrees) < 180 and abs(degrees) != 90:
+            axes.text(
+                1.06 * rim * x, 1.06 * rim * y, f"{abs(degrees):g}°",
+                size=style.TICK_SIZE, color=style.FAINT, ha="center", va="center",
+            )  # fmt: skip
+    if reach > 90.0:
+        axes.text(0, 1.06 * rim, "180°", size=style.TICK_SIZE, color=style.FAINT, ha="center", va="center")
+    for side in (-1, 1):
+        axes.text(
+            side * 1.02 * rim, -0.035 * rim, "90°", size=style.TICK_SIZE, color=style.FAINT, va="top",
+            ha="left" if side > 0 else "right",
+        )  # fmt: skip
+    for number, curve in enumerate(curves):
+        angle, colour = np.radians(curve.gamma), style.LINES[number]
+        inner, outer = (np.maximum(curve.values + sign * curve.error, 0.0) for sign in (-1.0, 1.0))
+        edge, back = np.concatenate([outer, inner[::-1]]), np.concatenate([angle, angle[::-1]])
+        axes.fill(edge * np.sin(back), -edge * np.cos(back), color=colour, alpha=0.22, linewidth=0.0, zorder=2)
+        axes.plot(
+            curve.values * np.sin(angle), -curve.values * np.cos(angle),
+            color=colour, linewidth=1.2, label=curve.label, zorder=3,
+        )  # fmt: skip
+
+
+def _circles(top: float) -> Array:
+    """Round radii, the last of which holds everything."""
+    from matplotlib.ticker import MaxNLocator
+
+    top = top if top > 0.0 else 1.0
+    ticks = np.asarray(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, top))
+    circles: Array = ticks[(ticks > 0.0) & (ticks < top + (ticks[1] - ticks[0]))]
+    return circles
+
+
+def _cartesian(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: float) -> None:
+    style.dress(axes)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    axes.grid(visible=True, axis="y", color=style.RULE, linewidth=0.4)
+    axes.set_axisbelow(True)
+    axes.set_xlim(-reach, reach)
+    axes.set_xticks(np.arange(-reach, reach + 1, reach / 6.0))
+    low = min(0.0, float(intensity.values.min()))
+    top = max(float((curve.values + curve.error).max()) for curve in curves)
+    axes.set_ylim(low, top + 0.05 * (top - low) if top > low else low + 1.0)
+    axes.yaxis.set_major_formatter(style.number_formatter())
+    for number, curve in enumerate(curves):
+        colour = style.LINES[number]
+        low_edge, high_edge = curve.values - curve.error, curve.values + curve.error
+        axes.fill_between(curve.gamma, low_edge, high_edge, color=colour, alpha=0.22, linewidth=0.0)
+        axes.plot(curve.gamma, curve.values, color=colour, linewidth=1.2, label=curve.label)
+    axes.set(xlabel="γ [°], to the left in the plane C + 180°", ylabel=f"{intensity.quantity} [{intensity.unit}]")
+
+
+def _facts(intensity: Intensity) -> Iterator[str]:
+    """What the picture rests on, fact by fact."""
+    unit = intensity.flux_unit
+    yield f"{'luminous' if unit == 'lm' else 'radiant'} flux {style.plain(intensity.flux)} {unit}"
+    node = _peak(intensity)
+    where = f"γ = {intensity.gamma[node[1]]:g}°"
+    if intensity.c.size > 1 and intensity.gamma[node[1]] not in (0.0, 180.0):
+        where = f"C = {intensity.c[node[0]]:g}°, {where}"
+    error = float(intensity.standard_error[node])
+    noise = f" ± {style.plain(float(f'{error:.2g}'))}" if np.isfinite(error) else ""
+    yield f"maximum {style.plain(intensity.values[node])}{noise} {intensity.unit} at {where}"
+    known = np.isfinite(intensity.standard_error) & (intensity.values > 0.0)
+    if known.any():
+        share = 100.0 * float(np.median(intensity.standard_error[known] / intensity.values[known]))
+        yield f"median standard error {style.percent(share)}"
+    planes = "one plane" if intensity.c.size == 1 else f"{intensity.c.size} planes"
+    yield f"{planes} × {intensity.gamma.size} angles"
+    yield Path(intensity.provenance.source).name
