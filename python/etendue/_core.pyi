@@ -76,6 +76,11 @@ def cone_sums(
 ) -> tuple[list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]], _Tally]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the tally."""
 
+def polya_posterior(
+    depths: Sequence[int], weight: _Floats, weight_squared: _Floats, base: _Floats, concentration: float
+) -> tuple[_Floats, _Floats, float]:
+    """Mean of mass over base mass per cell, mean of its square, ln evidence, for a grid of 2^depth cells per axis."""
+
 def select_subset(start: int, stop: int, n: int, k: int, taken: int, seed: int) -> npt.NDArray[np.uint64]:
     """Indices in ``start..stop`` of a random k-subset of n, of which `taken` were taken before."""
 

@@ -4,6 +4,7 @@
 //! between rounds of batches to report progress and to honour Ctrl-C.
 
 mod cone;
+mod polya;
 mod run;
 mod scan;
 mod source;
@@ -19,6 +20,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;
     module.add_function(wrap_pyfunction!(scan::scan, module)?)?;
     module.add_function(wrap_pyfunction!(cone::cone_sums, module)?)?;
+    module.add_function(wrap_pyfunction!(polya::polya_posterior, module)?)?;
     module.add_function(wrap_pyfunction!(subset::select_subset, module)?)?;
     module.add_function(wrap_pyfunction!(subset::deal_parts, module)?)?;
     Ok(())

@@ -1,9 +1,10 @@
 //! Estimators of luminance from rays.
 //!
 //! `view`: an observer and his pixel grid. `cone`: rays that point into a cone about the line to the observer, pixel by
-//! pixel (thesis chapter 2).
+//! pixel (thesis chapter 2). `polya`: counts on a dyadic grid, smoothed by averaging over all its partitions.
 
 pub mod cone;
+pub mod polya;
 pub mod view;
 
 pub use view::View;

@@ -10,13 +10,17 @@ import typer
 from etendue.cli.luminance import print_map, summary, write_map
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, say
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS, read_map
+from etendue.luminance.denoising import denoise_map
 from etendue.luminance.filters import FILTERS, filter_map
 from etendue.plot.map_picture import SCALES
+
+KINDS = ("opt", *FILTERS)
+"""The denoiser by optional Pólya tree, and the filters of the thesis."""
 
 
 def filter_(
     file: Annotated[Path, typer.Argument(help="A map written by étendue.")],
-    kind: Annotated[str, typer.Option("--kind", help=f"{', '.join(FILTERS)}.")],
+    kind: Annotated[str, typer.Option("--kind", help=f"{', '.join(KINDS)}.")],
     output: Annotated[list[Path], typer.Option("-o", "--output", help="Map to write; several are allowed.")],
     size: Annotated[int, typer.Option("--size", help="Pixels along each side of the kernel, odd.")] = 5,
     gamma: Annotated[
@@ -25,11 +29,12 @@ def filter_(
     scale: Annotated[str, typer.Option("--scale", help="Colours of a picture: linear or log.")] = "linear",
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Smooth a map with one of the four filters of the thesis; the flux before and after is printed."""
-    one_of(kind, FILTERS, "--kind")
+    """Smooth a map: opt needs no setting and keeps the flux; the four filters of the thesis report what they lose."""
+    one_of(kind, KINDS, "--kind")
     one_of(scale, SCALES, "--scale")
     check_outputs(output, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
-    smooth = filter_map(read_map(file), kind, size=size, gamma=gamma)
+    noisy = read_map(file)
+    smooth = denoise_map(noisy) if kind == "opt" else filter_map(noisy, kind, size=size, gamma=gamma)
     losses = write_map(smooth, output, scale)
     if json:
         print_json(summary(smooth) | {"outputs": output, "losses": losses})

@@ -13,6 +13,9 @@ from etendue.errors import ArgumentError, UnknownNameError
 
 Plane = Literal["view", "xy"]
 PLANES: tuple[str, ...] = get_args(Plane)
+MAX_PIXELS = 1 << 26
+"""Most pixels of a screen: the sums over its rays take 24 bytes each."""
+
 Vector = npt.NDArray[np.float64]
 
 
@@ -137,6 +140,10 @@ class Screen:
             if not 1 <= value <= 65536 or int(value) != value:  # in this order: NaN and infinity have no int
                 raise ArgumentError(f"Screen: {name} is {value}; give a whole number of pixels, 1 to 65536.")
             object.__setattr__(self, name, int(value))
+        if self.columns * self.rows > MAX_PIXELS:
+            raise ArgumentError(
+                f"Screen: {self.columns} x {self.rows} pixels are more than {MAX_PIXELS:,}, which no memory is meant for."
+            )
         if self.plane not in PLANES:
             raise UnknownNameError("screen plane", self.plane, PLANES)
 

@@ -16,6 +16,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_operations import FLUX_COLUMNS, RayOperations
 from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally, checked_threads
+from etendue.quantities.ray_units import RayUnits
 from etendue.quantities.report import Complaint, RayFileWarning, Severity
 from etendue.quantities.spectrum import Spectrum
 from etendue.units import FLUX_UNITS, FluxUnit
@@ -95,7 +96,7 @@ class RaySetMeaning:
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
 
 
-class RaySet(RayOperations, RayStream):
+class RaySet(RayOperations, RayUnits, RayStream):
     """A sample of a source's light: rays with position, direction and flux.
 
     The rays stay where they are, in memory or in a mapped file; properties copy what is asked for, `batches` streams.
@@ -204,7 +205,10 @@ class RaySet(RayOperations, RayStream):
 
     def replace(self, **changes: Any) -> RaySet:
         """A set over the same records with some fields of its meaning changed."""
-        return RaySet.from_records(self._records, dataclasses.replace(self._meaning, **changes))
+        changed = RaySet.from_records(self._records, dataclasses.replace(self._meaning, **changes))
+        # The account of the flux as stored depends on the records alone: no second pass for it, and no second warning.
+        changed._tally = self._tally  # noqa: SLF001 - its own kind
+        return changed
 
     def __len__(self) -> int:
         """Number of rays, usable or not."""

@@ -39,6 +39,7 @@ from etendue.formats.rays.tm25_layout import (
     padded,
 )
 from etendue.quantities.provenance import version
+from etendue.quantities.ray_operations import FLUX_COLUMNS
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.spectrum import Spectrum
@@ -52,9 +53,6 @@ SPECTRAL = {
 }
 NEEDS_WATTS = (Colour.PER_RAY, Colour.INDEXED)
 """Knowledge that the standard allows only beside radiant flux alone (4.7.2)."""
-
-FLUX_COLUMNS = ("radiant_flux", "tristimulus_x", "tristimulus_z")
-"""Further columns in a unit of flux, which share the scale of the flux."""
 
 
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:

@@ -1,0 +1,160 @@
+"""The optional Pólya tree against an independent statement of its recursion, closed forms and the truth."""
+
+from __future__ import annotations
+
+import itertools
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from etendue import _core
+from etendue.errors import ArgumentError
+from scipy.special import betaln, logsumexp
+
+Array = npt.NDArray[np.float64]
+
+
+def every_partition(counts: Array, base: Array, c: float, rho: float = 0.5) -> tuple[float, Array, Array]:
+    """(ln evidence, mean, mean square of the ratio) by recursion over boxes as Python dictionaries: the definition."""
+    known: dict[tuple[tuple[int, int], ...], tuple[float, Array, Array]] = {}
+
+    def visit(box: tuple[tuple[int, int], ...]) -> tuple[float, Array, Array]:
+        if box in known:
+            return known[box]
+        window = tuple(slice(*span) for span in box)
+        n, shape = counts[window], counts[window].shape
+        axes = [k for k, (a, b) in enumerate(box) if b - a > 1]
+        if not axes:
+            return 0.0, np.ones(shape), np.ones(shape)
+        terms, means, squares = [np.log(1 - rho)], [np.ones(shape)], [np.ones(shape)]
+        for k in axes:
+            a, b = box[k]
+            spans = ((a, (a + b) // 2), ((a + b) // 2, b))
+            halves = [(*box[:k], span, *box[k + 1 :]) for span in spans]
+            masses = [base[tuple(slice(*s) for s in half)].sum() for half in halves]
+            p = np.array(masses) / sum(masses)
+            n_half = np.array([counts[tuple(slice(*s) for s in half)].sum() for half in halves])
+            below = [visit(half) for half in halves]
+            bayes = betaln(*(c * p + n_half)) - betaln(*(c * p)) - n_half @ np.log(p)
+            terms.append(np.log(rho / len(axes)) + bayes + below[0][0] + below[1][0])
+            share = (c * p + n_half) / (c + n.sum())
+            second = share * (c * p + n_half + 1) / (c + n.sum() + 1)
+            means.append(np.concatenate([share[i] / p[i] * below[i][1] for i in (0, 1)], axis=k))
+            squares.append(np.concatenate([second[i] / p[i] ** 2 * below[i][2] for i in (0, 1)], axis=k))
+        total = float(logsumexp(terms))
+        q = np.exp(np.array(terms) - total)
+        known[box] = (
+            total,
+            sum((w * m for w, m in zip(q, means, strict=True)), np.zeros(shape)),
+            sum((w * s for w, s in zip(q, squares, strict=True)), np.zeros(shape)),
+        )
+        return known[box]
+
+    return visit(tuple((0, n) for n in counts.shape))
+
+
+@pytest.mark.parametrize("shape", [(16,), (8, 16), (4, 2, 8), (4, 4, 2, 4), (1, 8)])
+@pytest.mark.parametrize("c", [1.0, 3.0, 30.0])
+def test_the_core_equals_the_definition_in_any_number_of_dimensions(shape: tuple[int, ...], c: float) -> None:
+    rng = np.random.default_rng(len(shape))
+    counts = rng.poisson(rng.gamma(0.4, 6.0, shape)).astype(float)
+    base = rng.gamma(2.0, 1.0, shape)
+    base /= base.sum()
+    evidence, mean, square = every_partition(counts, base, c)
+    depths = [int(np.log2(n)) for n in shape]
+    got = _core.polya_posterior(depths, counts.ravel(), counts.ravel(), base.ravel(), c)
+    assert got[2] == pytest.approx(evidence, abs=1e-9)
+    np.testing.assert_allclose(got[0], mean.ravel(), rtol=1e-10)
+    np.testing.assert_allclose(got[1], square.ravel(), rtol=1e-10)
+
+
+def poisson_map(truth: Array, rays_per_unit: float, seed: int, screen: et.Screen) -> et.LuminanceMap:
+    counts = np.random.default_rng(seed).poisson(truth * rays_per_unit)
+    live = counts > 0
+    return et.LuminanceMap(
+        np.where(live, counts / rays_per_unit, np.nan),
+        np.where(live, np.sqrt(counts) / rays_per_unit, np.nan),
+        counts,
+        et.Observer(0, 0, 1e7),
+        screen,
+    )
+
+
+def scene(rows: int, columns: int) -> Array:
+    """Luminance of an asymmetric scene: a ramp, a bright tilted bar, a dark corner, a smooth bump."""
+    y, x = np.mgrid[0:rows, 0:columns] / max(rows, columns)
+    bar = np.abs(0.8 * x - y + 0.1) < 0.06
+    bump = 3.0 * np.exp(-((x - 0.7) ** 2 + (y - 0.2) ** 2) / 0.02)
+    return np.where((x < 0.2) & (y > 0.5), 0.05, 0.5 + x + bump + 6.0 * bar)
+
+
+def test_flux_is_kept_and_the_error_falls() -> None:
+    screen = et.Screen(9.0, 6.0, 90, 60)
+    truth = scene(60, 90)
+    noisy = poisson_map(truth, 4.0, 1, screen)
+    smooth = et.denoise_map(noisy)
+    assert smooth.intensity == pytest.approx(noisy.intensity, rel=1e-12)
+    assert smooth.dead_pixels == 0
+    assert noisy.dead_pixels > 20
+
+    def error(lmap: et.LuminanceMap) -> float:
+        return float(np.sqrt(((np.nan_to_num(lmap.values) - truth) ** 2).mean()))
+
+    best = min(error(et.filter_map(noisy, k, s)) for k, s in itertools.product(("average", "weighted"), (3, 5, 7)))
+    assert error(smooth) < best
+    assert error(smooth) < 0.5 * error(noisy)
+
+
+def test_error_bars_cover() -> None:
+    """On the safe side, and not absurdly: at least 68 % within one standard error, 95 % within two (theory section 12)."""
+    truth = scene(48, 64)
+    one, two = [], []
+    for seed, level in itertools.product(range(4), (3.0, 30.0)):
+        smooth = et.denoise_map(poisson_map(truth, level, seed, et.Screen(8, 6, 64, 48)))
+        z = np.abs(smooth.values - truth) / smooth.standard_error
+        one.append((z < 1).mean())
+        two.append((z < 2).mean())
+    assert 0.68 < np.mean(one) < 0.88, np.mean(one)
+    assert 0.95 < np.mean(two) < 0.995, np.mean(two)
+
+
+def test_a_uniform_map_becomes_uniform() -> None:
+    """One ray per pixel and no structure: the relative spread falls from 100 % to that of the total and little more."""
+    noisy = poisson_map(np.ones((64, 64)), 1.0, 3, et.Screen(6, 6, 64, 64))
+    smooth = et.denoise_map(noisy)
+    assert smooth.values.std() / smooth.values.mean() < 0.01
+    assert abs(smooth.values.mean() - 1) < 3 / 64
+    assert np.median(smooth.standard_error) > 1 / 64 * 0.9
+
+
+def test_unequal_weights_count_as_fewer_rays() -> None:
+    """The same map with errors three times as large rests on a ninth of the rays, and is smoothed more."""
+    truth = scene(32, 32)
+    noisy = poisson_map(truth, 20.0, 5, et.Screen(6, 6, 32, 32))
+    fewer = noisy.replace(standard_error=noisy.standard_error * 3)
+
+    def roughness(lmap: et.LuminanceMap) -> float:
+        return float(np.abs(np.diff(lmap.values, axis=1)).mean())
+
+    assert roughness(et.denoise_map(fewer)) < 0.97 * roughness(et.denoise_map(noisy))
+
+
+def test_same_bits_for_any_number_of_threads_and_any_odd_shape() -> None:
+    for rows, columns in ((7, 33), (1, 5), (3, 1), (64, 64)):
+        noisy = poisson_map(scene(rows, columns), 5.0, 2, et.Screen(2, 2, columns, rows))
+        results = [et.denoise_map(noisy, shifts=5, threads=n) for n in (1, 2, 7)]
+        assert len({r.values.tobytes() + r.standard_error.tobytes() for r in results}) == 1
+        assert np.isfinite(results[0].standard_error).all()
+
+
+def test_refusals() -> None:
+    noisy = poisson_map(np.ones((4, 4)), 5.0, 1, et.Screen(1, 1, 4, 4))
+    with pytest.raises(ArgumentError, match="shifts"):
+        et.denoise_map(noisy, shifts=0)
+    with pytest.raises(ArgumentError, match="without a standard error"):
+        et.denoise_map(noisy.replace(standard_error=np.full((4, 4), np.nan)))
+    with pytest.raises(ArgumentError, match="no pixel of the map has flux"):
+        et.denoise_map(noisy.replace(values=np.full((4, 4), np.nan)))
+    with pytest.raises(ArgumentError, match="negative"):
+        et.denoise_map(noisy.replace(values=-noisy.values))
