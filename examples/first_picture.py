@@ -1,6 +1,6 @@
 """The picture of the README: one source, three observers, one error bar per pixel.
 
-    python examples/first_picture.py                       # 1.4e9 rays, about half a minute on two cores
+    python examples/first_picture.py                       # 1.4e9 rays, a quarter of a minute on two cores
     python examples/first_picture.py --rays 20000000       # the same in a second, with eight times the noise
 
 The source is that of thesis 2.3: three Lambertian rings of 300, 200 and 100 lm. All observers are served in one pass; the

@@ -3,7 +3,7 @@
 //! A box of the grid is either left whole, with probability 1 − ρ, or split in half along one of its axes, each with the
 //! same share of ρ; the share of its mass that falls into the lower half then has a Beta prior with concentration c about
 //! the share of the base measure. Every axis-parallel dyadic partition has its prior probability, every one is averaged
-//! with its posterior probability, and no bin width is ever chosen. \[WongMa2010\], \[Hutter2005\]; theory eqs. 29 to 32.
+//! with its posterior probability, and no bin width is ever chosen. `[WongMa2010]`, `[Hutter2005]`; theory eqs. 29 to 32.
 
 use std::ops::Range;
 
@@ -219,7 +219,7 @@ fn log_beta(a: f64, b: f64) -> f64 {
     libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b)
 }
 
-/// ln of (1 − ρ) + Σ_k ρ/d · B_k · R_lower · R_upper, with its terms put into `terms` (stop first).
+/// ln of the evidence of a box, theory eq. 30, with the terms of its sum put into `terms`, the undivided box first.
 fn log_evidence(
     boxes: &Boxes,
     log_r: &[f64],
@@ -317,10 +317,10 @@ fn gather(grid: &Grid, mut stopped: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
                 };
                 for (index, at) in grid.range(id).enumerate() {
                     let (lower, upper) = split.halves(index);
-                    for moment in 0..2 {
-                        let amount = stopped[at][moment];
-                        stopped[lower][moment] += amount;
-                        stopped[upper][moment] += amount;
+                    let [mean, square] = stopped[at];
+                    for half in [lower, upper] {
+                        stopped[half][0] += mean;
+                        stopped[half][1] += square;
                     }
                 }
             }
