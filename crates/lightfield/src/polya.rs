@@ -364,13 +364,13 @@ mod tests {
                 .collect();
             let total: f64 = base.iter().sum();
             let base: Vec<f64> = base.iter().map(|v| v / total).collect();
-            let mask = |v: Vec<f64>| -> Vec<f64> {
+            let masked = |v: Vec<f64>| -> Vec<f64> {
                 v.iter()
                     .zip(&base)
                     .map(|(v, b)| if *b > 0.0 { *v } else { 0.0 })
                     .collect()
             };
-            let weight = mask(integers(n, 1));
+            let weight = masked(integers(n, 1));
             let squared: Vec<f64> = weight.iter().map(|w| w * 1.7).collect();
             let post = posterior(&grid, &weight, &squared, &base, 3.0);
             let mass: f64 = post.ratio.iter().zip(&base).map(|(r, b)| r * b).sum();
