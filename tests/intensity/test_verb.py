@@ -1,0 +1,102 @@
+"""``etendue intensity``: the numbers of the API, and nothing left behind by a failure."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.cli import main
+from oracles.intensity import lid
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Run the program in an empty folder: exit status, standard output, standard error."""
+    monkeypatch.setenv("COLUMNS", "300")
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        capsys.readouterr()
+        monkeypatch.setattr(sys, "argv", ["etendue", "intensity", *map(str, arguments)])
+        with pytest.raises(SystemExit) as leaving:
+            main()
+        return int(leaving.value.code or 0), *capsys.readouterr()
+
+    return call
+
+
+@pytest.fixture
+def led(tmp_path: Path) -> et.RaySet:
+    rng = np.random.default_rng(4)
+    direction = rng.normal(size=(30_000, 3)) + np.array([0.5, 0.3, 1.5])
+    rays = et.RaySet(rng.normal(size=(30_000, 3)), direction, rng.random(30_000))
+    et.write_rays(tmp_path / "led.tm25ray", rays)
+    return et.read_rays(tmp_path / "led.tm25ray")
+
+
+def test_rays_to_files_and_pictures(run: Run, led: et.RaySet, tmp_path: Path) -> None:
+    outputs = ["a.ies", "a.ldt", "a.png", "a.pdf"]
+    options = [part for name in outputs for part in ("-o", name)]
+    status, out, err = run("led.tm25ray", *options, "--c-planes", 12, "--gamma-step", 10, "--json")
+    facts = json.loads(out)
+    expected = et.intensity_distribution(led, 12, 10)
+    assert (status, err) == (0, "")
+    assert facts["flux"] == expected.flux
+    assert facts["maximum"] == expected.maximum
+    assert (facts["planes"], facts["gammas"], facts["unit"], facts["outputs"]) == (12, 19, "cd", outputs)
+    assert any("standard errors" in note for note in facts["losses"])
+    for name in ("a.ies", "a.ldt"):
+        assert np.allclose(et.read_intensity(name).values, expected.values, rtol=1e-5)
+    assert {p.name for p in tmp_path.iterdir()} == {"led.tm25ray", *outputs}
+
+
+@pytest.mark.usefixtures("led")
+def test_defaults_flux_and_text(run: Run) -> None:
+    status, out, _ = run("led.tm25ray", "--flux", "500lm")
+    assert status == 0
+    assert "36 planes, 73 angles" in out
+    assert "the cells hold 500 lm" in out
+    assert "±" not in out
+
+
+def test_files_are_turned_and_converted(run: Run) -> None:
+    et.write_intensity("a.ies", lid("none").replace(luminaire={"lamp": "x"}))
+    status, out, err = run("a.ies", "-o", "b.ldt", "--rotate", 90, "--mirror", "-o", "b.png", "--kind", "cartesian")
+    assert status == 0
+    assert "lamp: x" in out
+    assert "turns them" not in err
+    c = np.arange(0, 360, 30.0)[:, None]
+    found, source = et.read_intensity("b.ldt"), et.read_intensity("a.ies")
+    assert np.allclose(found.at(90 - c, [30, 100]), source.at(c, [30, 100]), rtol=1e-5)
+    _, _, err = run("a.ies", "-o", "b.ldt")
+    assert "rotate=90 turns" in err
+
+
+@pytest.mark.usefixtures("led")
+@pytest.mark.parametrize(
+    ("arguments", "status", "hint"),
+    [
+        (["a.ies", "--c-planes", "12"], 2, "--c-planes: for ray files"),
+        (["a.ies", "--kind", "ploar"], 2, "'polar'"),
+        (["a.ies", "-o", "b.tiff"], 1, ".tiff"),
+        (["a.ies", "-o", "none/b.ies"], 1, "does not exist"),
+        (["led.tm25ray", "--gamma-step", "7"], 1, "does not divide"),
+        (["nothing.ies"], 1, "nothing.ies"),
+        (["w.ies", "-o", "b.ldt"], 1, "luminous intensity only"),
+    ],
+)
+def test_failures_leave_nothing(run: Run, tmp_path: Path, arguments: list[str], status: int, hint: str) -> None:
+    et.write_intensity("a.ies", lid("none"))
+    et.write_intensity("w.ies", lid("none").replace(flux_unit="W"))
+    before = sorted(tmp_path.iterdir())
+    found, out, err = run(*arguments)
+    assert (found, out) == (status, "")
+    assert hint in err
+    assert sorted(tmp_path.iterdir()) == before
