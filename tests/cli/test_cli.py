@@ -215,8 +215,8 @@ def test_wrong_usage_ends_with_status_2(run: Run, folder: Path, arguments: list[
         (["luminance", "{}/led.tm25ray", "--observer", "0,0", "--size", "0,1", "-o", "a.npz"], "width is 0"),
         (["luminance", "{}/led.tm25ray", "--observer", "0,0", "--size", "1,1", "-o", "a.exrr"], ".exrr"),
         (
-            ["luminance", "{}/led.tm25ray", "--observer", "0,0", "--size", "1,1", "-o", "a.npz", "--acceptance", "1"],
-            "method",
+            ["luminance", "{}/led.tm25ray", "--observer", "0,0", "--size", "1,1", "-o", "a.npz", "--acceptance", "0"],
+            "acceptance is 0",
         ),
         (["luminance", "{}/nonsense.ray", "--observer", "0,0", "--size", "1,1", "-o", "a.npz"], "nonsense.ray"),
         (["filter", "{}/led.tm25ray", "--kind", "average", "-o", "b.npz"], "no map format"),
@@ -418,6 +418,7 @@ def api_view(**changes: Any) -> tuple[et.Observer, et.Screen]:
             {"plane": "xy"},
             {"method": "cone", "acceptance": 4.5},
         ),
+        (("--acceptance", "6"), {}, {"method": "cone", "acceptance": 6.0}),
         (("--threads", "2"), {}, {"threads": 1}),
     ],
 )

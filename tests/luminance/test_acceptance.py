@@ -87,3 +87,6 @@ def test_the_automatic_map_is_the_cone_map_at_the_chosen_acceptance() -> None:
     np.testing.assert_array_equal(cone.standard_error, automatic.standard_error)
     assert "blur" in note
     assert any("auto" in step for step in automatic.provenance.steps)
+    stated = et.luminance_map(rays, *args, acceptance=angle)
+    np.testing.assert_array_equal(cone.values, stated.values)
+    assert stated.provenance == cone.provenance

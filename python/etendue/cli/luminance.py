@@ -36,7 +36,10 @@ def luminance(
     plane: Annotated[str, typer.Option("--plane", help="view or xy.")] = "view",
     method: Annotated[str, typer.Option("--method", help="auto or cone.")] = "auto",
     acceptance: Annotated[
-        float | None, typer.Option("--acceptance", help="Half-angle of the cone in degrees [1.5].", show_default=False)
+        float | None,
+        typer.Option(
+            "--acceptance", help="Half-angle of the cone in degrees; cone: 1.5, auto: chosen.", show_default=False
+        ),
     ] = None,
     flux: Annotated[
         str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")

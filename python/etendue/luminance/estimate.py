@@ -67,9 +67,9 @@ def luminance_map(
         One for all observers, or one each.
     method : {"auto", "cone"}
         ``"cone"``: eqs. 2.2 to 2.4 of [Audenaert2014]_. ``"auto"``: the cone with the acceptance of least estimated
-        error; the map's notes say which and why.
+        error, unless `acceptance` is given; the map's notes say which and why.
     acceptance : float, optional
-        Half-angle α of the cone [°] for ``method="cone"``; 1.5 if None.
+        Half-angle α of the cone [°]; if None, 1.5 for ``"cone"`` and chosen for ``"auto"``.
     threads : int, optional
         All cores if None. The result has the same bits for any number.
     progress : callable, optional
@@ -96,14 +96,13 @@ def luminance_map(
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
-    if method == "auto" and acceptance is not None:
-        raise ArgumentError("method='auto' chooses the acceptance; give acceptance with method='cone'.")
     observers = [observer] if isinstance(observer, Observer) else list(observer)
     screens = [screen] * len(observers) if isinstance(screen, Screen) else list(screen)
     if len(observers) != len(screens) or not observers:
         raise ArgumentError(f"{len(observers)} observers and {len(screens)} screens; give one screen, or one for each.")
     pairs = list(zip(observers, screens, strict=True))
-    if method == "cone":
+    # "auto" chooses what is left open: a stated acceptance leaves it nothing to choose.
+    if method == "cone" or acceptance is not None:
         angle = check_acceptance(DEFAULT_ACCEPTANCE if acceptance is None else acceptance)
         estimates, tally = cone_estimates(rays, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
         maps = [_map(rays, estimate, 0, tally, None) for estimate in estimates]
