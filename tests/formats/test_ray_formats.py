@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import struct
-import time
 import tracemalloc
 import warnings
 from collections.abc import Iterator
@@ -368,18 +367,15 @@ def grown_file(name: str, path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", BINARY)
-def test_opening_a_large_file_costs_neither_memory_nor_time(name: str, tmp_path: Path) -> None:
+def test_opening_a_large_file_costs_no_memory(name: str, tmp_path: Path) -> None:
     path = tmp_path / "large"
     grown_file(name, path)
     tracemalloc.start()
-    begin = time.perf_counter()
     rays = read_rays(path)
-    duration = time.perf_counter() - begin
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert (len(rays), isinstance(rays.records, np.memmap)) == (MANY, True)
     assert peak < 16e6
-    assert duration < 5.0
 
 
 # --- failure ---------------------------------------------------------------------------------------------------------
