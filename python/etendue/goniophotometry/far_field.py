@@ -136,8 +136,8 @@ def intensity_distribution(
     Examples
     --------
     >>> import etendue as et
-    >>> rays = et.RingSource(rays=200_000, seed=1)               # Lambertian: I = Φ/π · cos γ
-    >>> led = et.intensity_distribution(rays, c_planes=12, gamma_step=5)
+    >>> rays = et.RingSource(rays=1_000_000, seed=1)             # Lambertian: I = Φ/π · cos γ
+    >>> led = et.intensity_distribution(rays, c_planes=1, gamma_step=5)
     >>> round(float(led.at(30, 60)) * np.pi / rays.total_flux, 2), led.unit
     (0.5, 'cd')
     """
@@ -175,9 +175,8 @@ def _notes(result: Intensity, total: float, rays: int, usable: int) -> list[str]
     notes = [f"mean over the cell around each node, from the directions of {usable:,} rays{left_out}"]
     if total > 0.0:
         deviation = f"{result.flux / total - 1.0:+.3%}".replace("-", "−")
-        notes.append(
-            f"the cells hold {total:.7g} {unit}; the table between its nodes integrates to {deviation} of that"
-        )
+        found = f"the function of the table has {result.flux:.7g} {unit} ({deviation})"
+        notes.append(f"the cells hold {total:.7g} {unit}, {found}")
     known = np.isfinite(result.standard_error)
     if known.any():
         share = result.standard_error[known] / result.values[known]
