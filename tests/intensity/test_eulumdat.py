@@ -103,6 +103,20 @@ def test_what_is_said_twice(read) -> None:
     assert "360°" in str(read(ldt(0, [0, 180, 360], [0, 90], range(6))).complaints[0])
 
 
+def test_what_the_table_does_not_rest_on_may_be_nonsense(read) -> None:
+    """A wattage with its unit before it, a missing ratio, sizes in words: complained about, and read."""
+    led = read(ldt(1, [0], [0, 90], [100, 50], lines={13: "long", 23: "", 24: "-", 32: "ca. 12 W", 27: "one"}))
+    assert led.values.tolist() == [[50, 25]]
+    assert led.luminaire["input_power"] == 0
+    assert led.luminaire["lamp_flux"] == 500
+    assert sorted(c.place for c in led.complaints) == [
+        "line 13, housing size",
+        "line 24, conversion factor",
+        "line 27, lamps of a lamp set",
+        "line 32, power of a lamp set",
+    ]
+
+
 def test_sizes(read) -> None:
     """The length lies along C90-C270, the width along C0-C180; a width of 0 is a circle."""
     facts = read(ldt(1, [0], [0, 90], [100, 50])).luminaire

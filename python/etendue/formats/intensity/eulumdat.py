@@ -88,6 +88,15 @@ class _Reader:
             raise FormatError(self.path, f"line {line}, {what}", "the line is empty", DAMAGED)
         return found
 
+    def aside(self, line: int, what: str) -> float:
+        """A number that the table does not rest on: 0 if the line is empty, or says something else."""
+        self.text(line, what)
+        try:
+            return self.value(line, what) or 0.0
+        except FormatError as error:
+            self.complain("warning", error.place, f"{error.found}; 0 was taken")
+            return 0.0
+
     def whole(self, line: int, what: str, low: int, high: int) -> int:
         found = self.needed(line, what)
         if not (found.is_integer() and low <= found <= high):
@@ -100,7 +109,7 @@ class _Reader:
     def intensity(self) -> Intensity:
         kind, isym = self.whole(2, "type", 0, 3), self.whole(3, "symmetry", 0, 4)
         n_c, n_gamma = self.whole(4, "number of C planes", 1, 100_000), self.whole(6, "number of γ", 2, 100_000)
-        steps = self.value(5, "step of C") or 0.0, self.value(7, "step of γ") or 0.0
+        steps = self.aside(5, "step of C"), self.aside(7, "step of γ")
         sets = self._lamp_sets(self.whole(26, "number of lamp sets", 1, 20))
         c, gamma, values = self._table(27 + 6 * len(sets) + 10, ISYM[isym], n_c, n_gamma)
         self._check_steps(steps, c, gamma)
@@ -128,9 +137,11 @@ class _Reader:
         for first in range(27, 27 + 6 * count, 6):
             row: dict[str, Any] = {}
             for line, field in enumerate(LAMP_FIELDS, first):
-                numeric = field in {"lamps", "flux", "power"}
                 what = f"{field} of a lamp set"
-                row[field] = (self.value(line, what) or 0.0) if numeric else self.text(line, what)
+                if field == "flux":
+                    row[field] = self.value(line, what) or 0.0
+                else:
+                    row[field] = self.aside(line, what) if field in {"lamps", "power"} else self.text(line, what)
             sets.append(row)
         return sets
 
@@ -197,9 +208,9 @@ class _Reader:
             facts["stated_flux"] = lamp["flux"]
         for what, first in (("housing", 13), ("opening", 16)):
             # The length lies along C90-C270; a width of 0 marks a circle.
-            length, width = (self.value(first + n, f"{what} size") or 0.0 for n in range(2))
+            length, width = (self.aside(first + n, f"{what} size") for n in range(2))
             heights = range(18, 22) if what == "opening" else range(15, 16)
-            height = max(self.value(n, f"{what} height") or 0.0 for n in heights)
+            height = max(self.aside(n, f"{what} height") for n in heights)
             facts |= {f"{what}_x": width or length, f"{what}_y": length, f"{what}_z": height}
             if what == "opening":
                 round_, flat = width == 0.0, height == 0.0
@@ -227,16 +238,16 @@ class _Reader:
         if sets > 1:
             found = f"{sets} lamp sets; the intensity is that with the first, of {flux:g} lm"
             self.complain("note", "line 26", f"{found}; scale it by the ratio of fluxes for another")
-        conversion = self.value(24, "conversion factor")
-        if conversion not in (None, 1.0):
+        conversion = self.aside(24, "conversion factor")
+        if conversion not in (0.0, 1.0):
             self.complain("warning", "line 24", f"the conversion factor is {conversion:g}; it was not applied")
-        tilt = self.value(25, "tilt")
+        tilt = self.aside(25, "tilt")
         if tilt:
             self.complain(
                 "note", "line 25", f"the luminaire was measured at a tilt of {tilt:g}°; nothing was turned back"
             )
-        ratio = self.value(23, "light output ratio")
-        stated = flux * (ratio or 0.0) / 100.0
+        ratio = self.aside(23, "light output ratio")
+        stated = flux * ratio / 100.0
         if stated > 0.0 and abs(result.flux - stated) > FLUX_TOLERANCE * stated:
             found = f"with a light output ratio of {ratio:g} % the luminaire has {stated:.6g} lm"
             taken = f"the table integrates to {result.flux:.6g} lm; the table was taken"
