@@ -19,6 +19,7 @@ INTENSITY = (
     "An intensity distribution has no start points, so it has no luminance. Ask the maker for ray files (TM-25, "
     "LightTools or Zemax)."
 )
+INTENSITY_FILE = f"{INTENSITY} read_intensity and the verb `intensity` take this file as what it is."
 UNPACK = "Unpack it and read the ray file inside."
 
 
@@ -74,8 +75,8 @@ REFUSALS = (
         signatures=(b"ISO-10303-21",),
         extensions=(".step", ".stp", ".igs", ".iges"),
     ),
-    Refusal("an IES LM-63 intensity file", INTENSITY, signatures=(b"IESNA", b"IES:LM-63"), extensions=(".ies",)),
-    Refusal("an EULUMDAT intensity file", INTENSITY, extensions=(".ldt",)),
+    Refusal("an IES LM-63 intensity file", INTENSITY_FILE, signatures=(b"IESNA", b"IES:LM-63"), extensions=(".ies",)),
+    Refusal("an EULUMDAT intensity file", INTENSITY_FILE, extensions=(".ldt",)),
     Refusal(
         "a Speos result map",
         "It holds no rays. Export the rays from Speos (.ray) or as TM-25.",
