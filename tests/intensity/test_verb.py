@@ -67,10 +67,11 @@ def test_defaults_flux_and_text(run: Run) -> None:
 
 
 def test_files_are_turned_and_converted(run: Run) -> None:
-    et.write_intensity("a.ies", lid("none").replace(luminaire={"lamp": "x"}))
+    et.write_intensity("a.ies", lid("none").replace(luminaire={"lamp": "x", "input_power": 12.5}))
     status, out, err = run("a.ies", "-o", "b.ldt", "--rotate", 90, "--mirror", "-o", "b.png", "--kind", "cartesian")
     assert status == 0
     assert "lamp: x" in out
+    assert "input power: 12.5 W\n" in out
     assert "turns them" not in err
     c = np.arange(0, 360, 30.0)[:, None]
     found, source = et.read_intensity("b.ldt"), et.read_intensity("a.ies")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,7 +20,7 @@ from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.formats.rays import read_rays
 from etendue.goniophotometry.far_field import Cells, intensity_distribution
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
-from etendue.quantities.intensity import Intensity
+from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
 
 
 def intensity(
@@ -113,6 +114,7 @@ def print_intensity(distribution: Intensity) -> None:
     for name, value in distribution.luminaire.items():
         if name not in {"keywords", "lamp_sets", "tilt"}:
             text = f"{value:.7g}" if isinstance(value, float) else str(value)
-            say(f"  {name.replace('_', ' ')}: {text[:100]}")
+            unit = re.search(r"\[(\w+)\]", LUMINAIRE_FACTS[name])
+            say(f"  {name.replace('_', ' ')}: {text[:100]}{f' {unit[1]}' if unit else ''}")
     for note in distribution.notes:
         say(f"  {note}")
