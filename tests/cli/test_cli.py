@@ -25,6 +25,7 @@ from etendue.cli import demo as demo_verb
 from etendue.cli import luminance as luminance_verb
 from etendue.cli.terminal import numbers, print_json
 from etendue.formats.rays import RAY_FORMATS
+from etendue.quantities.provenance import version
 from etendue.quantities.report import RayFileWarning
 
 
@@ -119,7 +120,7 @@ def test_every_verb_that_draws_random_numbers_takes_a_seed() -> None:
 
 
 def test_version(run: Run) -> None:
-    assert run("--version") == Outcome(0, f"etendue {et.quantities.provenance.version()}\n", "")  # type: ignore[attr-defined]
+    assert run("--version") == Outcome(0, f"etendue {version()}\n", "")
 
 
 def test_no_verb_shows_the_help(run: Run) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.terminal import check_folder, complain, one_of, print_json, say
+from etendue.cli.terminal import check_folder, complain, one_of, print_json, progress_bar, say
 from etendue.formats.rays import RAY_FORMATS, read_rays, write_rays
 from etendue.quantities.ray_set import RaySet
 from etendue.units import FLUX_UNITS, FluxUnit
@@ -45,7 +45,8 @@ def convert(
     rays = in_unit(rays, unit)
     if subset is not None:
         rays = rays.subset(subset, seed)
-    notes = write_rays(output, rays, format)
+    with progress_bar("rays", len(rays)) as progress:
+        notes = write_rays(output, rays.watched(progress) if progress else rays, format)
     complaints = [str(c) for c in rays.complaints]
     if json:
         facts = {"output": output, "rays": len(rays), "total_flux": rays.total_flux, "flux_unit": rays.flux_unit}

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import abc
+import copy
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -144,6 +145,22 @@ class RayStream(abc.ABC):
     def flux_scale(self) -> float:
         """Factor from stored flux to `flux_unit`."""
 
+    _watcher: Progress | None = None
+
+    def watched(self, progress: Progress) -> Self:
+        """The same rays, whose `batches` tell `progress` how many were read: for work that has no progress of its own.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> seen = []
+        >>> [len(b.flux) for b in et.RingSource(rays=10).watched(seen.append).batches(size=4)], seen
+        ([4, 4, 2], [4, 8, 10])
+        """
+        same = copy.copy(self)
+        same._watcher = progress  # noqa: SLF001 - its own kind
+        return same
+
     def batches(self, size: int = BATCH) -> Iterator[RayBatch]:
         """The usable rays in order, `size` records at a time.
 
@@ -155,9 +172,12 @@ class RayStream(abc.ABC):
         """
         source, scale = self.core_source(), self.flux_scale
         for start in range(0, len(self), size):
-            position, direction, flux = _core.read_rays(source, start, min(start + size, len(self)))
+            stop = min(start + size, len(self))
+            position, direction, flux = _core.read_rays(source, start, stop)
             usable: npt.NDArray[np.bool_] = np.any(direction != 0.0, axis=1)
             if usable.all():
                 yield RayBatch(start, usable, position, direction, flux * scale)
             else:
                 yield RayBatch(start, usable, position[usable], direction[usable], flux[usable] * scale)
+            if self._watcher is not None:
+                self._watcher(stop)
