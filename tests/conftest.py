@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import hypothesis
 import pytest
+
+# The same examples in every run: a failure is a failure, not a draw.
+hypothesis.settings.register_profile("fixed", derandomize=True, deadline=None)
+hypothesis.settings.load_profile("fixed")
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -16,11 +21,3 @@ def samples() -> Path:
     if not folder.is_dir():
         pytest.skip("the folder of real sample files is not there")
     return folder
-
-
-@pytest.fixture(autouse=True)
-def _names(doctest_namespace: dict[str, object]) -> None:
-    """Doctests may use the class they document without importing it."""
-    import etendue
-
-    doctest_namespace["RaySet"] = etendue.RaySet

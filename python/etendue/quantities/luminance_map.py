@@ -76,7 +76,8 @@ class LuminanceMap:
         if self.flux_unit not in FLUX_UNITS:
             raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)
         for name, dtype in (("values", np.float64), ("standard_error", np.float64), ("rays", np.int64)):
-            array = np.array(getattr(self, name), dtype=dtype)
+            with np.errstate(invalid="ignore"):  # signalling NaN of damaged files
+                array = np.array(getattr(self, name), dtype=dtype)
             if array.shape != self.screen.shape:
                 raise ArgumentError(
                     f"LuminanceMap: {name} has shape {array.shape}, the screen has (rows, columns) = {self.screen.shape}."

@@ -100,7 +100,8 @@ def read(path: Path) -> LuminanceMap:
     check_room(path, header.pixels, layout.pixel.itemsize)
     with parsing(path, "pixels"):
         pixels = layout.unpack(data)
-    values, error = (pixels[name].astype(np.float64) for name in ("Y", "standard_error"))
+    with np.errstate(invalid="ignore"):  # a signalling NaN of a damaged file is a NaN all the same
+        values, error = (pixels[name].astype(np.float64) for name in ("Y", "standard_error"))
     return header.restore(values, error, rays_from_uint32(pixels["rays"]))
 
 
