@@ -13,12 +13,18 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.formats.rays.lighttools_colour import (
+    NO_COLOUR,
+    TRISTIMULUS,
+    TRISTIMULUS_COLUMNS,
+    WAVELENGTH,
+    colour_losses,
+    held_colour,
+)
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
 from etendue.formats.rays.shared import (
-    Colour,
     RayColour,
     Records,
-    losses,
     own_rows,
     read_bytes,
     stated_total,
@@ -38,7 +44,9 @@ HEADER = struct.Struct("<4s6I3ff")
 VERSION = 2
 POLARISED_VERSION = 3
 
-NO_COLOUR, TRISTIMULUS, WAVELENGTH = 0, 1, 2
+COLOUR_INFO = (NO_COLOUR, TRISTIMULUS, WAVELENGTH)
+"""What a record holds of colour, in the order of the header's numbers."""
+
 LENGTH_UNITS = ("mm", "mm", "cm", "m", "inch", "feet", "um", "nm")
 """Length units in the order of the header's numbers. Number 0 is "the system's", which the file does not name."""
 
@@ -51,7 +59,7 @@ class _Layout:
     """The columns of a record."""
 
     far_field: bool
-    colour: int
+    colour: str
 
     def dtype(self) -> np.dtype[Any]:
         columns: list[Any] = [] if self.far_field else [("position", "<f4", 3)]
@@ -90,13 +98,13 @@ def read(path: Path) -> RaySet:
     for offset, name, value, known in (
         (12, "data type", data_type, ("radiometric", "photometric")),
         (16, "far field flag", far_field, ("with positions", "without")),
-        (20, "colour information", colour, ("none", "tristimulus", "wavelength")),
+        (20, "colour information", colour, COLOUR_INFO),
         (24, "length unit", unit, ("system", *LENGTH_UNITS[1:])),
     ):
         if value >= len(known):
             listed = ", ".join(f"{i} {word}" for i, word in enumerate(known))
             raise FormatError(path, f"byte {offset}", f"{name} {value} does not exist", f"Known: {listed}. [{CLAUSE}]")
-    dtype = _Layout(bool(far_field), colour).dtype()
+    dtype = _Layout(bool(far_field), COLOUR_INFO[colour]).dtype()
     rays, tail = _count(path, dtype.itemsize)
     records = map_records(path, dtype, HEADER.size, rays)
     total = stated_total(data[40:44])
@@ -178,35 +186,24 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         If there is no usable ray.
     """
     colour = RayColour.of(rays)
-    tristimulus = ("tristimulus_x", "tristimulus_z")
-    kind = NO_COLOUR
-    if colour.has_wavelengths and rays.flux_unit == "W":
-        kind = WAVELENGTH
-    elif isinstance(rays, RaySet) and rays.flux_unit == "lm" and all(name in rays.columns for name in tristimulus):
-        kind = TRISTIMULUS
+    held = held_colour(rays, colour)
 
     def fill(batch: RayBatch, records: Records) -> None:
-        if kind == WAVELENGTH:
+        if held == WAVELENGTH:
             records["wavelength"] = colour.wavelength(batch)
-        elif kind == TRISTIMULUS and isinstance(rays, RaySet):
-            for name in tristimulus:
+        elif held == TRISTIMULUS and isinstance(rays, RaySet):
+            for name in TRISTIMULUS_COLUMNS:
                 records[name] = own_rows(batch, rays.records[name]) * rays.flux_scale
 
     data_type, far_field = FLUX_UNIT.index(rays.flux_unit), not rays.has_position
-    fields = (VERSION, 0, data_type, far_field, kind, 1, 0.0, 0.0, 0.0)
+    fields = (VERSION, 0, data_type, far_field, COLOUR_INFO.index(held), 1, 0.0, 0.0, 0.0)
     with path.open("wb") as file:
         file.write(bytes(HEADER.size))
-        written = write_records(file, rays, _Layout(far_field, kind).dtype(), fill)
+        written = write_records(file, rays, _Layout(far_field, held).dtype(), fill)
         file.write(TRAILER)
         file.seek(0)
         file.write(HEADER.pack(MAGIC, *fields, written.totals["flux"]))
-    kept = tristimulus if kind == TRISTIMULUS else ()
-    notes = list(losses(rays, written, colour, colour_kept=kind == WAVELENGTH, kept=kept))
-    if colour.kind is Colour.PER_RAY and kind != WAVELENGTH:
-        notes.append("LightTools takes wavelengths only beside watts; convert with RaySet.in_unit('W') to keep them.")
-    if colour.kind is Colour.ONE_SPECTRUM:
-        notes.append("LightTools takes the spectrum from an .sre file that is chosen with the source.")
-    return tuple(notes)
+    return colour_losses(rays, written, colour, held)
 
 
 FORMAT = RayFormat("lighttools", "LightTools binary ray file (LTRF)", (".ray",), recognise, read, write, far_field=True)

@@ -14,8 +14,16 @@ from typing import NoReturn
 import numpy as np
 
 from etendue.errors import FormatError
+from etendue.formats.rays.lighttools_colour import (
+    NO_COLOUR,
+    TRISTIMULUS,
+    TRISTIMULUS_COLUMNS,
+    WAVELENGTH,
+    colour_losses,
+    held_colour,
+)
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
-from etendue.formats.rays.shared import Colour, FloatArray, RayColour, losses, own_rows, wavelength_complaints
+from etendue.formats.rays.shared import FloatArray, RayColour, own_rows, wavelength_complaints
 from etendue.formats.rays.text_output import geometry, usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
 from etendue.quantities.provenance import version
@@ -40,7 +48,6 @@ LENGTH_UNITS = {
 }
 FLUX_UNIT: dict[str, FluxUnit] = {"luminous_flux": "lm", "radiant_power": "W"}
 FAR_FIELD = {"no": False, "yes": True}
-NO_COLOUR, WAVELENGTH, TRISTIMULUS = "none", "wavelength", "tristimulus"
 COLOURS = (NO_COLOUR, WAVELENGTH, TRISTIMULUS)
 
 KNOWN_KEYS = (
@@ -240,19 +247,14 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         If there is no usable ray.
     """
     colour = RayColour.of(rays)
-    tristimulus = ("tristimulus_x", "tristimulus_z")
-    kind = NO_COLOUR
-    if colour.has_wavelengths and rays.flux_unit == "W":
-        kind = WAVELENGTH
-    elif isinstance(rays, RaySet) and rays.flux_unit == "lm" and all(name in rays.columns for name in tristimulus):
-        kind = TRISTIMULUS
+    held = held_colour(rays, colour)
 
     def columns(batch: RayBatch) -> list[FloatArray]:
         before = geometry(rays, batch)
-        if kind == WAVELENGTH:
+        if held == WAVELENGTH:
             return [*before, batch.flux, colour.wavelength(batch)]
-        if kind == TRISTIMULUS and isinstance(rays, RaySet):
-            x, z = (own_rows(batch, rays.records[name]) * rays.flux_scale for name in tristimulus)
+        if held == TRISTIMULUS and isinstance(rays, RaySet):
+            x, z = (own_rows(batch, rays.records[name]) * rays.flux_scale for name in TRISTIMULUS_COLUMNS)
             return [*before, x, batch.flux, z]
         return [*before, batch.flux]
 
@@ -266,7 +268,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         f"dataname: {name}",
         f"lt_datatype: {datatype}",
         f"lt_far_field_data: {'no' if rays.has_position else 'yes'}",
-        f"lt_color_info: {kind}",
+        f"lt_color_info: {held}",
         "lt_length_units: millimeters",
         "lt_data_origin: 0 0 0",
         f"lt_radiant_flux: {rays.total_flux:.17g}",
@@ -276,13 +278,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         file.write("".join(f"{line}\r\n" for line in header).encode("ascii"))
         written = write_rows(file, rays, columns)
         file.write(f"{END}\r\n".encode("ascii"))
-    kept = tristimulus if kind == TRISTIMULUS else ()
-    notes = list(losses(rays, written, colour, colour_kept=kind == WAVELENGTH, kept=kept))
-    if colour.kind is Colour.PER_RAY and kind != WAVELENGTH:
-        notes.append("LightTools takes wavelengths only beside watts; convert with RaySet.in_unit('W') to keep them.")
-    if colour.kind is Colour.ONE_SPECTRUM:
-        notes.append("LightTools takes the spectrum from an .sre file that is chosen with the source.")
-    return tuple(notes)
+    return colour_losses(rays, written, colour, held)
 
 
 FORMAT = RayFormat("lighttools-text", "LightTools text ray file", (), recognise, read, write, far_field=True)
