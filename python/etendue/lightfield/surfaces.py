@@ -1,0 +1,651 @@
+"""Carrier surfaces: where a light field lives. Rays are carried to them along themselves."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.ray_stream import RayStream
+
+FloatArray = npt.NDArray[np.float64]
+Shape = Literal["rectangle", "disk", "hemisphere", "tube"]
+
+PROBE = 1 << 18
+"""Rays looked at to size a surface that was given without its dimensions."""
+
+STRAY = 1e-4
+"""Share of the rays, on each side, that a surface sized from the rays may leave out when they lie far off."""
+
+SLACK = 1e-6
+"""A surface sized from the rays is larger than they need by this factor, so that rounding loses none."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """One chart of a carrier surface: a shape with an equal-area map to the unit square.
+
+    Light leaves a part on the side of its normal. Within a rectangle the chart is linear; a disk is mapped by the
+    concentric map of [ShirleyChiu1997]_; a hemisphere is mapped to the disk by Lambert's equal-area azimuthal projection
+    first; a tube is unrolled, azimuth first.
+
+    Parameters
+    ----------
+    name : str
+        What the part is within its surface: ``"window"``, ``"dome"``, ``"side"`` …
+    shape : {"rectangle", "disk", "hemisphere", "tube"}
+    centre : tuple of float, shape (3,)
+        [mm]; of a hemisphere the centre of the sphere, of a tube the middle of its axis.
+    axes : tuple of 3 tuples
+        Orthonormal, right-handed x, y, z. z is the normal of a flat part, the pole of a hemisphere, the axis of a tube.
+    size : tuple of float
+        [mm] (width along x, height along y) of a rectangle, (radius, 0) of a disk or hemisphere, (radius, height) of a tube.
+
+    Examples
+    --------
+    >>> round(Part("dome", "hemisphere", (0, 0, 0), ((1, 0, 0), (0, 1, 0), (0, 0, 1)), (2.0, 0.0)).area, 3)
+    25.133
+    """
+
+    name: str
+    shape: Shape
+    centre: tuple[float, float, float]
+    axes: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+    size: tuple[float, float]
+
+    @property
+    def area(self) -> float:
+        """Surface area [mm²]."""
+        a, b = self.size
+        match self.shape:
+            case "rectangle":
+                return a * b
+            case "disk":
+                return math.pi * a * a
+            case "hemisphere":
+                return 2 * math.pi * a * a
+            case "tube":
+                return 2 * math.pi * a * b
+
+    @property
+    def etendue(self) -> float:
+        """π · area [mm² sr]: that of all light that can leave the part on one side."""
+        return math.pi * self.area
+
+    def core(self) -> dict[str, Any]:
+        """The part as the compiled core takes it."""
+        x, y, z = self.axes
+        return {"shape": self.shape, "centre": self.centre, "x": x, "y": y, "z": z, "size": self.size}
+
+
+WORLD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+DOWN = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
+
+
+@dataclasses.dataclass(frozen=True)
+class Surface(abc.ABC):
+    """A carrier surface: parts in the order in which a ray is offered to them.
+
+    A ray belongs to the first part that its line crosses from the inside to the outside, wherever on its line it starts.
+    Dimensions that are None are taken from the rays by `sized_for`.
+    """
+
+    NAME: ClassVar[str]
+
+    @abc.abstractmethod
+    def parts(self) -> tuple[Part, ...]:
+        """The charts; `ArgumentError` if a dimension is still open."""
+
+    @abc.abstractmethod
+    def sized_for(self, rays: RayStream) -> Self:
+        """The same surface, with open dimensions as small as the rays allow; see `STRAY`."""
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, bool) or value is None:
+                continue
+            # Whatever numbers came in, floats are compared, printed and saved.
+            numbers = tuple(float(v) for v in value) if isinstance(value, Iterable) else float(value)
+            object.__setattr__(self, field.name, numbers)
+            if not np.isfinite(numbers).all():
+                raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give finite lengths in mm.")
+            if field.name in LENGTHS and not (isinstance(numbers, float) and numbers > 0):
+                raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give a length above 0 mm.")
+            if field.name == "centre" and len(np.atleast_1d(numbers)) != self.centre_size():
+                raise ArgumentError(
+                    f"{type(self).__name__}: centre is {value!r}; give {self.centre_size()} coordinates."
+                )
+
+    @classmethod
+    def centre_size(cls) -> int:
+        """Coordinates of the centre: 2 where the height is a parameter of its own."""
+        return 2
+
+    @property
+    def open_dimensions(self) -> tuple[str, ...]:
+        """Names of the dimensions that are None."""
+        return tuple(f.name for f in dataclasses.fields(self) if getattr(self, f.name) is None)
+
+    def closed(self, name: str) -> float:
+        """A dimension that must be known by now."""
+        value = getattr(self, name)
+        if value is None:
+            raise ArgumentError(
+                f"{type(self).__name__}: {name} is open; state it, or call sized_for(rays) to take it from the rays."
+            )
+        return float(value)
+
+    @property
+    def area(self) -> float:
+        """Surface area of all parts [mm²]."""
+        return sum(part.area for part in self.parts())
+
+    @property
+    def spec(self) -> str:
+        """The surface as the command line takes it.
+
+        Examples
+        --------
+        >>> Dome(radius=1.264).spec
+        'dome:radius=1.264,z=0,centre=0/0'
+        """
+        return f"{self.NAME}:" + ",".join(
+            f"{f.name}={_text(getattr(self, f.name))}"
+            for f in dataclasses.fields(self)
+            if getattr(self, f.name) is not None
+        )
+
+
+LENGTHS = {"width", "height", "depth", "radius", "window"}
+
+
+def _text(value: object) -> str:
+    if isinstance(value, tuple):
+        return "/".join(_text(v) for v in value)
+    return str(value).lower() if isinstance(value, bool) else format(value, ".12g")
+
+
+@dataclasses.dataclass(frozen=True)
+class Plane(Surface):
+    """A rectangle in a plane of constant z that emits towards +Z.
+
+    Parameters
+    ----------
+    z : float
+        [mm]
+    width, height : float, optional
+        Along X and Y [mm]; None: as large as the rays need.
+    centre : tuple of float, optional
+        (x, y) of the middle [mm]; None: from the rays.
+
+    Raises
+    ------
+    ArgumentError
+        If a number is not finite, or a length is not above 0.
+
+    Examples
+    --------
+    >>> Plane(z=0.5, width=4, height=3, centre=(0, 0)).area
+    12.0
+    """
+
+    NAME = "plane"
+    z: float = 0.0
+    width: float | None = None
+    height: float | None = None
+    centre: tuple[float, float] | None = None
+
+    def parts(self) -> tuple[Part, ...]:
+        """One rectangle."""
+        size = (self.closed("width"), self.closed("height"))
+        centre = self.centre
+        if centre is None:
+            raise ArgumentError("Plane: centre is open; state it, or call sized_for(rays).")
+        return (Part("plane", "rectangle", (*centre, self.z), WORLD, size),)
+
+    def sized_for(self, rays: RayStream) -> Plane:
+        """The smallest rectangle that the rays' lines cross, but for strays far off."""
+        if not self.open_dimensions:
+            return self
+        position, direction = _probe(rays)
+        up = direction[:, 2] > 0
+        if not up.any():
+            raise ArgumentError("Plane: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
+        x, y = (position[up] + ((self.z - position[up, 2]) / direction[up, 2])[:, None] * direction[up])[:, :2].T
+        spans = [_span(v, c) for v, c in zip((x, y), self.centre or (None, None), strict=True)]
+        centre = tuple((low + high) / 2 for low, high in spans)
+        width, height = ((high - low) * (1 + SLACK) for low, high in spans)
+        return dataclasses.replace(
+            self, width=self.width or width, height=self.height or height, centre=self.centre or (centre[0], centre[1])
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Disk(Surface):
+    """A disk in a plane of constant z that emits towards +Z.
+
+    Parameters
+    ----------
+    radius : float, optional
+        [mm]; None: as large as the rays need.
+    z : float
+        [mm]
+    centre : tuple of float
+        (x, y) [mm]
+
+    Raises
+    ------
+    ArgumentError
+        If a number is not finite, or a length is not above 0.
+
+    Examples
+    --------
+    >>> round(Disk(radius=2).area, 4)
+    12.5664
+    """
+
+    NAME = "disk"
+    radius: float | None = None
+    z: float = 0.0
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def parts(self) -> tuple[Part, ...]:
+        """One disk."""
+        return (Part("disk", "disk", (*self.centre, self.z), WORLD, (self.closed("radius"), 0.0)),)
+
+    def sized_for(self, rays: RayStream) -> Disk:
+        """The smallest disk that the rays' lines cross, but for strays far off."""
+        if not self.open_dimensions:
+            return self
+        position, direction = _probe(rays)
+        up = direction[:, 2] > 0
+        if not up.any():
+            raise ArgumentError("Disk: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
+        hit = position[up] + ((self.z - position[up, 2]) / direction[up, 2])[:, None] * direction[up]
+        return dataclasses.replace(self, radius=_reach(np.hypot(*(hit[:, :2] - self.centre).T)))
+
+
+@dataclasses.dataclass(frozen=True)
+class Hemisphere(Surface):
+    """The upper half of a sphere.
+
+    Parameters
+    ----------
+    radius : float, optional
+        [mm]; None: as small as the rays allow.
+    centre : tuple of float
+        (x, y, z) of the sphere [mm]
+
+    Raises
+    ------
+    ArgumentError
+        If a number is not finite, or a length is not above 0.
+
+    Examples
+    --------
+    >>> round(Hemisphere(radius=2).area, 4)
+    25.1327
+    """
+
+    NAME = "hemisphere"
+    radius: float | None = None
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def centre_size(cls) -> int:
+        """x, y, z."""
+        return 3
+
+    def parts(self) -> tuple[Part, ...]:
+        """One hemisphere."""
+        return (Part("hemisphere", "hemisphere", self.centre, WORLD, (self.closed("radius"), 0.0)),)
+
+    def sized_for(self, rays: RayStream) -> Hemisphere:
+        """The smallest hemisphere that the rays' lines meet, but for strays far off."""
+        return dataclasses.replace(self, radius=self.radius or _impact(rays, self.centre))
+
+
+@dataclasses.dataclass(frozen=True)
+class Sphere(Surface):
+    """A whole sphere, as two hemispheres: for sources that emit upwards and downwards.
+
+    Parameters
+    ----------
+    radius : float, optional
+        [mm]; None: as small as the rays allow.
+    centre : tuple of float
+        (x, y, z) [mm]
+
+    Raises
+    ------
+    ArgumentError
+        If a number is not finite, or a length is not above 0.
+
+    Examples
+    --------
+    >>> [part.name for part in Sphere(radius=2).parts()]
+    ['upper', 'lower']
+    """
+
+    NAME = "sphere"
+    radius: float | None = None
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def centre_size(cls) -> int:
+        """x, y, z."""
+        return 3
+
+    def parts(self) -> tuple[Part, ...]:
+        """The upper and the lower hemisphere."""
+        size = (self.closed("radius"), 0.0)
+        return (
+            Part("upper", "hemisphere", self.centre, WORLD, size),
+            Part("lower", "hemisphere", self.centre, DOWN, size),
+        )
+
+    def sized_for(self, rays: RayStream) -> Sphere:
+        """The smallest sphere that the rays' lines meet, but for strays far off."""
+        return dataclasses.replace(self, radius=self.radius or _impact(rays, self.centre))
+
+
+@dataclasses.dataclass(frozen=True)
+class Cylinder(Surface):
+    """A cylinder about an axis along Z, closed by its ends or open.
+
+    Parameters
+    ----------
+    radius : float, optional
+        [mm]; None: from the rays.
+    bottom, top : float, optional
+        Heights of the ends [mm]; None: from the rays' start points.
+    centre : tuple of float
+        (x, y) of the axis [mm]
+    ends : bool
+        Whether light that leaves through the ends belongs to the surface; if not, it is counted as not met.
+
+    Raises
+    ------
+    ArgumentError
+        If a number is not finite, a length is not above 0, or the top is not above the bottom.
+
+    Examples
+    --------
+    >>> [part.name for part in Cylinder(radius=2, bottom=0, top=5).parts()]
+    ['side', 'top', 'bottom']
+    """
+
+    NAME = "cylinder"
+    radius: float | None = None
+    bottom: float | None = None
+    top: float | None = None
+    centre: tuple[float, float] = (0.0, 0.0)
+    ends: bool = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.bottom is not None and self.top is not None and not self.top > self.bottom:
+            raise ArgumentError(f"Cylinder: top {self.top:g} is not above bottom {self.bottom:g}.")
+
+    def parts(self) -> tuple[Part, ...]:
+        """The side, and the two ends."""
+        radius, bottom, top = (self.closed(name) for name in ("radius", "bottom", "top"))
+        side = Part("side", "tube", (*self.centre, (bottom + top) / 2), WORLD, (radius, top - bottom))
+        lids = (
+            Part("top", "disk", (*self.centre, top), WORLD, (radius, 0.0)),
+            Part("bottom", "disk", (*self.centre, bottom), DOWN, (radius, 0.0)),
+        )
+        return (side, *lids) if self.ends else (side,)
+
+    def sized_for(self, rays: RayStream) -> Cylinder:
+        """The smallest cylinder about the rays' start points, but for strays far off."""
+        if not self.open_dimensions:
+            return self
+        position, _ = _probe(rays)
+        low, high = _span(position[:, 2], None)
+        bottom = low if self.bottom is None else self.bottom
+        top = high if self.top is None else self.top
+        room = max(top - bottom, np.spacing(abs(top) + abs(bottom))) * SLACK
+        return dataclasses.replace(
+            self,
+            radius=self.radius or _reach(np.hypot(*(position[:, :2] - self.centre).T)),
+            bottom=bottom - room if self.bottom is None else bottom,
+            top=top + room if self.top is None else top,
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Box(Surface):
+    """A closed box with faces along the axes.
+
+    Parameters
+    ----------
+    width, height, depth : float, optional
+        Along X, Y and Z [mm]; None: from the rays' start points.
+    centre : tuple of float, optional
+        (x, y, z) of the middle [mm]; None: from the rays.
+
+    Raises
+    ------
+    ArgumentError
+        If a number is not finite, or a length is not above 0.
+
+    Examples
+    --------
+    >>> Box(2, 3, 4, centre=(0, 0, 2)).area
+    52.0
+    """
+
+    NAME = "box"
+    width: float | None = None
+    height: float | None = None
+    depth: float | None = None
+    centre: tuple[float, float, float] | None = None
+
+    @classmethod
+    def centre_size(cls) -> int:
+        """x, y, z."""
+        return 3
+
+    def parts(self) -> tuple[Part, ...]:
+        """Six rectangles."""
+        size = [self.closed(name) for name in ("width", "height", "depth")]
+        if self.centre is None:
+            raise ArgumentError("Box: centre is open; state it, or call sized_for(rays).")
+        faces = []
+        for axis, letter in ((2, "z"), (0, "x"), (1, "y")):
+            for sign, mark in ((1.0, "+"), (-1.0, "-")):
+                normal, first = np.eye(3)[axis] * sign, np.eye(3)[(axis + 1) % 3]
+                axes = (_triple(first), _triple(np.cross(normal, first)), _triple(normal))
+                centre = np.array(self.centre) + normal * size[axis] / 2
+                extent = (size[(axis + 1) % 3], size[(axis + 2) % 3])
+                faces.append(Part(f"{mark}{letter}", "rectangle", _triple(centre), axes, extent))
+        return tuple(faces)
+
+    def sized_for(self, rays: RayStream) -> Box:
+        """The smallest box about the rays' start points, but for strays far off."""
+        if not self.open_dimensions:
+            return self
+        position, _ = _probe(rays)
+        spans = [_span(v, c) for v, c in zip(position.T, self.centre or (None, None, None), strict=True)]
+        extent = max(high - low for low, high in spans)
+        width, height, depth = (max(high - low, SLACK * extent) * (1 + SLACK) for low, high in spans)
+        middle = _triple(np.array([(low + high) / 2 for low, high in spans]))
+        return Box(self.width or width, self.height or height, self.depth or depth, self.centre or middle)
+
+
+@dataclasses.dataclass(frozen=True)
+class Dome(Surface):
+    """A flat window and the hemisphere above it, [Audenaert2014]_ section 3.3.2.
+
+    A ray whose line passes the window belongs to the window, where the image of a die is sharp; the rest, light that the
+    lens scatters or reflects, belongs to the hemisphere.
+
+    Parameters
+    ----------
+    radius : float, optional
+        Of the hemisphere [mm]; None: as small as the rays allow.
+    z : float
+        Height of the window and of the sphere's centre [mm].
+    window : float, optional
+        Radius of the window [mm]; None: that of the hemisphere.
+    centre : tuple of float
+        (x, y) [mm]
+
+    Raises
+    ------
+    ArgumentError
+        If a number is not finite, a length is not above 0, or the window is wider than the hemisphere.
+
+    Examples
+    --------
+    >>> [(part.name, round(part.area, 3)) for part in Dome(radius=1.264).parts()]
+    [('window', 5.019), ('dome', 10.039)]
+    """
+
+    NAME = "dome"
+    radius: float | None = None
+    z: float = 0.0
+    window: float | None = None
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.radius is not None and self.window is not None and self.window > self.radius:
+            raise ArgumentError(f"Dome: window radius {self.window:g} is above the dome's radius {self.radius:g}.")
+
+    @property
+    def open_dimensions(self) -> tuple[str, ...]:
+        """The radius alone: an open window is as wide as the dome."""
+        return () if self.radius is not None else ("radius",)
+
+    def parts(self) -> tuple[Part, ...]:
+        """The window, then the dome."""
+        radius, centre = self.closed("radius"), (*self.centre, self.z)
+        return (
+            Part("window", "disk", centre, WORLD, (self.window or radius, 0.0)),
+            Part("dome", "hemisphere", centre, WORLD, (radius, 0.0)),
+        )
+
+    def sized_for(self, rays: RayStream) -> Dome:
+        """The smallest dome that the rays' lines meet, but for strays far off."""
+        radius = self.radius or max(_impact(rays, (*self.centre, self.z)), self.window or 0.0)
+        return dataclasses.replace(self, radius=radius)
+
+
+SURFACES: Mapping[str, type[Surface]] = {
+    kind.NAME: kind for kind in (Plane, Disk, Hemisphere, Sphere, Cylinder, Box, Dome)
+}
+"""Every carrier surface, by the name the command line and the files know."""
+
+
+def parse_surface(text: str) -> Surface:
+    """The surface that ``name:key=value,key=value`` describes; coordinates of a centre are parted by slashes.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such surface or dimension.
+    ArgumentError
+        If a value is no number.
+
+    Examples
+    --------
+    >>> parse_surface("cylinder:radius=2,bottom=0,top=5,ends=false")
+    Cylinder(radius=2.0, bottom=0.0, top=5.0, centre=(0.0, 0.0), ends=False)
+    """
+    name, _, rest = text.partition(":")
+    kind = SURFACES.get(name.strip())
+    if kind is None:
+        raise UnknownNameError("surface", name, SURFACES)
+    known = {f.name for f in dataclasses.fields(kind)}
+    values: dict[str, Any] = {}
+    for item in filter(None, (part.strip() for part in rest.split(","))):
+        key, equals, value = (piece.strip() for piece in item.partition("="))
+        if key not in known:
+            raise UnknownNameError(f"dimension of the surface {name}", key, known)
+        if not equals:
+            raise ArgumentError(f"surface {text!r}: {key} has no value; write {key}=<number>.")
+        if key in values:
+            raise ArgumentError(f"surface {text!r}: {key} is stated twice.")
+        values[key] = _value(text, key, value)
+    return kind(**values)
+
+
+def _value(text: str, key: str, value: str) -> float | bool | tuple[float, ...]:
+    if key == "ends":
+        if value not in {"true", "false"}:
+            raise ArgumentError(f"surface {text!r}: ends is {value!r}; write true or false.")
+        return value == "true"
+    try:
+        numbers = tuple(float(v) for v in value.split("/"))
+    except ValueError:
+        raise ArgumentError(f"surface {text!r}: {key} is {value!r}; give a number in mm.") from None
+    if key == "centre":
+        return numbers
+    if len(numbers) != 1:
+        raise ArgumentError(f"surface {text!r}: {key} is {value!r}; give one number in mm.")
+    return numbers[0]
+
+
+def _probe(rays: RayStream) -> tuple[FloatArray, FloatArray]:
+    """Positions [mm] and directions of up to `PROBE` usable rays, from stretches spread evenly over the set."""
+    if not rays.has_position:
+        raise ArgumentError("these rays have no positions (a far-field set), so no surface can carry them.")
+    source, n = rays.core_source(), len(rays)
+    stretch = 4096
+    starts = range(0, n, stretch)
+    if n > PROBE:
+        starts = range(0, n - stretch + 1, (n - stretch) // (PROBE // stretch - 1))
+    parts = [_core.read_rays(source, start, min(start + stretch, n)) for start in starts]
+    position, direction, flux = (np.concatenate(arrays) for arrays in zip(*parts, strict=True)) if parts else _nothing()
+    usable = flux > 0
+    if not usable.any():
+        raise ArgumentError("these rays carry no flux, so no surface can be sized for them.")
+    return position[usable], direction[usable]
+
+
+def _nothing() -> tuple[FloatArray, FloatArray, FloatArray]:
+    return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
+
+
+def _span(values: FloatArray, centre: float | None) -> tuple[float, float]:
+    """The interval that holds the values: all of them, or all but `STRAY` on each side if the others lie far off."""
+    inner = np.quantile(values, [STRAY, 1 - STRAY])
+    low, high = float(values.min()), float(values.max())
+    if high - low > 1.5 * (inner[1] - inner[0]) > 0:
+        low, high = float(inner[0]), float(inner[1])
+    if centre is not None:
+        half = max(high - centre, centre - low)
+        low, high = centre - half, centre + half
+    if high == low:  # all rays through one point: any extent will do
+        low, high = low - 0.5e-3, high + 0.5e-3
+    return low, high
+
+
+def _reach(distances: FloatArray) -> float:
+    """The radius that holds the distances, but for strays far off."""
+    inner = float(np.quantile(distances, 1 - STRAY))
+    reach = float(distances.max())
+    reach = inner if reach > 1.5 * inner > 0 else reach
+    return (reach or 0.5e-3) * (1 + SLACK)
+
+
+def _impact(rays: RayStream, centre: tuple[float, float, float]) -> float:
+    """The radius of the sphere about `centre` that the rays' lines meet: their distance from the centre."""
+    position, direction = _probe(rays)
+    offset = position - np.asarray(centre)
+    return _reach(np.linalg.norm(np.cross(offset, direction), axis=1))
+
+
+def _triple(values: FloatArray) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)
