@@ -5,6 +5,7 @@
 
 pub mod cone;
 pub mod polya;
+pub mod surface;
 pub mod view;
 
 pub use view::View;

@@ -1,4 +1,4 @@
-//! Sine and cosine of a fraction of a turn.
+//! Sine and cosine of a fraction of a turn, and the angle of a slope.
 //!
 //! The C library's `sin` differs between platforms in the last bit, and does not vectorise. These polynomials use only
 //! +, × and rounding, so that they give the same bits everywhere and the compiler can run them eight at a time.
@@ -37,6 +37,24 @@ pub fn sin_cos_turns(u: f64) -> (f64, f64) {
     (sine, cosine)
 }
 
+/// atan t in units of a quarter right angle (π/4), for −1 ≤ t ≤ 1; exact at −1, 0 and 1, else to 4e-16.
+///
+/// Above tan π/8 by atan t = π/4 + atan((t − 1)/(t + 1)); an odd polynomial of degree 21 (3e-17), interpolated at
+/// Chebyshev nodes in 50 digits.
+#[inline(always)]
+#[must_use]
+pub fn atan_eighths(t: f64) -> f64 {
+    const QUARTER: f64 = 4.0 / std::f64::consts::PI;
+    let a = t.abs();
+    let steep = a > 0.414_213_562_373_095_03;
+    let x = if steep { (a - 1.0) / (a + 1.0) } else { a };
+    let x2 = x * x;
+    let series = 1.0 + x2 * (-0.333_333_333_333_284_4 + x2 * (0.199_999_999_988_551_1 + x2 * (-0.142_857_141_809_764_67 + x2 * (0.111_111_061_804_559_46 + x2 * (-0.090_907_730_748_084_14 + x2 * (0.076_899_534_963_068_57 + x2 * (-0.066_402_339_304_294_08 + x2 * (0.056_883_492_268_090_106 + x2 * (-0.043_480_522_157_164_62 + x2 * 0.021_135_373_157_693_246)))))))));
+    let small = QUARTER * (x * series);
+    let angle = if steep { 1.0 + small } else { small };
+    if t < 0.0 { -angle } else { angle }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,5 +84,15 @@ mod tests {
         ] {
             assert_eq!(sin_cos_turns(u), expected);
         }
+    }
+
+    #[test]
+    fn the_angle_of_a_slope_agrees_with_the_c_library() {
+        for i in -100_000..=100_000 {
+            let t = f64::from(i) / 100_000.0;
+            let expected = t.atan() / std::f64::consts::FRAC_PI_4;
+            assert!((atan_eighths(t) - expected).abs() < 5e-16, "t = {t}");
+        }
+        assert_eq!([-1.0, 0.0, 1.0].map(atan_eighths), [-1.0, 0.0, 1.0]);
     }
 }

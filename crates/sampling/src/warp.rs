@@ -1,6 +1,6 @@
 //! From the unit square to disks, annuli and hemispheres, each with its inverse.
 
-use etendue_math::trig::sin_cos_turns;
+use etendue_math::trig::{atan_eighths, sin_cos_turns};
 
 /// A point uniform in area on the annulus `inner ≤ r ≤ outer`, from `(u, v)` in the unit square: density 1/(π(R²−r²)).
 #[inline(always)]
@@ -18,6 +18,36 @@ pub fn square_to_cosine_hemisphere(u: f64, v: f64) -> (f64, f64, f64) {
     let (s, c) = sin_cos_turns(v);
     let sin_theta = u.sqrt();
     (sin_theta * c, sin_theta * s, (1.0 - u).sqrt())
+}
+
+/// A point of the unit disk, from `(u, v)` in the unit square: the concentric map of Shirley and Chiu, density 1/π.
+///
+/// Squares about the centre become circles; the map is continuous and keeps neighbours together. `[ShirleyChiu1997]`
+#[inline(always)]
+#[must_use]
+pub fn square_to_disk(u: f64, v: f64) -> (f64, f64) {
+    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    let wide = a.abs() > b.abs();
+    let (r, other) = if wide { (a, b) } else { (b, a) };
+    let slope = if r == 0.0 { 0.0 } else { other / r };
+    let (sine, cosine) = sin_cos_turns(slope.abs() * 0.125);
+    let across = if slope < 0.0 { -r * sine } else { r * sine };
+    let along = r * cosine;
+    if wide { (along, across) } else { (across, along) }
+}
+
+/// Inverse of [`square_to_disk`]; a point outside the disk gives one outside the square.
+#[inline(always)]
+#[must_use]
+pub fn disk_to_square(x: f64, y: f64) -> (f64, f64) {
+    let wide = x.abs() > y.abs();
+    let (along, across) = if wide { (x, y) } else { (y, x) };
+    let slope = if along == 0.0 { 0.0 } else { across / along };
+    let radius = (x * x + y * y).sqrt();
+    let r = if along < 0.0 { -radius } else { radius };
+    let other = r * atan_eighths(slope);
+    let (a, b) = if wide { (r, other) } else { (other, r) };
+    (0.5 * a + 0.5, 0.5 * b + 0.5)
 }
 
 /// Inverse of [`square_to_annulus`].
@@ -51,6 +81,10 @@ mod tests {
             let (x, y) = square_to_annulus(u, v, 10.0, 20.0);
             let (a, b) = annulus_to_square(x, y, 10.0, 20.0);
             assert!((a - u).abs() < 1e-14 && (b - v).abs() < 1e-14);
+            let (x, y) = square_to_disk(u, v);
+            assert!(x * x + y * y <= 1.0 + 1e-15);
+            let (a, b) = disk_to_square(x, y);
+            assert!((a - u).abs() < 1e-15 && (b - v).abs() < 1e-15);
             let (p, q, r) = square_to_cosine_hemisphere(u, v);
             assert!((p * p + q * q + r * r - 1.0).abs() < 1e-15);
             let (a, b) = cosine_hemisphere_to_square(p, q);
@@ -73,8 +107,23 @@ mod tests {
                 let (p, q, _) = square_to_cosine_hemisphere(u, v);
                 (p, q)
             });
+            let disk = det(&square_to_disk);
+            assert!((disk / std::f64::consts::PI - 1.0).abs() < 1e-6);
             assert!((annulus / (300.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
             assert!((hemisphere / std::f64::consts::PI - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_concentric_map_keeps_centre_and_corners() {
+        assert_eq!(square_to_disk(0.5, 0.5), (0.0, 0.0));
+        assert_eq!(disk_to_square(0.0, 0.0), (0.5, 0.5));
+        for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+            let (x, y) = square_to_disk(u, v);
+            assert!((x * x + y * y - 1.0).abs() < 1e-15);
+            assert_eq!((x > 0.0, y > 0.0), (u > 0.5, v > 0.5));
+            let (a, b) = disk_to_square(x, y);
+            assert!((a - u).abs() < 1e-15 && (b - v).abs() < 1e-15);
         }
     }
 }

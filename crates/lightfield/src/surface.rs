@@ -1,0 +1,426 @@
+//! Carrier surfaces: equal-area charts, and the étendue coordinates of a ray on them.
+//!
+//! A light field lives on a surface Σ in four coordinates, each from 0 to 1: (s₁, s₂) is the place on a part of Σ, by an
+//! equal-area chart, and (a, b) the direction, by the concentric map of its local direction cosines (p, q). Equal volumes
+//! in these coordinates are equal étendues: dU = dA dp dq = π A ds₁ ds₂ da db. Theory eqs. 34 to 36.
+
+use etendue_geometry::RayBatch;
+use etendue_geometry::batch::BLOCK;
+use etendue_math::{Frame, Vec3};
+use etendue_sampling::warp::{disk_to_square, square_to_disk};
+use multiversion::multiversion;
+
+/// The shape of a part in its frame; lengths in mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// In the plane z = 0, centred, emitting towards +z.
+    Rectangle {
+        /// Along x.
+        width: f64,
+        /// Along y.
+        height: f64,
+    },
+    /// In the plane z = 0, centred, emitting towards +z.
+    Disk {
+        /// Radius of the disk.
+        radius: f64,
+    },
+    /// The half z ≥ 0 of a sphere about the origin, emitting outwards.
+    Hemisphere {
+        /// Radius of the sphere.
+        radius: f64,
+    },
+    /// The side of a cylinder about the z axis, centred, emitting outwards.
+    Tube {
+        /// Radius of the cylinder.
+        radius: f64,
+        /// Along z.
+        height: f64,
+    },
+}
+
+/// One chart of a carrier surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// Where the part stands.
+    pub frame: Frame,
+    /// What it is.
+    pub shape: Shape,
+}
+
+/// Where a line leaves a part: place and direction, each coordinate from 0 to 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Crossing {
+    /// Whether the line leaves the part at all; the rest means nothing if not.
+    pub met: bool,
+    /// Chart coordinates (s₁, s₂).
+    pub place: [f64; 2],
+    /// Concentric coordinates (a, b) of the local direction cosines.
+    pub direction: [f64; 2],
+}
+
+/// A line crosses the part outwards at local point `n` of normal direction; p and q are its local direction cosines.
+#[inline(always)]
+fn crossing(inside: bool, place: (f64, f64), p: f64, q: f64) -> Crossing {
+    let (s1, s2) = place;
+    let (a, b) = disk_to_square(p, q);
+    let met = inside & (s1 >= 0.0) & (s1 <= 1.0) & (s2 >= 0.0) & (s2 <= 1.0);
+    // Rounding may carry a grazing direction out of the square by some 1e-16.
+    Crossing {
+        met,
+        place: [s1, s2],
+        direction: [a.clamp(0.0, 1.0), b.clamp(0.0, 1.0)],
+    }
+}
+
+#[inline(always)]
+fn cross_rectangle(width: f64, height: f64, o: Vec3, d: Vec3) -> Crossing {
+    let t = -o.z / d.z;
+    let place = ((o.x + t * d.x) / width + 0.5, (o.y + t * d.y) / height + 0.5);
+    crossing(d.z > 0.0, place, d.x, d.y)
+}
+
+#[inline(always)]
+fn cross_disk(radius: f64, o: Vec3, d: Vec3) -> Crossing {
+    let t = -o.z / d.z;
+    let (x, y) = ((o.x + t * d.x) / radius, (o.y + t * d.y) / radius);
+    crossing((d.z > 0.0) & (x * x + y * y <= 1.0), clamped(disk_to_square(x, y)), d.x, d.y)
+}
+
+/// Points on the rim of a disk may come out of its square by rounding.
+#[inline(always)]
+fn clamped((u, v): (f64, f64)) -> (f64, f64) {
+    (u.clamp(0.0, 1.0), v.clamp(0.0, 1.0))
+}
+
+#[inline(always)]
+fn cross_hemisphere(radius: f64, o: Vec3, d: Vec3) -> Crossing {
+    // From the point nearest the centre, so that a start point far away costs no digits.
+    let near = o + d * -o.dot(d);
+    let half_chord = radius * radius - near.dot(near);
+    let n = (near + d * half_chord.max(0.0).sqrt()) * (1.0 / radius);
+    let lift = 1.0 / (1.0 + n.z.max(0.0));
+    let azimuthal = lift.sqrt();
+    // Local axes: x and y turned by the shortest rotation that takes +z to the normal.
+    let shear = (d.x * n.x + d.y * n.y) * lift + d.z;
+    let inside = (half_chord > 0.0) & (n.z >= 0.0);
+    let place = clamped(disk_to_square(n.x * azimuthal, n.y * azimuthal));
+    crossing(inside, place, d.x - n.x * shear, d.y - n.y * shear)
+}
+
+#[inline(always)]
+fn cross_tube(radius: f64, height: f64, o: Vec3, d: Vec3) -> Crossing {
+    let across = d.x * d.x + d.y * d.y;
+    let t = -(o.x * d.x + o.y * d.y) / across;
+    let (x, y) = (o.x + t * d.x, o.y + t * d.y);
+    let half_chord = (radius * radius - (x * x + y * y)) / across;
+    let t_out = t + half_chord.max(0.0).sqrt();
+    let (x, y) = ((o.x + t_out * d.x) / radius, (o.y + t_out * d.y) / radius);
+    let z = o.z + t_out * d.z;
+    let inside = (across > 0.0) & (half_chord > 0.0);
+    crossing(inside, (turns(x, y), z / height + 0.5), d.y * x - d.x * y, d.z)
+}
+
+/// Azimuth of (x, y) as a fraction of a turn from −x over −y, +x and +y: the seam lies at −x.
+#[inline(always)]
+fn turns(x: f64, y: f64) -> f64 {
+    let wide = x.abs() > y.abs();
+    let (along, across) = if wide { (x, y) } else { (y, x) };
+    let slope = if along == 0.0 { 0.0 } else { across / along };
+    let eighth = 0.125 * etendue_math::trig::atan_eighths(slope);
+    let from_x = if wide {
+        let back = if y < 0.0 { -0.5 } else { 0.5 };
+        eighth + if x < 0.0 { back } else { 0.0 }
+    } else {
+        let quarter = if y < 0.0 { -0.25 } else { 0.25 };
+        quarter - eighth
+    };
+    (from_x + 0.5).clamp(0.0, 1.0)
+}
+
+impl Part {
+    /// Area \[mm²\].
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        use std::f64::consts::PI;
+        match self.shape {
+            Shape::Rectangle { width, height } => width * height,
+            Shape::Disk { radius } => PI * radius * radius,
+            Shape::Hemisphere { radius } => 2.0 * PI * radius * radius,
+            Shape::Tube { radius, height } => 2.0 * PI * radius * height,
+        }
+    }
+
+    /// Étendue \[mm² sr\] of all light that can leave the part: π times its area.
+    #[must_use]
+    pub fn etendue(&self) -> f64 {
+        std::f64::consts::PI * self.area()
+    }
+
+    /// Whether the first coordinate closes upon itself.
+    #[must_use]
+    pub const fn wraps(&self) -> bool {
+        matches!(self.shape, Shape::Tube { .. })
+    }
+
+    /// Where the line through `position` along `direction` leaves the part.
+    #[inline]
+    #[must_use]
+    pub fn cross(&self, position: Vec3, direction: Vec3) -> Crossing {
+        let (o, d) = self.localise(position, direction);
+        match self.shape {
+            Shape::Rectangle { width, height } => cross_rectangle(width, height, o, d),
+            Shape::Disk { radius } => cross_disk(radius, o, d),
+            Shape::Hemisphere { radius } => cross_hemisphere(radius, o, d),
+            Shape::Tube { radius, height } => cross_tube(radius, height, o, d),
+        }
+    }
+
+    #[inline(always)]
+    fn localise(&self, position: Vec3, direction: Vec3) -> (Vec3, Vec3) {
+        (self.frame.point_to_local(position), self.frame.direction_to_local(direction))
+    }
+
+    /// The point at chart coordinates (s₁, s₂), and the direction at (a, b) there: the inverse of [`Self::cross`].
+    #[must_use]
+    pub fn ray(&self, place: [f64; 2], direction: [f64; 2]) -> (Vec3, Vec3) {
+        let [s1, s2] = place;
+        let (p, q) = square_to_disk(direction[0], direction[1]);
+        let up = (1.0 - p * p - q * q).max(0.0).sqrt();
+        let (point, k) = match self.shape {
+            Shape::Rectangle { width, height } => (
+                Vec3::new((s1 - 0.5) * width, (s2 - 0.5) * height, 0.0),
+                Vec3::new(p, q, up),
+            ),
+            Shape::Disk { radius } => {
+                let (x, y) = square_to_disk(s1, s2);
+                (Vec3::new(x * radius, y * radius, 0.0), Vec3::new(p, q, up))
+            }
+            Shape::Hemisphere { radius } => {
+                let (x, y) = square_to_disk(s1, s2);
+                let r2 = x * x + y * y;
+                let scale = (2.0 - r2).max(0.0).sqrt();
+                let n = Vec3::new(x * scale, y * scale, (1.0 - r2).max(0.0));
+                // The shortest rotation from +z to n, applied to (p, q, up).
+                let lean = (n.x * p + n.y * q) / (1.0 + n.z);
+                let k = Vec3::new(p - n.x * lean, q - n.y * lean, -(n.x * p + n.y * q)) + n * up;
+                (n * radius, k)
+            }
+            Shape::Tube { radius, height } => {
+                let (sine, cosine) = etendue_math::trig::sin_cos_turns(s1);
+                // The seam lies at −x: azimuth is s₁ turns from there.
+                let (nx, ny) = (-cosine, -sine);
+                let k = Vec3::new(nx * up - ny * p, ny * up + nx * p, q);
+                (Vec3::new(nx * radius, ny * radius, (s2 - 0.5) * height), k)
+            }
+        };
+        (self.frame.point_to_world(point), self.frame.direction_to_world(k))
+    }
+}
+
+/// The étendue coordinates of a block of rays: a structure of arrays of length [`BLOCK`].
+#[derive(Clone, Debug)]
+pub struct Coordinates {
+    /// The part each ray belongs to, or [`Coordinates::NONE`].
+    pub part: Vec<u32>,
+    /// s₁, s₂, a, b.
+    pub values: [Vec<f64>; 4],
+}
+
+impl Coordinates {
+    /// The part of a ray that no part meets.
+    pub const NONE: u32 = u32::MAX;
+}
+
+impl Default for Coordinates {
+    fn default() -> Self {
+        Self {
+            part: vec![Self::NONE; BLOCK],
+            values: std::array::from_fn(|_| vec![0.0; BLOCK]),
+        }
+    }
+}
+
+/// Finds for each ray of the block the first part that its line leaves, with the coordinates there.
+pub fn carry(parts: &[Part], batch: &RayBatch, out: &mut Coordinates) {
+    let n = batch.len;
+    out.part[..n].fill(Coordinates::NONE);
+    for (index, part) in (0_u32..).zip(parts) {
+        match part.shape {
+            Shape::Rectangle { width, height } => carry_rectangle(part, (width, height), index, batch, out),
+            Shape::Disk { radius } => carry_disk(part, radius, index, batch, out),
+            Shape::Hemisphere { radius } => carry_hemisphere(part, radius, index, batch, out),
+            Shape::Tube { radius, height } => carry_tube(part, (radius, height), index, batch, out),
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn carry_rectangle(part: &Part, size: (f64, f64), index: u32, batch: &RayBatch, out: &mut Coordinates) {
+    carry_part(part, |o, d| cross_rectangle(size.0, size.1, o, d), index, batch, out);
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn carry_disk(part: &Part, radius: f64, index: u32, batch: &RayBatch, out: &mut Coordinates) {
+    carry_part(part, |o, d| cross_disk(radius, o, d), index, batch, out);
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn carry_hemisphere(part: &Part, radius: f64, index: u32, batch: &RayBatch, out: &mut Coordinates) {
+    carry_part(part, |o, d| cross_hemisphere(radius, o, d), index, batch, out);
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn carry_tube(part: &Part, size: (f64, f64), index: u32, batch: &RayBatch, out: &mut Coordinates) {
+    carry_part(part, |o, d| cross_tube(size.0, size.1, o, d), index, batch, out);
+}
+
+/// The loop that is compiled once per shape and instruction set. A ray that has its part already keeps it.
+#[inline(always)]
+fn carry_part(
+    part: &Part,
+    cross: impl Fn(Vec3, Vec3) -> Crossing,
+    index: u32,
+    batch: &RayBatch,
+    out: &mut Coordinates,
+) {
+    let n = batch.len;
+    let [px, py, pz] = batch.position.each_ref().map(|v| &v[..n]);
+    let [kx, ky, kz] = batch.direction.each_ref().map(|v| &v[..n]);
+    let owner = &mut out.part[..n];
+    let [s1, s2, a, b] = out.values.each_mut().map(|v| &mut v[..n]);
+    for i in 0..n {
+        let (o, d) = part.localise(Vec3::new(px[i], py[i], pz[i]), Vec3::new(kx[i], ky[i], kz[i]));
+        let found = cross(o, d);
+        let take = found.met & (owner[i] == Coordinates::NONE);
+        owner[i] = if take { index } else { owner[i] };
+        s1[i] = if take { found.place[0] } else { s1[i] };
+        s2[i] = if take { found.place[1] } else { s2[i] };
+        a[i] = if take { found.direction[0] } else { a[i] };
+        b[i] = if take { found.direction[1] } else { b[i] };
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// One part of each shape, moved and turned, none in a special position.
+    pub(crate) fn zoo() -> Vec<Part> {
+        let frame = Frame {
+            origin: Vec3::new(0.3, -0.2, 0.7),
+            x: Vec3::new(0.36, 0.48, -0.8),
+            y: Vec3::new(-0.8, 0.6, 0.0),
+            z: Vec3::new(0.48, 0.64, 0.6),
+        };
+        [
+            Shape::Rectangle { width: 2.5, height: 1.5 },
+            Shape::Disk { radius: 1.3 },
+            Shape::Hemisphere { radius: 1.7 },
+            Shape::Tube { radius: 0.8, height: 2.2 },
+        ]
+        .map(|shape| Part { frame, shape })
+        .to_vec()
+    }
+
+    /// Coordinates that fill the cube evenly.
+    pub(crate) fn lattice(n: u32) -> impl Iterator<Item = [f64; 4]> {
+        (0..n).map(|i| [0.856_675, 0.733_892, 0.628_707, 0.538_597].map(|g: f64| (0.5 + f64::from(i) * g).fract()))
+    }
+
+    #[test]
+    fn coordinates_and_rays_are_inverse_wherever_the_ray_starts() {
+        for part in zoo() {
+            for [s1, s2, a, b] in lattice(5000) {
+                let (x, k) = part.ray([s1, s2], [a, b]);
+                assert!((k.length() - 1.0).abs() < 1e-14);
+                for along in [0.0, 3.0, -700.0] {
+                    let c = part.cross(x + k * along, k);
+                    let tolerance = 1e-13 * (1.0 + along.abs());
+                    // Near the horizon the crossing of a curved part is a square root away from the line.
+                    let grazing = 1.0 / (1e-6 + (1.0 - (2.0 * a - 1.0).abs().max((2.0 * b - 1.0).abs())));
+                    assert!(c.met, "{part:?} {s1} {s2} {a} {b}");
+                    for (found, given) in c.place.iter().chain(&c.direction).zip([s1, s2, a, b]) {
+                        assert!((found - given).abs() < tolerance * grazing.min(1e4), "{part:?} {found} {given}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn equal_volumes_are_equal_etendues() {
+        // |∂(x, y)/∂(s₁, s₂)| on the surface is its area everywhere; central differences.
+        let h = 1e-6;
+        for part in zoo() {
+            for [s1, s2, a, b] in lattice(300) {
+                let near_kink = |u: f64, v: f64| ((2.0 * u - 1.0).abs() - (2.0 * v - 1.0).abs()).abs() < 1e-4;
+                let margin = |u: f64| u.min(1.0 - u) < 1e-4;
+                if near_kink(s1, s2) || near_kink(a, b) || [s1, s2, a, b].into_iter().any(margin) {
+                    continue;
+                }
+                let point = |u, v| part.ray([u, v], [a, b]).0;
+                let d1 = (point(s1 + h, s2) - point(s1 - h, s2)) * (0.5 / h);
+                let d2 = (point(s1, s2 + h) - point(s1, s2 - h)) * (0.5 / h);
+                assert!((d1.cross(d2).length() / part.area() - 1.0).abs() < 1e-5, "{part:?}");
+                // Solid angle times cosine: |∂k/∂a × ∂k/∂b| cos = π.
+                let k = |u, v| part.ray([s1, s2], [u, v]).1;
+                let normal = part.ray([s1, s2], [0.5, 0.5]).1;
+                let (e1, e2) = (k(a + h, b) - k(a - h, b), k(a, b + h) - k(a, b - h));
+                let projected = (e1.cross(e2) * (0.25 / (h * h))).dot(normal).abs();
+                assert!((projected / std::f64::consts::PI - 1.0).abs() < 1e-5, "{part:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ray_belongs_to_the_first_part_it_leaves_and_never_to_one_it_enters() {
+        let flat = Frame {
+            origin: Vec3::default(),
+            x: Vec3::new(1.0, 0.0, 0.0),
+            y: Vec3::new(0.0, 1.0, 0.0),
+            z: Vec3::new(0.0, 0.0, 1.0),
+        };
+        let dome = [Shape::Disk { radius: 1.0 }, Shape::Hemisphere { radius: 1.0 }].map(|shape| Part { frame: flat, shape });
+        let rays = [
+            ([0.2, 0.1, 5.0], [0.0, 0.0, 1.0], 0),
+            ([-2.0, 0.0, 0.5], [1.0, 0.0, 0.0], 1),
+            ([0.0, 0.0, 0.5], [0.0, 0.6, -0.8], Coordinates::NONE),
+            ([3.0, 0.0, 0.0], [0.0, 0.0, 1.0], Coordinates::NONE),
+        ];
+        let mut batch = RayBatch { len: rays.len(), ..RayBatch::default() };
+        for (i, (x, k, _)) in rays.iter().enumerate() {
+            for axis in 0..3 {
+                batch.position[axis][i] = x[axis];
+                batch.direction[axis][i] = k[axis];
+            }
+        }
+        let mut out = Coordinates::default();
+        carry(&dome, &batch, &mut out);
+        for (i, (_, _, part)) in rays.iter().enumerate() {
+            assert_eq!(out.part[i], *part, "ray {i}");
+        }
+    }
+
+    #[test]
+    fn blocks_have_the_bits_of_single_rays() {
+        for part in zoo() {
+            let mut batch = RayBatch { len: 999, ..RayBatch::default() };
+            for (i, c) in lattice(999).enumerate() {
+                let (x, k) = part.ray([c[0], c[1]], [c[2], c[3]]);
+                for (axis, (p, d)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
+                    batch.position[axis][i] = p;
+                    batch.direction[axis][i] = d;
+                }
+            }
+            let mut out = Coordinates::default();
+            carry(&[part], &batch, &mut out);
+            for i in 0..999 {
+                let c = part.cross(batch.position(i), batch.direction(i));
+                assert_eq!(c.met, out.part[i] == 0);
+                let block = out.values.each_ref().map(|v| v[i].to_bits());
+                assert_eq!(block, [c.place[0], c.place[1], c.direction[0], c.direction[1]].map(f64::to_bits));
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Exponential, logarithm and ln Γ from +, ×, / and bit moves only.
+//!
+//! The same bits on every platform, no branches, no calls: the compiler runs them several at a time. Coefficients are
+//! interpolations at Chebyshev nodes, worked out in 50 digits; the relative errors stand beside them.
+
+use std::f64::consts::{LN_2, LOG2_E};
+
+/// High and low part of ln 2: the high part has 32 bits, so that multiples by an exponent are exact.
+const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
+const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+
+/// eˣ to 4e-16 relative for −708 ≤ x ≤ 709; below, 0.
+///
+/// x = k ln 2 + r with |r| ≤ ½ ln 2; eʳ by a polynomial of degree 11 (4e-18).
+#[inline(always)]
+#[must_use]
+pub fn exp(x: f64) -> f64 {
+    let clamped = x.clamp(-708.0, 709.0);
+    let k = (clamped * LOG2_E).round();
+    let r = (clamped - k * LN_2_HIGH) - k * LN_2_LOW;
+    let series = 0.5
+        + r * (0.166_666_666_666_666_808_06
+            + r * (0.041_666_666_666_488_095_495
+                + r * (0.008_333_333_333_319_600_610_9
+                    + r * (0.001_388_888_895_231_474_465_2
+                        + r * (1.984_126_989_004_711_370_7e-4
+                            + r * (2.480_148_548_233_249_242_8e-5
+                                + r * (2.755_724_091_857_897_e-6
+                                    + r * (2.763_263_963_904_103e-7 + r * 2.511_003_760_596_377_7e-8))))))));
+    let power = 1.0 + (r + r * r * series);
+    // 1.5·2⁵² + k holds k in its low bits; shifted to the exponent they multiply by 2ᵏ.
+    let bits = (k + 6_755_399_441_055_744.0).to_bits() << 52;
+    let scaled = f64::from_bits(power.to_bits().wrapping_add(bits));
+    if x < -708.0 { 0.0 } else { scaled }
+}
+
+/// ln x to 3e-16 relative or 1e-16 absolute, for normal x > 0.
+///
+/// x = 2ᵏ m with √½ ≤ m < √2; ln m = 2 artanh((m − 1)/(m + 1)) by a polynomial in its square (1e-18).
+#[inline(always)]
+#[must_use]
+pub fn ln(x: f64) -> f64 {
+    // Adding the distance from √½ to 1 to the bits carries into the exponent exactly where m would reach √2.
+    const ONE: u64 = 0x3FF0_0000_0000_0000;
+    const SQRT_HALF: u64 = 0x3FE6_A09E_667F_3BCD;
+    let shifted = x.to_bits().wrapping_add(ONE - SQRT_HALF);
+    let m = f64::from_bits((shifted & 0x000F_FFFF_FFFF_FFFF) + SQRT_HALF);
+    // The biased exponent as the low bits of 2⁵², an integer-to-float conversion that every instruction set has.
+    let k = f64::from_bits((shifted >> 52) | 0x4330_0000_0000_0000) - (4_503_599_627_370_496.0 + 1023.0);
+    let s = (m - 1.0) / (m + 1.0);
+    let t = s * s;
+    let series = 0.333_333_333_333_338_228_29
+        + t * (0.199_999_999_996_511_690_56
+            + t * (0.142_857_143_803_208_399_41
+                + t * (0.111_110_985_283_630_233_04
+                    + t * (0.090_918_158_401_146_644_019
+                        + t * (0.076_562_640_741_820_954_83 + t * 0.074_048_551_803_276_383_491)))));
+    2.0 * s + (2.0 * s * t * series + k * LN_2)
+}
+
+/// ln Γ(x) for x > 0: absolute error below 1e-13 up to x = 100, relative error below 1e-15 beyond.
+///
+/// Stirling's series to y⁻¹³ for y ≥ 8; below, Γ(x) = Γ(x + 8)/(x (x + 1) … (x + 7)). DLMF 5.11.1.
+#[inline(always)]
+#[must_use]
+pub fn ln_gamma(x: f64) -> f64 {
+    const HALF_LN_TAU: f64 = 0.918_938_533_204_672_8;
+    let small = x < 8.0;
+    // (x)₈ = x (x + 7) · (x + 1)(x + 6) · …, each pair from the same product.
+    let pair = x * (x + 7.0);
+    let rising = pair * (pair + 6.0) * ((pair + 10.0) * (pair + 12.0));
+    let y = if small { x + 8.0 } else { x };
+    let below = if small { rising } else { 1.0 };
+    let z = 1.0 / y;
+    let z2 = z * z;
+    let series = z
+        * (1.0 / 12.0
+            + z2 * (-1.0 / 360.0
+                + z2 * (1.0 / 1_260.0
+                    + z2 * (-1.0 / 1_680.0
+                        + z2 * (1.0 / 1_188.0 + z2 * (-691.0 / 360_360.0 + z2 * (1.0 / 156.0)))))));
+    (y - 0.5) * ln(y) - y + HALF_LN_TAU + series - ln(below)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exp_agrees_with_the_library() {
+        for i in -70_790..=70_890 {
+            let x = f64::from(i) * 0.01 + 0.001_234;
+            assert!((exp(x) / x.exp() - 1.0).abs() < 6e-16, "{x}");
+        }
+        assert_eq!(exp(0.0), 1.0);
+        assert_eq!(exp(-800.0), 0.0);
+        assert_eq!(exp(f64::NEG_INFINITY), 0.0);
+    }
+
+    #[test]
+    fn ln_agrees_with_the_library() {
+        for i in 1..200_000 {
+            let x = (f64::from(i) * 0.003_7 - 300.0).exp();
+            let expected = x.ln();
+            assert!((ln(x) - expected).abs() <= 4e-16 * expected.abs().max(0.5), "{x}");
+        }
+        assert_eq!(ln(1.0), 0.0);
+        assert_eq!(ln(2.0), LN_2);
+    }
+
+    #[test]
+    fn ln_gamma_knows_factorials_halves_and_its_recurrence() {
+        let mut factorial = 1.0_f64;
+        for n in 1..=20 {
+            assert!((ln_gamma(f64::from(n)) - factorial.ln()).abs() < 1e-13, "{n}");
+            factorial *= f64::from(n);
+        }
+        assert!((ln_gamma(0.5) - std::f64::consts::PI.sqrt().ln()).abs() < 1e-14);
+        for i in 1..4000 {
+            let x = (f64::from(i) * 0.01 - 15.0).exp();
+            let (a, b) = (ln_gamma(x + 1.0), ln_gamma(x) + x.ln());
+            assert!((a - b).abs() < 1e-13 + 2e-15 * a.abs(), "{x}: {a} {b}");
+        }
+    }
+}
