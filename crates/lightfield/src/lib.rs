@@ -4,6 +4,7 @@
 //! pixel (thesis chapter 2). `polya`: counts on a dyadic grid, smoothed by averaging over all its partitions.
 
 pub mod cone;
+pub mod counts;
 pub mod polya;
 pub mod surface;
 pub mod view;

@@ -62,11 +62,18 @@ impl Stream {
         philox4x64([index, block, 0, 0], self.key).map(unit_open)
     }
 
+    /// Four independent 64-bit words at `index`.
+    #[inline]
+    #[must_use]
+    pub fn words(self, index: u64) -> [u64; 4] {
+        philox4x64([index, 0, 0, 0], self.key)
+    }
+
     /// A 64-bit word at `index`.
     #[inline]
     #[must_use]
     pub fn word(self, index: u64) -> u64 {
-        philox4x64([index, 0, 0, 0], self.key)[0]
+        self.words(index)[0]
     }
 }
 

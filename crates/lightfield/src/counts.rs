@@ -1,0 +1,348 @@
+//! Étendue counts: one pass over any number of rays, into a grid on each part of a carrier surface.
+//!
+//! Beside the grid in (s₁, s₂, a, b) the pass fills two finer ones, in (s₁, s₂) and in (a, b) alone, and deals the rays to
+//! two folds by the address of a random number: most are fitted, some are held out to judge the fit. Of the latter a few
+//! are kept with their exact coordinates.
+
+use std::ops::{ControlFlow, Range};
+
+use etendue_geometry::{RayBatch, RaySource, Tally};
+use etendue_sampling::ordered;
+use etendue_sampling::philox::Stream;
+
+use crate::surface::{Coordinates, Part, carry};
+
+/// The purpose under which rays are held out (see [`Stream::new`]).
+pub const PURPOSE_HOLD_OUT: u64 = 0x484F_4C44;
+
+/// Chances are counted in these parts of one.
+pub const CHANCES: u32 = 1 << 16;
+
+/// What to count.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The charts, in the order in which rays are offered to them.
+    pub parts: Vec<Part>,
+    /// Halvings of each of the four coordinates.
+    pub depths: [u32; 4],
+    /// Halvings of each coordinate of the fine grids: over the place, over the direction.
+    pub fine: [u32; 2],
+    /// Rays held out, in parts of [`CHANCES`].
+    pub held_out: u32,
+    /// Rays kept with their coordinates, in parts of [`CHANCES`]; at most `held_out`: they are among those.
+    pub kept: u32,
+    /// Seed of the choice.
+    pub seed: u64,
+}
+
+impl Plan {
+    fn sizes(&self) -> [usize; 3] {
+        let [space, direction] = self.fine.map(|d| 1 << (2 * d));
+        [1 << self.depths.iter().sum::<u32>(), space, direction]
+    }
+
+    /// Whether every cell of every grid has a number of 32 bits.
+    #[must_use]
+    pub fn is_countable(&self) -> bool {
+        let bits = [self.depths.iter().sum::<u32>(), 2 * self.fine[0], 2 * self.fine[1]];
+        let cells = |b: u32| (b < 32).then(|| (1_u64 << b) * 2 * self.parts.len() as u64);
+        let deep = self.depths.iter().chain(&self.fine).all(|d| *d <= 16);
+        deep && bits.into_iter().all(|b| cells(b).is_some_and(|n| u32::try_from(n).is_ok()))
+    }
+}
+
+/// Σ w and Σ w² over the rays of each cell.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sums {
+    /// All rays so far have the same weight: their numbers.
+    Equal(Vec<u32>),
+    /// Σ w and Σ w².
+    Weighted(Vec<f64>, Vec<f64>),
+}
+
+impl Sums {
+    fn add(&mut self, cells: &[u32], weights: &[f64]) {
+        match self {
+            Self::Equal(counts) => cells.iter().for_each(|c| counts[*c as usize] += 1),
+            Self::Weighted(sum, squares) => {
+                for (c, w) in cells.iter().zip(weights) {
+                    sum[*c as usize] += w;
+                    squares[*c as usize] += w * w;
+                }
+            }
+        }
+    }
+
+    fn weighted(&mut self, weight: f64) {
+        if let Self::Equal(counts) = self {
+            let sum: Vec<f64> = counts.iter().map(|n| f64::from(*n) * weight).collect();
+            let squares = sum.iter().map(|s| s * weight).collect();
+            *self = Self::Weighted(sum, squares);
+        }
+    }
+}
+
+/// A held-out ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kept {
+    /// Number of its part.
+    pub part: u32,
+    /// s₁, s₂, a, b.
+    pub coordinates: [f64; 4],
+    /// Its flux.
+    pub weight: f64,
+}
+
+/// The account of a pass.
+#[derive(Clone, Debug)]
+pub struct Counts {
+    /// Cells of the 4-D grid, fold by fold (fitted, held out), part by part, b fastest.
+    pub grid: Sums,
+    /// Cells of the place grid, in the same order of folds and parts, s₂ fastest.
+    pub space: Sums,
+    /// Cells of the direction grid, likewise, b fastest.
+    pub direction: Sums,
+    /// The one weight that all rays have, if they have.
+    pub weight: Option<f64>,
+    /// Held-out rays with their coordinates, in ray order.
+    pub kept: Vec<Kept>,
+    /// Rays with flux that no part meets.
+    pub unmet_rays: u64,
+    /// Their flux.
+    pub unmet_flux: f64,
+    /// The flux account of all rays.
+    pub tally: Tally,
+}
+
+/// What one batch has found.
+#[derive(Default)]
+struct Found {
+    tally: Tally,
+    cells: [Vec<u32>; 3],
+    weights: Vec<f64>,
+    kept: Vec<Kept>,
+    unmet_rays: u64,
+    unmet_flux: f64,
+}
+
+impl Found {
+    fn collect(&mut self, plan: &Plan, sizes: [usize; 3], first: u64, batch: &RayBatch, at: &mut Coordinates) {
+        self.tally.add_block(batch);
+        carry(&plan.parts, batch, at);
+        let chances = chances(plan.seed, first, batch.len);
+        let shape = plan.depths.map(|d| f64::from(d).exp2());
+        let fine = plan.fine.map(|d| f64::from(d).exp2());
+        let [s1, s2, a, b] = &at.values;
+        for i in 0..batch.len {
+            let weight = batch.flux[i];
+            if weight <= 0.0 {
+                continue;
+            }
+            let part = at.part[i];
+            if part == Coordinates::NONE {
+                self.unmet_rays += 1;
+                self.unmet_flux += weight;
+                continue;
+            }
+            let out = u32::from(chances[i]) < plan.held_out;
+            let block = u32::from(out) * u32::try_from(plan.parts.len()).unwrap_or(0) + part;
+            let place = |shape: f64, v: f64| cell(v, shape);
+            let grid = ((place(shape[0], s1[i]) << plan.depths[1] | place(shape[1], s2[i])) << plan.depths[2]
+                | place(shape[2], a[i]))
+                << plan.depths[3]
+                | place(shape[3], b[i]);
+            let space = place(fine[0], s1[i]) << plan.fine[0] | place(fine[0], s2[i]);
+            let direction = place(fine[1], a[i]) << plan.fine[1] | place(fine[1], b[i]);
+            for ((cells, cell), size) in self.cells.iter_mut().zip([grid, space, direction]).zip(sizes) {
+                #[allow(clippy::cast_possible_truncation, reason = "the plan is countable")]
+                cells.push(block * size as u32 + cell);
+            }
+            self.weights.push(weight);
+            if u32::from(chances[i]) < plan.kept {
+                let coordinates = [s1[i], s2[i], a[i], b[i]];
+                self.kept.push(Kept { part, coordinates, weight });
+            }
+        }
+    }
+}
+
+/// The cell of a coordinate from 0 to 1, both included.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1 times at most 2^16")]
+fn cell(value: f64, cells: f64) -> u32 {
+    (value * cells).min(cells - 1.0) as u32
+}
+
+/// A number from 0 to 65 535 for each ray of a block: sixteen from one call of the generator.
+#[allow(clippy::cast_possible_truncation, reason = "a word is cut into four pieces")]
+fn chances(seed: u64, first: u64, len: usize) -> Vec<u16> {
+    let stream = Stream::new(seed, PURPOSE_HOLD_OUT);
+    let last = first + len as u64;
+    let mut numbers: Vec<u16> = (first / 16..last.div_ceil(16))
+        .flat_map(|block| stream.words(block))
+        .flat_map(|word| [0, 16, 32, 48].map(|shift| (word >> shift) as u16))
+        .skip((first % 16) as usize)
+        .collect();
+    numbers.truncate(len);
+    numbers
+}
+
+/// Counts all rays of a source on a surface.
+///
+/// Every sum runs in ray order, so its bits do not depend on the number of threads. Memory: the grids, twice 12 bytes per
+/// ray of a round of batches, and the kept rays. Ends early if `progress` breaks.
+pub fn count(
+    source: &impl RaySource,
+    plan: &Plan,
+    threads: usize,
+    progress: impl FnMut(u64) -> ControlFlow<()>,
+) -> Counts {
+    let sizes = plan.sizes();
+    let [grid, space, direction] = sizes.map(|n| Sums::Equal(vec![0; 2 * plan.parts.len() * n]));
+    let mut counts = Counts {
+        grid,
+        space,
+        direction,
+        weight: None,
+        kept: Vec::new(),
+        unmet_rays: 0,
+        unmet_flux: 0.0,
+        tally: Tally::default(),
+    };
+    let mut equal = true;
+    let work = |range: Range<u64>| {
+        let mut found = Found::default();
+        let mut at = Coordinates::default();
+        source.for_each_block(range, |first, batch| found.collect(plan, sizes, first, batch, &mut at));
+        found
+    };
+    let merge = |found: Found| {
+        counts.tally.merge(&found.tally);
+        counts.unmet_rays += found.unmet_rays;
+        counts.unmet_flux += found.unmet_flux;
+        counts.kept.extend(found.kept);
+        if let Some(first) = found.weights.first() {
+            let weight = *counts.weight.get_or_insert(*first);
+            let many = counts.tally.rays > u64::from(u32::MAX);
+            if equal && (many || found.weights.iter().any(|w| *w != weight)) {
+                equal = false;
+                for sums in [&mut counts.grid, &mut counts.space, &mut counts.direction] {
+                    sums.weighted(weight);
+                }
+            }
+        }
+        for (sums, cells) in [&mut counts.grid, &mut counts.space, &mut counts.direction]
+            .into_iter()
+            .zip(&found.cells)
+        {
+            sums.add(cells, &found.weights);
+        }
+    };
+    ordered::run(threads, source.len(), work, merge, progress);
+    if !equal {
+        counts.weight = None;
+    }
+    counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::tests::{lattice, zoo};
+    use etendue_geometry::table::{Float, Layout, RayTable};
+
+    fn bytes(n: u32, weights: impl Fn(u32) -> f64) -> Vec<u8> {
+        let parts = zoo();
+        lattice(n)
+            .zip(0..)
+            .flat_map(|([s1, s2, a, b], i)| {
+                let (x, k) = parts[(i % 3) as usize].ray([s1 * s1, s2], [a, b]);
+                [x.x, x.y, x.z, k.x, k.y, k.z, weights(i)]
+            })
+            .flat_map(f64::to_le_bytes)
+            .collect()
+    }
+
+    const LAYOUT: Layout = Layout {
+        stride: 56,
+        position: Some(0),
+        direction: 24,
+        flux: 48,
+        float: Float::F64,
+        length_scale: 1.0,
+    };
+
+    fn plan() -> Plan {
+        Plan {
+            parts: zoo(),
+            depths: [2, 3, 2, 1],
+            fine: [4, 3],
+            held_out: CHANCES / 10,
+            kept: CHANCES / 100,
+            seed: 3,
+        }
+    }
+
+    fn run(bytes: &[u8], threads: usize) -> Counts {
+        let table = RayTable::new(bytes, LAYOUT).expect("valid");
+        count(&table, &plan(), threads, |_| ControlFlow::Continue(()))
+    }
+
+    #[test]
+    fn every_ray_is_counted_once_in_every_grid() {
+        let n = 200_000;
+        let counts = run(&bytes(n, |_| 2.5), 2);
+        assert_eq!(counts.weight, Some(2.5));
+        for (sums, size) in [(&counts.grid, 256), (&counts.space, 256), (&counts.direction, 64)] {
+            let Sums::Equal(numbers) = sums else { panic!("equal weights") };
+            assert_eq!(numbers.len(), 2 * 4 * size);
+            let total: u64 = numbers.iter().map(|c| u64::from(*c)).sum();
+            assert_eq!(total + counts.unmet_rays, u64::from(n));
+            // Held out: a tenth, within four standard deviations of a binomial.
+            let out: u32 = numbers[4 * size..].iter().sum();
+            let (mean, deviation) = (0.1 * total as f64, (0.09 * total as f64).sqrt());
+            assert!((f64::from(out) - mean).abs() < 4.0 * deviation + 1.0, "{out} {mean}");
+        }
+        assert!((counts.kept.len() as f64 - 2000.0).abs() < 4.0 * 45.0);
+        assert!((counts.unmet_flux - 2.5 * counts.unmet_rays as f64).abs() < 1e-9);
+        assert_eq!(counts.tally.rays, u64::from(n));
+    }
+
+    #[test]
+    fn weights_that_differ_late_are_summed_as_if_they_had_differed_from_the_start() {
+        let n = 200_000;
+        let late = |i| if i == n - 1 { 7.0 } else { 2.5 };
+        let counts = run(&bytes(n, late), 2);
+        assert_eq!(counts.weight, None);
+        let Sums::Weighted(sum, squares) = &counts.grid else { panic!("unequal weights") };
+        let (w1, w2) = (sum.iter().sum::<f64>(), squares.iter().sum::<f64>());
+        let met = f64::from(n) - counts.unmet_rays as f64;
+        assert!((w1 - (met * 2.5 + 4.5)).abs() < 1e-6 && (w2 - (met * 6.25 + 49.0 - 6.25)).abs() < 1e-5);
+    }
+
+    #[test]
+    fn gives_the_same_bits_for_one_two_and_seven_threads() {
+        let bytes = bytes(300_000, |i| 1.0 + f64::from(i % 7) / 3.0);
+        let one = run(&bytes, 1);
+        for threads in [2, 7] {
+            let more = run(&bytes, threads);
+            assert!(one.grid == more.grid && one.space == more.space && one.direction == more.direction);
+            assert_eq!(one.kept, more.kept);
+            assert_eq!(one.unmet_flux.to_bits(), more.unmet_flux.to_bits());
+        }
+    }
+
+    #[test]
+    fn the_same_ray_has_the_same_chance_in_any_block() {
+        let whole = chances(5, 0, 4096);
+        assert_eq!(chances(5, 2048, 100), whole[2048..2148]);
+        assert_eq!(chances(5, 7, 20), whole[7..27]);
+    }
+
+    #[test]
+    fn absurd_plans_are_told() {
+        assert!(plan().is_countable());
+        assert!(!Plan { depths: [8, 8, 8, 8], ..plan() }.is_countable());
+        assert!(!Plan { fine: [40, 2], ..plan() }.is_countable());
+    }
+}
