@@ -76,10 +76,31 @@ def cone_sums(
 ) -> tuple[list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]], _Tally]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the tally."""
 
+_Masses: TypeAlias = _Floats | Sequence[tuple[int, _Floats]]
+
 def polya_posterior(
-    depths: Sequence[int], weight: _Floats, weight_squared: _Floats, base: _Floats, concentration: float
+    depths: Sequence[int],
+    weight: _Floats,
+    weight_squared: _Floats | None,
+    base: _Masses | None,
+    concentration: float,
+    threads: int | None = None,
 ) -> tuple[_Floats, _Floats, float]:
-    """Mean of mass over base mass per cell, mean of its square, ln evidence, for a grid of 2^depth cells per axis."""
+    """Mean of mass over base mass per cell, mean of its square, ln evidence, for a grid of 2^depth cells per axis.
+
+    `weight_squared` None: `weight` counts points. `base` None: uniform; an array: the mass of each cell; a sequence of
+    (axes, masses): the product of factors over successive axes.
+    """
+
+def polya_evidence(
+    depths: Sequence[int],
+    weight: _Floats,
+    weight_squared: _Floats | None,
+    base: _Masses | None,
+    concentration: float,
+    threads: int | None = None,
+) -> float:
+    """ln evidence alone."""
 
 def select_subset(start: int, stop: int, n: int, k: int, taken: int, seed: int) -> npt.NDArray[np.uint64]:
     """Indices in ``start..stop`` of a random k-subset of n, of which `taken` were taken before."""

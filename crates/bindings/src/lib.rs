@@ -21,6 +21,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scan::scan, module)?)?;
     module.add_function(wrap_pyfunction!(cone::cone_sums, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_posterior, module)?)?;
+    module.add_function(wrap_pyfunction!(polya::polya_evidence, module)?)?;
     module.add_function(wrap_pyfunction!(subset::select_subset, module)?)?;
     module.add_function(wrap_pyfunction!(subset::deal_parts, module)?)?;
     Ok(())

@@ -47,7 +47,9 @@ impl Plan {
         let bits = [self.depths.iter().sum::<u32>(), 2 * self.fine[0], 2 * self.fine[1]];
         let cells = |b: u32| (b < 32).then(|| (1_u64 << b) * 2 * self.parts.len() as u64);
         let deep = self.depths.iter().chain(&self.fine).all(|d| *d <= 16);
-        deep && bits.into_iter().all(|b| cells(b).is_some_and(|n| u32::try_from(n).is_ok()))
+        deep && bits
+            .into_iter()
+            .all(|b| cells(b).is_some_and(|n| u32::try_from(n).is_ok()))
     }
 }
 
@@ -160,7 +162,11 @@ impl Found {
             self.weights.push(weight);
             if u32::from(chances[i]) < plan.kept {
                 let coordinates = [s1[i], s2[i], a[i], b[i]];
-                self.kept.push(Kept { part, coordinates, weight });
+                self.kept.push(Kept {
+                    part,
+                    coordinates,
+                    weight,
+                });
             }
         }
     }
@@ -168,7 +174,11 @@ impl Found {
 
 /// The cell of a coordinate from 0 to 1, both included.
 #[inline(always)]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1 times at most 2^16")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "0 to 1 times at most 2^16"
+)]
 fn cell(value: f64, cells: f64) -> u32 {
     (value * cells).min(cells - 1.0) as u32
 }
@@ -294,7 +304,9 @@ mod tests {
         let counts = run(&bytes(n, |_| 2.5), 2);
         assert_eq!(counts.weight, Some(2.5));
         for (sums, size) in [(&counts.grid, 256), (&counts.space, 256), (&counts.direction, 64)] {
-            let Sums::Equal(numbers) = sums else { panic!("equal weights") };
+            let Sums::Equal(numbers) = sums else {
+                panic!("equal weights")
+            };
             assert_eq!(numbers.len(), 2 * 4 * size);
             let total: u64 = numbers.iter().map(|c| u64::from(*c)).sum();
             assert_eq!(total + counts.unmet_rays, u64::from(n));
@@ -314,7 +326,9 @@ mod tests {
         let late = |i| if i == n - 1 { 7.0 } else { 2.5 };
         let counts = run(&bytes(n, late), 2);
         assert_eq!(counts.weight, None);
-        let Sums::Weighted(sum, squares) = &counts.grid else { panic!("unequal weights") };
+        let Sums::Weighted(sum, squares) = &counts.grid else {
+            panic!("unequal weights")
+        };
         let (w1, w2) = (sum.iter().sum::<f64>(), squares.iter().sum::<f64>());
         let met = f64::from(n) - counts.unmet_rays as f64;
         assert!((w1 - (met * 2.5 + 4.5)).abs() < 1e-6 && (w2 - (met * 6.25 + 49.0 - 6.25)).abs() < 1e-5);
@@ -342,7 +356,19 @@ mod tests {
     #[test]
     fn absurd_plans_are_told() {
         assert!(plan().is_countable());
-        assert!(!Plan { depths: [8, 8, 8, 8], ..plan() }.is_countable());
-        assert!(!Plan { fine: [40, 2], ..plan() }.is_countable());
+        assert!(
+            !Plan {
+                depths: [8, 8, 8, 8],
+                ..plan()
+            }
+            .is_countable()
+        );
+        assert!(
+            !Plan {
+                fine: [40, 2],
+                ..plan()
+            }
+            .is_countable()
+        );
     }
 }

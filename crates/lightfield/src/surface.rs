@@ -84,7 +84,12 @@ fn cross_rectangle(width: f64, height: f64, o: Vec3, d: Vec3) -> Crossing {
 fn cross_disk(radius: f64, o: Vec3, d: Vec3) -> Crossing {
     let t = -o.z / d.z;
     let (x, y) = ((o.x + t * d.x) / radius, (o.y + t * d.y) / radius);
-    crossing((d.z > 0.0) & (x * x + y * y <= 1.0), clamped(disk_to_square(x, y)), d.x, d.y)
+    crossing(
+        (d.z > 0.0) & (x * x + y * y <= 1.0),
+        clamped(disk_to_square(x, y)),
+        d.x,
+        d.y,
+    )
 }
 
 /// Points on the rim of a disk may come out of its square by rounding.
@@ -178,7 +183,10 @@ impl Part {
 
     #[inline(always)]
     fn localise(&self, position: Vec3, direction: Vec3) -> (Vec3, Vec3) {
-        (self.frame.point_to_local(position), self.frame.direction_to_local(direction))
+        (
+            self.frame.point_to_local(position),
+            self.frame.direction_to_local(direction),
+        )
     }
 
     /// The point at chart coordinates (s₁, s₂), and the direction at (a, b) there: the inverse of [`Self::cross`].
@@ -314,10 +322,16 @@ pub(crate) mod tests {
             z: Vec3::new(0.48, 0.64, 0.6),
         };
         [
-            Shape::Rectangle { width: 2.5, height: 1.5 },
+            Shape::Rectangle {
+                width: 2.5,
+                height: 1.5,
+            },
             Shape::Disk { radius: 1.3 },
             Shape::Hemisphere { radius: 1.7 },
-            Shape::Tube { radius: 0.8, height: 2.2 },
+            Shape::Tube {
+                radius: 0.8,
+                height: 2.2,
+            },
         ]
         .map(|shape| Part { frame, shape })
         .to_vec()
@@ -341,7 +355,10 @@ pub(crate) mod tests {
                     let grazing = 1.0 / (1e-6 + (1.0 - (2.0 * a - 1.0).abs().max((2.0 * b - 1.0).abs())));
                     assert!(c.met, "{part:?} {s1} {s2} {a} {b}");
                     for (found, given) in c.place.iter().chain(&c.direction).zip([s1, s2, a, b]) {
-                        assert!((found - given).abs() < tolerance * grazing.min(1e4), "{part:?} {found} {given}");
+                        assert!(
+                            (found - given).abs() < tolerance * grazing.min(1e4),
+                            "{part:?} {found} {given}"
+                        );
                     }
                 }
             }
@@ -381,14 +398,18 @@ pub(crate) mod tests {
             y: Vec3::new(0.0, 1.0, 0.0),
             z: Vec3::new(0.0, 0.0, 1.0),
         };
-        let dome = [Shape::Disk { radius: 1.0 }, Shape::Hemisphere { radius: 1.0 }].map(|shape| Part { frame: flat, shape });
+        let dome =
+            [Shape::Disk { radius: 1.0 }, Shape::Hemisphere { radius: 1.0 }].map(|shape| Part { frame: flat, shape });
         let rays = [
             ([0.2, 0.1, 5.0], [0.0, 0.0, 1.0], 0),
             ([-2.0, 0.0, 0.5], [1.0, 0.0, 0.0], 1),
             ([0.0, 0.0, 0.5], [0.0, 0.6, -0.8], Coordinates::NONE),
             ([3.0, 0.0, 0.0], [0.0, 0.0, 1.0], Coordinates::NONE),
         ];
-        let mut batch = RayBatch { len: rays.len(), ..RayBatch::default() };
+        let mut batch = RayBatch {
+            len: rays.len(),
+            ..RayBatch::default()
+        };
         for (i, (x, k, _)) in rays.iter().enumerate() {
             for axis in 0..3 {
                 batch.position[axis][i] = x[axis];
@@ -405,7 +426,10 @@ pub(crate) mod tests {
     #[test]
     fn blocks_have_the_bits_of_single_rays() {
         for part in zoo() {
-            let mut batch = RayBatch { len: 999, ..RayBatch::default() };
+            let mut batch = RayBatch {
+                len: 999,
+                ..RayBatch::default()
+            };
             for (i, c) in lattice(999).enumerate() {
                 let (x, k) = part.ray([c[0], c[1]], [c[2], c[3]]);
                 for (axis, (p, d)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
@@ -419,7 +443,10 @@ pub(crate) mod tests {
                 let c = part.cross(batch.position(i), batch.direction(i));
                 assert_eq!(c.met, out.part[i] == 0);
                 let block = out.values.each_ref().map(|v| v[i].to_bits());
-                assert_eq!(block, [c.place[0], c.place[1], c.direction[0], c.direction[1]].map(f64::to_bits));
+                assert_eq!(
+                    block,
+                    [c.place[0], c.place[1], c.direction[0], c.direction[1]].map(f64::to_bits)
+                );
             }
         }
     }

@@ -53,6 +53,17 @@ pub fn run<T: Send>(
     done.unwrap_or_else(|_| rounds(None))
 }
 
+/// Calls `work` inside a pool of `threads` threads (0: one per core), where rayon's parallel loops run; tells it whether
+/// there is such a pool, which a system may refuse. The threads live as long as the call.
+pub fn within<T: Send>(threads: usize, work: impl Fn(bool) -> T + Sync) -> T {
+    if threads == 1 {
+        return work(false);
+    }
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    let done = builder.build_scoped(rayon::ThreadBuilder::run, |pool| pool.install(|| work(true)));
+    done.unwrap_or_else(|_| work(false))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
