@@ -5,6 +5,7 @@
 
 pub mod cone;
 pub mod counts;
+pub mod field;
 pub mod polya;
 pub mod surface;
 pub mod view;

@@ -1,0 +1,175 @@
+//! What an observer sees of a light field: luminance averaged over each pixel, by quadrature.
+
+use rayon::prelude::*;
+
+use etendue_math::Vec3;
+use etendue_sampling::ordered;
+
+use super::{LightField, Reading};
+use crate::view::View;
+
+/// Pixels in one unit of work.
+const CHUNK: usize = 256;
+
+/// Mean luminance of each pixel and its standard deviation, row by row; the same bits for any number of threads.
+///
+/// The average runs over `samples` points of a rank-1 lattice in the pixel: of all point sets that small its shadows on
+/// rows, columns and slanted edges are the most even. Deviations of the points add up, as they err together.
+#[must_use]
+pub fn look(field: &LightField, view: &View, samples: u32, threads: usize) -> Vec<Reading> {
+    let points = lattice(samples);
+    let mut pixels = vec![Reading::default(); view.pixels()];
+    let fill = |(chunk, pixels): (usize, &mut [Reading])| {
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            *pixel = see(field, view, chunk * CHUNK + i, &points);
+        }
+    };
+    if threads == 1 || pixels.len() <= CHUNK {
+        pixels.chunks_mut(CHUNK).enumerate().for_each(fill);
+        return pixels;
+    }
+    ordered::within(threads, |parallel| {
+        let mut pixels = vec![Reading::default(); view.pixels()];
+        if parallel {
+            pixels.par_chunks_mut(CHUNK).enumerate().for_each(fill);
+        } else {
+            pixels.chunks_mut(CHUNK).enumerate().for_each(fill);
+        }
+        pixels
+    })
+}
+
+fn see(field: &LightField, view: &View, pixel: usize, points: &[[f64; 2]]) -> Reading {
+    let (row, column) = (pixel / view.columns as usize, pixel % view.columns as usize);
+    let mut sum = Reading::default();
+    for [du, dv] in points {
+        let u = ((column as f64 + du) / f64::from(view.columns) - 0.5) * view.width;
+        let v = (0.5 - (row as f64 + dv) / f64::from(view.rows)) * view.height;
+        let point = view.target + view.right * u + view.up * v;
+        let reading = field.luminance(point, (view.eye - point).normalized());
+        sum.value += reading.value;
+        sum.deviation += reading.deviation;
+    }
+    let share = 1.0 / points.len() as f64;
+    Reading {
+        value: sum.value * share,
+        deviation: sum.deviation * share,
+    }
+}
+
+/// Luminance along lines given by points and directions.
+#[must_use]
+pub fn along(field: &LightField, points: &[[f64; 3]], directions: &[[f64; 3]], threads: usize) -> Vec<Reading> {
+    let read = |(p, k): (&[f64; 3], &[f64; 3])| field.luminance(Vec3::from(*p), Vec3::from(*k).normalized());
+    if threads == 1 || points.len() <= CHUNK {
+        return points.iter().zip(directions).map(read).collect();
+    }
+    ordered::within(threads, |parallel| {
+        if parallel {
+            points
+                .par_iter()
+                .zip(directions)
+                .with_min_len(CHUNK)
+                .map(read)
+                .collect()
+        } else {
+            points.iter().zip(directions).map(read).collect()
+        }
+    })
+}
+
+/// A rank-1 lattice in the unit square: (i + ½)/n and the fractions of i·g/n, g the number prime to n next to n/φ.
+fn lattice(n: u32) -> Vec<[f64; 2]> {
+    let n = n.max(1);
+    let ideal = f64::from(n) * 0.618_033_988_749_894_9;
+    let prime_to_n = |g: &u32| gcd(*g, n) == 1;
+    let generator = (1..=n)
+        .filter(prime_to_n)
+        .min_by(|a, b| (f64::from(*a) - ideal).abs().total_cmp(&(f64::from(*b) - ideal).abs()))
+        .unwrap_or(1);
+    (0..n)
+        .map(|i| {
+            let second = u64::from(i) * u64::from(generator) % u64::from(n);
+            [
+                (f64::from(i) + 0.5) / f64::from(n),
+                (second as f64 + 0.5) / f64::from(n),
+            ]
+        })
+        .collect()
+}
+
+const fn gcd(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::tests::rough;
+
+    fn view() -> View {
+        View {
+            eye: Vec3::new(300.0, 200.0, 900.0),
+            target: Vec3::new(0.3, -0.2, 0.7),
+            right: Vec3::new(1.0, 0.0, 0.0),
+            up: Vec3::new(0.0, 1.0, 0.0),
+            normal: Vec3::new(0.0, 0.0, 1.0),
+            width: 4.0,
+            height: 3.0,
+            columns: 40,
+            rows: 30,
+        }
+    }
+
+    #[test]
+    fn lattices_hit_every_row_and_column_once() {
+        for n in [1, 2, 3, 8, 16, 64] {
+            for axis in 0..2 {
+                let mut seen: Vec<f64> = lattice(n).iter().map(|p| p[axis]).collect();
+                seen.sort_by(f64::total_cmp);
+                for (i, x) in (0..).zip(seen) {
+                    assert!((x - (f64::from(i) + 0.5) / f64::from(n)).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn maps_converge_to_the_average_of_many_points_and_have_the_same_bits_on_any_threads() {
+        let field = LightField {
+            parts: (0..4).map(rough).collect(),
+        };
+        let (coarse, fine) = (look(&field, &view(), 16, 2), look(&field, &view(), 4096, 2));
+        assert_eq!(coarse, look(&field, &view(), 16, 1));
+        assert_eq!(coarse, look(&field, &view(), 16, 7));
+        let total: f64 = fine.iter().map(|r| r.value).sum();
+        let difference: f64 = coarse.iter().zip(&fine).map(|(a, b)| (a.value - b.value).abs()).sum();
+        assert!(total > 0.0 && difference < 0.05 * total, "{difference} {total}");
+        // A pixel's own average, point by point, through the public reading.
+        let v = view();
+        let pixel = 15 * 40 + 17;
+        let mut sum = 0.0;
+        for [du, dv] in lattice(16) {
+            let u = ((17.0 + du) / 40.0 - 0.5) * 4.0;
+            let w = (0.5 - (15.0 + dv) / 30.0) * 3.0;
+            let point = v.target + v.right * u + v.up * w;
+            sum += field.luminance(point, (v.eye - point).normalized()).value / 16.0;
+        }
+        assert!((coarse[pixel].value / sum - 1.0).abs() < 1e-12 && sum > 0.0);
+    }
+
+    #[test]
+    fn lines_are_read_in_order() {
+        let field = LightField {
+            parts: (0..4).map(rough).collect(),
+        };
+        let points: Vec<[f64; 3]> = (0..2000).map(|i| [f64::from(i) * 1e-3 - 1.0, 0.2, 3.0]).collect();
+        let directions = vec![[0.1, 0.2, 1.0]; 2000];
+        let readings = along(&field, &points, &directions, 2);
+        assert_eq!(readings, along(&field, &points, &directions, 1));
+        assert_eq!(
+            readings[700],
+            field.luminance(points[700].into(), Vec3::from(directions[700]).normalized())
+        );
+    }
+}

@@ -1,0 +1,101 @@
+//! Exact sampling of a table: one uniform number, two look-ups.
+
+/// Alias table (Walker 1977; construction of Vose 1991, `[Vose1991]`) over weights that need not add up to one.
+#[derive(Clone, Debug)]
+pub struct Alias {
+    /// For each entry the chance of itself, else of its alias.
+    slots: Vec<(f64, u32)>,
+}
+
+impl Alias {
+    /// A table over weights ≥ 0; None if there are none, their sum is not above 0 and finite, or there are 2³² or more.
+    #[must_use]
+    pub fn new(weights: &[f64]) -> Option<Self> {
+        let count = u32::try_from(weights.len()).ok()?;
+        let total: f64 = weights.iter().sum();
+        if !(total > 0.0 && total.is_finite()) || weights.iter().any(|w| *w < 0.0) {
+            return None;
+        }
+        let scale = f64::from(count) / total;
+        let mut slots: Vec<(f64, u32)> = weights.iter().zip(0..count).map(|(w, i)| (w * scale, i)).collect();
+        let (mut poor, mut rich): (Vec<u32>, Vec<u32>) = (0..count).partition(|i| slots[*i as usize].0 < 1.0);
+        while let (Some(small), Some(large)) = (poor.pop(), rich.last().copied()) {
+            let missing = 1.0 - slots[small as usize].0;
+            slots[small as usize].1 = large;
+            slots[large as usize].0 -= missing;
+            if slots[large as usize].0 < 1.0 {
+                rich.pop();
+                poor.push(large);
+            }
+        }
+        // Whatever is left differs from one by rounding only.
+        for i in rich.into_iter().chain(poor) {
+            if weights[i as usize] > 0.0 {
+                slots[i as usize] = (1.0, i);
+            }
+        }
+        Some(Self { slots })
+    }
+
+    /// The entry for a uniform number in (0, 1).
+    #[inline]
+    #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "below the number of slots"
+    )]
+    pub fn pick(&self, u: f64) -> usize {
+        let scaled = u * self.slots.len() as f64;
+        let slot = (scaled as usize).min(self.slots.len() - 1);
+        let (chance, alias) = self.slots[slot];
+        if scaled - (slot as f64) < chance {
+            slot
+        } else {
+            alias as usize
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_entry_has_its_share_exactly() {
+        // The share of an entry, from the table itself: own chances and what aliases hand over.
+        for weights in [
+            vec![1.0],
+            vec![0.0, 3.0, 1.0, 0.0, 0.5],
+            (0..1000_u32).map(|i| f64::from(i * i % 97)).collect(),
+        ] {
+            let table = Alias::new(&weights).expect("positive");
+            let n = weights.len() as f64;
+            let mut shares = vec![0.0; weights.len()];
+            for (i, (chance, alias)) in table.slots.iter().enumerate() {
+                shares[i] += chance / n;
+                shares[*alias as usize] += (1.0 - chance) / n;
+            }
+            let total: f64 = weights.iter().sum();
+            for (share, weight) in shares.iter().zip(&weights) {
+                assert!((share - weight / total).abs() < 1e-12);
+            }
+            for k in 0..10_000 {
+                assert!(weights[table.pick((f64::from(k) + 0.5) / 10_000.0)] > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn tables_without_a_meaning_are_refused() {
+        for weights in [
+            vec![],
+            vec![0.0, 0.0],
+            vec![1.0, -1.0],
+            vec![f64::NAN],
+            vec![f64::INFINITY, 1.0],
+        ] {
+            assert!(Alias::new(&weights).is_none());
+        }
+    }
+}
