@@ -25,7 +25,7 @@ class _Moments(TypedDict):
     weighted_outer: list[float]
     focus_rhs: list[float]
 
-class _Cone(TypedDict):
+class _View(TypedDict):
     eye: Sequence[float]
     target: Sequence[float]
     right: Sequence[float]
@@ -35,7 +35,39 @@ class _Cone(TypedDict):
     height: float
     columns: int
     rows: int
+
+class _Cone(TypedDict):
+    view: _View
     acceptances: Sequence[float]
+
+class _Part(TypedDict):
+    shape: str
+    centre: Sequence[float]
+    x: Sequence[float]
+    y: Sequence[float]
+    z: Sequence[float]
+    size: Sequence[float]
+
+class _FieldPart(TypedDict):
+    part: _Part
+    cells: Sequence[int]
+    ratio: npt.NDArray[np.float32]
+    deviation: npt.NDArray[np.float32]
+    space: _Floats | None
+    direction: _Floats | None
+    level: float
+
+class _Counts(TypedDict):
+    grid: tuple[npt.NDArray[np.uint32] | _Floats, _Floats | None]
+    space: tuple[npt.NDArray[np.uint32] | _Floats, _Floats | None]
+    direction: tuple[npt.NDArray[np.uint32] | _Floats, _Floats | None]
+    weight: float | None
+    kept_part: npt.NDArray[np.int64]
+    kept_weight: _Floats
+    kept: _Floats
+    unmet_rays: int
+    unmet_flux: float
+    tally: _Tally
 
 @final
 class RayTable:
@@ -60,21 +92,73 @@ class RingSource:
     def __new__(cls, rings: Sequence[tuple[float, float, float, int]], runs: int, seed: int) -> RingSource: ...
     def __len__(self) -> int: ...
 
-def read_rays(source: RayTable | RingSource, start: int, stop: int) -> tuple[_Floats, _Floats, _Floats]:
+@final
+class LightField:
+    """The light that leaves the parts of a carrier surface, ready to be read, looked at and drawn from."""
+
+    def __new__(cls, parts: Sequence[_FieldPart]) -> LightField: ...
+    def flux(self) -> list[float]:
+        """Flux of each part: ∫ L dU."""
+
+    def luminance(
+        self, points: _Floats, directions: _Floats, threads: int | None = None
+    ) -> tuple[_Floats, _Floats]:
+        """Luminance and its standard deviation along lines given by points (n, 3) and directions (n, 3)."""
+
+    def at(self, part: int, coordinates: _Floats) -> tuple[_Floats, _Floats]:
+        """Luminance and its standard deviation at coordinates (n, 4) of a part."""
+
+    def look(self, view: _View, samples: int, threads: int | None = None) -> tuple[_Floats, _Floats]:
+        """Mean luminance of each pixel and its standard deviation, shape (rows, columns)."""
+
+@final
+class FieldRays:
+    """A number of equal rays drawn from a field, with the field's flux."""
+
+    def __new__(cls, field: LightField, rays: int, seed: int) -> FieldRays: ...
+    def __len__(self) -> int: ...
+
+_Source: TypeAlias = RayTable | RingSource | FieldRays
+
+def read_rays(source: _Source, start: int, stop: int) -> tuple[_Floats, _Floats, _Floats]:
     """Rays ``start..stop`` as (position (n, 3) [mm], unit direction (n, 3), flux (n,))."""
 
 def scan(
-    source: RayTable | RingSource, threads: int | None = None, progress: _Progress | None = None
+    source: _Source, threads: int | None = None, progress: _Progress | None = None
 ) -> tuple[_Tally, _Moments]:
     """One pass over a source."""
 
 def cone_sums(
-    source: RayTable | RingSource,
+    source: _Source,
     cones: Sequence[_Cone],
     threads: int | None = None,
     progress: _Progress | None = None,
 ) -> tuple[list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]], _Tally]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the tally."""
+
+def count_rays(
+    source: _Source,
+    parts: Sequence[_Part],
+    depths: Sequence[int],
+    fine: Sequence[int],
+    held_out: float,
+    kept: float,
+    seed: int,
+    threads: int | None = None,
+    progress: _Progress | None = None,
+) -> _Counts:
+    """One pass: (Σ w, Σ w²) per cell of three grids; cells by fold (fitted, held out), part, coordinates.
+
+    Where all rays have one weight, the first of each pair counts rays and the second is None.
+    """
+
+def cross_parts(
+    parts: Sequence[_Part], position: _Floats, direction: _Floats
+) -> tuple[npt.NDArray[np.int64], _Floats]:
+    """For each ray the first part its line leaves (-1: none), and its coordinates (n, 4) there."""
+
+def rays_of_part(part: _Part, coordinates: _Floats) -> tuple[_Floats, _Floats]:
+    """Points (n, 3) and directions (n, 3) at coordinates (n, 4) of a part."""
 
 _Masses: TypeAlias = _Floats | Sequence[tuple[int, _Floats]]
 

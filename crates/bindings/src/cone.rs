@@ -1,6 +1,5 @@
 //! The cone estimator.
 
-use etendue_lightfield::View;
 use etendue_lightfield::cone::{Cone as CoreCone, cone_sums as core_cone_sums};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -9,38 +8,20 @@ use pyo3::types::PyDict;
 use crate::run::interruptible;
 use crate::scan::tally_dict;
 use crate::source::with_source;
+use crate::view::View;
 
 /// A view with its acceptances, as Python hands it over.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Cone {
-    eye: [f64; 3],
-    target: [f64; 3],
-    right: [f64; 3],
-    up: [f64; 3],
-    normal: [f64; 3],
-    width: f64,
-    height: f64,
-    columns: u32,
-    rows: u32,
+    view: View,
     acceptances: Vec<f64>,
 }
 
 impl Cone {
     fn core(&self) -> CoreCone {
-        let view = View {
-            eye: self.eye.into(),
-            target: self.target.into(),
-            right: self.right.into(),
-            up: self.up.into(),
-            normal: self.normal.into(),
-            width: self.width,
-            height: self.height,
-            columns: self.columns,
-            rows: self.rows,
-        };
         CoreCone {
-            view,
+            view: self.view.core(),
             acceptances: self.acceptances.clone(),
         }
     }
@@ -72,7 +53,8 @@ pub fn cone_sums<'py>(
         .into_iter()
         .zip(&cones)
         .map(|(sum, cone)| {
-            let shape = [cone.acceptances.len(), cone.rows as usize, cone.columns as usize];
+            let view = cone.view.core();
+            let shape = [cone.acceptances.len(), view.rows as usize, view.columns as usize];
             Ok((
                 PyArray1::from_vec(py, sum.flux).reshape(shape)?,
                 PyArray1::from_vec(py, sum.flux_squared).reshape(shape)?,

@@ -4,11 +4,15 @@
 //! between rounds of batches to report progress and to honour Ctrl-C.
 
 mod cone;
+mod counts;
+mod field;
 mod polya;
 mod run;
 mod scan;
 mod source;
 mod subset;
+mod surface;
+mod view;
 
 use pyo3::prelude::*;
 
@@ -17,9 +21,14 @@ use pyo3::prelude::*;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<source::RayTable>()?;
     module.add_class::<source::RingSource>()?;
+    module.add_class::<field::LightField>()?;
+    module.add_class::<field::FieldRays>()?;
     module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;
     module.add_function(wrap_pyfunction!(scan::scan, module)?)?;
     module.add_function(wrap_pyfunction!(cone::cone_sums, module)?)?;
+    module.add_function(wrap_pyfunction!(counts::count_rays, module)?)?;
+    module.add_function(wrap_pyfunction!(surface::cross_parts, module)?)?;
+    module.add_function(wrap_pyfunction!(surface::rays_of_part, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_posterior, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_evidence, module)?)?;
     module.add_function(wrap_pyfunction!(subset::select_subset, module)?)?;

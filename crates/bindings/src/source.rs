@@ -4,10 +4,13 @@ use std::ops::Range;
 
 use etendue_geometry::table::{Float, Layout, RayTable as CoreTable};
 use etendue_geometry::{RayBatch, RaySource};
+use etendue_lightfield::field::draw::FieldRays as CoreFieldRays;
 use etendue_optics::source::{Ring, RingSource as CoreRings};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+use crate::field::FieldRays;
 
 /// Ray records over the bytes of an array: in memory, or mapped from a file.
 #[pyclass(frozen, module = "etendue._core")]
@@ -80,10 +83,11 @@ impl RingSource {
     }
 }
 
-/// Either source, borrowed for the time of a call.
+/// Any source, borrowed for the time of a call.
 pub enum Source<'a> {
     Table(CoreTable<'a>),
     Rings(&'a CoreRings),
+    Field(CoreFieldRays<'a>),
 }
 
 impl RaySource for Source<'_> {
@@ -91,6 +95,7 @@ impl RaySource for Source<'_> {
         match self {
             Self::Table(table) => table.len(),
             Self::Rings(rings) => rings.len(),
+            Self::Field(rays) => rays.len(),
         }
     }
 
@@ -98,6 +103,7 @@ impl RaySource for Source<'_> {
         match self {
             Self::Table(table) => table.fill(range, batch),
             Self::Rings(rings) => rings.fill(range, batch),
+            Self::Field(rays) => rays.fill(range, batch),
         }
     }
 }
@@ -110,6 +116,8 @@ pub fn with_source<R>(source: &Bound<'_, PyAny>, body: impl FnOnce(&Source<'_>) 
         let core = CoreTable::new(bytes.as_slice()?, table.layout)
             .ok_or_else(|| PyValueError::new_err("the ray table changed its size"))?;
         body(&Source::Table(core))
+    } else if let Ok(rays) = source.cast::<FieldRays>() {
+        body(&Source::Field(rays.get().core()))
     } else {
         body(&Source::Rings(&source.cast::<RingSource>()?.get().0))
     }

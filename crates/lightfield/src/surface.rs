@@ -64,7 +64,7 @@ pub struct Crossing {
 fn crossing(inside: bool, place: (f64, f64), p: f64, q: f64) -> Crossing {
     let (s1, s2) = place;
     let (a, b) = disk_to_square(p, q);
-    let met = inside & (s1 >= 0.0) & (s1 <= 1.0) & (s2 >= 0.0) & (s2 <= 1.0);
+    let met = inside & (0.0..=1.0).contains(&s1) & (0.0..=1.0).contains(&s2);
     // Rounding may carry a grazing direction out of the square by some 1e-16.
     Crossing {
         met,

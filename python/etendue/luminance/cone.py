@@ -110,16 +110,7 @@ def cone_estimates(
 
 
 def _core_cone(view: ConeView) -> _core._Cone:
-    right, up, normal = view.screen.axes(view.observer)
     return {
-        "eye": view.observer.position.tolist(),
-        "target": view.observer.target,
-        "right": right.tolist(),
-        "up": up.tolist(),
-        "normal": normal.tolist(),
-        "width": float(view.screen.width),
-        "height": float(view.screen.height),
-        "columns": view.screen.columns,
-        "rows": view.screen.rows,
+        "view": view.screen.core_view(view.observer),
         "acceptances": [math.radians(a) for a in view.acceptances],
     }

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 
 Plane = Literal["view", "xy"]
@@ -182,6 +183,21 @@ class Screen:
                 "Screen: plane='xy' seen from theta = 90° has no apparent area; use plane='view' or another theta."
             )
         return np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+
+    def core_view(self, observer: Observer) -> _core._View:
+        """The observer's view of this screen as the compiled core takes it."""
+        right, up, normal = self.axes(observer)
+        return {
+            "eye": observer.position.tolist(),
+            "target": observer.target,
+            "right": right.tolist(),
+            "up": up.tolist(),
+            "normal": normal.tolist(),
+            "width": float(self.width),
+            "height": float(self.height),
+            "columns": self.columns,
+            "rows": self.rows,
+        }
 
     def cosine(self, observer: Observer) -> npt.NDArray[np.float64]:
         """Cosine between the grid's normal and the line from each pixel centre to the observer, shape (rows, columns).

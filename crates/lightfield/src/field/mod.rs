@@ -1,6 +1,6 @@
 //! A light field: luminance at any point of a carrier surface, in any direction.
 //!
-//! On each part of the surface L(z) = level · B_s(s₁, s₂) · B_d(a, b) · r(z): two factors that are bilinear on fine grids
+//! On each part of the surface L(z) = level · `B_s(s₁`, s₂) · `B_d(a`, b) · r(z): two factors that are bilinear on fine grids
 //! and a ratio that is linear in each of the four coordinates between the centres of its cells. Read-out (`PartField::at`)
 //! and sampling (`draw`) are of one and the same function. Theory eqs. 37 to 39.
 
@@ -24,9 +24,9 @@ pub struct PartField {
     pub cells: [usize; 4],
     /// Ratio and its standard deviation at each cell's centre, last coordinate fastest.
     pub ratio: Vec<[f32; 2]>,
-    /// B_s.
+    /// `B_s`.
     pub space: Factor,
-    /// B_d.
+    /// `B_d`.
     pub direction: Factor,
     /// Luminance where all factors and the ratio are 1.
     pub level: f64,

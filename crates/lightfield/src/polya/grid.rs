@@ -149,7 +149,7 @@ impl Step {
             let start = ((first & !(2 * block - 1)) >> 1) + (first & (block - 1));
             out.copy_from_slice(&coarser[start..start + n]);
         } else {
-            let wholes = coarser[first / 2..(first + n) / 2].chunks_exact(block);
+            let wholes = coarser[first / 2..usize::midpoint(first, n)].chunks_exact(block);
             for (whole, pair) in wholes.zip(out.chunks_exact_mut(2 * block)) {
                 pair[..block].copy_from_slice(whole);
                 pair[block..].copy_from_slice(whole);

@@ -18,7 +18,7 @@ pub use base::Base;
 pub use grid::Grid;
 
 /// Boxes in one unit of work: a power of two whose scratch arrays fit the first caches.
-const CHUNK: usize = 1024;
+const CHUNK: usize = 256;
 
 /// Weighted points on the cells of a grid, and the measure they are compared with.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,175 @@
+//! Light fields as Python objects.
+
+use std::sync::Arc;
+
+use etendue_lightfield::field::draw::{FieldRays as CoreRays, Sampler};
+use etendue_lightfield::field::look::{along, look};
+use etendue_lightfield::field::{Factor, LightField as CoreField, PartField, Reading};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::surface::{Part, vectors};
+use crate::view::View;
+
+/// The light that leaves one part, as Python hands it over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct FieldPart<'py> {
+    part: Part,
+    cells: [usize; 4],
+    ratio: PyReadonlyArray1<'py, f32>,
+    deviation: PyReadonlyArray1<'py, f32>,
+    space: Option<PyReadonlyArray2<'py, f64>>,
+    direction: Option<PyReadonlyArray2<'py, f64>>,
+    level: f64,
+}
+
+impl FieldPart<'_> {
+    fn core(&self) -> PyResult<PartField> {
+        let refuse = |message: &str| PyValueError::new_err(message.to_owned());
+        let part = self.part.core()?;
+        let (ratio, deviation) = (self.ratio.as_slice()?, self.deviation.as_slice()?);
+        let cells: usize = self.cells.iter().product();
+        if ratio.len() != cells || deviation.len() != cells || !self.cells.iter().all(|n| n.is_power_of_two()) {
+            return Err(refuse(
+                "ratio and deviation need one entry per cell, and powers of two cells along each axis",
+            ));
+        }
+        let sound = |v: &[f32]| v.iter().all(|r| *r >= 0.0 && r.is_finite());
+        if !(sound(ratio) && sound(deviation) && self.level >= 0.0 && self.level.is_finite()) {
+            return Err(refuse("ratio, deviation and level must be finite and not negative"));
+        }
+        let factor = |values: Option<&PyReadonlyArray2<'_, f64>>, wraps: bool| match values {
+            None => Ok(Factor::one()),
+            Some(values) => Factor::new(values.shape()[0], values.as_slice()?.to_vec(), wraps)
+                .ok_or_else(|| refuse("a factor needs n × n values, n a power of two, finite and not negative")),
+        };
+        Ok(PartField {
+            part,
+            cells: self.cells,
+            ratio: ratio.iter().zip(deviation).map(|(r, d)| [*r, *d]).collect(),
+            space: factor(self.space.as_ref(), part.wraps())?,
+            direction: factor(self.direction.as_ref(), false)?,
+            level: self.level,
+        })
+    }
+}
+
+/// A light field, ready to be read, looked at and drawn from.
+#[pyclass(frozen, module = "etendue._core")]
+pub struct LightField(Arc<Sampler>);
+
+type Readings<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
+fn readings(py: Python<'_>, readings: Vec<Reading>) -> Readings<'_> {
+    let values = readings.iter().map(|r| r.value).collect();
+    let deviations = readings.iter().map(|r| r.deviation).collect();
+    (PyArray1::from_vec(py, values), PyArray1::from_vec(py, deviations))
+}
+
+#[pymethods]
+impl LightField {
+    #[new]
+    fn new(py: Python<'_>, parts: Vec<FieldPart<'_>>) -> PyResult<Self> {
+        let parts = parts.iter().map(FieldPart::core).collect::<PyResult<Vec<_>>>()?;
+        let sampler = py.detach(|| Sampler::new(CoreField { parts }));
+        let sampler = sampler.ok_or_else(|| PyValueError::new_err("a light field needs flux"))?;
+        Ok(Self(Arc::new(sampler)))
+    }
+
+    /// Flux of each part.
+    fn flux(&self) -> Vec<f64> {
+        self.0.flux().to_vec()
+    }
+
+    /// Luminance and its standard deviation along lines given by points and directions.
+    #[pyo3(signature = (points, directions, threads=None))]
+    fn luminance<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+        directions: PyReadonlyArray2<'py, f64>,
+        threads: Option<usize>,
+    ) -> PyResult<Readings<'py>> {
+        let (points, directions) = (vectors(&points)?, vectors(&directions)?);
+        if points.len() != directions.len() {
+            return Err(PyValueError::new_err("points and directions differ in number"));
+        }
+        let found = py.detach(|| along(self.0.field(), &points, &directions, threads.unwrap_or(0)));
+        Ok(readings(py, found))
+    }
+
+    /// Luminance and its standard deviation at coordinates (s₁, s₂, a, b) of a part.
+    fn at<'py>(
+        &self,
+        py: Python<'py>,
+        part: usize,
+        coordinates: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Readings<'py>> {
+        let Some(field) = self.0.field().parts.get(part) else {
+            return Err(PyValueError::new_err(format!("there is no part {part}")));
+        };
+        if coordinates.shape()[1] != 4 {
+            return Err(PyValueError::new_err("an array of shape (n, 4) is needed"));
+        }
+        let rows = coordinates.as_slice()?;
+        let found = py.detach(|| {
+            rows.chunks_exact(4)
+                .map(|c| field.at([c[0], c[1]], [c[2], c[3]]))
+                .collect()
+        });
+        Ok(readings(py, found))
+    }
+
+    /// Mean luminance of each pixel of a view and its standard deviation, shape (rows, columns).
+    #[pyo3(signature = (view, samples, threads=None))]
+    fn look<'py>(
+        &self,
+        py: Python<'py>,
+        view: View,
+        samples: u32,
+        threads: Option<usize>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let view = view.core();
+        let found = py.detach(|| look(self.0.field(), &view, samples, threads.unwrap_or(0)));
+        let shape = [view.rows as usize, view.columns as usize];
+        let (values, deviations) = readings(py, found);
+        Ok((values.reshape(shape)?, deviations.reshape(shape)?))
+    }
+}
+
+/// A number of equal rays drawn from a field.
+#[pyclass(frozen, module = "etendue._core")]
+pub struct FieldRays {
+    sampler: Arc<Sampler>,
+    rays: u64,
+    seed: u64,
+}
+
+impl FieldRays {
+    /// The core's source of these rays.
+    pub fn core(&self) -> CoreRays<'_> {
+        CoreRays {
+            sampler: &self.sampler,
+            rays: self.rays,
+            seed: self.seed,
+        }
+    }
+}
+
+#[pymethods]
+impl FieldRays {
+    #[new]
+    fn new(field: &LightField, rays: u64, seed: u64) -> Self {
+        Self {
+            sampler: Arc::clone(&field.0),
+            rays,
+            seed,
+        }
+    }
+
+    fn __len__(&self) -> PyResult<usize> {
+        Ok(usize::try_from(self.rays)?)
+    }
+}
