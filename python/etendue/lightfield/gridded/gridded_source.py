@@ -1,0 +1,271 @@
+"""A ray file as surface sources, each with an intensity distribution of its own: chapter 3 of the thesis."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import operator
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+from etendue.lightfield.gridded import angular
+from etendue.lightfield.gridded.fitting import Account, all_batches, fill_bins, lit_pixels, patches_of
+from etendue.lightfield.gridded.pixelated import PixelatedSurface
+from etendue.lightfield.gridded.pixels import Array
+from etendue.lightfield.gridded.sampling import RECORD, sampled_records
+from etendue.lightfield.gridded.summing import summed_intensity
+from etendue.lightfield.surfaces import Surface
+from etendue.quantities.intensity import Intensity
+from etendue.quantities.patches import Patches
+from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_stream import Progress, RayStream
+from etendue.quantities.spool import spool
+from etendue.units import MM2_PER_M2, FluxUnit
+
+LINES = 1 << 18
+"""Lines that `GriddedSource.luminance` follows at once."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GriddedSource:
+    """A ray file sampled into surface sources: sections 3.2.2 and 3.3.2 of [Audenaert2014]_; made by `fit`.
+
+    Parameters
+    ----------
+    surface : PixelatedSurface
+        The carrier surface and its pixels.
+    patches : Patches
+        The pixels that light comes from, each with its table.
+    account : Account
+        Where the rays went.
+    pixel : float
+        Δd [mm].
+    threshold : float
+        Of E [%].
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> from etendue.lightfield.surfaces import Disk
+    >>> rays = et.RingSource(rays=100_000, seed=3)
+    >>> grid = GriddedSource.fit(rays, Disk(radius=30), pixel=10, threshold=2.1)
+    >>> len(grid.patches), round(grid.total_flux, 6)
+    (36, 600.0)
+    >>> seen = grid.luminance([[4, 4, 0], [40, 4, 0]], [[0.5, 0, 1], [0.5, 0, 1]])      # [cd/m²]
+    >>> bool(seen[0] > 1e5), float(seen[1])
+    (True, 0.0)
+    """
+
+    surface: PixelatedSurface
+    patches: Patches
+    account: Account
+    pixel: float
+    threshold: float
+
+    @classmethod
+    def fit(
+        cls,
+        rays: RayStream,
+        surface: Surface,
+        pixel: float = 1.0,
+        threshold: float = 0.021,
+        parallels: int | None = None,
+        progress: Progress | None = None,
+    ) -> GriddedSource:
+        """Sample rays into surface sources.
+
+        Every pixel of the surface gets the intensities of its own rays in angular bins, which are made finer, step by
+        step from Δθ = 30° and Δφ = 90° to 1° and 1°, until the flux that eq. 3.2 integrates from them agrees with that of
+        the rays. The rays are read twice, in batches; memory holds 1.4 kB for each lit pixel, and the bins.
+
+        Parameters
+        ----------
+        rays : RayStream
+            With positions. A ray belongs to the first part of the surface that its line crosses outwards.
+        surface : Surface
+            Open dimensions are taken from the rays.
+        pixel : float
+            Δd [mm], the side of the squares on flat parts.
+        threshold : float
+            The largest E that is good enough, in percent: 0.021 means 0.021 %.
+        parallels : int, optional
+            N, that divide a hemisphere into (2N - 1)² cells. None: as many as give cells the area of Δd² most nearly.
+        progress : callable, optional
+            Called with the number of rays done, counted over both passes together.
+
+        Returns
+        -------
+        GriddedSource
+
+        Raises
+        ------
+        ArgumentError
+            If a number is out of its domain, the rays have no positions, none of them leaves the surface, or there are
+            too many pixels or bins.
+        """
+        check_threshold(threshold)
+        batches = all_batches(rays, 2, progress)
+        lit = lit_pixels(batches, PixelatedSurface.cut(surface.sized_for(rays), pixel, parallels))
+        steps = angular.first_within(angular.quadrature_errors(lit.rings), threshold)
+        bins = fill_bins(batches, lit, steps == np.arange(len(angular.SEQUENCE))[:, None])
+        step = f"sampled on {lit.surface.surface.spec}, pixel {pixel:g} mm, threshold {threshold:g} %"
+        patches = patches_of(lit, bins, steps, rays.flux_unit, rays.provenance.then(step))
+        return cls(lit.surface, patches, lit.account, float(pixel), float(threshold))
+
+    @property
+    def flux_unit(self) -> FluxUnit:
+        """``"lm"`` or ``"W"``."""
+        return self.patches.flux_unit
+
+    @property
+    def total_flux(self) -> float:
+        """Of the rays on patches [`flux_unit`]."""
+        return float(self.patches.flux.sum())
+
+    @property
+    def table_flux(self) -> float:
+        """What the tables integrate to, exactly [`flux_unit`]: the flux that `luminance`, `sample` and ray tracers give."""
+        return float(self.patches.table_flux.sum())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know."""
+        patches, unit = self.patches, self.flux_unit
+        finest = int((patches.error > self.threshold).sum())
+        bins = f"{patches.bins.mean():,.0f} bins in the mean, {patches.bins.min():,} to {patches.bins.max():,}"
+        found = [f"{len(patches):,} patches with {bins}"]
+        if self.surface.parallels is not None:
+            n = self.surface.parallels
+            found.append(f"hemispheres in {(2 * n - 1) ** 2:,} cells of equal area by {n} parallels")
+        if finest:
+            found.append(f"{finest:,} patches do not reach E = {self.threshold:g} % even with the finest bins")
+        share = f"{self.table_flux / self.total_flux - 1:+.3%}".replace("-", "−")
+        found.append(
+            f"the rays on patches have {self.total_flux:.7g} {unit}, the tables {self.table_flux:.7g} {unit} ({share})"
+        )
+        return (*found, *self.account.notes(unit))
+
+    def luminance(self, points: npt.ArrayLike, directions: npt.ArrayLike) -> Array:
+        """Luminance of the light that leaves along lines, as a reverse ray tracer finds it.
+
+        Each line is followed to the patches that it leaves through, one on each part of the surface at most, and their
+        I(θ, φ) / (A cos θ) are added up: light from a window passes the dome above it.
+
+        Parameters
+        ----------
+        points : array_like, shape (m, 3)
+            Any point of each line [mm].
+        directions : array_like, shape (m, 3)
+            In which the light travels, of any length above 0.
+
+        Returns
+        -------
+        array, shape (m,)
+            [cd/m²], or W/(m² sr) when `flux_unit` is ``"W"``; 0 where no patch is.
+
+        Raises
+        ------
+        ArgumentError
+            If the shapes are others, a number is not finite, or a direction has no length.
+        """
+        points, directions = (np.asarray(v, dtype=np.float64) for v in (points, directions))
+        if points.ndim != 2 or points.shape[1] != 3 or points.shape != directions.shape:
+            raise ArgumentError(
+                f"luminance: points {points.shape} and directions {directions.shape}; give (m, 3) of each."
+            )
+        length = np.linalg.norm(directions, axis=1)
+        if not (np.isfinite(points).all() and np.isfinite(length).all() and (length > 0.0).all()):
+            raise ArgumentError("luminance: a point or direction is not finite, or a direction has no length.")
+        return np.concatenate(
+            [
+                self._seen(points[some], directions[some] / length[some, None])
+                for some in (slice(start, start + LINES) for start in range(0, max(1, len(points)), LINES))
+            ]
+        )
+
+    def _seen(self, points: Array, directions: Array) -> Array:
+        patches, total = self.patches, np.zeros(len(points))
+        for pixel in self.surface.passed(points, directions):
+            place = np.searchsorted(patches.pixel, pixel)
+            lit = np.flatnonzero(patches.pixel[np.minimum(place, len(patches) - 1)] == pixel)
+            patch = place[lit]
+            local = patches.local(patch, directions[lit])
+            # Before 90° the intensity falls to 0 as the cosine does.
+            cosine = np.where(local[:, 2] > 0.0, local[:, 2], np.inf)
+            total[lit] += patches.at_local(patch, local) / (patches.projected_area[patch] * cosine)
+        return total * MM2_PER_M2
+
+    def intensity(self, c_planes: int = 36, gamma_step: float = 2.5) -> Intensity:
+        """Far-field intensity of all patches together.
+
+        Parameters
+        ----------
+        c_planes : int
+            Half planes C, from 0° in equal steps.
+        gamma_step : float
+            [°], a whole part of 180.
+
+        Returns
+        -------
+        Intensity
+            Means over the cells around the nodes, to be compared with `etendue.intensity_distribution`.
+
+        Raises
+        ------
+        ArgumentError
+            If there are no such planes or steps.
+        """
+        return summed_intensity(self.patches, c_planes, gamma_step)
+
+    def sample(self, n: int, seed: int) -> RaySet:
+        """Draw rays of equal flux, patch by patch by the flux of its table, directions exactly from the table.
+
+        On a flat patch the density of rays is that of `luminance`. On a curved one rays leave each point in proportion to
+        the cosine there, so that the patch as a whole has the intensities of its table; the two differ where a patch is
+        partly beyond its own horizon.
+
+        Parameters
+        ----------
+        n : int
+            Number of rays. Sets beyond 64 MB wait in a temporary file, not in memory.
+        seed : int
+            0 to 2⁶⁴ - 1; ray i depends on n, the seed and i alone.
+
+        Returns
+        -------
+        RaySet
+            Of the flux `table_flux`.
+
+        Raises
+        ------
+        ArgumentError
+            If `n` is below 1 or the seed out of range.
+        """
+        n, seed = operator.index(n), operator.index(seed)
+        if n < 1:
+            raise ArgumentError(f"sample: {n} rays; ask for 1 or more.")
+        if not 0 <= seed < 2**64:
+            raise ArgumentError(f"sample: seed {seed}; give 0 to 2^64 - 1.")
+        records = spool(sampled_records(self.surface, self.patches, n, seed), RECORD)
+        provenance = self.patches.provenance.then(f"{n} rays drawn from {len(self.patches)} patches, seed {seed}")
+        return RaySet.from_records(records, RaySetMeaning(flux_unit=self.flux_unit, provenance=provenance))
+
+
+def check_threshold(threshold: float) -> None:
+    """Refuse what is no threshold.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+
+    Examples
+    --------
+    >>> check_threshold(0.021)
+    """
+    if not (math.isfinite(threshold) and threshold >= 0.0):
+        raise ArgumentError(
+            f"threshold is {threshold!r}; give the largest flux error of a patch in percent, 0 or more."
+        )
