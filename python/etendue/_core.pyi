@@ -108,6 +108,9 @@ class LightField:
     def at(self, part: int, coordinates: _Floats) -> tuple[_Floats, _Floats]:
         """Luminance and its standard deviation at coordinates (n, 4) of a part."""
 
+    def intensity(self, directions: _Floats, side: int, threads: int | None = None) -> _Floats:
+        """Intensity in each direction (n, 3), by a midpoint rule of side² points on every part."""
+
     def look(self, view: _View, samples: int, threads: int | None = None) -> tuple[_Floats, _Floats]:
         """Mean luminance of each pixel and its standard deviation, shape (rows, columns)."""
 

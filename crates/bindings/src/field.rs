@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use etendue_lightfield::field::draw::{FieldRays as CoreRays, Sampler};
+use etendue_lightfield::field::intensity::intensity;
 use etendue_lightfield::field::look::{along, look};
 use etendue_lightfield::field::{Factor, LightField as CoreField, PartField, Reading};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
@@ -120,6 +121,20 @@ impl LightField {
                 .collect()
         });
         Ok(readings(py, found))
+    }
+
+    /// Intensity in each direction, by a midpoint rule of `side`² points on every part.
+    #[pyo3(signature = (directions, side, threads=None))]
+    fn intensity<'py>(
+        &self,
+        py: Python<'py>,
+        directions: PyReadonlyArray2<'py, f64>,
+        side: u32,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let directions = vectors(&directions)?;
+        let found = py.detach(|| intensity(self.0.field(), &directions, side, threads.unwrap_or(0)));
+        Ok(PyArray1::from_vec(py, found))
     }
 
     /// Mean luminance of each pixel of a view and its standard deviation, shape (rows, columns).

@@ -6,6 +6,7 @@
 
 pub mod draw;
 pub mod factor;
+pub mod intensity;
 pub mod look;
 pub mod tent;
 

@@ -1,0 +1,237 @@
+"""Étendue counts: what a pass over the rays leaves of them on a carrier surface."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.lightfield.surfaces import Surface
+from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
+
+FloatArray = npt.NDArray[np.float64]
+Fold = Literal["fitted", "held out", "all"]
+
+MOST_CELLS = 1 << 26
+"""Cells of all parts together: a gigabyte for the weighted sums of both folds."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Sums:
+    """Σ w and Σ w² over the rays of each cell of one part.
+
+    Parameters
+    ----------
+    weight : array
+        Number of rays if all rays are equal, else Σ w.
+    squared : array or None
+        Σ w²; None if all rays are equal.
+    """
+
+    weight: FloatArray
+    squared: FloatArray | None
+
+    @property
+    def rays(self) -> float:
+        """Number of equal rays that would tell as much: (Σ w)²/Σ w²."""
+        total = float(self.weight.sum())
+        if self.squared is None or total == 0.0:
+            return total
+        return total**2 / float(self.squared.sum())
+
+    def map(self, change: Callable[[FloatArray], FloatArray]) -> Sums:
+        """Both sums, changed alike by a function of arrays."""
+        return Sums(change(self.weight), None if self.squared is None else change(self.squared))
+
+
+@dataclasses.dataclass(frozen=True)
+class PartCounts:
+    """The counts of one part and fold: over (s₁, s₂, a, b), over (s₁, s₂) and over (a, b) alone."""
+
+    grid: Sums
+    space: Sums
+    direction: Sums
+
+
+@dataclasses.dataclass(frozen=True)
+class KeptRays:
+    """Held-out rays with their exact coordinates.
+
+    Parameters
+    ----------
+    part : array of int, shape (n,)
+    coordinates : array, shape (n, 4)
+        (s₁, s₂, a, b), each from 0 to 1.
+    weight : array, shape (n,)
+        Relative flux.
+    """
+
+    part: npt.NDArray[np.int64]
+    coordinates: FloatArray
+    weight: FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class EtendueCounts:
+    """Counts of a ray set on a carrier surface; see `count_rays`.
+
+    Parameters
+    ----------
+    surface : Surface
+        With all its dimensions.
+    depths : tuple of int
+        Halvings of s₁, s₂, a and b.
+    folds : dict
+        Per fold the counts of each part.
+    kept : KeptRays
+        Some of the held-out rays.
+    flux_per_weight : float
+        [flux unit] per unit of the sums.
+    rays, unmet_rays : int
+        Rays with flux, and those of them that no part meets.
+    unmet_flux : float
+        Flux of the latter [flux unit].
+    tally : Tally
+        The flux account of all rays.
+    """
+
+    surface: Surface
+    depths: tuple[int, int, int, int]
+    folds: dict[Fold, tuple[PartCounts, ...]]
+    kept: KeptRays
+    flux_per_weight: float
+    rays: int
+    unmet_rays: int
+    unmet_flux: float
+    tally: Tally
+
+    def __getitem__(self, fold: Fold) -> tuple[PartCounts, ...]:
+        return self.folds[fold]
+
+    @property
+    def part_flux(self) -> tuple[float, ...]:
+        """Flux that was counted on each part [flux unit]."""
+        return tuple(float(c.grid.weight.sum()) * self.flux_per_weight for c in self["all"])
+
+
+def count_rays(
+    rays: RayStream,
+    surface: Surface,
+    depths: tuple[int, int, int, int] = (5, 5, 5, 5),
+    fine: tuple[int, int] = (8, 6),
+    *,
+    held_out: float = 0.1,
+    keep: int = 1 << 18,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> EtendueCounts:
+    """Count every ray in the cell of étendue that it crosses: one pass, whatever the size of the set.
+
+    Parameters
+    ----------
+    rays : RayStream
+    surface : Surface
+        Open dimensions are taken from the rays.
+    depths : tuple of int
+        2^depth cells along each of s₁, s₂, a, b; all have the same étendue π A / cells.
+    fine : tuple of int
+        2^depth cells along s₁ and s₂, and along a and b, of the finer grids over place and direction alone.
+    held_out : float
+        Share of the rays, 0 to ½, that is counted apart; which, hangs on the number of the ray and the seed.
+    keep : int
+        About as many of the held-out rays are kept with their coordinates.
+    seed : int
+        Of the choice.
+    threads : int, optional
+        All cores if None. The result has the same bits for any number.
+    progress : callable, optional
+        Called with the number of rays done.
+
+    Raises
+    ------
+    ArgumentError
+        If the rays have no position, the grids are too large, or no ray meets the surface.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> counts = count_rays(et.RingSource(rays=100_000), et.Disk(radius=30), depths=(3, 3, 3, 3))
+    >>> [round(flux, 9) for flux in counts.part_flux], counts.unmet_rays
+    ([600.0], 0)
+    """
+    surface = surface.sized_for(rays)
+    parts = surface.parts()
+    if not rays.has_position:
+        raise ArgumentError("these rays have no positions (a far-field set), so no surface can carry them.")
+    if not all(0 <= d <= 16 for d in (*depths, *fine)) or len(parts) << sum(depths) > MOST_CELLS:
+        raise ArgumentError(
+            f"grids of depths {depths} and {fine} on {len(parts)} parts; give depths from 0 to 16 that make at most "
+            f"{MOST_CELLS:,} cells."
+        )
+    share = min(1.0, keep / max(len(rays), 1))
+    raw = _core.count_rays(
+        rays.core_source(),
+        [p.core() for p in parts],
+        depths,
+        fine,
+        held_out,
+        share,
+        seed,
+        checked_threads(threads),
+        progress,
+    )
+    tally = Tally.from_core(raw["tally"])
+    scale = rays.accept_tally(tally)
+    folds = _folds(raw, len(parts), depths, fine)
+    counted = sum(float(c.grid.weight.sum()) for c in folds["all"])
+    if counted == 0.0:
+        raise ArgumentError(
+            f"none of {tally.rays:,} rays meets the surface {surface.spec}; move the surface, or give it more room."
+        )
+    return EtendueCounts(
+        surface=surface,
+        depths=depths,
+        folds=folds,
+        kept=KeptRays(raw["kept_part"], raw["kept"], raw["kept_weight"]),
+        flux_per_weight=scale * (1.0 if raw["weight"] is None else raw["weight"]),
+        rays=tally.rays - tally.unusable,
+        unmet_rays=raw["unmet_rays"],
+        unmet_flux=raw["unmet_flux"] * scale,
+        tally=tally,
+    )
+
+
+def _folds(
+    raw: _core._Counts, parts: int, depths: tuple[int, int, int, int], fine: tuple[int, int]
+) -> dict[Fold, tuple[PartCounts, ...]]:
+    """The core's flat arrays as sums per fold and part, each with the shape of its grid."""
+    shapes = {
+        "grid": tuple(1 << d for d in depths),
+        "space": (1 << fine[0],) * 2,
+        "direction": (1 << fine[1],) * 2,
+    }
+
+    def sums(name: Literal["grid", "space", "direction"]) -> Sums:
+        weight, squared = raw[name]
+        shape = (2, parts, *shapes[name])
+        return Sums(weight.reshape(shape).astype(np.float64), None if squared is None else squared.reshape(shape))
+
+    grid, space, direction = sums("grid"), sums("space"), sums("direction")
+
+    def fold(pick: Callable[[FloatArray, int], FloatArray]) -> tuple[PartCounts, ...]:
+        return tuple(
+            PartCounts(*(s.map(lambda a, part=part: pick(a, part)) for s in (grid, space, direction)))
+            for part in range(parts)
+        )
+
+    return {
+        "fitted": fold(lambda a, part: a[0, part]),
+        "held out": fold(lambda a, part: a[1, part]),
+        "all": fold(lambda a, part: a[0, part] + a[1, part]),
+    }
