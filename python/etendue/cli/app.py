@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli import compare, convert, demo, filter_, info, intensity, luminance
+from etendue.cli import compare, convert, demo, filter_, info, intensity, luminance, patches
 from etendue.cli.terminal import complain, spell_out_unknown_letters
 from etendue.errors import EtendueError
 from etendue.quantities.provenance import version
@@ -29,6 +29,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "convert": convert.convert,
     "luminance": luminance.luminance,
     "intensity": intensity.intensity,
+    "patches": patches.patches,
     "filter": filter_.filter_,
     "compare": compare.compare,
 }

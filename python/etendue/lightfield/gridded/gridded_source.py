@@ -5,11 +5,15 @@ from __future__ import annotations
 import dataclasses
 import math
 import operator
+import os
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.formats.patch_folder import write_patch_folder
 from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.fitting import Account, all_batches, fill_bins, lit_pixels, patches_of
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
@@ -251,6 +255,41 @@ class GriddedSource:
         records = spool(sampled_records(self.surface, self.patches, n, seed), RECORD)
         provenance = self.patches.provenance.then(f"{n} rays drawn from {len(self.patches)} patches, seed {seed}")
         return RaySet.from_records(records, RaySetMeaning(flux_unit=self.flux_unit, provenance=provenance))
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The source in figures, as plain data [`flux_unit`, mm, %]."""
+        return {
+            "surface": self.surface.surface.spec,
+            "pixel": self.pixel,
+            "parallels": self.surface.parallels,
+            "threshold": self.threshold,
+            "flux": self.total_flux,
+            "table_flux": self.table_flux,
+            "account": dataclasses.asdict(self.account),
+            "notes": list(self.notes),
+        }
+
+    def save_patches(self, folder: str | os.PathLike[str], format: str = "ies", scenes: Iterable[str] = ()) -> None:
+        """Write one intensity file per patch and a manifest from which other ray tracers can be driven.
+
+        Parameters
+        ----------
+        folder : path
+            To be made, whole or not at all; see docs/formats/patches.md. A folder of patches of that name is replaced.
+        format : {"ies", "ldt"}
+            Of the intensity files.
+        scenes : iterable of str
+            ``"radiance"``, ``"mitsuba"``: scenes that are added.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such format or ray tracer.
+        ArgumentError
+            If the folder cannot be written or holds something else, or the format does not know the unit of flux.
+        """
+        write_patch_folder(folder, self.patches, self.facts, format, scenes)
 
 
 def check_threshold(threshold: float) -> None:

@@ -1,0 +1,62 @@
+"""``etendue patches``: a ray file as surface sources with intensity distributions, for other ray tracers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from etendue.cli.convert import in_unit, with_flux
+from etendue.cli.terminal import complain, one_of, print_json, progress_bar, say
+from etendue.formats.patch_folder import PATCH_FORMATS, check_patch_folder
+from etendue.formats.rays import read_rays
+from etendue.formats.scenes import SCENES
+from etendue.lightfield.gridded.gridded_source import GriddedSource
+from etendue.lightfield.surfaces import parse_surface
+
+
+def patches(
+    file: Annotated[Path, typer.Argument(help="A ray file of any format.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to be made.")],
+    surface: Annotated[
+        str, typer.Option("--surface", help="Carrier surface: plane:z=0, disk:radius=11.5, dome:radius=1.264 …")
+    ] = "plane:z=0",
+    pixel: Annotated[float, typer.Option("--pixel", help="Side of the squares on flat parts, in mm.")] = 1.0,
+    threshold: Annotated[
+        float, typer.Option("--threshold", help="Largest flux error E of a patch, in percent (thesis eq. 3.3).")
+    ] = 0.021,
+    parallels: Annotated[
+        int | None, typer.Option("--parallels", help="Cut a hemisphere into (2N-1)² cells; from --pixel if not given.")
+    ] = None,
+    format: Annotated[str, typer.Option("--format", help="Of the intensity files: ies or ldt.")] = "ies",
+    scene: Annotated[
+        list[str] | None, typer.Option("--scene", help="Add a scene: radiance or mitsuba; several are allowed.")
+    ] = None,
+    flux: Annotated[
+        str | None, typer.Option("--flux", help="Total flux that overrides the ray file's: 337, 337lm.")
+    ] = None,
+    unit: Annotated[
+        str | None, typer.Option("--unit", help="lm or W: convert through the ray file's spectrum.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Sample a ray file into patches, each with an intensity distribution of its own: thesis 3.2 and 3.3."""
+    one_of(format, PATCH_FORMATS, "--format")
+    scenes = [one_of(name, SCENES, "--scene") for name in scene or []]
+    carrier = parse_surface(surface)
+    rays = in_unit(with_flux(read_rays(file), flux), unit)
+    check_patch_folder(output, rays.flux_unit, format, scenes)
+    with progress_bar("rays", len(rays)) as progress:
+        source = GriddedSource.fit(rays, carrier, pixel, threshold, parallels, progress)
+    source.save_patches(output, format, scenes)
+    complaints = [str(c) for c in rays.complaints]
+    if json:
+        facts = {"file": file, "output": output, "flux_unit": source.flux_unit, "patches": len(source.patches)}
+        print_json(facts | source.facts | {"scenes": scenes, "complaints": complaints})
+        return
+    for line in complaints:
+        complain(line)
+    say(f"{output}: {len(source.patches):,} patches on {source.surface.surface.spec}")
+    for note in source.notes:
+        say(f"  {note}")

@@ -1,0 +1,150 @@
+"""A source as a folder of patches: one intensity file per patch, and a manifest. See docs/formats/patches.md."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.formats.intensity import INTENSITY_FORMATS
+from etendue.formats.output_folder import atomic_folder, check_output_folder
+from etendue.formats.scenes import SCENES
+from etendue.quantities.patches import Patches
+
+MANIFEST = "manifest.json"
+KIND, VERSION = "etendue patches", 1
+
+PATCH_FORMATS = {"ies": "lm63", "ldt": "eulumdat"}
+"""What the intensity files can be, by extension."""
+
+
+def check_patch_folder(
+    folder: str | os.PathLike[str], flux_unit: str, format: str = "ies", scenes: Iterable[str] = ()
+) -> None:
+    """Refuse, before any work is done, what `write_patch_folder` cannot write.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such format or ray tracer.
+    ArgumentError
+        If the folder cannot be written or holds something else, or the format does not know the unit of flux.
+    """
+    check_output_folder(folder, is_patch_folder)
+    if format not in PATCH_FORMATS:
+        raise UnknownNameError("format of patches", format, PATCH_FORMATS)
+    for scene in scenes:
+        if scene not in SCENES:
+            raise UnknownNameError("ray tracer", scene, SCENES)
+    if format == "ldt" and flux_unit != "lm":
+        raise ArgumentError("EULUMDAT knows luminous intensity only, and these rays are in watts; write ies files.")
+
+
+def is_patch_folder(folder: Path) -> bool:
+    """Whether a folder holds patches, by its manifest."""
+    try:
+        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(manifest, dict) and manifest.get("kind") == KIND
+
+
+def write_patch_folder(
+    folder: str | os.PathLike[str],
+    patches: Patches,
+    facts: Mapping[str, Any],
+    format: str = "ies",
+    scenes: Iterable[str] = (),
+) -> None:
+    """Write patches: completely, or not at all.
+
+    Parameters
+    ----------
+    folder : path
+        To be made; its parent must exist. A folder of patches of that name is replaced.
+    patches : Patches
+        At least one.
+    facts : mapping
+        What else the manifest says of the whole: plain data.
+    format : {"ies", "ldt"}
+        Of the intensity files.
+    scenes : iterable of str
+        Ray tracers for which scenes are added; keys of `etendue.formats.scenes.SCENES`.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such format or ray tracer.
+    ArgumentError
+        If the folder cannot be written or holds something else, or the format does not know the unit of flux.
+    """
+    scenes = tuple(dict.fromkeys(scenes))
+    check_patch_folder(folder, patches.flux_unit, format, scenes)
+    rows = list(_rows(patches, format))
+    with atomic_folder(folder, is_patch_folder) as temporary:
+        (temporary / "lids").mkdir()
+        writer = INTENSITY_FORMATS[PATCH_FORMATS[format]].write
+        for i, row in enumerate(rows):
+            writer(patches.intensity(i), temporary / row["file"])
+        for scene in scenes:
+            (temporary / scene).mkdir()
+            SCENES[scene](patches, temporary / scene)
+        _write_table(temporary / "manifest.csv", rows)
+        head = {"kind": KIND, "version": VERSION, "software": patches.provenance.software}
+        head |= {"source": patches.provenance.to_dict(), "flux_unit": patches.flux_unit, **facts}
+        (temporary / MANIFEST).write_text(_manifest(head, rows), encoding="utf-8")
+
+
+def _manifest(head: Mapping[str, Any], rows: Iterable[Mapping[str, Any]]) -> str:
+    """JSON with one line for each patch, for people who look into it."""
+    text = json.dumps(head, ensure_ascii=False, indent=1, allow_nan=False).removesuffix("\n}")
+    lines = ",\n  ".join(json.dumps(row, allow_nan=False) for row in rows)
+    return f'{text},\n "patches": [\n  {lines}\n ]\n}}\n'
+
+
+def _rows(patches: Patches, format: str) -> Iterator[dict[str, Any]]:
+    """What the manifest says of each patch."""
+    table_flux = patches.table_flux
+    for i in range(len(patches)):
+        x, y, z = patches.axes[i].tolist()
+        yield {
+            "file": f"lids/{i + 1:06d}.{format}",
+            "part": patches.parts[patches.part[i]],
+            "shape": patches.shape(i),
+            "centre": patches.centre[i].tolist(),
+            "x": x,
+            "y": y,
+            "z": z,
+            "extent": patches.extent[i].tolist(),
+            "area": float(patches.area[i]),
+            "projected_area": float(patches.projected_area[i]),
+            "flux": float(patches.flux[i]),
+            "table_flux": float(table_flux[i]),
+            **dataclasses.asdict(patches.grid(i)),
+            "error": float(patches.error[i]),
+            "outline": patches.outline[i].tolist(),
+        }
+
+
+def _write_table(path: Path, rows: list[dict[str, Any]]) -> None:
+    """The manifest without the outlines, one patch per line; vectors as three columns."""
+    flat = [dict(_columns(row)) for row in rows]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, list(flat[0]))
+        table.writeheader()
+        table.writerows(flat)
+
+
+def _columns(row: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    for name, value in row.items():
+        if name == "outline":
+            continue
+        if isinstance(value, list):
+            yield from ((f"{name}_{axis}", part) for axis, part in zip("xyz", value, strict=False))
+        else:
+            yield name, value

@@ -1,0 +1,12 @@
+"""Scenes for ray tracers: a source's patches with their intensity distributions, one writer per ray tracer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from etendue.formats.scenes import mitsuba, radiance
+from etendue.quantities.patches import Patches
+
+SCENES: dict[str, Callable[[Patches, Path], None]] = {"radiance": radiance.write, "mitsuba": mitsuba.write}
+"""What writes a scene into an empty folder, by the name of the ray tracer."""
