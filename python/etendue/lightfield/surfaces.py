@@ -11,8 +11,8 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
-from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.lightfield.probe import probe_rays
 from etendue.quantities.ray_stream import RayStream
 
 FloatArray = npt.NDArray[np.float64]
@@ -597,24 +597,9 @@ def _value(text: str, key: str, value: str) -> float | bool | tuple[float, ...]:
 
 
 def _probe(rays: RayStream) -> tuple[FloatArray, FloatArray]:
-    """Positions [mm] and directions of up to `PROBE` usable rays, from stretches spread evenly over the set."""
-    if not rays.has_position:
-        raise ArgumentError("these rays have no positions (a far-field set), so no surface can carry them.")
-    source, n = rays.core_source(), len(rays)
-    stretch = 4096
-    starts = range(0, n, stretch)
-    if n > PROBE:
-        starts = range(0, n - stretch + 1, (n - stretch) // (PROBE // stretch - 1))
-    parts = [_core.read_rays(source, start, min(start + stretch, n)) for start in starts]
-    position, direction, flux = (np.concatenate(arrays) for arrays in zip(*parts, strict=True)) if parts else _nothing()
-    usable = flux > 0
-    if not usable.any():
-        raise ArgumentError("these rays carry no flux, so no surface can be sized for them.")
-    return position[usable], direction[usable]
-
-
-def _nothing() -> tuple[FloatArray, FloatArray, FloatArray]:
-    return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
+    """Positions [mm] and directions of some of the rays."""
+    some = probe_rays(rays, PROBE)
+    return some.position, some.direction
 
 
 def _span(values: FloatArray, centre: float | None) -> tuple[float, float]:

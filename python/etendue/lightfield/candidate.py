@@ -1,0 +1,178 @@
+"""One way to explain the counts: a base measure and a tree for each part; and how well it foretells held-out rays."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from etendue import _core
+from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
+from etendue.lightfield.light_field import PartField, core_part
+from etendue.lightfield.smoothing import smooth_counts
+from etendue.lightfield.trees import Base, Tree, grow, log_evidence
+
+CONCENTRATIONS = {"uniform": (1.0, 3.0, 10.0), "product": (10.0, 30.0, 100.0)}
+"""Concentrations c among which the evidence chooses, by base measure: one that was taken from the data is believed more."""
+
+FLOOR = 1e-3
+"""Share of a uniform density in the factors of a product base: where they are wrongly dark, the data can still say so."""
+
+MIXED_IN = 1e-4
+"""Share of a uniform field in every score, so that one cell that is wrongly dark cannot decide it."""
+
+Smoother = Callable[[Sums], FloatArray]
+
+
+def uniform_bases(counts: Sequence[PartCounts]) -> tuple[Base, ...]:
+    """Nothing is known beforehand: every cell has the same luminance."""
+    return tuple(Base() for _ in counts)
+
+
+def product_bases(counts: Sequence[PartCounts], smoother: Smoother) -> tuple[Base, ...]:
+    """Exitance times intensity: what the fine counts over place and over direction tell, each by itself."""
+
+    def density(sums: Sums) -> FloatArray:
+        mass = smoother(sums)
+        lifted: FloatArray = mass * ((1.0 - FLOOR) * mass.size / mass.sum()) + FLOOR
+        return lifted
+
+    return tuple(
+        Base(density(part.space), density(part.direction)) if part.space.rays > 0 else Base() for part in counts
+    )
+
+
+def quick_density(threads: int | None) -> Smoother:
+    """A two-dimensional tree on the counts as they lie: rough at its dyadic edges, and done in a moment."""
+
+    def smooth(sums: Sums) -> FloatArray:
+        return grow(sums, Base(), 1.0, threads).ratio
+
+    return smooth
+
+
+def careful_density(threads: int | None) -> Smoother:
+    """The denoiser of luminance maps; see `smooth_counts`."""
+
+    def smooth(sums: Sums) -> FloatArray:
+        squared = sums.weight if sums.squared is None else sums.squared
+        return smooth_counts(sums.weight, squared, np.ones_like(sums.weight), threads=threads).mass
+
+    return smooth
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Candidate:
+    """Base measure, concentration and tree of each part."""
+
+    bases: tuple[Base, ...]
+    concentrations: tuple[float, ...]
+    trees: tuple[Tree, ...]
+
+    @property
+    def base_name(self) -> str:
+        """``"product"`` if any part has such a base."""
+        return "product" if any(base.name == "product" for base in self.bases) else "uniform"
+
+    @property
+    def log_evidence(self) -> float:
+        """Against the base measures, summed over the parts."""
+        return sum(tree.log_evidence for tree in self.trees)
+
+    def fields(self, counts: EtendueCounts) -> tuple[PartField, ...]:
+        """The parts' fields, each with the flux that was counted on it."""
+        charts = counts.surface.parts()
+        fields = []
+        for chart, base, tree, flux in zip(charts, self.bases, self.trees, counts.part_flux, strict=True):
+            unit = PartField(
+                tree.ratio.astype(np.float32), tree.deviation.astype(np.float32), base.space, base.direction, 1.0
+            )
+            integral = _core.LightField([core_part(chart.core(), unit)]).flux()[0]
+            fields.append(dataclasses.replace(unit, level=flux / integral))
+        return tuple(fields)
+
+    def score(self, counts: EtendueCounts) -> Score:
+        """ln of the density in étendue [1/(mm² sr)] at each of the held-out rays that were kept."""
+        charts = counts.surface.parts()
+        core = _core.LightField(
+            [core_part(chart.core(), part) for chart, part in zip(charts, self.fields(counts), strict=True)]
+        )
+        kept = counts.kept
+        density = np.zeros(len(kept.part))
+        for index, chart in enumerate(charts):
+            mine = kept.part == index
+            x, k = _core.rays_of_part(chart.core(), np.ascontiguousarray(kept.coordinates[mine]))
+            # What other parts send along the same line counts too: luminance is theirs together.
+            density[mine] = core.luminance(x, k)[0]
+        return score_densities(counts, density)
+
+
+def score_densities(counts: EtendueCounts, luminance: FloatArray) -> Score:
+    """The score of a field that has these luminances at the rays that were kept [flux unit/(mm² sr)]."""
+    flux = sum(counts.part_flux)
+    even = flux / sum(chart.etendue for chart in counts.surface.parts())
+    mixed = (1.0 - MIXED_IN) * luminance + MIXED_IN * even
+    return Score(np.log(mixed / flux), counts.kept.weight)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Score:
+    """How well held-out rays were foretold.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        ln of the density at each ray.
+    weights : array, shape (n,)
+        Relative flux of each.
+    """
+
+    values: FloatArray
+    weights: FloatArray
+
+    @property
+    def mean(self) -> float:
+        """Flux-weighted mean; NaN if no ray was held out."""
+        return float(np.average(self.values, weights=self.weights)) if len(self.values) else float("nan")
+
+    @property
+    def error(self) -> float:
+        """Standard error of the mean."""
+        return _standard_error(self.values, self.weights)
+
+    def lead(self, other: Score) -> tuple[float, float]:
+        """By how much the mean lies above another's on the same rays, and the standard error of that difference."""
+        difference = self.values - other.values
+        mean = float(np.average(difference, weights=self.weights)) if len(difference) else 0.0
+        return mean, _standard_error(difference, self.weights)
+
+
+def _standard_error(values: FloatArray, weights: FloatArray) -> float:
+    if len(values) < 2:
+        return float("inf")
+    mean = np.average(values, weights=weights)
+    return float(np.sqrt(np.sum((weights * (values - mean)) ** 2)) / weights.sum())
+
+
+def choose_concentrations(
+    counts: Sequence[PartCounts], bases: tuple[Base, ...], threads: int | None
+) -> tuple[float, ...]:
+    """For each part the concentration of greatest evidence."""
+
+    def choose(part: PartCounts, base: Base) -> float:
+        options = CONCENTRATIONS[base.name]
+        evidence = [log_evidence(part.grid, base, c, threads) for c in options]
+        return options[int(np.argmax(evidence))]
+
+    return tuple(choose(part, base) for part, base in zip(counts, bases, strict=True))
+
+
+def grow_candidate(
+    counts: EtendueCounts, fold: Fold, bases: tuple[Base, ...], concentrations: Sequence[float], threads: int | None
+) -> Candidate:
+    """The candidate's trees, on the counts of a fold."""
+    trees = [
+        grow(part.grid, base, c, threads) for part, base, c in zip(counts[fold], bases, concentrations, strict=True)
+    ]
+    return Candidate(bases, tuple(concentrations), tuple(trees))

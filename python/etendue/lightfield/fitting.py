@@ -1,0 +1,176 @@
+"""From a ray set to its light field, without a knob."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from etendue.lightfield.candidate import (
+    Candidate,
+    Score,
+    careful_density,
+    choose_concentrations,
+    grow_candidate,
+    product_bases,
+    quick_density,
+    score_densities,
+    uniform_bases,
+)
+from etendue.lightfield.counting import EtendueCounts, FloatArray, count_rays
+from etendue.lightfield.light_field import FitReport, LightField
+from etendue.lightfield.probe import probe_rays
+from etendue.lightfield.surfaces import Surface
+from etendue.lightfield.trees import Base
+from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
+
+Depths = tuple[int, int, int, int]
+
+PROBE = 1 << 20
+"""Rays on which the shape of the grid and the concentrations are chosen."""
+
+FINE = (8, 8)
+"""Halvings of the fine grids over place and over direction: 256 × 256 cells each."""
+
+SHAPES = (0, 1, -1, 2, -2)
+"""Halvings per coordinate that the place may lend to the direction."""
+
+LEAD = 3.0
+"""Standard errors by which the score of a product base must lead to be taken."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """What was chosen before all rays are counted: halvings of the grid, and concentrations by base measure and part."""
+
+    depths: Depths
+    concentrations: dict[str, tuple[float, ...]]
+
+
+def fit_light_field(
+    rays: RayStream,
+    surface: Surface,
+    depths: Depths | None = None,
+    *,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> LightField:
+    """See `LightField.fit`."""
+    threads = checked_threads(threads)
+    surface = surface.sized_for(rays)
+    plan = make_plan(rays, surface, depths, seed, threads)
+    counts = count_rays(rays, surface, plan.depths, FINE, seed=seed, threads=threads, progress=progress)
+    return fit_counts(rays, counts, plan, threads)
+
+
+def default_bits(rays: int) -> int:
+    """Halvings of the grid in all: the number of cells follows that of the rays."""
+    return 16 if rays < 30_000 else 20 if rays < 5_000_000 else 22 if rays < 200_000_000 else 24
+
+
+def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: int, threads: int | None) -> Plan:
+    """Choose, on some of the rays, what foretells held-out rays best: the shape of the grid unless it is given.
+
+    The grids compared have a quarter of the cells of the one to be filled: what is gained by finer cells along one axis
+    and lost by coarser ones along another shows in them, too.
+    """
+    some = probe_rays(rays, PROBE)
+    bits = default_bits(len(rays))
+    options = [depths] if depths else [_depths(min(bits, 20) - 2, lend) for lend in SHAPES]
+    final = [depths] if depths else [_depths(bits, lend) for lend in SHAPES]
+    bases: dict[str, tuple[Base, ...]] = {}
+    plans, scores = [], []
+    for trial, wanted in zip(options, final, strict=True):
+        counts = count_rays(some, surface, trial, FINE, seed=seed, threads=threads)
+        if not bases:
+            product = product_bases(counts["fitted"], quick_density(threads))
+            bases = {"uniform": uniform_bases(counts["fitted"]), "product": product}
+        concentrations, means = {}, []
+        for name, measure in bases.items():
+            concentrations[name] = choose_concentrations(counts["fitted"], measure, threads)
+            means.append(grow_candidate(counts, "fitted", measure, concentrations[name], threads).score(counts).mean)
+        plans.append(Plan(wanted, concentrations))
+        scores.append(max(means))
+    return plans[int(np.argmax(scores))]
+
+
+def _depths(bits: int, lend: int) -> Depths:
+    place = bits // 4 - lend
+    direction = bits // 2 - place
+    return (place, place, direction, direction)
+
+
+def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, threads: int | None) -> LightField:
+    """The field of counted rays: base measures compared on the held-out rays, the better one grown on all."""
+    density = careful_density(threads)
+    candidates: list[tuple[Candidate, Score]] = []
+    for name in ("uniform", "product"):
+        bases = uniform_bases(counts["fitted"]) if name == "uniform" else product_bases(counts["fitted"], density)
+        candidate = grow_candidate(counts, "fitted", bases, plan.concentrations[name], threads)
+        candidates.append((candidate, candidate.score(counts)))
+    (plain, plain_score), (elaborate, elaborate_score) = candidates
+    lead, error = elaborate_score.lead(plain_score)
+    taken, score = (elaborate, elaborate_score) if lead > LEAD * error else (plain, plain_score)
+    name = taken.base_name
+    bases = uniform_bases(counts["all"]) if name == "uniform" else product_bases(counts["all"], density)
+    final = grow_candidate(counts, "all", bases, plan.concentrations[name], threads)
+    histogram = score_densities(counts, _histogram(counts))
+    report = FitReport(
+        rays=counts.rays,
+        unmet_rays=counts.unmet_rays,
+        unmet_flux=counts.unmet_flux,
+        bases=tuple(base.name for base in final.bases),
+        concentrations=final.concentrations,
+        log_evidence=final.log_evidence,
+        score=score.mean,
+        score_error=score.error,
+        histogram_score=histogram.mean,
+        effective_cells=_effective_cells(counts, final),
+    )
+    return LightField(
+        surface=counts.surface,
+        parts=final.fields(counts),
+        flux_unit=rays.flux_unit,
+        report=report,
+        provenance=rays.provenance.then(f"light field on {counts.surface.spec}"),
+        notes=_notes(counts),
+    )
+
+
+def _histogram(counts: EtendueCounts) -> FloatArray:
+    """At each kept ray the density of the fitted rays in its cell [flux unit/(mm² sr)]."""
+    kept = counts.kept
+    total = sum(float(part.grid.weight.sum()) for part in counts["fitted"])
+    density = np.zeros(len(kept.part))
+    for index, (part, chart) in enumerate(zip(counts["fitted"], counts.surface.parts(), strict=True)):
+        mine = kept.part == index
+        shape = np.array(part.grid.weight.shape)
+        cells = np.minimum((kept.coordinates[mine] * shape).astype(np.intp), shape - 1)
+        density[mine] = part.grid.weight[tuple(cells.T)] * (part.grid.weight.size / chart.etendue)
+    density *= sum(counts.part_flux) / total
+    return density
+
+
+def _effective_cells(counts: EtendueCounts, candidate: Candidate) -> float:
+    """N Σ m (σ/L)² over the cells, m their share of the flux: twice N times the expected loss of score, theory eq. 41."""
+    total = 0.0
+    for part, base, tree in zip(counts["all"], candidate.bases, candidate.trees, strict=True):
+        space, direction = base.masses(tree.ratio.shape)
+        mass = tree.ratio * space[:, :, None, None] * direction[None, None]
+        relative = np.divide(tree.deviation, tree.ratio, out=np.zeros_like(tree.ratio), where=tree.ratio > 0)
+        total += part.grid.rays * float((mass * relative**2).sum())
+    return total
+
+
+def _notes(counts: EtendueCounts) -> tuple[str, ...]:
+    notes = []
+    if counts.unmet_rays:
+        whole = counts.unmet_flux + sum(counts.part_flux)
+        notes.append(
+            f"{counts.unmet_rays:,} of {counts.rays:,} rays ({counts.unmet_flux / whole:.3%} of the flux) do not meet "
+            f"{counts.surface.spec} and are not in the field"
+        )
+    if counts.tally.unusable:
+        notes.append(f"{counts.tally.unusable:,} rays cannot be used and were left out; see the ray set's complaints")
+    return tuple(notes)

@@ -1,0 +1,148 @@
+"""Optional Pólya trees over the étendue cells of one part: one candidate for its light."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+
+from etendue import _core
+from etendue.lightfield.counting import FloatArray, PartCounts, Sums
+
+TILE_BITS = 22
+"""Halvings of a grid that one tree takes: 4 million cells, whose boxes fill 1.5 GB. Larger grids are cut into tiles."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Base:
+    """What a tree falls back on: a product of a density over the place and one over the direction.
+
+    Parameters
+    ----------
+    space, direction : array, shape (n, n), or None
+        Densities at the centres of fine cells, mean 1; None: 1 everywhere.
+    """
+
+    space: FloatArray | None = None
+    direction: FloatArray | None = None
+
+    @property
+    def name(self) -> str:
+        """``"uniform"`` or ``"product"``."""
+        return "uniform" if self.space is None and self.direction is None else "product"
+
+    def masses(self, shape: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+        """Mass of the coarse cells over place and over direction; each adds up to one."""
+        return _coarse(self.space, shape[:2]), _coarse(self.direction, shape[2:])
+
+
+@dataclasses.dataclass(frozen=True)
+class Tree:
+    """Posterior of a tree on the cells of a part.
+
+    Parameters
+    ----------
+    ratio, deviation : array, shape of the grid
+        Mean and standard deviation of mass over base mass.
+    log_evidence : float
+        ln of the evidence against the base measure.
+    """
+
+    ratio: FloatArray
+    deviation: FloatArray
+    log_evidence: float
+
+
+def _coarse(values: FloatArray | None, shape: tuple[int, ...]) -> FloatArray:
+    if values is None:
+        return np.full(shape, 1.0 / (shape[0] * shape[1]))
+    rows, columns = shape
+    n = values.shape[0]
+    if n < max(rows, columns):  # a factor coarser than the grid: each of its cells is shared out evenly
+        values = values.repeat(max(rows, columns) // n, axis=0).repeat(max(rows, columns) // n, axis=1)
+        n = values.shape[0]
+    blocks = values.reshape(rows, n // rows, columns, n // columns).sum(axis=(1, 3))
+    mass: FloatArray = blocks / blocks.sum()
+    return mass
+
+
+def log_evidence(counts: Sums, base: Base, concentration: float, threads: int | None) -> float:
+    """ln of the evidence of a tree against its base measure."""
+    if sum(_depths(counts)) > TILE_BITS:
+        return grow(counts, base, concentration, threads).log_evidence
+    return _core.polya_evidence(*_problem(counts, base), concentration, threads)
+
+
+def grow(counts: Sums, base: Base, concentration: float, threads: int | None) -> Tree:
+    """The tree's posterior; grids of more than 2^`TILE_BITS` cells by tiles over the place.
+
+    Tiles are first halves of the first two axes, taken for certain: what they hold is shared out by one Dirichlet trial
+    with the tree's concentration, theory eq. 40.
+    """
+    depths = _depths(counts)
+    if sum(depths) <= TILE_BITS:
+        ratio, squared, evidence = _core.polya_posterior(*_problem(counts, base), concentration, threads)
+        deviation = np.sqrt(np.maximum(squared - ratio**2, 0.0))
+        shape = counts.weight.shape
+        return Tree(ratio.reshape(shape), deviation.reshape(shape), evidence)
+    return _tiled(counts, base, concentration, threads)
+
+
+def _tiled(counts: Sums, base: Base, concentration: float, threads: int | None) -> Tree:
+    shape = counts.weight.shape
+    cuts = [0, 0]
+    while sum(_depths(counts)) - sum(cuts) > TILE_BITS:
+        axis = int(np.argmax([shape[0] >> cuts[0], shape[1] >> cuts[1]]))
+        cuts[axis] += 1
+    steps = [n >> c for n, c in zip(shape[:2], cuts, strict=True)]
+    space, direction = base.masses(shape)
+    total = counts.rays
+    ratio, deviation = np.zeros(shape), np.zeros(shape)
+    evidence = 0.0
+    for i, j in itertools.product(*(range(0, n, s) for n, s in zip(shape, steps, strict=False))):
+        window = (slice(i, i + steps[0]), slice(j, j + steps[1]))
+        part = counts.map(lambda a, window=window: np.ascontiguousarray(a[window]))
+        prior = float(space[window].sum())
+        if prior == 0.0:
+            continue
+        factors = None if base.name == "uniform" else [(2, space[window].ravel()), (2, direction.ravel())]
+        ratios, squares, log_tile = _core.polya_posterior(
+            _depths(part),
+            part.weight.ravel(),
+            None if part.squared is None else part.squared.ravel(),
+            factors,
+            concentration,
+            threads,
+        )
+        points = total * float(part.weight.sum()) / float(counts.weight.sum()) if total else 0.0
+        alpha, everything = concentration * prior + points, concentration + total
+        first, second = alpha / everything, alpha * (alpha + 1) / (everything * (everything + 1))
+        ratio[window] = (ratios * first / prior).reshape(part.weight.shape)
+        variance = squares * second / prior**2 - (ratios * first / prior) ** 2
+        deviation[window] = np.sqrt(np.maximum(variance, 0.0)).reshape(part.weight.shape)
+        evidence += log_tile + _log_trial(concentration, prior, points)
+    evidence -= _log_trial(concentration, 1.0, total)
+    return Tree(ratio, deviation, evidence)
+
+
+def _log_trial(c: float, prior: float, points: float) -> float:
+    """One tile's part of ln of the evidence of the Dirichlet trial."""
+    return math.lgamma(c * prior + points) - math.lgamma(c * prior) - points * math.log(prior)
+
+
+def _depths(counts: Sums) -> list[int]:
+    return [n.bit_length() - 1 for n in counts.weight.shape]
+
+
+def _problem(
+    counts: Sums, base: Base
+) -> tuple[list[int], FloatArray, FloatArray | None, list[tuple[int, FloatArray]] | None]:
+    """The arguments of the core that describe data and base."""
+    factors = None
+    if base.name != "uniform":
+        space, direction = base.masses(counts.weight.shape)
+        factors = [(2, space.ravel()), (2, direction.ravel())]
+    squared = None if counts.squared is None else counts.squared.ravel()
+    return _depths(counts), counts.weight.ravel(), squared, factors
