@@ -9,11 +9,14 @@ import typer
 
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.terminal import complain, one_of, print_json, progress_bar, say
+from etendue.formats.output import atomic_output
 from etendue.formats.patch_folder import PATCH_FORMATS, check_patch_folder
 from etendue.formats.rays import read_rays
 from etendue.formats.scenes import SCENES
+from etendue.goniophotometry.threshold_sweep import THRESHOLDS, threshold_sweep
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.surfaces import parse_surface
+from etendue.plot.threshold_picture import plot_threshold_sweep
 
 
 def patches(
@@ -33,6 +36,10 @@ def patches(
     scene: Annotated[
         list[str] | None, typer.Option("--scene", help="Add a scene: radiance or mitsuba; several are allowed.")
     ] = None,
+    sweep: Annotated[
+        bool, typer.Option("--sweep", help="Also judge nine thresholds and this one: sweep.csv and sweep.png.")
+    ] = False,
+    seed: Annotated[int, typer.Option("--seed", help="Chooses the rays that --sweep keeps back.")] = 1,
     flux: Annotated[
         str | None, typer.Option("--flux", help="Total flux that overrides the ray file's: 337, 337lm.")
     ] = None,
@@ -49,14 +56,29 @@ def patches(
     check_patch_folder(output, rays.flux_unit, format, scenes)
     with progress_bar("rays", len(rays)) as progress:
         source = GriddedSource.fit(rays, carrier, pixel, threshold, parallels, progress)
+    swept = None
+    if sweep:
+        thresholds = sorted({*THRESHOLDS, threshold} - {0.0}, reverse=True)
+        with progress_bar("thresholds", len(rays)) as progress:
+            swept = threshold_sweep(rays, carrier, pixel, thresholds, parallels, seed=seed, progress=progress)
     source.save_patches(output, format, scenes)
+    if swept is not None:
+        with atomic_output(output / "sweep.csv") as temporary:
+            temporary.write_text(swept.to_csv(), encoding="utf-8")
+        plot_threshold_sweep(swept, output / "sweep.png")
     complaints = [str(c) for c in rays.complaints]
     if json:
         facts = {"file": file, "output": output, "flux_unit": source.flux_unit, "patches": len(source.patches)}
-        print_json(facts | source.facts | {"scenes": scenes, "complaints": complaints})
+        facts |= source.facts | {"scenes": scenes, "sweep": swept and swept.to_dict(), "complaints": complaints}
+        print_json(facts)
         return
     for line in complaints:
         complain(line)
     say(f"{output}: {len(source.patches):,} patches on {source.surface.surface.spec}")
     for note in source.notes:
         say(f"  {note}")
+    if swept is not None:
+        for name, criterion in (("ncc", "the far field (NCC)"), ("score", "rays kept back")):
+            row = swept.best(name)
+            found = f"NCC {100 * swept['ncc'][row]:.2f} %, score {swept['score'][row]:.3f} nat per ray"
+            say(f"  threshold by {criterion}: {swept['threshold'][row]:g} % ({found})")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 import numpy.typing as npt
@@ -203,7 +204,7 @@ class Patches:
         """Bins of each patch that rays were counted in, shape (n,)."""
         return (90 // self.theta_step + 1) * (360 // self.phi_step)
 
-    @property
+    @functools.cached_property
     def table_flux(self) -> Array:
         """Exact integral of each patch's bilinear function [`flux_unit`], shape (n,).
 
@@ -211,7 +212,9 @@ class Patches:
         """
         flux = np.zeros(len(self))
         for _, chosen, weight in self.by_grid():
-            flux[chosen] = [self.values[self.start[i] : self.start[i + 1]] @ weight for i in chosen]
+            # Not `@`: BLAS starts threads for it, which cost more than such short products.
+            flux[chosen] = [np.einsum("i,i", self.values[self.start[i] : self.start[i + 1]], weight) for i in chosen]
+        flux.setflags(write=False)
         return flux
 
     def by_grid(self) -> list[tuple[AngularGrid, Indices, Array]]:

@@ -8,6 +8,7 @@ The first pass counts the flux of every pixel in half degrees of θ, which is al
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from etendue.errors import ArgumentError
 from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
-from etendue.lightfield.gridded.pixels import Array, Indices
+from etendue.lightfield.gridded.pixels import Array, Cells, Indices
 from etendue.quantities.patches import Patches
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, RayBatch, RayStream
@@ -91,7 +92,12 @@ class LitPixels:
     rings: Array
     account: Account
 
-    @property
+    @functools.cached_property
+    def cells(self) -> Cells:
+        """What they look like."""
+        return self.surface.cells(self.pixel)
+
+    @functools.cached_property
     def slots(self) -> Indices:
         """Place of each of the surface's pixels in `pixel`, -1 for dark ones."""
         result = np.full(self.surface.count, -1, dtype=np.intp)
@@ -226,7 +232,7 @@ def patches_of(lit: LitPixels, bins: Bins, steps: Indices, flux_unit: FluxUnit, 
     for slot, grid in enumerate(grids):  # one by one: the bins may be most of the memory there is
         table = angular.intensities(grid, bins.of(int(steps[slot]), slot))
         values[start[slot] : start[slot + 1]] = table.ravel()
-    cells, surface = lit.surface.cells(lit.pixel), lit.surface
+    cells, surface = lit.cells, lit.surface
     errors = angular.quadrature_errors(lit.rings)
     return Patches(
         shapes=tuple(pixels.SHAPE for pixels in surface.pixels),
@@ -245,8 +251,19 @@ def patches_of(lit: LitPixels, bins: Bins, steps: Indices, flux_unit: FluxUnit, 
     )
 
 
-def all_batches(rays: RayStream, passes: int, progress: Progress | None) -> Batches:
+def all_batches(rays: RayStream, passes: int, progress: Progress | None, done: int = 0) -> Batches:
     """The rays of a stream, again and again; `progress` sees one run over them, spread over so many passes.
+
+    Parameters
+    ----------
+    rays : RayStream
+        With positions.
+    passes : int
+        Times that they are read in all.
+    progress : callable, optional
+        Called with the number of rays read, over the number of passes.
+    done : int
+        Rays that were read before.
 
     Raises
     ------
@@ -255,7 +272,6 @@ def all_batches(rays: RayStream, passes: int, progress: Progress | None) -> Batc
     """
     if not rays.has_position:
         raise ArgumentError("these rays have no positions (a far-field set), so no surface can carry them.")
-    done = 0
 
     def batches() -> Iterator[RayBatch]:
         nonlocal done

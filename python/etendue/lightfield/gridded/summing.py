@@ -15,7 +15,7 @@ from etendue.quantities.patches import Patches, interpolated
 WORK = 1 << 24
 """Table look-ups that a distribution may cost: some two seconds."""
 
-MOST_POINTS = 8
+MOST_POINTS = 6
 """Points along each side of a cell over which a mean is taken, at most."""
 
 
