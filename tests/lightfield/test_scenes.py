@@ -68,7 +68,10 @@ def inside(points: Array, polygon: Array) -> npt.NDArray[np.bool_]:
 def expected(name: str) -> tuple[GriddedSource, Array, Array, Array]:
     """A source, lines through it and beside it, and its own luminance along them."""
     source, points, directions = fitted(name)
-    points, directions = np.concatenate([points, points + np.array([40, 0, 0])]), np.concatenate([directions] * 2)
+    grazing = directions[:200] * np.array([1, 1, 0.07])
+    grazing /= np.linalg.norm(grazing, axis=1)[:, None]
+    points = np.concatenate([points, points + np.array([40, 0, 0]), points[:200]])
+    directions = np.concatenate([directions, directions, grazing])
     chosen = (
         np.ones(len(points), dtype=bool) if name in {"film", "watts"} else away_from_edges(source, points, directions)
     )

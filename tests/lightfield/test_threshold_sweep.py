@@ -72,7 +72,7 @@ def test_the_far_field_rises_while_the_light_field_drowns() -> None:
     assert sweep["threshold"][by_score] >= 0.2
     assert sweep["ncc"][by_ncc] > sweep["ncc"][by_score] > 0.95
     assert sweep["score"][by_ncc] < 0 < sweep["score"][by_score]
-    assert sweep["score"][by_score] - sweep["score"][by_ncc] > 100 * sweep["score_error"].max()
+    assert sweep["score"][by_score] - sweep["score"][by_ncc] > 20 * sweep["score_error"].max()
 
 
 def test_no_score_is_above_that_of_the_truth() -> None:
