@@ -79,14 +79,14 @@ def test_a_large_screen_is_compared_on_a_coarser_one_and_mapped_on_its_own() -> 
 def test_the_automatic_map_is_the_cone_map_at_the_chosen_acceptance() -> None:
     rays = lobed_source(300_000, 60.0, seed=1)
     args = et.Observer(10, 0, 2000), et.Screen(10, 6, 16, 8)
-    automatic = et.luminance_map(rays, *args)
+    automatic = et.luminance_map(rays, *args, method="cone", acceptance="auto")
     note = next(note for note in automatic.notes if note.startswith("acceptance"))
     angle = min(LADDER, key=lambda a: abs(a - float(note.split("°")[0].removeprefix("acceptance "))))
     cone = et.luminance_map(rays, *args, method="cone", acceptance=angle)
     np.testing.assert_array_equal(cone.values, automatic.values)
     np.testing.assert_array_equal(cone.standard_error, automatic.standard_error)
     assert "blur" in note
-    assert any("auto" in step for step in automatic.provenance.steps)
+    assert any("automatic" in step for step in automatic.provenance.steps)
     stated = et.luminance_map(rays, *args, acceptance=angle)
     np.testing.assert_array_equal(cone.values, stated.values)
     assert stated.provenance == cone.provenance

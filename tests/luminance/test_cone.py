@@ -219,7 +219,7 @@ def test_a_map_without_any_ray_is_all_dead_and_says_so() -> None:
     rays = et.RaySet([[0, 0, 0]], [[0, 0, -1]], [1.0])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for method in ("cone", "auto"):
-            lmap = et.luminance_map(rays, et.Observer(0, 0, 1000), et.Screen(2, 2, 4, 4), method=method)
+        for acceptance in (1.5, "auto"):
+            lmap = et.luminance_map(rays, et.Observer(0, 0, 1000), et.Screen(2, 2, 4, 4), acceptance=acceptance)
             assert lmap.dead_pixels == 16
             assert any("16 of 16 pixels are dead" in note for note in lmap.notes)

@@ -1,6 +1,6 @@
 //! Light fields as Python objects.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use etendue_lightfield::field::draw::{FieldRays as CoreRays, Sampler};
 use etendue_lightfield::field::intensity::intensity;
@@ -59,7 +59,19 @@ impl FieldPart<'_> {
 
 /// A light field, ready to be read, looked at and drawn from.
 #[pyclass(frozen, module = "etendue._core")]
-pub struct LightField(Arc<Sampler>);
+pub struct LightField {
+    field: Arc<CoreField>,
+    /// Made when it is first asked for: reading needs none.
+    sampler: OnceLock<Option<Arc<Sampler>>>,
+}
+
+impl LightField {
+    fn sampler(&self, py: Python<'_>) -> PyResult<Arc<Sampler>> {
+        let make = || Sampler::new(Arc::clone(&self.field)).map(Arc::new);
+        let sampler = py.detach(|| self.sampler.get_or_init(make).clone());
+        sampler.ok_or_else(|| PyValueError::new_err("a light field needs flux"))
+    }
+}
 
 type Readings<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
@@ -72,16 +84,17 @@ fn readings(py: Python<'_>, readings: Vec<Reading>) -> Readings<'_> {
 #[pymethods]
 impl LightField {
     #[new]
-    fn new(py: Python<'_>, parts: Vec<FieldPart<'_>>) -> PyResult<Self> {
+    fn new(parts: Vec<FieldPart<'_>>) -> PyResult<Self> {
         let parts = parts.iter().map(FieldPart::core).collect::<PyResult<Vec<_>>>()?;
-        let sampler = py.detach(|| Sampler::new(CoreField { parts }));
-        let sampler = sampler.ok_or_else(|| PyValueError::new_err("a light field needs flux"))?;
-        Ok(Self(Arc::new(sampler)))
+        Ok(Self {
+            field: Arc::new(CoreField { parts }),
+            sampler: OnceLock::new(),
+        })
     }
 
     /// Flux of each part.
-    fn flux(&self) -> Vec<f64> {
-        self.0.flux().to_vec()
+    fn flux(&self, py: Python<'_>) -> PyResult<Vec<f64>> {
+        Ok(self.sampler(py)?.flux().to_vec())
     }
 
     /// Luminance and its standard deviation along lines given by points and directions.
@@ -97,7 +110,7 @@ impl LightField {
         if points.len() != directions.len() {
             return Err(PyValueError::new_err("points and directions differ in number"));
         }
-        let found = py.detach(|| along(self.0.field(), &points, &directions, threads.unwrap_or(0)));
+        let found = py.detach(|| along(&self.field, &points, &directions, threads.unwrap_or(0)));
         Ok(readings(py, found))
     }
 
@@ -108,7 +121,7 @@ impl LightField {
         part: usize,
         coordinates: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Readings<'py>> {
-        let Some(field) = self.0.field().parts.get(part) else {
+        let Some(field) = self.field.parts.get(part) else {
             return Err(PyValueError::new_err(format!("there is no part {part}")));
         };
         if coordinates.shape()[1] != 4 {
@@ -133,7 +146,7 @@ impl LightField {
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let directions = vectors(&directions)?;
-        let found = py.detach(|| intensity(self.0.field(), &directions, side, threads.unwrap_or(0)));
+        let found = py.detach(|| intensity(&self.field, &directions, side, threads.unwrap_or(0)));
         Ok(PyArray1::from_vec(py, found))
     }
 
@@ -147,7 +160,7 @@ impl LightField {
         threads: Option<usize>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
         let view = view.core();
-        let found = py.detach(|| look(self.0.field(), &view, samples, threads.unwrap_or(0)));
+        let found = py.detach(|| look(&self.field, &view, samples, threads.unwrap_or(0)));
         let shape = [view.rows as usize, view.columns as usize];
         let (values, deviations) = readings(py, found);
         Ok((values.reshape(shape)?, deviations.reshape(shape)?))
@@ -176,12 +189,12 @@ impl FieldRays {
 #[pymethods]
 impl FieldRays {
     #[new]
-    fn new(field: &LightField, rays: u64, seed: u64) -> Self {
-        Self {
-            sampler: Arc::clone(&field.0),
+    fn new(py: Python<'_>, field: &LightField, rays: u64, seed: u64) -> PyResult<Self> {
+        Ok(Self {
+            sampler: field.sampler(py)?,
             rays,
             seed,
-        }
+        })
     }
 
     fn __len__(&self) -> PyResult<usize> {

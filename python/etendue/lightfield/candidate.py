@@ -10,6 +10,7 @@ import numpy as np
 from etendue import _core
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
 from etendue.lightfield.light_field import PartField, core_part
+from etendue.lightfield.nodes import node_values
 from etendue.lightfield.smoothing import smooth_counts
 from etendue.lightfield.trees import Base, Tree, grow, log_evidence
 
@@ -85,15 +86,14 @@ class Candidate:
         charts = counts.surface.parts()
         fields = []
         for chart, base, tree, flux in zip(charts, self.bases, self.trees, counts.part_flux, strict=True):
-            unit = PartField(
-                tree.ratio.astype(np.float32), tree.deviation.astype(np.float32), base.space, base.direction, 1.0
-            )
+            ratio, deviation = node_values(tree.ratio).astype(np.float32), tree.deviation.astype(np.float32)
+            unit = PartField(ratio, deviation, base.space, base.direction, 1.0)
             integral = _core.LightField([core_part(chart.core(), unit)]).flux()[0]
             fields.append(dataclasses.replace(unit, level=flux / integral))
         return tuple(fields)
 
     def score(self, counts: EtendueCounts) -> Score:
-        """ln of the density in étendue [1/(mm² sr)] at each of the held-out rays that were kept."""
+        """Ln of the density in étendue [1/(mm² sr)] at each of the held-out rays that were kept."""
         charts = counts.surface.parts()
         core = _core.LightField(
             [core_part(chart.core(), part) for chart, part in zip(charts, self.fields(counts), strict=True)]

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 
+from etendue.errors import ArgumentError
+from etendue.lightfield.autofocus import choose_surface
+from etendue.lightfield.calibration import calibrate
 from etendue.lightfield.candidate import (
     Candidate,
     Score,
@@ -21,7 +26,7 @@ from etendue.lightfield.counting import EtendueCounts, FloatArray, count_rays
 from etendue.lightfield.light_field import FitReport, LightField
 from etendue.lightfield.probe import probe_rays
 from etendue.lightfield.surfaces import Surface
-from etendue.lightfield.trees import Base
+from etendue.lightfield.trees import Base, Tree
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 
 Depths = tuple[int, int, int, int]
@@ -49,19 +54,27 @@ class Plan:
 
 def fit_light_field(
     rays: RayStream,
-    surface: Surface,
-    depths: Depths | None = None,
+    surface: Surface | Literal["auto"],
     *,
+    symmetry: str = "none",
+    depths: Depths | None = None,
     seed: int = 1,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> LightField:
     """See `LightField.fit`."""
     threads = checked_threads(threads)
+    notes: tuple[str, ...] = ()
+    if isinstance(surface, str):
+        if surface != "auto":
+            raise ArgumentError(f"surface is {surface!r}; give a Surface, or 'auto'. For text there is parse_surface.")
+        choice = choose_surface(rays, seed=seed, threads=threads)
+        surface, notes = choice.surface, choice.notes
     surface = surface.sized_for(rays)
     plan = make_plan(rays, surface, depths, seed, threads)
     counts = count_rays(rays, surface, plan.depths, FINE, seed=seed, threads=threads, progress=progress)
-    return fit_counts(rays, counts, plan, threads)
+    field = fit_counts(rays, counts, plan, seed, threads)
+    return field.replace(notes=(*notes, *field.notes))
 
 
 def default_bits(rays: int) -> int:
@@ -80,19 +93,17 @@ def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: in
     options = [depths] if depths else [_depths(min(bits, 20) - 2, lend) for lend in SHAPES]
     final = [depths] if depths else [_depths(bits, lend) for lend in SHAPES]
     bases: dict[str, tuple[Base, ...]] = {}
-    plans, scores = [], []
-    for trial, wanted in zip(options, final, strict=True):
+    concentrations: dict[str, tuple[float, ...]] = {}
+    scores = []
+    for trial in options:
         counts = count_rays(some, surface, trial, FINE, seed=seed, threads=threads)
+        fitted = counts["fitted"]
         if not bases:
-            product = product_bases(counts["fitted"], quick_density(threads))
-            bases = {"uniform": uniform_bases(counts["fitted"]), "product": product}
-        concentrations, means = {}, []
-        for name, measure in bases.items():
-            concentrations[name] = choose_concentrations(counts["fitted"], measure, threads)
-            means.append(grow_candidate(counts, "fitted", measure, concentrations[name], threads).score(counts).mean)
-        plans.append(Plan(wanted, concentrations))
-        scores.append(max(means))
-    return plans[int(np.argmax(scores))]
+            bases = {"uniform": uniform_bases(fitted), "product": product_bases(fitted, quick_density(threads))}
+            concentrations = {name: choose_concentrations(fitted, b, threads) for name, b in bases.items()}
+        trees = [grow_candidate(counts, "fitted", b, concentrations[name], threads) for name, b in bases.items()]
+        scores.append(max(candidate.score(counts).mean for candidate in trees))
+    return Plan(final[int(np.argmax(scores))], concentrations)
 
 
 def _depths(bits: int, lend: int) -> Depths:
@@ -101,7 +112,7 @@ def _depths(bits: int, lend: int) -> Depths:
     return (place, place, direction, direction)
 
 
-def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, threads: int | None) -> LightField:
+def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, threads: int | None) -> LightField:
     """The field of counted rays: base measures compared on the held-out rays, the better one grown on all."""
     density = careful_density(threads)
     candidates: list[tuple[Candidate, Score]] = []
@@ -115,6 +126,7 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, threads: int 
     name = taken.base_name
     bases = uniform_bases(counts["all"]) if name == "uniform" else product_bases(counts["all"], density)
     final = grow_candidate(counts, "all", bases, plan.concentrations[name], threads)
+    final = dataclasses.replace(final, trees=tuple(_calibrated(counts, final, seed, threads)))
     histogram = score_densities(counts, _histogram(counts))
     report = FitReport(
         rays=counts.rays,
@@ -136,6 +148,18 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, threads: int 
         provenance=rays.provenance.then(f"light field on {counts.surface.spec}"),
         notes=_notes(counts),
     )
+
+
+def _calibrated(counts: EtendueCounts, candidate: Candidate, seed: int, threads: int | None) -> Iterator[Tree]:
+    """The trees with error bars that also hold the Poisson error of the part's flux."""
+    parts = zip(counts["all"], candidate.bases, candidate.trees, candidate.concentrations, strict=True)
+    for part, base, tree, concentration in parts:
+        if part.grid.rays == 0:
+            yield tree
+            continue
+        shares = calibrate(part, base, tree, concentration, seed, threads)
+        deviation = np.sqrt(shares.deviation**2 + tree.ratio**2 / part.grid.rays)
+        yield dataclasses.replace(tree, deviation=deviation)
 
 
 def _histogram(counts: EtendueCounts) -> FloatArray:

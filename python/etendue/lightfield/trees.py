@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from etendue import _core
-from etendue.lightfield.counting import FloatArray, PartCounts, Sums
+from etendue.lightfield.counting import FloatArray, Sums
 
 TILE_BITS = 22
 """Halvings of a grid that one tree takes: 4 million cells, whose boxes fill 1.5 GB. Larger grids are cut into tiles."""
@@ -36,6 +36,24 @@ class Base:
     def masses(self, shape: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
         """Mass of the coarse cells over place and over direction; each adds up to one."""
         return _coarse(self.space, shape[:2]), _coarse(self.direction, shape[2:])
+
+    def cells(self, shape: tuple[int, ...]) -> FloatArray:
+        """Mass of every coarse cell; all together one."""
+        space, direction = self.masses(shape)
+        product: FloatArray = space[:, :, None, None] * direction[None, None]
+        return product
+
+    def rolled(self, shift: tuple[int, ...], shape: tuple[int, ...]) -> Base:
+        """The base for a grid of this shape whose cells are moved cyclically, forwards or backwards."""
+
+        def roll(values: FloatArray | None, axes: slice) -> FloatArray | None:
+            if values is None:
+                return None
+            steps = [s * values.shape[0] // n for s, n in zip(shift[axes], shape[axes], strict=True)]
+            moved: FloatArray = np.roll(values, steps, (0, 1))
+            return moved
+
+        return Base(roll(self.space, slice(0, 2)), roll(self.direction, slice(2, 4)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +87,7 @@ def _coarse(values: FloatArray | None, shape: tuple[int, ...]) -> FloatArray:
 
 
 def log_evidence(counts: Sums, base: Base, concentration: float, threads: int | None) -> float:
-    """ln of the evidence of a tree against its base measure."""
+    """Ln of the evidence of a tree against its base measure."""
     if sum(_depths(counts)) > TILE_BITS:
         return grow(counts, base, concentration, threads).log_evidence
     return _core.polya_evidence(*_problem(counts, base), concentration, threads)

@@ -1,4 +1,4 @@
-"""From rays to luminance maps."""
+"""From rays, or from the light field fitted to them, to luminance maps."""
 
 from __future__ import annotations
 
@@ -8,68 +8,83 @@ from typing import Literal, get_args, overload
 import numpy as np
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.lightfield.light_field import LightField
+from etendue.lightfield.surfaces import Surface
 from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
 from etendue.luminance.cone import ConeEstimate, ConeView, check_acceptance, cone_estimates
+from etendue.luminance.looking import look_at_field
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally
 
-Method = Literal["auto", "cone"]
+Method = Literal["auto", "cone", "lightfield"]
 METHODS: tuple[str, ...] = get_args(Method)
 
 DEFAULT_ACCEPTANCE = 1.5
 """Half-angle [°] of the cone in [Audenaert2014]_ section 2.3.2."""
 
+Acceptance = float | Literal["auto"] | None
+
 
 @overload
 def luminance_map(
-    rays: RayStream,
+    source: RayStream | LightField,
     observer: Observer,
     screen: Screen,
     *,
     method: Method = ...,
-    acceptance: float | None = ...,
+    acceptance: Acceptance = ...,
+    surface: Surface | Literal["auto"] = ...,
+    samples: int = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> LuminanceMap: ...
 @overload
 def luminance_map(
-    rays: RayStream,
+    source: RayStream | LightField,
     observer: Sequence[Observer],
     screen: Screen | Sequence[Screen],
     *,
     method: Method = ...,
-    acceptance: float | None = ...,
+    acceptance: Acceptance = ...,
+    surface: Surface | Literal["auto"] = ...,
+    samples: int = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> list[LuminanceMap]: ...
 def luminance_map(
-    rays: RayStream,
+    source: RayStream | LightField,
     observer: Observer | Sequence[Observer],
     screen: Screen | Sequence[Screen],
     *,
     method: Method = "auto",
-    acceptance: float | None = None,
+    acceptance: Acceptance = None,
+    surface: Surface | Literal["auto"] = "auto",
+    samples: int = 16,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> LuminanceMap | list[LuminanceMap]:
-    """What an observer sees of the rays' source: luminance per pixel, with its standard error.
+    """What an observer sees of a source: luminance per pixel, with its standard error.
 
     Rays travel in free space, forwards and backwards along their lines: where on its line a ray starts has no influence.
 
     Parameters
     ----------
-    rays : RayStream
-        A ray set, or a source that draws its rays on demand.
+    source : RayStream or LightField
+        A ray set, a source that draws its rays on demand, or the light field that was fitted to one.
     observer : Observer or sequence of Observer
-        Any number is served in one pass.
+        Any number is served by one pass over the rays.
     screen : Screen or sequence of Screen
         One for all observers, or one each.
-    method : {"auto", "cone"}
-        ``"cone"``: eqs. 2.2 to 2.4 of [Audenaert2014]_. ``"auto"``: the cone with the acceptance of least estimated
-        error, unless `acceptance` is given; the map's notes say which and why.
-    acceptance : float, optional
-        Half-angle α of the cone [°]; if None, 1.5 for ``"cone"`` and chosen for ``"auto"``.
+    method : {"auto", "cone", "lightfield"}
+        ``"lightfield"``: fit a light field to all rays, then look at it. ``"cone"``: only rays that head for the observer,
+        eqs. 2.2 to 2.4 of [Audenaert2014]_. ``"auto"``: the light field, unless an acceptance is given.
+    acceptance : float, "auto" or None
+        Half-angle α of the cone [°]; None: 1.5; ``"auto"``: the one of least estimated error, and the map's notes say why.
+    surface : Surface or "auto"
+        Carrier surface of the light field; ``"auto"``: the one that foretells held-out rays best.
+    samples : int
+        Points per pixel at which a light field is read.
     threads : int, optional
         All cores if None. The result has the same bits for any number.
     progress : callable, optional
@@ -84,6 +99,8 @@ def luminance_map(
     ------
     ArgumentError
         If the rays have no position, an angle is out of its domain, or the numbers of observers and screens differ.
+    UnknownNameError
+        If there is no such method.
 
     Examples
     --------
@@ -101,13 +118,25 @@ def luminance_map(
     if len(observers) != len(screens) or not observers:
         raise ArgumentError(f"{len(observers)} observers and {len(screens)} screens; give one screen, or one for each.")
     pairs = list(zip(observers, screens, strict=True))
-    # "auto" chooses what is left open: a stated acceptance leaves it nothing to choose.
-    if method == "cone" or acceptance is not None:
-        angle = check_acceptance(DEFAULT_ACCEPTANCE if acceptance is None else acceptance)
-        estimates, tally = cone_estimates(rays, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
-        maps = [_map(rays, estimate, 0, tally, None) for estimate in estimates]
+    # A stated acceptance asks for the cone.
+    by_cone = method == "cone" or (method == "auto" and acceptance is not None)
+    if isinstance(source, LightField):
+        if by_cone:
+            raise ArgumentError("a light field has no rays that a cone could accept; leave method and acceptance out.")
+        maps = [look_at_field(source, o, s, samples, threads) for o, s in pairs]
+    elif not by_cone:
+        if acceptance is not None:
+            raise ArgumentError(f"method 'lightfield' uses all rays and has no acceptance ({acceptance}); leave it out.")
+        for o, s in pairs:
+            s.axes(o)  # a view without area is refused before the work
+        field = LightField.fit(source, surface, threads=threads, progress=progress)
+        maps = [look_at_field(field, o, s, samples, threads) for o, s in pairs]
+    elif acceptance == "auto":
+        maps = _automatic(source, pairs, threads, progress)
     else:
-        maps = _automatic(rays, pairs, threads, progress)
+        angle = check_acceptance(DEFAULT_ACCEPTANCE if acceptance is None else acceptance)
+        estimates, tally = cone_estimates(source, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
+        maps = [_map(source, estimate, 0, tally, None) for estimate in estimates]
     return maps[0] if isinstance(observer, Observer) else maps
 
 
@@ -145,7 +174,7 @@ def _map(
         notes.append(f"{tally.unusable:,} rays cannot be used and were left out; see the ray set's complaints")
     if choice is not None:
         notes.append(choice.reason)
-    method = "cone" if choice is None else "auto (cone)"
+    method = "cone" if choice is None else "cone, automatic acceptance"
     return LuminanceMap(
         values=values,
         standard_error=error,

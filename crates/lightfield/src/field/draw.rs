@@ -1,6 +1,7 @@
 //! Rays drawn from a light field: as many as wanted, each from its address.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_sampling::alias::Alias;
@@ -16,7 +17,7 @@ pub const PURPOSE_FIELD: u64 = 0x4649_454C;
 /// What has to be worked out once before rays can be drawn.
 #[derive(Clone, Debug)]
 pub struct Sampler {
-    field: LightField,
+    field: Arc<LightField>,
     /// Over the cells of all parts, by the flux under their tents.
     cells: Alias,
     /// Where the cells of each part begin.
@@ -30,7 +31,8 @@ pub struct Sampler {
 impl Sampler {
     /// None if the field has no flux.
     #[must_use]
-    pub fn new(field: LightField) -> Option<Self> {
+    pub fn new(field: impl Into<Arc<LightField>>) -> Option<Self> {
+        let field = field.into();
         let (mut weights, mut starts, mut under, mut flux) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for part in &field.parts {
             starts.push(weights.len());
@@ -66,7 +68,7 @@ impl Sampler {
 
     /// The field that is drawn from.
     #[must_use]
-    pub const fn field(&self) -> &LightField {
+    pub fn field(&self) -> &LightField {
         &self.field
     }
 

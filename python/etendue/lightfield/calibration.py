@@ -1,0 +1,150 @@
+"""Error bars that hold: the posterior's, calibrated on counts of a known field much like the one that was found.
+
+A tree's posterior tells how uncertain the shares of its boxes are; that the truth varies within a box it knows only as
+far as its prior foresees. How far off the whole estimate is, is therefore tried out: counts are drawn from a field that
+was fitted to the same rays on a grid in another position, the estimate is made again from them, and its errors against
+that field are compared with its error bars, separately for cells that are sure or unsure of themselves and for cells in
+smooth or in rough surroundings (parametric bootstrap, [EfronTibshirani1993]_ chapter 6). Theory section 14.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.lightfield.candidate import product_bases, quick_density
+from etendue.lightfield.counting import FloatArray, PartCounts, Sums
+from etendue.lightfield.trees import Base, Tree, grow
+
+STRATA = 12
+"""Classes by either feature: about 7000 of a million cells in each."""
+
+FEWEST = 50
+"""Cells that a class needs to speak for itself."""
+
+ROLL = (0.38, 0.62, 0.29, 0.71)
+"""Shares of each axis by which the grid of the known field is moved: far from any dyadic fraction."""
+
+PURPOSE = 0x424F_4F54
+"""Keeps the random numbers of the trial apart from all others."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Masses:
+    """Share of each cell in the flux of its part, with a standard deviation yet to be calibrated."""
+
+    mean: FloatArray
+    deviation: FloatArray
+
+    def features(self) -> tuple[FloatArray, FloatArray]:
+        """What the trust in a cell hangs on: logarithms of its relative deviation, and of the relative spread around."""
+        mean = np.maximum(self.mean, np.finfo(np.float64).tiny)
+        certainty = np.log(np.maximum(self.deviation / mean, 1e-12))
+        average = _around(mean)
+        spread = np.sqrt(np.maximum(_around(mean**2) - average**2, 0.0)) / mean
+        return certainty.ravel(), np.log(np.maximum(spread, 1e-6)).ravel()
+
+
+def calibrate(counts: PartCounts, base: Base, tree: Tree, concentration: float, seed: int, threads: int | None) -> Tree:
+    """The tree with calibrated standard deviations."""
+    found = _masses(counts.grid, base, tree, threads)
+    known, known_base = _elsewhere(counts, base, concentration, threads)
+    drawn = _draw(known, counts, known_base, seed)
+    again = base if base.name == "uniform" else product_bases([drawn], quick_density(threads))[0]
+    retried = _masses(drawn.grid, again, grow(drawn.grid, again, concentration, threads), threads)
+    factors = _factors(retried, np.abs(retried.mean - known) / np.maximum(retried.deviation, _tiny(known)), found)
+    cells = base.cells(tree.ratio.shape)
+    deviation = np.divide(found.deviation * factors, cells, out=np.zeros_like(cells), where=cells > 0)
+    return dataclasses.replace(tree, deviation=deviation)
+
+
+def _masses(counts: Sums, base: Base, tree: Tree, threads: int | None) -> Masses:
+    """Masses with the posterior deviations of the ratio and, where the base came from the data, of its margins."""
+    cells = base.cells(tree.ratio.shape)
+    mean = tree.ratio * cells
+    variance = (tree.deviation * cells) ** 2
+    if base.name == "product":
+        for axes, shape in (((2, 3), (slice(None), slice(None), None, None)), ((0, 1), (None, None))):
+            margin = grow(counts.map(lambda a, axes=axes: a.sum(axis=axes)), Base(), 1.0, threads)
+            variance = variance + (mean * (margin.deviation / margin.ratio)[shape]) ** 2
+    return Masses(mean, np.sqrt(variance))
+
+
+def _elsewhere(counts: PartCounts, base: Base, concentration: float, threads: int | None) -> tuple[FloatArray, Base]:
+    """The masses that a grid in another position finds, with its base measure in place of the given one."""
+    shape = counts.grid.weight.shape
+    shift = tuple(round(share * n) for share, n in zip(ROLL, shape, strict=True))
+    back = tuple(-s for s in shift)
+    axes = (0, 1, 2, 3)
+    moved = base
+    if base.name == "product":
+        # Edges of the margins, too, are found anew: on the old grid they would lie where its boxes end.
+        fine = [
+            sums.map(lambda a, s=s, n=n: np.roll(a, _fine_steps(s, n, a.shape[0]), (0, 1)))
+            for sums, s, n in ((counts.space, shift[:2], shape[:2]), (counts.direction, shift[2:], shape[2:]))
+        ]
+        moved = product_bases([PartCounts(counts.grid, *fine)], quick_density(threads))[0]
+    rolled = grow(counts.grid.map(lambda a: np.roll(a, shift, axes)), moved, concentration, threads)
+    mass = np.roll(rolled.ratio * moved.cells(shape), back, axes)
+    return mass / mass.sum(), moved.rolled(back, shape)
+
+
+def _fine_steps(shift: tuple[int, ...], shape: tuple[int, ...], fine: int) -> list[int]:
+    return [s * fine // n for s, n in zip(shift, shape, strict=True)]
+
+
+def _draw(known: FloatArray, counts: PartCounts, base: Base, seed: int) -> PartCounts:
+    """Counts of as many equal rays as the set is worth, from the known field; the fine ones follow from the base."""
+    generator = np.random.Generator(np.random.Philox(key=np.array([seed, PURPOSE], dtype=np.uint64)))
+    grid = generator.poisson(known * counts.grid.rays).astype(np.float64)
+    if base.name == "uniform":
+        return PartCounts(Sums(grid, None), counts.space, counts.direction)
+    space = _refine(grid.sum(axis=(2, 3)), base.space, generator)
+    direction = _refine(grid.sum(axis=(0, 1)), base.direction, generator)
+    return PartCounts(Sums(grid, None), Sums(space, None), Sums(direction, None))
+
+
+def _refine(coarse: FloatArray, fine: FloatArray | None, generator: np.random.Generator) -> FloatArray:
+    """The counts of coarse cells dealt out to the fine cells within them, by the fine density."""
+    if fine is None:
+        return coarse
+    (rows, columns), n = coarse.shape, fine.shape[0]
+    blocks = fine.reshape(rows, n // rows, columns, n // columns).transpose(0, 2, 1, 3)
+    shares = blocks.reshape(rows * columns, -1)
+    dealt = generator.multinomial(coarse.astype(np.int64).ravel(), shares / shares.sum(axis=1, keepdims=True))
+    back = dealt.reshape(rows, columns, n // rows, n // columns).transpose(0, 2, 1, 3)
+    refined: FloatArray = back.reshape(n, n).astype(np.float64)
+    return refined
+
+
+def _factors(tried: Masses, errors: FloatArray, found: Masses) -> FloatArray:
+    """Factor for the deviation of each found cell: that which the errors of the tried cells of its class show."""
+    features = tried.features()
+    edges = [np.quantile(f, np.linspace(0, 1, STRATA + 1)[1:-1]) for f in features]
+    classes, targets = _classes(features, edges), _classes(found.features(), edges)
+    squared = errors.ravel() ** 2
+    numbers = np.bincount(classes, minlength=STRATA**2)
+    sums = np.bincount(classes, squared, minlength=STRATA**2)
+    # Classes with few cells lean on what all cells show.
+    table = np.sqrt((sums + FEWEST * squared.mean()) / (numbers + FEWEST))
+    factors: FloatArray = table[targets].reshape(found.mean.shape)
+    return factors
+
+
+def _classes(features: tuple[FloatArray, FloatArray], edges: list[FloatArray]) -> npt.NDArray[np.intp]:
+    rows, columns = (np.searchsorted(e, f) for e, f in zip(edges, features, strict=True))
+    return rows * STRATA + columns
+
+
+def _around(values: FloatArray) -> FloatArray:
+    """Average over each cell and its neighbours, ½ of its own value and ¼ of either neighbour's along each axis."""
+    for axis in range(values.ndim):
+        if values.shape[axis] > 1:
+            values = 0.5 * values + 0.25 * (np.roll(values, 1, axis) + np.roll(values, -1, axis))
+    return values
+
+
+def _tiny(known: FloatArray) -> float:
+    return float(np.finfo(np.float64).tiny) + 1e-12 / known.size
