@@ -12,6 +12,7 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RUNS = {
     "chapter_2.py": (["--rays", "200000", "--seeds", "4"], 4),
     "first_picture.py": (["--rays", "500000", "--output", "picture.png"], 1),
+    "threshold_sweep.py": (["--rays", "100000"], 1),
 }
 
 
