@@ -9,6 +9,7 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
+from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.gridded import angular, fitting
 from etendue.lightfield.gridded.gridded_source import GriddedSource
@@ -683,3 +684,29 @@ def test_the_noise_of_the_mean_luminance_is_that_of_the_rays() -> None:
     step = math.radians(float(source.patches.theta_step.max()))
     rays_behind = n * 2 * math.sin(theta) * math.cos(theta) * step
     assert abs(seen - 1) < norm.isf(0.5e-4) / math.sqrt(rays_behind) + step**2 / 6
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        Plane(0.2, 3, 2, (0.4, 0)),
+        Disk(radius=1.5, centre=(0.2, 0.3)),
+        Box(2, 3, 1.5, centre=(0.1, 0.2, 0.3)),
+        Sphere(radius=1.8, centre=(0.1, 0, 0)),
+        Cylinder(radius=1.5, bottom=-1, top=1.3, centre=(0.5, 0)),
+        Cylinder(radius=1.5, bottom=-1, top=1.3, ends=False),
+        Dome(radius=2, z=0.3, centre=(0.2, 0.1), window=1.0),
+    ],
+)
+def test_the_compiled_core_deals_rays_to_the_same_parts(surface: Surface) -> None:
+    """Two routes to the rule of a surface: this one in numpy, that of the light field in Rust."""
+    rng = np.random.default_rng(31)
+    position = rng.normal(size=(20_000, 3)) * 1.2
+    direction = unit(rng.normal(size=(20_000, 3)))
+    direction[:6] = np.concatenate([np.eye(3), -np.eye(3)])
+    pixels = PixelatedSurface.cut(surface, 0.3, None)
+    owner = pixels.owner(position + 40 * direction, direction)
+    found = np.where(owner < 0, -1, pixels.part_of(owner))
+    part, _ = _core.cross_parts([part.core() for part in surface.parts()], position, direction)
+    assert np.array_equal(found, part)
+    assert len(np.unique(found)) == len(surface.parts()) + 1
