@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,8 +16,12 @@ from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 from etendue.units import INTENSITY_UNIT, MM2_PER_M2, FluxUnit
+
+if TYPE_CHECKING:
+    from etendue.lightfield.field_rays import FieldRays
 
 INTENSITY_SIDE = 96
 """Points along each coordinate of a part over which an intensity is summed: 9216 per part and direction."""
@@ -173,6 +177,29 @@ class LightField:
         x, k = _lines(points, directions)
         density: FloatArray = self.core.luminance(x, k)[0] / self.total_flux
         return density
+
+    def rays(self, n: int, seed: int = 1) -> FieldRays:
+        """`n` rays of equal flux drawn from the field, as a stream that needs no memory.
+
+        Parameters
+        ----------
+        n : int
+            Number of rays, which together carry the field's flux.
+        seed : int
+            0 to 2⁶⁴ - 1.
+
+        Raises
+        ------
+        ArgumentError
+            If there are no rays to be drawn, or there is no such seed.
+        """
+        from etendue.lightfield.field_rays import FieldRays  # noqa: PLC0415 - it needs this class
+
+        return FieldRays(self, n, seed)
+
+    def sample(self, n: int, seed: int = 1) -> RaySet:
+        """The same rays as those of `rays`, as a ray set in memory: 56 bytes each."""
+        return self.rays(n, seed).ray_set()
 
     def intensity(self, c_planes: int = 24, gamma_step: float = 5.0, *, threads: int | None = None) -> Intensity:
         """Far-field intensity, I(k) = ∫ L(x, k) n·k dA over the surface, by the midpoint rule.

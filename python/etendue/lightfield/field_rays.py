@@ -1,0 +1,101 @@
+"""Rays drawn from a light field, as a stream: any number of them, none of which has to be in memory."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.lightfield.light_field import LightField
+from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import RayStream, Tally
+from etendue.units import FluxUnit
+
+
+class FieldRays(RayStream):
+    """Rays of equal flux with the density of a light field's luminance in étendue, drawn exactly.
+
+    Each ray starts on the carrier surface. It depends on the seed and its number alone: any stretch of the stream, read
+    in any order, has the same bits.
+
+    Parameters
+    ----------
+    field : LightField
+        What is drawn from.
+    rays : int
+        Number of rays, which together carry the field's flux.
+    seed : int
+        0 to 2⁶⁴ - 1.
+
+    Raises
+    ------
+    ArgumentError
+        If a parameter is out of its domain.
+    TypeError
+        If the number of rays or the seed is no integer.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> from etendue.lightfield.surfaces import Disk
+    >>> field = LightField.fit(et.RingSource(rays=100_000), Disk(radius=30), depths=(3, 3, 3, 3))
+    >>> rays = FieldRays(field, 10**9, seed=4)
+    >>> len(rays), round(rays.total_flux, 6), len(next(rays.batches()).flux)
+    (1000000000, 600.0, 262144)
+    """
+
+    def __init__(self, field: LightField, rays: int, seed: int = 1) -> None:
+        # Python's own TypeError for 1e6, as everywhere a number of rays is asked for.
+        rays, seed = map(operator.index, (rays, seed))
+        if not 1 <= rays < 2**63:
+            raise ArgumentError(f"FieldRays: {rays} rays; give at least one, and fewer than 2^63.")
+        if not 0 <= seed < 2**64:
+            raise ArgumentError(f"FieldRays: seed {seed}; give 0 to 2^64 - 1.")
+        self.field = field
+        self.seed = seed
+        self._core = _core.FieldRays(field.core, rays, seed)
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self._core)
+
+    @property
+    def flux_unit(self) -> FluxUnit:
+        """The field's."""
+        return self.field.flux_unit
+
+    @property
+    def has_position(self) -> bool:
+        """Rays start on the carrier surface."""
+        return True
+
+    @property
+    def total_flux(self) -> float:
+        """The field's [`flux_unit`]."""
+        return self.field.total_flux
+
+    @property
+    def flux_scale(self) -> float:
+        """Rays are drawn with their flux in `flux_unit`."""
+        return 1.0
+
+    @property
+    def provenance(self) -> Provenance:
+        """The field's, and how many rays were drawn with which seed."""
+        return self.field.provenance.then(f"{len(self)} rays drawn from the light field, seed {self.seed}")
+
+    def core_source(self) -> Any:
+        """The source as the compiled core takes it."""
+        return self._core
+
+    def accept_tally(self, tally: Tally) -> float:
+        """Nothing is learnt from a pass: the flux is known."""
+        del tally
+        return 1.0
+
+    def ray_set(self) -> RaySet:
+        """All rays as a ray set, for sets that fit into memory."""
+        position, direction, flux = _core.read_rays(self._core, 0, len(self))
+        return RaySet(position, direction, flux, flux_unit=self.flux_unit, provenance=self.provenance)

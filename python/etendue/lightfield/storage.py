@@ -1,0 +1,391 @@
+"""Light fields as HDF5 files; docs/formats/light-fields.md describes them field by field.
+
+Files hold what the field is worth and no more: the ratio to a sixteenth of its standard deviation, which leaves long
+runs of zero bits. They are written so that the HDF5 library finds damage by itself: a checksum on every header (file
+format 1.10) and on every chunk.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import FormatError
+from etendue.formats.output import atomic_output
+from etendue.lightfield.counting import MOST_CELLS, FloatArray
+from etendue.lightfield.light_field import FitReport, LightField, PartField
+from etendue.lightfield.rounding import digits_for, rounded
+from etendue.lightfield.surfaces import SURFACES, Part, Surface
+from etendue.quantities.provenance import Provenance
+from etendue.units import FLUX_UNITS
+
+FORMAT = "etendue light field"
+VERSION = 1
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""The first bytes of an HDF5 file."""
+
+LIBRARY = ("v110", "v110")
+"""The oldest HDF5 that reads the files: the first with checksums on all that tells where data are."""
+
+STEPS = 16.0
+"""The ratio is rounded to at least so many steps per standard deviation: it adds 1/3072 to the loss to be expected."""
+
+FEWEST_DIGITS = 4
+"""Binary digits of the ratio after the leading one, however uncertain it is: then it is off by 3 % at most."""
+
+DEVIATION_DIGITS = 4
+"""Of the standard deviation: off by 3 % at most."""
+
+FACTOR_DIGITS = 11
+"""Of B_s and B_d: off by 0.025 % at most."""
+
+CHUNK_SIDE = 16
+"""Cells of a chunk along each coordinate. Trees are constant over boxes, and blocks cut fewer boxes than slices do."""
+
+DEFLATE = 9
+DEFLATE_RATIO = 1032
+"""The largest factor by which deflate can shrink anything: 258 bytes into 2 bits."""
+
+SAME_FLUX = 1e-9
+"""Relative difference between the stated flux of a part and the one worked out that rounding may make."""
+
+DAMAGED = "The file is damaged or cut short: copy it again, or fit and save the field again."
+FOREIGN = "Give an HDF5 file that LightField.save wrote."
+
+
+def is_field_file(path: str | Path) -> bool:
+    """Whether a file is a light field, by its content.
+
+    An HDF5 file that cannot be opened counts as one, so that `load_field` tells what is wrong with it.
+
+    Raises
+    ------
+    OSError
+        If there is no such file.
+    """
+    import h5py  # noqa: PLC0415 - only who has such a file needs the library
+
+    path = Path(path)
+    if not _begins_as_hdf5(path):
+        return False
+    with contextlib.suppress(FormatError), _reading(path, "HDF5"), h5py.File(path, "r") as file:
+        return _Node(path, file).has_text("format", FORMAT)
+    return True
+
+
+def save_field(field: LightField, path: Path) -> None:
+    """See `LightField.save`.
+
+    What is saved is `as_stored`: a field that was loaded gives the same file again, bit by bit.
+    """
+    import h5py  # noqa: PLC0415
+
+    stored = as_stored(field)
+    with atomic_output(path) as temporary:
+        # Made in memory and written in one go: an HDF5 library whose disk is full cannot even close its file.
+        with h5py.File(temporary, "w", driver="core", backing_store=False, libver=LIBRARY) as file:
+            _write(file, stored)
+            file.flush()
+            image = file.id.get_file_image()
+        temporary.write_bytes(image)
+
+
+def load_field(path: Path) -> LightField:
+    """See `LightField.load`."""
+    import h5py  # noqa: PLC0415
+
+    if not _begins_as_hdf5(path):
+        raise FormatError(path, "byte 0", "this is no HDF5 file", FOREIGN)
+    with _reading(path, "HDF5"), h5py.File(path, "r") as file:
+        return _read(_Node(path, file))
+
+
+def as_stored(field: LightField) -> LightField:
+    """The field as a file holds it: rounded to what it is worth, each part with exactly the flux it had."""
+    parts = tuple(_rounded_part(part) for part in field.parts)
+    flux = field.replace(parts=parts).part_flux
+    levels = (
+        part.level * (had / has) if has > 0 else part.level
+        for part, had, has in zip(parts, field.part_flux, flux, strict=True)
+    )
+    return field.replace(
+        parts=tuple(dataclasses.replace(part, level=level) for part, level in zip(parts, levels, strict=True))
+    )
+
+
+def _rounded_part(part: PartField) -> PartField:
+    ratio, deviation = (np.asarray(values, dtype=np.float32) for values in (part.ratio, part.deviation))
+    deviation = rounded(deviation, DEVIATION_DIGITS)
+    ratio = rounded(ratio, digits_for(ratio, deviation / np.float32(STEPS), FEWEST_DIGITS))
+    factors = (None if f is None else rounded(f, FACTOR_DIGITS) for f in (part.space, part.direction))
+    return PartField(ratio, deviation, *factors, part.level)
+
+
+def _begins_as_hdf5(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return stream.read(len(SIGNATURE)) == SIGNATURE
+
+
+@contextlib.contextmanager
+def _reading(path: Path, place: str) -> Iterator[None]:
+    """Turn whatever is raised over damaged or foreign content into a `FormatError` that names file and place."""
+    try:
+        yield
+    except (FormatError, MemoryError):
+        raise
+    # The library raises anything from OSError to KeyError over damaged files, our own constructors ArgumentError.
+    except Exception as error:
+        raise FormatError(path, place, f"{type(error).__name__}: {error}", DAMAGED) from error
+
+
+# --- writing ---------------------------------------------------------------------------------------------------------
+
+
+def _write(file: Any, field: LightField) -> None:
+    unit = f"{field.flux_unit}/(mm2 sr)"
+    _put(file, format=FORMAT, version=VERSION, flux_unit=field.flux_unit, length_unit="mm", level_unit=unit)
+    _put(file, provenance=json.dumps(field.provenance.to_dict(), sort_keys=True), notes=json.dumps(field.notes))
+    surface = {f.name: getattr(field.surface, f.name) for f in dataclasses.fields(field.surface)}
+    known = {name: value for name, value in surface.items() if value is not None}
+    _put(file.create_group("surface"), name=field.surface.NAME, spec=field.surface.spec, **known)
+    _put(file.create_group("report"), **_report_values(field.report))
+    parts = file.create_group("parts")
+    for index, (chart, part, flux) in enumerate(zip(field.surface.parts(), field.parts, field.part_flux, strict=True)):
+        group = parts.create_group(str(index))
+        _put(group, **_chart(chart), level=float(part.level), flux=flux)
+        _put_array(group, "ratio", part.ratio, "luminance / (level * space * direction) at the centres of equal cells")
+        _put_array(group, "deviation", part.deviation, "standard deviation of ratio")
+        for name, factor, meaning in (
+            ("space", part.space, "factor of luminance over the place, at the centres of equal cells"),
+            ("direction", part.direction, "factor of luminance over the direction, at the centres of equal cells"),
+        ):
+            if factor is not None:
+                _put_array(group, name, factor, meaning)
+
+
+def _chart(chart: Part) -> dict[str, Any]:
+    return {f.name: getattr(chart, f.name) for f in dataclasses.fields(Part)}
+
+
+def _report_values(report: FitReport) -> dict[str, Any]:
+    """The report's fields as attributes: lists of texts as JSON."""
+    hints = get_type_hints(FitReport)
+    values = {name: getattr(report, name) for name in hints}
+    return {name: json.dumps(v) if hints[name] == tuple[str, ...] else v for name, v in values.items()}
+
+
+def _put(node: Any, **values: Any) -> None:
+    """Attributes: texts in UTF-8, numbers and arrays of numbers as they are."""
+    import h5py  # noqa: PLC0415
+
+    for name, value in values.items():
+        if isinstance(value, str):
+            # Of fixed length, because the heap that holds texts of any length has no checksum.
+            encoded = value.encode("utf-8")
+            node.attrs.create(name, encoded, dtype=h5py.string_dtype("utf-8", max(len(encoded), 1)))
+        else:
+            node.attrs[name] = value
+
+
+def _put_array(group: Any, name: str, values: npt.NDArray[Any], meaning: str) -> None:
+    chunks = tuple(min(n, CHUNK_SIDE) for n in values.shape) if values.ndim == 4 else values.shape
+    dataset = group.create_dataset(
+        name, data=values, chunks=chunks, shuffle=True, compression="gzip", compression_opts=DEFLATE, fletcher32=True
+    )
+    _put(dataset, unit="1", meaning=meaning)
+
+
+# --- reading ---------------------------------------------------------------------------------------------------------
+
+
+def _read(file: _Node) -> LightField:
+    if not file.has_text("format", FORMAT):
+        raise file.error("attribute 'format'", f"it is not {FORMAT!r}", FOREIGN)
+    version = file.integer("version")
+    if version != VERSION:
+        raise file.error("attribute 'version'", f"version {version}", f"This étendue reads {VERSION}; update it.")
+    flux_unit = file.text("flux_unit")
+    if flux_unit not in FLUX_UNITS:
+        raise file.error("attribute 'flux_unit'", f"{flux_unit!r} is none of {', '.join(FLUX_UNITS)}", DAMAGED)
+    surface = _surface(file.group("surface"))
+    parts, flux = _parts(file.group("parts"), surface)
+    field = LightField(
+        surface=surface,
+        parts=parts,
+        flux_unit=flux_unit,
+        report=_report(file.group("report")),
+        provenance=_provenance(file),
+        notes=file.texts("notes"),
+    )
+    for index, (stated, found) in enumerate(zip(flux, field.part_flux, strict=True)):
+        if not math.isclose(stated, found, rel_tol=SAME_FLUX):
+            place = f"/parts/{index}, attribute 'flux'"
+            raise file.error(place, f"{stated!r} {flux_unit}, but the arrays hold {found!r}", DAMAGED)
+    return field
+
+
+def _surface(group: _Node) -> Surface:
+    kind = SURFACES[group.text("name")]
+    hints = get_type_hints(kind)
+    known = [f.name for f in dataclasses.fields(kind) if f.name in group.node.attrs]
+    dimensions = {
+        name: group.truth(name)
+        if hints[name] is bool
+        else group.numbers(name, (kind.centre_size(),)).tolist()
+        if name == "centre"
+        else group.number(name)
+        for name in known
+    }
+    surface = kind(**dimensions)
+    if surface.spec != group.text("spec"):
+        raise group.error("attribute 'spec'", f"the dimensions are those of {surface.spec}", DAMAGED)
+    return surface
+
+
+def _parts(group: _Node, surface: Surface) -> tuple[tuple[PartField, ...], list[float]]:
+    """The fields of all parts, and the fluxes that the file states for them."""
+    charts = surface.parts()
+    if len(group.node) != len(charts):
+        raise group.error("members", f"{len(group.node)} parts, expected {len(charts)} of {surface.spec}", DAMAGED)
+    parts, flux = [], []
+    for index, chart in enumerate(charts):
+        part = group.group(str(index))
+        for name, value in _chart(chart).items():
+            stored = part.text(name) if isinstance(value, str) else part.numbers(name, np.shape(value))
+            agrees = stored == value if isinstance(value, str) else np.allclose(stored, value, rtol=1e-12, atol=1e-12)
+            if not agrees:
+                raise part.error(f"attribute {name!r}", f"{stored!r}, but {surface.spec} has {value!r}", DAMAGED)
+        ratio = part.array("ratio", np.dtype("<f4"), 4)
+        deviation = part.array("deviation", np.dtype("<f4"), 4)
+        factors = (
+            part.array(name, np.dtype("<f8"), 2) if name in part.node else None for name in ("space", "direction")
+        )
+        parts.append(PartField(ratio, deviation, *factors, part.number("level")))
+        flux.append(part.number("flux"))
+    return tuple(parts), flux
+
+
+def _report(group: _Node) -> FitReport:
+    readers: Mapping[Any, Callable[[str], Any]] = {
+        int: group.integer,
+        float: lambda name: group.number(name, finite=False),
+        str: group.text,
+        tuple[str, ...]: group.texts,
+        tuple[float, ...]: lambda name: tuple(group.numbers(name, None).tolist()),
+    }
+    return FitReport(**{name: readers[hint](name) for name, hint in get_type_hints(FitReport).items()})
+
+
+def _provenance(file: _Node) -> Provenance:
+    provenance = Provenance.from_dict(json.loads(file.text("provenance")))
+    if not all(isinstance(text, str) for text in (*dataclasses.astuple(provenance)[:3], *provenance.steps)):
+        raise file.error("attribute 'provenance'", "something else than texts", DAMAGED)
+    return provenance
+
+
+@dataclasses.dataclass(frozen=True)
+class _Node:
+    """A group of the file. Nothing is read of which kind and size were not looked at before.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file, for messages.
+    node : h5py.Group
+    """
+
+    path: Path
+    node: Any
+
+    def error(self, place: str, found: str, advice: str) -> FormatError:
+        """A complaint about something in this group."""
+        return FormatError(self.path, f"{self.node.name.rstrip('/')}/ {place}", found, advice)
+
+    def group(self, name: str) -> _Node:
+        """A group in this one."""
+        return _Node(self.path, self._member(name, "group"))
+
+    def array(self, name: str, dtype: np.dtype[Any], axes: int) -> npt.NDArray[Any]:
+        """A dataset with 2^k cells along each of its axes, finite and not negative."""
+        data = self._member(name, "dataset")
+        place = f"dataset {name!r}"
+        if data.dtype != dtype or len(data.shape or ()) != axes:
+            raise self.error(place, f"{data.dtype} of shape {data.shape}, expected {dtype} with {axes} axes", DAMAGED)
+        if not all(n > 0 and n & (n - 1) == 0 for n in data.shape) or math.prod(data.shape) > MOST_CELLS:
+            raise self.error(place, f"shape {data.shape}, expected powers of two, {MOST_CELLS} at most", DAMAGED)
+        # Memory is set aside only for what the file can hold; and nothing is followed to other files.
+        if data.external or data.is_virtual or data.nbytes > DEFLATE_RATIO * data.id.get_storage_size():
+            raise self.error(place, f"the {data.nbytes} bytes of shape {data.shape} are not in it", DAMAGED)
+        if data.chunks is not None and math.prod(data.chunks) > data.size:
+            raise self.error(place, f"chunks of shape {data.chunks} in shape {data.shape}", DAMAGED)
+        values: npt.NDArray[Any] = data[()]
+        if not (np.isfinite(values).all() and (values >= 0).all()):
+            raise self.error(place, "a value that is negative or not finite", DAMAGED)
+        return values
+
+    def text(self, name: str) -> str:
+        """An attribute that is a text."""
+        stored = self._attribute(name, (), "SO")
+        return stored.decode("utf-8") if isinstance(stored, bytes) else str(stored)
+
+    def has_text(self, name: str, text: str) -> bool:
+        """Whether there is such an attribute with just this text, whatever else it may be."""
+        fits = name in self.node.attrs and self.node.attrs.get_id(name).dtype.kind in "SO"
+        return fits and self.node.attrs.get_id(name).shape == () and self.text(name) == text
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        """An attribute that is a list of texts, as JSON."""
+        stored = json.loads(self.text(name))
+        if not (isinstance(stored, list) and all(isinstance(item, str) for item in stored)):
+            raise self.error(f"attribute {name!r}", "it is not a list of texts", DAMAGED)
+        return tuple(stored)
+
+    def integer(self, name: str) -> int:
+        """An attribute that is a whole number."""
+        return int(self._attribute(name, (), "iu"))
+
+    def truth(self, name: str) -> bool:
+        """An attribute that is true or false."""
+        return bool(self._attribute(name, (), "b"))
+
+    def number(self, name: str, *, finite: bool = True) -> float:
+        """An attribute that is a number."""
+        return float(self._numbers(name, (), finite=finite))
+
+    def numbers(self, name: str, shape: tuple[int, ...] | None) -> FloatArray:
+        """An attribute that is an array of finite numbers; shape None: of any length."""
+        return self._numbers(name, shape, finite=True)
+
+    def _numbers(self, name: str, shape: tuple[int, ...] | None, *, finite: bool) -> FloatArray:
+        values = np.asarray(self._attribute(name, shape, "iuf"), dtype=np.float64)
+        if finite and not np.isfinite(values).all():
+            raise self.error(f"attribute {name!r}", f"{values} is not finite", DAMAGED)
+        return values
+
+    def _attribute(self, name: str, shape: tuple[int, ...] | None, kinds: str) -> Any:
+        if name not in self.node.attrs:
+            raise self.error(f"attribute {name!r}", "there is none", DAMAGED)
+        stored = self.node.attrs.get_id(name)
+        fits = stored.shape == shape if shape is not None else stored.shape is not None and len(stored.shape) == 1
+        if not fits or stored.dtype.kind not in kinds or stored.get_storage_size() > self.path.stat().st_size:
+            raise self.error(f"attribute {name!r}", f"{stored.dtype} of shape {stored.shape}", DAMAGED)
+        return self.node.attrs[name]
+
+    def _member(self, name: str, kind: str) -> Any:
+        import h5py  # noqa: PLC0415
+
+        link = self.node.get(name, getlink=True)
+        # Soft and external links lead elsewhere, out of the file even.
+        member = self.node[name] if isinstance(link, h5py.HardLink) and name in self.node else None
+        if not isinstance(member, h5py.Group if kind == "group" else h5py.Dataset):
+            raise self.error(f"{kind} {name!r}", "there is none", DAMAGED)
+        return member
