@@ -25,7 +25,7 @@ from etendue.lightfield.light_field import FitReport, LightField, PartField
 from etendue.lightfield.rounding import digits_for, rounded
 from etendue.lightfield.surfaces import SURFACES, Part, Surface
 from etendue.quantities.provenance import Provenance
-from etendue.units import FLUX_UNITS
+from etendue.units import LUMINANCE_UNIT, FluxUnit
 
 FORMAT = "etendue light field"
 VERSION = 1
@@ -126,8 +126,8 @@ def _rounded_part(part: PartField) -> PartField:
     ratio, deviation = (np.asarray(values, dtype=np.float32) for values in (part.ratio, part.deviation))
     deviation = rounded(deviation, DEVIATION_DIGITS)
     ratio = rounded(ratio, digits_for(ratio, deviation / np.float32(STEPS), FEWEST_DIGITS))
-    factors = (None if f is None else rounded(f, FACTOR_DIGITS) for f in (part.space, part.direction))
-    return PartField(ratio, deviation, *factors, part.level)
+    space, direction = (None if f is None else rounded(f, FACTOR_DIGITS) for f in (part.space, part.direction))
+    return PartField(ratio, deviation, space, direction, part.level)
 
 
 def _begins_as_hdf5(path: Path) -> bool:
@@ -213,15 +213,12 @@ def _read(file: _Node) -> LightField:
     version = file.integer("version")
     if version != VERSION:
         raise file.error("attribute 'version'", f"version {version}", f"This étendue reads {VERSION}; update it.")
-    flux_unit = file.text("flux_unit")
-    if flux_unit not in FLUX_UNITS:
-        raise file.error("attribute 'flux_unit'", f"{flux_unit!r} is none of {', '.join(FLUX_UNITS)}", DAMAGED)
     surface = _surface(file.group("surface"))
     parts, flux = _parts(file.group("parts"), surface)
     field = LightField(
         surface=surface,
         parts=parts,
-        flux_unit=flux_unit,
+        flux_unit=_flux_unit(file),
         report=_report(file.group("report")),
         provenance=_provenance(file),
         notes=file.texts("notes"),
@@ -229,8 +226,16 @@ def _read(file: _Node) -> LightField:
     for index, (stated, found) in enumerate(zip(flux, field.part_flux, strict=True)):
         if not math.isclose(stated, found, rel_tol=SAME_FLUX):
             place = f"/parts/{index}, attribute 'flux'"
-            raise file.error(place, f"{stated!r} {flux_unit}, but the arrays hold {found!r}", DAMAGED)
+            raise file.error(place, f"{stated!r} {field.flux_unit}, but the arrays hold {found!r}", DAMAGED)
     return field
+
+
+def _flux_unit(file: _Node) -> FluxUnit:
+    stored = file.text("flux_unit")
+    for known in LUMINANCE_UNIT:
+        if stored == known:
+            return known
+    raise file.error("attribute 'flux_unit'", f"{stored!r} is none of {', '.join(LUMINANCE_UNIT)}", DAMAGED)
 
 
 def _surface(group: _Node) -> Surface:
@@ -266,10 +271,10 @@ def _parts(group: _Node, surface: Surface) -> tuple[tuple[PartField, ...], list[
                 raise part.error(f"attribute {name!r}", f"{stored!r}, but {surface.spec} has {value!r}", DAMAGED)
         ratio = part.array("ratio", np.dtype("<f4"), 4)
         deviation = part.array("deviation", np.dtype("<f4"), 4)
-        factors = (
+        space, direction = (
             part.array(name, np.dtype("<f8"), 2) if name in part.node else None for name in ("space", "direction")
         )
-        parts.append(PartField(ratio, deviation, *factors, part.number("level")))
+        parts.append(PartField(ratio, deviation, space, direction, part.number("level")))
         flux.append(part.number("flux"))
     return tuple(parts), flux
 
