@@ -11,12 +11,22 @@ from etendue.formats.intensity import read_intensity, write_intensity
 from etendue.formats.maps import read_map
 from etendue.formats.rays import read_rays, write_rays
 from etendue.goniophotometry.far_field import intensity_distribution
+from etendue.goniophotometry.threshold_sweep import threshold_sweep
+from etendue.lightfield.gridded.gridded_source import GriddedSource
+from etendue.lightfield.light_field import LightField
+from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, parse_surface
 from etendue.luminance.combination import combine_maps
 from etendue.luminance.comparison import Region, compare, cross_section
 from etendue.luminance.denoising import denoise_map
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
-from etendue.plot import plot_comparison, plot_cross_sections, plot_intensity, plot_map
+from etendue.plot import (
+    plot_comparison,
+    plot_cross_sections,
+    plot_intensity,
+    plot_map,
+    plot_threshold_sweep,
+)
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
@@ -25,14 +35,23 @@ from etendue.quantities.spectrum import Spectrum
 from etendue.sources.ring_source import RingSource
 
 __all__ = [
+    "Box",
+    "Cylinder",
+    "Disk",
+    "Dome",
+    "GriddedSource",
+    "Hemisphere",
     "Intensity",
+    "LightField",
     "LuminanceMap",
     "Observer",
+    "Plane",
     "RaySet",
     "Region",
     "RingSource",
     "Screen",
     "Spectrum",
+    "Sphere",
     "combine_maps",
     "compare",
     "cross_section",
@@ -40,13 +59,16 @@ __all__ = [
     "filter_map",
     "intensity_distribution",
     "luminance_map",
+    "parse_surface",
     "plot_comparison",
     "plot_cross_sections",
     "plot_intensity",
     "plot_map",
+    "plot_threshold_sweep",
     "read_intensity",
     "read_map",
     "read_rays",
+    "threshold_sweep",
     "write_intensity",
     "write_rays",
 ]

@@ -11,7 +11,7 @@ from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import checked_threads
 from etendue.units import MM2_PER_M2
 
-MOST_SAMPLES = 4096
+MOST_SAMPLES = 2048
 """Points per pixel: more resolve nothing that a field holds."""
 
 

@@ -151,6 +151,7 @@ impl RaySource for FieldRays<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::tent::cell_of;
     use crate::field::tests::rough;
 
     #[test]
@@ -196,7 +197,7 @@ mod tests {
         let rays = 400_000;
         let mut counts = vec![0.0; 128];
         let bin = |part: usize, at: [f64; 4]| {
-            let [i, j, k, l] = [0, 1, 2, 3].map(|m| ((at[m] * [4.0, 2.0, 4.0, 2.0][m]) as usize).min([3, 1, 3, 1][m]));
+            let [i, j, k, l] = [0, 1, 2, 3].map(|m| cell_of(at[m], [4, 2, 4, 2][m]));
             part * 64 + ((i * 2 + j) * 4 + k) * 2 + l
         };
         for index in 0..rays {
@@ -207,8 +208,8 @@ mod tests {
         let n = 32;
         for (p, part) in field.parts.iter().enumerate() {
             for index in 0..n * n * n * n {
-                let at: [f64; 4] =
-                    std::array::from_fn(|k| ((index / usize::pow(n, k as u32) % n) as f64 + 0.5) / n as f64);
+                let strides = [1, n, n * n, n * n * n];
+                let at = strides.map(|stride| ((index / stride % n) as f64 + 0.5) / n as f64);
                 expected[bin(p, at)] += part.at([at[0], at[1]], [at[2], at[3]]).value * part.part.etendue();
             }
         }

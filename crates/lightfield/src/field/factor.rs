@@ -173,6 +173,7 @@ const fn under_count(pieces: [usize; 2]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::tent::cell_of;
     use etendue_sampling::philox::Stream;
 
     fn factor(n: usize, wraps: bool) -> Factor {
@@ -219,7 +220,7 @@ mod tests {
                     used += 1;
                     numbers[used - 1]
                 });
-                let bin = point.map(|x| ((x * bins as f64) as usize).min(bins - 1));
+                let bin = point.map(|x| cell_of(x, bins));
                 counts[bin[0] * bins + bin[1]] += 1.0;
             }
             let mut expected = vec![0.0; bins * bins];
@@ -237,7 +238,7 @@ mod tests {
                             .sum::<f64>()
                     };
                     let density = factor.at(point) * weight(x, cell[0]) * weight(y, cell[1]);
-                    let bin = point.map(|x| (x * bins as f64) as usize);
+                    let bin = point.map(|x| cell_of(x, bins));
                     expected[bin[0] * bins + bin[1]] += density / f64::from(fine * fine);
                 }
             }

@@ -2,58 +2,82 @@
 
 use rayon::prelude::*;
 
+use etendue_geometry::RayBatch;
+use etendue_geometry::batch::BLOCK;
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 
 use super::{LightField, Reading};
+use crate::surface::{Coordinates, carry};
 use crate::view::View;
 
-/// Pixels in one unit of work.
+/// Lines in one unit of work outside of maps.
 const CHUNK: usize = 256;
 
 /// Mean luminance of each pixel and its standard deviation, row by row; the same bits for any number of threads.
 ///
-/// The average runs over `samples` points of a rank-1 lattice in the pixel: of all point sets that small its shadows on
-/// rows, columns and slanted edges are the most even. Deviations of the points add up, as they err together.
+/// The average runs over `samples` points, at most [`BLOCK`], of a rank-1 lattice in the pixel: of all point sets that
+/// small its shadows on rows, columns and slanted edges are the most even. Deviations of the points add up, as they err
+/// together.
 #[must_use]
 pub fn look(field: &LightField, view: &View, samples: u32, threads: usize) -> Vec<Reading> {
     let points = lattice(samples);
-    let mut pixels = vec![Reading::default(); view.pixels()];
-    let fill = |(chunk, pixels): (usize, &mut [Reading])| {
-        for (i, pixel) in pixels.iter_mut().enumerate() {
-            *pixel = see(field, view, chunk * CHUNK + i, &points);
-        }
-    };
-    if threads == 1 || pixels.len() <= CHUNK {
-        pixels.chunks_mut(CHUNK).enumerate().for_each(fill);
-        return pixels;
-    }
-    ordered::within(threads, |parallel| {
+    let chunk = (BLOCK / points.len()).max(1);
+    let work = |(index, pixels): (usize, &mut [Reading])| see(field, view, index * chunk, &points, pixels);
+    let serial = threads == 1 || view.pixels() <= 4 * chunk;
+    let paint = |parallel: bool| {
         let mut pixels = vec![Reading::default(); view.pixels()];
         if parallel {
-            pixels.par_chunks_mut(CHUNK).enumerate().for_each(fill);
+            pixels.par_chunks_mut(chunk).enumerate().for_each(work);
         } else {
-            pixels.chunks_mut(CHUNK).enumerate().for_each(fill);
+            pixels.chunks_mut(chunk).enumerate().for_each(work);
         }
         pixels
-    })
+    };
+    if serial {
+        paint(false)
+    } else {
+        ordered::within(threads, paint)
+    }
 }
 
-fn see(field: &LightField, view: &View, pixel: usize, points: &[[f64; 2]]) -> Reading {
-    let (row, column) = (pixel / view.columns as usize, pixel % view.columns as usize);
-    let mut sum = Reading::default();
-    for [du, dv] in points {
-        let u = ((column as f64 + du) / f64::from(view.columns) - 0.5) * view.width;
-        let v = (0.5 - (row as f64 + dv) / f64::from(view.rows)) * view.height;
-        let point = view.target + view.right * u + view.up * v;
-        let reading = field.luminance(point, (view.eye - point).normalized());
-        sum.value += reading.value;
-        sum.deviation += reading.deviation;
-    }
+/// Fills pixels from number `first` on: all their points are carried to each part as one block.
+fn see(field: &LightField, view: &View, first: usize, points: &[[f64; 2]], pixels: &mut [Reading]) {
+    let mut batch = RayBatch::default();
+    let mut at = Coordinates::default();
+    aim(view, first, points, pixels.len(), &mut batch);
     let share = 1.0 / points.len() as f64;
-    Reading {
-        value: sum.value * share,
-        deviation: sum.deviation * share,
+    for part in &field.parts {
+        carry(std::slice::from_ref(&part.part), &batch, &mut at);
+        let [s1, s2, a, b] = &at.values;
+        for (pixel, start) in pixels.iter_mut().zip((0..).step_by(points.len())) {
+            for i in start..start + points.len() {
+                if at.part[i] != Coordinates::NONE {
+                    let reading = part.at([s1[i], s2[i]], [a[i], b[i]]);
+                    pixel.value += share * reading.value;
+                    pixel.deviation += share * reading.deviation;
+                }
+            }
+        }
+    }
+}
+
+/// The lines from the points of `count` pixels to the observer.
+fn aim(view: &View, first: usize, points: &[[f64; 2]], count: usize, batch: &mut RayBatch) {
+    batch.len = count * points.len();
+    let columns = view.columns as usize;
+    for (pixel, start) in (first..first + count).zip((0..).step_by(points.len())) {
+        let (row, column) = ((pixel / columns) as f64, (pixel % columns) as f64);
+        for (i, [du, dv]) in (start..).zip(points) {
+            let u = ((column + du) / f64::from(view.columns) - 0.5) * view.width;
+            let v = (0.5 - (row + dv) / f64::from(view.rows)) * view.height;
+            let point = view.target + view.right * u + view.up * v;
+            let k = (view.eye - point).normalized();
+            for (axis, (x, k)) in [(point.x, k.x), (point.y, k.y), (point.z, k.z)].into_iter().enumerate() {
+                batch.position[axis][i] = x;
+                batch.direction[axis][i] = k;
+            }
+        }
     }
 }
 
@@ -139,7 +163,7 @@ mod tests {
         let field = LightField {
             parts: (0..4).map(rough).collect(),
         };
-        let (coarse, fine) = (look(&field, &view(), 16, 2), look(&field, &view(), 4096, 2));
+        let (coarse, fine) = (look(&field, &view(), 16, 2), look(&field, &view(), 2048, 2));
         assert_eq!(coarse, look(&field, &view(), 16, 1));
         assert_eq!(coarse, look(&field, &view(), 16, 7));
         let total: f64 = fine.iter().map(|r| r.value).sum();

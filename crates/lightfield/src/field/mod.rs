@@ -51,18 +51,19 @@ impl PartField {
         let [n1, n2, n3, n4] = self.cells;
         let (x, y) = (Tent::at(place[0], n1, wraps), Tent::at(place[1], n2, false));
         let (u, v) = (Tent::at(direction[0], n3, false), Tent::at(direction[1], n4, false));
-        let (mut mean, mut deviation) = (0.0, 0.0);
-        for (i, wi) in x.cells.iter().zip(x.weights) {
-            for (j, wj) in y.cells.iter().zip(y.weights) {
-                for (k, wk) in u.cells.iter().zip(u.weights) {
-                    let row = &self.ratio[((i * n2 + j) * n3 + k) * n4..][..n4];
-                    let w = wi * wj * wk;
-                    let (lower, upper) = (row[v.cells[0]], row[v.cells[1]]);
-                    mean += w * (v.weights[0] * f64::from(lower[0]) + v.weights[1] * f64::from(upper[0]));
-                    deviation += w * (v.weights[0] * f64::from(lower[1]) + v.weights[1] * f64::from(upper[1]));
+        let mut sum = [0.0; 2];
+        let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
+        let aims = pairs.map(|(k, l)| (u.cells[k] * n4 + v.cells[l], u.weights[k] * v.weights[l]));
+        for (i, j) in pairs {
+            let layer = &self.ratio[(x.cells[i] * n2 + y.cells[j]) * (n3 * n4)..][..n3 * n4];
+            let near = x.weights[i] * y.weights[j];
+            for (cell, weight) in aims {
+                for (s, c) in sum.iter_mut().zip(layer[cell]) {
+                    *s += near * weight * f64::from(c);
                 }
             }
         }
+        let [mean, deviation] = sum;
         let base = self.level * self.space.at(place) * self.direction.at(direction);
         Reading {
             value: base * mean,

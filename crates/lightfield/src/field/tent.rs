@@ -23,9 +23,9 @@ impl Tent {
     )]
     pub fn at(x: f64, n: usize, wraps: bool) -> Self {
         let t = x * n as f64 + 0.5; // in cells, from half a cell before the first centre
-        let floor = t.floor();
-        let upper_weight = t - floor;
-        let upper = floor as usize; // 0 ..= n: the cell after the interval
+        // Cut off, not `floor`: that is a call where the processor is not known to round.
+        let upper = t as usize; // 0 ..= n: the cell after the interval
+        let upper_weight = t - upper as f64;
         let cells = if wraps {
             [
                 if upper == 0 { n - 1 } else { upper - 1 },
@@ -66,6 +66,14 @@ pub fn inside(x: f64, wraps: bool) -> f64 {
     }
 }
 
+/// The cell of a coordinate from 0 to 1, both included, on an axis of `n` cells.
+#[inline(always)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to n")]
+pub fn cell_of(x: f64, n: usize) -> usize {
+    ((x * n as f64) as usize).min(n - 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,11 +107,11 @@ mod tests {
                 for i in 0..steps {
                     let u = (f64::from(i) + 0.5) / f64::from(steps);
                     let x = under_tent(cell, u, n, wraps);
-                    bins[((x * 16.0) as usize).min(15)] += 1.0 / f64::from(steps);
+                    bins[cell_of(x, 16)] += 1.0 / f64::from(steps);
                     let tent = Tent::at(u, n, wraps);
                     for (c, w) in tent.cells.iter().zip(tent.weights) {
                         if *c == cell {
-                            expected[((u * 16.0) as usize).min(15)] += w * n as f64 / f64::from(steps);
+                            expected[cell_of(u, 16)] += w * n as f64 / f64::from(steps);
                         }
                     }
                 }

@@ -75,7 +75,7 @@ pub fn posterior(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> Poster
     let data = &data.simplified();
     let ((ratio, ratio_squared), log_evidence) = ordered::within(threads, |parallel| {
         let evidence = tree::ascend(grid, data, c, true, parallel);
-        (tree::descend(grid, data, c, &evidence, parallel), evidence.log_evidence)
+        (tree::descend(grid, data, c, &evidence, parallel), evidence.log_root)
     });
     Posterior {
         ratio,
@@ -93,7 +93,7 @@ pub fn log_evidence(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> f64
     assert!(data.fits(grid), "one entry per cell");
     let data = &data.simplified();
     ordered::within(threads, |parallel| {
-        tree::ascend(grid, data, c, false, parallel).log_evidence
+        tree::ascend(grid, data, c, false, parallel).log_root
     })
 }
 

@@ -15,7 +15,7 @@ pub(super) struct Evidence {
     /// Posterior probability of each split, by level and split; empty unless they were to be kept.
     splits: Vec<Vec<Vec<f32>>>,
     /// ln R of the root.
-    pub log_evidence: f64,
+    pub log_root: f64,
 }
 
 /// One chunk of a level's arrays to be filled.
@@ -99,17 +99,17 @@ pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, parallel:
             squared[id] = Vec::new();
         }
     }
-    let mut log_evidence = [log_r[0][0]];
+    let mut log_root = [log_r[0][0]];
     if data.has_equal_halves() {
         let mut own = [0.0];
         add_log_gamma(c, &weight[0], &mut own);
-        log_evidence[0] -= own[0];
+        log_root[0] -= own[0];
     }
     Evidence {
         weight,
         effective,
         splits,
-        log_evidence: log_evidence[0],
+        log_root: log_root[0],
     }
 }
 
@@ -259,7 +259,7 @@ fn descend_chunk(
     let (first, n) = (task.first, task.flow.0.len());
     let own = &evidence.weight[id];
     let mut buffer = [[0.0; CHUNK]; 6];
-    let [share, half, whole, mean, square, spare] = buffer.each_mut().map(|b| &mut b[..n]);
+    let [share, half, whole, mean, square, scratch] = buffer.each_mut().map(|b| &mut b[..n]);
     let mut split = [0.0_f32; CHUNK];
     let split = &mut split[..n];
     if level.origins.is_empty() {
@@ -274,8 +274,8 @@ fn descend_chunk(
             *w += h;
         }
         if data.squared.is_some() {
-            step.wholes(&evidence.effective[step.level], first, spare);
-            for ((h, w), e) in half.iter_mut().zip(&mut *whole).zip(&*spare) {
+            step.wholes(&evidence.effective[step.level], first, scratch);
+            for ((h, w), e) in half.iter_mut().zip(&mut *whole).zip(&*scratch) {
                 *h = if *w > 0.0 { e * (*h / *w) } else { 0.0 };
                 *w = *e;
             }
@@ -310,9 +310,10 @@ fn descend_chunk(
             *stop -= f64::from(*q);
         }
     }
-    for i in 0..n {
-        task.total.0[i] = task.flow.0[i] * share[i];
-        task.total.1[i] = task.flow.1[i] * share[i];
+    for (total, flow) in [(&mut *task.total.0, &*task.flow.0), (&mut *task.total.1, &*task.flow.1)] {
+        for ((t, f), stop) in total.iter_mut().zip(flow).zip(&*share) {
+            *t = f * stop;
+        }
     }
     // What stopped above is handed on along one path: the first axis that was not yet fully halved.
     for step in &level.origins {
