@@ -1,0 +1,89 @@
+"""Error bars of a smoothed image, learnt where the truth is known: on counts drawn from an image much like it."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+
+import numpy as np
+
+from etendue.lightfield.fourier_plane import Array, blurred
+from etendue.lightfield.image_estimates import Estimates, Estimator
+from etendue.lightfield.image_mixture import Mixture
+
+PURPOSE = 0x5452_4941
+"""Keeps the random numbers of the trial apart from all others."""
+
+ROUNDS = 60
+"""Steps of the fit, whose objective falls with each."""
+
+MOST_CELLS = 1 << 17
+"""More cells than these are sampled evenly for the fit."""
+
+
+def variance_of_mixture(
+    estimator: Estimator, found: Estimates, mixture: Mixture, mass: Array, shifts: int, pool: Executor
+) -> Array:
+    """Mean square error of each cell's mass, given the total.
+
+    Counts are drawn from a known image, the estimate is made again from them, and its squared errors are explained by
+    what it knows of itself: theory eq. 36. The known image lies halfway between the estimate and the estimate of that
+    estimate: the first still has wiggles that are only noise, the second has lost some that are not.
+    """
+    total, quantum = float(mass.sum()), estimator.quantum
+    smoother = mixture.mass(estimator(mass, mass * quantum, max(1, shifts // 4), pool), total)
+    known = (mass + smoother) / 2
+    generator = np.random.Generator(np.random.Philox(key=PURPOSE))
+    drawn = generator.poisson(known / quantum) * quantum
+    again = estimator(drawn, drawn * quantum, max(1, shifts // 2), pool)
+    retried = mixture.mass(again, total)
+    cells = np.flatnonzero(estimator.lit)
+    cells = cells[:: -(-len(cells) // MOST_CELLS)]
+    symptoms = np.array([s.ravel()[cells] for s in _symptoms(estimator, again, retried)])
+    factors = fitted_factors(symptoms, ((retried - known) ** 2).ravel()[cells])
+    variance: Array = np.einsum("k,k...->...", factors, _symptoms(estimator, found, mass))
+    return variance
+
+
+def fitted_factors(symptoms: Array, squares: Array) -> Array:
+    """Factors b ≥ 0 that maximise the likelihood of errors ~ N(0, Σ b_k s_k) with these squares.
+
+    Multiplicative steps for the Itakura-Saito divergence [FevotteBertinDurrieu2009]_; each factor stays positive.
+
+    Parameters
+    ----------
+    symptoms : array, shape (kinds, cells)
+        What each kind of symptom says about the variance.
+    squares : array, shape (cells,)
+        Squared errors.
+    """
+    tiny = np.finfo(np.float64).tiny
+    scale = symptoms.mean(axis=1, keepdims=True) + tiny
+    symptoms = symptoms / scale
+    factors = np.full(len(symptoms), squares.mean() / len(symptoms) + tiny)
+    for _ in range(ROUNDS):
+        variance = factors @ symptoms + 1e-6 * squares.mean() + tiny
+        factors = factors * np.sqrt(symptoms @ (squares / variance**2) / (symptoms @ (1 / variance) + tiny))
+    fitted: Array = factors / scale[:, 0]
+    return fitted
+
+
+def _symptoms(estimator: Estimator, estimates: Estimates, mass: Array) -> Array:
+    """What tells how far off a cell may be, as variances of its mass."""
+    ones = np.ones_like(mass)
+
+    def around(values: Array, width: float) -> Array:
+        return np.maximum(blurred(values, width), 0.0) / blurred(ones, width)
+
+    tree, edges, rings = estimates.masses
+    disagreement = ((tree - edges) ** 2 + (tree - rings) ** 2 + (edges - rings) ** 2) / 3
+    down, right = np.gradient(estimator.density(mass))
+    return np.array(
+        [
+            around(estimates.tree.variance, 1.0),
+            around(estimates.tree.spread, 1.0),
+            estimates.kept_variance,
+            around(disagreement, 1.5),
+            around((down**2 + right**2) * estimator.base**2, 1.0),
+            mass**2 / mass.sum(),
+        ]
+    )
