@@ -11,7 +11,7 @@ from etendue import _core
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
 from etendue.lightfield.light_field import PartField, core_part
 from etendue.lightfield.nodes import node_values
-from etendue.lightfield.smoothing import smooth_counts
+from etendue.lightfield.smoothing import smooth_mass
 from etendue.lightfield.trees import Base, Tree, grow, log_evidence
 
 CONCENTRATIONS = {"uniform": (1.0, 3.0, 10.0), "product": (10.0, 30.0, 100.0)}
@@ -22,6 +22,9 @@ FLOOR = 1e-3
 
 MIXED_IN = 1e-4
 """Share of a uniform field in every score, so that one cell that is wrongly dark cannot decide it."""
+
+SHIFTS = 4
+"""Grid positions over which the factors of a product base are averaged."""
 
 Smoother = Callable[[Sums], FloatArray]
 
@@ -58,7 +61,7 @@ def careful_density(threads: int | None) -> Smoother:
 
     def smooth(sums: Sums) -> FloatArray:
         squared = sums.weight if sums.squared is None else sums.squared
-        return smooth_counts(sums.weight, squared, np.ones_like(sums.weight), threads=threads).mass
+        return smooth_mass(sums.weight, squared, shifts=SHIFTS, threads=threads)
 
     return smooth
 
@@ -86,7 +89,7 @@ class Candidate:
         charts = counts.surface.parts()
         fields = []
         for chart, base, tree, flux in zip(charts, self.bases, self.trees, counts.part_flux, strict=True):
-            ratio, deviation = node_values(tree.ratio).astype(np.float32), tree.deviation.astype(np.float32)
+            ratio, deviation = (node_values(v).astype(np.float32) for v in (tree.ratio, tree.deviation))
             unit = PartField(ratio, deviation, base.space, base.direction, 1.0)
             integral = _core.LightField([core_part(chart.core(), unit)]).flux()[0]
             fields.append(dataclasses.replace(unit, level=flux / integral))
