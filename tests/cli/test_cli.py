@@ -96,7 +96,8 @@ def verbs() -> dict[str, Any]:
 def test_help_names_every_verb_with_what_it_does(run: Run) -> None:
     outcome = run("--help")
     assert outcome.status == 0
-    assert set(verbs()) == {"demo", "info", "convert", "luminance", "intensity", "filter", "compare"}
+    expected = "demo info convert fit luminance sample intensity patches filter compare"
+    assert set(verbs()) == set(expected.split())
     for name, verb in verbs().items():
         assert f" {name} " in outcome.out
         assert verb.help
@@ -116,7 +117,7 @@ def test_help_of_a_verb_explains_every_option_and_argument(run: Run, name: str) 
 
 def test_every_verb_that_draws_random_numbers_takes_a_seed() -> None:
     seeded = {name for name, verb in verbs().items() if any("--seed" in p.opts for p in verb.params)}
-    assert seeded == {"demo", "convert"}
+    assert seeded == {"demo", "convert", "fit", "sample", "patches"}
 
 
 def test_version(run: Run) -> None:
@@ -141,6 +142,7 @@ def test_no_verb_shows_the_help(run: Run) -> None:
         (["convert", "a.dat", "b.ray", "--format", "lightools"], "'lighttools'"),
         (["luminance", "a.dat", "--observer", "0,0", "--size", "1,1", "-o", "a.npz", "--plane", "veiw"], "'view'"),
         (["luminance", "a.dat", "--observer", "0,0", "--size", "1,1", "-o", "a.npz", "--method", "cones"], "'cone'"),
+        (["sample", "a.h5", "-n", "5", "-o", "b.dat", "--format", "zemaxx"], "'zemax'"),
     ],
 )
 def test_a_misspelt_name_is_met_with_the_nearest_one(run: Run, tmp_path: Path, arguments: list[str], hint: str) -> None:
@@ -255,7 +257,7 @@ def test_a_failing_run_leaves_the_old_output_as_it_was(run: Run, folder: Path, t
 def test_a_folder_that_does_not_exist_is_refused_before_any_work(
     run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: list[str]
 ) -> None:
-    for module, name in ((convert_verb, "read_rays"), (luminance_verb, "read_rays"), (demo_verb, "luminance_map")):
+    for module, name in ((convert_verb, "read_rays"), (luminance_verb, "read_source"), (demo_verb, "luminance_map")):
         monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail("work was done"))
     outcome = run(*arguments)
     assert outcome.status == 1
@@ -400,6 +402,7 @@ def test_convert_prints_complaints_and_losses_and_keeps_standard_output_clean(ru
 
 # --- luminance, filter, compare --------------------------------------------------------------------------------------
 
+CONE = ("--acceptance", "6")
 VIEW = ("--observer", "25,-40", "--distance", 300, "--target", "1,-0.5,0", "--size", "12,9", "--pixels", "12,9")
 
 
@@ -411,8 +414,8 @@ def api_view(**changes: Any) -> tuple[et.Observer, et.Screen]:
 @pytest.mark.parametrize(
     ("options", "screen", "method"),
     [
-        ((), {}, {}),
-        (("--method", "auto"), {}, {"method": "auto"}),
+        (("--acceptance", "auto"), {}, {"acceptance": "auto"}),
+        (("--method", "cone", "--acceptance", "auto"), {}, {"method": "cone", "acceptance": "auto"}),
         (("--method", "cone"), {}, {"method": "cone"}),
         (
             ("--method", "cone", "--acceptance", "4.5", "--plane", "xy"),
@@ -420,7 +423,7 @@ def api_view(**changes: Any) -> tuple[et.Observer, et.Screen]:
             {"method": "cone", "acceptance": 4.5},
         ),
         (("--acceptance", "6"), {}, {"method": "cone", "acceptance": 6.0}),
-        (("--threads", "2"), {}, {"threads": 1}),
+        (("--acceptance", "6", "--threads", "2"), {}, {"acceptance": 6.0, "threads": 1}),
     ],
 )
 def test_luminance_is_the_map_of_the_api(
@@ -442,28 +445,29 @@ def test_luminance_is_the_map_of_the_api(
 
 
 def test_luminance_takes_another_flux_and_unit(run: Run, folder: Path, tmp_path: Path) -> None:
-    assert run("luminance", folder / "watts.tm25ray", *VIEW, "--flux", "2W", "-o", "w.npz").status == 0
+    assert run("luminance", folder / "watts.tm25ray", *VIEW, *CONE, "--flux", "2W", "-o", "w.npz").status == 0
     radiance = et.read_map(tmp_path / "w.npz")
     assert radiance.unit == "W/(m² sr)"
-    assert run("luminance", folder / "watts.tm25ray", *VIEW, "--flux", "2W", "--unit", "lm", "-o", "l.npz").status == 0
+    stated = ("--flux", "2W", "--unit", "lm")
+    assert run("luminance", folder / "watts.tm25ray", *VIEW, *CONE, *stated, "-o", "l.npz").status == 0
     rays = et.read_rays(folder / "watts.tm25ray").with_total_flux(2.0).in_unit("lm")
     luminance = et.read_map(tmp_path / "l.npz")
     assert luminance.unit == "cd/m²"
-    np.testing.assert_array_equal(luminance.values, et.luminance_map(rays, *api_view()).values)
+    np.testing.assert_array_equal(luminance.values, et.luminance_map(rays, *api_view(), acceptance=6).values)
     assert (luminance.values != radiance.values).any()
 
 
 def test_many_observers_are_served_in_one_run_and_fill_in_their_names(run: Run, folder: Path, tmp_path: Path) -> None:
     observers = ["--observer", "0,0", "--observer", "30,12.5", "--observer", "30,-90"]
     outputs = ["-o", "t{theta}p{phi}.npz", "-o", "t{theta}p{phi}.png"]
-    outcome = run("luminance", folder / "led.tm25ray", *VIEW[2:], *observers, *outputs, "--json")
+    outcome = run("luminance", folder / "led.tm25ray", *VIEW[2:], *CONE, *observers, *outputs, "--json")
     names = ["t0p0", "t30p12.5", "t30p-90"]
     assert files(tmp_path) == sorted(f"{name}{end}" for name in names for end in (".npz", ".png"))
     assert [m["outputs"] for m in outcome.json["maps"]] == [[f"{name}.npz", f"{name}.png"] for name in names]
     for name, (theta, phi) in zip(names, [(0, 0), (30, 12.5), (30, -90)], strict=True):
         seen = et.read_map(tmp_path / f"{name}.npz")
         assert seen.observer == et.Observer(theta, phi, 300, (1, -0.5, 0))
-        alone = et.luminance_map(et.read_rays(folder / "led.tm25ray"), seen.observer, seen.screen)
+        alone = et.luminance_map(et.read_rays(folder / "led.tm25ray"), seen.observer, seen.screen, acceptance=6)
         np.testing.assert_array_equal(seen.values, alone.values)
 
 
@@ -477,7 +481,7 @@ def test_observers_that_would_overwrite_each_other_are_refused(run: Run, folder:
 
 
 def test_people_read_figures_notes_and_file_names(run: Run, folder: Path) -> None:
-    outcome = run("luminance", folder / "led.tm25ray", *VIEW, "-o", "a.exr", "-o", "a.png", "--scale", "log")
+    outcome = run("luminance", folder / "led.tm25ray", *VIEW, *CONE, "-o", "a.exr", "-o", "a.png", "--scale", "log")
     assert outcome.status == 0
     for piece in (
         "luminance from θ = 25°, φ = -40°, 300 mm",
@@ -500,6 +504,7 @@ def test_a_screen_that_sees_nothing_ends_well_with_a_hint(run: Run, folder: Path
         "2,2",
         "--target",
         "500,0,0",
+        *CONE,
     ]
     outcome = run(*arguments, "-o", "a.npz", "--json")
     assert outcome.status == 0
@@ -653,7 +658,7 @@ def test_letters_that_the_output_does_not_have_do_no_harm(
     run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, encoding: str
 ) -> None:
     """As on Windows, where output that goes to a file is in cp1252: it has ² and °, but neither θ nor φ."""
-    arguments = ["luminance", folder / "led.tm25ray", *VIEW, "-o", "a.npz"]
+    arguments = ["luminance", folder / "led.tm25ray", *VIEW, *CONE, "-o", "a.npz"]
     documents = []
     for options in ([], ["--json"]):
         stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)

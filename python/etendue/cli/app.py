@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli import compare, convert, demo, filter_, info, intensity, luminance, patches
+from etendue.cli import compare, convert, demo, filter_, fit, info, intensity, luminance, patches, sample
 from etendue.cli.terminal import complain, spell_out_unknown_letters
 from etendue.errors import EtendueError
 from etendue.quantities.provenance import version
@@ -27,7 +27,9 @@ VERBS: dict[str, Callable[..., None]] = {
     "demo": demo.demo,
     "info": info.info,
     "convert": convert.convert,
+    "fit": fit.fit,
     "luminance": luminance.luminance,
+    "sample": sample.sample,
     "intensity": intensity.intensity,
     "patches": patches.patches,
     "filter": filter_.filter_,

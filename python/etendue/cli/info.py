@@ -1,4 +1,4 @@
-"""``etendue info``: what is in a ray file, and what is wrong with it."""
+"""``etendue info``: what is in a ray file, and what is wrong with it; or what a light field is."""
 
 from __future__ import annotations
 
@@ -9,35 +9,47 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from etendue.cli.field import describe_field, print_field
 from etendue.cli.terminal import complain, print_json, progress_bar, say
 from etendue.errors import EtendueError
 from etendue.formats.rays import detect_format, read_rays
+from etendue.lightfield.light_field import LightField
+from etendue.lightfield.storage import is_field_file
 from etendue.quantities.ray_set import RaySet
 
 
 def info(
-    files: Annotated[list[Path], typer.Argument(help="Ray files of any format.")],
+    files: Annotated[list[Path], typer.Argument(help="Ray files of any format, and light fields.")],
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Format, rays, flux by header and by sum, bounding box, virtual focus, wavelengths, and every complaint."""
-    described: list[dict[str, Any]] = []
+    """Format, rays, flux by header and by sum, bounding box, virtual focus, wavelengths, complaints; or a field's fit."""
+    described: list[dict[str, Any] | LightField] = []
     failed = False
     for file in files:
         try:
-            described.append(describe(file))
+            described.append(LightField.load(file) if is_field_file(file) else describe(file))
         except (EtendueError, OSError) as error:
             failed = True
             reason = error.strerror if isinstance(error, OSError) else error
             described.append({"file": str(file), "error": str(reason)})
     if json:
-        print_json(described)
+        both = zip(files, described, strict=True)
+        print_json([_field_facts(file, d) if isinstance(d, LightField) else d for file, d in both])
     else:
-        for number, facts in enumerate(described):
+        for number, (file, facts) in enumerate(zip(files, described, strict=True)):
             if number:
                 say()
-            _print(facts)
+            if isinstance(facts, LightField):
+                say(f"{file}: light field, {file.stat().st_size / 1000:,.1f} kB")
+                print_field(facts)
+            else:
+                _print(facts)
     if failed:
         raise typer.Exit(1)
+
+
+def _field_facts(path: Path, field: LightField) -> dict[str, Any]:
+    return {"file": path, "format": "light field", "bytes": path.stat().st_size} | describe_field(field)
 
 
 def describe(path: Path) -> dict[str, Any]:

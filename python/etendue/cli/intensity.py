@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from etendue.cli.convert import in_unit, with_flux
+from etendue.cli.field import complaints_of, read_source
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, progress_bar, say
 from etendue.formats.intensity import (
     INTENSITY_EXTENSIONS,
@@ -17,23 +17,27 @@ from etendue.formats.intensity import (
     write_intensity,
 )
 from etendue.formats.maps import PICTURE_EXTENSIONS
-from etendue.formats.rays import read_rays
 from etendue.goniophotometry.far_field import Cells, intensity_distribution
+from etendue.lightfield.light_field import LightField
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
 from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
 
 
 def intensity(
-    file: Annotated[Path, typer.Argument(help="A ray file of any format, or an IES or EULUMDAT file.")],
+    file: Annotated[Path, typer.Argument(help="A ray file of any format, a light field, or an IES or EULUMDAT file.")],
     output: Annotated[
         list[Path] | None,
         typer.Option("-o", "--output", help="Distribution (.ies, .ldt) or picture (.png, .pdf); several are allowed."),
     ] = None,
     c_planes: Annotated[
-        int | None, typer.Option("--c-planes", help="Half planes C made of rays [36].", min=1, show_default=False)
+        int | None,
+        typer.Option("--c-planes", help="Half planes C made of rays or of a field [36].", min=1, show_default=False),
     ] = None,
     gamma_step: Annotated[
-        float | None, typer.Option("--gamma-step", help="Step of γ made of rays, in degrees [2.5].", show_default=False)
+        float | None,
+        typer.Option(
+            "--gamma-step", help="Step of γ made of rays or of a field, in degrees [2.5].", show_default=False
+        ),
     ] = None,
     flux: Annotated[
         str | None, typer.Option("--flux", help="Total flux that overrides the ray file's: 337, 337lm.")
@@ -48,21 +52,24 @@ def intensity(
     kind: Annotated[str, typer.Option("--kind", help="Picture: polar or cartesian.")] = "polar",
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Far-field intensity of rays, or of an intensity file: in figures, as a file, as a picture."""
+    """Far-field intensity of rays, of a light field or of an intensity file: in figures, as a file, as a picture."""
     outputs = output or []
     one_of(kind, INTENSITY_KINDS, "--kind")
     check_outputs(outputs, (*INTENSITY_EXTENSIONS, *PICTURE_EXTENSIONS))
     if detect_intensity_format(file) is None:
         cells = Cells(36 if c_planes is None else c_planes, 2.5 if gamma_step is None else gamma_step)
-        rays = in_unit(with_flux(read_rays(file), flux), unit)
-        with progress_bar("rays", len(rays)) as progress:
-            result = intensity_distribution(rays, cells.c_planes, cells.gamma_step, progress=progress)
-        complaints = [str(c) for c in rays.complaints]
+        source = read_source(file, flux, unit)
+        if isinstance(source, LightField):
+            result = source.intensity(cells.c_planes, cells.gamma_step)
+        else:
+            with progress_bar("rays", len(source)) as progress:
+                result = intensity_distribution(source, cells.c_planes, cells.gamma_step, progress=progress)
+        complaints = complaints_of(source)
     else:
         given = {"--c-planes": c_planes, "--gamma-step": gamma_step, "--flux": flux, "--unit": unit}
         needless = [option for option, value in given.items() if value is not None]
         if needless:
-            raise typer.BadParameter(f"{', '.join(needless)}: for ray files; {file} is an intensity distribution")
+            raise typer.BadParameter(f"{', '.join(needless)}: for ray files and light fields, and {file} is neither")
         result = read_intensity(file)
         complaints = [str(c) for c in result.complaints]
     shown = result.mirrored() if mirror else result

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import re
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from etendue.cli.convert import in_unit, with_flux
+from etendue.cli.field import complaints_of, read_source, surface_option
 from etendue.cli.terminal import check_outputs, complain, numbers, one_of, print_json, progress_bar, say, whole_numbers
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
-from etendue.formats.rays import read_rays
-from etendue.luminance.estimate import METHODS, luminance_map
+from etendue.lightfield.light_field import LightField
+from etendue.luminance.estimate import METHODS, Acceptance, luminance_map
 from etendue.plot.map_picture import SCALES, plot_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import PLANES, Observer, Screen
+from etendue.quantities.ray_set import RaySet
 
 
 def luminance(
-    file: Annotated[Path, typer.Argument(help="A ray file of any format.")],
+    file: Annotated[Path, typer.Argument(help="A ray file of any format, or a light field.")],
     observer: Annotated[
         list[str], typer.Option("--observer", help="θ,φ in degrees; may be given several times.", metavar="THETA,PHI")
     ],
@@ -34,13 +36,24 @@ def luminance(
     target: Annotated[str, typer.Option("--target", help="Point looked at, in mm.", metavar="X,Y,Z")] = "0,0,0",
     pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
     plane: Annotated[str, typer.Option("--plane", help="view or xy.")] = "view",
-    method: Annotated[str, typer.Option("--method", help="auto or cone.")] = "auto",
+    method: Annotated[
+        str, typer.Option("--method", help="auto, cone or lightfield; auto: the light field if no acceptance is given.")
+    ] = "auto",
     acceptance: Annotated[
-        float | None,
+        str | None,
         typer.Option(
-            "--acceptance", help="Half-angle of the cone in degrees; cone: 1.5, auto: chosen.", show_default=False
+            "--acceptance",
+            help="Half-angle of the cone in degrees [1.5], or auto: the one of least error.",
+            show_default=False,
         ),
     ] = None,
+    surface: Annotated[
+        str | None,
+        typer.Option("--surface", help="Carrier surface of the light field, as for fit [auto].", show_default=False),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option("--samples", help="Points per pixel at which a light field is read.", min=1)
+    ] = 16,
     flux: Annotated[
         str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")
     ] = None,
@@ -49,7 +62,7 @@ def luminance(
     threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Luminance maps with a standard error per pixel, for any number of observers in one pass over the rays."""
+    """Luminance maps with a standard error per pixel, from rays or from a light field, for any number of observers."""
     one_of(method, METHODS, "--method")
     one_of(plane, PLANES, "--plane")
     one_of(scale, SCALES, "--scale")
@@ -65,35 +78,52 @@ def luminance(
         raise ArgumentError("several observers would write to the same file; put {theta} and {phi} into its name.")
     check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
 
-    rays = in_unit(with_flux(read_rays(file), flux), unit)
-    # The first pass over the rays is this one; with method="auto" a second one may follow for large screens.
-    with progress_bar("rays", len(rays)) as progress:
+    cone = None if acceptance is None else _acceptance(acceptance)
+    carrier = "auto" if surface is None else surface_option(surface)
+    for_rays = {"--method": "cone" if method == "cone" else None, "--acceptance": acceptance, "--surface": surface}
+    source = read_source(file, flux, unit, for_rays)
+    with progress_bar("rays", len(source)) if isinstance(source, RaySet) else nullcontext() as progress:
         maps = luminance_map(
-            rays,
+            source,
             observers,
             screen,
-            method="cone" if method == "cone" else "auto",
-            acceptance=acceptance,
+            method="cone" if method == "cone" else "lightfield" if method == "lightfield" else "auto",
+            acceptance=cone,
+            surface=carrier,
+            samples=samples,
             threads=threads,
             progress=progress,
         )
     losses = [note for lmap, paths in zip(maps, targets, strict=True) for note in write_map(lmap, paths, scale)]
-    complaints = [str(c) for c in rays.complaints]
+    complaints = complaints_of(source)
     if json:
         summaries = [summary(lmap) | {"outputs": paths} for lmap, paths in zip(maps, targets, strict=True)]
         print_json({"file": file, "maps": summaries, "complaints": complaints, "notes": losses})
         return
     for line in (*complaints, *(f"note: {note}" for note in losses)):
         complain(line)
-    if all(lmap.dead_pixels == lmap.values.size for lmap in maps):
-        middle = rays.moments().bounds.mean(axis=1)
-        if np.linalg.norm(middle - (x, y, z)) > max(width, height) / 2:
-            centre = ",".join(f"{c:.4g}" for c in middle)
-            complain(f"hint: the rays start around {centre} mm, off the screen about {target}: try --target {centre}")
+    if not any((lmap.values > 0).any() for lmap in maps):
+        _hint(source, (x, y, z), max(width, height))
     for lmap, paths in zip(maps, targets, strict=True):
         print_map(lmap)
         for path in paths:
             say(f"  {path}")
+
+
+def _acceptance(text: str) -> Acceptance:
+    """The half-angle that an option states, or "auto"."""
+    return "auto" if text.strip() == "auto" else numbers(text, 1, "--acceptance", "1.5, or --acceptance auto")[0]
+
+
+def _hint(source: RaySet | LightField, target: tuple[float, float, float], size: float) -> None:
+    """Where to look, if the source lies off a screen on which nothing is seen."""
+    if isinstance(source, RaySet):
+        middle, what = source.moments().bounds.mean(axis=1), "the rays start"
+    else:
+        middle, what = np.mean([part.centre for part in source.surface.parts()], axis=0), "the light field lies"
+    if np.linalg.norm(middle - target) > size / 2:
+        centre, looked_at = (",".join(f"{c:.4g}" for c in point) for point in (middle, target))
+        complain(f"hint: {what} around {centre} mm, off the screen about {looked_at}: try --target {centre}")
 
 
 def write_map(lmap: LuminanceMap, paths: list[Path], scale: str) -> list[str]:
@@ -130,7 +160,7 @@ def summary(lmap: LuminanceMap) -> dict[str, Any]:
         "mean_of_live_pixels": float(values.mean()) if live.any() else None,
         "maximum": float(values.max()) if live.any() else None,
         "intensity": lmap.intensity,
-        "rays": int(lmap.rays[lmap.rays > 0].sum()),
+        "rays": int(lmap.rays[lmap.rays > 0].sum()) if (lmap.rays >= 0).any() else None,
         "dead_pixels": lmap.dead_pixels,
         "pixels": lmap.values.size,
         "notes": list(lmap.notes),

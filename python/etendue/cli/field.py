@@ -1,0 +1,103 @@
+"""What the verbs share about light fields: how one is named, read and described."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import typer
+
+from etendue.cli.convert import in_unit, with_flux
+from etendue.cli.terminal import say
+from etendue.formats.rays import read_rays
+from etendue.lightfield.light_field import LightField
+from etendue.lightfield.storage import is_field_file
+from etendue.lightfield.surfaces import Surface, parse_surface
+from etendue.quantities.ray_set import RaySet
+
+FIELD_EXTENSIONS = (".h5", ".hdf5")
+"""Of the files that hold a light field."""
+
+
+def surface_option(text: str) -> Surface | Literal["auto"]:
+    """The carrier surface that an option names."""
+    return "auto" if text.strip() == "auto" else parse_surface(text)
+
+
+def read_source(
+    path: Path, flux: str | None, unit: str | None, for_rays: Mapping[str, str | None] | None = None
+) -> RaySet | LightField:
+    """The light field, or the rays with flux and unit as the options state; which of them, the file's content tells.
+
+    Raises
+    ------
+    typer.BadParameter
+        If the file is a light field, and one of the options `for_rays`, or flux or unit, was given.
+    """
+    if not is_field_file(path):
+        return in_unit(with_flux(read_rays(path), flux), unit)
+    given = {"--flux": flux, "--unit": unit} | dict(for_rays or {})
+    needless = [option for option, value in given.items() if value is not None]
+    if needless:
+        raise typer.BadParameter(f"{', '.join(needless)}: for ray files; {path} is a light field")
+    return LightField.load(path)
+
+
+def complaints_of(source: RaySet | LightField) -> list[str]:
+    """What is wrong with a ray file, one line each; a field tells it in its notes."""
+    return [str(c) for c in source.complaints] if isinstance(source, RaySet) else []
+
+
+def describe_field(field: LightField) -> dict[str, Any]:
+    """A field in figures, as plain data [mm², flux unit, nat]."""
+    report = field.report
+    return {
+        "surface": field.surface.spec,
+        "parts": [
+            {"name": chart.name, "area": chart.area, "flux": flux, "cells": list(part.ratio.shape)}
+            for chart, flux, part in zip(field.surface.parts(), field.part_flux, field.parts, strict=True)
+        ],
+        "flux_unit": field.flux_unit,
+        "total_flux": field.total_flux,
+        **dataclasses.asdict(report),
+        "lead_over_histogram": report.score - report.histogram_score,
+        "source": field.provenance.source,
+        "notes": list(field.notes),
+    }
+
+
+def print_field(field: LightField) -> None:
+    """A field in figures, for people."""
+    report = field.report
+    unmet = ""
+    if report.unmet_rays:
+        share = report.unmet_flux / (report.unmet_flux + field.total_flux)
+        unmet = f"; {report.unmet_rays:,} more ({share:.3%} of the flux) do not meet the surface"
+    ahead = report.score - report.histogram_score
+    rows = [
+        ("surface", field.surface.spec),
+        ("flux", f"{field.total_flux:.7g} {field.flux_unit}"),
+        ("rays", f"{report.rays - report.unmet_rays:,}{unmet}"),
+        *(("grid" if number == 0 else "", text) for number, text in enumerate(_grids(field))),
+        ("evidence", f"{report.log_evidence:,.1f} nat against the base measure"),
+        ("degrees of freedom", f"{report.effective_cells:,.0f}, effective"),
+        ("held-out score", f"{report.score:.4f} ± {report.score_error:.4f} nat per ray"),
+        ("", f"{ahead:+.4f} against the equal-étendue histogram"),
+    ]
+    for label, value in rows:
+        say(f"  {label:<22} {value}")
+    for note in field.notes:
+        say(f"  {note}")
+
+
+def _grids(field: LightField) -> list[str]:
+    """Cells, base measure and concentration of each part."""
+    charts, report = field.surface.parts(), field.report
+    lines = []
+    for chart, part, base, concentration in zip(charts, field.parts, report.bases, report.concentrations, strict=True):
+        name = f"{chart.name}: " if len(charts) > 1 else ""
+        cells = " × ".join(str(n) for n in part.ratio.shape)
+        lines.append(f"{name}{cells} cells, {base} base, concentration {concentration:g}")
+    return lines

@@ -1,0 +1,303 @@
+"""How good a light field is, where it is least certain, and what more rays would bring."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.lightfield.characteristic import CharacteristicCurve, characteristic_curve
+from etendue.lightfield.counting import FloatArray
+from etendue.lightfield.learning import Forecast, LearningCurve, learning_curve
+from etendue.lightfield.light_field import FitReport, LightField, PartField
+from etendue.lightfield.trees import Base
+from etendue.quantities.ray_stream import RayStream, checked_threads
+from etendue.units import LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
+
+BOXES = 8
+"""Boxes along each coordinate of a part in which uncertainty is summed."""
+
+
+@dataclasses.dataclass(frozen=True)
+class UncertainSpot:
+    """A box of places and directions that the field knows badly, by its worst cell.
+
+    Parameters
+    ----------
+    part : str
+        Name of the part of the surface.
+    point : tuple of float
+        Centre of the cell [mm].
+    theta, phi : float
+        Direction in which the light travels there [°].
+    luminance, standard_error : float
+        There [cd/m² or W/(m² sr)].
+    share : float
+        Of the loss of score that the error bars foretell, in the box: an eighth of the part along each coordinate.
+    """
+
+    part: str
+    point: tuple[float, float, float]
+    theta: float
+    phi: float
+    luminance: float
+    standard_error: float
+    share: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Diagnostics:
+    """What is known of the quality of a light field; see `diagnose`.
+
+    Parameters
+    ----------
+    surface : str
+        The carrier surface, as the command line takes it.
+    flux : float
+        Of the field [`flux_unit`].
+    flux_unit : {"lm", "W"}
+    report : FitReport
+        Of the fit.
+    expected_error : float
+        Relative error of luminance at a ray as the error bars foretell it: √(2 · expected loss of score).
+    curve : CharacteristicCurve
+    spots : tuple of UncertainSpot
+        The worst first.
+    learning : LearningCurve or None
+        None if no rays were given.
+    source : str
+        Where the rays came from.
+    """
+
+    surface: str
+    flux: float
+    flux_unit: FluxUnit
+    report: FitReport
+    expected_error: float
+    curve: CharacteristicCurve
+    spots: tuple[UncertainSpot, ...]
+    learning: LearningCurve | None
+    source: str
+
+    @property
+    def lead(self) -> float:
+        """By how much the held-out score lies above that of the equal-étendue histogram [nat per ray]."""
+        return self.report.score - self.report.histogram_score
+
+    def summary(self) -> str:
+        """The diagnostics in a few lines."""
+        unit, report, curve = LUMINANCE_UNIT[self.flux_unit], self.report, self.curve
+        half, most = curve.etendue_of(0.5), curve.etendue_of(0.99)
+        lines = [
+            f"held-out score {report.score:.4f} ± {report.score_error:.4f} nat per ray",
+            f"{self.lead:+.4f} nat per ray against the equal-étendue histogram",
+            f"{report.effective_cells:,.0f} effective degrees of freedom",
+            f"relative error at a ray by the error bars {self.expected_error:.1%}",
+            f"half of the flux in {half:.4g} mm² sr, 99 % in {most:.4g} of {curve.total_etendue:.4g} mm² sr",
+            f"peak {curve.luminance[0]:.4g} {unit}",
+        ]
+        if self.learning is not None:
+            lines += _lessons(self.learning)
+        lines += [
+            f"least certain: ({', '.join(f'{c:.4g}' for c in s.point)}) mm towards θ = {s.theta:.0f}°, φ = {s.phi:.0f}° "
+            f"on the {s.part}: {s.luminance:.3g} ± {s.standard_error:.2g} {unit}, {s.share:.1%} of the expected loss"
+            for s in self.spots[:3]
+        ]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as plain data."""
+        curve = self.curve
+        return {
+            "surface": self.surface,
+            "flux": self.flux,
+            "flux_unit": self.flux_unit,
+            "luminance_unit": LUMINANCE_UNIT[self.flux_unit],
+            "report": dataclasses.asdict(self.report),
+            "lead_over_histogram": self.lead,
+            "expected_error": self.expected_error,
+            "characteristic_curve": {
+                "total_etendue": curve.total_etendue,
+                "etendue": curve.etendue.tolist(),
+                "luminance": curve.luminance.tolist(),
+                "standard_error": curve.standard_error.tolist(),
+                "flux": curve.flux.tolist(),
+            },
+            "least_certain": [dataclasses.asdict(spot) for spot in self.spots],
+            "learning": None if self.learning is None else _learning_facts(self.learning),
+            "source": self.source,
+        }
+
+
+def diagnose(
+    field: LightField,
+    rays: RayStream | None = None,
+    *,
+    spots: int = 12,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Diagnostics:
+    """Judge a light field: its characteristic curve, where it is least certain, and what more rays would bring.
+
+    Parameters
+    ----------
+    field : LightField
+        Any.
+    rays : RayStream, optional
+        The rays it was fitted to; without them nothing can be said about more rays.
+    spots : int
+        How many places and directions of least certainty are named.
+    seed : int
+        Deals the rays into the parts that are fitted again.
+    threads : int, optional
+        All cores if None.
+    progress : callable, optional
+        Called with the number of fits done, of `etendue.lightfield.learning.REFITS`.
+
+    Raises
+    ------
+    ArgumentError
+        If `spots` is below 0, or the rays are not those of the fit, or fewer than 4000.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> from etendue.lightfield.surfaces import Disk
+    >>> rays = et.RingSource(rays=100_000)
+    >>> field = LightField.fit(rays, Disk(radius=30), depths=(4, 4, 2, 2))
+    >>> diagnostics = diagnose(field, rays)
+    >>> bool(diagnostics.lead > 0), len(diagnostics.spots), diagnostics.learning.factor(0.5).value > 4
+    (True, 12, True)
+    """
+    if not (isinstance(spots, int) and spots >= 0):
+        raise ArgumentError(f"spots is {spots!r}; give a whole number, 0 or more.")
+    if rays is not None and rays.flux_unit != field.flux_unit:
+        raise ArgumentError(
+            f"the field is in {field.flux_unit}, the rays are in {rays.flux_unit}; give the rays of the fit, in its unit."
+        )
+    threads = checked_threads(threads)
+    learning = None
+    if rays is not None:
+        learning = learning_curve(field, rays, seed=seed, threads=threads, progress=progress)
+    losses = [flux / field.total_flux * _losses(part) for part, flux in zip(field.parts, field.part_flux, strict=True)]
+    return Diagnostics(
+        surface=field.surface.spec,
+        flux=field.total_flux,
+        flux_unit=field.flux_unit,
+        report=field.report,
+        expected_error=math.sqrt(2.0 * sum(float(loss.sum()) for loss in losses)),
+        curve=characteristic_curve(field, threads=threads),
+        spots=tuple(_spots(field, losses, spots)),
+        learning=learning,
+        source=field.provenance.source,
+    )
+
+
+def _losses(part: PartField) -> FloatArray:
+    """What each cell adds to the expected loss of score on this part [nat per ray]."""
+    ratio, deviation = part.ratio.astype(np.float64), part.deviation.astype(np.float64)
+    mass = ratio * Base(part.space, part.direction).cells(ratio.shape)
+    total = float(mass.sum())
+    if total == 0.0:
+        return np.zeros_like(mass)
+    certainty = np.divide(ratio, deviation, out=np.full_like(ratio, np.inf), where=deviation > 0) ** 2
+    losses: FloatArray = mass / total * _loss_of_gamma(certainty)
+    return losses
+
+
+def _loss_of_gamma(certainty: FloatArray) -> FloatArray:
+    """E[x ln x] of a gamma variable of mean 1 and shape `certainty`: ψ(k + 1) - ln k, which is 1/2k where k is large.
+
+    That is the loss, per unit of its mass, of a cell whose luminance has a relative variance of 1/k. Half the relative
+    variance itself would let dark cells with large error bars, which no ray ever meets, drown all others.
+    """
+    k = np.maximum(certainty, np.finfo(np.float64).tiny)
+    # ψ(k + 1) = ψ(k + 7) - Σ 1/(k + i), and Stirling's series of ψ is good to 1e-9 from there on.
+    y = k + 7.0
+    stirling = np.log1p(7.0 / k) - 1.0 / (2.0 * y) - 1.0 / (12.0 * y**2) + 1.0 / (120.0 * y**4)
+    losses: FloatArray = np.maximum(stirling - sum(1.0 / (k + i) for i in range(1, 7)), 0.0)
+    return losses
+
+
+def _spots(field: LightField, losses: list[FloatArray], count: int) -> Iterator[UncertainSpot]:
+    """The boxes of greatest loss, the worst first."""
+    whole = sum(float(loss.sum()) for loss in losses)
+    if whole == 0.0:
+        return
+    found = []
+    for index, loss in enumerate(losses):
+        sums = _boxes(loss).sum(axis=(1, 3, 5, 7)) / whole
+        largest = np.argsort(sums, axis=None)[::-1][:count]
+        found += [(float(sums.flat[n]), index, np.unravel_index(n, sums.shape)) for n in largest]
+    for share, index, place in sorted(found, reverse=True)[:count]:
+        if share > 0.0:
+            yield _spot(field, index, _worst_cell(losses[index], place), share)
+
+
+def _boxes(loss: FloatArray) -> FloatArray:
+    """The cells by box and by place in the box, along each coordinate."""
+    shape = []
+    for n in loss.shape:
+        boxes = min(n, BOXES)
+        shape += [boxes, n // boxes]
+    return loss.reshape(shape)
+
+
+def _worst_cell(loss: FloatArray, place: tuple[np.intp, ...]) -> FloatArray:
+    """Coordinates of the centre of the cell of greatest loss in a box."""
+    boxes = _boxes(loss)
+    a, b, c, d = place
+    inside = boxes[a, :, b, :, c, :, d, :]
+    within = np.unravel_index(int(inside.argmax()), inside.shape)
+    cell = np.array(place) * inside.shape + within
+    centre: FloatArray = (cell + 0.5) / loss.shape
+    return centre
+
+
+def _spot(field: LightField, index: int, coordinates: FloatArray, share: float) -> UncertainSpot:
+    chart = field.surface.parts()[index]
+    x, k = _core.rays_of_part(chart.core(), coordinates[None, :])
+    (luminance,), (deviation,) = field.core.luminance(x, k)
+    px, py, pz = (float(c) for c in x[0])
+    kx, ky, kz = (float(c) for c in k[0])
+    return UncertainSpot(
+        part=chart.name,
+        point=(px, py, pz),
+        theta=math.degrees(math.atan2(math.hypot(kx, ky), kz)),
+        phi=math.degrees(math.atan2(ky, kx)) % 360.0,
+        luminance=float(luminance) * MM2_PER_M2,
+        standard_error=float(deviation) * MM2_PER_M2,
+        share=share,
+    )
+
+
+def _lessons(learning: LearningCurve) -> list[str]:
+    """What the learning curve says, for people."""
+    error, factor, gain = learning.error(), learning.factor(0.5), learning.gain(4.0)
+    return [
+        f"relative error at a ray by fits to parts of the rays {_between(error, '{:.1%}')}, and what the grid blurs",
+        f"half of it would take {_between(factor, '{:.3g}')} times the rays",
+        f"four times the rays would raise the score by {_between(gain, '{:.4f}')} nat per ray",
+    ]
+
+
+def _between(forecast: Forecast, form: str) -> str:
+    value, low, high = (form.format(v) for v in forecast)
+    return f"{value} ({low} to {high})"
+
+
+def _learning_facts(learning: LearningCurve) -> dict[str, Any]:
+    return {
+        "rays": learning.rays.tolist(),
+        "gains": learning.gains.tolist(),
+        "gain_errors": learning.gain_errors.tolist(),
+        "exponent": learning.exponent._asdict(),
+        "error": learning.error()._asdict(),
+        "rays_factor_to_halve_error": learning.factor(0.5)._asdict(),
+    }

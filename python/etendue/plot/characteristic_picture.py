@@ -1,0 +1,224 @@
+"""The diagnostics of a light field: its characteristic curve, what more rays would bring, where it is least certain."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from etendue.lightfield.characteristic import CharacteristicCurve
+from etendue.lightfield.diagnostics import Diagnostics, UncertainSpot
+from etendue.lightfield.learning import LearningCurve
+from etendue.plot import style
+from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT, FluxUnit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH, LEFT, RIGHT = 7.6, 0.85, 0.3
+"""Of the figure and its margins [inches]."""
+
+PANEL, GAP, UNDER, ABOVE = 2.35, 0.95, 0.55, 0.8
+"""Height of a diagram, and room between two side by side, under each and above the first [inches]."""
+
+ROW = 0.165
+"""Height of a line of the table [inches]."""
+
+MOST_SPOTS = 8
+"""Lines of the table."""
+
+AHEAD = 64.0
+"""How many times the rays the learning curve is drawn for."""
+
+BRIGHTEST, LIT = 1e-3, 0.999
+"""Shares of the flux: the logarithmic étendue axis begins with the first, the linear one ends with the second."""
+
+
+def plot_characteristic(
+    diagnostics: Diagnostics, path: str | os.PathLike[str] | None = None, *, title: str | None = None
+) -> Figure:
+    """Draw what `etendue.diagnose` found of a light field.
+
+    Parameters
+    ----------
+    diagnostics : Diagnostics
+        With or without a learning curve.
+    path : path, optional
+        Where to write the picture, .png or .pdf. The same diagnostics give the same bytes.
+    title : str, optional
+        First line; "Light field" if not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure, not registered with pyplot.
+
+    Raises
+    ------
+    ArgumentError
+        If the directory of `path` does not exist.
+    UnknownNameError
+        If the extension of `path` is none of a picture.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> from etendue.lightfield.diagnostics import diagnose
+    >>> from etendue.lightfield.light_field import LightField
+    >>> from etendue.lightfield.surfaces import Disk
+    >>> field = LightField.fit(et.RingSource(rays=50_000), Disk(radius=30), depths=(4, 4, 2, 2))
+    >>> [axes.get_ylabel() for axes in plot_characteristic(diagnose(field)).axes]
+    ['luminance [cd/m²]', 'flux [lm]']
+    """
+    table = diagnostics.spots[:MOST_SPOTS]
+    facts = style.wrapped(_facts(diagnostics), WIDTH - 0.6)
+    under_table = 0.3 + 0.15 * len(facts) + 0.12
+    under_panels = under_table + (ROW * (len(table) + 1) + 0.3 if table else 0.0) + UNDER
+    learning = diagnostics.learning
+    top = under_panels + (PANEL + UNDER + 0.1 if learning is not None else 0.0)
+    height = top + PANEL + ABOVE
+    figure = style.new_figure(WIDTH, height)
+    wide = (WIDTH - LEFT - RIGHT - GAP) / 2
+    first, second = (style.add_axes(figure, LEFT + n * (wide + GAP), top, wide, PANEL) for n in (0, 1))
+    _draw_luminance(first, diagnostics.curve, diagnostics.flux_unit)
+    _draw_flux(second, diagnostics.curve, diagnostics.flux_unit)
+    if learning is not None:
+        _draw_learning(style.add_axes(figure, LEFT, under_panels, WIDTH - LEFT - RIGHT, PANEL), learning)
+    heading = title if title is not None else "Light field"
+    style.add_text(figure, 0.3, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
+    on = re.sub(r"\d+\.\d+", lambda number: f"{float(number[0]):.4g}", f"on {diagnostics.surface}")
+    style.add_text(figure, 0.3, height - 0.54, on, size=style.LABEL_SIZE, color=style.FAINT)
+    if table:
+        _write_table(figure, under_table, table, diagnostics.flux_unit)
+    for number, line in enumerate(reversed(facts)):
+        style.add_text(figure, 0.3, 0.14 + 0.15 * number, line, size=style.CAPTION_SIZE, color=style.FAINT)
+    return style.finish(figure, path)
+
+
+def _open(axes: Axes) -> None:
+    """The house look with two sides and a grid."""
+    style.dress(axes)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    axes.grid(visible=True, color=style.RULE, linewidth=0.4)
+    axes.set_axisbelow(True)
+
+
+def _draw_luminance(axes: Axes, curve: CharacteristicCurve, unit: FluxUnit) -> None:
+    _open(axes)
+    # A step is drawn over its extent, from where the one before ended.
+    starts = np.append(0.0, curve.etendue[:-1])
+    middles = (starts + curve.etendue) / 2
+    low, high = curve.luminance - curve.standard_error, curve.luminance + curve.standard_error
+    colour = style.LINES[0]
+    axes.fill_between(middles, np.maximum(low, 0.0), high, color=colour, alpha=0.22, linewidth=0.0)
+    axes.plot(middles, curve.luminance, color=colour, linewidth=1.2)
+    # A bright spot and a dim surround are powers of ten apart.
+    left, right = max(curve.etendue_of(BRIGHTEST), middles[0]), curve.total_etendue
+    axes.set_xscale("log")
+    axes.set_xlim(left, right)
+    axes.xaxis.set_major_formatter(style.log_formatter(left, right))
+    axes.set_xlabel("étendue, brightest first [mm² sr]")
+    shown = high[middles >= left]
+    axes.set_ylim(0.0, 1.05 * float(shown.max()) or 1.0)
+    axes.yaxis.set_major_formatter(style.number_formatter())
+    axes.set_ylabel(f"{LUMINANCE_NAME[unit]} [{LUMINANCE_UNIT[unit]}]")
+
+
+def _draw_flux(axes: Axes, curve: CharacteristicCurve, unit: FluxUnit) -> None:
+    _open(axes)
+    axes.plot(np.append(0.0, curve.etendue), np.append(0.0, curve.flux), color=style.LINES[0], linewidth=1.2)
+    axes.set_xlim(0.0, curve.etendue_of(LIT))
+    axes.set_ylim(0.0, 1.05 * float(curve.flux[-1]))
+    axes.xaxis.set_major_formatter(style.number_formatter())
+    axes.set_xlabel("étendue, brightest first [mm² sr]")
+    axes.yaxis.set_major_formatter(style.number_formatter())
+    axes.set_ylabel(f"flux [{unit}]")
+    half = curve.etendue_of(0.5)
+    axes.plot([half], [0.5 * curve.flux[-1]], "o", color=style.LINES[1], markersize=4)
+    axes.annotate(
+        f"half in {style.plain(float(f'{half:.3g}'))} mm² sr", (half, 0.5 * curve.flux[-1]), (7, -5),
+        textcoords="offset points", size=style.TICK_SIZE, color=style.LINES[1], va="top",
+    )  # fmt: skip
+
+
+def _draw_learning(axes: Axes, learning: LearningCurve) -> None:
+    _open(axes)
+    n = np.geomspace(learning.rays[0], AHEAD * learning.field_rays, 97)
+    value, low, high = (100.0 * np.array(column) for column in zip(*map(learning.error, n), strict=True))
+    colour = style.LINES[0]
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.fill_between(n, low, high, color=colour, alpha=0.22, linewidth=0.0)
+    axes.plot(n, value, color=colour, linewidth=1.2, label="error and its 68 % interval")
+    now, then = learning.error(), learning.factor(0.5)
+    axes.plot([learning.field_rays], [100 * now.value], "o", color=style.INK, markersize=4.5, label="this field")
+    # From a rung to the end of the law the loss falls by the gains on the way: those were measured.
+    top = learning.loss(learning.rays[-1]).value
+    losses = top + np.append(np.cumsum(learning.gains[::-1])[::-1], 0.0)
+    measured = 100.0 * np.sqrt(2.0 * np.maximum(losses, 0.0))
+    axes.plot(learning.rays, measured, "s", color=style.LINES[1], markersize=3.5, label="fits to parts of the rays")
+    wanted = 50.0 * now.value
+    reach = [learning.field_rays * factor for factor in (then.low, then.high)]
+    axes.plot(reach, [wanted, wanted], color=style.LINES[2], linewidth=2.0, solid_capstyle="butt")
+    axes.plot(
+        [learning.field_rays * then.value], [wanted], "D", color=style.LINES[2], markersize=4.5,
+        label=f"half the error: {then.value:.2g} times the rays ({then.low:.2g} to {then.high:.2g})",
+    )  # fmt: skip
+    axes.set_xlim(n[0] / 1.15, n[-1])
+    floor, ceiling = axes.get_ylim()
+    for place in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+        place(style.log_formatter(floor, ceiling))
+    axes.xaxis.set_major_formatter(style.log_formatter(n[0], n[-1]))
+    axes.set_xlabel("rays")
+    axes.set_ylabel("relative error at a ray [%]")
+    axes.legend(loc="lower left", frameon=False, fontsize=style.TICK_SIZE, labelcolor=style.INK, handlelength=1.6)
+
+
+def _write_table(figure: Figure, bottom: float, spots: tuple[UncertainSpot, ...], unit: FluxUnit) -> None:
+    """Where the field is least certain, the worst first."""
+    names = ("x, y, z [mm]", "on the", "θ [°]", "φ [°]", f"{LUMINANCE_NAME[unit]} [{LUMINANCE_UNIT[unit]}]", "share")
+    stops = (0.3, 2.35, 3.75, 4.35, 4.95, WIDTH - RIGHT)
+    alignment = ("left", "left", "right", "right", "left", "right")
+    top = bottom + ROW * (len(spots) + 1)
+    heading = (
+        "Least certain: boxes of places and directions by their share of the expected loss, each with its worst cell"
+    )
+    style.add_text(figure, 0.3, top + 0.03, heading, size=style.TICK_SIZE, color=style.INK)
+    for number, row in enumerate([names, *map(_row, spots)]):
+        y = top - ROW * (number + 1) + 0.02
+        for x, text, side in zip(stops, row, alignment, strict=True):
+            style.add_text(figure, x, y, text, size=style.CAPTION_SIZE, color=style.FAINT, ha=side)
+
+
+def _row(spot: UncertainSpot) -> tuple[str, ...]:
+    return (
+        ", ".join(f"{c:.4g}" for c in spot.point).replace("-", "−"),
+        spot.part,
+        f"{spot.theta:.1f}",
+        f"{spot.phi:.1f}",
+        f"{style.plain(float(f'{spot.luminance:.3g}'))} ± {style.plain(float(f'{spot.standard_error:.2g}'))}",
+        style.percent(100.0 * spot.share),
+    )
+
+
+def _facts(diagnostics: Diagnostics) -> Iterator[str]:
+    """What the picture rests on, fact by fact."""
+    report, curve = diagnostics.report, diagnostics.curve
+    yield f"flux {style.plain(diagnostics.flux)} {diagnostics.flux_unit}"
+    yield f"{style.grouped(str(report.rays - report.unmet_rays))} rays"
+    if report.unmet_rays:
+        yield f"{style.grouped(str(report.unmet_rays))} more do not meet the surface"
+    score, lead = (text.replace("-", "−") for text in (f"{report.score:.4f}", f"{diagnostics.lead:+.4f}"))
+    yield f"held-out score {score} ± {report.score_error:.4f} nat per ray"
+    yield f"{lead} against the equal-étendue histogram"
+    yield f"{style.grouped(f'{report.effective_cells:.0f}')} effective degrees of freedom"
+    yield f"error bars foretell a relative error of {style.percent(100 * diagnostics.expected_error)} at a ray"
+    yield f"99 % of the flux in {style.plain(float(f'{curve.etendue_of(0.99):.3g}'))} mm² sr"
+    yield f"base measure {', '.join(report.bases)}"
+    yield Path(diagnostics.source).name
