@@ -104,7 +104,10 @@ class _Scale:
         self.waves_of_plane = plane.size[0] * plane.size[1]
 
     def _lobe(self, direction: int) -> Array:
-        lobe: Array = np.abs(np.cos(self.angle - np.pi * direction / DIRECTIONS)) ** (DIRECTIONS - 1)
+        turn = np.pi * direction / DIRECTIONS
+        there, mirrored = (np.cos(angle - turn) ** (2 * DIRECTIONS - 2) for angle in (self.angle, -self.angle))
+        # The finest waves along a row run both ways at once.
+        lobe: Array = np.sqrt(np.where(self.fx == 0.5, (there + mirrored) / 2, there))
         return lobe
 
     def below(self, plane: FourierPlane) -> Array:
@@ -122,8 +125,9 @@ class _Scale:
         coefficients = self.cells(noisy * response)
         seen = coefficients if guide is None else self.cells(guide * response)
         window = self._window(direction, FIRST_WINDOW if guide is None else SECOND_WINDOW)
-        energy = np.maximum(self.cells(np.fft.rfft2(seen**2) * window), 1e-300)
-        gain = np.maximum(1 - SIGNIFICANCE * noise / energy, 0.0) if guide is None else energy / (energy + noise)
+        energy = np.maximum(self.cells(np.fft.rfft2(seen**2) * window), 0.0)
+        threshold = SIGNIFICANCE * noise
+        gain = 1 - threshold / np.maximum(energy, threshold) if guide is None else energy / (energy + noise)
         return np.fft.rfft2(gain * coefficients) * response, gain * noise
 
     def _window(self, direction: int, width: float) -> Array:
@@ -161,6 +165,6 @@ def shrunk_rings(plane: FourierPlane, image: Array, variance: Array, beyond: Arr
     number = np.maximum(np.bincount(block.ravel(), each), 1.0)
     energy = np.bincount(block.ravel(), each * np.abs(waves.ravel()) ** 2)
     noise = variance.sum() * (number + 2 * np.sqrt(2 * number) + 4)
-    gain = np.maximum(1 - noise / np.maximum(energy, 1e-300), 0.0)
+    gain = 1 - noise / np.maximum(energy, noise)
     gain[0] = 1.0
     return plane.image(waves * gain[block])

@@ -13,8 +13,8 @@ Waves = npt.NDArray[np.complex128]
 MARGIN = 32
 """Least number of cells between the image and its own periodic copy, on either side."""
 
-GRAIN = 16
-"""The plane's sides are multiples of this, so that it can be halved without loss as often as the coarsest scale asks."""
+GRAIN = 32
+"""The plane's sides are multiples of this, so that every 16th cell, the coarsest scale's, still make an even number."""
 
 
 class FourierPlane:

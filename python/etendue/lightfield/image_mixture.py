@@ -61,7 +61,10 @@ def cross_fitted_mixture(
         difference = masses[1:] - masses[0]
         moments += (kept[0] - masses[0]) * difference / spread
         products += difference[:, None] * difference[None] / spread
-    overall = _proven_shares(products.sum(axis=(2, 3)), moments.sum(axis=(1, 2)))
+    whole_products, whole_moments = products.sum(axis=(2, 3)), moments.sum(axis=(1, 2))
+    overall = least_squares_shares(whole_products, whole_moments)
+    if whole_moments @ overall - 0.5 * overall @ whole_products @ overall < PROOF:
+        return Mixture(np.concatenate([np.ones((1, *weight.shape)), np.zeros_like(moments)]))
     area = 2 * np.pi * WINDOW**2  # turns the blur's average into a sum
     moments = np.array([blurred(m, WINDOW) * area for m in moments])
     products = np.array([[blurred(p, WINDOW) * area for p in row] for row in products])
@@ -71,13 +74,6 @@ def cross_fitted_mixture(
     prior = np.eye(2)[..., None, None] / variance
     others = least_squares_shares(products + prior, moments + overall[:, None, None] / variance)
     return Mixture(np.concatenate([1.0 - others.sum(axis=0, keepdims=True), others]))
-
-
-def _proven_shares(products: Array, moments: Array) -> Array:
-    """The best shares over the whole image, or none."""
-    shares = least_squares_shares(products, moments)
-    gain = float(moments @ shares - 0.5 * shares @ products @ shares)
-    return shares if gain > PROOF else np.zeros_like(shares)
 
 
 def halves(weight: Array, weight_squared: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
