@@ -38,8 +38,20 @@ def families() -> dict[str, tuple[Any, Surface, float, float, int | None]]:
     limb, film = LimbDarkenedDisk(), PrismaticFilm()
     flat = {name: s.radius * 2 for name, s in (("limb", limb), ("film", film))}
     return {
-        "limb": (limb, Plane(z=0, width=flat["limb"], height=flat["limb"], centre=limb.centre), 24, flat["limb"] / 32, None),
-        "film": (film, Plane(z=0, width=flat["film"], height=flat["film"], centre=film.centre), 24, flat["film"] / 32, None),
+        "limb": (
+            limb,
+            Plane(z=0, width=flat["limb"], height=flat["limb"], centre=limb.centre),
+            24,
+            flat["limb"] / 32,
+            None,
+        ),
+        "film": (
+            film,
+            Plane(z=0, width=flat["film"], height=flat["film"], centre=film.centre),
+            24,
+            flat["film"] / 32,
+            None,
+        ),
         "die": (DIE, Plane(z=0, width=2.53, height=2.53, centre=(0, 0)), 2.6, 2.53 / 32, None),
         "dome": (DIE, Hemisphere(radius=DIE.radius * 1.00001), 2.6, 0.1, 16),
     }

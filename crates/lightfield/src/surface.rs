@@ -2,7 +2,7 @@
 //!
 //! A light field lives on a surface Σ in four coordinates, each from 0 to 1: (s₁, s₂) is the place on a part of Σ, by an
 //! equal-area chart, and (a, b) the direction, by the concentric map of its local direction cosines (p, q). Equal volumes
-//! in these coordinates are equal étendues: dU = dA dp dq = π A ds₁ ds₂ da db. Theory eqs. 34 to 36.
+//! in these coordinates are equal étendues: dU = dA dp dq = π A ds₁ ds₂ da db. Theory eq. 37.
 
 use etendue_geometry::RayBatch;
 use etendue_geometry::batch::BLOCK;

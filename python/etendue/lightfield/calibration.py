@@ -15,7 +15,7 @@ import itertools
 import numpy as np
 import numpy.typing as npt
 
-from etendue.lightfield.candidate import product_bases, careful_density
+from etendue.lightfield.candidate import careful_density, product_bases
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.trees import Base, Tree, grow
 
@@ -53,7 +53,7 @@ def calibrate(counts: PartCounts, base: Base, tree: Tree, concentration: float, 
     found = _masses(counts.grid, base, tree, threads)
     known, known_base = _elsewhere(counts, base, concentration, threads)
     drawn = _draw(known, counts, known_base, seed)
-    again = base if base.name == "uniform" else product_bases([drawn], careful_density(threads))[0]
+    again = base if base.name == "uniform" else product_bases([drawn], careful_density(threads), threads)[0]
     retried = _masses(drawn.grid, again, grow(drawn.grid, again, concentration, threads), threads)
     factors = _factors(retried, np.abs(retried.mean - known) / np.maximum(retried.deviation, _tiny(known)), found)
     cells = base.cells(tree.ratio.shape)
@@ -86,7 +86,7 @@ def _elsewhere(counts: PartCounts, base: Base, concentration: float, threads: in
             sums.map(lambda a, s=s, n=n: np.roll(a, _fine_steps(s, n, a.shape[0]), (0, 1)))
             for sums, s, n in ((counts.space, shift[:2], shape[:2]), (counts.direction, shift[2:], shape[2:]))
         ]
-        moved = product_bases([PartCounts(counts.grid, *fine)], careful_density(threads))[0]
+        moved = product_bases([PartCounts(counts.grid, *fine)], careful_density(threads), threads)[0]
     rolled = grow(counts.grid.map(lambda a: np.roll(a, shift, axes)), moved, concentration, threads)
     mass = np.roll(rolled.ratio * moved.cells(shape), back, axes)
     return mass / mass.sum(), moved.rolled(back, shape)

@@ -34,16 +34,20 @@ def uniform_bases(counts: Sequence[PartCounts]) -> tuple[Base, ...]:
     return tuple(Base() for _ in counts)
 
 
-def product_bases(counts: Sequence[PartCounts], smoother: Smoother) -> tuple[Base, ...]:
-    """Exitance times intensity: what the fine counts over place and over direction tell, each by itself."""
+def product_bases(counts: Sequence[PartCounts], smoother: Smoother, threads: int | None) -> tuple[Base, ...]:
+    """Exitance times intensity: what the fine counts over place and over direction tell, each by itself.
 
-    def density(sums: Sums) -> FloatArray:
-        mass = smoother(sums)
+    The place, which people look at, is smoothed by `smoother`; over directions a tree will do.
+    """
+
+    def density(mass: FloatArray) -> FloatArray:
         lifted: FloatArray = mass * ((1.0 - FLOOR) * mass.size / mass.sum()) + FLOOR
         return lifted
 
+    rough = quick_density(threads)
     return tuple(
-        Base(density(part.space), density(part.direction)) if part.space.rays > 0 else Base() for part in counts
+        Base(density(smoother(part.space)), density(rough(part.direction))) if part.space.rays > 0 else Base()
+        for part in counts
     )
 
 

@@ -99,7 +99,10 @@ def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: in
         counts = count_rays(some, surface, trial, FINE, seed=seed, threads=threads)
         fitted = counts["fitted"]
         if not bases:
-            bases = {"uniform": uniform_bases(fitted), "product": product_bases(fitted, quick_density(threads))}
+            bases = {
+                "uniform": uniform_bases(fitted),
+                "product": product_bases(fitted, quick_density(threads), threads),
+            }
             concentrations = {name: choose_concentrations(fitted, b, threads) for name, b in bases.items()}
         trees = [grow_candidate(counts, "fitted", b, concentrations[name], threads) for name, b in bases.items()]
         scores.append(max(candidate.score(counts).mean for candidate in trees))
@@ -117,14 +120,16 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
     density = careful_density(threads)
     candidates: list[tuple[Candidate, Score]] = []
     for name in ("uniform", "product"):
-        bases = uniform_bases(counts["fitted"]) if name == "uniform" else product_bases(counts["fitted"], density)
+        bases = (
+            uniform_bases(counts["fitted"]) if name == "uniform" else product_bases(counts["fitted"], density, threads)
+        )
         candidate = grow_candidate(counts, "fitted", bases, plan.concentrations[name], threads)
         candidates.append((candidate, candidate.score(counts)))
     (plain, plain_score), (elaborate, elaborate_score) = candidates
     lead, error = elaborate_score.lead(plain_score)
     taken, score = (elaborate, elaborate_score) if lead > LEAD * error else (plain, plain_score)
     name = taken.base_name
-    bases = uniform_bases(counts["all"]) if name == "uniform" else product_bases(counts["all"], density)
+    bases = uniform_bases(counts["all"]) if name == "uniform" else product_bases(counts["all"], density, threads)
     final = grow_candidate(counts, "all", bases, plan.concentrations[name], threads)
     final = dataclasses.replace(final, trees=tuple(_calibrated(counts, final, seed, threads)))
     histogram = score_densities(counts, _histogram(counts))

@@ -234,19 +234,20 @@ def _some(rays: RaySet, wanted: npt.NDArray[np.bool_]) -> RaySet:
 
 
 def _refit(field: LightField, rays: RaySet, seed: int, threads: int | None) -> LightField:
-    """The field of other rays, with everything chosen as it was for this one."""
+    """The field of other rays, with everything chosen as it was for this one, and a flux of 1."""
     depths = tuple(n.bit_length() - 1 for n in field.parts[0].ratio.shape)
     counts = count_rays(rays, field.surface, depths, FINE, held_out=0.0, seed=seed, threads=threads)
     everything = counts["all"]
     product = "product" in field.report.bases
-    bases = product_bases(everything, careful_density(threads)) if product else uniform_bases(everything)
-    candidate = grow_candidate(counts, "all", bases, field.report.concentrations, threads)
-    return field.replace(parts=candidate.fields(counts))
+    bases = product_bases(everything, careful_density(threads), threads) if product else uniform_bases(everything)
+    parts = grow_candidate(counts, "all", bases, field.report.concentrations, threads).fields(counts)
+    flux = sum(counts.part_flux)
+    return field.replace(parts=tuple(dataclasses.replace(part, level=part.level / flux) for part in parts))
 
 
 def _score(field: LightField, rays: RaySet, threads: int | None) -> Score:
-    """Ln of the density in étendue [1/(mm² sr)] at each of the rays."""
-    density = field.core.luminance(rays.position, rays.direction, threads)[0] / field.total_flux
+    """Ln of the density in étendue [1/(mm² sr)] at each of the rays, for a field with a flux of 1."""
+    density = field.core.luminance(rays.position, rays.direction, threads)[0]
     even = 1.0 / sum(chart.etendue for chart in field.surface.parts())
     return Score(np.log((1.0 - MIXED_IN) * density + MIXED_IN * even), rays.flux)
 

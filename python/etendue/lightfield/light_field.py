@@ -29,7 +29,7 @@ INTENSITY_SIDE = 96
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PartField:
-    """The light that leaves one part: L = level · B_s(s₁, s₂) · B_d(a, b) · r(s₁, s₂, a, b), theory eq. 37.
+    """The light that leaves one part: L = level · B_s(s₁, s₂) · B_d(a, b) · r(s₁, s₂, a, b), theory eq. 38.
 
     Parameters
     ----------

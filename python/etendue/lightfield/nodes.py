@@ -15,7 +15,7 @@ def node_values(means: FloatArray) -> FloatArray:
 
     The mean of the interpolation over a cell is ¾ of its own value and ⅛ of either neighbour's along each axis, and at a
     border ⅞ of its own: call that T v. One step of v ← v + (m - T v) from v = m takes away the blur of T but for its
-    square; steps beyond a factor of 4 would be noise, or the shadow of an edge, and are cut off. Theory eq. 38.
+    square; steps beyond a factor of 4 would be noise, or the shadow of an edge, and are cut off. Theory eq. 39.
 
     Examples
     --------

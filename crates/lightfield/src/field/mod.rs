@@ -2,7 +2,7 @@
 //!
 //! On each part of the surface L(z) = level · `B_s(s₁`, s₂) · `B_d(a`, b) · r(z): two factors that are bilinear on fine grids
 //! and a ratio that is linear in each of the four coordinates between the centres of its cells. Read-out (`PartField::at`)
-//! and sampling (`draw`) are of one and the same function. Theory eqs. 37 to 39.
+//! and sampling (`draw`) are of one and the same function. Theory eq. 38.
 
 pub mod draw;
 pub mod factor;

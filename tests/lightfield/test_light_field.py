@@ -1,0 +1,205 @@
+"""The light field against sources of known luminance: flux, score, error bars, maps, intensity, sampling, bits."""
+
+from __future__ import annotations
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.lightfield.light_field import LightField
+from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm
+
+DEPTHS = (4, 4, 4, 4)
+
+
+def rays_of(source: object, n: int, seed: int = 1, weights: np.ndarray | None = None) -> et.RaySet:
+    x, k = source.rays(n, seed)  # type: ignore[attr-defined]
+    flux = np.full(n, source.total_flux / n) if weights is None else weights  # type: ignore[attr-defined]
+    return et.RaySet(x, k, flux)
+
+
+@pytest.fixture(scope="module")
+def film() -> tuple[PrismaticFilm, et.RaySet, LightField]:
+    source = PrismaticFilm()
+    rays = rays_of(source, 200_000)
+    return source, rays, LightField.fit(rays, et.Disk(radius=source.radius, centre=source.centre), depths=DEPTHS)
+
+
+def excess(source: object, field: LightField, luminance: np.ndarray | None = None) -> float:
+    """Mean ln of true over estimated density on fresh rays [nat], each mixed with 1e-4 of a uniform field."""
+    x, k = source.rays(50_000, 77)  # type: ignore[attr-defined]
+    truth = source.luminance(x, k) / source.total_flux  # type: ignore[attr-defined]
+    found = field.luminance(x, k)[0] / field.total_flux if luminance is None else luminance
+    return float(np.mean(np.log(truth) - np.log((1 - 1e-4) * found + 1e-4 * 1e6 / (np.pi * field.surface.area))))
+
+
+def test_flux_is_that_of_the_rays_that_were_met(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
+    _, rays, field = film
+    assert field.total_flux == pytest.approx(rays.total_flux - field.report.unmet_flux, rel=1e-12)
+
+
+def test_it_beats_the_grid_of_the_thesis_by_far_whatever_its_threshold(
+    film: tuple[PrismaticFilm, et.RaySet, LightField],
+) -> None:
+    source, rays, field = film
+    x, k = source.rays(50_000, 77)
+    ours = excess(source, field)
+    for threshold in (20.0, 5.0, 1.0, 0.2):
+        grid = et.GriddedSource.fit(rays, et.Plane(z=0), pixel=source.radius / 16, threshold=threshold)
+        theirs = excess(source, field, grid.luminance(x, k) / grid.total_flux)
+        assert ours < theirs / 4
+
+
+def test_the_product_base_is_taken_for_a_film_and_not_for_an_entangled_source() -> None:
+    source = LimbDarkenedDisk()
+    field = LightField.fit(rays_of(source, 50_000), et.Plane(z=0), depths=DEPTHS)
+    assert field.report.bases == ("product",)
+    # Light from two spots in two opposite directions: neither exitance nor intensity knows which goes with which.
+    rng = np.random.default_rng(2)
+    side = rng.choice([-1.0, 1.0], 50_000)
+    x = np.column_stack([side + rng.uniform(-0.5, 0.5, 50_000), rng.uniform(-1, 1, 50_000), np.zeros(50_000)])
+    p = 0.5 * side + rng.uniform(-0.3, 0.3, 50_000)
+    q = rng.uniform(-0.3, 0.3, 50_000)
+    k = np.column_stack([p, q, np.sqrt(1 - p * p - q * q)])
+    entangled = LightField.fit(et.RaySet(x, k, np.ones(50_000)), et.Plane(z=0), depths=DEPTHS)
+    bright = entangled.luminance([[1, 0, 0], [1, 0, 0]], [[0.5, 0, np.sqrt(0.75)], [-0.5, 0, np.sqrt(0.75)]])[0]
+    assert bright[1] < 0.01 * bright[0]
+
+
+@pytest.mark.parametrize("family", ["film", "dome"])
+def test_error_bars_cover_the_truth(family: str) -> None:
+    """Share of cells within one and two standard errors, over three seeds.
+
+    Cells err together, so their number tells no significance; five fits of other seeds of each source had standard
+    deviations below 0.02 of the one-sigma share. The bars ask for 68 and 95 %.
+    """
+    source = PrismaticFilm() if family == "film" else DieUnderDome()
+    surface = et.Disk(radius=source.radius, centre=source.centre) if family == "film" else et.Hemisphere(radius=1.2641)
+    rng = np.random.default_rng(1)
+    index = rng.integers(0, 16, (3000, 4))
+    steps = np.array([0.856675, 0.733892, 0.628707, 0.538597])
+    shares = []
+    for seed in (1, 2, 3):
+        field = LightField.fit(rays_of(source, 100_000, seed), surface, depths=DEPTHS)
+        chart = field.surface.parts()[0].core()
+        sums = np.zeros((3, 3000))
+        for i in range(48):
+            at = np.ascontiguousarray((index + ((i + 0.5) / 48 + i * steps) % 1.0) / 16)
+            x, k = _core.rays_of_part(chart, at)
+            sums += np.array([source.luminance(x + 1e-9 * k, k), *field.luminance(x, k)]) / 48
+        lit = sums[0] > 0
+        z = np.abs(sums[1] - sums[0])[lit] / sums[2][lit]
+        shares.append([(z < 1).mean(), (z < 2).mean()])
+    one, two = np.mean(shares, axis=0)
+    assert 0.58 < one < 0.88
+    assert 0.88 < two < 0.995
+
+
+def test_maps_show_the_truth_from_everywhere(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
+    source, _, field = film
+    for theta, phi, plane in ((0, 0, "view"), (30, 20, "view"), (20, 250, "xy")):
+        observer, screen = et.Observer(theta, phi, 1000), et.Screen(26, 26, 24, 24, plane)
+        lmap = et.luminance_map(field, observer, screen)
+        right, up, _ = screen.axes(observer)
+        offsets = (np.arange(8) + 0.5) / 8 - 0.5
+        xx = (screen.x[:, None] + offsets * screen.width / 24).ravel()
+        yy = (screen.y[:, None] + offsets * screen.height / 24).ravel()
+        points = yy[:, None, None] * up + xx[None, :, None] * right
+        k = observer.position - points
+        k /= np.linalg.norm(k, axis=-1, keepdims=True)
+        truth = source.luminance(points.reshape(-1, 3), k.reshape(-1, 3)).reshape(24, 8, 24, 8).mean(axis=(1, 3))
+        found = et.compare(lmap, lmap.replace(values=truth))
+        assert found.ncc > 0.99
+        assert found.nrmse < 0.06
+        assert (lmap.standard_error[truth > 0.05 * truth.max()] > 0).all()
+        assert lmap.dead_pixels == 0
+
+
+def test_both_parts_of_a_dome_are_seen() -> None:
+    source = DieUnderDome()
+    field = LightField.fit(rays_of(source, 100_000), et.Dome(radius=source.radius * 1.001), depths=(5, 5, 3, 3))
+    assert all(flux > 0 for flux in field.part_flux)
+    # A line through the dome's edge misses the window; the shell's own light is there all the same.
+    x, k = np.array([[1.2, 0, 0.2]]), np.array([[0.0, 1.0, 0.0]])
+    assert field.luminance(x, k)[0][0] > 0
+    parts = [
+        field.core.at(i, _core.cross_parts([part.core()], p, d)[1])[0][0]
+        for p, d in [(np.array([[0.1, 0.1, 5.0]]), np.array([[0.0, 0.0, 1.0]]))]
+        for i, part in enumerate(field.surface.parts())
+    ]
+    both = field.luminance([[0.1, 0.1, 5.0]], [[0, 0, 1]])[0][0]
+    assert both == pytest.approx(sum(parts) * 1e6, rel=1e-12)
+
+
+def test_flux_through_a_far_sphere_is_the_total(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
+    _, _, field = film
+    intensity = field.intensity(72, 2.5)
+    # The integral of the table over the sphere; its own quadrature error is below 1e-3 for a table this fine.
+    gamma = np.radians(intensity.gamma)
+    ring = intensity.values.mean(axis=0) * np.sin(gamma)
+    assert 2 * np.pi * np.trapezoid(ring, gamma) == pytest.approx(field.total_flux, rel=3e-3)
+    # A map from afar has the intensity of its direction, but for the quadrature of either.
+    lmap = et.luminance_map(field, et.Observer(25, 40, 1e5), et.Screen(26, 26, 96, 96))
+    assert lmap.intensity == pytest.approx(float(intensity.at(40, 25)), rel=0.02)
+
+
+def test_a_refit_of_drawn_rays_agrees(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
+    _, _, field = film
+    again = LightField.fit(field.rays(200_000, seed=5), field.surface, depths=DEPTHS)
+    x, k = field.sample(20_000, seed=6).position, field.sample(20_000, seed=6).direction
+    (a, sa), (b, sb) = field.luminance(x, k), again.luminance(x, k)
+    # The drawn field is the truth here; three standard errors hold all but a few points.
+    assert (np.abs(a - b) < 3 * sb).mean() > 0.97
+    assert np.median(np.abs(a / b - 1)) < 0.1
+    assert (sa > 0).all()
+
+
+def test_weights_count_as_flux_and_not_as_rays() -> None:
+    source = LimbDarkenedDisk()
+    x, k = source.rays(120_000, 3)
+    # Thin by place: where rays are kept with a smaller chance, they weigh more; the light is the same.
+    chance = np.where(x[:, 0] > source.centre[0], 1.0, 1 / 3)
+    kept = np.random.default_rng(4).random(len(x)) < chance
+    weights = (1 / chance)[kept] * source.total_flux / len(x)
+    rays = et.RaySet(x[kept], k[kept], weights)
+    field = LightField.fit(rays, et.Disk(radius=source.radius, centre=source.centre), depths=DEPTHS)
+    assert field.total_flux == pytest.approx(float(weights.sum()) - field.report.unmet_flux, rel=1e-12)
+    points = (
+        source.centre[0]
+        + np.array([[-4, 1, 0], [4, 1, 0], [-6, -2, 0], [6, -2, 0.0]]) * [1, 0, 0]
+        + np.array([[0, 0.5, 0]])
+    )
+    directions = np.tile([0.3, -0.2, 0.93], (4, 1))
+    value, error = field.luminance(points, directions)
+    truth = source.luminance(points, directions / np.linalg.norm(directions[0]))
+    assert (np.abs(value - truth) < 4 * error).all()
+
+
+def test_bits_do_not_depend_on_threads() -> None:
+    rays = rays_of(DieUnderDome(), 40_000)
+    one, seven = (LightField.fit(rays, et.Dome(radius=1.3), depths=(3, 3, 3, 3), threads=t) for t in (1, 7))
+    for a, b in zip(one.parts, seven.parts, strict=True):
+        assert a.ratio.tobytes() == b.ratio.tobytes()
+        assert a.deviation.tobytes() == b.deviation.tobytes()
+        assert a.level == b.level
+    observer, screen = et.Observer(40, 0, 100), et.Screen(3, 3, 32, 32)
+    maps = [et.luminance_map(one, observer, screen, threads=t).values.tobytes() for t in (1, 2, 7)]
+    assert maps[0] == maps[1] == maps[2]
+
+
+def test_what_makes_no_sense_is_refused(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
+    _, rays, field = film
+    observer, screen = et.Observer(0, 0, 1000), et.Screen(2, 2, 4, 4)
+    with pytest.raises(ArgumentError, match="no rays that a cone"):
+        et.luminance_map(field, observer, screen, method="cone")
+    with pytest.raises(ArgumentError, match="has no acceptance"):
+        et.luminance_map(rays, observer, screen, method="lightfield", acceptance=2.0)
+    with pytest.raises(ArgumentError, match="points per pixel"):
+        et.luminance_map(field, observer, screen, samples=0)
+    with pytest.raises(ArgumentError, match="shape"):
+        field.luminance([[0, 0, 0]], [[0, 0, 1], [0, 0, 1]])
+    with pytest.raises(ArgumentError, match="direction"):
+        field.luminance([[0, 0, 0]], [[0, 0, 0]])
+    with pytest.raises(ArgumentError, match="divide|whole part"):
+        field.intensity(24, 7.0)

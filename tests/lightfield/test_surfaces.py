@@ -1,0 +1,133 @@
+"""Carrier surfaces: charts, sizing from rays, text, and what they refuse."""
+
+from __future__ import annotations
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue import _core
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.lightfield.surfaces import SURFACES
+
+SPECIMENS = [
+    et.Plane(z=0.5, width=3, height=2, centre=(0.2, -0.1)),
+    et.Disk(radius=1.5, z=-0.3, centre=(0.1, 0.4)),
+    et.Hemisphere(radius=2, centre=(0.5, 0, 1)),
+    et.Sphere(radius=1.2, centre=(0, -1, 0)),
+    et.Cylinder(radius=0.7, bottom=-1, top=2, centre=(0.3, 0.1)),
+    et.Box(2, 3, 4, centre=(0, 1, 2)),
+    et.Dome(radius=1.264, z=0.2, window=1.0, centre=(0.3, -0.2)),
+]
+
+
+def bundle(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    position = rng.normal(size=(n, 3)) * [0.5, 0.8, 0.4] + [0.2, 0.1, 0.3]
+    direction = rng.normal(size=(n, 3)) + [0.2, -0.1, 0.3]
+    return position, direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
+def test_every_surface_is_tried() -> None:
+    assert {type(s) for s in SPECIMENS} == set(SURFACES.values())
+
+
+@pytest.mark.parametrize("surface", SPECIMENS, ids=lambda s: s.NAME)
+def test_the_text_of_a_surface_gives_the_surface(surface: et.Plane) -> None:
+    assert et.parse_surface(surface.spec) == surface
+
+
+@pytest.mark.parametrize("surface", SPECIMENS, ids=lambda s: s.NAME)
+def test_axes_are_right_handed_and_coordinates_lead_back_to_the_ray(surface: et.Plane) -> None:
+    position, direction = bundle(4000, 1)
+    parts = surface.parts()
+    for part in parts:
+        axes = np.array(part.axes)
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+        assert np.linalg.det(axes) > 0
+    owner, at = _core.cross_parts([p.core() for p in parts], position, direction)
+    assert 0.05 < (owner >= 0).mean() <= 1.0
+    for index, part in enumerate(parts):
+        mine = owner == index
+        points, directions = _core.rays_of_part(part.core(), np.ascontiguousarray(at[mine]))
+        np.testing.assert_allclose(directions, direction[mine], atol=1e-9)
+        # The point lies on the ray's line.
+        off = np.linalg.norm(np.cross(points - position[mine], direction[mine]), axis=1)
+        assert off.max(initial=0) < 1e-9
+
+
+@pytest.mark.parametrize("surface", SPECIMENS[3:6], ids=lambda s: s.NAME)
+def test_whatever_starts_inside_a_closed_surface_leaves_it(surface: et.Sphere) -> None:
+    centre = np.array([0, -1, 0]) if surface.NAME == "sphere" else np.array([0.3, 0.1, 0.5])
+    rng = np.random.default_rng(2)
+    direction = rng.normal(size=(5000, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    owner, _ = _core.cross_parts([p.core() for p in surface.parts()], np.tile(centre + 0.0, (5000, 1)), direction)
+    assert (owner >= 0).all()
+    assert len(set(owner)) == len(surface.parts())
+
+
+@pytest.mark.parametrize(
+    ("surface", "lost"),
+    [
+        (et.Plane(z=0), 5e-4),
+        (et.Disk(), 5e-4),
+        (et.Hemisphere(), 5e-4),
+        (et.Sphere(), 5e-4),
+        (et.Cylinder(), 5e-4),
+        (et.Box(), 5e-4),
+        (et.Dome(), 5e-4),
+    ],
+)
+def test_open_dimensions_are_taken_from_the_rays(surface: et.Plane, lost: float) -> None:
+    rng = np.random.default_rng(3)
+    n = 40_000
+    x = np.column_stack([rng.uniform(-2, 3, n), rng.uniform(-1, 1, n), np.zeros(n)])
+    u, phi = rng.uniform(0, 0.9, n), rng.uniform(0, 2 * np.pi, n)
+    k = np.column_stack([np.sqrt(u) * np.cos(phi), np.sqrt(u) * np.sin(phi), np.sqrt(1 - u)])
+    rays = et.RaySet(x, k, np.ones(n))
+    sized = surface.sized_for(rays)
+    assert not sized.open_dimensions
+    owner, _ = _core.cross_parts([p.core() for p in sized.parts()], x, k)
+    assert (owner < 0).mean() <= lost
+    if isinstance(sized, et.Plane):
+        assert sized.area == pytest.approx(10, rel=1e-3)
+
+
+def test_a_few_strays_do_not_blow_a_plane_up() -> None:
+    rng = np.random.default_rng(4)
+    n = 200_000
+    x = np.column_stack([rng.uniform(-1, 1, (n, 2)), np.zeros(n)])
+    x[:10] *= 500
+    rays = et.RaySet(x, np.tile([0, 0, 1.0], (n, 1)), np.ones(n))
+    sized = et.Plane(z=0).sized_for(rays)
+    assert sized.width is not None
+    assert 1.9 < sized.width < 2.1
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: et.Plane(width=-1), "length above 0"),
+        (lambda: et.Disk(radius=float("nan")), "finite"),
+        (lambda: et.Cylinder(radius=1, bottom=2, top=1), "not above bottom"),
+        (lambda: et.Dome(radius=1, window=2), "window"),
+        (lambda: et.Hemisphere(radius=1, centre=(0, 0)), "3 coordinates"),
+        (lambda: et.Plane().parts(), "open"),
+        (lambda: et.parse_surface("plane:z=high"), "number"),
+        (lambda: et.parse_surface("plane:z"), "no value"),
+        (lambda: et.parse_surface("plane:z=1,z=2"), "twice"),
+        (lambda: et.parse_surface("cylinder:ends=maybe"), "true or false"),
+        (lambda: et.Plane().sized_for(et.RaySet([[0, 0, 0]], [[0, 0, -1.0]], [1.0])), r"towards \+Z"),
+        (lambda: et.Plane().sized_for(et.RaySet([[0, 0, 0]], [[0, 0, 1.0]], [0.0])), "no flux"),
+    ],
+)
+def test_senseless_surfaces_are_refused(make: object, message: str) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        make()  # type: ignore[operator]
+
+
+def test_unknown_names_suggest_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="Did you mean 'dome'"):
+        et.parse_surface("dom:radius=1")
+    with pytest.raises(UnknownNameError, match="Did you mean 'radius'"):
+        et.parse_surface("dome:radios=1")
