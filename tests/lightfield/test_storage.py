@@ -290,6 +290,24 @@ def test_damage_gives_a_format_error_or_the_right_field(saved: dict[str, Path], 
     assert refused > 0.5 * len(whole) / 19
 
 
+@pytest.mark.parametrize("name", ["ratio", "deviation", "space", "direction"])
+@pytest.mark.parametrize("cells", [(16, 8, 8, 16), (2, 1, 1, 1)], ids=["large", "small"])
+def test_damaged_arrays_are_never_taken(name: str, cells: Any, tmp_path: Path) -> None:
+    """Wherever a bit of them is turned: also in a few cells, which compression would not make smaller."""
+    rng = np.random.default_rng(6)
+    path = tmp_path / "field.h5"
+    make_field(SURFACES["disk"], cells=cells, factors=(cells[1], cells[2])).save(path)
+    whole = path.read_bytes()
+    with h5py.File(path) as file:
+        chunk = file[f"parts/0/{name}"].id.get_chunk_info(0)
+    for at in range(chunk.byte_offset, chunk.byte_offset + chunk.size, max(chunk.size // 30, 1)):
+        set_byte(path, at, whole[at] ^ 1 << int(rng.integers(8)))
+        with pytest.raises(FormatError, match=r"field\.h5"):
+            LightField.load(path)
+        set_byte(path, at, whole[at])
+    assert LightField.load(path).notes
+
+
 def set_byte(path: Path, at: int, byte: int) -> None:
     """Change a byte where it stands: to write the whole file anew takes longer than to read it."""
     with path.open("r+b") as file:
