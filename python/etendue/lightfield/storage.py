@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import io
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -92,11 +93,10 @@ def save_field(field: LightField, path: Path) -> None:
     stored = as_stored(field)
     with atomic_output(path) as temporary:
         # Made in memory and written in one go: an HDF5 library whose disk is full cannot even close its file.
-        with h5py.File(temporary, "w", driver="core", backing_store=False, libver=LIBRARY) as file:
+        image = io.BytesIO()
+        with h5py.File(image, "w", libver=LIBRARY) as file:
             _write(file, stored)
-            file.flush()
-            image = file.id.get_file_image()
-        temporary.write_bytes(image)
+        temporary.write_bytes(image.getbuffer())
 
 
 def load_field(path: Path) -> LightField:
