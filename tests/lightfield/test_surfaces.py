@@ -23,7 +23,7 @@ SPECIMENS = [
 def bundle(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     position = rng.normal(size=(n, 3)) * [0.5, 0.8, 0.4] + [0.2, 0.1, 0.3]
-    direction = rng.normal(size=(n, 3)) + [0.2, -0.1, 0.3]
+    direction = rng.normal([0.2, -0.1, 0.3], size=(n, 3))
     return position, direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 

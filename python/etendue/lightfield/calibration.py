@@ -68,7 +68,7 @@ def _masses(counts: Sums, base: Base, tree: Tree, threads: int | None) -> Masses
     variance = (tree.deviation * cells) ** 2
     if base.name == "product":
         for axes, shape in (((2, 3), (slice(None), slice(None), None, None)), ((0, 1), (None, None))):
-            margin = grow(counts.map(lambda a, axes=axes: a.sum(axis=axes)), Base(), 1.0, threads)
+            margin = grow(counts.map(np.sum, axes), Base(), 1.0, threads)
             variance = variance + (mean * (margin.deviation / margin.ratio)[shape]) ** 2
     return Masses(mean, np.sqrt(variance))
 
@@ -83,11 +83,11 @@ def _elsewhere(counts: PartCounts, base: Base, concentration: float, threads: in
     if base.name == "product":
         # Edges of the margins, too, are found anew: on the old grid they would lie where its boxes end.
         fine = [
-            sums.map(lambda a, s=s, n=n: np.roll(a, _fine_steps(s, n, a.shape[0]), (0, 1)))
+            sums.map(np.roll, _fine_steps(s, n, sums.weight.shape[0]), (0, 1))
             for sums, s, n in ((counts.space, shift[:2], shape[:2]), (counts.direction, shift[2:], shape[2:]))
         ]
         moved = product_bases([PartCounts(counts.grid, *fine)], careful_density(threads), threads)[0]
-    rolled = grow(counts.grid.map(lambda a: np.roll(a, shift, axes)), moved, concentration, threads)
+    rolled = grow(counts.grid.map(np.roll, shift, axes), moved, concentration, threads)
     mass = np.roll(rolled.ratio * moved.cells(shape), back, axes)
     return mass / mass.sum(), moved.rolled(back, shape)
 

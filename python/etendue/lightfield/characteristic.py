@@ -14,7 +14,7 @@ from etendue.lightfield.light_field import LightField
 from etendue.quantities.ray_stream import checked_threads
 from etendue.units import MM2_PER_M2
 
-POINTS = 1 << 21
+POINTS = 1 << 20
 """Lines at which the field is read: their sum is the flux to about 1e-4."""
 
 BATCH = 1 << 18

@@ -44,9 +44,9 @@ class Sums:
             return total
         return total**2 / float(self.squared.sum())
 
-    def map(self, change: Callable[[FloatArray], FloatArray]) -> Sums:
-        """Both sums, changed alike by a function of arrays."""
-        return Sums(change(self.weight), None if self.squared is None else change(self.squared))
+    def map(self, change: Callable[..., FloatArray], *arguments: object) -> Sums:
+        """Both sums, changed alike by a function of an array and further arguments."""
+        return Sums(change(self.weight, *arguments), None if self.squared is None else change(self.squared, *arguments))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,6 +136,7 @@ def count_rays(
     Parameters
     ----------
     rays : RayStream
+        Any number of rays.
     surface : Surface
         Open dimensions are taken from the rays.
     depths : tuple of int
@@ -224,14 +225,21 @@ def _folds(
 
     grid, space, direction = sums("grid"), sums("space"), sums("direction")
 
-    def fold(pick: Callable[[FloatArray, int], FloatArray]) -> tuple[PartCounts, ...]:
-        return tuple(
-            PartCounts(*(s.map(lambda a, part=part: pick(a, part)) for s in (grid, space, direction)))
-            for part in range(parts)
-        )
+    def fold(pick: Callable[..., FloatArray]) -> tuple[PartCounts, ...]:
+        return tuple(PartCounts(*(s.map(pick, part) for s in (grid, space, direction))) for part in range(parts))
 
-    return {
-        "fitted": fold(lambda a, part: a[0, part]),
-        "held out": fold(lambda a, part: a[1, part]),
-        "all": fold(lambda a, part: a[0, part] + a[1, part]),
-    }
+    return {"fitted": fold(_fitted), "held out": fold(_held_out), "all": fold(_all)}
+
+
+def _fitted(sums: FloatArray, part: int) -> FloatArray:
+    chosen: FloatArray = sums[0, part]
+    return chosen
+
+
+def _held_out(sums: FloatArray, part: int) -> FloatArray:
+    chosen: FloatArray = sums[1, part]
+    return chosen
+
+
+def _all(sums: FloatArray, part: int) -> FloatArray:
+    return _fitted(sums, part) + _held_out(sums, part)

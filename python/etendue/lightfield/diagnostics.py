@@ -185,10 +185,12 @@ def diagnose(
     learning = None
     if rays is not None:
         learning = learning_curve(field, rays, seed=seed, threads=threads, progress=progress)
-    losses = [flux / field.total_flux * _losses(part) for part, flux in zip(field.parts, field.part_flux, strict=True)]
+    fluxes = field.part_flux
+    flux = math.fsum(fluxes)
+    losses = [share / flux * _losses(part) for part, share in zip(field.parts, fluxes, strict=True)]
     return Diagnostics(
         surface=field.surface.spec,
-        flux=field.total_flux,
+        flux=flux,
         flux_unit=field.flux_unit,
         report=field.report,
         expected_error=math.sqrt(2.0 * sum(float(loss.sum()) for loss in losses)),
@@ -217,7 +219,7 @@ def _loss_of_gamma(certainty: FloatArray) -> FloatArray:
     That is the loss, per unit of its mass, of a cell whose luminance has a relative variance of 1/k. Half the relative
     variance itself would let dark cells with large error bars, which no ray ever meets, drown all others.
     """
-    k = np.maximum(certainty, np.finfo(np.float64).tiny)
+    k = np.maximum(certainty, 1e-300)
     # ψ(k + 1) = ψ(k + 7) - Σ 1/(k + i), and Stirling's series of ψ is good to 1e-9 from there on.
     y = k + 7.0
     stirling = np.log1p(7.0 / k) - 1.0 / (2.0 * y) - 1.0 / (12.0 * y**2) + 1.0 / (120.0 * y**4)

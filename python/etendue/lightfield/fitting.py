@@ -26,6 +26,7 @@ from etendue.lightfield.counting import EtendueCounts, FloatArray, count_rays
 from etendue.lightfield.light_field import FitReport, LightField
 from etendue.lightfield.probe import probe_rays
 from etendue.lightfield.surfaces import Surface
+from etendue.lightfield.symmetry import fold, proven_symmetry
 from etendue.lightfield.trees import Base, Tree
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 
@@ -34,8 +35,8 @@ Depths = tuple[int, int, int, int]
 PROBE = 1 << 20
 """Rays on which the shape of the grid and the concentrations are chosen."""
 
-FINE = (8, 8)
-"""Halvings of the fine grids over place and over direction: 256 × 256 cells each."""
+FINEST = 8
+"""Halvings of the fine grids over place and over direction for sets of 65 536 rays and more: 256 × 256 cells each."""
 
 SHAPES = (0, 1, -1, 2, -2)
 """Halvings per coordinate that the place may lend to the direction."""
@@ -72,7 +73,14 @@ def fit_light_field(
         surface, notes = choice.surface, choice.notes
     surface = surface.sized_for(rays)
     plan = make_plan(rays, surface, depths, seed, threads)
-    counts = count_rays(rays, surface, plan.depths, FINE, seed=seed, threads=threads, progress=progress)
+    fine = fine_depths(len(rays), plan.depths)
+    counts = count_rays(rays, surface, plan.depths, fine, seed=seed, threads=threads, progress=progress)
+    if symmetry == "auto":
+        symmetry = proven_symmetry(counts)
+        told = "no symmetry is borne out" if symmetry == "none" else f"the rays bear out the symmetry {symmetry}"
+        notes = (*notes, f"{told} (χ² of counts and images, 1e-3)")
+    if symmetry != "none":
+        counts = fold(counts, symmetry)
     field = fit_counts(rays, counts, plan, seed, threads)
     return field.replace(notes=(*notes, *field.notes))
 
@@ -80,6 +88,12 @@ def fit_light_field(
 def default_bits(rays: int) -> int:
     """Halvings of the grid in all: the number of cells follows that of the rays."""
     return 16 if rays < 30_000 else 20 if rays < 5_000_000 else 22 if rays < 200_000_000 else 24
+
+
+def fine_depths(rays: int, depths: Depths) -> tuple[int, int]:
+    """Halvings of the fine grids: about one ray in each cell suffices, and none is coarser than the grid itself."""
+    wanted = min(FINEST, max(rays, 1).bit_length() // 2)
+    return max(wanted, *depths[:2]), max(wanted, *depths[2:])
 
 
 def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: int, threads: int | None) -> Plan:
@@ -92,11 +106,12 @@ def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: in
     bits = default_bits(len(rays))
     options = [depths] if depths else [_depths(min(bits, 20) - 2, lend) for lend in SHAPES]
     final = [depths] if depths else [_depths(bits, lend) for lend in SHAPES]
+    fine = fine_depths(len(some), tuple(max(axis) for axis in zip(*options, strict=True)))
     bases: dict[str, tuple[Base, ...]] = {}
     concentrations: dict[str, tuple[float, ...]] = {}
     scores = []
     for trial in options:
-        counts = count_rays(some, surface, trial, FINE, seed=seed, threads=threads)
+        counts = count_rays(some, surface, trial, fine, seed=seed, threads=threads)
         fitted = counts["fitted"]
         if not bases:
             bases = {

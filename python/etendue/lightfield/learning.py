@@ -21,7 +21,7 @@ from etendue.lightfield.candidate import (
     uniform_bases,
 )
 from etendue.lightfield.counting import FloatArray, count_rays
-from etendue.lightfield.fitting import FINE
+from etendue.lightfield.fitting import fine_depths
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.probe import probe_rays
 from etendue.quantities.ray_set import RaySet
@@ -236,7 +236,9 @@ def _some(rays: RaySet, wanted: npt.NDArray[np.bool_]) -> RaySet:
 def _refit(field: LightField, rays: RaySet, seed: int, threads: int | None) -> LightField:
     """The field of other rays, with everything chosen as it was for this one, and a flux of 1."""
     depths = tuple(n.bit_length() - 1 for n in field.parts[0].ratio.shape)
-    counts = count_rays(rays, field.surface, depths, FINE, held_out=0.0, seed=seed, threads=threads)
+    counts = count_rays(
+        rays, field.surface, depths, fine_depths(len(rays), depths), held_out=0.0, seed=seed, threads=threads
+    )
     everything = counts["all"]
     product = "product" in field.report.bases
     bases = product_bases(everything, careful_density(threads), threads) if product else uniform_bases(everything)

@@ -223,8 +223,8 @@ class LightField:
             raise ArgumentError(f"c_planes is {c_planes!r}; give a whole number of planes, 1 to 3600.")
         if not (1 <= steps <= 3600 and math.isclose(steps * gamma_step, 180.0, rel_tol=1e-9)):
             raise ArgumentError(f"gamma_step is {gamma_step}°; give a whole part of 180°, 0.05° or more.")
-        c = np.arange(c_planes) * (360.0 / c_planes)
-        gamma = np.arange(steps + 1) * (180.0 / steps)
+        c: FloatArray = np.arange(c_planes, dtype=np.float64) * (360.0 / c_planes)
+        gamma: FloatArray = np.arange(steps + 1, dtype=np.float64) * (180.0 / steps)
         phi, theta = np.radians(c)[:, None], np.radians(gamma)[None, :]
         k = np.stack(
             np.broadcast_arrays(np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)), axis=-1

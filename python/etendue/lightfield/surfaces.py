@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
+from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.probe import probe_rays
 from etendue.quantities.ray_stream import RayStream
@@ -79,7 +80,7 @@ class Part:
         """π · area [mm² sr]: that of all light that can leave the part on one side."""
         return math.pi * self.area
 
-    def core(self) -> dict[str, Any]:
+    def core(self) -> _core._Part:
         """The part as the compiled core takes it."""
         x, y, z = self.axes
         return {"shape": self.shape, "centre": self.centre, "x": x, "y": y, "z": z, "size": self.size}

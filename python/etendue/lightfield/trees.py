@@ -121,7 +121,7 @@ def _tiled(counts: Sums, base: Base, concentration: float, threads: int | None) 
     evidence = 0.0
     for i, j in itertools.product(*(range(0, n, s) for n, s in zip(shape, steps, strict=False))):
         window = (slice(i, i + steps[0]), slice(j, j + steps[1]))
-        part = counts.map(lambda a, window=window: np.ascontiguousarray(a[window]))
+        part = counts.map(_cut, window)
         prior = float(space[window].sum())
         if prior == 0.0:
             continue
@@ -143,6 +143,10 @@ def _tiled(counts: Sums, base: Base, concentration: float, threads: int | None) 
         evidence += log_tile + _log_trial(concentration, prior, points)
     evidence -= _log_trial(concentration, 1.0, total)
     return Tree(ratio, deviation, evidence)
+
+
+def _cut(values: FloatArray, window: tuple[slice, slice]) -> FloatArray:
+    return np.ascontiguousarray(values[window])
 
 
 def _log_trial(c: float, prior: float, points: float) -> float:

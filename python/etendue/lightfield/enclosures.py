@@ -1,0 +1,134 @@
+"""Where a source is and how large, from its rays alone: strays, and the smallest ball and cylinder that the others meet."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.lightfield.counting import FloatArray
+from etendue.lightfield.surfaces import SLACK, STRAY, Cylinder
+
+LINES = 1 << 12
+"""Lines that one search for the smallest ball looks at."""
+
+STEPS = 200
+"""Steps of that search: the centre is then found to some thousandths of the radius."""
+
+FAR = 1.5
+"""A stray lies so many times farther out than the others."""
+
+STRAYS = (1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03)
+"""Shares of the rays that may be strays."""
+
+ON_SPHERE = 0.01
+"""Largest relative deviation of the distances of start points from a centre if they are to lie on a sphere about it."""
+
+
+def near_rays(position: FloatArray, direction: FloatArray, centre: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which rays are no strays: their lines pass a point not much farther off than almost all others.
+
+    Parameters
+    ----------
+    position, direction : array, shape (n, 3)
+        [mm], unit vectors.
+    centre : array, shape (3,)
+        [mm]
+    """
+    distance = np.linalg.norm(np.cross(position - centre, direction), axis=1)
+    outer = np.quantile(distance, [1.0 - share for share in STRAYS])
+    inner = np.quantile(distance, [1.0 - 3.0 * share for share in STRAYS])
+    bounded = np.flatnonzero(outer <= FAR * inner)
+    near: npt.NDArray[np.bool_] = distance <= (FAR * outer[bounded[0]] if len(bounded) else np.inf)
+    return near
+
+
+def ball_centre(position: FloatArray, direction: FloatArray, start: FloatArray, seed: int) -> FloatArray:
+    """Centre of the smallest ball that all lines pass, in any number of dimensions.
+
+    From `start` it steps towards the farthest line, each time a smaller share of the way: the algorithm of
+    [BadoiuClarkson2003]_ for points, with the foot of the perpendicular on the line as the point. It looks at some of the
+    lines first, then at those that lie farthest out.
+
+    Parameters
+    ----------
+    position, direction : array, shape (n, d)
+        Points of the lines [mm] and unit vectors along them.
+    start : array, shape (d,)
+        [mm]
+    seed : int
+        Of the choice of lines.
+
+    Examples
+    --------
+    >>> turn = np.linspace(0, 2 * np.pi, 1000)
+    >>> rim = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    >>> along = np.stack([-np.sin(turn), np.cos(turn), 0 * turn], axis=1)
+    >>> bool(np.abs(ball_centre(rim + [5, 0, 1], along, np.zeros(3), 1) - [5, 0, 1]).max() < 0.02)
+    True
+    """
+
+    def feet(some: npt.NDArray[np.intp]) -> FloatArray:
+        x, k = position[some], direction[some]
+        foot: FloatArray = x + np.sum((centre - x) * k, axis=1)[:, None] * k - centre
+        return foot
+
+    centre = start
+    everyone = np.arange(len(position))
+    few = np.random.default_rng(seed).permutation(everyone)[:LINES]
+    for _ in range(2):
+        for step in range(2, STEPS + 2):
+            foot = feet(few)
+            centre = centre + foot[np.argmax(np.sum(foot**2, axis=1))] / step
+        few = np.argsort(np.linalg.norm(feet(everyone), axis=1))[-LINES:]
+    return centre
+
+
+def start_centre(position: FloatArray) -> FloatArray | None:
+    """Centre of the sphere on which rays start, by linear least squares; None if they do not start on one.
+
+    Parameters
+    ----------
+    position : array, shape (n, 3)
+        Start points [mm].
+    """
+    middle = position.mean(axis=0)
+    offset = position - middle
+    unknowns = np.column_stack([2.0 * offset, np.ones(len(offset))])
+    centre = np.linalg.lstsq(unknowns, np.sum(offset**2, axis=1), rcond=None)[0][:3]
+    distance = np.linalg.norm(offset - centre, axis=1)
+    if np.std(distance) > ON_SPHERE * distance.mean():
+        return None
+    found: FloatArray = middle + centre
+    return found
+
+
+def cylinder_of_lines(position: FloatArray, direction: FloatArray, start: FloatArray, seed: int) -> Cylinder | None:
+    """The smallest closed cylinder about an axis along Z that all lines meet, but for the share `STRAY` on each side.
+
+    None if they all pass one height within the tube, as those of a flat source do. A line meets the cylinder if the lower
+    of the heights at which it meets the tube is not above the top, and the higher not below the bottom.
+
+    Parameters
+    ----------
+    position, direction : array, shape (n, 3)
+        [mm], unit vectors.
+    start : array, shape (3,)
+        Where the search for the axis begins [mm].
+    seed : int
+        Of the choice of lines.
+    """
+    across = np.hypot(*direction[:, :2].T)
+    oblique = across > 0.0
+    if not oblique.any():
+        return None
+    x, k, across = position[oblique], direction[oblique], across[oblique]
+    flat = k[:, :2] / across[:, None]
+    centre = ball_centre(x[:, :2], flat, start[:2], seed)
+    offset = x[:, :2] - centre
+    middle = -np.sum(offset * flat, axis=1)
+    near = offset + middle[:, None] * flat
+    radius = float(np.quantile(np.hypot(*near.T), 1.0 - STRAY)) * (1.0 + SLACK)
+    half = np.sqrt(np.maximum(radius**2 - np.sum(near**2, axis=1), 0.0))
+    height, climb = x[:, 2] + middle * k[:, 2] / across, half * np.abs(k[:, 2]) / across
+    bottom, top = float(np.quantile(height + climb, STRAY)), float(np.quantile(height - climb, 1.0 - STRAY))
+    return Cylinder(radius, bottom, top, (float(centre[0]), float(centre[1]))) if top > bottom and radius > 0 else None

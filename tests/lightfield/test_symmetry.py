@@ -1,0 +1,90 @@
+"""Folding by a symmetry, and proving one from the rays."""
+
+from __future__ import annotations
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.lightfield.counting import count_rays
+from etendue.lightfield.symmetry import SYMMETRIES, fold, proven_symmetry
+
+DEPTHS = (3, 3, 3, 3)
+MAPS = {
+    "mirror-x": [lambda x, y: (-x, y)],
+    "mirror-y": [lambda x, y: (x, -y)],
+    "c2": [lambda x, y: (-x, -y)],
+    "mirror-xy": [lambda x, y: (-x, y), lambda x, y: (x, -y), lambda x, y: (-x, -y)],
+    "c4": [lambda x, y: (-y, x), lambda x, y: (-x, -y), lambda x, y: (y, -x)],
+}
+
+
+def rays_of(n: int, seed: int, slope: float = 0.4) -> tuple[np.ndarray, np.ndarray]:
+    """An asymmetric bundle: luminance that rises along x, directions that lean."""
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(-1, 1, (3 * n, 2))
+    x = x[rng.random(3 * n) < (1 + slope * x[:, 0]) / (1 + abs(slope))][:n]
+    u, phi = rng.random(len(x)), rng.uniform(0, 2 * np.pi, len(x))
+    p, q = np.sqrt(u) * np.cos(phi), np.sqrt(u) * np.sin(phi)
+    return np.column_stack([x, np.zeros(len(x))]), np.column_stack([p, q, np.sqrt(1 - u)])
+
+
+@pytest.mark.parametrize("name", list(SYMMETRIES))
+@pytest.mark.parametrize(
+    "surface", [et.Plane(z=0.3, width=4, height=4, centre=(0, 0)), et.Dome(radius=2, window=1), et.Sphere(radius=2)]
+)
+def test_folded_counts_are_those_of_all_images_of_the_rays(name: str, surface: et.Plane) -> None:
+    x, k = rays_of(4000, 1)
+    k[:1000, 2] *= -1  # some go down: the lower half of a sphere has its own chart
+    folded = fold(count_rays(et.RaySet(x, k, np.ones(len(x))), surface, DEPTHS), name)
+    copies = [(x, k)]
+    copies += [
+        tuple(np.column_stack([*move(v[:, 0], v[:, 1]), v[:, 2]]) for v in (x, k))  # type: ignore[misc]
+        for move in MAPS[name]
+    ]
+    everything = et.RaySet(
+        np.concatenate([c[0] for c in copies]), np.concatenate([c[1] for c in copies]), np.ones(len(x) * len(copies))
+    )
+    expected = count_rays(everything, surface, DEPTHS)
+    for a, b in zip(folded["all"], expected["all"], strict=True):
+        # Rays on the border of a cell may fall to either side.
+        assert np.abs(a.grid.weight - b.grid.weight).sum() <= 4
+        assert np.abs(a.space.weight - b.space.weight).sum() <= 4
+        assert np.abs(a.direction.weight - b.direction.weight).sum() <= 4
+    assert sum(folded.part_flux) == pytest.approx(sum(expected.part_flux) / len(copies), rel=1e-12)
+
+
+def test_a_symmetric_source_is_found_and_its_errors_shrink() -> None:
+    rays = et.RingSource(rays=100_000)
+    plain = et.LightField.fit(rays, et.Disk(radius=30), depths=DEPTHS)
+    folded = et.LightField.fit(rays, et.Disk(radius=30), depths=DEPTHS, symmetry="auto")
+    assert any("c4" in note or "mirror-xy" in note for note in folded.notes)
+    assert folded.total_flux == pytest.approx(plain.total_flux, rel=1e-9)
+    x = np.array([[3.0, 4, 0], [-4, 3, 0], [-3, -4, 0], [4, -3, 0]])
+    value, error = folded.luminance(x, np.tile([0.0, 0, 1], (4, 1)))
+    np.testing.assert_allclose(value, value[0], rtol=0.02)
+    assert (np.abs(value - rays.luminance(3, 4)) < 4 * error).all()
+
+
+def test_an_asymmetry_of_two_per_cent_is_seen_with_a_million_rays() -> None:
+    x, k = rays_of(1_000_000, 2, slope=0.02)
+    plane = et.Plane(z=0, width=2, height=2, centre=(0, 0))
+    found = proven_symmetry(count_rays(et.RaySet(x, k, np.ones(len(x))), plane, DEPTHS))
+    assert found == "mirror-y"
+
+
+def test_without_any_symmetry_none_is_found() -> None:
+    x, k = rays_of(100_000, 3)
+    x[:, 1] += 0.3 * (x[:, 0] > 0)
+    rays = et.RaySet(x, k, np.ones(len(x)))
+    assert proven_symmetry(count_rays(rays, et.Plane(z=0, width=4, height=4, centre=(0, 0)), DEPTHS)) == "none"
+
+
+def test_symmetries_that_cannot_be_are_refused() -> None:
+    rays = et.RaySet(*rays_of(100, 4), np.ones(100))
+    with pytest.raises(UnknownNameError, match="Did you mean 'mirror-x'"):
+        fold(count_rays(rays, et.Disk(radius=2), DEPTHS), "miror-x")
+    with pytest.raises(ArgumentError, match="cannot carry"):
+        fold(count_rays(rays, et.Cylinder(radius=2, bottom=-1, top=1), DEPTHS), "c2")
+    with pytest.raises(ArgumentError, match="quarter-turn"):
+        fold(count_rays(rays, et.Plane(z=0, width=4, height=3, centre=(0, 0)), DEPTHS), "c4")
