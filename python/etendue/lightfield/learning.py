@@ -88,7 +88,7 @@ class LearningCurve:
     --------
     >>> curve = law_of_gains(np.array([1e4, 2e4, 4e4]), np.array([0.008, 0.004]), np.eye(2) * 1e-8, 80_000)
     >>> f"{curve.error().value:.2f}", round(curve.factor(0.5).value)
-    ('0.06', 5)
+    ('0.07', 5)
     """
 
     field_rays: int
