@@ -12,6 +12,7 @@ from etendue.formats.maps import read_map
 from etendue.formats.rays import read_rays, write_rays
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.goniophotometry.threshold_sweep import threshold_sweep
+from etendue.lightfield.diagnostics import diagnose
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, parse_surface
@@ -21,6 +22,7 @@ from etendue.luminance.denoising import denoise_map
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
 from etendue.plot import (
+    plot_characteristic,
     plot_comparison,
     plot_cross_sections,
     plot_intensity,
@@ -56,10 +58,12 @@ __all__ = [
     "compare",
     "cross_section",
     "denoise_map",
+    "diagnose",
     "filter_map",
     "intensity_distribution",
     "luminance_map",
     "parse_surface",
+    "plot_characteristic",
     "plot_comparison",
     "plot_cross_sections",
     "plot_intensity",

@@ -78,10 +78,12 @@ def test_a_scan_comes_back_with_the_keys_of_the_stub() -> None:
 
 
 def test_cone_sums_want_every_key_and_come_back_in_the_stated_shapes() -> None:
-    cone: Any = {
+    view = {
         "eye": (0.0, 0.0, 9.0), "target": (0.0, 0.0, 0.0), "right": (1.0, 0.0, 0.0), "up": (0.0, 1.0, 0.0),
-        "normal": (0.0, 0.0, 1.0), "width": 2.0, "height": 2.0, "columns": 3, "rows": 2, "acceptances": [0.1, 0.5, 1.0, 1.5],
+        "normal": (0.0, 0.0, 1.0), "width": 2.0, "height": 2.0, "columns": 3, "rows": 2,
     }  # fmt: skip
+    cone: Any = {"view": view, "acceptances": [0.1, 0.5, 1.0, 1.5]}
+    assert list(view) == keys("_View")
     assert list(cone) == keys("_Cone")
     ((flux, flux_squared, rays),), tally = _core.cone_sums(source(), [cone])
     assert {a.shape for a in (flux, flux_squared, rays)} == {(4, 2, 3)}
@@ -90,6 +92,9 @@ def test_cone_sums_want_every_key_and_come_back_in_the_stated_shapes() -> None:
     for key in cone:
         with pytest.raises((TypeError, KeyError, ValueError), match=key):
             _core.cone_sums(source(), [{k: v for k, v in cone.items() if k != key}])
+    for key in view:
+        with pytest.raises((TypeError, KeyError, ValueError), match=key):
+            _core.cone_sums(source(), [{**cone, "view": {k: v for k, v in view.items() if k != key}}])
 
 
 def test_arrays_come_back_in_the_stated_shapes_and_types() -> None:

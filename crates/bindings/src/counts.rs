@@ -12,7 +12,7 @@ use crate::source::with_source;
 use crate::surface::Part;
 
 /// Σ w and Σ w² per cell as arrays; numbers and None if all weights are equal.
-fn sums<'py>(py: Python<'py>, sums: Sums) -> (Bound<'py, PyAny>, Option<Bound<'py, PyArray1<f64>>>) {
+fn sums(py: Python<'_>, sums: Sums) -> (Bound<'_, PyAny>, Option<Bound<'_, PyArray1<f64>>>) {
     match sums {
         Sums::Equal(counts) => (PyArray1::from_vec(py, counts).into_any(), None),
         Sums::Weighted(sum, squares) => (
@@ -25,6 +25,7 @@ fn sums<'py>(py: Python<'py>, sums: Sums) -> (Bound<'py, PyAny>, Option<Bound<'p
 /// One pass: for each of the grids "grid", "space" and "direction" the pair (Σ w, Σ w²), with cells ordered by fold
 /// (fitted, held out), part, coordinates; beside them the kept rays, the rays not met, and the tally.
 #[pyfunction]
+#[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
 #[pyo3(signature = (source, parts, depths, fine, held_out, kept, seed, threads=None, progress=None))]
 pub fn count_rays<'py>(
     py: Python<'py>,

@@ -73,6 +73,7 @@ impl LightField {
     }
 }
 
+type Pixels<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 type Readings<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 fn readings(py: Python<'_>, readings: Vec<Reading>) -> Readings<'_> {
@@ -152,13 +153,7 @@ impl LightField {
 
     /// Mean luminance of each pixel of a view and its standard deviation, shape (rows, columns).
     #[pyo3(signature = (view, samples, threads=None))]
-    fn look<'py>(
-        &self,
-        py: Python<'py>,
-        view: View,
-        samples: u32,
-        threads: Option<usize>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    fn look<'py>(&self, py: Python<'py>, view: View, samples: u32, threads: Option<usize>) -> PyResult<Pixels<'py>> {
         let view = view.core();
         let found = py.detach(|| look(&self.field, &view, samples, threads.unwrap_or(0)));
         let shape = [view.rows as usize, view.columns as usize];

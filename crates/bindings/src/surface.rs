@@ -51,6 +51,9 @@ pub fn vectors(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
         .collect())
 }
 
+type Owners<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>);
+type Rays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
 /// For each ray the first part its line leaves (−1: none), and its coordinates (s₁, s₂, a, b) there.
 #[pyfunction]
 pub fn cross_parts<'py>(
@@ -58,7 +61,7 @@ pub fn cross_parts<'py>(
     parts: Vec<Part>,
     position: PyReadonlyArray2<'py, f64>,
     direction: PyReadonlyArray2<'py, f64>,
-) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<Owners<'py>> {
     let parts = parts.iter().map(Part::core).collect::<PyResult<Vec<_>>>()?;
     let (position, direction) = (vectors(&position)?, vectors(&direction)?);
     if position.len() != direction.len() {
@@ -86,11 +89,7 @@ pub fn cross_parts<'py>(
 
 /// Points and directions of rays at coordinates (s₁, s₂, a, b) of a part.
 #[pyfunction]
-pub fn rays_of_part<'py>(
-    py: Python<'py>,
-    part: Part,
-    coordinates: PyReadonlyArray2<'py, f64>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+pub fn rays_of_part<'py>(py: Python<'py>, part: Part, coordinates: PyReadonlyArray2<'py, f64>) -> PyResult<Rays<'py>> {
     let part = part.core()?;
     if coordinates.shape()[1] != 4 {
         return Err(PyValueError::new_err("an array of shape (n, 4) is needed"));

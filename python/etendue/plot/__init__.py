@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from etendue.plot.characteristic_picture import plot_characteristic
 from etendue.plot.comparison_picture import plot_comparison
 from etendue.plot.cross_section_picture import plot_cross_sections
 from etendue.plot.intensity_picture import plot_intensity
@@ -9,6 +10,13 @@ from etendue.plot.map_picture import plot_map
 from etendue.plot.threshold_picture import plot_threshold_sweep
 from etendue.quantities.luminance_map import PLOT_MAP
 
-__all__ = ["plot_comparison", "plot_cross_sections", "plot_intensity", "plot_map", "plot_threshold_sweep"]
+__all__ = [
+    "plot_characteristic",
+    "plot_comparison",
+    "plot_cross_sections",
+    "plot_intensity",
+    "plot_map",
+    "plot_threshold_sweep",
+]
 
 PLOT_MAP[:] = [plot_map]
