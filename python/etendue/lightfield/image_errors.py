@@ -28,6 +28,9 @@ def variance_of_mixture(
     Counts are drawn from a known image, the estimate is made again from them, and its squared errors are explained by
     what it knows of itself: theory eq. 36. The known image lies halfway between the estimate and the estimate of that
     estimate: the first still has wiggles that are only noise, the second has lost some that are not.
+
+    The fewer rays a cell holds, the more structure leaves no trace in the estimate, and so none in the known image: then
+    half of the squared difference of the two is added.
     """
     total, quantum = float(mass.sum()), estimator.quantum
     smoother = mixture.mass(estimator(mass, mass * quantum, max(1, shifts // 4), pool), total)
@@ -39,9 +42,12 @@ def variance_of_mixture(
     cells = np.flatnonzero(estimator.lit)
     cells = cells[:: -(-len(cells) // MOST_CELLS)]
     symptoms = np.array([s.ravel()[cells] for s in _symptoms(estimator, again, retried)])
-    factors = fitted_factors(symptoms, ((retried - known) ** 2).ravel()[cells])
+    squares = ((retried - known) ** 2).ravel()[cells]
+    factors = fitted_factors(symptoms, squares)
+    factors *= _stretch(squares / (factors @ symptoms + np.finfo(np.float64).tiny))
     variance: Array = np.einsum("k,k...->...", factors, _symptoms(estimator, found, mass))
-    return variance
+    typical = float((mass**2).sum()) / total
+    return variance + _around((mass - smoother) ** 2, 1.5) / (2 * (1 + typical))
 
 
 def fitted_factors(symptoms: Array, squares: Array) -> Array:
@@ -67,23 +73,33 @@ def fitted_factors(symptoms: Array, squares: Array) -> Array:
     return fitted
 
 
+def _stretch(squares: Array) -> float:
+    """Factor for variances with which one and two standard deviations cover what they do of a normal distribution.
+
+    `squares` are those of errors over their supposed variances. One factor cannot do both: their geometric mean.
+    """
+    one, two = np.quantile(squares, [0.6827, 0.9545])
+    return float(np.sqrt(one * two / 4))
+
+
+def _around(values: Array, width: float) -> Array:
+    """Average of what lies around each cell, as far as there are cells."""
+    average: Array = np.maximum(blurred(values, width), 0.0) / blurred(np.ones_like(values), width)
+    return average
+
+
 def _symptoms(estimator: Estimator, estimates: Estimates, mass: Array) -> Array:
     """What tells how far off a cell may be, as variances of its mass."""
-    ones = np.ones_like(mass)
-
-    def around(values: Array, width: float) -> Array:
-        return np.maximum(blurred(values, width), 0.0) / blurred(ones, width)
-
     tree, edges, rings = estimates.masses
     disagreement = ((tree - edges) ** 2 + (tree - rings) ** 2 + (edges - rings) ** 2) / 3
     down, right = np.gradient(estimator.density(mass))
     return np.array(
         [
-            around(estimates.tree.variance, 1.0),
-            around(estimates.tree.spread, 1.0),
+            _around(estimates.tree.variance, 1.0),
+            _around(estimates.tree.spread, 1.0),
             estimates.kept_variance,
-            around(disagreement, 1.5),
-            around((down**2 + right**2) * estimator.base**2, 1.0),
+            _around(disagreement, 1.5),
+            _around((down**2 + right**2) * estimator.base**2, 1.0),
             mass**2 / mass.sum(),
         ]
     )
