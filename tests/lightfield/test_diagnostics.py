@@ -21,7 +21,7 @@ from etendue.lightfield.counting import Sums
 from etendue.lightfield.diagnostics import _loss_of_gamma, diagnose
 from etendue.lightfield.learning import EXPONENTS, REFITS, LearningCurve, law_of_gains, learning_curve
 from etendue.lightfield.light_field import FitReport, LightField, PartField
-from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Plane, Surface
+from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Hemisphere, Plane, Surface
 from etendue.lightfield.trees import Base, grow
 from etendue.plot.characteristic_picture import plot_characteristic
 from oracles.light_fields import SURFACES, make_field
@@ -388,6 +388,22 @@ def test_rays_of_unequal_flux_are_judged_by_their_flux() -> None:
     apart = unequal.gains - more * equal.gains
     noise = np.hypot(more * equal.gain_errors, unequal.gain_errors)
     assert (np.abs(apart) < stats.norm.isf(SIGNIFICANCE / 4) * np.hypot(noise, 0.1 * equal.gains)).all()
+
+
+def test_a_symmetry_tells_of_twice_the_rays(trial: Trial) -> None:
+    """Rays of a source that is even in x, and the same rays beside their mirror images, fit the same field."""
+    rays = trial.rays(16_000)
+    sign = np.where(np.random.default_rng(3).random(16_000) < 0.5, -1.0, 1.0)[:, None] * [1, 0, 0] + [0, 1, 1]
+    even = et.RaySet(rays.position * sign, rays.direction * sign, rays.flux)
+    field = plain_field(Hemisphere(radius=1.264), (3, 3, 2, 2), 16_000)
+    alone, folded, found = (learning_curve(field, even, symmetry=name) for name in ("none", "mirror-x", "auto"))
+    np.testing.assert_array_equal(found.gains, folded.gains)
+    # Folded rays are worth twice as many: the second gain of the lone ones is the first of the folded ones.
+    noise = np.hypot(alone.gain_errors[1], folded.gain_errors[0])
+    assert abs(folded.gains[0] - alone.gains[1]) < stats.norm.isf(SIGNIFICANCE / 2) * noise + 0.1 * alone.gains[1]
+    assert folded.gains[0] < alone.gains[0]
+    with pytest.raises(UnknownNameError, match="mirror-x"):
+        learning_curve(field, even, symmetry="mirorx")
 
 
 def test_progress_threads_and_seed(trial: Trial) -> None:

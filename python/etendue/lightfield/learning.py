@@ -20,10 +20,11 @@ from etendue.lightfield.candidate import (
     product_bases,
     uniform_bases,
 )
-from etendue.lightfield.counting import FloatArray, count_rays
+from etendue.lightfield.counting import EtendueCounts, FloatArray, count_rays
 from etendue.lightfield.fitting import fine_depths
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.probe import probe_rays
+from etendue.lightfield.symmetry import fold, proven_symmetry
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, checked_threads
 
@@ -147,6 +148,7 @@ def learning_curve(
     field: LightField,
     rays: RayStream,
     *,
+    symmetry: str = "none",
     seed: int = 1,
     threads: int | None = None,
     progress: Callable[[int], None] | None = None,
@@ -161,6 +163,8 @@ def learning_curve(
         What was fitted to the rays.
     rays : RayStream
         The rays it was fitted to; of more than 4 million, 4 million are used.
+    symmetry : str
+        That of the fit, as `LightField.fit` takes it.
     seed : int
         Deals the rays into parts.
     threads : int, optional
@@ -172,6 +176,8 @@ def learning_curve(
     ------
     ArgumentError
         If there are fewer than 4000 rays, or fewer than the field was fitted to.
+    UnknownNameError
+        If there is no such symmetry.
     """
     threads = checked_threads(threads)
     if len(rays) < field.report.rays:
@@ -181,6 +187,8 @@ def learning_curve(
     some = probe_rays(rays, MOST_RAYS)
     if len(some) < FEWEST_RAYS:
         raise ArgumentError(f"{len(some):,} rays are too few to learn what more would bring; {FEWEST_RAYS:,} are not.")
+    if symmetry == "auto":
+        symmetry = proven_symmetry(_count(field, some, seed, threads))
     part = _core.deal_parts(0, len(some), PARTS, seed)
     half = part // (PARTS // 2)
     scores: list[list[Score]] = []
@@ -188,7 +196,8 @@ def learning_curve(
         judges = _some(some, half != fitted)
         rungs = []
         for parts in RUNGS:
-            again = _refit(field, _some(some, (half == fitted) & (part % (PARTS // 2) < parts)), seed, threads)
+            mine = _some(some, (half == fitted) & (part % (PARTS // 2) < parts))
+            again = _refit(field, _count(field, mine, seed, threads), symmetry, threads)
             rungs.append(_score(again, judges, threads))
             if progress is not None:
                 progress(len(scores) * len(RUNGS) + len(rungs))
@@ -233,12 +242,17 @@ def _some(rays: RaySet, wanted: npt.NDArray[np.bool_]) -> RaySet:
     return RaySet(rays.position[wanted], rays.direction[wanted], rays.flux[wanted], flux_unit=rays.flux_unit)
 
 
-def _refit(field: LightField, rays: RaySet, seed: int, threads: int | None) -> LightField:
+def _count(field: LightField, rays: RaySet, seed: int, threads: int | None) -> EtendueCounts:
+    """The rays in the cells of the field."""
+    s1, s2, a, b = (n.bit_length() - 1 for n in field.parts[0].ratio.shape)
+    fine = fine_depths(len(rays), (s1, s2, a, b))
+    return count_rays(rays, field.surface, (s1, s2, a, b), fine, held_out=0.0, seed=seed, threads=threads)
+
+
+def _refit(field: LightField, counts: EtendueCounts, symmetry: str, threads: int | None) -> LightField:
     """The field of other rays, with everything chosen as it was for this one, and a flux of 1."""
-    depths = tuple(n.bit_length() - 1 for n in field.parts[0].ratio.shape)
-    counts = count_rays(
-        rays, field.surface, depths, fine_depths(len(rays), depths), held_out=0.0, seed=seed, threads=threads
-    )
+    if symmetry != "none":
+        counts = fold(counts, symmetry)
     everything = counts["all"]
     product = "product" in field.report.bases
     bases = product_bases(everything, careful_density(threads), threads) if product else uniform_bases(everything)
