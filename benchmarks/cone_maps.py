@@ -44,14 +44,15 @@ def main() -> None:
         print(f"{options.rays:,} rays, {size / 1e6:,.0f} MB; summing its bytes in numpy: {read:.3f} s")
         observer = et.Observer(30, 40, 1000)
 
-        def maps(count: int, threads: int | None, method: str) -> Callable[[], object]:
+        def maps(count: int, threads: int | None, acceptance: float | str) -> Callable[[], object]:
             observers = [et.Observer(5 * i, 20 * i, 1000) for i in range(count)]
             return lambda: et.luminance_map(
                 et.read_rays(path),
                 observers,
                 SCREEN,
-                method=method,
-                threads=threads,  # type: ignore[call-overload]
+                method="cone",
+                acceptance=acceptance,  # type: ignore[call-overload]
+                threads=threads,
             )
 
         def numpy_map() -> None:
@@ -62,10 +63,10 @@ def main() -> None:
         plain = best(numpy_map, 1)
         print(f"  numpy, one observer                  {plain:8.3f} s   {options.rays / plain / 1e6:7.1f} M rays/s")
         for title, job in (
-            ("étendue, one observer, 1 thread", maps(1, 1, "cone")),
-            ("étendue, one observer, all threads", maps(1, None, "cone")),
-            ("étendue, one observer, method auto", maps(1, None, "auto")),
-            ("étendue, 16 observers, all threads", maps(16, None, "cone")),
+            ("étendue, one observer, 1 thread", maps(1, 1, ACCEPTANCE)),
+            ("étendue, one observer, all threads", maps(1, None, ACCEPTANCE)),
+            ("étendue, one observer, acceptance auto", maps(1, None, "auto")),
+            ("étendue, 16 observers, all threads", maps(16, None, ACCEPTANCE)),
         ):
             seconds = best(job, 5)
             rate = options.rays / seconds / 1e6

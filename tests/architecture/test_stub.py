@@ -93,7 +93,7 @@ def test_cone_sums_want_every_key_and_come_back_in_the_stated_shapes() -> None:
         with pytest.raises((TypeError, KeyError, ValueError), match=key):
             _core.cone_sums(source(), [{k: v for k, v in cone.items() if k != key}])
     for key in view:
-        with pytest.raises((TypeError, KeyError, ValueError), match=key):
+        with pytest.raises((TypeError, KeyError, ValueError), match="view"):
             _core.cone_sums(source(), [{**cone, "view": {k: v for k, v in view.items() if k != key}}])
 
 
