@@ -100,9 +100,7 @@ class LightField:
     def flux(self) -> list[float]:
         """Flux of each part: ∫ L dU."""
 
-    def luminance(
-        self, points: _Floats, directions: _Floats, threads: int | None = None
-    ) -> tuple[_Floats, _Floats]:
+    def luminance(self, points: _Floats, directions: _Floats, threads: int | None = None) -> tuple[_Floats, _Floats]:
         """Luminance and its standard deviation along lines given by points (n, 3) and directions (n, 3)."""
 
     def at(self, part: int, coordinates: _Floats) -> tuple[_Floats, _Floats]:
@@ -126,9 +124,7 @@ _Source: TypeAlias = RayTable | RingSource | FieldRays
 def read_rays(source: _Source, start: int, stop: int) -> tuple[_Floats, _Floats, _Floats]:
     """Rays ``start..stop`` as (position (n, 3) [mm], unit direction (n, 3), flux (n,))."""
 
-def scan(
-    source: _Source, threads: int | None = None, progress: _Progress | None = None
-) -> tuple[_Tally, _Moments]:
+def scan(source: _Source, threads: int | None = None, progress: _Progress | None = None) -> tuple[_Tally, _Moments]:
     """One pass over a source."""
 
 def cone_sums(
@@ -155,9 +151,7 @@ def count_rays(
     Where all rays have one weight, the first of each pair counts rays and the second is None.
     """
 
-def cross_parts(
-    parts: Sequence[_Part], position: _Floats, direction: _Floats
-) -> tuple[npt.NDArray[np.int64], _Floats]:
+def cross_parts(parts: Sequence[_Part], position: _Floats, direction: _Floats) -> tuple[npt.NDArray[np.int64], _Floats]:
     """For each ray the first part its line leaves (-1: none), and its coordinates (n, 4) there."""
 
 def rays_of_part(part: _Part, coordinates: _Floats) -> tuple[_Floats, _Floats]:
@@ -187,7 +181,7 @@ def polya_evidence(
     concentration: float,
     threads: int | None = None,
 ) -> float:
-    """ln evidence alone."""
+    """The logarithm of the evidence alone."""
 
 def select_subset(start: int, stop: int, n: int, k: int, taken: int, seed: int) -> npt.NDArray[np.uint64]:
     """Indices in ``start..stop`` of a random k-subset of n, of which `taken` were taken before."""
