@@ -49,9 +49,7 @@ def fit(
     ] = None,
     report: Annotated[
         Path | None,
-        typer.Option(
-            "--report", help="Picture of the diagnostics, .png or .pdf; takes a few times as long as the fit."
-        ),
+        typer.Option("--report", help="Picture of the diagnostics, .png or .pdf; takes about as long as the fit."),
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
