@@ -31,7 +31,7 @@ def watch():
 base = anonymous()
 thread = threading.Thread(target=watch); thread.start()
 start = time.perf_counter()
-lmap = et.luminance_map(et.read_rays(sys.argv[1]), et.Observer(30, 40, 1000), et.Screen(70, 70, 128, 128))
+lmap = et.luminance_map(et.read_rays(sys.argv[1]), et.Observer(30, 40, 1000), et.Screen(70, 70, 128, 128), method="cone")
 seconds = time.perf_counter() - start
 running[0] = False; thread.join()
 print(base, peak[0], seconds, int(lmap.rays.sum()))

@@ -67,7 +67,7 @@ def test_a_large_screen_is_compared_on_a_coarser_one_and_mapped_on_its_own() -> 
     assert coarse.columns * coarse.rows <= 1 << 16
     assert (coarse.width, coarse.height) == (70, 35)
     rays = et.RingSource(rays=400_000, seed=2)
-    lmap = et.luminance_map(rays, et.Observer(0, 0, 150), screen)
+    lmap = et.luminance_map(rays, et.Observer(0, 0, 150), screen, acceptance="auto")
     assert lmap.values.shape == (500, 1000)
     note = next(note for note in lmap.notes if note.startswith("acceptance"))
     angle = float(note.split("°")[0].removeprefix("acceptance "))

@@ -132,7 +132,7 @@ def test_moving_origins_along_the_rays_changes_nothing(unequal_rays: et.RaySet) 
 def test_one_two_and_seven_threads_give_the_same_bits(unequal_rays: et.RaySet) -> None:
     def run(threads: int) -> bytes:
         args = [et.Observer(20, 100, 60), et.Observer(0, 0, 60)], et.Screen(20, 20, 40, 40)
-        maps = et.luminance_map(unequal_rays, *args, threads=threads)
+        maps = et.luminance_map(unequal_rays, *args, acceptance="auto", threads=threads)
         return b"".join(m.values.tobytes() + m.standard_error.tobytes() for m in maps)
 
     assert run(1) == run(2) == run(7)
