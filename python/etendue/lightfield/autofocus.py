@@ -30,8 +30,11 @@ FEWEST = 25
 LEAD = 3.0
 """Standard errors of the difference by which a less simple surface must lead."""
 
-LEAST_MET = 0.95
-"""Share of the flux that a surface must meet to be chosen."""
+MOST_UNMET = 0.01
+"""Share of the flux, beside that of strays, from which a surface that leaves it unmet is not chosen."""
+
+TINY = 1e-9
+"""Size of a source against its coordinates below which rounding alone may have made it."""
 
 NESTED = (0.15, 0.02, 1e-3)
 """Shares of the rays beyond each side of nested rectangles on which depths are compared: a die, and what lies about it."""
@@ -125,11 +128,12 @@ def choose_surface(rays: RayStream, *, seed: int = 1, threads: int | None = None
 
     A field of 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and judged on the
     others; see `Jury`. A surface replaces a simpler one if it leads by three standard errors of the difference. None is
-    chosen that leaves more than a twentieth of the flux unmet.
+    chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off.
 
     Parameters
     ----------
     rays : RayStream
+        With positions.
     seed : int
         Of which rays are held out.
     threads : int, optional
@@ -176,12 +180,13 @@ class _Search:
         self.up = self.direction[:, 2] > 0
         self.centre = ball_centre(self.position, self.direction, focus, seed)
         self.start_centre = start_centre(self.position)
-        self.ball = Sphere(centre=_triple(self.centre)).sized_for(self.rays)
-        # A point has no size, but steps of depth must be told from one another.
-        self.radius = max(self.ball.closed("radius"), 1e-9 * float(np.abs(self.centre).max()))
-        everything = Sphere(centre=_triple(self.centre)).sized_for(rays).area
-        self.jury = Jury.of(rays, 1.0 / (np.pi * everything), seed, threads)
-        self.scouts = Jury.of(probe_rays(rays, SCOUTS), self.jury.even, seed, threads)
+        self.least = TINY * float(np.abs(self.position).max())
+        self.radius = self.sphere(self.centre).closed("radius")
+        everything = Sphere(centre=_triple(self.centre)).sized_for(rays).closed("radius")
+        even = 1.0 / (4.0 * np.pi**2 * max(everything, self.least) ** 2)
+        self.jury = Jury.of(rays, even, seed, threads)
+        self.scouts = Jury.of(probe_rays(rays, SCOUTS), even, seed, threads)
+        self.most_unmet = MOST_UNMET + 1.0 - float(self.rays.flux.sum() / rays.flux.sum())
 
     def choice(self) -> SurfaceChoice:
         """Try all kinds, then take the simplest that none beats."""
@@ -196,7 +201,7 @@ class _Search:
             kinds += [self.hemispheres(z), self.domes(z)]
         kinds += filter(None, [self.spheres(), self.cylinders(), [Box().sized_for(self.rays)]])
         finalists = self.finals([self.best(kind) for kind in kinds])
-        able = [t for t in finalists if t.verdict.unmet <= 1.0 - LEAST_MET]
+        able = [t for t in finalists if t.verdict.unmet <= self.most_unmet]
         winner = able[0]
         for challenger in able[1:]:
             if challenger.verdict.leads(winner.verdict, LEAD):
@@ -207,7 +212,7 @@ class _Search:
     def best(self, kind: Sequence[Surface]) -> _Tried:
         """Of surfaces of one kind the best; of those that meet enough of the flux, if there are any."""
         tried = [_Tried(surface, self.jury.judge(surface.parts(), LENDS[0])) for surface in kind]
-        able = [t for t in tried if t.verdict.unmet <= 1.0 - LEAST_MET]
+        able = [t for t in tried if t.verdict.unmet <= self.most_unmet]
         return max(able or tried, key=lambda t: t.verdict.score.mean)
 
     def finals(self, tried: list[_Tried]) -> list[_Tried]:
@@ -231,10 +236,14 @@ class _Search:
         steps, seen = self.sharpest_depths()
         sharpest = max(seen, key=lambda z: seen[z].score.mean)
         alike = [z for z, verdict in seen.items() if not seen[sharpest].leads(verdict, LEAD)]
-        near = _rounder(sharpest, SHARP * FINE * steps, FINE * steps)
+        tried: dict[float, Verdict] = {}
         if np.ptp(self.position[:, 2]) <= SLACK * self.radius:
-            near.insert(0, float(self.position[0, 2]))
-        tried = {z: self.best(self.flats(z)).verdict for z in (*near, sharpest)}
+            start = float(self.position[0, 2])
+            tried[start] = self.best(self.flats(start)).verdict
+        flats = self.flats(sharpest)
+        for z in (*_rounder(sharpest, SHARP * FINE * steps, FINE * steps), sharpest):
+            # Of one size at all of them, so that depth alone is judged.
+            tried[z] = self.best([dataclasses.replace(flat, z=z) for flat in flats]).verdict
         best = max(tried.values(), key=lambda v: v.score.mean)
         z = next(z for z, verdict in tried.items() if not best.leads(verdict, LEAD))
         return z, (min(*alike, z), max(*alike, z))
@@ -273,9 +282,10 @@ class _Search:
         """Rectangles and disks at a depth, for all rays and for those that cross it within the ball."""
         flats: list[Plane | Disk] = []
         for some in (self.rays, *self.within_ball(z)):
-            plane = Plane(z=z).sized_for(some)
-            x, y, _ = plane.parts()[0].centre
-            flats += [plane, Disk(z=z, centre=(x, y)).sized_for(some)]
+            part = Plane(z=z).sized_for(some).parts()[0]
+            (x, y, _), (width, height) = part.centre, (max(length, self.least) for length in part.size)
+            disk = Disk(z=z, centre=(x, y)).sized_for(some)
+            flats += [Plane(z, width, height, (x, y)), Disk(max(disk.closed("radius"), self.least), z, (x, y))]
         return flats
 
     def within_ball(self, z: float) -> Iterator[RaySet]:
@@ -290,22 +300,28 @@ class _Search:
         """Of the ball, and of the sphere on which the rays start, if they do."""
         return [self.centre, *([] if self.start_centre is None else [self.start_centre])]
 
+    def sphere(self, centre: FloatArray) -> Sphere:
+        """The smallest about a centre that the rays allow."""
+        sphere = Sphere(centre=_triple(centre)).sized_for(self.rays)
+        return dataclasses.replace(sphere, radius=max(sphere.closed("radius"), self.least))
+
     def hemispheres(self, z: float) -> list[Surface]:
         """As small as the rays allow, also with its rim at a depth."""
-        centres = [*self.centres(), np.array([*self.centre[:2], z])]
-        return [Hemisphere(centre=_triple(c)).sized_for(self.rays) for c in centres]
+        spheres = [self.sphere(c) for c in (*self.centres(), np.array([*self.centre[:2], z]))]
+        return [Hemisphere(sphere.radius, sphere.centre) for sphere in spheres]
 
     def spheres(self) -> list[Surface]:
         """As small as the rays allow."""
-        return [Sphere(centre=_triple(c)).sized_for(self.rays) for c in self.centres()]
+        return [self.sphere(c) for c in self.centres()]
 
     def domes(self, z: float) -> list[Surface]:
         """With a window as wide as the dome, and with one about what is brightest."""
         domes: list[Surface] = []
-        for c in self.centres():
-            dome = Dome(z=z, centre=(float(c[0]), float(c[1]))).sized_for(self.rays)
-            window = _window(np.hypot(*(_crossings(self.rays, z) - c[:2]).T), dome.closed("radius"))
-            domes += [dome] if window is None else [dome, dataclasses.replace(dome, window=window)]
+        for x, y, _ in self.centres():
+            radius = self.sphere(np.array([x, y, z])).closed("radius")
+            window = _window(np.hypot(*(_crossings(self.rays, z) - (x, y)).T), radius)
+            windows = (None,) if window is None or window < self.least else (None, window)
+            domes += [Dome(radius, z, width, (float(x), float(y))) for width in windows]
         return domes
 
     def cylinders(self) -> list[Surface]:
@@ -326,8 +342,8 @@ class _Search:
             f"{row.surface.NAME} {row.lag:+.3f} ± {row.lag_error:.3f}" for row in table if row.surface != winner.surface
         )
         yield (
-            f"the surface {winner.surface.spec} was chosen on {len(self.jury.flux):,} rays; it foretells held-out rays better "
-            f"than others by so many nat per ray: {others}"
+            f"the surface {winner.surface.spec} was chosen on {len(self.jury.flux):,} rays; it foretells held-out rays "
+            f"better than others by so many nat per ray: {others}"
         )
         if depths is not None and isinstance(winner.surface, Plane | Disk | Dome):
             yield f"depths from {depths[0]:.6g} to {depths[1]:.6g} mm cannot be told from that of {winner.surface.spec}"

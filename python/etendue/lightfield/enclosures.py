@@ -14,11 +14,11 @@ LINES = 1 << 12
 STEPS = 200
 """Steps of that search: the centre is then found to some thousandths of the radius."""
 
-FAR = 1.5
-"""A stray lies so many times farther out than the others."""
+STRAYS = (1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1)
+"""Shares of the rays at which a gap is looked for; those beyond it are strays, at most the last share but one."""
 
-STRAYS = (1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03)
-"""Shares of the rays that may be strays."""
+GAP = 1.5
+"""Ratio of the distances of successive shares that makes a gap."""
 
 ON_SPHERE = 0.01
 """Largest relative deviation of the distances of start points from a centre if they are to lie on a sphere about it."""
@@ -35,10 +35,9 @@ def near_rays(position: FloatArray, direction: FloatArray, centre: FloatArray) -
         [mm]
     """
     distance = np.linalg.norm(np.cross(position - centre, direction), axis=1)
-    outer = np.quantile(distance, [1.0 - share for share in STRAYS])
-    inner = np.quantile(distance, [1.0 - 3.0 * share for share in STRAYS])
-    bounded = np.flatnonzero(outer <= FAR * inner)
-    near: npt.NDArray[np.bool_] = distance <= (FAR * outer[bounded[0]] if len(bounded) else np.inf)
+    reach = np.quantile(distance, [1.0 - share for share in STRAYS])
+    gaps = np.flatnonzero(reach[:-1] > GAP * reach[1:])
+    near: npt.NDArray[np.bool_] = distance <= (GAP * reach[gaps[-1] + 1] if len(gaps) else np.inf)
     return near
 
 

@@ -24,6 +24,9 @@ FOLDS = 5
 MANY = 1 << 15
 """Rays from which on one fold is enough."""
 
+SLIGHT = 1e-3
+"""A lead [nat] that no map shows, however sure."""
+
 CONCENTRATION = 1.0
 """Of the trees: between ½ and 3 the scores of 100 thousand rays change by 0.001 nat."""
 
@@ -44,9 +47,9 @@ class Verdict:
     unmet: float
 
     def leads(self, other: Verdict, errors: float) -> bool:
-        """Whether the score lies above another by more than so many standard errors of the difference."""
+        """Whether the score lies above another by more than so many standard errors of the difference, and not slightly."""
         lead, error = self.score.lead(other.score)
-        return lead > errors * error
+        return lead > max(errors * error, SLIGHT)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -63,6 +66,7 @@ class Jury:
     position, direction : array, shape (n, 3)
         [mm], unit vectors.
     flux : array, shape (n,)
+        Of any unit.
     even : float
         e [1/(mm² sr)]
     seed : int
@@ -80,7 +84,8 @@ class Jury:
     @classmethod
     def of(cls, rays: RaySet, even: float, seed: int, threads: int | None) -> Jury:
         """A jury of all rays of a set."""
-        return cls(rays.position, rays.direction, rays.flux, even, seed, threads)
+        # Against the largest, so that no square of a flux overflows.
+        return cls(rays.position, rays.direction, rays.flux / rays.flux.max(), even, seed, threads)
 
     @property
     def depth(self) -> int:
@@ -145,7 +150,8 @@ class Jury:
         if flux.min() == flux.max():
             sums = Sums(np.bincount(cell, minlength=n).reshape(shape).astype(np.float64), None)
         else:
-            sums = Sums(np.bincount(cell, flux, n).reshape(shape), np.bincount(cell, flux**2, n).reshape(shape))
+            first, second = (np.bincount(cell, w, n).reshape(shape).astype(np.float64) for w in (flux, flux**2))
+            sums = Sums(first, second)
         ratio = grow(sums, Base(), CONCENTRATION, self.threads).ratio.astype(np.float32)
         unit = PartField(ratio, np.zeros_like(ratio), None, None, 1.0)
         integral = _core.LightField([core_part(part.core(), unit)]).flux()[0]
