@@ -61,7 +61,8 @@ def smooth_counts(
     any width among them. Each cell gets the convex combination with which estimates from one half of the rays foretell
     the other half best around it (theory eq. 35).
 
-    Errors are learnt on counts drawn from a known image much like the estimate (theory eq. 36).
+    Errors are learnt on counts drawn from a known image much like the estimate (theory eq. 36). Structure that leaves no
+    trace in the counts, fine lines seen by less than one ray per cell, is in no error bar.
 
     Parameters
     ----------

@@ -35,8 +35,9 @@ def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None
     LuminanceMap
         Every pixel has a value above 0. The flux Σ L · étendue is that of the input exactly. `standard_error` is
         calibrated on counts drawn from a known map much like this one (theory eq. 36): one standard error covers about
-        68 % of the pixels, two about 95 %; errors of neighbouring pixels are correlated. Maps of fewer than 16 pixels a
-        side or 100 effective rays are left to the trees alone, with errors on the safe side. `rays` is that of the input.
+        68 % of the pixels, two about 95 %, fewer where structure is too fine for the rays to show. Errors of neighbouring
+        pixels are correlated. Maps of fewer than 16 pixels a side or 100 effective rays are left to the trees alone, with
+        errors on the safe side. `rays` is that of the input.
 
     Raises
     ------

@@ -126,7 +126,9 @@ def luminance_map(
         maps = [look_at_field(source, o, s, samples, threads) for o, s in pairs]
     elif not by_cone:
         if acceptance is not None:
-            raise ArgumentError(f"method 'lightfield' uses all rays and has no acceptance ({acceptance}); leave it out.")
+            raise ArgumentError(
+                f"method 'lightfield' uses all rays and has no acceptance ({acceptance}); leave it out."
+            )
         for o, s in pairs:
             s.axes(o)  # a view without area is refused before the work
         field = LightField.fit(source, surface, threads=threads, progress=progress)
