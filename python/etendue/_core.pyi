@@ -103,6 +103,9 @@ class LightField:
     def luminance(self, points: _Floats, directions: _Floats, threads: int | None = None) -> tuple[_Floats, _Floats]:
         """Luminance and its standard deviation along lines given by points (n, 3) and directions (n, 3)."""
 
+    def cell_means(self, part: int, threads: int | None = None) -> tuple[_Floats, _Floats]:
+        """Mean luminance of each cell of a part, last coordinate fastest, and mean of its standard deviation."""
+
     def at(self, part: int, coordinates: _Floats) -> tuple[_Floats, _Floats]:
         """Luminance and its standard deviation at coordinates (n, 4) of a part."""
 

@@ -92,8 +92,8 @@ def test_error_bars_cover_the_truth(family: str) -> None:
         z = np.abs(sums[1] - sums[0])[lit] / sums[2][lit]
         shares.append([(z < 1).mean(), (z < 2).mean()])
     one, two = np.mean(shares, axis=0)
-    assert 0.58 < one < 0.88
-    assert 0.88 < two < 0.995
+    assert 0.60 < one < 0.77
+    assert 0.89 < two < 0.985
 
 
 def test_maps_show_the_truth_from_everywhere(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
@@ -149,8 +149,10 @@ def test_a_refit_of_drawn_rays_agrees(film: tuple[PrismaticFilm, et.RaySet, Ligh
     again = LightField.fit(field.rays(200_000, seed=5), field.surface, depths=DEPTHS)
     x, k = field.sample(20_000, seed=6).position, field.sample(20_000, seed=6).direction
     (a, sa), (b, sb) = field.luminance(x, k), again.luminance(x, k)
-    # The drawn field is the truth here; three standard errors hold all but a few points.
-    assert (np.abs(a - b) < 3 * sb).mean() > 0.97
+    # The drawn field is the truth here. Over seeds of the draw the shares vary by 0.05 and by 0.02.
+    z = np.abs(a - b) / sb
+    assert 0.55 < (z < 1).mean() < 0.85
+    assert 0.86 < (z < 2).mean() < 0.99
     assert np.median(np.abs(a / b - 1)) < 0.1
     assert (sa > 0).all()
 

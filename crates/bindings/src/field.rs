@@ -71,6 +71,11 @@ impl LightField {
         let sampler = py.detach(|| self.sampler.get_or_init(make).clone());
         sampler.ok_or_else(|| PyValueError::new_err("a light field needs flux"))
     }
+
+    fn part(&self, index: usize) -> PyResult<&PartField> {
+        let found = self.field.parts.get(index);
+        found.ok_or_else(|| PyValueError::new_err(format!("there is no part {index}")))
+    }
 }
 
 type Pixels<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
@@ -94,8 +99,16 @@ impl LightField {
     }
 
     /// Flux of each part.
-    fn flux(&self, py: Python<'_>) -> PyResult<Vec<f64>> {
-        Ok(self.sampler(py)?.flux().to_vec())
+    fn flux(&self, py: Python<'_>) -> Vec<f64> {
+        py.detach(|| self.field.parts.iter().map(PartField::flux).collect())
+    }
+
+    /// Mean luminance of each cell of a part, and mean of its standard deviation.
+    #[pyo3(signature = (part, threads=None))]
+    fn cell_means<'py>(&self, py: Python<'py>, part: usize, threads: Option<usize>) -> PyResult<Readings<'py>> {
+        let field = self.part(part)?;
+        let found = py.detach(|| field.cell_means(threads.unwrap_or(0)));
+        Ok(readings(py, found))
     }
 
     /// Luminance and its standard deviation along lines given by points and directions.
@@ -122,9 +135,7 @@ impl LightField {
         part: usize,
         coordinates: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Readings<'py>> {
-        let Some(field) = self.field.parts.get(part) else {
-            return Err(PyValueError::new_err(format!("there is no part {part}")));
-        };
+        let field = self.part(part)?;
         if coordinates.shape()[1] != 4 {
             return Err(PyValueError::new_err("an array of shape (n, 4) is needed"));
         }

@@ -12,7 +12,7 @@ from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCou
 from etendue.lightfield.light_field import PartField, core_part
 from etendue.lightfield.nodes import node_values
 from etendue.lightfield.smoothing import smooth_mass
-from etendue.lightfield.trees import Base, Tree, grow, log_evidence
+from etendue.lightfield.trees import POSITIONS, Base, Tree, grow, grow_averaged, log_evidence
 
 CONCENTRATIONS = {"uniform": (1.0, 3.0, 10.0), "product": (10.0, 30.0, 100.0)}
 """Concentrations c among which the evidence chooses, by base measure: one that was taken from the data is believed more."""
@@ -70,6 +70,12 @@ def careful_density(threads: int | None) -> Smoother:
     return smooth
 
 
+def unit_field(base: Base, tree: Tree) -> PartField:
+    """What a tree on a base measure tells of a part's light, up to a factor."""
+    ratio, deviation = (node_values(v).astype(np.float32) for v in (tree.ratio, tree.deviation))
+    return PartField(ratio, deviation, base.space, base.direction, 1.0)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Candidate:
     """Base measure, concentration and tree of each part."""
@@ -93,8 +99,7 @@ class Candidate:
         charts = counts.surface.parts()
         fields = []
         for chart, base, tree, flux in zip(charts, self.bases, self.trees, counts.part_flux, strict=True):
-            ratio, deviation = (node_values(v).astype(np.float32) for v in (tree.ratio, tree.deviation))
-            unit = PartField(ratio, deviation, base.space, base.direction, 1.0)
+            unit = unit_field(base, tree)
             integral = _core.LightField([core_part(chart.core(), unit)]).flux()[0]
             fields.append(dataclasses.replace(unit, level=flux / integral))
         return tuple(fields)
@@ -176,10 +181,16 @@ def choose_concentrations(
 
 
 def grow_candidate(
-    counts: EtendueCounts, fold: Fold, bases: tuple[Base, ...], concentrations: Sequence[float], threads: int | None
+    counts: EtendueCounts,
+    fold: Fold,
+    bases: tuple[Base, ...],
+    concentrations: Sequence[float],
+    threads: int | None,
+    positions: Sequence[tuple[float, ...]] = POSITIONS,
 ) -> Candidate:
-    """The candidate's trees, on the counts of a fold."""
+    """The candidate's trees, on the counts of a fold, averaged over positions of the grid."""
     trees = [
-        grow(part.grid, base, c, threads) for part, base, c in zip(counts[fold], bases, concentrations, strict=True)
+        grow_averaged(part.grid, base, c, threads, positions)
+        for part, base, c in zip(counts[fold], bases, concentrations, strict=True)
     ]
     return Candidate(bases, tuple(concentrations), tuple(trees))

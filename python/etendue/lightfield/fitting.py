@@ -27,7 +27,7 @@ from etendue.lightfield.light_field import FitReport, LightField
 from etendue.lightfield.probe import probe_rays
 from etendue.lightfield.surfaces import Surface
 from etendue.lightfield.symmetry import fold, proven_symmetry
-from etendue.lightfield.trees import Base, Tree
+from etendue.lightfield.trees import POSITIONS, Base, Tree
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 
 Depths = tuple[int, int, int, int]
@@ -119,7 +119,10 @@ def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: in
                 "product": product_bases(fitted, quick_density(threads), threads),
             }
             concentrations = {name: choose_concentrations(fitted, b, threads) for name, b in bases.items()}
-        trees = [grow_candidate(counts, "fitted", b, concentrations[name], threads) for name, b in bases.items()]
+        trees = [
+            grow_candidate(counts, "fitted", b, concentrations[name], threads, POSITIONS[:1])
+            for name, b in bases.items()
+        ]
         scores.append(max(candidate.score(counts).mean for candidate in trees))
     return Plan(final[int(np.argmax(scores))], concentrations)
 
@@ -172,12 +175,13 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
 
 def _calibrated(counts: EtendueCounts, candidate: Candidate, seed: int, threads: int | None) -> Iterator[Tree]:
     """The trees with error bars that also hold the Poisson error of the part's flux."""
-    parts = zip(counts["all"], candidate.bases, candidate.trees, candidate.concentrations, strict=True)
-    for part, base, tree, concentration in parts:
+    charts = counts.surface.parts()
+    parts = zip(charts, counts["all"], candidate.bases, candidate.trees, candidate.concentrations, strict=True)
+    for chart, part, base, tree, concentration in parts:
         if part.grid.rays == 0:
             yield tree
             continue
-        shares = calibrate(part, base, tree, concentration, seed, threads)
+        shares = calibrate(chart, part, base, tree, concentration, seed, threads)
         deviation = np.sqrt(shares.deviation**2 + tree.ratio**2 / part.grid.rays)
         yield dataclasses.replace(tree, deviation=deviation)
 

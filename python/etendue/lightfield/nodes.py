@@ -6,7 +6,7 @@ import numpy as np
 
 from etendue.lightfield.counting import FloatArray
 
-LARGEST_STEP = 4.0
+LARGEST_STEP = 8.0
 """Factor by which the value at a cell's centre may differ from the cell's mean."""
 
 
@@ -15,7 +15,7 @@ def node_values(means: FloatArray) -> FloatArray:
 
     The mean of the interpolation over a cell is ¾ of its own value and ⅛ of either neighbour's along each axis, and at a
     border ⅞ of its own: call that T v. One step of v ← v + (m - T v) from v = m takes away the blur of T but for its
-    square; steps beyond a factor of 4 would be noise, or the shadow of an edge, and are cut off. Theory eq. 39.
+    square; steps beyond a factor of 8 would be noise, or the shadow of an edge, and are cut off. Theory eq. 39.
 
     Examples
     --------

@@ -4,6 +4,7 @@
 //! and a ratio that is linear in each of the four coordinates between the centres of its cells. Read-out (`PartField::at`)
 //! and sampling (`draw`) are of one and the same function. Theory eq. 38.
 
+pub mod cells;
 pub mod draw;
 pub mod factor;
 pub mod intensity;
