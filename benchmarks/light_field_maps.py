@@ -32,7 +32,7 @@ PIXELS = 128
 MARGIN = 1.04
 """Extent of the screen over that of the source."""
 
-SIZES = (3, 5, 7, 9, 13, 17, 25, 35)
+SIZES = (3, 5, 7, 9, 13, 17, 25)
 GAMMAS = (0.1, 0.2, 0.4, 0.8, 1.6)
 
 ESTIMATORS = ("light field", "cone", "cone, denoised", "cone, best filter", "grid, best E")
@@ -149,7 +149,9 @@ def main() -> None:
     parser.add_argument("--rays", default="1e5,1e6")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--families", default="limb,film,die,dome")
-    parser.add_argument("--fine", type=int, default=16, help="the truth is a mean of so many points, squared, per pixel")
+    parser.add_argument(
+        "--fine", type=int, default=16, help="the truth is a mean of so many points, squared, per pixel"
+    )
     parser.add_argument("--verbose", action="store_true", help="also print each map, and what was best for it")
     options = parser.parse_args()
     print(" " * 22 + "".join(f"   {name:^15}" for name in ESTIMATORS))
