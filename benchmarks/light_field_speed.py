@@ -217,7 +217,8 @@ def fitting(family: Family, rays: et.RaySet) -> LightField:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rays", type=int, default=20_000_000, help="that are counted and drawn")
+    parser.add_argument("--rays", type=int, default=20_000_000, help="that are counted")
+    parser.add_argument("--drawn", type=int, default=2_000_000, help="rays that are drawn")
     parser.add_argument("--fit-rays", type=int, default=1_000_000)
     parser.add_argument("--family", default="film", help="whose rays are fitted")
     parser.add_argument("--repeats", type=int, default=5)
@@ -232,7 +233,7 @@ def main() -> None:
     field = fitting(family, rays)
     x0, x1, y0, y1 = family.source.extent
     looking(field, 1.04 * (x1 - x0), ((x0 + x1) / 2, (y0 + y1) / 2, 0.0), options.maps)
-    drawing(counts, field, options.rays, options.repeats)
+    drawing(counts, field, options.drawn, options.repeats)
 
 
 if __name__ == "__main__":
