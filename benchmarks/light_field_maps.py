@@ -24,7 +24,7 @@ import etendue as et
 import numpy as np
 from etendue.luminance.filters import FILTERS
 from etendue.luminance.gridded_map import gridded_luminance_map
-from light_field import THRESHOLDS, Family, families
+from light_field import DIE, THRESHOLDS, Family, families
 
 Array = Any
 OBSERVERS = ((0, 0), (30, 0), (60, 0), (80, 0), (30, 90), (60, 90), (80, 90))
@@ -73,10 +73,10 @@ def outline_of(family: Family) -> Array:
     x0, x1, y0, y1 = family.source.extent
     turn = np.linspace(0, 2 * np.pi, 361)
     circle = np.stack([(x0 + x1 + (x1 - x0) * np.cos(turn)) / 2, (y0 + y1 + (y1 - y0) * np.sin(turn)) / 2], axis=1)
-    radius = getattr(family.source, "index", None) and family.source.radius  # a medium of its own: there is a dome
+    radius = DIE.radius if family.source is DIE else 0.0
     heights = np.radians(np.linspace(0, 90, 31)) if radius else np.zeros(1)
     return np.concatenate(
-        [np.column_stack([np.cos(t) * circle, np.full(len(turn), np.sin(t) * (radius or 0))]) for t in heights]
+        [np.column_stack([np.cos(t) * circle, np.full(len(turn), np.sin(t) * radius)]) for t in heights]
     )
 
 
