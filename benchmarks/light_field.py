@@ -4,14 +4,15 @@ Score: excess KL in mnat per ray, the mean of ln(L/Φ) - ln(L^/Φ^) over fresh r
 1e-4 of a uniform field. Beside it stands that score less the one of the best field that is constant on 32⁴ equal cells,
 which knows the truth. The grid has pixels of a 32nd of the source, and its threshold is the best of eleven, *chosen
 knowing the truth*. Coverage: share of cells, drawn from the lit ones, whose true mean lies within one and two standard
-errors of the field's. Maps: 128 × 128 pixels from seven observers, mean NCC and true NRMSE.
+errors of the field's. What the sources look like is the matter of `light_field_maps.py`.
 
-python benchmarks/light_field.py [--rays 1e5,1e6] [--seeds 5] [--families limb,film,die,dome] [--maps]
+python benchmarks/light_field.py [--rays 1e5,1e6] [--seeds 5] [--families limb,film,die,dome]
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
 import time
 from pathlib import Path
@@ -28,32 +29,37 @@ from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm
 
 Array = Any
 THRESHOLDS = (20.0, 10.0, 5.0, 2.1, 1.0, 0.5, 0.2, 0.1, 0.05, 0.021, 0.01)
-OBSERVERS = ((0, 0), (30, 0), (60, 0), (80, 0), (30, 90), (60, 90), (80, 90))
 TESTS = 400_000
 DIE = DieUnderDome()
 
 
-def families() -> dict[str, tuple[Any, Surface, float, float, int | None]]:
-    """Source, carrier, extent [mm], pixel of the grid [mm], parallels of its hemisphere."""
-    limb, film = LimbDarkenedDisk(), PrismaticFilm()
-    flat = {name: s.radius * 2 for name, s in (("limb", limb), ("film", film))}
+@dataclasses.dataclass(frozen=True)
+class Family:
+    """A source, what carries its light, and the pixels of the grid: their size [mm], or the hemisphere's parallels."""
+
+    source: Any
+    surface: Surface
+    pixel: float
+    parallels: int | None = None
+
+    def ray_set(self, rays: int, seed: int) -> et.RaySet:
+        """Rays of equal flux, in memory."""
+        x, d = self.source.rays(rays, seed)
+        return et.RaySet(x, d, np.full(rays, self.source.total_flux / rays))
+
+
+def families() -> dict[str, Family]:
+    """The four of the tests, by name."""
+
+    def flat(source: LimbDarkenedDisk | PrismaticFilm) -> Family:
+        side = 2 * source.radius
+        return Family(source, Plane(z=0, width=side, height=side, centre=source.centre), side / 32)
+
     return {
-        "limb": (
-            limb,
-            Plane(z=0, width=flat["limb"], height=flat["limb"], centre=limb.centre),
-            24,
-            flat["limb"] / 32,
-            None,
-        ),
-        "film": (
-            film,
-            Plane(z=0, width=flat["film"], height=flat["film"], centre=film.centre),
-            24,
-            flat["film"] / 32,
-            None,
-        ),
-        "die": (DIE, Plane(z=0, width=2.53, height=2.53, centre=(0, 0)), 2.6, 2.53 / 32, None),
-        "dome": (DIE, Hemisphere(radius=DIE.radius * 1.00001), 2.6, 0.1, 16),
+        "limb": flat(LimbDarkenedDisk()),
+        "film": flat(PrismaticFilm()),
+        "die": Family(DIE, Plane(z=0, width=2.53, height=2.53, centre=(0, 0)), 2.53 / 32),
+        "dome": Family(DIE, Hemisphere(radius=DIE.radius * 1.00001), 0.1, 16),
     }
 
 
@@ -107,21 +113,23 @@ def coverage(field: LightField, source: Any, cells: int = 20_000, points: int = 
 
 def compare(name: str, rays: int, seeds: int) -> list[tuple[float, float, float, float]]:
     """Print, for each seed, both excesses, the coverage and the times; return them."""
-    source, surface, _, pixel, parallels = families()[name]
+    family = families()[name]
+    source, surface = family.source, family.surface
     judge = Judge(source, surface)
     floor = judge.cells()
     print(f"{name} {rays:.0e}: best constants on 32⁴ cells {floor:.1f}")
     rows = []
     for seed in range(1, seeds + 1):
-        x, d = source.rays(rays, seed)
-        ray_set = et.RaySet(x, d, np.full(rays, source.total_flux / rays))
+        ray_set = family.ray_set(rays, seed)
         start = time.perf_counter()
         field = LightField.fit(ray_set, surface)
         seconds = time.perf_counter() - start
         ours = judge.excess(field.luminance(judge.points, judge.directions)[0], field.total_flux)
         grids = []
         for threshold in THRESHOLDS:
-            grid = et.GriddedSource.fit(ray_set, surface, pixel=pixel, threshold=threshold, parallels=parallels)
+            grid = et.GriddedSource.fit(
+                ray_set, surface, pixel=family.pixel, threshold=threshold, parallels=family.parallels
+            )
             grids.append(judge.excess(grid.luminance(judge.points, judge.directions), grid.total_flux))
         best = int(np.argmin(grids))
         one, two = coverage(field, source)
