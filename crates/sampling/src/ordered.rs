@@ -56,12 +56,23 @@ pub fn run<T: Send>(
 /// Calls `work` inside a pool of `threads` threads (0: one per core), where rayon's parallel loops run; tells it whether
 /// there is such a pool, which a system may refuse. The threads live as long as the call.
 pub fn within<T: Send>(threads: usize, work: impl Fn(bool) -> T + Sync) -> T {
+    beside(threads, |pool| match pool {
+        Some(pool) => pool.install(|| work(true)),
+        None => work(false),
+    })
+}
+
+/// Calls `work` on the calling thread, beside a pool of `threads` threads (0: one per core), if there is one.
+///
+/// For work that allocates much between its parallel loops: what the calling thread frees, it is given again, while the
+/// memory of threads that come and go has to be fetched page by page.
+pub fn beside<T>(threads: usize, work: impl Fn(Option<&rayon::ThreadPool>) -> T) -> T {
     if threads == 1 {
-        return work(false);
+        return work(None);
     }
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
-    let done = builder.build_scoped(rayon::ThreadBuilder::run, |pool| pool.install(|| work(true)));
-    done.unwrap_or_else(|_| work(false))
+    let done = builder.build_scoped(rayon::ThreadBuilder::run, |pool| work(Some(pool)));
+    done.unwrap_or_else(|_| work(None))
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ from etendue.lightfield.light_field import FitReport, LightField
 from etendue.lightfield.probe import probe_rays
 from etendue.lightfield.surfaces import Surface
 from etendue.lightfield.symmetry import fold, proven_symmetry
-from etendue.lightfield.trees import POSITIONS, Base, Tree
+from etendue.lightfield.trees import POSITIONS, Tree
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 
 Depths = tuple[int, int, int, int]
@@ -38,7 +38,7 @@ PROBE = 1 << 20
 FINEST = 8
 """Halvings of the fine grids over place and over direction for sets of 65 536 rays and more: 256 × 256 cells each."""
 
-SHAPES = (0, 1, -1, 2, -2)
+SHAPES = (-2, -1, 0, 1, 2)
 """Halvings per coordinate that the place may lend to the direction."""
 
 LEAD = 3.0
@@ -99,32 +99,39 @@ def fine_depths(rays: int, depths: Depths) -> tuple[int, int]:
 def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: int, threads: int | None) -> Plan:
     """Choose, on some of the rays, what foretells held-out rays best: the shape of the grid unless it is given.
 
+    From the even shape the search goes on as long as the score rises, on the base measure that is the better one there.
     The grids compared have a quarter of the cells of the one to be filled: what is gained by finer cells along one axis
     and lost by coarser ones along another shows in them, too.
     """
     some = probe_rays(rays, PROBE)
     bits = default_bits(len(rays))
-    options = [depths] if depths else [_depths(min(bits, 20) - 2, lend) for lend in SHAPES]
-    final = [depths] if depths else [_depths(bits, lend) for lend in SHAPES]
-    fine = fine_depths(len(some), tuple(max(axis) for axis in zip(*options, strict=True)))
-    bases: dict[str, tuple[Base, ...]] = {}
-    concentrations: dict[str, tuple[float, ...]] = {}
-    scores = []
-    for trial in options:
-        counts = count_rays(some, surface, trial, fine, seed=seed, threads=threads)
-        fitted = counts["fitted"]
-        if not bases:
-            bases = {
-                "uniform": uniform_bases(fitted),
-                "product": product_bases(fitted, quick_density(threads), threads),
-            }
-            concentrations = {name: choose_concentrations(fitted, b, threads) for name, b in bases.items()}
-        trees = [
-            grow_candidate(counts, "fitted", b, concentrations[name], threads, POSITIONS[:1])
-            for name, b in bases.items()
-        ]
-        scores.append(max(candidate.score(counts).mean for candidate in trees))
-    return Plan(final[int(np.argmax(scores))], concentrations)
+    lends = (0,) if depths else SHAPES
+    options = {lend: depths or _depths(min(bits, 20) - 2, lend) for lend in lends}
+    fine = fine_depths(len(some), tuple(max(axis) for axis in zip(*options.values(), strict=True)))
+    counts = count_rays(some, surface, options[0], fine, seed=seed, threads=threads)
+    bases = {
+        "uniform": uniform_bases(counts["fitted"]),
+        "product": product_bases(counts["fitted"], quick_density(threads), threads),
+    }
+    concentrations = {name: choose_concentrations(counts["fitted"], b, threads) for name, b in bases.items()}
+
+    def score(counts: EtendueCounts, name: str) -> float:
+        candidate = grow_candidate(counts, "fitted", bases[name], concentrations[name], threads, POSITIONS[:1])
+        return candidate.score(counts).mean
+
+    if depths:
+        return Plan(depths, concentrations)
+    first = {name: score(counts, name) for name in bases}
+    name = max(first, key=lambda name: first[name])
+    best, reached = 0, first[name]
+    for step in (1, -1):
+        while best * step >= 0 and best + step in options:
+            trial = count_rays(some, surface, options[best + step], fine, seed=seed, threads=threads)
+            tried = score(trial, name)
+            if tried <= reached:
+                break
+            best, reached = best + step, tried
+    return Plan(_depths(bits, best), concentrations)
 
 
 def _depths(bits: int, lend: int) -> Depths:
@@ -141,7 +148,7 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
         bases = (
             uniform_bases(counts["fitted"]) if name == "uniform" else product_bases(counts["fitted"], density, threads)
         )
-        candidate = grow_candidate(counts, "fitted", bases, plan.concentrations[name], threads)
+        candidate = grow_candidate(counts, "fitted", bases, plan.concentrations[name], threads, POSITIONS[:1])
         candidates.append((candidate, candidate.score(counts)))
     (plain, plain_score), (elaborate, elaborate_score) = candidates
     lead, error = elaborate_score.lead(plain_score)

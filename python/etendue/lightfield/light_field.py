@@ -69,7 +69,8 @@ class FitReport:
     log_evidence : float
         ln of the evidence of the trees against their base measures, summed over the parts.
     score : float
-        Mean ln L/Φ of held-out rays, L in 1/(mm² sr): the larger the better, comparable between surfaces.
+        Mean ln L/Φ of held-out rays, L in 1/(mm² sr): the larger the better, comparable between surfaces. It is that of
+        one tree on nine tenths of the rays; the field, an average of trees on all rays, is somewhat better.
     score_error : float
         Standard error of the score.
     histogram_score : float

@@ -1,5 +1,7 @@
 //! Base measures: what the tree falls back on where the data say nothing.
 
+use etendue_math::special::{ln, ln_gamma};
+
 use super::grid::{Grid, Level};
 
 /// A base measure over the cells of a grid: a product of factors, each over some neighbouring axes.
@@ -9,13 +11,40 @@ pub struct Base {
     factors: Vec<Factor>,
 }
 
-/// The share of its lower half in every dyadic box of a few axes, by level and split axis.
+/// For each level of a grid, for each of its splits: one number per box.
+type Table = Vec<Vec<Vec<f64>>>;
+
+/// The share of its lower half in every dyadic box of a few axes.
 #[derive(Clone, Debug)]
 struct Factor {
     axes: std::ops::Range<usize>,
     grid: Grid,
-    /// For each level of `grid`, for each of its splits: one share per box.
-    shares: Vec<Vec<Vec<f64>>>,
+    shares: Table,
+}
+
+/// What the evidence of a split owes to the base measure alone, for one concentration: worked out once per box of a factor
+/// instead of once per box of the whole grid.
+pub(super) struct SplitTerms {
+    tables: Vec<[Table; 3]>,
+    /// Where the halves are equal.
+    even: [f64; 3],
+}
+
+/// Shares of the lower halves of some boxes, and the terms of their splits.
+pub(super) struct Splits<'a> {
+    /// p
+    pub share: &'a mut [f64],
+    /// ln Γ(c) − ln Γ(c p) − ln Γ(c (1 − p)), ln p and ln (1 − p); where p is 0 or 1 no number that means anything.
+    pub terms: [&'a mut [f64]; 3],
+}
+
+fn terms_of(c: f64, share: f64) -> [f64; 3] {
+    let p = if share > 0.0 && share < 1.0 { share } else { 0.5 };
+    [
+        ln_gamma(c) - ln_gamma(c * p) - ln_gamma(c * (1.0 - p)),
+        ln(p),
+        ln(1.0 - p),
+    ]
 }
 
 impl Base {
@@ -52,22 +81,61 @@ impl Base {
         self.factors.is_empty()
     }
 
+    /// The terms of all splits for the concentration `c`.
+    pub(super) fn split_terms(&self, c: f64) -> SplitTerms {
+        let of_factor = |factor: &Factor| {
+            [0, 1, 2].map(|k| {
+                let of_box = |share: &f64| terms_of(c, *share)[k];
+                let of_level = |splits: &Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+                    splits.iter().map(|boxes| boxes.iter().map(of_box).collect()).collect()
+                };
+                factor.shares.iter().map(of_level).collect()
+            })
+        };
+        SplitTerms {
+            tables: self.factors.iter().map(of_factor).collect(),
+            even: terms_of(c, 0.5),
+        }
+    }
+
     /// For boxes `first..first + n` of a level, split along `axis`: the base share of the lower half.
     pub(super) fn lower_shares(&self, level: &Level, axis: usize, first: usize, out: &mut [f64]) {
-        let Some(factor) = self.factors.iter().find(|f| f.axes.contains(&axis)) else {
-            out.fill(0.5);
-            return;
-        };
-        let depths = factor.grid.depths();
-        let halvings = &level.halvings[factor.axes.clone()];
+        match self.factors.iter().find(|f| f.axes.contains(&axis)) {
+            None => out.fill(0.5),
+            Some(factor) => factor.spread(&factor.shares, level, axis, first, out),
+        }
+    }
+
+    /// The same with the terms of the splits.
+    pub(super) fn splits(&self, terms: &SplitTerms, level: &Level, axis: usize, first: usize, out: &mut Splits<'_>) {
+        self.lower_shares(level, axis, first, out.share);
+        match self.factors.iter().position(|f| f.axes.contains(&axis)) {
+            None => {
+                for (row, value) in out.terms.iter_mut().zip(terms.even) {
+                    row.fill(value);
+                }
+            }
+            Some(index) => {
+                for (row, table) in out.terms.iter_mut().zip(&terms.tables[index]) {
+                    self.factors[index].spread(table, level, axis, first, row);
+                }
+            }
+        }
+    }
+}
+
+impl Factor {
+    /// Deals the numbers of a table out to boxes `first..first + n` of a level of the whole grid, split along `axis`.
+    fn spread(&self, table: &Table, level: &Level, axis: usize, first: usize, out: &mut [f64]) {
+        let halvings = &level.halvings[self.axes.clone()];
         let id = halvings
             .iter()
-            .zip(depths)
+            .zip(self.grid.depths())
             .fold(0, |id, (h, d)| id * (*d as usize + 1) + *h as usize);
-        let own = &factor.grid.levels()[id];
-        let split = own.splits.iter().position(|s| s.axis == axis - factor.axes.start);
-        let table = &factor.shares[id][split.expect("the axis can be split")];
-        let low_bits: u32 = level.halvings[factor.axes.end..].iter().sum();
+        let own = &self.grid.levels()[id];
+        let split = own.splits.iter().position(|s| s.axis == axis - self.axes.start);
+        let table = &table[id][split.expect("the axis can be split")];
+        let low_bits: u32 = level.halvings[self.axes.end..].iter().sum();
         let mask = own.boxes - 1;
         let n = out.len();
         if low_bits == 0 && own.boxes >= n {
@@ -84,7 +152,7 @@ impl Base {
 }
 
 /// The shares of all lower halves, from the masses of the cells.
-fn shares(grid: &Grid, mass: &[f64]) -> Vec<Vec<Vec<f64>>> {
+fn shares(grid: &Grid, mass: &[f64]) -> Table {
     let levels = grid.levels();
     let mut masses: Vec<Vec<f64>> = vec![Vec::new(); levels.len()];
     let mut shares = vec![Vec::new(); levels.len()];

@@ -25,18 +25,43 @@ pub fn whole_term(c: f64, splits: f64, count: &[f64], out: &mut [f64]) {
     }
 }
 
+/// ln Γ(c + n) of each number of points.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub fn log_gamma(c: f64, count: &[f64], out: &mut [f64]) {
+    for (o, n) in out.iter_mut().zip(count) {
+        *o = ln_gamma(c + n);
+    }
+}
+
+/// What is known of the splits of some boxes along one axis.
+pub struct Trial<'a> {
+    /// Base share of the lower half, and what follows from it alone.
+    pub share: &'a [f64],
+    pub terms: [&'a [f64]; 3],
+    /// Points in the halves.
+    pub lower: &'a [f64],
+    pub upper: &'a [f64],
+    /// ln Γ(c + n) of the whole.
+    pub whole: &'a [f64],
+}
+
 /// Adds ln B of a split to `out`, theory eq. 31: p the base share of the lower half, n₀ and n₁ the points in the halves.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-pub fn add_log_bayes(c: f64, p: &[f64], lower: &[f64], upper: &[f64], out: &mut [f64]) {
-    let log_gamma_c = ln_gamma(c);
-    for (((o, p0), n0), n1) in out.iter_mut().zip(p).zip(lower).zip(upper) {
-        let void = (*p0 <= 0.0) | (*p0 >= 1.0);
-        let p0 = if void { 0.5 } else { *p0 };
-        let p1 = 1.0 - p0;
-        let (a0, a1) = (c * p0, c * p1);
-        let beta = ln_gamma(a0 + n0) - ln_gamma(a0) + ln_gamma(a1 + n1) - ln_gamma(a1);
-        let bayes = beta + log_gamma_c - ln_gamma(c + (n0 + n1)) - n0 * ln(p0) - n1 * ln(p1);
-        *o += if void { 0.0 } else { bayes };
+pub fn add_log_bayes(c: f64, trial: &Trial<'_>, out: &mut [f64]) {
+    let n = out.len();
+    let (share, lower, upper, whole) = (
+        &trial.share[..n],
+        &trial.lower[..n],
+        &trial.upper[..n],
+        &trial.whole[..n],
+    );
+    let [prior, log_lower, log_upper] = trial.terms.map(|t| &t[..n]);
+    for i in 0..n {
+        let void = (share[i] <= 0.0) | (share[i] >= 1.0);
+        let p = if void { 0.5 } else { share[i] };
+        let beta = ln_gamma(c * p + lower[i]) + ln_gamma(c * (1.0 - p) + upper[i]) - whole[i];
+        let bayes = beta + prior[i] - lower[i] * log_lower[i] - upper[i] * log_upper[i];
+        out[i] += if void { 0.0 } else { bayes };
     }
 }
 

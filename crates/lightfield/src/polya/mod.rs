@@ -73,9 +73,9 @@ pub struct Posterior {
 pub fn posterior(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> Posterior {
     assert!(data.fits(grid), "one entry per cell");
     let data = &data.simplified();
-    let ((ratio, ratio_squared), log_evidence) = ordered::within(threads, |parallel| {
-        let evidence = tree::ascend(grid, data, c, true, parallel);
-        (tree::descend(grid, data, c, &evidence, parallel), evidence.log_root)
+    let ((ratio, ratio_squared), log_evidence) = ordered::beside(threads, |pool| {
+        let evidence = tree::ascend(grid, data, c, true, pool);
+        (tree::descend(grid, data, c, &evidence, pool), evidence.log_root)
     });
     Posterior {
         ratio,
@@ -92,9 +92,7 @@ pub fn posterior(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> Poster
 pub fn log_evidence(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> f64 {
     assert!(data.fits(grid), "one entry per cell");
     let data = &data.simplified();
-    ordered::within(threads, |parallel| {
-        tree::ascend(grid, data, c, false, parallel).log_root
-    })
+    ordered::beside(threads, |pool| tree::ascend(grid, data, c, false, pool).log_root)
 }
 
 #[cfg(test)]

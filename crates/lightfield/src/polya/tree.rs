@@ -1,9 +1,11 @@
 //! The two sweeps over the lattice: evidence from the cells to the root, ratios from the root to the cells.
 
+use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::base::{SplitTerms, Splits};
 use super::grid::{Grid, Level};
-use super::kernel::{Flow, add_flow, add_log_bayes, add_log_gamma, join, whole_term};
+use super::kernel::{Flow, Trial, add_flow, add_log_bayes, add_log_gamma, join, log_gamma, whole_term};
 use super::{CHUNK, Data};
 
 /// What the upward sweep leaves behind.
@@ -27,12 +29,11 @@ struct UpTask<'a> {
     splits: Vec<&'a mut [f32]>,
 }
 
-/// Runs tasks side by side if that is worth it: inside the caller's thread pool, or on the caller's thread.
-fn each<T: Send>(parallel: bool, tasks: Vec<T>, work: impl Fn(T) + Sync + Send) {
-    if parallel && tasks.len() > 8 {
-        tasks.into_par_iter().for_each(work);
-    } else {
-        tasks.into_iter().for_each(work);
+/// Runs tasks side by side if that is worth it: in the pool, or on the caller's thread.
+fn each<T: Send>(pool: Option<&ThreadPool>, tasks: Vec<T>, work: impl Fn(T) + Sync + Send) {
+    match pool {
+        Some(pool) if tasks.len() > 8 => pool.install(|| tasks.into_par_iter().for_each(work)),
+        _ => tasks.into_iter().for_each(work),
     }
 }
 
@@ -44,7 +45,7 @@ fn chunks<T>(values: &mut [T], size: usize) -> impl Iterator<Item = &mut [T]> {
 }
 
 /// From the cells to the root: sums, evidence and, if `keep`, the probabilities of the splits.
-pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, parallel: bool) -> Evidence {
+pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, pool: Option<&ThreadPool>) -> Evidence {
     let levels = grid.levels();
     let mut weight: Vec<Vec<f64>> = vec![Vec::new(); levels.len()];
     let mut squared: Vec<Vec<f64>> = vec![Vec::new(); levels.len()];
@@ -59,6 +60,7 @@ pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, parallel:
         add_log_gamma(c, &weight[finest], &mut log_r[finest]);
     }
     let layers = grid.layers();
+    let split_terms = data.base.split_terms(c);
     for (depth, layer) in layers.iter().enumerate().rev().skip(1) {
         for &id in layer {
             let level = &levels[id];
@@ -81,8 +83,8 @@ pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, parallel:
                 })
                 .collect();
             drop(rows);
-            each(parallel, tasks, |task| {
-                ascend_chunk(level, data, c, (&weight, &squared, &log_r), task);
+            each(pool, tasks, |task| {
+                ascend_chunk(level, data, (c, &split_terms), (&weight, &squared, &log_r), task);
             });
             if data.squared.is_some() {
                 effective[id] = w
@@ -115,8 +117,9 @@ pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, parallel:
 
 type Finer<'a> = (&'a [Vec<f64>], &'a [Vec<f64>], &'a [Vec<f64>]);
 
-fn ascend_chunk(level: &Level, data: &Data<'_>, c: f64, finer: Finer<'_>, task: UpTask<'_>) {
+fn ascend_chunk(level: &Level, data: &Data<'_>, prior: (f64, &SplitTerms), finer: Finer<'_>, task: UpTask<'_>) {
     let (weight, squared, log_r) = finer;
+    let (c, split_terms) = prior;
     let (first, n) = (task.first, task.weight.len());
     let mut buffer = [[0.0; CHUNK]; 5];
     let [lower, upper, r0, r1, share] = buffer.each_mut().map(|b| &mut b[..n]);
@@ -146,6 +149,11 @@ fn ascend_chunk(level: &Level, data: &Data<'_>, c: f64, finer: Finer<'_>, task: 
         return;
     }
     let mut terms = vec![0.0; n * level.splits.len()];
+    let mut of_base = [[0.0; CHUNK]; 4];
+    let [prior, log_lower, log_upper, whole_gamma] = of_base.each_mut().map(|b| &mut b[..n]);
+    if !data.has_equal_halves() {
+        log_gamma(c, count, whole_gamma);
+    }
     for (step, term) in level.splits.iter().zip(terms.chunks_exact_mut(n)) {
         step.halves(&log_r[step.level], first, r0, r1);
         add(term, r0, r1);
@@ -157,8 +165,19 @@ fn ascend_chunk(level: &Level, data: &Data<'_>, c: f64, finer: Finer<'_>, task: 
                     (*l, *u) = (*l * scale, *u * scale);
                 }
             }
-            data.base.lower_shares(level, step.axis, first, share);
-            add_log_bayes(c, share, lower, upper, term);
+            let mut splits = Splits {
+                share: &mut *share,
+                terms: [&mut *prior, &mut *log_lower, &mut *log_upper],
+            };
+            data.base.splits(split_terms, level, step.axis, first, &mut splits);
+            let trial = Trial {
+                share,
+                terms: [prior, log_lower, log_upper],
+                lower,
+                upper,
+                whole: whole_gamma,
+            };
+            add_log_bayes(c, &trial, term);
         }
     }
     let whole = r0;
@@ -207,7 +226,7 @@ pub(super) fn descend(
     data: &Data<'_>,
     c: f64,
     evidence: &Evidence,
-    parallel: bool,
+    pool: Option<&ThreadPool>,
 ) -> (Vec<f64>, Vec<f64>) {
     let levels = grid.levels();
     // What reaches a box, and what has stopped at the box or above it and is handed on to its first half-able axis.
@@ -230,7 +249,7 @@ pub(super) fn descend(
                     total: (tm, ts),
                 })
                 .collect();
-            each(parallel, tasks, |task| {
+            each(pool, tasks, |task| {
                 descend_chunk(grid, id, data, c, evidence, (&flows, &totals), task);
             });
             (flows[id], totals[id]) = (Moments { mean: m, square: s }, Moments { mean: tm, square: ts });
