@@ -12,7 +12,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.enclosures import ball_centre, cylinder_of_lines, near_rays, start_centre
-from etendue.lightfield.jury import Jury, Verdict
+from etendue.lightfield.jury import Grid, Jury, Verdict
 from etendue.lightfield.probe import probe_rays
 from etendue.lightfield.surfaces import SLACK, Box, Cylinder, Disk, Dome, Hemisphere, Part, Plane, Sphere, Surface
 from etendue.quantities.ray_set import RaySet
@@ -22,7 +22,10 @@ PROBE = 1 << 17
 """Rays on which surfaces are compared."""
 
 SCOUTS = 1 << 15
-"""Rays on which depths are compared over the whole range."""
+"""Rays on which depths are compared over the whole range, and surfaces of one kind with each other."""
+
+MANY = 1 << 16
+"""Rays from which on fine grids say more than coarse ones."""
 
 FEWEST = 25
 """Rays below which no comparison means anything."""
@@ -39,11 +42,17 @@ TINY = 1e-9
 NESTED = (0.15, 0.02, 1e-3)
 """Shares of the rays beyond each side of nested rectangles on which depths are compared: a die, and what lies about it."""
 
-LENDS = (1, 2, 0, -1, -2)
-"""Halvings per coordinate that the direction may lend to the place; the first is that of the first round."""
+COARSE = (4, 2)
+"""Grid on which few rays compare depths, and surfaces of one kind."""
+
+SHARP = (5, 2)
+"""Grid on which many rays seek the sharpest depth: a finer one takes longer and finds it no better."""
+
+FINER = {(5, 2): ((5, 3), (6, 2)), (3, 4): ((3, 5), (4, 4))}
+"""Grids on which many rays compare kinds, then finer ones for those that are not hopeless; few rays halve once less."""
 
 HOPELESS = 0.3
-"""Lag behind the best score of the first round [nat] from which other shapes of the grid are not tried."""
+"""Lag behind the best score [nat] from which finer grids are not tried."""
 
 STEP = 0.125
 """Steps of depth in which the source is searched, in radii of the smallest ball about it."""
@@ -54,8 +63,8 @@ REACH = 8
 FINE = 0.01
 """Share of two steps to which the sharpest depth is found."""
 
-SHARP = 15
-"""Lengths of that share to either side among which the whole jury seeks the sharpest depth."""
+SIMPLER = 0.15
+"""Share of two steps to either side of it among which a rounder depth is sought."""
 
 BACKWARDS = 0.5
 """Share of the flux towards −Z from which surfaces that shine towards +Z alone are not tried."""
@@ -126,8 +135,8 @@ def choose_surface(rays: RayStream, *, seed: int = 1, threads: int | None = None
     - a cylinder about Z: the smallest that all lines meet, or about their start points;
     - a box about their start points.
 
-    A field of 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and judged on the
-    others; see `Jury`. A surface replaces a simpler one if it leads by three standard errors of the difference. None is
+    A field of up to 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and judged on
+    the others; see `Jury`. A surface replaces a simpler one if it leads by three standard errors of the difference. None is
     chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off.
 
     Parameters
@@ -186,6 +195,7 @@ class _Search:
         even = 1.0 / (4.0 * np.pi**2 * max(everything, self.least) ** 2)
         self.jury = Jury.of(rays, even, seed, threads)
         self.scouts = Jury.of(probe_rays(rays, SCOUTS), even, seed, threads)
+        self.less = 0 if len(rays) >= MANY else 1
         self.most_unmet = MOST_UNMET + 1.0 - float(self.rays.flux.sum() / rays.flux.sum())
 
     def choice(self) -> SurfaceChoice:
@@ -200,7 +210,7 @@ class _Search:
             kinds += [[s for s in flats if isinstance(s, kind)] for kind in (Plane, Disk)]
             kinds += [self.hemispheres(z), self.domes(z)]
         kinds += filter(None, [self.spheres(), self.cylinders(), [Box().sized_for(self.rays)]])
-        finalists = self.finals([self.best(kind) for kind in kinds])
+        finalists = self.finals([self.best(kind, self.scouts, COARSE).surface for kind in kinds])
         able = [t for t in finalists if t.verdict.unmet <= self.most_unmet]
         winner = able[0]
         for challenger in able[1:]:
@@ -209,21 +219,28 @@ class _Search:
         table = _table(finalists, winner)
         return SurfaceChoice(winner.surface, table, depths, tuple(self.notes(winner, table, depths)))
 
-    def best(self, kind: Sequence[Surface]) -> _Tried:
+    def best(self, kind: Sequence[Surface], jury: Jury, grid: Grid) -> _Tried:
         """Of surfaces of one kind the best; of those that meet enough of the flux, if there are any."""
-        tried = [_Tried(surface, self.jury.judge(surface.parts(), LENDS[0])) for surface in kind]
+        verdicts = jury.judge_all([(surface.parts(), grid) for surface in kind])
+        tried = [_Tried(surface, verdict) for surface, verdict in zip(kind, verdicts, strict=True)]
         able = [t for t in tried if t.verdict.unmet <= self.most_unmet]
         return max(able or tried, key=lambda t: t.verdict.score.mean)
 
-    def finals(self, tried: list[_Tried]) -> list[_Tried]:
-        """The same surfaces, each in the shape of grid that suits it; but for the hopeless."""
-        enough = max(t.verdict.score.mean for t in tried) - HOPELESS
-        results = []
-        for t in tried:
-            others = LENDS[1:] if t.verdict.score.mean > enough else ()
-            verdicts = [t.verdict, *(self.jury.judge(t.surface.parts(), lend) for lend in others)]
-            results.append(_Tried(t.surface, max(verdicts, key=lambda v: v.score.mean)))
-        return results
+    def finals(self, surfaces: list[Surface]) -> list[_Tried]:
+        """The surfaces as the whole jury sees them, each on the grid that suits it; but for the hopeless."""
+
+        def judged(pairs: list[tuple[Surface, Grid]]) -> dict[tuple[Surface, Grid], Verdict]:
+            grids = [(surface.parts(), (place - self.less, turn - self.less)) for surface, (place, turn) in pairs]
+            return dict(zip(pairs, self.jury.judge_all(grids), strict=True))
+
+        seen = judged([(surface, grid) for surface in surfaces for grid in FINER])
+        best = {s: max(FINER, key=lambda grid: seen[s, grid].score.mean) for s in surfaces}  # noqa: B023
+        enough = max(verdict.score.mean for verdict in seen.values()) - HOPELESS
+        hopeful = [(s, grid) for s, grid in best.items() if seen[s, grid].score.mean > enough]
+        seen |= judged([(s, finer) for s, grid in hopeful for finer in FINER[grid]])
+        return [
+            _Tried(s, max((v for (t, _), v in seen.items() if t == s), key=lambda v: v.score.mean)) for s in surfaces
+        ]
 
     # --- depth ---------------------------------------------------------------------------------------------------------
 
@@ -231,21 +248,24 @@ class _Search:
         """The simplest of the depths that are as good as any, and the range of those that are [mm].
 
         The sharpest is sought with nested rectangles, which fit any source well enough. Between it and simpler ones the
-        surfaces decide that would be chosen there.
+        surface decides that would be chosen there.
         """
         steps, seen = self.sharpest_depths()
         sharpest = max(seen, key=lambda z: seen[z].score.mean)
         alike = [z for z, verdict in seen.items() if not seen[sharpest].leads(verdict, LEAD)]
+        grid = (5 - self.less, 3 - self.less)
         tried: dict[float, Verdict] = {}
         if np.ptp(self.position[:, 2]) <= SLACK * self.radius:
             start = float(self.position[0, 2])
-            tried[start] = self.best(self.flats(start)).verdict
-        flats = self.flats(sharpest)
-        for z in (*_rounder(sharpest, SHARP * FINE * steps, FINE * steps), sharpest):
-            # Of one size at all of them, so that depth alone is judged.
-            tried[z] = self.best([dataclasses.replace(flat, z=z) for flat in flats]).verdict
-        best = max(tried.values(), key=lambda v: v.score.mean)
-        z = next(z for z, verdict in tried.items() if not best.leads(verdict, LEAD))
+            tried[start] = self.best(self.flats(start), self.jury, grid).verdict
+        best = self.best(self.flats(sharpest), self.jury, grid)
+        # Of one size at all of them, so that depth alone is judged.
+        rounder = _rounder(sharpest, SIMPLER * steps, FINE * steps)
+        flats = [(dataclasses.replace(best.surface, z=z).parts(), grid) for z in rounder]
+        tried |= zip(rounder, self.jury.judge_all(flats), strict=True)
+        tried[sharpest] = best.verdict
+        lead = max(tried.values(), key=lambda v: v.score.mean)
+        z = next(z for z, verdict in tried.items() if not lead.leads(verdict, LEAD))
         return z, (min(*alike, z), max(*alike, z))
 
     def sharpest_depths(self) -> tuple[float, dict[float, Verdict]]:
@@ -256,20 +276,17 @@ class _Search:
         near = np.arange(-1.0, 1.0 + STEP, STEP)
         far = 2.0 ** np.arange(1, REACH + 1)
         places = self.centre[2] + self.radius * np.concatenate([-far[::-1], near, far])
-        scores = [self.scouts.judge(self.nested(z), LENDS[0]).score.mean for z in places]
-        at = int(np.clip(np.argmax(scores), 1, len(places) - 2))
+        verdicts = self.scouts.judge_all([(self.nested(z), COARSE) for z in places])
+        at = int(np.clip(np.argmax([verdict.score.mean for verdict in verdicts]), 1, len(places) - 2))
         low, high = float(places[at - 1]), float(places[at + 1])
-        steps = high - low
-        margin = SHARP * FINE * steps
-        about = _golden(lambda z: self.scouts.judge(self.nested(z), LENDS[0]).score.mean, low, high, margin)
         seen: dict[float, Verdict] = {}
 
         def score(z: float) -> float:
-            seen[z] = self.jury.judge(self.nested(z), LENDS[0])
+            seen[z] = self.jury.judge(self.nested(z), COARSE if self.less else SHARP)
             return seen[z].score.mean
 
-        _golden(score, about - margin, about + margin, FINE * steps)
-        return steps, seen
+        _golden(score, low, high, FINE * (high - low))
+        return high - low, seen
 
     def nested(self, z: float) -> tuple[Part, ...]:
         """Rectangles at a depth, each within the next, the smallest first; by some of the rays."""
