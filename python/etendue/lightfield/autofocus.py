@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 
@@ -24,6 +25,9 @@ PROBE = 1 << 17
 SCOUTS = 1 << 15
 """Rays on which depths are compared over the whole range, and surfaces of one kind with each other."""
 
+ENOUGH = 1 << 12
+"""Scouts from which on one fold of them is enough."""
+
 MANY = 1 << 16
 """Rays from which on fine grids say more than coarse ones."""
 
@@ -39,19 +43,22 @@ MOST_UNMET = 0.01
 TINY = 1e-9
 """Size of a source against its coordinates below which rounding alone may have made it."""
 
+FLATS = tuple(itertools.product((Plane, Disk), (False, True)))
+"""Flat surfaces that are tried: kind, and whether only for rays that cross the depth within the ball about the source."""
+
 NESTED = (0.15, 0.02, 1e-3)
 """Shares of the rays beyond each side of nested rectangles on which depths are compared: a die, and what lies about it."""
 
 COARSE = (4, 2)
 """Grid on which few rays compare depths, and surfaces of one kind."""
 
-SHARP = (5, 2)
-"""Grid on which many rays seek the sharpest depth: a finer one takes longer and finds it no better."""
+SHARP = (5, 3)
+"""Grid on which many rays seek the sharpest depth; few rays halve each coordinate once less, here and below."""
 
 FINER = {(5, 2): ((5, 3), (6, 2)), (3, 4): ((3, 5), (4, 4))}
-"""Grids on which many rays compare kinds, then finer ones for those that are not hopeless; few rays halve once less."""
+"""Grids on which many rays compare kinds, then finer ones for those that are not hopeless."""
 
-HOPELESS = 0.3
+HOPELESS = 0.15
 """Lag behind the best score [nat] from which finer grids are not tried."""
 
 STEP = 0.125
@@ -63,8 +70,8 @@ REACH = 8
 FINE = 0.01
 """Share of two steps to which the sharpest depth is found."""
 
-SIMPLER = 0.15
-"""Share of two steps to either side of it among which a rounder depth is sought."""
+NEAR = 0.15
+"""Share of two steps to either side of where the scouts see it among which all of the jury seeks it."""
 
 BACKWARDS = 0.5
 """Share of the flux towards −Z from which surfaces that shine towards +Z alone are not tried."""
@@ -194,7 +201,7 @@ class _Search:
         everything = Sphere(centre=_triple(self.centre)).sized_for(rays).closed("radius")
         even = 1.0 / (4.0 * np.pi**2 * max(everything, self.least) ** 2)
         self.jury = Jury.of(rays, even, seed, threads)
-        self.scouts = Jury.of(probe_rays(rays, SCOUTS), even, seed, threads)
+        self.scouts = Jury.of(probe_rays(rays, SCOUTS), even, seed, threads, ENOUGH)
         self.less = 0 if len(rays) >= MANY else 1
         self.most_unmet = MOST_UNMET + 1.0 - float(self.rays.flux.sum() / rays.flux.sum())
 
@@ -247,46 +254,44 @@ class _Search:
     def depth(self) -> tuple[float, tuple[float, float]]:
         """The simplest of the depths that are as good as any, and the range of those that are [mm].
 
-        The sharpest is sought with nested rectangles, which fit any source well enough. Between it and simpler ones the
-        surface decides that would be chosen there.
+        Nested rectangles, which fit any source well enough, tell the scouts where it is about. There the rectangle or disk
+        decides that suits the source best: its own edge is what tells depths apart best.
         """
-        steps, seen = self.sharpest_depths()
+        about, steps = self.about()
+        flats = {f: self.flat(*f, about, self.few) for f in FLATS}
+        kind, within = max(flats, key=lambda f: self.scouts.judge(flats[f].parts(), COARSE).score.mean)
+        seen: dict[float, Verdict] = {}
+
+        def score(z: float) -> float:
+            grid = (SHARP[0] - self.less, SHARP[1] - self.less)
+            seen[z] = self.jury.judge(self.flat(kind, within, z, self.few).parts(), grid)
+            return seen[z].score.mean
+
+        _golden(score, about - NEAR * steps, about + NEAR * steps, FINE * steps)
         sharpest = max(seen, key=lambda z: seen[z].score.mean)
         alike = [z for z, verdict in seen.items() if not seen[sharpest].leads(verdict, LEAD)]
-        grid = (5 - self.less, 3 - self.less)
-        tried: dict[float, Verdict] = {}
+        simple = _rounder(sharpest, NEAR * steps, FINE * steps)
         if np.ptp(self.position[:, 2]) <= SLACK * self.radius:
-            start = float(self.position[0, 2])
-            tried[start] = self.best(self.flats(start), self.jury, grid).verdict
-        best = self.best(self.flats(sharpest), self.jury, grid)
-        # Of one size at all of them, so that depth alone is judged.
-        rounder = _rounder(sharpest, SIMPLER * steps, FINE * steps)
-        flats = [(dataclasses.replace(best.surface, z=z).parts(), grid) for z in rounder]
-        tried |= zip(rounder, self.jury.judge_all(flats), strict=True)
-        tried[sharpest] = best.verdict
-        lead = max(tried.values(), key=lambda v: v.score.mean)
-        z = next(z for z, verdict in tried.items() if not lead.leads(verdict, LEAD))
-        return z, (min(*alike, z), max(*alike, z))
+            simple.insert(0, float(self.position[0, 2]))
+        for z in simple:
+            score(z)
+            if not seen[sharpest].leads(seen[z], LEAD):
+                return z, (min(*alike, z), max(*alike, z))
+        return sharpest, (min(alike), max(alike))
 
-    def sharpest_depths(self) -> tuple[float, dict[float, Verdict]]:
-        """The length of two steps [mm], and verdicts on depths about the sharpest.
-
-        It is sought among the scouts over the whole range, then by all of the jury.
-        """
+    def about(self) -> tuple[float, float]:
+        """About where the source is sharpest, and the length of two steps [mm]: to the scouts, over the whole range."""
         near = np.arange(-1.0, 1.0 + STEP, STEP)
         far = 2.0 ** np.arange(1, REACH + 1)
         places = self.centre[2] + self.radius * np.concatenate([-far[::-1], near, far])
         verdicts = self.scouts.judge_all([(self.nested(z), COARSE) for z in places])
         at = int(np.clip(np.argmax([verdict.score.mean for verdict in verdicts]), 1, len(places) - 2))
         low, high = float(places[at - 1]), float(places[at + 1])
-        seen: dict[float, Verdict] = {}
 
         def score(z: float) -> float:
-            seen[z] = self.jury.judge(self.nested(z), COARSE if self.less else SHARP)
-            return seen[z].score.mean
+            return self.scouts.judge(self.nested(z), COARSE).score.mean
 
-        _golden(score, low, high, FINE * (high - low))
-        return high - low, seen
+        return _golden(score, low, high, NEAR * (high - low)), high - low
 
     def nested(self, z: float) -> tuple[Part, ...]:
         """Rectangles at a depth, each within the next, the smallest first; by some of the rays."""
@@ -297,21 +302,21 @@ class _Search:
 
     def flats(self, z: float) -> list[Plane | Disk]:
         """Rectangles and disks at a depth, for all rays and for those that cross it within the ball."""
-        flats: list[Plane | Disk] = []
-        for some in (self.rays, *self.within_ball(z)):
-            part = Plane(z=z).sized_for(some).parts()[0]
-            (x, y, _), (width, height) = part.centre, (max(length, self.least) for length in part.size)
-            disk = Disk(z=z, centre=(x, y)).sized_for(some)
-            flats += [Plane(z, width, height, (x, y)), Disk(max(disk.closed("radius"), self.least), z, (x, y))]
-        return flats
+        return list(dict.fromkeys(self.flat(kind, within, z, self.rays) for kind, within in FLATS))
 
-    def within_ball(self, z: float) -> Iterator[RaySet]:
-        """The rays that cross a depth no farther from the axis of the ball than its radius, if there are others."""
-        near = np.zeros(len(self.position), np.bool_)
-        distance = np.hypot(*(_crossings(self.rays, z) - self.centre[:2]).T)
-        near[self.up] = distance <= self.radius * (1 + SLACK)
-        if 0 < np.count_nonzero(near) < len(distance):
-            yield _some(self.rays, near)
+    def flat(self, kind: type[Plane | Disk], within: bool, z: float, rays: RaySet) -> Plane | Disk:
+        """The smallest rectangle or disk at a depth for some rays, or for those of them that cross it within the ball."""
+        if within:
+            up = rays.direction[:, 2] > 0
+            near = np.hypot(*(_crossings(rays, z) - self.centre[:2]).T) <= self.radius * (1 + SLACK)
+            if near.any():
+                up[up] = near
+                rays = _some(rays, up)
+        part = Plane(z=z).sized_for(rays).parts()[0]
+        (x, y, _), (width, height) = part.centre, (max(length, self.least) for length in part.size)
+        if kind is Plane:
+            return Plane(z, width, height, (x, y))
+        return Disk(max(Disk(z=z, centre=(x, y)).sized_for(rays).closed("radius"), self.least), z, (x, y))
 
     def centres(self) -> list[FloatArray]:
         """Of the ball, and of the sphere on which the rays start, if they do."""
@@ -323,9 +328,26 @@ class _Search:
         return dataclasses.replace(sphere, radius=max(sphere.closed("radius"), self.least))
 
     def hemispheres(self, z: float) -> list[Surface]:
-        """As small as the rays allow, also with its rim at a depth."""
-        spheres = [self.sphere(c) for c in (*self.centres(), np.array([*self.centre[:2], z]))]
+        """As small as the rays allow, also with the rim at a depth, and where few lines leave below it."""
+        centres = [*self.centres(), *(np.array([*self.centre[:2], rim]) for rim in (z, self.rim()))]
+        spheres = [self.sphere(c) for c in centres]
         return [Hemisphere(sphere.radius, sphere.centre) for sphere in spheres]
+
+    def rim(self) -> float:
+        """The height near the ball's centre at which the least flux leaves a hemisphere through its floor [mm].
+
+        Of a hemisphere the height of the smallest ball is ill-defined: only lines that graze the rim hold it.
+        """
+        offset, k, flux = self.few.position - self.centre, self.few.direction, self.few.flux
+
+        def kept(height: float) -> float:
+            x = offset - (0.0, 0.0, height)
+            middle = -np.sum(x * k, axis=1)
+            near = np.sum(x**2, axis=1) - middle**2
+            leaves = x[:, 2] + (middle + np.sqrt(near.max() - near)) * k[:, 2]
+            return float(flux[leaves >= 0.0].sum())
+
+        return float(self.centre[2]) + _golden(kept, -STEP * self.radius, STEP * self.radius, FINE * STEP * self.radius)
 
     def spheres(self) -> list[Surface]:
         """As small as the rays allow."""

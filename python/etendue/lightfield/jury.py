@@ -25,7 +25,7 @@ FOLDS = 5
 """One ray in so many is held out; of a small set each once, in turn."""
 
 MANY = 1 << 15
-"""Rays from which on one fold is enough."""
+"""Rays from which on one fold is enough to tell surfaces apart."""
 
 SLIGHT = 1e-3
 """A lead [nat] that no map shows, however sure."""
@@ -75,6 +75,8 @@ class Jury:
     seed : int
         Of the dealing.
     threads : int or None
+    many : int
+        Rays from which on one fold is enough.
     """
 
     position: FloatArray
@@ -83,12 +85,13 @@ class Jury:
     even: float
     seed: int
     threads: int | None
+    many: int = MANY
 
     @classmethod
-    def of(cls, rays: RaySet, even: float, seed: int, threads: int | None) -> Jury:
+    def of(cls, rays: RaySet, even: float, seed: int, threads: int | None, many: int = MANY) -> Jury:
         """A jury of all rays of a set."""
         # Against the largest, so that no square of a flux overflows.
-        return cls(rays.position, rays.direction, rays.flux / rays.flux.max(), even, seed, threads)
+        return cls(rays.position, rays.direction, rays.flux / rays.flux.max(), even, seed, threads, many)
 
     @functools.cached_property
     def fold(self) -> npt.NDArray[np.int64]:
@@ -115,7 +118,7 @@ class Jury:
         cell = np.zeros(len(owner), np.intp)
         for axis, n in enumerate(shape):
             cell = cell * n + np.minimum((coordinates[:, axis] * n).astype(np.intp), n - 1)
-        turns = range(1 if len(owner) >= MANY else FOLDS)
+        turns = range(1 if len(owner) >= self.many else FOLDS)
         values = [self._held_out(parts, owner, cell, shape, self.fold == turn) for turn in turns]
         weights = [self.flux[self.fold == turn] for turn in turns]
         unmet = float(self.flux[owner < 0].sum() / self.flux.sum())
