@@ -1,4 +1,4 @@
-"""The automatic surface against sources whose best surface is known; start points are scattered, so that lines alone tell."""
+"""The automatic surface against sources whose best surface is known; start points are scattered: lines alone tell."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ def led_choice() -> SurfaceChoice:
 FLAT = {
     # source, kind, radius of the source [mm], largest error of the depth in such radii
     "limb": (LimbDarkenedDisk(), Disk, 11.2, 2e-3),
-    "film": (PrismaticFilm(), Disk, 11.2, 4e-3),
+    "film": (PrismaticFilm(), Disk, 11.2, 2e-3),
     "led": (StructuredLed(), Plane, 0.6, 2e-3),
     "die": (DieUnderDome(), Plane, 1.264, 0.01),
     "die in a scattering dome": (DieUnderDome(floor=0.3), Dome, 1.264, 0.01),
 }
-"""Twice what five seeds gave. A dome's image of its die is curved: the best plane is a few thousandths beside the die."""
+"""Five seeds gave less. A dome's image of its die is curved: the best plane is some thousandths of the radius beside it."""
 
 
 @pytest.mark.parametrize("name", list(FLAT))
@@ -70,9 +70,10 @@ def test_a_flat_source_is_found_at_its_depth(name: str) -> None:
     assert surface.z == pytest.approx(MOVE[2], abs=error * radius)
     assert choice.depths is not None
     low, high = choice.depths
-    assert low <= surface.z <= high
-    assert low - error * radius / 2 <= MOVE[2] <= high + error * radius / 2
-    assert high - low < 8 * error * radius
+    assert low < surface.z < high
+    slack = 2e-3 * radius if isinstance(source, DieUnderDome) else 0.0
+    assert low - slack < MOVE[2] < high + slack
+    assert high - low < 0.05 * radius
     x0, x1, y0, y1 = source.extent  # type: ignore[attr-defined]
     if name == "die":  # it magnifies the die by its index; light that it scatters comes from all of the dome
         assert isinstance(surface, Plane)
@@ -82,21 +83,21 @@ def test_a_flat_source_is_found_at_its_depth(name: str) -> None:
         assert (surface.width, surface.height) == pytest.approx((x1 - x0, y1 - y0), rel=0.01)
     else:
         assert surface.radius == pytest.approx(radius, rel=0.01)
-    assert surface.centre == pytest.approx(MOVE[:2] + [(x0 + x1) / 2, (y0 + y1) / 2], abs=0.07 * radius)
+    assert surface.centre == pytest.approx(np.add(MOVE[:2], [(x0 + x1) / 2, (y0 + y1) / 2]), abs=0.07 * radius)
     (row,) = (row for row in choice.table if row.surface == surface)
     assert (row.lag, row.lag_error) == (0.0, 0.0)
     assert row.unmet < 0.01
     assert [type(row.surface) for row in choice.table].count(kind) == 1
-    assert any(f"depths from {low:.6g} to {high:.6g} mm" in note for note in choice.notes)
+    assert any(f"depths between {low:.6g} and {high:.6g} mm" in note for note in choice.notes)
 
 
 @pytest.mark.parametrize("seed", [2, 3, 4])
 def test_a_film_of_few_details_is_found_by_its_rim(seed: int) -> None:
-    """Its cut-offs move with the place, so that what is on the film itself hardly tells the depth."""
+    """Its cut-offs move with the place, so that what is within it hardly tells the depth."""
     position, direction = PrismaticFilm().rays(N, seed)
     choice = choose_surface(rays_of(*scattered(position + MOVE, direction, 3.0, seed)))
     assert isinstance(choice.surface, Disk)
-    assert choice.surface.z == pytest.approx(MOVE[2], abs=0.045)
+    assert choice.surface.z == pytest.approx(MOVE[2], abs=2e-3 * 11.2)
 
 
 # --- lamps that shine all round ----------------------------------------------------------------------------------------
@@ -256,7 +257,7 @@ def test_light_towards_minus_z_gets_a_closed_surface_and_a_hint() -> None:
 
 def test_too_few_rays_say_what_to_do() -> None:
     position, direction = led_lines(25)
-    with pytest.raises(ArgumentError, match="24 rays with flux are too few.*surface="):
+    with pytest.raises(ArgumentError, match=r"24 rays with flux are too few.*surface="):
         choose_surface(rays_of(position[:24], direction[:24]))
     surface = choose_surface(rays_of(position, direction)).surface
     assert surface.area < 20.0  # of a die of 1 mm²: crude, but no nonsense

@@ -65,7 +65,9 @@ class Globe(Body):
     @property
     def total_flux(self) -> float:
         """[lm]"""
-        return float(self.scale * MM2 * 4 * np.pi * self.radius**2 * (np.pi + SIGMA * self.radius / self.size * A @ B / 3))
+        return float(
+            self.scale * MM2 * 4 * np.pi * self.radius**2 * (np.pi + SIGMA * self.radius / self.size * A @ B / 3)
+        )
 
     def on_surface(self, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
         v = rng.normal(size=(n, 3))

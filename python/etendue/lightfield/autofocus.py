@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 
@@ -43,7 +42,7 @@ MOST_UNMET = 0.01
 TINY = 1e-9
 """Size of a source against its coordinates below which rounding alone may have made it."""
 
-FLATS = tuple(itertools.product((Plane, Disk), (False, True)))
+FLATS: tuple[tuple[type[Plane | Disk], bool], ...] = ((Plane, False), (Disk, False), (Plane, True), (Disk, True))
 """Flat surfaces that are tried: kind, and whether only for rays that cross the depth within the ball about the source."""
 
 NESTED = (0.15, 0.02, 1e-3)
@@ -115,7 +114,8 @@ class SurfaceChoice:
     table : tuple of SurfaceScore
         The best surface of each kind, the best score first.
     depths : tuple of float, or None
-        Lowest and highest depth tried that cannot be told from the chosen one [mm]; None if no depth was sought.
+        The depths tried that come next to the chosen one, below and above, and are worse for sure [mm]; what lies between
+        cannot be told from it. The lowest and highest that were tried, if none is worse; None if no depth was sought.
     notes : tuple of str
         The choice in words.
     """
@@ -241,7 +241,7 @@ class _Search:
             return dict(zip(pairs, self.jury.judge_all(grids), strict=True))
 
         seen = judged([(surface, grid) for surface in surfaces for grid in FINER])
-        best = {s: max(FINER, key=lambda grid: seen[s, grid].score.mean) for s in surfaces}  # noqa: B023
+        best = {s: max(FINER, key=lambda grid: seen[s, grid].score.mean) for s in surfaces}
         enough = max(verdict.score.mean for verdict in seen.values()) - HOPELESS
         hopeful = [(s, grid) for s, grid in best.items() if seen[s, grid].score.mean > enough]
         seen |= judged([(s, finer) for s, grid in hopeful for finer in FINER[grid]])
@@ -252,7 +252,7 @@ class _Search:
     # --- depth ---------------------------------------------------------------------------------------------------------
 
     def depth(self) -> tuple[float, tuple[float, float]]:
-        """The simplest of the depths that are as good as any, and the range of those that are [mm].
+        """The simplest of the depths that are as good as any, and those next to it that are not [mm].
 
         Nested rectangles, which fit any source well enough, tell the scouts where it is about. There the rectangle or disk
         decides that suits the source best: its own edge is what tells depths apart best.
@@ -269,15 +269,18 @@ class _Search:
 
         _golden(score, about - NEAR * steps, about + NEAR * steps, FINE * steps)
         sharpest = max(seen, key=lambda z: seen[z].score.mean)
-        alike = [z for z, verdict in seen.items() if not seen[sharpest].leads(verdict, LEAD)]
         simple = _rounder(sharpest, NEAR * steps, FINE * steps)
         if np.ptp(self.position[:, 2]) <= SLACK * self.radius:
             simple.insert(0, float(self.position[0, 2]))
         for z in simple:
             score(z)
             if not seen[sharpest].leads(seen[z], LEAD):
-                return z, (min(*alike, z), max(*alike, z))
-        return sharpest, (min(alike), max(alike))
+                break
+        else:
+            z = sharpest
+        alike = [z for z, verdict in seen.items() if not seen[sharpest].leads(verdict, LEAD)]
+        below, above = [z for z in seen if z < min(alike)], [z for z in seen if z > max(alike)]
+        return z, (max(below, default=min(alike)), min(above, default=max(alike)))
 
     def about(self) -> tuple[float, float]:
         """About where the source is sharpest, and the length of two steps [mm]: to the scouts, over the whole range."""
@@ -385,7 +388,7 @@ class _Search:
             f"better than others by so many nat per ray: {others}"
         )
         if depths is not None and isinstance(winner.surface, Plane | Disk | Dome):
-            yield f"depths from {depths[0]:.6g} to {depths[1]:.6g} mm cannot be told from that of {winner.surface.spec}"
+            yield f"depths between {depths[0]:.6g} and {depths[1]:.6g} mm cannot be told from that of {winner.surface.spec}"
         mean = np.average(self.direction, weights=self.rays.flux, axis=0)
         if np.linalg.norm(mean) > ASLANT and mean[2] < ASLANT * np.linalg.norm(mean):
             x, y, z = mean / np.linalg.norm(mean)
