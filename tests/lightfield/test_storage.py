@@ -394,6 +394,8 @@ CHANGES: dict[str, tuple[Callable[[Any], None], str]] = {
     "no report": (lambda file: file.__delitem__("report"), "group 'report'"),
     "a report without score": (drop("score", "report"), "attribute 'score'"),
     "rays and a half": (put("rays", 1.5, "report"), "attribute 'rays'"),
+    "a symmetry of triangles": (put("symmetry", "c3", "report"), "attribute 'symmetry'.*mirror-x"),
+    "a number for a symmetry": (put("symmetry", 2.0, "report"), "attribute 'symmetry'"),
     "one part": (lambda file: file.__delitem__("parts/1"), "1 parts, expected 2"),
     "three parts": (lambda file: file.create_group("parts/2"), "3 parts, expected 2"),
     "a part of another name": (lambda file: file.move("parts/1", "parts/one"), "group '1'"),

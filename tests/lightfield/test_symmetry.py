@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+
 import etendue as et
+import h5py
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.lightfield import fitting
 from etendue.lightfield.counting import count_rays
 from etendue.lightfield.symmetry import SYMMETRIES, fold, proven_symmetry
 
@@ -64,6 +69,34 @@ def test_a_symmetric_source_is_found_and_its_errors_shrink() -> None:
     value, error = folded.luminance(x, np.tile([0.0, 0, 1], (4, 1)))
     np.testing.assert_allclose(value, value[0], rtol=0.02)
     assert (np.abs(value - rays.luminance(3, 4)) < 4 * error).all()
+
+
+def test_what_a_field_was_folded_by_is_known_and_kept(tmp_path: Path) -> None:
+    rays = et.RaySet(*rays_of(4000, 5), np.ones(4000))
+    plane = et.Plane(z=0, width=2, height=2, centre=(0, 0))
+    for asked, found in (("none", "none"), ("mirror-y", "mirror-y"), ("auto", "mirror-y")):
+        field = et.LightField.fit(rays, plane, depths=DEPTHS, symmetry=asked)
+        assert field.report.symmetry == found
+        field.save(tmp_path / "field.h5")
+        assert et.LightField.load(tmp_path / "field.h5").report.symmetry == found
+    with h5py.File(tmp_path / "field.h5", "r+") as file:  # as before this was written down
+        del file["report"].attrs["symmetry"]
+    assert et.LightField.load(tmp_path / "field.h5").report.symmetry == "none"
+
+
+@pytest.mark.parametrize("symmetry", ["none", "mirror-x", "c4"])
+@pytest.mark.parametrize("weighted", [False, True])
+def test_images_of_a_ray_tell_nothing_more_of_the_flux(
+    symmetry: str, weighted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Were the shares of all cells certain, every error bar would be that of the flux: √Σw² / Σw of the rays themselves."""
+    monkeypatch.setattr(fitting, "calibrate", lambda *args: dataclasses.replace(args[2], deviation=0 * args[2].ratio))
+    weights = np.random.default_rng(7).gamma(2.0, 1.0, 4000) if weighted else np.ones(4000)
+    rays = et.RaySet(*rays_of(4000, 6), weights)
+    plane = et.Plane(z=0, width=2, height=2, centre=(0, 0))
+    field = et.LightField.fit(rays, plane, depths=(1, 1, 1, 1), symmetry=symmetry)
+    relative = field.parts[0].deviation / field.parts[0].ratio
+    np.testing.assert_allclose(relative, np.sqrt(np.sum(weights**2)) / np.sum(weights), rtol=1e-5)
 
 
 def test_an_asymmetry_of_two_per_cent_is_seen_with_a_million_rays() -> None:

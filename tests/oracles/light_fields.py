@@ -52,6 +52,7 @@ def make_field(
         score_error=math.inf,
         histogram_score=-2.5,
         effective_cells=33.3,
+        symmetry="c2",
     )
     provenance = Provenance("LED »x«, ü.ray", "tm25", "ab12", ("subset of 10 rays", "light field"), "étendue 0.1")
     return LightField(surface, tuple(parts), flux_unit, report, provenance, ("first\nin two lines", "zweite: µ"))

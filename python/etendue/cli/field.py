@@ -79,6 +79,7 @@ def print_field(field: LightField) -> None:
     rows = [
         ("surface", field.surface.spec),
         ("flux", f"{field.total_flux:.7g} {field.flux_unit}"),
+        *([] if report.symmetry == "none" else [("symmetry", report.symmetry)]),
         ("rays", f"{report.rays - report.unmet_rays:,}{unmet}"),
         *(("grid" if number == 0 else "", text) for number, text in enumerate(_grids(field))),
         ("evidence", f"{report.log_evidence:,.1f} nat against the base measure"),

@@ -66,7 +66,7 @@ def fit(
         )
     seconds = time.perf_counter() - started
     field.save(output)
-    diagnostics = None if report is None else _report(field, rays, report, symmetry, seed, threads)
+    diagnostics = None if report is None else _report(field, rays, report, seed, threads)
     complaints = [str(c) for c in rays.complaints]
     if json:
         facts = {"file": file, "output": output, "bytes": output.stat().st_size, "seconds": seconds}
@@ -89,8 +89,8 @@ def depths_option(text: str) -> tuple[int, int, int, int]:
     return s1, s2, a, b
 
 
-def _report(field: LightField, rays: RaySet, path: Path, symmetry: str, seed: int, threads: int | None) -> Diagnostics:
+def _report(field: LightField, rays: RaySet, path: Path, seed: int, threads: int | None) -> Diagnostics:
     with progress_bar("refits", REFITS) as progress:
-        diagnostics = diagnose(field, rays, symmetry=symmetry, seed=seed, threads=threads, progress=progress)
+        diagnostics = diagnose(field, rays, seed=seed, threads=threads, progress=progress)
     plot_characteristic(diagnostics, path)
     return diagnostics

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.enclosures import ball_centre, cylinder_of_lines, near_rays, start_centre
-from etendue.lightfield.jury import Jury, Verdict
+from etendue.lightfield.jury import Grid, Jury, Verdict
 from etendue.lightfield.probe import probe_rays
 from etendue.lightfield.surfaces import SLACK, Box, Cylinder, Disk, Dome, Hemisphere, Part, Plane, Sphere, Surface
 from etendue.quantities.ray_set import RaySet
@@ -22,7 +22,13 @@ PROBE = 1 << 17
 """Rays on which surfaces are compared."""
 
 SCOUTS = 1 << 15
-"""Rays on which depths are compared over the whole range."""
+"""Rays on which depths are compared over the whole range, and surfaces of one kind with each other."""
+
+ENOUGH = 1 << 12
+"""Scouts from which on one fold of them is enough."""
+
+MANY = 1 << 16
+"""Rays from which on fine grids say more than coarse ones."""
 
 FEWEST = 25
 """Rays below which no comparison means anything."""
@@ -36,14 +42,23 @@ MOST_UNMET = 0.01
 TINY = 1e-9
 """Size of a source against its coordinates below which rounding alone may have made it."""
 
+FLATS: tuple[tuple[type[Plane | Disk], bool], ...] = ((Plane, False), (Disk, False), (Plane, True), (Disk, True))
+"""Flat surfaces that are tried: kind, and whether only for rays that cross the depth within the ball about the source."""
+
 NESTED = (0.15, 0.02, 1e-3)
 """Shares of the rays beyond each side of nested rectangles on which depths are compared: a die, and what lies about it."""
 
-LENDS = (1, 2, 0, -1, -2)
-"""Halvings per coordinate that the direction may lend to the place; the first is that of the first round."""
+COARSE = (4, 2)
+"""Grid on which few rays compare depths, and surfaces of one kind."""
 
-HOPELESS = 0.3
-"""Lag behind the best score of the first round [nat] from which other shapes of the grid are not tried."""
+SHARP = (5, 3)
+"""Grid on which many rays seek the sharpest depth; few rays halve each coordinate once less, here and below."""
+
+FINER = {(5, 2): ((5, 3), (6, 2)), (3, 4): ((3, 5), (4, 4))}
+"""Grids on which many rays compare kinds, then finer ones for those that are not hopeless."""
+
+HOPELESS = 0.15
+"""Lag behind the best score [nat] from which finer grids are not tried."""
 
 STEP = 0.125
 """Steps of depth in which the source is searched, in radii of the smallest ball about it."""
@@ -54,8 +69,8 @@ REACH = 8
 FINE = 0.01
 """Share of two steps to which the sharpest depth is found."""
 
-SHARP = 15
-"""Lengths of that share to either side among which the whole jury seeks the sharpest depth."""
+NEAR = 0.15
+"""Share of two steps to either side of where the scouts see it among which all of the jury seeks it."""
 
 BACKWARDS = 0.5
 """Share of the flux towards −Z from which surfaces that shine towards +Z alone are not tried."""
@@ -99,7 +114,8 @@ class SurfaceChoice:
     table : tuple of SurfaceScore
         The best surface of each kind, the best score first.
     depths : tuple of float, or None
-        Lowest and highest depth tried that cannot be told from the chosen one [mm]; None if no depth was sought.
+        The depths tried that come next to the chosen one, below and above, and are worse for sure [mm]; what lies between
+        cannot be told from it. The lowest and highest that were tried, if none is worse; None if no depth was sought.
     notes : tuple of str
         The choice in words.
     """
@@ -126,8 +142,8 @@ def choose_surface(rays: RayStream, *, seed: int = 1, threads: int | None = None
     - a cylinder about Z: the smallest that all lines meet, or about their start points;
     - a box about their start points.
 
-    A field of 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and judged on the
-    others; see `Jury`. A surface replaces a simpler one if it leads by three standard errors of the difference. None is
+    A field of up to 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and judged on
+    the others; see `Jury`. A surface replaces a simpler one if it leads by three standard errors of the difference. None is
     chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off.
 
     Parameters
@@ -185,7 +201,8 @@ class _Search:
         everything = Sphere(centre=_triple(self.centre)).sized_for(rays).closed("radius")
         even = 1.0 / (4.0 * np.pi**2 * max(everything, self.least) ** 2)
         self.jury = Jury.of(rays, even, seed, threads)
-        self.scouts = Jury.of(probe_rays(rays, SCOUTS), even, seed, threads)
+        self.scouts = Jury.of(probe_rays(rays, SCOUTS), even, seed, threads, ENOUGH)
+        self.less = 0 if len(rays) >= MANY else 1
         self.most_unmet = MOST_UNMET + 1.0 - float(self.rays.flux.sum() / rays.flux.sum())
 
     def choice(self) -> SurfaceChoice:
@@ -200,7 +217,7 @@ class _Search:
             kinds += [[s for s in flats if isinstance(s, kind)] for kind in (Plane, Disk)]
             kinds += [self.hemispheres(z), self.domes(z)]
         kinds += filter(None, [self.spheres(), self.cylinders(), [Box().sized_for(self.rays)]])
-        finalists = self.finals([self.best(kind) for kind in kinds])
+        finalists = self.finals([self.best(kind, self.scouts, COARSE).surface for kind in kinds])
         able = [t for t in finalists if t.verdict.unmet <= self.most_unmet]
         winner = able[0]
         for challenger in able[1:]:
@@ -209,67 +226,75 @@ class _Search:
         table = _table(finalists, winner)
         return SurfaceChoice(winner.surface, table, depths, tuple(self.notes(winner, table, depths)))
 
-    def best(self, kind: Sequence[Surface]) -> _Tried:
+    def best(self, kind: Sequence[Surface], jury: Jury, grid: Grid) -> _Tried:
         """Of surfaces of one kind the best; of those that meet enough of the flux, if there are any."""
-        tried = [_Tried(surface, self.jury.judge(surface.parts(), LENDS[0])) for surface in kind]
+        verdicts = jury.judge_all([(surface.parts(), grid) for surface in kind])
+        tried = [_Tried(surface, verdict) for surface, verdict in zip(kind, verdicts, strict=True)]
         able = [t for t in tried if t.verdict.unmet <= self.most_unmet]
         return max(able or tried, key=lambda t: t.verdict.score.mean)
 
-    def finals(self, tried: list[_Tried]) -> list[_Tried]:
-        """The same surfaces, each in the shape of grid that suits it; but for the hopeless."""
-        enough = max(t.verdict.score.mean for t in tried) - HOPELESS
-        results = []
-        for t in tried:
-            others = LENDS[1:] if t.verdict.score.mean > enough else ()
-            verdicts = [t.verdict, *(self.jury.judge(t.surface.parts(), lend) for lend in others)]
-            results.append(_Tried(t.surface, max(verdicts, key=lambda v: v.score.mean)))
-        return results
+    def finals(self, surfaces: list[Surface]) -> list[_Tried]:
+        """The surfaces as the whole jury sees them, each on the grid that suits it; but for the hopeless."""
+
+        def judged(pairs: list[tuple[Surface, Grid]]) -> dict[tuple[Surface, Grid], Verdict]:
+            grids = [(surface.parts(), (place - self.less, turn - self.less)) for surface, (place, turn) in pairs]
+            return dict(zip(pairs, self.jury.judge_all(grids), strict=True))
+
+        seen = judged([(surface, grid) for surface in surfaces for grid in FINER])
+        best = {s: max(FINER, key=lambda grid: seen[s, grid].score.mean) for s in surfaces}
+        enough = max(verdict.score.mean for verdict in seen.values()) - HOPELESS
+        hopeful = [(s, grid) for s, grid in best.items() if seen[s, grid].score.mean > enough]
+        seen |= judged([(s, finer) for s, grid in hopeful for finer in FINER[grid]])
+        return [
+            _Tried(s, max((v for (t, _), v in seen.items() if t == s), key=lambda v: v.score.mean)) for s in surfaces
+        ]
 
     # --- depth ---------------------------------------------------------------------------------------------------------
 
     def depth(self) -> tuple[float, tuple[float, float]]:
-        """The simplest of the depths that are as good as any, and the range of those that are [mm].
+        """The simplest of the depths that are as good as any, and those next to it that are not [mm].
 
-        The sharpest is sought with nested rectangles, which fit any source well enough. Between it and simpler ones the
-        surfaces decide that would be chosen there.
+        Nested rectangles, which fit any source well enough, tell the scouts where it is about. There the rectangle or disk
+        decides that suits the source best: its own edge is what tells depths apart best.
         """
-        steps, seen = self.sharpest_depths()
-        sharpest = max(seen, key=lambda z: seen[z].score.mean)
-        alike = [z for z, verdict in seen.items() if not seen[sharpest].leads(verdict, LEAD)]
-        tried: dict[float, Verdict] = {}
-        if np.ptp(self.position[:, 2]) <= SLACK * self.radius:
-            start = float(self.position[0, 2])
-            tried[start] = self.best(self.flats(start)).verdict
-        flats = self.flats(sharpest)
-        for z in (*_rounder(sharpest, SHARP * FINE * steps, FINE * steps), sharpest):
-            # Of one size at all of them, so that depth alone is judged.
-            tried[z] = self.best([dataclasses.replace(flat, z=z) for flat in flats]).verdict
-        best = max(tried.values(), key=lambda v: v.score.mean)
-        z = next(z for z, verdict in tried.items() if not best.leads(verdict, LEAD))
-        return z, (min(*alike, z), max(*alike, z))
-
-    def sharpest_depths(self) -> tuple[float, dict[float, Verdict]]:
-        """The length of two steps [mm], and verdicts on depths about the sharpest.
-
-        It is sought among the scouts over the whole range, then by all of the jury.
-        """
-        near = np.arange(-1.0, 1.0 + STEP, STEP)
-        far = 2.0 ** np.arange(1, REACH + 1)
-        places = self.centre[2] + self.radius * np.concatenate([-far[::-1], near, far])
-        scores = [self.scouts.judge(self.nested(z), LENDS[0]).score.mean for z in places]
-        at = int(np.clip(np.argmax(scores), 1, len(places) - 2))
-        low, high = float(places[at - 1]), float(places[at + 1])
-        steps = high - low
-        margin = SHARP * FINE * steps
-        about = _golden(lambda z: self.scouts.judge(self.nested(z), LENDS[0]).score.mean, low, high, margin)
+        about, steps = self.about()
+        flats = {f: self.flat(*f, about, self.few) for f in FLATS}
+        kind, within = max(flats, key=lambda f: self.scouts.judge(flats[f].parts(), COARSE).score.mean)
         seen: dict[float, Verdict] = {}
 
         def score(z: float) -> float:
-            seen[z] = self.jury.judge(self.nested(z), LENDS[0])
+            grid = (SHARP[0] - self.less, SHARP[1] - self.less)
+            seen[z] = self.jury.judge(self.flat(kind, within, z, self.few).parts(), grid)
             return seen[z].score.mean
 
-        _golden(score, about - margin, about + margin, FINE * steps)
-        return steps, seen
+        _golden(score, about - NEAR * steps, about + NEAR * steps, FINE * steps)
+        sharpest = max(seen, key=lambda z: seen[z].score.mean)
+        simple = _rounder(sharpest, NEAR * steps, FINE * steps)
+        if np.ptp(self.position[:, 2]) <= SLACK * self.radius:
+            simple.insert(0, float(self.position[0, 2]))
+        for z in simple:
+            score(z)
+            if not seen[sharpest].leads(seen[z], LEAD):
+                break
+        else:
+            z = sharpest
+        alike = [z for z, verdict in seen.items() if not seen[sharpest].leads(verdict, LEAD)]
+        below, above = [z for z in seen if z < min(alike)], [z for z in seen if z > max(alike)]
+        return z, (max(below, default=min(alike)), min(above, default=max(alike)))
+
+    def about(self) -> tuple[float, float]:
+        """About where the source is sharpest, and the length of two steps [mm]: to the scouts, over the whole range."""
+        near = np.arange(-1.0, 1.0 + STEP, STEP)
+        far = 2.0 ** np.arange(1, REACH + 1)
+        places = self.centre[2] + self.radius * np.concatenate([-far[::-1], near, far])
+        verdicts = self.scouts.judge_all([(self.nested(z), COARSE) for z in places])
+        at = int(np.clip(np.argmax([verdict.score.mean for verdict in verdicts]), 1, len(places) - 2))
+        low, high = float(places[at - 1]), float(places[at + 1])
+
+        def score(z: float) -> float:
+            return self.scouts.judge(self.nested(z), COARSE).score.mean
+
+        return _golden(score, low, high, NEAR * (high - low)), high - low
 
     def nested(self, z: float) -> tuple[Part, ...]:
         """Rectangles at a depth, each within the next, the smallest first; by some of the rays."""
@@ -280,21 +305,21 @@ class _Search:
 
     def flats(self, z: float) -> list[Plane | Disk]:
         """Rectangles and disks at a depth, for all rays and for those that cross it within the ball."""
-        flats: list[Plane | Disk] = []
-        for some in (self.rays, *self.within_ball(z)):
-            part = Plane(z=z).sized_for(some).parts()[0]
-            (x, y, _), (width, height) = part.centre, (max(length, self.least) for length in part.size)
-            disk = Disk(z=z, centre=(x, y)).sized_for(some)
-            flats += [Plane(z, width, height, (x, y)), Disk(max(disk.closed("radius"), self.least), z, (x, y))]
-        return flats
+        return list(dict.fromkeys(self.flat(kind, within, z, self.rays) for kind, within in FLATS))
 
-    def within_ball(self, z: float) -> Iterator[RaySet]:
-        """The rays that cross a depth no farther from the axis of the ball than its radius, if there are others."""
-        near = np.zeros(len(self.position), np.bool_)
-        distance = np.hypot(*(_crossings(self.rays, z) - self.centre[:2]).T)
-        near[self.up] = distance <= self.radius * (1 + SLACK)
-        if 0 < np.count_nonzero(near) < len(distance):
-            yield _some(self.rays, near)
+    def flat(self, kind: type[Plane | Disk], within: bool, z: float, rays: RaySet) -> Plane | Disk:
+        """The smallest rectangle or disk at a depth for some rays, or for those of them that cross it within the ball."""
+        if within:
+            up = rays.direction[:, 2] > 0
+            near = np.hypot(*(_crossings(rays, z) - self.centre[:2]).T) <= self.radius * (1 + SLACK)
+            if near.any():
+                up[up] = near
+                rays = _some(rays, up)
+        part = Plane(z=z).sized_for(rays).parts()[0]
+        (x, y, _), (width, height) = part.centre, (max(length, self.least) for length in part.size)
+        if kind is Plane:
+            return Plane(z, width, height, (x, y))
+        return Disk(max(Disk(z=z, centre=(x, y)).sized_for(rays).closed("radius"), self.least), z, (x, y))
 
     def centres(self) -> list[FloatArray]:
         """Of the ball, and of the sphere on which the rays start, if they do."""
@@ -306,9 +331,26 @@ class _Search:
         return dataclasses.replace(sphere, radius=max(sphere.closed("radius"), self.least))
 
     def hemispheres(self, z: float) -> list[Surface]:
-        """As small as the rays allow, also with its rim at a depth."""
-        spheres = [self.sphere(c) for c in (*self.centres(), np.array([*self.centre[:2], z]))]
+        """As small as the rays allow, also with the rim at a depth, and where few lines leave below it."""
+        centres = [*self.centres(), *(np.array([*self.centre[:2], rim]) for rim in (z, self.rim()))]
+        spheres = [self.sphere(c) for c in centres]
         return [Hemisphere(sphere.radius, sphere.centre) for sphere in spheres]
+
+    def rim(self) -> float:
+        """The height near the ball's centre at which the least flux leaves a hemisphere through its floor [mm].
+
+        Of a hemisphere the height of the smallest ball is ill-defined: only lines that graze the rim hold it.
+        """
+        offset, k, flux = self.few.position - self.centre, self.few.direction, self.few.flux
+
+        def kept(height: float) -> float:
+            x = offset - (0.0, 0.0, height)
+            middle = -np.sum(x * k, axis=1)
+            near = np.sum(x**2, axis=1) - middle**2
+            leaves = x[:, 2] + (middle + np.sqrt(near.max() - near)) * k[:, 2]
+            return float(flux[leaves >= 0.0].sum())
+
+        return float(self.centre[2]) + _golden(kept, -STEP * self.radius, STEP * self.radius, FINE * STEP * self.radius)
 
     def spheres(self) -> list[Surface]:
         """As small as the rays allow."""
@@ -346,7 +388,7 @@ class _Search:
             f"better than others by so many nat per ray: {others}"
         )
         if depths is not None and isinstance(winner.surface, Plane | Disk | Dome):
-            yield f"depths from {depths[0]:.6g} to {depths[1]:.6g} mm cannot be told from that of {winner.surface.spec}"
+            yield f"depths between {depths[0]:.6g} and {depths[1]:.6g} mm cannot be told from that of {winner.surface.spec}"
         mean = np.average(self.direction, weights=self.rays.flux, axis=0)
         if np.linalg.norm(mean) > ASLANT and mean[2] < ASLANT * np.linalg.norm(mean):
             x, y, z = mean / np.linalg.norm(mean)

@@ -98,6 +98,8 @@ class EtendueCounts:
         Flux of the latter [flux unit].
     tally : Tally
         The flux account of all rays.
+    images : int
+        How often each ray is counted: once for each image under a symmetry, itself included.
     """
 
     surface: Surface
@@ -109,6 +111,7 @@ class EtendueCounts:
     unmet_rays: int
     unmet_flux: float
     tally: Tally
+    images: int = 1
 
     def __getitem__(self, fold: Fold) -> tuple[PartCounts, ...]:
         return self.folds[fold]

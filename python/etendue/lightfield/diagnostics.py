@@ -138,7 +138,6 @@ def diagnose(
     field: LightField,
     rays: RayStream | None = None,
     *,
-    symmetry: str = "none",
     spots: int = 12,
     seed: int = 1,
     threads: int | None = None,
@@ -152,8 +151,6 @@ def diagnose(
         Any.
     rays : RayStream, optional
         The rays it was fitted to; without them nothing can be said about more rays.
-    symmetry : str
-        That of the fit, as `LightField.fit` takes it: fits to parts of the rays use it, too.
     spots : int
         How many places and directions of least certainty are named.
     seed : int
@@ -167,8 +164,6 @@ def diagnose(
     ------
     ArgumentError
         If `spots` is below 0, or the rays are not those of the fit, or fewer than 4000.
-    UnknownNameError
-        If there is no such symmetry.
 
     Examples
     --------
@@ -189,7 +184,7 @@ def diagnose(
     threads = checked_threads(threads)
     learning = None
     if rays is not None:
-        learning = learning_curve(field, rays, symmetry=symmetry, seed=seed, threads=threads, progress=progress)
+        learning = learning_curve(field, rays, seed=seed, threads=threads, progress=progress)
     fluxes = field.part_flux
     flux = math.fsum(fluxes)
     losses = [share / flux * _losses(part) for part, share in zip(field.parts, fluxes, strict=True)]

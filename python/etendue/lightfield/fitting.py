@@ -82,7 +82,7 @@ def fit_light_field(
     if symmetry != "none":
         counts = fold(counts, symmetry)
     field = fit_counts(rays, counts, plan, seed, threads)
-    return field.replace(notes=(*notes, *field.notes))
+    return field.replace(notes=(*notes, *field.notes), report=dataclasses.replace(field.report, symmetry=symmetry))
 
 
 def default_bits(rays: int) -> int:
@@ -189,7 +189,7 @@ def _calibrated(counts: EtendueCounts, candidate: Candidate, seed: int, threads:
             yield tree
             continue
         shares = calibrate(chart, part, base, tree, concentration, seed, threads)
-        deviation = np.sqrt(shares.deviation**2 + tree.ratio**2 / part.grid.rays)
+        deviation = np.sqrt(shares.deviation**2 + tree.ratio**2 * counts.images / part.grid.rays)
         yield dataclasses.replace(tree, deviation=deviation)
 
 

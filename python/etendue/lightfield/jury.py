@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +19,13 @@ from etendue.lightfield.surfaces import Part
 from etendue.lightfield.trees import Base, grow
 from etendue.quantities.ray_set import RaySet
 
+Grid = tuple[int, int]
+
 FOLDS = 5
 """One ray in so many is held out; of a small set each once, in turn."""
 
 MANY = 1 << 15
-"""Rays from which on one fold is enough."""
+"""Rays from which on one fold is enough to tell surfaces apart."""
 
 SLIGHT = 1e-3
 """A lead [nat] that no map shows, however sure."""
@@ -72,6 +75,8 @@ class Jury:
     seed : int
         Of the dealing.
     threads : int or None
+    many : int
+        Rays from which on one fold is enough.
     """
 
     position: FloatArray
@@ -80,39 +85,40 @@ class Jury:
     even: float
     seed: int
     threads: int | None
+    many: int = MANY
 
     @classmethod
-    def of(cls, rays: RaySet, even: float, seed: int, threads: int | None) -> Jury:
+    def of(cls, rays: RaySet, even: float, seed: int, threads: int | None, many: int = MANY) -> Jury:
         """A jury of all rays of a set."""
         # Against the largest, so that no square of a flux overflows.
-        return cls(rays.position, rays.direction, rays.flux / rays.flux.max(), even, seed, threads)
-
-    @property
-    def depth(self) -> int:
-        """Halvings of each of the four coordinates."""
-        return 4 if len(self.flux) > 2 * MANY else 3
+        return cls(rays.position, rays.direction, rays.flux / rays.flux.max(), even, seed, threads, many)
 
     @functools.cached_property
     def fold(self) -> npt.NDArray[np.int64]:
         """In which fold each ray is held out."""
         return np.random.default_rng(self.seed).permutation(len(self.flux)) % FOLDS
 
-    def judge(self, parts: Sequence[Part], lend: int = 0) -> Verdict:
+    def judge_all(self, surfaces: Sequence[tuple[Sequence[Part], Grid]]) -> list[Verdict]:
+        """The verdict on each of several surfaces, each on its grid; see `judge`."""
+        with ThreadPoolExecutor(self.threads) as pool:
+            return list(pool.map(lambda both: self.judge(*both), surfaces))
+
+    def judge(self, parts: Sequence[Part], grid: Grid) -> Verdict:
         """The verdict on a surface of these parts.
 
         Parameters
         ----------
         parts : sequence of Part
             In the order in which a ray is offered to them.
-        lend : int
-            Halvings per coordinate that the direction lends to the place.
+        grid : tuple of int
+            Halvings of each coordinate of the place, and of each of the direction.
         """
         owner, coordinates = _core.cross_parts([part.core() for part in parts], self.position, self.direction)
-        shape = (1 << self.depth + lend,) * 2 + (1 << self.depth - lend,) * 2
+        shape = (1 << grid[0],) * 2 + (1 << grid[1],) * 2
         cell = np.zeros(len(owner), np.intp)
         for axis, n in enumerate(shape):
             cell = cell * n + np.minimum((coordinates[:, axis] * n).astype(np.intp), n - 1)
-        turns = range(1 if len(owner) >= MANY else FOLDS)
+        turns = range(1 if len(owner) >= self.many else FOLDS)
         values = [self._held_out(parts, owner, cell, shape, self.fold == turn) for turn in turns]
         weights = [self.flux[self.fold == turn] for turn in turns]
         unmet = float(self.flux[owner < 0].sum() / self.flux.sum())
@@ -137,7 +143,7 @@ class Jury:
         density = np.zeros(int(out.sum()))
         if fields:
             # Where a line leaves two parts, both shine along it.
-            light = _core.LightField(fields).luminance(self.position[out], self.direction[out], self.threads)[0]
+            light = _core.LightField(fields).luminance(self.position[out], self.direction[out], 1)[0]
             density = light / met
         values: FloatArray = np.log((1.0 - unmet) * density + unmet * self.even)
         return values
@@ -152,7 +158,7 @@ class Jury:
         else:
             first, second = (np.bincount(cell, w, n).reshape(shape).astype(np.float64) for w in (flux, flux**2))
             sums = Sums(first, second)
-        ratio = grow(sums, Base(), CONCENTRATION, self.threads).ratio.astype(np.float32)
+        ratio = grow(sums, Base(), CONCENTRATION, 1).ratio.astype(np.float32)
         unit = PartField(ratio, np.zeros_like(ratio), None, None, 1.0)
         integral = _core.LightField([core_part(part.core(), unit)]).flux()[0]
         return core_part(part.core(), dataclasses.replace(unit, level=float(flux.sum()) / integral))

@@ -24,7 +24,7 @@ from etendue.lightfield.counting import EtendueCounts, FloatArray, count_rays
 from etendue.lightfield.fitting import fine_depths
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.probe import probe_rays
-from etendue.lightfield.symmetry import fold, proven_symmetry
+from etendue.lightfield.symmetry import fold
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, checked_threads
 
@@ -148,14 +148,13 @@ def learning_curve(
     field: LightField,
     rays: RayStream,
     *,
-    symmetry: str = "none",
     seed: int = 1,
     threads: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> LearningCurve:
     """Fit the field again to an eighth, a quarter and half of its rays, and judge each fit on the other half.
 
-    Surface, grid, base measure and concentrations stay as they are.
+    Surface, grid, symmetry, base measure and concentrations stay as they are.
 
     Parameters
     ----------
@@ -163,8 +162,6 @@ def learning_curve(
         What was fitted to the rays.
     rays : RayStream
         The rays it was fitted to; of more than 4 million, 4 million are used.
-    symmetry : str
-        That of the fit, as `LightField.fit` takes it.
     seed : int
         Deals the rays into parts.
     threads : int, optional
@@ -176,8 +173,6 @@ def learning_curve(
     ------
     ArgumentError
         If there are fewer than 4000 rays, or fewer than the field was fitted to.
-    UnknownNameError
-        If there is no such symmetry.
     """
     threads = checked_threads(threads)
     if len(rays) < field.report.rays:
@@ -187,8 +182,6 @@ def learning_curve(
     some = probe_rays(rays, MOST_RAYS)
     if len(some) < FEWEST_RAYS:
         raise ArgumentError(f"{len(some):,} rays are too few to learn what more would bring; {FEWEST_RAYS:,} are not.")
-    if symmetry == "auto":
-        symmetry = proven_symmetry(_count(field, some, seed, threads))
     part = _core.deal_parts(0, len(some), PARTS, seed)
     half = part // (PARTS // 2)
     scores: list[list[Score]] = []
@@ -197,7 +190,7 @@ def learning_curve(
         rungs = []
         for parts in RUNGS:
             mine = _some(some, (half == fitted) & (part % (PARTS // 2) < parts))
-            again = _refit(field, _count(field, mine, seed, threads), symmetry, threads)
+            again = _refit(field, _count(field, mine, seed, threads), threads)
             rungs.append(_score(again, judges, threads))
             if progress is not None:
                 progress(len(scores) * len(RUNGS) + len(rungs))
@@ -249,10 +242,10 @@ def _count(field: LightField, rays: RaySet, seed: int, threads: int | None) -> E
     return count_rays(rays, field.surface, (s1, s2, a, b), fine, held_out=0.0, seed=seed, threads=threads)
 
 
-def _refit(field: LightField, counts: EtendueCounts, symmetry: str, threads: int | None) -> LightField:
+def _refit(field: LightField, counts: EtendueCounts, threads: int | None) -> LightField:
     """The field of other rays, with everything chosen as it was for this one, and a flux of 1."""
-    if symmetry != "none":
-        counts = fold(counts, symmetry)
+    if field.report.symmetry != "none":
+        counts = fold(counts, field.report.symmetry)
     everything = counts["all"]
     product = "product" in field.report.bases
     bases = product_bases(everything, careful_density(threads), threads) if product else uniform_bases(everything)

@@ -77,6 +77,8 @@ class FitReport:
         That of the equal-étendue histogram of the fitted rays, mixed with 1e-4 of a uniform field, on the same rays.
     effective_cells : float
         Effective degrees of freedom: how many free cells would be as uncertain as the field is.
+    symmetry : str
+        What the field was folded by: ``"none"``, or the symmetry that was stated or borne out by the rays.
     """
 
     rays: int
@@ -89,6 +91,7 @@ class FitReport:
     score_error: float
     histogram_score: float
     effective_cells: float
+    symmetry: str = "none"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

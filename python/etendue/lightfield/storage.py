@@ -25,6 +25,7 @@ from etendue.lightfield.counting import MOST_CELLS, FloatArray
 from etendue.lightfield.light_field import FitReport, LightField, PartField
 from etendue.lightfield.rounding import digits_for, rounded
 from etendue.lightfield.surfaces import SURFACES, Part, Surface
+from etendue.lightfield.symmetry import SYMMETRIES
 from etendue.quantities.provenance import Provenance
 from etendue.units import LUMINANCE_UNIT, FluxUnit
 
@@ -287,7 +288,13 @@ def _report(group: _Node) -> FitReport:
         tuple[str, ...]: group.texts,
         tuple[float, ...]: lambda name: tuple(group.numbers(name, None).tolist()),
     }
-    return FitReport(**{name: readers[hint](name) for name, hint in get_type_hints(FitReport).items()})
+    hints = get_type_hints(FitReport)
+    if "symmetry" not in group.node.attrs:  # files of before it was kept
+        del hints["symmetry"]
+    report = FitReport(**{name: readers[hint](name) for name, hint in hints.items()})
+    if report.symmetry not in {"none", *SYMMETRIES}:
+        raise group.error("attribute 'symmetry'", f"{report.symmetry!r} is none of {', '.join(SYMMETRIES)}", DAMAGED)
+    return report
 
 
 def _provenance(file: _Node) -> Provenance:

@@ -89,7 +89,10 @@ def fold(counts: EtendueCounts, symmetry: str) -> EtendueCounts:
         name: tuple(PartCounts(*(s.map(together) for s in (p.grid, p.space, p.direction))) for p in parts)
         for name, parts in counts.folds.items()
     }
-    return dataclasses.replace(counts, folds=folds, flux_per_weight=counts.flux_per_weight / (len(images) + 1))
+    times = len(images) + 1
+    return dataclasses.replace(
+        counts, folds=folds, flux_per_weight=counts.flux_per_weight / times, images=counts.images * times
+    )
 
 
 def proven_symmetry(counts: EtendueCounts) -> str:
