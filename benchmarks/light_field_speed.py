@@ -18,7 +18,7 @@ from typing import Any
 import etendue as et
 import numpy as np
 from cone_maps import best
-from etendue.lightfield.candidate import careful_density, grow_candidate, product_bases, uniform_bases
+from etendue.lightfield.candidate import grow_candidate, product_bases, uniform_bases
 from etendue.lightfield.counting import EtendueCounts, count_rays
 from etendue.lightfield.fitting import fine_depths
 from etendue.lightfield.light_field import LightField, PartField
@@ -107,7 +107,7 @@ def counting(radii: tuple[float, ...], flux: tuple[float, ...], rays: int, repea
 def growing(counts: EtendueCounts, repeats: int) -> None:
     """The tree of 32⁴ cells, from counts: posterior and evidence."""
     grid = counts["all"][0].grid
-    for base in (*uniform_bases(counts["all"]), *product_bases(counts["all"], careful_density(None), None)):
+    for base in (*uniform_bases(counts["all"]), *product_bases(counts["all"], None)):
         for threads, cores in CORES:
             for title, job in (("posterior", grow), ("evidence alone", log_evidence)):
                 seconds = best(lambda job=job, base=base, threads=threads: job(grid, base, 10.0, threads), repeats)
@@ -184,7 +184,7 @@ def drawing(counts: EtendueCounts, fitted: LightField, rays: int, repeats: int) 
     """Rays drawn from fields of either base, and the bytes of their files."""
     candidates = (
         (uniform_bases(counts["all"]), 3.0),
-        (product_bases(counts["all"], careful_density(None), None), 30.0),
+        (product_bases(counts["all"], None), 30.0),
     )
     for bases, concentration in candidates:
         grown = grow_candidate(counts, "all", bases, [concentration] * len(bases), None)

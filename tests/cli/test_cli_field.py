@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,8 @@ from etendue.cli import field as field_verbs
 from etendue.cli import fit as fit_verb
 from etendue.cli import main
 from etendue.cli import sample as sample_verb
-from etendue.lightfield import candidate
-from etendue.lightfield.counting import Sums
 from etendue.lightfield.diagnostics import diagnose
 from etendue.lightfield.surfaces import Disk, Plane
-from etendue.lightfield.trees import Base, grow
 from oracles.light_fields import SURFACES, make_field
 from oracles.sources import LimbDarkenedDisk
 
@@ -43,19 +40,6 @@ class Outcome:
 
 
 Run = Callable[..., Outcome]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _rough_factors() -> Iterator[None]:
-    """The factors of product bases by a single tree: what a verb prints does not hang on how smooth they are."""
-
-    def smooth(weight: Array, squared: Array, *, shifts: int, threads: int | None) -> Array:
-        del shifts
-        return grow(Sums(weight, squared), Base(), 1.0, threads).ratio
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(candidate, "smooth_mass", smooth)
-        yield
 
 
 @pytest.fixture

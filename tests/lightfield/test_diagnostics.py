@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import json
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import etendue as et
@@ -17,12 +16,10 @@ from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield import candidate, learning
 from etendue.lightfield.characteristic import CharacteristicCurve, characteristic_curve
-from etendue.lightfield.counting import Sums
 from etendue.lightfield.diagnostics import _loss_of_gamma, diagnose
 from etendue.lightfield.learning import EXPONENTS, REFITS, LearningCurve, law_of_gains, learning_curve
 from etendue.lightfield.light_field import FitReport, LightField, PartField
 from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Hemisphere, Plane, Surface
-from etendue.lightfield.trees import Base, grow
 from etendue.plot.characteristic_picture import plot_characteristic
 from oracles.light_fields import SURFACES, make_field
 from oracles.sources import DieUnderDome, LimbDarkenedDisk
@@ -36,19 +33,6 @@ WHOLE = math.pi * 6.0
 """Étendue of the plane [mm² sr]."""
 
 SIGNIFICANCE = 1e-3
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _rough_factors() -> Iterator[None]:
-    """The factors of product bases by a single tree: the diagnostics do not hang on how smooth they are."""
-
-    def smooth(weight: Array, squared: Array, *, shifts: int, threads: int | None) -> Array:
-        del shifts
-        return grow(Sums(weight, squared), Base(), 1.0, threads).ratio
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(candidate, "smooth_mass", smooth)
-        yield
 
 
 def field_of(surface: Surface, *parts: PartField, report: FitReport = REPORT) -> LightField:

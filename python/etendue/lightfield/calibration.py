@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.lightfield.candidate import careful_density, product_bases, unit_field
+from etendue.lightfield.candidate import product_bases, unit_field
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.light_field import core_part
 from etendue.lightfield.surfaces import Part
@@ -59,7 +59,7 @@ def calibrate(
     found = _masses(counts.grid, base, tree, threads)
     known, known_base = _elsewhere(counts, base, concentration, threads)
     drawn = _draw(known, counts, known_base, seed)
-    again = base if base.name == "uniform" else product_bases([drawn], careful_density(threads), threads)[0]
+    again = base if base.name == "uniform" else product_bases([drawn], threads)[0]
     second = grow_averaged(drawn.grid, again, concentration, threads)
     retried = _masses(drawn.grid, again, second, threads)
     shown = _shown(chart, again, second, threads)
@@ -100,7 +100,7 @@ def _elsewhere(counts: PartCounts, base: Base, concentration: float, threads: in
             sums.map(np.roll, _fine_steps(s, n, sums.weight.shape[0]), (0, 1))
             for sums, s, n in ((counts.space, shift[:2], shape[:2]), (counts.direction, shift[2:], shape[2:]))
         ]
-        there = product_bases([PartCounts(counts.grid, *fine)], careful_density(threads), threads)[0]
+        there = product_bases([PartCounts(counts.grid, *fine)], threads)[0]
         moved = there.rolled(tuple(-s for s in shift), shape)
     tree = grow_moved(counts.grid, moved, shift, concentration, threads)
     mass = tree.ratio * moved.cells(shape)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,8 +11,7 @@ from etendue import _core
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
 from etendue.lightfield.light_field import PartField, core_part
 from etendue.lightfield.nodes import node_values
-from etendue.lightfield.smoothing import smooth_mass
-from etendue.lightfield.trees import POSITIONS, Base, Tree, grow, grow_averaged, log_evidence
+from etendue.lightfield.trees import POSITIONS, Base, Tree, grow_averaged, log_evidence
 
 CONCENTRATIONS = {"uniform": (1.0, 3.0, 10.0), "product": (10.0, 30.0, 100.0)}
 """Concentrations c among which the evidence chooses, by base measure: one that was taken from the data is believed more."""
@@ -23,10 +22,8 @@ FLOOR = 1e-3
 MIXED_IN = 1e-4
 """Share of a uniform field in every score, so that one cell that is wrongly dark cannot decide it."""
 
-SHIFTS = 4
-"""Grid positions over which the factors of a product base are averaged."""
-
-Smoother = Callable[[Sums], FloatArray]
+FINE_POSITIONS = tuple((k * 0.754_877_666 % 1.0, k * 0.569_840_291 % 1.0) for k in range(16))
+"""Positions of the fine grids over which the factors of a product base are averaged: evenly spread, [Roberts2018]_."""
 
 
 def uniform_bases(counts: Sequence[PartCounts]) -> tuple[Base, ...]:
@@ -34,40 +31,20 @@ def uniform_bases(counts: Sequence[PartCounts]) -> tuple[Base, ...]:
     return tuple(Base() for _ in counts)
 
 
-def product_bases(counts: Sequence[PartCounts], smoother: Smoother, threads: int | None) -> tuple[Base, ...]:
+def product_bases(counts: Sequence[PartCounts], threads: int | None) -> tuple[Base, ...]:
     """Exitance times intensity: what the fine counts over place and over direction tell, each by itself.
 
-    The place, which people look at, is smoothed by `smoother`; over directions a tree will do.
+    Either is a tree of its own, averaged over positions of the fine grid.
     """
 
-    def density(mass: FloatArray) -> FloatArray:
-        lifted: FloatArray = mass * ((1.0 - FLOOR) * mass.size / mass.sum()) + FLOOR
+    def density(sums: Sums) -> FloatArray:
+        found = grow_averaged(sums, Base(), 1.0, threads, FINE_POSITIONS).ratio
+        lifted: FloatArray = found * (1.0 - FLOOR) + FLOOR
         return lifted
 
-    rough = quick_density(threads)
     return tuple(
-        Base(density(smoother(part.space)), density(rough(part.direction))) if part.space.rays > 0 else Base()
-        for part in counts
+        Base(density(part.space), density(part.direction)) if part.space.rays > 0 else Base() for part in counts
     )
-
-
-def quick_density(threads: int | None) -> Smoother:
-    """A two-dimensional tree on the counts as they lie: rough at its dyadic edges, and done in a moment."""
-
-    def smooth(sums: Sums) -> FloatArray:
-        return grow(sums, Base(), 1.0, threads).ratio
-
-    return smooth
-
-
-def careful_density(threads: int | None) -> Smoother:
-    """The denoiser of luminance maps; see `smooth_counts`."""
-
-    def smooth(sums: Sums) -> FloatArray:
-        squared = sums.weight if sums.squared is None else sums.squared
-        return smooth_mass(sums.weight, squared, shifts=SHIFTS, threads=threads)
-
-    return smooth
 
 
 def unit_field(base: Base, tree: Tree) -> PartField:

@@ -14,11 +14,9 @@ from etendue.lightfield.calibration import calibrate
 from etendue.lightfield.candidate import (
     Candidate,
     Score,
-    careful_density,
     choose_concentrations,
     grow_candidate,
     product_bases,
-    quick_density,
     score_densities,
     uniform_bases,
 )
@@ -111,7 +109,7 @@ def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: in
     counts = count_rays(some, surface, options[0], fine, seed=seed, threads=threads)
     bases = {
         "uniform": uniform_bases(counts["fitted"]),
-        "product": product_bases(counts["fitted"], quick_density(threads), threads),
+        "product": product_bases(counts["fitted"], threads),
     }
     concentrations = {name: choose_concentrations(counts["fitted"], b, threads) for name, b in bases.items()}
 
@@ -142,19 +140,16 @@ def _depths(bits: int, lend: int) -> Depths:
 
 def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, threads: int | None) -> LightField:
     """The field of counted rays: base measures compared on the held-out rays, the better one grown on all."""
-    density = careful_density(threads)
     candidates: list[tuple[Candidate, Score]] = []
     for name in ("uniform", "product"):
-        bases = (
-            uniform_bases(counts["fitted"]) if name == "uniform" else product_bases(counts["fitted"], density, threads)
-        )
+        bases = uniform_bases(counts["fitted"]) if name == "uniform" else product_bases(counts["fitted"], threads)
         candidate = grow_candidate(counts, "fitted", bases, plan.concentrations[name], threads, POSITIONS[:1])
         candidates.append((candidate, candidate.score(counts)))
     (plain, plain_score), (elaborate, elaborate_score) = candidates
     lead, error = elaborate_score.lead(plain_score)
     taken, score = (elaborate, elaborate_score) if lead > LEAD * error else (plain, plain_score)
     name = taken.base_name
-    bases = uniform_bases(counts["all"]) if name == "uniform" else product_bases(counts["all"], density, threads)
+    bases = uniform_bases(counts["all"]) if name == "uniform" else product_bases(counts["all"], threads)
     final = grow_candidate(counts, "all", bases, plan.concentrations[name], threads)
     final = dataclasses.replace(final, trees=tuple(_calibrated(counts, final, seed, threads)))
     histogram = score_densities(counts, _histogram(counts))

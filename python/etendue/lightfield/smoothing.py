@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.lightfield.image_errors import variance_of_mixture
-from etendue.lightfield.image_estimates import Estimates, Estimator, ray_quantum
-from etendue.lightfield.image_mixture import Mixture, cross_fitted_mixture
+from etendue.lightfield.image_estimates import Estimator, ray_quantum
+from etendue.lightfield.image_mixture import cross_fitted_mixture
 from etendue.lightfield.shifted_trees import ShiftedTrees
 from etendue.quantities.ray_stream import checked_threads
 
@@ -121,36 +121,14 @@ def smooth_counts(
     return Smoothed(mass=mass * scale, standard_error=np.sqrt(variance) * scale, notes=notes)
 
 
-def smooth_mass(weight: Array, weight_squared: Array, *, shifts: int, threads: int | None) -> Array:
-    """The mass of `smooth_counts` on cells of equal measure, without its errors, which cost most of the time."""
-    unit = float(weight_squared.sum()) / float(weight.sum())
-    rays, rays_squared, measure = weight / unit, weight_squared / unit**2, np.ones_like(weight)
-    with ThreadPoolExecutor(checked_threads(threads) or os.cpu_count() or 1) as pool:
-        trees = ShiftedTrees(measure)
-        trees.choose_concentration(rays, rays_squared, pool)
-        if min(measure.shape) < LEAST_SIDE or rays.sum() < FEWEST_RAYS:
-            mass = trees.average(rays, rays_squared, shifts, pool).mass
-        else:
-            mass = _mixture(trees, rays, rays_squared, measure, shifts, pool)[0]
-    scaled: Array = mass * (float(weight.sum()) / mass.sum())
-    return scaled
-
-
-def _mixture(
-    trees: ShiftedTrees, rays: Array, rays_squared: Array, measure: Array, shifts: int, pool: Executor
-) -> tuple[Array, Estimator, Estimates, Mixture]:
-    """Mass, and what it was mixed from."""
-    estimator = Estimator(trees, measure, ray_quantum(rays, rays_squared))
-    estimates = estimator(rays, rays_squared, shifts, pool)
-    mixture = cross_fitted_mixture(estimator, rays, rays_squared, max(1, shifts // 4), pool)
-    return mixture.mass(estimates, float(rays.sum())), estimator, estimates, mixture
-
-
 def _mixed(
     trees: ShiftedTrees, rays: Array, rays_squared: Array, measure: Array, shifts: int, pool: Executor
 ) -> tuple[Array, Array, tuple[str, ...]]:
     """Mass, its variance given the total, and notes."""
-    mass, estimator, estimates, mixture = _mixture(trees, rays, rays_squared, measure, shifts, pool)
+    estimator = Estimator(trees, measure, ray_quantum(rays, rays_squared))
+    estimates = estimator(rays, rays_squared, shifts, pool)
+    mixture = cross_fitted_mixture(estimator, rays, rays_squared, max(1, shifts // 4), pool)
+    mass = mixture.mass(estimates, float(rays.sum()))
     variance = variance_of_mixture(estimator, estimates, mixture, mass, shifts, pool)
     tree, edges, rings = (mixture.shares * mass).sum(axis=(1, 2)) / mass.sum()
     what = (
