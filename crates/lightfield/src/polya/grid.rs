@@ -14,6 +14,12 @@ pub(super) struct Level {
     pub halvings: Vec<u32>,
     /// Number of boxes.
     pub boxes: usize,
+    /// Halvings in all: boxes of one layer are halved into boxes of the next.
+    pub layer: usize,
+    /// Where the boxes begin in an array over all boxes of the layer.
+    pub start: usize,
+    /// Where the splits begin in an array over all splits of all boxes of the layer, split by split.
+    pub splits_start: usize,
     /// The ways to halve these boxes once more; the neighbour is the finer level.
     pub splits: Vec<Step>,
     /// The ways in which these boxes are halves; the neighbour is the coarser level.
@@ -42,9 +48,16 @@ impl Grid {
         if depths.is_empty() || boxes > 2.0_f64.powi(34) {
             return None;
         }
-        let levels = (0..depths.iter().map(|d| *d as usize + 1).product())
+        let mut levels: Vec<Level> = (0..depths.iter().map(|d| *d as usize + 1).product())
             .map(|id| Level::new(&depths, id))
             .collect();
+        let mut ends = vec![(0, 0); depths.iter().sum::<u32>() as usize + 1];
+        for level in &mut levels {
+            let (boxes, splits) = &mut ends[level.layer];
+            (level.start, level.splits_start) = (*boxes, *splits);
+            *boxes += level.boxes;
+            *splits += level.boxes * level.splits.len();
+        }
         Some(Self { depths, levels })
     }
 
@@ -69,11 +82,11 @@ impl Grid {
         self.levels.len() - 1
     }
 
-    /// Level numbers by number of halvings: boxes of layer s are halved into boxes of layer s + 1.
+    /// Level numbers by layer, in the order in which they lie in the layer's arrays.
     pub(super) fn layers(&self) -> Vec<Vec<usize>> {
         let mut layers = vec![Vec::new(); self.depths.iter().sum::<u32>() as usize + 1];
         for (id, level) in self.levels.iter().enumerate() {
-            layers[level.halvings.iter().sum::<u32>() as usize].push(id);
+            layers[level.layer].push(id);
         }
         layers
     }
@@ -105,10 +118,25 @@ impl Level {
         }
         Self {
             boxes: block,
+            layer: halvings.iter().sum::<u32>() as usize,
+            start: 0,
+            splits_start: 0,
             halvings,
             splits,
             origins,
         }
+    }
+}
+
+impl Level {
+    /// The level's boxes in an array over its layer.
+    pub fn of<'a, T>(&self, layer: &'a [T]) -> &'a [T] {
+        &layer[self.start..self.start + self.boxes]
+    }
+
+    /// The level's numbers for one of its splits, in an array over the splits of its layer.
+    pub fn of_split<'a, T>(&self, layer: &'a [T], split: usize) -> &'a [T] {
+        &layer[self.splits_start + split * self.boxes..][..self.boxes]
     }
 }
 

@@ -6,7 +6,9 @@
 //! with its posterior probability, and no bin width is ever chosen. `[WongMa2010]`, `[Hutter2005]`; theory eqs. 29 to 32.
 //!
 //! `grid`: the lattice of boxes. `base`: what the tree falls back on. `kernel`: the arithmetic. `tree`: the sweeps.
+//! `array`: their memory.
 
+mod array;
 mod base;
 mod grid;
 mod kernel;

@@ -3,25 +3,27 @@
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::array::Array;
 use super::base::{SplitTerms, Splits};
 use super::grid::{Grid, Level};
 use super::kernel::{Flow, Trial, add_flow, add_log_bayes, add_log_gamma, join, log_gamma, whole_term};
 use super::{CHUNK, Data};
 
-/// What the upward sweep leaves behind.
+/// What the upward sweep leaves behind; arrays over the boxes of each layer.
 pub(super) struct Evidence {
-    /// Σ w of each box, by level.
-    weight: Vec<Vec<f64>>,
-    /// (Σ w)²/Σ w² of each box, by level; empty if all weights are one.
-    effective: Vec<Vec<f64>>,
-    /// Posterior probability of each split, by level and split; empty unless they were to be kept.
-    splits: Vec<Vec<Vec<f32>>>,
+    /// Σ w of each box.
+    weight: Vec<Array<f64>>,
+    /// (Σ w)²/Σ w² of each box; empty if all weights are one.
+    effective: Vec<Array<f64>>,
+    /// Posterior probability of each split; empty unless they were to be kept.
+    splits: Vec<Array<f32>>,
     /// ln R of the root.
     pub log_root: f64,
 }
 
 /// One chunk of a level's arrays to be filled.
 struct UpTask<'a> {
+    level: &'a Level,
     first: usize,
     weight: &'a mut [f64],
     squared: &'a mut [f64],
@@ -37,97 +39,104 @@ fn each<T: Send>(pool: Option<&ThreadPool>, tasks: Vec<T>, work: impl Fn(T) + Sy
     }
 }
 
-/// The chunks of an array, or empty slices without end if there is no array.
-fn chunks<T>(values: &mut [T], size: usize) -> impl Iterator<Item = &mut [T]> {
-    values
-        .chunks_mut(size)
-        .chain(std::iter::repeat_with(|| [].as_mut_slice()))
-}
-
 /// From the cells to the root: sums, evidence and, if `keep`, the probabilities of the splits.
 pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, pool: Option<&ThreadPool>) -> Evidence {
-    let levels = grid.levels();
-    let mut weight: Vec<Vec<f64>> = vec![Vec::new(); levels.len()];
-    let mut squared: Vec<Vec<f64>> = vec![Vec::new(); levels.len()];
-    let mut log_r: Vec<Vec<f64>> = vec![Vec::new(); levels.len()];
-    let mut splits: Vec<Vec<Vec<f32>>> = vec![Vec::new(); levels.len()];
-    let mut effective: Vec<Vec<f64>> = vec![Vec::new(); levels.len()];
-    let finest = grid.finest();
-    weight[finest] = data.weight.to_vec();
-    squared[finest] = data.squared.map(<[f64]>::to_vec).unwrap_or_default();
-    log_r[finest] = vec![0.0; grid.cells()];
+    let (levels, layers) = (grid.levels(), grid.layers());
+    let none = || layers.iter().map(|_| Array::default()).collect::<Vec<_>>();
+    let (mut weight, mut squared, mut log_r, mut effective) = (none(), none(), none(), none());
+    let mut splits: Vec<_> = layers.iter().map(|_| Array::default()).collect();
+    let last = layers.len() - 1;
+    weight[last] = Array::copy(data.weight);
+    squared[last] = data.squared.map(Array::copy).unwrap_or_default();
+    log_r[last] = Array::zeros(grid.cells());
     if data.has_equal_halves() {
-        add_log_gamma(c, &weight[finest], &mut log_r[finest]);
+        add_log_gamma(c, data.weight, &mut log_r[last]);
     }
-    let layers = grid.layers();
     let split_terms = data.base.split_terms(c);
     for (depth, layer) in layers.iter().enumerate().rev().skip(1) {
-        for &id in layer {
-            let level = &levels[id];
-            let mut w = vec![0.0; level.boxes];
-            let mut w2 = vec![0.0; if data.squared.is_some() { level.boxes } else { 0 }];
-            let mut r = vec![0.0; level.boxes];
-            let mut q = vec![vec![0.0_f32; if keep { level.boxes } else { 0 }]; level.splits.len()];
-            let mut rows: Vec<_> = q.iter_mut().map(|row| chunks(row, CHUNK)).collect();
-            let tasks: Vec<UpTask<'_>> = w
-                .chunks_mut(CHUNK)
-                .zip(chunks(&mut w2, CHUNK))
-                .zip(r.chunks_mut(CHUNK))
-                .enumerate()
-                .map(|(i, ((weight, squared), log_r))| UpTask {
-                    first: i * CHUNK,
-                    weight,
-                    squared,
-                    log_r,
-                    splits: rows.iter_mut().filter_map(Iterator::next).collect(),
-                })
+        let boxes = layer.iter().map(|id| levels[*id].boxes).sum();
+        let of_splits = layer
+            .iter()
+            .map(|id| levels[*id].boxes * levels[*id].splits.len())
+            .sum();
+        let mut w = Array::zeros(boxes);
+        let mut w2 = Array::zeros(if data.squared.is_some() { boxes } else { 0 });
+        let mut r = Array::zeros(boxes);
+        let mut q = Array::zeros(if keep { of_splits } else { 0 });
+        let mut tasks = Vec::with_capacity(boxes / CHUNK + layer.len());
+        let (mut weights, mut squares, mut logs, mut rest) = (&mut w[..], &mut w2[..], &mut r[..], &mut q[..]);
+        for id in layer {
+            let level = &levels[*id];
+            let mut rows: Vec<_> = level
+                .splits
+                .iter()
+                .map(|_| rest.split_off_mut(..level.boxes).unwrap_or_default())
                 .collect();
-            drop(rows);
-            each(pool, tasks, |task| {
-                ascend_chunk(level, data, (c, &split_terms), (&weight, &squared, &log_r), task);
-            });
-            if data.squared.is_some() {
-                effective[id] = w
-                    .iter()
-                    .zip(&w2)
-                    .map(|(w, w2)| if *w2 > 0.0 { w * w / w2 } else { 0.0 })
-                    .collect();
+            for first in (0..level.boxes).step_by(CHUNK) {
+                let n = CHUNK.min(level.boxes);
+                tasks.push(UpTask {
+                    level,
+                    first,
+                    weight: weights.split_off_mut(..n).unwrap_or_default(),
+                    squared: squares.split_off_mut(..n).unwrap_or_default(),
+                    log_r: logs.split_off_mut(..n).unwrap_or_default(),
+                    splits: rows
+                        .iter_mut()
+                        .map(|row| row.split_off_mut(..n).unwrap_or_default())
+                        .collect(),
+                });
             }
-            (weight[id], squared[id], log_r[id], splits[id]) = (w, w2, r, q);
         }
-        // Boxes two layers down have been asked for the last time.
-        for &id in layers.get(depth + 1).into_iter().flatten() {
-            log_r[id] = Vec::new();
-            squared[id] = Vec::new();
+        let finer = Finer {
+            levels,
+            weight: &weight[depth + 1],
+            squared: &squared[depth + 1],
+            log_r: &log_r[depth + 1],
+        };
+        each(pool, tasks, |task| ascend_chunk(data, (c, &split_terms), &finer, task));
+        if data.squared.is_some() {
+            effective[depth] = Array::zeros(boxes);
+            for ((e, w), w2) in effective[depth].iter_mut().zip(&*w).zip(&*w2) {
+                *e = if *w2 > 0.0 { w * w / w2 } else { 0.0 };
+            }
         }
+        (weight[depth], squared[depth], log_r[depth], splits[depth]) = (w, w2, r, q);
+        // Boxes of the finer layer have been asked for the last time.
+        (squared[depth + 1], log_r[depth + 1]) = (Array::default(), Array::default());
     }
-    let mut log_root = [log_r[0][0]];
+    let mut log_root = log_r[0][0];
     if data.has_equal_halves() {
         let mut own = [0.0];
         add_log_gamma(c, &weight[0], &mut own);
-        log_root[0] -= own[0];
+        log_root -= own[0];
     }
     Evidence {
         weight,
         effective,
         splits,
-        log_root: log_root[0],
+        log_root,
     }
 }
 
-type Finer<'a> = (&'a [Vec<f64>], &'a [Vec<f64>], &'a [Vec<f64>]);
+/// The layer that the boxes are halved into.
+struct Finer<'a> {
+    levels: &'a [Level],
+    weight: &'a [f64],
+    squared: &'a [f64],
+    log_r: &'a [f64],
+}
 
-fn ascend_chunk(level: &Level, data: &Data<'_>, prior: (f64, &SplitTerms), finer: Finer<'_>, task: UpTask<'_>) {
-    let (weight, squared, log_r) = finer;
+fn ascend_chunk(data: &Data<'_>, prior: (f64, &SplitTerms), finer: &Finer<'_>, task: UpTask<'_>) {
     let (c, split_terms) = prior;
+    let level = task.level;
     let (first, n) = (task.first, task.weight.len());
     let mut buffer = [[0.0; CHUNK]; 5];
     let [lower, upper, r0, r1, share] = buffer.each_mut().map(|b| &mut b[..n]);
     let step = level.splits[0];
-    step.halves(&weight[step.level], first, lower, upper);
+    step.halves(finer.levels[step.level].of(finer.weight), first, lower, upper);
     add(task.weight, lower, upper);
     if data.squared.is_some() {
-        step.halves(&squared[step.level], first, lower, upper);
+        step.halves(finer.levels[step.level].of(finer.squared), first, lower, upper);
         add(task.squared, lower, upper);
     }
     let mut count = [0.0; CHUNK];
@@ -155,10 +164,10 @@ fn ascend_chunk(level: &Level, data: &Data<'_>, prior: (f64, &SplitTerms), finer
         log_gamma(c, count, whole_gamma);
     }
     for (step, term) in level.splits.iter().zip(terms.chunks_exact_mut(n)) {
-        step.halves(&log_r[step.level], first, r0, r1);
+        step.halves(finer.levels[step.level].of(finer.log_r), first, r0, r1);
         add(term, r0, r1);
         if !data.has_equal_halves() {
-            step.halves(&weight[step.level], first, lower, upper);
+            step.halves(finer.levels[step.level].of(finer.weight), first, lower, upper);
             if data.squared.is_some() {
                 for ((l, u), n) in lower.iter_mut().zip(&mut *upper).zip(&*count) {
                     let scale = if *l + *u > 0.0 { n / (*l + *u) } else { 0.0 };
@@ -207,17 +216,19 @@ fn add(out: &mut [f64], a: &[f64], b: &[f64]) {
     }
 }
 
-/// Mean and mean square of a quantity of each box of a level.
-#[derive(Clone, Default)]
+/// Mean and mean square of what reaches a box, and of what has stopped at the box or above it and is handed on to its first
+/// half-able axis; over the boxes of a layer.
+#[derive(Default)]
 struct Moments {
-    mean: Vec<f64>,
-    square: Vec<f64>,
+    flow: [Array<f64>; 2],
+    total: [Array<f64>; 2],
 }
 
 struct DownTask<'a> {
+    level: &'a Level,
     first: usize,
-    flow: (&'a mut [f64], &'a mut [f64]),
-    total: (&'a mut [f64], &'a mut [f64]),
+    flow: [&'a mut [f64]; 2],
+    total: [&'a mut [f64]; 2],
 }
 
 /// From the root to the cells: posterior mean and mean square of the ratio of each cell.
@@ -229,71 +240,67 @@ pub(super) fn descend(
     pool: Option<&ThreadPool>,
 ) -> (Vec<f64>, Vec<f64>) {
     let levels = grid.levels();
-    // What reaches a box, and what has stopped at the box or above it and is handed on to its first half-able axis.
-    let mut flows = vec![Moments::default(); levels.len()];
-    let mut totals = vec![Moments::default(); levels.len()];
-    for (depth, layer) in grid.layers().iter().enumerate() {
-        for &id in layer {
+    let mut coarser = Moments::default();
+    for layer in grid.layers() {
+        let boxes = layer.iter().map(|id| levels[*id].boxes).sum();
+        let zeros = || [Array::zeros(boxes), Array::zeros(boxes)];
+        let mut own = Moments {
+            flow: zeros(),
+            total: zeros(),
+        };
+        let mut tasks = Vec::with_capacity(boxes / CHUNK + layer.len());
+        let mut flow = own.flow.each_mut().map(|f| &mut f[..]);
+        let mut total = own.total.each_mut().map(|t| &mut t[..]);
+        for id in layer {
             let level = &levels[id];
-            let zeros = || vec![0.0; level.boxes];
-            let [mut m, mut s, mut tm, mut ts] = [zeros(), zeros(), zeros(), zeros()];
-            let tasks: Vec<DownTask<'_>> = m
-                .chunks_mut(CHUNK)
-                .zip(s.chunks_mut(CHUNK))
-                .zip(tm.chunks_mut(CHUNK))
-                .zip(ts.chunks_mut(CHUNK))
-                .enumerate()
-                .map(|(i, (((m, s), tm), ts))| DownTask {
-                    first: i * CHUNK,
-                    flow: (m, s),
-                    total: (tm, ts),
-                })
-                .collect();
-            each(pool, tasks, |task| {
-                descend_chunk(grid, id, data, c, evidence, (&flows, &totals), task);
-            });
-            (flows[id], totals[id]) = (Moments { mean: m, square: s }, Moments { mean: tm, square: ts });
-        }
-        if depth > 0 {
-            for &id in &grid.layers()[depth - 1] {
-                (flows[id], totals[id]) = (Moments::default(), Moments::default());
+            for first in (0..level.boxes).step_by(CHUNK) {
+                let n = CHUNK.min(level.boxes);
+                tasks.push(DownTask {
+                    level,
+                    first,
+                    flow: flow.each_mut().map(|f| f.split_off_mut(..n).unwrap_or_default()),
+                    total: total.each_mut().map(|t| t.split_off_mut(..n).unwrap_or_default()),
+                });
             }
         }
+        each(pool, tasks, |task| {
+            descend_chunk(levels, data, c, evidence, &coarser, task);
+        });
+        coarser = own;
     }
-    let cells = std::mem::take(&mut totals[grid.finest()]);
-    (cells.mean, cells.square)
+    let [mean, square] = coarser.total;
+    (mean.to_vec(), square.to_vec())
 }
 
 fn descend_chunk(
-    grid: &Grid,
-    id: usize,
+    levels: &[Level],
     data: &Data<'_>,
     c: f64,
     evidence: &Evidence,
-    coarser: (&[Moments], &[Moments]),
+    coarser: &Moments,
     task: DownTask<'_>,
 ) {
-    let (flows, totals) = coarser;
-    let level = &grid.levels()[id];
-    let (first, n) = (task.first, task.flow.0.len());
-    let own = &evidence.weight[id];
+    let level = task.level;
+    let ([flow_mean, flow_square], [total_mean, total_square]) = (task.flow, task.total);
+    let (first, n) = (task.first, flow_mean.len());
+    let own = level.of(&evidence.weight[level.layer]);
     let mut buffer = [[0.0; CHUNK]; 6];
     let [share, half, whole, mean, square, scratch] = buffer.each_mut().map(|b| &mut b[..n]);
     let mut split = [0.0_f32; CHUNK];
     let split = &mut split[..n];
     if level.origins.is_empty() {
-        task.flow.0.fill(1.0);
-        task.flow.1.fill(1.0);
+        flow_mean.fill(1.0);
+        flow_square.fill(1.0);
     }
     for step in &level.origins {
-        let above = &grid.levels()[step.level];
+        let above = &levels[step.level];
         half.copy_from_slice(&own[first..first + n]);
         step.siblings(own, first, whole);
         for (w, h) in whole.iter_mut().zip(&*half) {
             *w += h;
         }
         if data.squared.is_some() {
-            step.wholes(&evidence.effective[step.level], first, scratch);
+            step.wholes(above.of(&evidence.effective[above.layer]), first, scratch);
             for ((h, w), e) in half.iter_mut().zip(&mut *whole).zip(&*scratch) {
                 *h = if *w > 0.0 { e * (*h / *w) } else { 0.0 };
                 *w = *e;
@@ -309,9 +316,9 @@ fn descend_chunk(
             .iter()
             .position(|s| s.axis == step.axis)
             .expect("each origin has its split");
-        step.wholes(&evidence.splits[step.level][way], first, split);
-        step.wholes(&flows[step.level].mean, first, mean);
-        step.wholes(&flows[step.level].square, first, square);
+        step.wholes(above.of_split(&evidence.splits[above.layer], way), first, split);
+        step.wholes(above.of(&coarser.flow[0]), first, mean);
+        step.wholes(above.of(&coarser.flow[1]), first, square);
         let flow = Flow {
             share,
             half,
@@ -320,30 +327,31 @@ fn descend_chunk(
             mean,
             square,
         };
-        add_flow(c, &flow, task.flow.0, task.flow.1);
+        add_flow(c, &flow, flow_mean, flow_square);
     }
     // What is not split stops here.
     share.fill(1.0);
-    for q in &evidence.splits[id] {
+    for way in 0..level.splits.len() {
+        let q = level.of_split(&evidence.splits[level.layer], way);
         for (stop, q) in share.iter_mut().zip(&q[first..first + n]) {
             *stop -= f64::from(*q);
         }
     }
-    for (total, flow) in [(&mut *task.total.0, &*task.flow.0), (&mut *task.total.1, &*task.flow.1)] {
+    for (total, flow) in [(&mut *total_mean, &*flow_mean), (&mut *total_square, &*flow_square)] {
         for ((t, f), stop) in total.iter_mut().zip(flow).zip(&*share) {
             *t = f * stop;
         }
     }
     // What stopped above is handed on along one path: the first axis that was not yet fully halved.
     for step in &level.origins {
-        let above = &grid.levels()[step.level];
+        let above = &levels[step.level];
         let next = above.splits.iter().map(|s| s.axis).min();
         if next == Some(step.axis) {
-            step.wholes(&totals[step.level].mean, first, mean);
-            step.wholes(&totals[step.level].square, first, square);
+            step.wholes(above.of(&coarser.total[0]), first, mean);
+            step.wholes(above.of(&coarser.total[1]), first, square);
             for i in 0..n {
-                task.total.0[i] += mean[i];
-                task.total.1[i] += square[i];
+                total_mean[i] += mean[i];
+                total_square[i] += square[i];
             }
         }
     }
