@@ -610,7 +610,9 @@ def test_ctrl_c_ends_long_work_with_status_130_and_no_file(tmp_path: Path) -> No
     """In a process of its own, with a terminal, so that the progress bar tells when the work has begun."""
     parent, child = os.openpty()
     try:
-        command = [sys.executable, "-c", "from etendue.cli import main; main()"]
+        # A test runner in the background may ignore the signal, and so would its children.
+        heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+        command = [sys.executable, "-c", f"{heed}; from etendue.cli import main; main()"]
         process = subprocess.Popen(
             [*command, "demo", "--rays", "5000000000000", "-o", "d.png"],
             cwd=tmp_path,

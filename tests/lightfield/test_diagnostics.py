@@ -14,9 +14,11 @@ import numpy.typing as npt
 import pytest
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.lightfield import candidate, learning
+from etendue.lightfield import learning
+from etendue.lightfield.candidate import Score
 from etendue.lightfield.characteristic import CharacteristicCurve, characteristic_curve
-from etendue.lightfield.diagnostics import _loss_of_gamma, diagnose
+from etendue.lightfield.diagnostics import diagnose
+from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.learning import EXPONENTS, REFITS, LearningCurve, law_of_gains, learning_curve
 from etendue.lightfield.light_field import FitReport, LightField, PartField
 from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Hemisphere, Plane, Surface
@@ -162,9 +164,9 @@ def test_a_curve_is_asked_for_what_it_holds() -> None:
 
 def test_expected_loss_is_that_of_a_gamma_variable() -> None:
     k = np.geomspace(1e-6, 1e9, 46)
-    np.testing.assert_allclose(_loss_of_gamma(k), special.digamma(k + 1) - np.log(k), rtol=1e-7, atol=1e-14)
-    assert _loss_of_gamma(np.array([np.inf])) == 0.0
-    assert np.isfinite(_loss_of_gamma(np.array([0.0]))).all()
+    np.testing.assert_allclose(loss_of_gamma(k), special.digamma(k + 1) - np.log(k), rtol=1e-7, atol=1e-14)
+    assert loss_of_gamma(np.array([np.inf])) == 0.0
+    assert np.isfinite(loss_of_gamma(np.array([0.0]))).all()
 
 
 def test_the_worst_cell_is_found_and_named_in_space() -> None:
@@ -186,8 +188,8 @@ def test_the_worst_cell_is_found_and_named_in_space() -> None:
     assert first.part == "plane"
     # Each cell has the same mass: its loss is that of its relative variance.
     cells = math.prod(shape)
-    even = float(_loss_of_gamma(np.array([1e4]))[0])
-    high, middle = (float(_loss_of_gamma(np.array([1 / v**2]))[0]) for v in (0.4, 0.2))
+    even = float(loss_of_gamma(np.array([1e4]))[0])
+    high, middle = (float(loss_of_gamma(np.array([1 / v**2]))[0]) for v in (0.4, 0.2))
     whole = (cells - 2) * even + high + middle
     in_box = cells // 8**4
     assert first.share == pytest.approx(((in_box - 1) * even + high) / whole, rel=1e-4)
@@ -337,16 +339,14 @@ def test_gains_are_weighed_by_flux() -> None:
     """Equal weights: mean and covariance of the mean; a ray without flux changes nothing."""
     rng = np.random.default_rng(2)
     values, weights = rng.normal(size=(2, 3, 50)), np.full(50, 0.7)
-    gains, covariance = learning._gains([[candidate.Score(v, weights) for v in half] for half in values])
+    gains, covariance = learning._gains([[Score(v, weights) for v in half] for half in values])
     steps = np.diff(np.concatenate(values, axis=1), axis=0)
     np.testing.assert_allclose(gains, steps.mean(axis=1), rtol=1e-12)
     np.testing.assert_allclose(covariance, np.cov(steps, ddof=0) / 100, rtol=1e-12)
     values[:, 1, 7], weights[7] = 1e3, 0.0
     kept = np.arange(50) != 7
-    alone = learning._gains([[candidate.Score(v[kept], weights[kept]) for v in half] for half in values])
-    for one, other in zip(
-        learning._gains([[candidate.Score(v, weights) for v in half] for half in values]), alone, strict=True
-    ):
+    alone = learning._gains([[Score(v[kept], weights[kept]) for v in half] for half in values])
+    for one, other in zip(learning._gains([[Score(v, weights) for v in half] for half in values]), alone, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
@@ -375,18 +375,28 @@ def test_rays_of_unequal_flux_are_judged_by_their_flux() -> None:
 
 
 def test_a_symmetry_tells_of_twice_the_rays(trial: Trial) -> None:
-    """Rays of a source that is even in x, and the same rays beside their mirror images, fit the same field."""
-    rays = trial.rays(16_000)
-    sign = np.where(np.random.default_rng(3).random(16_000) < 0.5, -1.0, 1.0)[:, None] * [1, 0, 0] + [0, 1, 1]
-    even = et.RaySet(rays.position * sign, rays.direction * sign, rays.flux)
-    field = plain_field(Hemisphere(radius=1.264), (3, 3, 2, 2), 16_000)
-    mirrored = field.replace(report=dataclasses.replace(field.report, symmetry="mirror-x"))
-    alone, folded = (learning_curve(one, even) for one in (field, mirrored))
-    np.testing.assert_array_equal(diagnose(mirrored, even).learning.gains, folded.gains)
-    # Folded rays are worth twice as many: the second gain of the lone ones is the first of the folded ones.
-    noise = np.hypot(alone.gain_errors[1], folded.gain_errors[0])
-    assert abs(folded.gains[0] - alone.gains[1]) < stats.norm.isf(SIGNIFICANCE / 2) * noise + 0.1 * alone.gains[1]
-    assert folded.gains[0] < alone.gains[0]
+    """Of a source that is even in x, half the rays folded foretell fresh rays at least as well as all rays unfolded."""
+    surface, depths = Hemisphere(radius=1.264), (3, 3, 2, 2)
+    rays = trial.rays(48_000)
+    sign = np.where(np.random.default_rng(3).random(48_000) < 0.5, -1.0, 1.0)[:, None] * [1, 0, 0] + [0, 1, 1]
+    x, k = rays.position * sign, rays.direction * sign
+
+    def even(stop: int) -> et.RaySet:
+        return et.RaySet(x[:stop], k[:stop], rays.flux[:stop])
+
+    fields = (
+        LightField.fit(even(16_000), surface, depths=depths),
+        LightField.fit(even(8_000), surface, depths=depths, symmetry="mirror-x"),
+        LightField.fit(even(8_000), surface, depths=depths),
+    )
+    alone, folded, few = (np.log(field.pdf(x[16_000:], k[16_000:])) for field in fields)
+    least = stats.norm.isf(SIGNIFICANCE / 2) / np.sqrt(32_000)
+    assert (folded - few).mean() > least * (folded - few).std()
+    assert (folded - alone).mean() > -least * (folded - alone).std()
+    mirrored, plain = fields[0].replace(report=dataclasses.replace(fields[0].report, symmetry="mirror-x")), fields[0]
+    curve = learning_curve(mirrored, even(16_000))
+    np.testing.assert_array_equal(diagnose(mirrored, even(16_000)).learning.gains, curve.gains)
+    assert (curve.gains < learning_curve(plain, even(16_000)).gains).all()
 
 
 def test_progress_threads_and_seed(trial: Trial) -> None:

@@ -17,11 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.lightfield.candidate import product_bases, unit_field
+from etendue.lightfield.candidate import grow_symmetric, product_bases, unit_field
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.light_field import core_part
 from etendue.lightfield.surfaces import Part
-from etendue.lightfield.trees import ELSEWHERE, Base, Tree, grow, grow_averaged, grow_moved
+from etendue.lightfield.symmetry import order, sum_of_images
+from etendue.lightfield.trees import ELSEWHERE, POSITIONS, Base, Tree, grow, grow_moved
 
 STRATA = 12
 """Classes by either feature: about 7000 of a million cells in each."""
@@ -53,14 +54,21 @@ class Masses:
 
 
 def calibrate(
-    chart: Part, counts: PartCounts, base: Base, tree: Tree, concentration: float, seed: int, threads: int | None
+    chart: Part,
+    counts: PartCounts,
+    base: Base,
+    tree: Tree,
+    concentration: float,
+    symmetry: str,
+    seed: int,
+    threads: int | None,
 ) -> Tree:
     """The tree with calibrated standard deviations."""
     found = _masses(counts.grid, base, tree, threads)
-    known, known_base = _elsewhere(counts, base, concentration, threads)
-    drawn = _draw(known, counts, known_base, seed)
-    again = base if base.name == "uniform" else product_bases([drawn], threads)[0]
-    second = grow_averaged(drawn.grid, again, concentration, threads)
+    known, known_base = _elsewhere(counts, base, concentration, symmetry, threads)
+    drawn = _draw(known, counts, known_base, symmetry, seed)
+    again = base if base.name == "uniform" else product_bases([drawn], threads, symmetry)[0]
+    second = grow_symmetric(drawn.grid, again, concentration, threads, POSITIONS, symmetry)
     retried = _masses(drawn.grid, again, second, threads)
     shown = _shown(chart, again, second, threads)
     factors = _factors(retried, np.abs(shown - known) / np.maximum(retried.deviation, _tiny(known)), found)
@@ -89,7 +97,9 @@ def _masses(counts: Sums, base: Base, tree: Tree, threads: int | None) -> Masses
     return Masses(mean, np.sqrt(variance))
 
 
-def _elsewhere(counts: PartCounts, base: Base, concentration: float, threads: int | None) -> tuple[FloatArray, Base]:
+def _elsewhere(
+    counts: PartCounts, base: Base, concentration: float, symmetry: str, threads: int | None
+) -> tuple[FloatArray, Base]:
     """The masses that a grid in another position finds, with its base measure in place of the given one."""
     shape = counts.grid.weight.shape
     shift = tuple(round(share * n) for share, n in zip(ELSEWHERE, shape, strict=True))
@@ -103,7 +113,7 @@ def _elsewhere(counts: PartCounts, base: Base, concentration: float, threads: in
         there = product_bases([PartCounts(counts.grid, *fine)], threads)[0]
         moved = there.rolled(tuple(-s for s in shift), shape)
     tree = grow_moved(counts.grid, moved, shift, concentration, threads)
-    mass = tree.ratio * moved.cells(shape)
+    mass = sum_of_images(tree.ratio * moved.cells(shape), symmetry)
     return mass / mass.sum(), moved
 
 
@@ -111,15 +121,18 @@ def _fine_steps(shift: tuple[int, ...], shape: tuple[int, ...], fine: int) -> li
     return [s * fine // n for s, n in zip(shift, shape, strict=True)]
 
 
-def _draw(known: FloatArray, counts: PartCounts, base: Base, seed: int) -> PartCounts:
-    """Counts of as many equal rays as the set is worth, from the known field; the fine ones follow from the base."""
+def _draw(known: FloatArray, counts: PartCounts, base: Base, symmetry: str, seed: int) -> PartCounts:
+    """Counts of as many equal rays as the set is worth, from the known field; the fine ones follow from the base.
+
+    Of a symmetric field fewer rays are drawn, and folded as those of the set were.
+    """
     generator = np.random.Generator(np.random.Philox(key=np.array([seed, PURPOSE], dtype=np.uint64)))
-    grid = generator.poisson(known * counts.grid.rays).astype(np.float64)
+    grid = generator.poisson(known * (counts.grid.rays / order(symmetry))).astype(np.float64)
     if base.name == "uniform":
-        return PartCounts(Sums(grid, None), counts.space, counts.direction)
+        return PartCounts(Sums(sum_of_images(grid, symmetry), None), counts.space, counts.direction)
     space = _refine(grid.sum(axis=(2, 3)), base.space, generator)
     direction = _refine(grid.sum(axis=(0, 1)), base.direction, generator)
-    return PartCounts(Sums(grid, None), Sums(space, None), Sums(direction, None))
+    return PartCounts(*(Sums(sum_of_images(cells, symmetry), None) for cells in (grid, space, direction)))
 
 
 def _refine(coarse: FloatArray, fine: FloatArray | None, generator: np.random.Generator) -> FloatArray:

@@ -11,6 +11,7 @@ from etendue import _core
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
 from etendue.lightfield.light_field import PartField, core_part
 from etendue.lightfield.nodes import node_values
+from etendue.lightfield.symmetry import order, sum_of_images
 from etendue.lightfield.trees import POSITIONS, Base, Tree, grow_averaged, log_evidence
 
 CONCENTRATIONS = {"uniform": (1.0, 3.0, 10.0), "product": (10.0, 30.0, 100.0)}
@@ -31,20 +32,34 @@ def uniform_bases(counts: Sequence[PartCounts]) -> tuple[Base, ...]:
     return tuple(Base() for _ in counts)
 
 
-def product_bases(counts: Sequence[PartCounts], threads: int | None) -> tuple[Base, ...]:
+def product_bases(counts: Sequence[PartCounts], threads: int | None, symmetry: str = "none") -> tuple[Base, ...]:
     """Exitance times intensity: what the fine counts over place and over direction tell, each by itself.
 
     Either is a tree of its own, averaged over positions of the fine grid.
     """
 
     def density(sums: Sums) -> FloatArray:
-        found = grow_averaged(sums, Base(), 1.0, threads, FINE_POSITIONS).ratio
+        found = grow_symmetric(sums, Base(), 1.0, threads, FINE_POSITIONS, symmetry).ratio
         lifted: FloatArray = found * (1.0 - FLOOR) + FLOOR
         return lifted
 
     return tuple(
         Base(density(part.space), density(part.direction)) if part.space.rays > 0 else Base() for part in counts
     )
+
+
+def grow_symmetric(
+    counts: Sums,
+    base: Base,
+    concentration: float,
+    threads: int | None,
+    positions: Sequence[tuple[float, ...]],
+    symmetry: str,
+) -> Tree:
+    """The average of trees of folded counts: as symmetric as they are, which grids that are moved are not."""
+    tree = grow_averaged(counts, base, concentration, threads, positions)
+    ratio, deviation = (sum_of_images(cells, symmetry) / order(symmetry) for cells in (tree.ratio, tree.deviation))
+    return dataclasses.replace(tree, ratio=ratio, deviation=deviation)
 
 
 def unit_field(base: Base, tree: Tree) -> PartField:
@@ -167,7 +182,7 @@ def grow_candidate(
 ) -> Candidate:
     """The candidate's trees, on the counts of a fold, averaged over positions of the grid."""
     trees = [
-        grow_averaged(part.grid, base, c, threads, positions)
+        grow_symmetric(part.grid, base, c, threads, positions, counts.symmetry)
         for part, base, c in zip(counts[fold], bases, concentrations, strict=True)
     ]
     return Candidate(bases, tuple(concentrations), tuple(trees))

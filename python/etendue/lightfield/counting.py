@@ -98,8 +98,8 @@ class EtendueCounts:
         Flux of the latter [flux unit].
     tally : Tally
         The flux account of all rays.
-    images : int
-        How often each ray is counted: once for each image under a symmetry, itself included.
+    symmetry : str
+        What the counts are folded by, so that each ray is counted once for each of its images; ``"none"``: they are not.
     """
 
     surface: Surface
@@ -111,7 +111,7 @@ class EtendueCounts:
     unmet_rays: int
     unmet_flux: float
     tally: Tally
-    images: int = 1
+    symmetry: str = "none"
 
     def __getitem__(self, fold: Fold) -> tuple[PartCounts, ...]:
         return self.folds[fold]

@@ -13,6 +13,7 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.characteristic import CharacteristicCurve, characteristic_curve
 from etendue.lightfield.counting import FloatArray
+from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.learning import Forecast, LearningCurve, learning_curve
 from etendue.lightfield.light_field import FitReport, LightField, PartField
 from etendue.lightfield.trees import Base
@@ -209,21 +210,7 @@ def _losses(part: PartField) -> FloatArray:
     if total == 0.0:
         return np.zeros_like(mass)
     certainty = np.divide(ratio, deviation, out=np.full_like(ratio, np.inf), where=deviation > 0) ** 2
-    losses: FloatArray = mass / total * _loss_of_gamma(certainty)
-    return losses
-
-
-def _loss_of_gamma(certainty: FloatArray) -> FloatArray:
-    """E[x ln x] of a gamma variable of mean 1 and shape `certainty`: ψ(k + 1) - ln k, which is 1/2k where k is large.
-
-    That is the loss, per unit of its mass, of a cell whose luminance has a relative variance of 1/k. Half the relative
-    variance itself would let dark cells with large error bars, which no ray ever meets, drown all others.
-    """
-    k = np.maximum(certainty, 1e-300)
-    # ψ(k + 1) = ψ(k + 7) - Σ 1/(k + i), and Stirling's series of ψ is good to 1e-9 from there on.
-    y = k + 7.0
-    stirling = np.log1p(7.0 / k) - 1.0 / (2.0 * y) - 1.0 / (12.0 * y**2) + 1.0 / (120.0 * y**4)
-    losses: FloatArray = np.maximum(stirling - sum(1.0 / (k + i) for i in range(1, 7)), 0.0)
+    losses: FloatArray = mass / total * loss_of_gamma(certainty)
     return losses
 
 

@@ -20,12 +20,13 @@ from etendue.lightfield.candidate import (
     score_densities,
     uniform_bases,
 )
-from etendue.lightfield.counting import EtendueCounts, FloatArray, count_rays
+from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, count_rays
+from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.light_field import FitReport, LightField
 from etendue.lightfield.probe import probe_rays
 from etendue.lightfield.surfaces import Surface
-from etendue.lightfield.symmetry import fold, proven_symmetry
-from etendue.lightfield.trees import POSITIONS, Tree
+from etendue.lightfield.symmetry import fold, order, proven_symmetry
+from etendue.lightfield.trees import POSITIONS, Base, Tree
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 
 Depths = tuple[int, int, int, int]
@@ -80,7 +81,7 @@ def fit_light_field(
     if symmetry != "none":
         counts = fold(counts, symmetry)
     field = fit_counts(rays, counts, plan, seed, threads)
-    return field.replace(notes=(*notes, *field.notes), report=dataclasses.replace(field.report, symmetry=symmetry))
+    return field.replace(notes=(*notes, *field.notes))
 
 
 def default_bits(rays: int) -> int:
@@ -109,7 +110,7 @@ def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: in
     counts = count_rays(some, surface, options[0], fine, seed=seed, threads=threads)
     bases = {
         "uniform": uniform_bases(counts["fitted"]),
-        "product": product_bases(counts["fitted"], threads),
+        "product": product_bases(counts["fitted"], threads, counts.symmetry),
     }
     concentrations = {name: choose_concentrations(counts["fitted"], b, threads) for name, b in bases.items()}
 
@@ -140,17 +141,21 @@ def _depths(bits: int, lend: int) -> Depths:
 
 def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, threads: int | None) -> LightField:
     """The field of counted rays: base measures compared on the held-out rays, the better one grown on all."""
-    candidates: list[tuple[Candidate, Score]] = []
+
+    def bases(name: str, fold: Fold) -> tuple[Base, ...]:
+        return (
+            uniform_bases(counts[fold]) if name == "uniform" else product_bases(counts[fold], threads, counts.symmetry)
+        )
+
+    scores: dict[str, Score] = {}
     for name in ("uniform", "product"):
-        bases = uniform_bases(counts["fitted"]) if name == "uniform" else product_bases(counts["fitted"], threads)
-        candidate = grow_candidate(counts, "fitted", bases, plan.concentrations[name], threads, POSITIONS[:1])
-        candidates.append((candidate, candidate.score(counts)))
-    (plain, plain_score), (elaborate, elaborate_score) = candidates
-    lead, error = elaborate_score.lead(plain_score)
-    taken, score = (elaborate, elaborate_score) if lead > LEAD * error else (plain, plain_score)
-    name = taken.base_name
-    bases = uniform_bases(counts["all"]) if name == "uniform" else product_bases(counts["all"], threads)
-    final = grow_candidate(counts, "all", bases, plan.concentrations[name], threads)
+        concentrations = plan.concentrations[name]
+        candidate = grow_candidate(counts, "fitted", bases(name, "fitted"), concentrations, threads, POSITIONS[:1])
+        scores[name] = candidate.score(counts)
+    lead, error = scores["product"].lead(scores["uniform"])
+    name = "product" if lead > LEAD * error else "uniform"
+    score = scores[name]
+    final = grow_candidate(counts, "all", bases(name, "all"), plan.concentrations[name], threads)
     final = dataclasses.replace(final, trees=tuple(_calibrated(counts, final, seed, threads)))
     histogram = score_densities(counts, _histogram(counts))
     report = FitReport(
@@ -164,6 +169,7 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
         score_error=score.error,
         histogram_score=histogram.mean,
         effective_cells=_effective_cells(counts, final),
+        symmetry=counts.symmetry,
     )
     return LightField(
         surface=counts.surface,
@@ -183,8 +189,8 @@ def _calibrated(counts: EtendueCounts, candidate: Candidate, seed: int, threads:
         if part.grid.rays == 0:
             yield tree
             continue
-        shares = calibrate(chart, part, base, tree, concentration, seed, threads)
-        deviation = np.sqrt(shares.deviation**2 + tree.ratio**2 * counts.images / part.grid.rays)
+        calibrated = calibrate(chart, part, base, tree, concentration, counts.symmetry, seed, threads)
+        deviation = np.sqrt(calibrated.deviation**2 + tree.ratio**2 * order(counts.symmetry) / part.grid.rays)
         yield dataclasses.replace(tree, deviation=deviation)
 
 
@@ -203,13 +209,14 @@ def _histogram(counts: EtendueCounts) -> FloatArray:
 
 
 def _effective_cells(counts: EtendueCounts, candidate: Candidate) -> float:
-    """N Σ m (σ/L)² over the cells, m their share of the flux: twice N times the expected loss of score, theory eq. 41."""
+    """2 N Σ m (ψ(k + 1) - ln k) over the cells, k = (L/σ)², m their share of the flux; theory eq. 41."""
     total = 0.0
     for part, base, tree in zip(counts["all"], candidate.bases, candidate.trees, strict=True):
         space, direction = base.masses(tree.ratio.shape)
         mass = tree.ratio * space[:, :, None, None] * direction[None, None]
-        relative = np.divide(tree.deviation, tree.ratio, out=np.zeros_like(tree.ratio), where=tree.ratio > 0)
-        total += part.grid.rays * float((mass * relative**2).sum())
+        sure = np.divide(tree.ratio, tree.deviation, out=np.full_like(tree.ratio, np.inf), where=tree.deviation > 0)
+        rays = part.grid.rays / order(counts.symmetry)
+        total += 2.0 * rays * float((mass * loss_of_gamma(np.square(sure))).sum())
     return total
 
 

@@ -247,7 +247,7 @@ def _refit(field: LightField, counts: EtendueCounts, threads: int | None) -> Lig
         counts = fold(counts, field.report.symmetry)
     everything = counts["all"]
     product = "product" in field.report.bases
-    bases = product_bases(everything, threads) if product else uniform_bases(everything)
+    bases = product_bases(everything, threads, counts.symmetry) if product else uniform_bases(everything)
     parts = grow_candidate(counts, "all", bases, field.report.concentrations, threads).fields(counts)
     flux = sum(counts.part_flux)
     return field.replace(parts=tuple(dataclasses.replace(part, level=part.level / flux) for part in parts))

@@ -77,22 +77,31 @@ def fold(counts: EtendueCounts, symmetry: str) -> EtendueCounts:
     >>> bool(folded["all"][0].grid.rays == 2 * counts["all"][0].grid.rays), round(folded.part_flux[0], 6)
     (True, 600.0)
     """
-    images = _images(counts, symmetry)
+    _images(counts, symmetry)
 
     def together(cells: FloatArray) -> FloatArray:
-        total = cells.copy()
-        for image in images:
-            total += image(cells)
-        return total
+        return sum_of_images(cells, symmetry)
 
     folds = {
         name: tuple(PartCounts(*(s.map(together) for s in (p.grid, p.space, p.direction))) for p in parts)
         for name, parts in counts.folds.items()
     }
-    times = len(images) + 1
     return dataclasses.replace(
-        counts, folds=folds, flux_per_weight=counts.flux_per_weight / times, images=counts.images * times
+        counts, folds=folds, flux_per_weight=counts.flux_per_weight / order(symmetry), symmetry=symmetry
     )
+
+
+def order(symmetry: str) -> int:
+    """How many images a ray has under a symmetry, itself included."""
+    return 1 + len(SYMMETRIES.get(symmetry, ()))
+
+
+def sum_of_images(cells: FloatArray, symmetry: str) -> FloatArray:
+    """The sum of an array over cells, of place and direction or of either, and of its images."""
+    total = cells.copy()
+    for image in SYMMETRIES.get(symmetry, ()):
+        total += image(cells)
+    return total
 
 
 def proven_symmetry(counts: EtendueCounts) -> str:

@@ -64,7 +64,7 @@ pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, pool: Opt
         let mut r = Array::zeros(boxes);
         let mut q = Array::zeros(if keep { of_splits } else { 0 });
         let mut tasks = Vec::with_capacity(boxes / CHUNK + layer.len());
-        let (mut weights, mut squares, mut logs, mut rest) = (&mut w[..], &mut w2[..], &mut r[..], &mut q[..]);
+        let (mut weights, mut second, mut logs, mut rest) = (&mut w[..], &mut w2[..], &mut r[..], &mut q[..]);
         for id in layer {
             let level = &levels[*id];
             let mut rows: Vec<_> = level
@@ -78,7 +78,7 @@ pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, pool: Opt
                     level,
                     first,
                     weight: weights.split_off_mut(..n).unwrap_or_default(),
-                    squared: squares.split_off_mut(..n).unwrap_or_default(),
+                    squared: second.split_off_mut(..n).unwrap_or_default(),
                     log_r: logs.split_off_mut(..n).unwrap_or_default(),
                     splits: rows
                         .iter_mut()
