@@ -123,7 +123,7 @@ def grow_averaged(
     threads: int | None,
     positions: Sequence[tuple[float, ...]] = POSITIONS,
 ) -> Tree:
-    """The average of the trees on a grid that is moved cyclically to each of some positions, theory eq. 39.
+    """The average of the trees on a grid that is moved cyclically to each of some positions; theory section 14.
 
     A dyadic grid knows edges best where its own coarse boxes end. Averaging takes that preference away, and what the
     trees differ by shows in the deviation. The evidence is that of the mixture of the trees, each with the same share.
