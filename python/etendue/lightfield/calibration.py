@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.lightfield.candidate import grow_symmetric, product_bases, unit_field
+from etendue.lightfield.candidate import FINE_POSITIONS, grow_symmetric, product_bases, unit_field
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.light_field import core_part
 from etendue.lightfield.surfaces import Part
@@ -32,6 +32,9 @@ ONE_SIGMA, TWO_SIGMA = 0.6827, 0.9545
 
 FEWEST = 50
 """Cells that a class needs to speak for itself."""
+
+KNOWN_POSITIONS = FINE_POSITIONS[:4]
+"""Positions over which the margins of the known field are averaged: so few that they are less smooth than an estimate."""
 
 PURPOSE = 0x424F_4F54
 """Keeps the random numbers of the trial apart from all others."""
@@ -110,7 +113,7 @@ def _elsewhere(
             sums.map(np.roll, _fine_steps(s, n, sums.weight.shape[0]), (0, 1))
             for sums, s, n in ((counts.space, shift[:2], shape[:2]), (counts.direction, shift[2:], shape[2:]))
         ]
-        there = product_bases([PartCounts(counts.grid, *fine)], threads)[0]
+        there = product_bases([PartCounts(counts.grid, *fine)], threads, positions=KNOWN_POSITIONS)[0]
         moved = there.rolled(tuple(-s for s in shift), shape)
     tree = grow_moved(counts.grid, moved, shift, concentration, threads)
     mass = sum_of_images(tree.ratio * moved.cells(shape), symmetry)

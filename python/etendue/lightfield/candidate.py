@@ -32,14 +32,19 @@ def uniform_bases(counts: Sequence[PartCounts]) -> tuple[Base, ...]:
     return tuple(Base() for _ in counts)
 
 
-def product_bases(counts: Sequence[PartCounts], threads: int | None, symmetry: str = "none") -> tuple[Base, ...]:
+def product_bases(
+    counts: Sequence[PartCounts],
+    threads: int | None,
+    symmetry: str = "none",
+    positions: Sequence[tuple[float, ...]] = FINE_POSITIONS,
+) -> tuple[Base, ...]:
     """Exitance times intensity: what the fine counts over place and over direction tell, each by itself.
 
     Either is a tree of its own, averaged over positions of the fine grid.
     """
 
     def density(sums: Sums) -> FloatArray:
-        found = grow_symmetric(sums, Base(), 1.0, threads, FINE_POSITIONS, symmetry).ratio
+        found = grow_symmetric(sums, Base(), 1.0, threads, positions, symmetry).ratio
         lifted: FloatArray = found * (1.0 - FLOOR) + FLOOR
         return lifted
 

@@ -92,12 +92,24 @@ def fold(counts: EtendueCounts, symmetry: str) -> EtendueCounts:
 
 
 def order(symmetry: str) -> int:
-    """How many images a ray has under a symmetry, itself included."""
+    """How many images a ray has under a symmetry, itself included.
+
+    Examples
+    --------
+    >>> order("none"), order("mirror-x"), order("c4")
+    (1, 2, 4)
+    """
     return 1 + len(SYMMETRIES.get(symmetry, ()))
 
 
 def sum_of_images(cells: FloatArray, symmetry: str) -> FloatArray:
-    """The sum of an array over cells, of place and direction or of either, and of its images."""
+    """The sum of an array over cells, of place and direction or of either, and of its images.
+
+    Examples
+    --------
+    >>> sum_of_images(np.array([[1.0, 2.0], [3.0, 4.0]]), "mirror-x").tolist()
+    [[4.0, 6.0], [4.0, 6.0]]
+    """
     total = cells.copy()
     for image in SYMMETRIES.get(symmetry, ()):
         total += image(cells)
