@@ -176,7 +176,7 @@ def test_effective_rays_count_equal_rays_in_full(weights: list[float]) -> None:
 
 
 def test_progress_rises_to_the_number_of_rays() -> None:
-    source = RingSource(rays=(64 << 16) * 2 + 5)  # two rounds of the core and a little
+    source = RingSource(rays=(32 << 16) * 2 + 5)  # two rounds of the core and a little
     seen: list[int] = []
     source.pass_over(seen.append)
     assert seen == sorted(set(seen))

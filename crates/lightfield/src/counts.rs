@@ -6,9 +6,11 @@
 
 use std::ops::{ControlFlow, Range};
 
+use etendue_geometry::batch::BLOCK;
 use etendue_geometry::{RayBatch, RaySource, Tally};
 use etendue_sampling::ordered;
 use etendue_sampling::philox::Stream;
+use multiversion::multiversion;
 
 use crate::surface::{Coordinates, Part, carry};
 
@@ -127,14 +129,35 @@ struct Found {
     unmet_flux: f64,
 }
 
+/// Where the rays of a block cross the surface.
+struct Scratch {
+    at: Coordinates,
+    cells: [Vec<u32>; 3],
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self {
+            at: Coordinates::default(),
+            cells: std::array::from_fn(|_| vec![0; BLOCK]),
+        }
+    }
+}
+
 impl Found {
-    fn collect(&mut self, plan: &Plan, sizes: [usize; 3], first: u64, batch: &RayBatch, at: &mut Coordinates) {
+    fn collect(&mut self, plan: &Plan, sizes: [usize; 3], first: u64, batch: &RayBatch, scratch: &mut Scratch) {
         self.tally.add_block(batch);
-        carry(&plan.parts, batch, at);
         let chances = chances(plan.seed, first, batch.len);
-        let shape = plan.depths.map(|d| f64::from(d).exp2());
-        let fine = plan.fine.map(|d| f64::from(d).exp2());
+        let Scratch { at, cells } = scratch;
+        carry(&plan.parts, batch, at);
+        cells_of(plan.depths, plan.fine, &at.values, batch.len, cells);
         let [s1, s2, a, b] = &at.values;
+        let parts = u32::try_from(plan.parts.len()).unwrap_or(0);
+        #[allow(clippy::cast_possible_truncation, reason = "the plan is countable")]
+        let sizes = sizes.map(|n| n as u32);
+        for list in &mut self.cells {
+            list.reserve(batch.len);
+        }
         for i in 0..batch.len {
             let weight = batch.flux[i];
             if weight <= 0.0 {
@@ -146,18 +169,9 @@ impl Found {
                 self.unmet_flux += weight;
                 continue;
             }
-            let out = u32::from(chances[i]) < plan.held_out;
-            let block = u32::from(out) * u32::try_from(plan.parts.len()).unwrap_or(0) + part;
-            let place = |shape: f64, v: f64| cell(v, shape);
-            let grid = ((place(shape[0], s1[i]) << plan.depths[1] | place(shape[1], s2[i])) << plan.depths[2]
-                | place(shape[2], a[i]))
-                << plan.depths[3]
-                | place(shape[3], b[i]);
-            let space = place(fine[0], s1[i]) << plan.fine[0] | place(fine[0], s2[i]);
-            let direction = place(fine[1], a[i]) << plan.fine[1] | place(fine[1], b[i]);
-            for ((cells, cell), size) in self.cells.iter_mut().zip([grid, space, direction]).zip(sizes) {
-                #[allow(clippy::cast_possible_truncation, reason = "the plan is countable")]
-                cells.push(block * size as u32 + cell);
+            let block = u32::from(u32::from(chances[i]) < plan.held_out) * parts + part;
+            for k in 0..3 {
+                self.cells[k].push(block * sizes[k] + cells[k][i]);
             }
             self.weights.push(weight);
             if u32::from(chances[i]) < plan.kept {
@@ -172,7 +186,23 @@ impl Found {
     }
 }
 
-/// The cell of a coordinate from 0 to 1, both included.
+/// The cells of a block's coordinates in the grid and in the two finer ones.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn cells_of(depths: [u32; 4], fine: [u32; 2], at: &[Vec<f64>; 4], len: usize, out: &mut [Vec<u32>; 3]) {
+    let shape = depths.map(|d| f64::from(d).exp2());
+    let sides = fine.map(|d| f64::from(d).exp2());
+    let [s1, s2, a, b] = at.each_ref().map(|v| &v[..len]);
+    let [grid, space, direction] = out.each_mut().map(|v| &mut v[..len]);
+    for i in 0..len {
+        let c1 = cell(s1[i], shape[0]) << depths[1] | cell(s2[i], shape[1]);
+        let c2 = c1 << depths[2] | cell(a[i], shape[2]);
+        grid[i] = c2 << depths[3] | cell(b[i], shape[3]);
+        space[i] = cell(s1[i], sides[0]) << fine[0] | cell(s2[i], sides[0]);
+        direction[i] = cell(a[i], sides[1]) << fine[1] | cell(b[i], sides[1]);
+    }
+}
+
+/// The cell of a coordinate from 0 to 1, both included; any cell if it is none.
 #[inline(always)]
 #[allow(
     clippy::cast_possible_truncation,
@@ -180,7 +210,8 @@ impl Found {
     reason = "0 to 1 times at most 2^16"
 )]
 fn cell(value: f64, cells: f64) -> u32 {
-    (value * cells).min(cells - 1.0) as u32
+    // By way of a signed number: there are instructions for many of those at once.
+    (value * cells).min(cells - 1.0) as i32 as u32
 }
 
 /// A number from 0 to 65 535 for each ray of a block: sixteen from one call of the generator.
@@ -222,8 +253,10 @@ pub fn count(
     let mut equal = true;
     let work = |range: Range<u64>| {
         let mut found = Found::default();
-        let mut at = Coordinates::default();
-        source.for_each_block(range, |first, batch| found.collect(plan, sizes, first, batch, &mut at));
+        let mut scratch = Scratch::default();
+        source.for_each_block(range, |first, batch| {
+            found.collect(plan, sizes, first, batch, &mut scratch);
+        });
         found
     };
     let merge = |found: Found| {

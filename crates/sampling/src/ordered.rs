@@ -8,15 +8,15 @@ use rayon::prelude::*;
 /// Rays in one unit of work. Fixed: partial sums are formed per batch, so their bits depend on it.
 pub const BATCH: u64 = 1 << 16;
 
-/// Batches between two calls of the progress function: some 10 ms to 100 ms of work.
-const ROUND: u64 = 64;
+/// Batches between two calls of the progress function: some 5 ms to 50 ms of work.
+const ROUND: u64 = 32;
 
 /// Runs `work` over `0..n` in batches of [`BATCH`] on `threads` threads (0: one per core), and hands each result to
 /// `merge` in batch order.
 ///
 /// `merge` and `progress` run on the calling thread, which is where an interpreter looks for signals. `progress` is told
 /// how many items are done after each round; [`ControlFlow::Break`] ends the run early. Returns the number of items done.
-/// At most [`ROUND`] results wait to be merged at any time, which bounds the memory. The threads live as long as the call:
+/// At most twice [`ROUND`] results wait to be merged at any time, which bounds the memory. The threads live as long as the call:
 /// a process may fork afterwards. A single batch, or a system that grants no threads, is served by the calling thread.
 pub fn run<T: Send>(
     threads: usize,
@@ -27,19 +27,33 @@ pub fn run<T: Send>(
 ) -> u64 {
     let batches = n.div_ceil(BATCH);
     let batch = |b: u64| work(b * BATCH..((b + 1) * BATCH).min(n));
+    let round = |first: u64| {
+        (first..(first + ROUND).min(batches))
+            .into_par_iter()
+            .map(batch)
+            .collect::<Vec<T>>()
+    };
     let mut rounds = |pool: Option<&rayon::ThreadPool>| {
         let mut first = 0;
+        let mut ready = pool.map(|pool| pool.install(|| round(0)));
         while first < batches {
             let last = (first + ROUND).min(batches);
-            match pool {
-                Some(pool) => {
-                    let results: Vec<T> = pool.install(|| (first..last).into_par_iter().map(batch).collect());
+            let done = (last * BATCH).min(n);
+            let stop = if let (Some(pool), Some(results)) = (pool, ready.take()) {
+                pool.in_place_scope(|scope| {
+                    if last < batches {
+                        // The next round is worked on while this one is merged.
+                        scope.spawn(|_| ready = Some(round(last)));
+                    }
                     results.into_iter().for_each(&mut merge);
-                }
-                None => (first..last).map(batch).for_each(&mut merge),
-            }
+                    progress(done).is_break()
+                })
+            } else {
+                (first..last).map(batch).for_each(&mut merge);
+                progress(done).is_break()
+            };
             first = last;
-            if progress((first * BATCH).min(n)).is_break() {
+            if stop {
                 break;
             }
         }
@@ -104,7 +118,7 @@ mod tests {
             |k| seen += k,
             |_| ControlFlow::Break(()),
         );
-        assert_eq!(done, 64 * BATCH);
+        assert_eq!(done, ROUND * BATCH);
         assert_eq!(seen, done);
     }
 }
