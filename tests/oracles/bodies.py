@@ -6,6 +6,7 @@ at x from its middle and in the direction k, L = scale · (1 + a·x/size) · (1 
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 from typing import ClassVar
 
@@ -20,20 +21,20 @@ SIGMA = 2 * np.pi / 3
 
 
 @dataclasses.dataclass(frozen=True)
-class Body:
+class Body(abc.ABC):
     """Lengths in mm, luminance in cd/m²."""
 
     middle: tuple[float, float, float] = (0.4, -0.7, 1.9)
     scale: float = 1e4
     size: ClassVar[float] = 5.0
 
+    @abc.abstractmethod
     def on_surface(self, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
         """Uniform points on the surface, from the middle, and normals there."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def exits(self, points: Array, directions: Array) -> tuple[Array, Array]:
         """Where lines leave the body, from its middle; and whether they meet it."""
-        raise NotImplementedError
 
     def _level(self, x: Array, k: Array) -> Array:
         return self.scale * (1 + x @ A / self.size) * (1 + k @ B)

@@ -13,6 +13,7 @@ None has a mirror or rotation symmetry that could hide a swapped axis or a wrong
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import functools
 import itertools
@@ -84,16 +85,16 @@ def _azimuthal(p: Array, q: Array, drop: float, tilt: tuple[float, float], cross
     return 1 - drop * (1 - cosine) + tilt[0] * p + tilt[1] * q + cross * p * q
 
 
-class _Planar:
+class _Planar(abc.ABC):
     """A source on z = 0 that shines upwards; what it lacks is the luminance at coordinates x, y, p, q."""
 
     extent: Extent
     ceiling: float
     """No luminance is above it [cd/m²]."""
 
+    @abc.abstractmethod
     def at(self, x: Array, y: Array, p: Array, q: Array) -> Array:
         """Luminance [cd/m²] at x, y [mm] towards the direction cosines p, q; 0 outside the source."""
-        raise NotImplementedError
 
     def luminance(self, points: Array, directions: Array) -> Array:
         """Luminance [cd/m²] along lines; see the module."""

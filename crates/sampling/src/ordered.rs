@@ -16,8 +16,8 @@ const ROUND: u64 = 32;
 ///
 /// `merge` and `progress` run on the calling thread, which is where an interpreter looks for signals. `progress` is told
 /// how many items are done after each round; [`ControlFlow::Break`] ends the run early. Returns the number of items done.
-/// At most twice [`ROUND`] results wait to be merged at any time, which bounds the memory. The threads live as long as the call:
-/// a process may fork afterwards. A single batch, or a system that grants no threads, is served by the calling thread.
+/// At most twice [`ROUND`] results wait to be merged at any time, which bounds the memory. The threads live as long as the
+/// call: a process may fork afterwards. A single batch, or a system that grants no threads, is served by the calling thread.
 pub fn run<T: Send>(
     threads: usize,
     n: u64,

@@ -11,6 +11,7 @@ from etendue import _core
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
 from etendue.lightfield.light_field import PartField, core_part
 from etendue.lightfield.nodes import node_values
+from etendue.lightfield.shifted_trees import LATTICE
 from etendue.lightfield.symmetry import order, sum_of_images
 from etendue.lightfield.trees import POSITIONS, Base, Tree, grow_averaged, log_evidence
 
@@ -23,8 +24,8 @@ FLOOR = 1e-3
 MIXED_IN = 1e-4
 """Share of a uniform field in every score, so that one cell that is wrongly dark cannot decide it."""
 
-FINE_POSITIONS = tuple((k * 0.754_877_666 % 1.0, k * 0.569_840_291 % 1.0) for k in range(16))
-"""Positions of the fine grids over which the factors of a product base are averaged: evenly spread, [Roberts2018]_."""
+FINE_POSITIONS = tuple((k * LATTICE[0] % 1.0, k * LATTICE[1] % 1.0) for k in range(16))
+"""Positions of the fine grids over which the factors of a product base are averaged: evenly spread."""
 
 
 def uniform_bases(counts: Sequence[PartCounts]) -> tuple[Base, ...]:

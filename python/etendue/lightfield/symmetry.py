@@ -77,7 +77,7 @@ def fold(counts: EtendueCounts, symmetry: str) -> EtendueCounts:
     >>> bool(folded["all"][0].grid.rays == 2 * counts["all"][0].grid.rays), round(folded.part_flux[0], 6)
     (True, 600.0)
     """
-    _images(counts, symmetry)
+    _images(counts, symmetry)  # refuses what the surface cannot carry
 
     def together(cells: FloatArray) -> FloatArray:
         return sum_of_images(cells, symmetry)
