@@ -3,12 +3,17 @@
 //! `batch`: a structure of arrays that the inner loops run over. `source`: anything that yields rays by index. `table`:
 //! records in memory or in a mapped file. `tally`: the flux account of a pass. `scan`: the statistics of a ray set in one pass.
 
+pub mod assembly;
 pub mod batch;
+pub mod face;
 pub mod scan;
+pub mod shape;
 pub mod source;
 pub mod table;
 pub mod tally;
 
+pub use assembly::Assembly;
 pub use batch::RayBatch;
+pub use face::Face;
 pub use source::RaySource;
 pub use tally::Tally;

@@ -1,5 +1,184 @@
-//! Sources of rays.
+//! Sources: what emits rays, where it stands, how much flux it has and of which wavelengths.
 
+pub mod numbers;
+mod point;
 mod rings;
+pub mod surface;
 
+use std::ops::Range;
+use std::sync::Arc;
+
+use etendue_geometry::shape::Shape;
+use etendue_geometry::shape::sample::AreaSampler;
+use etendue_geometry::{RayBatch, RaySource};
+use etendue_lightfield::field::draw::{FieldRays, Sampler};
+use etendue_math::{Frame, Vec3};
+use etendue_sampling::philox::Stream;
+
+pub use numbers::Numbers;
+pub use point::PointSource;
 pub use rings::{Ring, RingSource};
+pub use surface::SurfaceSource;
+
+/// The purpose under which the rays of traced sources are drawn (see [`Stream::new`]); each source has one of its own.
+const PURPOSE_EMIT: u64 = 0x454D_4954 << 32;
+
+/// The purpose under which their wavelengths are drawn.
+const PURPOSE_COLOUR: u64 = 0x434F_4C52 << 32;
+
+/// What emits, in its own coordinates.
+#[derive(Clone, Debug)]
+pub enum Emitter {
+    /// The rays of a set, by its number among those that a trace is given.
+    Rays {
+        /// Which set.
+        set: usize,
+        /// From stored flux to flux unit.
+        scale: f64,
+    },
+    /// A light field, drawn from.
+    Field(Arc<Sampler>),
+    /// An emitting surface.
+    Surface(SurfaceSource),
+    /// A point with an intensity distribution.
+    Point(PointSource),
+    /// Parallel light along +z from a piece of the plane z = 0.
+    Beam(AreaSampler),
+}
+
+impl Emitter {
+    /// A collimated beam; None if the shape is not flat or has no finite area.
+    #[must_use]
+    pub fn beam(shape: &Shape) -> Option<Self> {
+        matches!(shape, Shape::Flat(_)).then(|| AreaSampler::new(shape).map(Self::Beam))?
+    }
+}
+
+/// A source in its place.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// What emits.
+    pub emitter: Emitter,
+    /// Where it stands.
+    pub frame: Frame,
+    /// \[flux unit\].
+    pub flux: f64,
+    /// Wavelengths \[nm\], and the share of the flux up to each of them; the last one is 1.
+    pub spectrum: Vec<(f64, f64)>,
+}
+
+impl Source {
+    /// The wavelength of ray `index` of source number `source` \[nm\].
+    #[inline]
+    #[must_use]
+    pub fn wavelength(&self, seed: u64, source: u64, index: u64) -> f64 {
+        if let [(wavelength, _)] = self.spectrum[..] {
+            return wavelength;
+        }
+        let [number, ..] = Stream::new(seed, PURPOSE_COLOUR + source).uniforms(index, 0);
+        let line = self.spectrum.partition_point(|(_, share)| *share < number);
+        self.spectrum[line.min(self.spectrum.len() - 1)].0
+    }
+
+    /// Puts rays `range` of `count` (at most a block) into `batch`, in world coordinates: together the `count` rays carry
+    /// the flux of the source.
+    ///
+    /// A set of n rays is gone through once: ray i of `count` is ray ⌊i n/count⌋ of the set, with n/count of its flux.
+    pub fn emit(
+        &self,
+        source: u64,
+        range: Range<u64>,
+        count: u64,
+        seed: u64,
+        sets: &[&dyn RaySource],
+        batch: &mut RayBatch,
+    ) {
+        match &self.emitter {
+            Emitter::Rays { set, scale } => {
+                resample(sets[*set], range, count, batch);
+                let scale = scale * sets[*set].len() as f64 / count as f64;
+                batch.flux[..batch.len].iter_mut().for_each(|w| *w *= scale);
+            }
+            Emitter::Field(sampler) => {
+                let rays = FieldRays {
+                    sampler,
+                    rays: count,
+                    seed: seed.wrapping_add(source << 48),
+                };
+                rays.fill(range, batch);
+                // The field's own flux may have been restated.
+                let flux = self.flux / count as f64;
+                batch.flux[..batch.len].fill(flux);
+            }
+            Emitter::Surface(surface) => self.draw(source, range, count, seed, batch, |n| surface.draw(n)),
+            Emitter::Point(point) => self.draw(source, range, count, seed, batch, |n| (Vec3::default(), point.draw(n))),
+            Emitter::Beam(area) => self.draw(source, range, count, seed, batch, |n| {
+                (area.draw(&mut || n.next()), Vec3::new(0.0, 0.0, 1.0))
+            }),
+        }
+        for i in 0..batch.len {
+            if batch.usable(i) {
+                let x = self.frame.point_to_world(batch.position(i));
+                let k = self.frame.direction_to_world(batch.direction(i));
+                for (axis, (x, k)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
+                    batch.position[axis][i] = x;
+                    batch.direction[axis][i] = k;
+                }
+            }
+        }
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "a range of at most a block")]
+    fn draw(
+        &self,
+        source: u64,
+        range: Range<u64>,
+        count: u64,
+        seed: u64,
+        batch: &mut RayBatch,
+        ray: impl Fn(&mut Numbers) -> (Vec3, Vec3),
+    ) {
+        let stream = Stream::new(seed, PURPOSE_EMIT + source);
+        batch.len = (range.end - range.start) as usize;
+        batch.defects = Default::default();
+        batch.norm_error = 0.0;
+        batch.flux[..batch.len].fill(self.flux / count as f64);
+        for (i, index) in range.enumerate() {
+            let (x, k) = ray(&mut Numbers::new(stream, index, 0));
+            for (axis, (x, k)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
+                batch.position[axis][i] = x;
+                batch.direction[axis][i] = k;
+            }
+        }
+    }
+}
+
+/// Rays ⌊i n/count⌋ of a set for i in `range`.
+#[allow(clippy::cast_possible_truncation, reason = "quotients are below the set's length; ranges are at most a block")]
+fn resample(set: &dyn RaySource, range: Range<u64>, count: u64, batch: &mut RayBatch) {
+    let n = set.len();
+    if n == count {
+        set.fill(range, batch);
+        return;
+    }
+    let record = |i: u64| (u128::from(i) * u128::from(n) / u128::from(count)) as u64;
+    let len = (range.end - range.start) as usize;
+    let mut one = RayBatch::default();
+    let mut held = u64::MAX;
+    batch.len = len;
+    batch.defects = Default::default();
+    for (slot, i) in range.enumerate() {
+        let wanted = record(i);
+        if wanted != held {
+            set.fill(wanted..wanted + 1, &mut one);
+            held = wanted;
+        }
+        for axis in 0..3 {
+            batch.position[axis][slot] = one.position[axis][0];
+            batch.direction[axis][slot] = one.direction[axis][0];
+        }
+        batch.flux[slot] = one.flux[0];
+        batch.norm_error = batch.norm_error.max(one.norm_error);
+        batch.defects.iter_mut().zip(one.defects).for_each(|(a, b)| *a += b);
+    }
+}

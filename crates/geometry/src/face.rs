@@ -1,0 +1,71 @@
+//! A shape in its place: moved, turned and trimmed.
+
+use etendue_math::{Frame, Vec3};
+
+use crate::shape::{Crossing, ROUNDING, Shape, size};
+
+/// The points p with n·p ≤ d, in the coordinates of the shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfSpace {
+    /// Unit normal, pointing out of the half space.
+    pub normal: Vec3,
+    /// Distance of its plane from the origin \[mm\].
+    pub offset: f64,
+}
+
+/// A shape, where it stands, and what is cut off.
+#[derive(Clone, Debug)]
+pub struct Face {
+    /// The surface.
+    pub shape: Shape,
+    /// Where it stands and how it is turned.
+    pub frame: Frame,
+    /// Only what lies in all of these is kept.
+    pub trims: Vec<HalfSpace>,
+    /// Whether the normal is that of the shape reversed.
+    pub flipped: bool,
+}
+
+/// A point of a face: what a ray that arrives there needs to know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foot {
+    /// The point, on the surface to within a rounding error \[mm\].
+    pub point: Vec3,
+    /// Unit normal of the surface, on the side that the face calls its front.
+    pub normal: Vec3,
+}
+
+impl Face {
+    /// Whether the point, in the coordinates of the shape, may lie in all half spaces.
+    #[inline]
+    #[must_use]
+    pub fn keeps(&self, p: Vec3, error: f64) -> bool {
+        self.trims.iter().all(|trim| trim.normal.dot(p) <= trim.offset + error)
+    }
+
+    /// Calls `visit` for each crossing of the line o + t d with `from` ≤ t ≤ `to`, in no order.
+    ///
+    /// `leaving`: the parts of the shape (triangles of a mesh) on which the line starts; none if it starts elsewhere.
+    #[inline]
+    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], leaving: &[u32], mut visit: impl FnMut(Crossing)) {
+        let (p, k) = (self.frame.point_to_local(o), self.frame.direction_to_local(d));
+        self.shape.crossings(p, k, range, !leaving.is_empty(), |crossing| {
+            if self.trims.is_empty() || self.keeps(p + k * crossing.t, ROUNDING * (size(p) + crossing.t.abs())) {
+                visit(crossing);
+            }
+        });
+    }
+
+    /// The point where the line o + t d crosses the face, settled on it, and the normal there.
+    #[inline]
+    #[must_use]
+    pub fn foot(&self, o: Vec3, d: Vec3, crossing: &Crossing) -> Foot {
+        let p = self.frame.point_to_local(o) + self.frame.direction_to_local(d) * crossing.t;
+        let (p, n) = self.shape.settle(p);
+        let n = self.frame.direction_to_world(n);
+        Foot {
+            point: self.frame.point_to_world(p),
+            normal: if self.flipped { -n } else { n },
+        }
+    }
+}

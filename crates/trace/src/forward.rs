@@ -1,0 +1,395 @@
+//! From the sources to the detectors.
+//!
+//! Every ray keeps its flux and has one fate: at a surface it goes into one of the lobes, or is absorbed, by chance in
+//! proportion to their shares, and in a medium it is absorbed at a distance drawn from Beer's law. So the rays that a
+//! detector keeps have equal flux if those of the source have.
+
+use std::ops::Range;
+
+use etendue_geometry::assembly::{Hits, Leaving, Lines, NONE};
+use etendue_geometry::batch::BLOCK;
+use etendue_geometry::{RayBatch, RaySource};
+use etendue_math::Vec3;
+use etendue_optics::finish::{Incidence, Lobe, pick};
+use etendue_optics::fresnel::{reflect, refract};
+use etendue_optics::source::surface::about;
+use etendue_sampling::ordered::BATCH;
+use etendue_sampling::philox::Stream;
+use rayon::prelude::*;
+
+use crate::detector::{Detector, illuminance_cell, intensity_cell};
+use crate::inside::Inside;
+use crate::ledger::{Fate, Ledger};
+use crate::meeting::{Fillings, Loss, Meeting, meet, place, transmittance};
+use crate::scene::Scene;
+
+/// The purpose under which the events of traced rays are drawn (see [`Stream::new`]).
+const PURPOSE_TRACE: u64 = 0x5452_4143;
+
+/// How many rays, and how.
+#[derive(Clone, Copy)]
+pub struct Run<'a> {
+    /// Of all sources together.
+    pub rays: u64,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Events that a ray may have before it is ended.
+    pub most_events: u32,
+    /// The ray sets that sources refer to.
+    pub sets: &'a [&'a dyn RaySource],
+}
+
+/// A ray as a collecting surface keeps it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Record {
+    /// \[mm\].
+    pub position: [f64; 3],
+    /// Unit vector.
+    pub direction: [f64; 3],
+    /// \[flux unit\].
+    pub flux: f64,
+    /// \[nm\].
+    pub wavelength: f64,
+}
+
+/// Sums of a cell: Σ w, Σ w² with w the contribution of one ray, and how many rays contributed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cell {
+    /// Σ w.
+    pub sum: f64,
+    /// Σ w².
+    pub squares: f64,
+    /// Rays.
+    pub rays: u64,
+}
+
+/// What a number of batches amount to.
+#[derive(Clone, Debug)]
+pub struct Harvest {
+    /// The flux account.
+    pub ledger: Ledger,
+    /// Cells of each detector that has some.
+    pub cells: Vec<Vec<Cell>>,
+    /// Rays of each collecting surface.
+    pub records: Vec<Vec<Record>>,
+    /// Rays that the sources gave out.
+    pub rays: u64,
+    /// Largest | emitted − Σ fates | / emitted of a batch.
+    pub imbalance: f64,
+}
+
+/// What one batch amounts to: contributions in the order in which they were made.
+struct Yield {
+    ledger: Ledger,
+    /// For each detector: cell, ray of the batch, contribution.
+    marks: Vec<Vec<(u32, u32, f64)>>,
+    records: Vec<Vec<Record>>,
+}
+
+/// The rays of each source in batch `batch`: the first one's number among those of the source, and how many.
+///
+/// After b batches, source s has had ⌊b B Q_s⌋ − ⌊b B Q_{s−1}⌋ rays, Q being the sums of the shares of the flux: every
+/// beginning of a run serves all sources in proportion, and each number is known without counting.
+#[must_use]
+pub fn deal(scene: &Scene, rays: u64, batch: u64) -> Vec<Range<u64>> {
+    let bounds = |done: u64| edges(scene, done);
+    let (from, to) = (bounds((batch * BATCH).min(rays)), bounds(((batch + 1) * BATCH).min(rays)));
+    (0..scene.sources.len())
+        .map(|s| (from[s + 1] - from[s])..(to[s + 1] - to[s]))
+        .collect()
+}
+
+/// Rays of the first s sources among the first `done` rays.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of `done`")]
+fn edges(scene: &Scene, done: u64) -> Vec<u64> {
+    let total: f64 = scene.sources.iter().map(|s| s.flux).sum();
+    let mut sum = 0.0;
+    let mut result = vec![0];
+    for source in &scene.sources {
+        sum += source.flux;
+        result.push(((sum / total) * done as f64).floor() as u64);
+    }
+    let last = result.len() - 1;
+    result[last] = done;
+    result
+}
+
+/// Traces batches `batches` of a run on the threads of the current pool, and merges them in order.
+///
+/// `stop` is looked at before each batch; batches from the first one that was not begun on are left out, and the number of
+/// batches done is returned.
+pub fn trace(scene: &Scene, run: &Run<'_>, batches: Range<u64>) -> Harvest {
+    let parts: Vec<Yield> = batches.clone().into_par_iter().map(|b| trace_batch(scene, run, b)).collect();
+    let mut harvest = Harvest {
+        ledger: Ledger::new(scene),
+        cells: scene.detectors.iter().map(|d| vec![Cell::default(); d.cells()]).collect(),
+        records: vec![Vec::new(); scene.detectors.len()],
+        rays: 0,
+        imbalance: 0.0,
+    };
+    for part in parts {
+        let [emitted, fates] = part.ledger.balance();
+        let scale = if emitted.flux > 0.0 { emitted.flux } else { 1.0 };
+        let lost = if emitted.rays == fates.rays { 0.0 } else { f64::INFINITY };
+        harvest.imbalance = harvest.imbalance.max((emitted.flux - fates.flux).abs() / scale + lost);
+        harvest.rays += emitted.rays;
+        harvest.ledger.merge(&part.ledger);
+        for (cells, mut marks) in harvest.cells.iter_mut().zip(part.marks) {
+            // The contributions of one ray to one cell belong together: they are not independent.
+            marks.sort_by_key(|(cell, ray, _)| (*cell, *ray));
+            for same in marks.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+                let sum: f64 = same.iter().map(|(_, _, w)| w).sum();
+                let cell = &mut cells[same[0].0 as usize];
+                cell.sum += sum;
+                cell.squares += sum * sum;
+                cell.rays += 1;
+            }
+        }
+        for (all, records) in harvest.records.iter_mut().zip(part.records) {
+            all.extend(records);
+        }
+    }
+    harvest
+}
+
+/// A ray on its way, besides its line.
+#[derive(Clone, Copy)]
+struct Rider {
+    flux: f64,
+    wavelength: f64,
+    /// Its number in the run, and in the batch.
+    ray: u64,
+    mark: u32,
+    event: u32,
+    inside: Inside,
+}
+
+struct Walk<'a> {
+    scene: &'a Scene,
+    run: &'a Run<'a>,
+    stream: Stream,
+    fillings: Fillings,
+    lines: Lines,
+    riders: Vec<Rider>,
+    hits: Hits,
+    out: Yield,
+}
+
+fn trace_batch(scene: &Scene, run: &Run<'_>, batch: u64) -> Yield {
+    let mut walk = Walk {
+        scene,
+        run,
+        stream: Stream::new(run.seed, PURPOSE_TRACE),
+        fillings: Fillings::new(scene),
+        lines: Lines::default(),
+        riders: Vec::with_capacity(BLOCK),
+        hits: Hits::default(),
+        out: Yield {
+            ledger: Ledger::new(scene),
+            marks: vec![Vec::new(); scene.detectors.len()],
+            records: vec![Vec::new(); scene.detectors.len()],
+        },
+    };
+    let mut births = RayBatch::default();
+    let totals = edges(scene, run.rays);
+    let mut mark = 0;
+    for (number, range) in deal(scene, run.rays, batch).into_iter().enumerate() {
+        let source = &scene.sources[number];
+        let count = totals[number + 1] - totals[number];
+        let mut start = range.start;
+        while start < range.end {
+            let stop = (start + BLOCK as u64).min(range.end);
+            source.emit(number as u64, start..stop, count, run.seed, run.sets, &mut births);
+            for i in 0..births.len {
+                let flux = births.flux[i];
+                walk.out.ledger.emitted[number].add(flux);
+                let ray = batch * BATCH + u64::from(mark);
+                if births.usable(i) {
+                    let wavelength = source.wavelength(run.seed, number as u64, start + i as u64);
+                    walk.start(births.position(i), births.direction(i), flux, wavelength, ray, mark);
+                } else {
+                    walk.out.ledger.book(Fate::Lost(Loss::NotFinite, NONE), flux);
+                }
+                mark += 1;
+            }
+            walk.finish();
+            start = stop;
+        }
+    }
+    walk.out
+}
+
+/// How a ray goes on.
+type Next = Result<(Vec3, Vec3, Leaving), Fate>;
+
+impl Walk<'_> {
+    fn start(&mut self, o: Vec3, d: Vec3, flux: f64, wavelength: f64, ray: u64, mark: u32) {
+        match place(self.scene, o, d) {
+            Ok((inside, leaving)) => {
+                self.lines.push(o, d, leaving);
+                self.riders.push(Rider {
+                    flux,
+                    wavelength,
+                    ray,
+                    mark,
+                    event: 0,
+                    inside,
+                });
+            }
+            Err((loss, face)) => self.out.ledger.book(Fate::Lost(loss, face), flux),
+        }
+    }
+
+    /// Follows all rays of the block to their ends.
+    fn finish(&mut self) {
+        while !self.lines.is_empty() {
+            let mut hits = std::mem::take(&mut self.hits);
+            self.scene.assembly.nearest(&self.lines, &mut hits);
+            self.out.ledger.segments += self.lines.len() as u64;
+            let mut kept = 0;
+            for i in 0..self.lines.len() {
+                let mut rider = self.riders[i];
+                match self.step(&hits, i, &mut rider) {
+                    Ok((o, d, leaving)) => {
+                        self.lines.set(kept, o, d, leaving);
+                        self.riders[kept] = rider;
+                        kept += 1;
+                    }
+                    Err(fate) => self.out.ledger.book(fate, rider.flux),
+                }
+            }
+            self.lines.truncate(kept);
+            self.riders.truncate(kept);
+            self.hits = hits;
+        }
+    }
+
+    #[inline]
+    fn step(&mut self, hits: &Hits, i: usize, rider: &mut Rider) -> Next {
+        let scene = self.scene;
+        let d = self.lines.direction(i);
+        let numbers = self.stream.uniforms(rider.ray, u64::from(rider.event));
+        let filling = self.fillings.at(scene, rider.inside.top(), rider.wavelength);
+        if filling.absorption > 0.0 && -numbers[3].ln() < filling.absorption * hits.t[i] {
+            return Err(Fate::InMedium(scene.medium(rider.inside.top())));
+        }
+        if hits.face[i] == NONE {
+            self.escape(d, rider);
+            return Err(Fate::Escaped);
+        }
+        let out = &mut self.out;
+        let meeting = meet(scene, &self.lines, hits, i, rider.inside, |detector, point, _| {
+            detect(scene, out, detector, point, d, rider);
+        })
+        .map_err(|(loss, face)| Fate::Lost(loss, face))?;
+        rider.event += 1;
+        if rider.event >= self.run.most_events {
+            return Err(Fate::Terminated);
+        }
+        let Some(finish) = meeting.finish else {
+            rider.inside = meeting.after;
+            return Ok((meeting.point, d, meeting.leaving));
+        };
+        self.scatter(&meeting, finish, d, numbers, rider)
+    }
+
+    #[inline]
+    fn scatter(&mut self, meeting: &Meeting, finish: u32, d: Vec3, numbers: [f64; 4], rider: &mut Rider) -> Next {
+        let scene = self.scene;
+        let finish = &scene.finishes[finish as usize];
+        let light = Incidence {
+            cosine: (-d.dot(meeting.normal)).min(1.0),
+            wavelength: rider.wavelength,
+            n1: self.fillings.at(scene, meeting.before.top(), rider.wavelength).n,
+            n2: self.fillings.at(scene, meeting.after.top(), rider.wavelength).n,
+        };
+        if !(light.n1 > 0.0 && light.n2 > 0.0) {
+            return Err(Fate::Lost(Loss::NoIndex, meeting.face));
+        }
+        if finish.is_diffuse() {
+            self.show(meeting, finish, &light, rider);
+        }
+        let (shares, across) = finish.shares(&light);
+        let Some(lobe) = pick(&shares, numbers[0]) else {
+            return Err(Fate::OnFace(meeting.face));
+        };
+        if lobe.is_transmission() {
+            rider.inside = meeting.after;
+        }
+        let d = match lobe {
+            Lobe::SpecularReflection => reflect(d, meeting.normal, light.cosine),
+            Lobe::SpecularTransmission if light.n1 == light.n2 => d,
+            Lobe::SpecularTransmission => refract(d, meeting.normal, light.cosine, light.n1 / light.n2, across),
+            Lobe::DiffuseReflection => about(meeting.normal, (1.0 - numbers[1]).sqrt(), numbers[2]),
+            Lobe::DiffuseTransmission => about(-meeting.normal, (1.0 - numbers[1]).sqrt(), numbers[2]),
+        };
+        Ok((meeting.point, d, meeting.leaving))
+    }
+
+    /// The far field takes note of a ray that leaves the scene.
+    fn escape(&mut self, d: Vec3, rider: &Rider) {
+        for (detector, marks) in self.scene.detectors.iter().zip(&mut self.out.marks) {
+            if let Detector::Intensity { planes, steps } = detector {
+                marks.push((intensity_cell(*planes, *steps, d), rider.mark, rider.flux));
+            }
+        }
+    }
+
+    /// Connects a diffuse scatter to the eye of every light image.
+    fn show(&mut self, meeting: &Meeting, finish: &etendue_optics::finish::Finish, light: &Incidence, rider: &Rider) {
+        for (number, detector) in self.scene.detectors.iter().enumerate() {
+            let Detector::Image(view) = detector else { continue };
+            let away = view.eye - meeting.point;
+            let distance = away.length();
+            let k = away * (1.0 / distance);
+            let cosine = k.dot(meeting.normal);
+            let Some(pixel) = view.pixel(meeting.point, k) else { continue };
+            let bsdf = finish.bsdf(light, cosine < 0.0);
+            if bsdf == 0.0 || cosine == 0.0 {
+                continue;
+            }
+            let inside = if cosine < 0.0 { meeting.after } else { meeting.before };
+            let share = transmittance(
+                self.scene,
+                meeting.point,
+                view.eye,
+                meeting.leaving,
+                inside,
+                &mut self.fillings,
+                rider.wavelength,
+            );
+            if share > 0.0 {
+                // Flux Φ on an element gives it the intensity Φ f cos θ towards the eye; seen through a pixel of area A
+                // at distance p, that is the luminance I/s² · p²/(A cos θₚ).
+                let t = (view.target - view.eye).dot(view.normal) / k.dot(view.normal);
+                let area = view.width * view.height / view.pixels() as f64;
+                let weight = bsdf * cosine.abs() / (distance * distance) * (t * t) / (area * k.dot(view.normal).abs());
+                self.out.marks[number].push((pixel, rider.mark, rider.flux * share * weight));
+            }
+        }
+    }
+}
+
+fn detect(scene: &Scene, out: &mut Yield, detector: u32, point: Vec3, d: Vec3, rider: &Rider) {
+    let number = detector as usize;
+    match &scene.detectors[number] {
+        Detector::Rays(_) => out.records[number].push(Record {
+            position: [point.x, point.y, point.z],
+            direction: [d.x, d.y, d.z],
+            flux: rider.flux,
+            wavelength: rider.wavelength,
+        }),
+        Detector::Illuminance {
+            frame,
+            width,
+            height,
+            columns,
+            rows,
+        } => {
+            if let Some(cell) = illuminance_cell(frame, [*width, *height], [*columns, *rows], point, d) {
+                out.marks[number].push((cell, rider.mark, rider.flux));
+            }
+        }
+        Detector::Intensity { .. } | Detector::Image(_) => {}
+    }
+}
