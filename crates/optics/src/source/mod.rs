@@ -1,5 +1,6 @@
 //! Sources: what emits rays, where it stands, how much flux it has and of which wavelengths.
 
+pub mod lit;
 pub mod numbers;
 mod point;
 mod rings;
@@ -15,6 +16,7 @@ use etendue_lightfield::field::draw::{FieldRays, Sampler};
 use etendue_math::{Frame, Vec3};
 use etendue_sampling::philox::Stream;
 
+pub use lit::{Beacon, Lantern, Lit};
 pub use numbers::Numbers;
 pub use point::PointSource;
 pub use rings::{Ring, RingSource};
