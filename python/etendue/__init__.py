@@ -34,6 +34,7 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
+from etendue.scene import Scene
 from etendue.sources.ring_source import RingSource
 
 __all__ = [
@@ -51,6 +52,7 @@ __all__ = [
     "RaySet",
     "Region",
     "RingSource",
+    "Scene",
     "Screen",
     "Spectrum",
     "Sphere",

@@ -23,8 +23,8 @@ class UnknownNameError(EtendueError, ValueError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         choices = sorted(known)
-        near = difflib.get_close_matches(name, choices, n=1, cutoff=0.5)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
+        near = nearest_name(name, choices)
+        hint = f" Did you mean {near!r}?" if near else ""
         super().__init__(f"unknown {kind} {name!r}.{hint} Known: {', '.join(choices)}.")
 
 
@@ -45,3 +45,31 @@ class UnsupportedFormatError(FormatError):
 
 class UnitError(EtendueError, ValueError):
     """A conversion between units that the data does not support (watts to lumens without a spectrum)."""
+
+
+class SceneError(EtendueError, ValueError):
+    """A scene that cannot be built: every mistake in it, each with its place and what to do.
+
+    Parameters
+    ----------
+    source : object
+        The file, or what was being made.
+    mistakes : iterable of (place, text)
+        ``('solids[2] "lens": shape.radius', "…")`` and so on, at least one.
+    """
+
+    def __init__(self, source: object, mistakes: Iterable[tuple[str, str]]) -> None:
+        self.source = source
+        self.mistakes = tuple(mistakes)
+        lines = [f"{place}: {text}" if place else text for place, text in self.mistakes]
+        if len(lines) == 1:
+            super().__init__(f"{source}: {lines[0]}")
+        else:
+            super().__init__("\n  ".join([f"{source}: {len(lines)} mistakes", *lines]))
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str | None:
+    """The known name that somebody who wrote `name` may have meant, if there is one; capitals do not matter."""
+    by_folded = {choice.casefold(): choice for choice in sorted(known)}
+    near = difflib.get_close_matches(name.casefold(), list(by_folded), n=1, cutoff=0.5)
+    return by_folded[near[0]] if near else None

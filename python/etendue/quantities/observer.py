@@ -83,15 +83,22 @@ class Observer:
         unique; this form stays continuous and lets φ choose the axis.
         """
         # Exact values at the quarter turns, so that φ = 90° gives exactly +Y and not 6e-17 of +X.
-        c, s = _cos_sin_degrees(self.phi)
-        ct, st = _cos_sin_degrees(self.theta)
+        c, s = cos_sin_degrees(self.phi)
+        ct, st = cos_sin_degrees(self.theta)
         right = (ct * c * c + s * s, (ct - 1.0) * c * s, -st * c)
         up = ((ct - 1.0) * c * s, ct * s * s + c * c, -st * s)
         toward = (st * c, st * s, ct)
         return np.array(right), np.array(up), np.array(toward)
 
 
-def _cos_sin_degrees(angle: float) -> tuple[float, float]:
+def cos_sin_degrees(angle: float) -> tuple[float, float]:
+    """Cosine and sine of an angle [°], exact at quarter turns.
+
+    Examples
+    --------
+    >>> cos_sin_degrees(-90)
+    (0.0, -1.0)
+    """
     quarter, rest = divmod(angle, 90.0)
     c, s = math.cos(math.radians(rest)), math.sin(math.radians(rest))
     for _ in range(int(quarter) % 4):

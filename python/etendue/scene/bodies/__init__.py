@@ -1,0 +1,13 @@
+"""Shapes of solids, by the ``kind`` that a user writes; the registry is the list of the tests."""
+
+from __future__ import annotations
+
+from etendue.scene.bodies.body import Body
+from etendue.scene.bodies.flat import FLAT_BODIES, Block, Prism, PrismaticFilm
+from etendue.scene.bodies.lens import Lens
+from etendue.scene.bodies.round import ROUND_BODIES, Ball, Dome, Frustum, Rod
+
+BODIES: dict[str, type[Body]] = {**ROUND_BODIES, **FLAT_BODIES, "lens": Lens}
+"""Every shape of a solid by its kind."""
+
+__all__ = ["BODIES", "Ball", "Block", "Body", "Dome", "Frustum", "Lens", "Prism", "PrismaticFilm", "Rod"]

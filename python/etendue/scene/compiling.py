@@ -1,0 +1,270 @@
+"""From a scene to the one record that the tracer takes: names become numbers, files are opened, angles become radians."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from etendue.errors import EtendueError, SceneError, UnknownNameError
+from etendue.scene.finishes import BUILT_IN, Finish
+from etendue.scene.media import Medium
+from etendue.scene.media_library import MEDIA
+from etendue.scene.mistakes import join
+from etendue.scene.scene import Scene
+from etendue.scene.things import Solid, Surface
+from etendue.units import FluxUnit
+
+Record = dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Compiled:
+    """A scene as the tracer takes it, and the names of what it counts.
+
+    Parameters
+    ----------
+    record : mapping
+        ``media``, ``finishes``, ``solids``, ``faces``, ``sources``, ``detectors``: rows of plain values and arrays.
+        Lengths are in mm, angles in radians, wavelengths in nm.
+    medium_names, finish_names, solid_names, face_names, source_names, detector_names : tuple of str
+        One for each entry of the rows, in their order. What has no name is called by its place, as ``solids[0]``.
+    flux_unit : {"lm", "W"}
+        Of all sources.
+    notes : tuple of str
+        What the user should know.
+
+    Examples
+    --------
+    >>> ball = {"shape": {"kind": "ball", "radius": 1}, "medium": "BK7"}
+    >>> compile_scene(Scene(solids=[ball])).face_names
+    ('solids[0].surface',)
+    """
+
+    record: Record
+    medium_names: tuple[str, ...]
+    finish_names: tuple[str, ...]
+    solid_names: tuple[str, ...]
+    face_names: tuple[str, ...]
+    source_names: tuple[str, ...]
+    detector_names: tuple[str, ...]
+    flux_unit: FluxUnit
+    notes: tuple[str, ...]
+
+
+def compile_scene(scene: Scene) -> Compiled:
+    """The record of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        With the folder of its files.
+
+    Raises
+    ------
+    SceneError
+        With every mistake: a name that stands for nothing, a solid without a medium, a file that is missing or damaged,
+        units of flux that do not agree, a medium without an index at a wavelength of the sources.
+
+    Examples
+    --------
+    >>> disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 100}
+    >>> compiled = compile_scene(Scene(sources=[disk]))
+    >>> compiled.record["sources"][0]["wavelengths"].tolist(), compiled.flux_unit
+    ([555.0], 'lm')
+    """
+    return _Compiler(scene).compiled()
+
+
+class _Compiler:
+    """The rows under construction, and the mistakes found so far."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.files = scene.files
+        self.mistakes: list[tuple[str, str]] = []
+        self.notes: list[str] = []
+        self.rows: dict[str, list[Record]] = {
+            key: [] for key in ("media", "finishes", "solids", "faces", "sources", "detectors")
+        }
+        self.names: dict[str, list[str]] = {key: [] for key in self.rows}
+        self.media: list[tuple[str, str, Medium]] = []
+        self.numbers: dict[tuple[str, str], int] = {}
+
+    def compiled(self) -> Compiled:
+        """Everything, or all mistakes."""
+        unit = self._sources()
+        self._medium("surroundings", "surroundings", self.scene.surroundings)
+        for i, solid in enumerate(self.scene.solids):
+            self._solid(_place("solids", i, solid.name), solid.name or f"solids[{i}]", solid)
+        for i, surface in enumerate(self.scene.surfaces):
+            self._surface(_place("surfaces", i, surface.name), surface.name or f"surfaces[{i}]", surface)
+        self._detectors()
+        self._check_indices()
+        if self.mistakes:
+            raise SceneError(self.scene.name or "scene", self.mistakes)
+        names = {key: tuple(held) for key, held in self.names.items()}
+        return Compiled(
+            dict(self.rows),
+            names["media"],
+            names["finishes"],
+            names["solids"],
+            names["faces"],
+            names["sources"],
+            names["detectors"],
+            unit,
+            tuple(dict.fromkeys(self.notes)),
+        )
+
+    @contextlib.contextmanager
+    def _at(self, place: str) -> Iterator[None]:
+        """What goes wrong here is a mistake at this place, and the rest is looked at all the same."""
+        try:
+            yield
+        except SceneError as error:
+            self.mistakes += [(join(place, inner), text) for inner, text in error.mistakes]
+        except EtendueError as error:
+            self.mistakes.append((place, str(error)))
+        except FileNotFoundError as error:
+            self.mistakes.append((place, f"there is no file {error.filename}"))
+        except OSError as error:
+            self.mistakes.append((place, f"{error.filename} cannot be read: {error.strerror}"))
+
+    # --- media and finishes --------------------------------------------------------------------------------------------
+
+    def _medium(self, place: str, owner: str, given: Medium | str) -> int:
+        """Number of a medium, which is written down when it is first met."""
+        if isinstance(given, str):
+            key, name = ("media", given), given
+            medium = self.scene.media.get(given) or (MEDIA[given].medium if given in MEDIA else None)
+            if medium is None:
+                self.mistakes.append((place, str(UnknownNameError("medium", given, [*self.scene.media, *MEDIA]))))
+                return 0
+        else:
+            key, name, medium = ("media", f"{owner}.medium"), f"{owner}.medium", given
+        if key not in self.numbers:
+            self.numbers[key] = len(self.rows["media"])
+            with self._at(f"media.{name}" if given in self.scene.media else place):
+                self.rows["media"].append(medium.record(self.files))
+                self.names["media"].append(name)
+                self.media.append((place, name, medium))
+        return self.numbers[key]
+
+    def _finish(self, place: str, owner: str, given: Finish | str) -> tuple[int, bool]:
+        """Number of a finish, which is written down when it is first met; and whether it lets light in."""
+        if isinstance(given, str):
+            name = given
+            finish = self.scene.finishes.get(given) or BUILT_IN.get(given)
+            if finish is None:
+                known = [*self.scene.finishes, *BUILT_IN]
+                self.mistakes.append((place, str(UnknownNameError("finish", given, known))))
+                return 0, False
+        else:
+            name, finish = f"{owner}.finish", given
+        key = ("finishes", name)
+        if key not in self.numbers:
+            self.numbers[key] = len(self.rows["finishes"])
+            with self._at(f"finishes.{name}" if given in self.scene.finishes else place):
+                self.rows["finishes"].append(finish.record(self.files))
+                self.names["finishes"].append(name)
+        return self.numbers[key], finish.lets_light_in()
+
+    def _check_indices(self) -> None:
+        """Every medium has an index at every wavelength of the sources; a library's range is a note."""
+        used = [source["wavelengths"] for source in self.rows["sources"]]
+        wavelength = np.unique(np.concatenate(used)) if used else np.array([self.scene.wavelength])
+        for place, name, medium in self.media:
+            with self._at(place):
+                index = medium.index_at(wavelength, self.files)
+                bad = ~(np.isfinite(index) & (index >= 1.0) & (index <= 10.0))
+                if bad.any():
+                    at = wavelength[bad][0]
+                    n = index[bad][0]
+                    text = f"the refractive index of {name!r} is {n:.4g} at {at:g} nm; it must lie between 1 and 10"
+                    self.mistakes.append((place, text))
+            if name in MEDIA and name not in self.scene.media:
+                low, high = MEDIA[name].range
+                outside = wavelength[(wavelength < low) | (wavelength > high)]
+                if outside.size:
+                    known = f"{name}: its index was measured from {low:g} to {high:g} nm"
+                    self.notes.append(f"{known} and is extrapolated to {outside[0]:g} nm")
+
+    # --- what stands in the scene --------------------------------------------------------------------------------------
+
+    def _solid(self, place: str, name: str, solid: Solid) -> None:
+        number = len(self.rows["solids"])
+        frame = solid.frame()
+        entered = False
+        with self._at(join(place, "shape")):
+            faces = solid.shape.faces(self.files)
+            self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(faces)]
+            for face in faces:
+                given = solid.finish_of(face)
+                key = "finish" if given is solid.finish else f"finishes.{face.name}"
+                finish, lets_in = self._finish(
+                    join(place, key), name if key == "finish" else f"{name}.{face.name}", given
+                )
+                entered |= lets_in
+                self._face(
+                    f"{name}.{face.name}", face.shape, frame.then(face.frame).record(), [], number, face.flip, finish
+                )
+        if solid.medium is None and entered:
+            text = "is missing; light enters this solid, so its refractive index is needed"
+            self.mistakes.append((join(place, "medium"), text))
+        medium = 0 if solid.medium is None else self._medium(join(place, "medium"), name, solid.medium)
+        self.rows["solids"].append({"medium": medium})
+        self.names["solids"].append(name)
+
+    def _surface(self, place: str, name: str, surface: Surface) -> None:
+        with self._at(join(place, "shape")):
+            sheet = surface.shape.sheet(surface.trim, self.files)
+            finish, _ = self._finish(join(place, "finish"), name, surface.finish)
+            self._face(name, sheet.shape, surface.frame().record(), sheet.trims, None, False, finish)
+
+    def _face(
+        self, name: str, shape: Record, frame: list[float], trims: list[Any], solid: int | None, flip: bool, finish: int
+    ) -> None:
+        self.rows["faces"].append(
+            {"shape": shape, "frame": frame, "trims": trims, "solid": solid, "flip": flip, "finish": finish}
+        )
+        self.names["faces"].append(name)
+
+    # --- light and what becomes of it ----------------------------------------------------------------------------------
+
+    def _sources(self) -> FluxUnit:
+        units: dict[FluxUnit, str] = {}
+        for i, source in enumerate(self.scene.sources):
+            place, name = _place("sources", i, source.name), source.name or f"sources[{i}]"
+            with self._at(place):
+                for emitter in source.emitters(self.files):
+                    wavelengths, shares = source.colours(emitter, self.scene.wavelength)
+                    units.setdefault(emitter.flux_unit, name)
+                    self.rows["sources"].append(
+                        {
+                            **emitter.record,
+                            "wavelengths": wavelengths,
+                            "shares": shares,
+                            "frame": source.frame().record(),
+                        }
+                    )
+                    self.names["sources"].append(f"{name}.{emitter.name}" if emitter.name else name)
+                    if source.wavelength is None and source.spectrum is None:
+                        self.notes += [f"{name}: {note}" for note in emitter.notes]
+        if len(units) > 1:
+            text = " and ".join(f"{name!r} is in {unit}" for unit, name in units.items())
+            self.mistakes.append(("sources", f"{text}; give all of them in one unit, by flux and flux_unit"))
+        return next(iter(units), "lm")
+
+    def _detectors(self) -> None:
+        observers = {observer.name: observer for observer in self.scene.observers if observer.name}
+        for i, detector in enumerate(self.scene.detectors):
+            with self._at(_place("detectors", i, detector.name)):
+                self.rows["detectors"].append(detector.record(self.files, observers))
+                self.names["detectors"].append(detector.name or f"detectors[{i}]")
+
+
+def _place(family: str, i: int, name: str) -> str:
+    return f'{family}[{i}] "{name}"' if name else f"{family}[{i}]"

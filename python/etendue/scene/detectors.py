@@ -1,0 +1,178 @@
+"""What a trace records. Detectors are transparent: light goes on as if they were not there."""
+
+from __future__ import annotations
+
+import abc
+import math
+from typing import Annotated, Any, Literal, Self
+
+from annotated_types import Gt, Le
+from pydantic import model_validator
+
+from etendue.errors import UnknownNameError
+from etendue.scene.description import Description
+from etendue.scene.families import Family
+from etendue.scene.files import Files
+from etendue.scene.observers import ObserverKeys
+from etendue.scene.placement import Placement
+from etendue.scene.shapes import SHAPES
+from etendue.scene.shapes.shape import WHOLE, Shape, Trim
+from etendue.scene.values import Count, Length, Number
+
+Record = dict[str, Any]
+Pixels = Annotated[Count, Le(65536)]
+MOST_STEPS = 18_000
+"""Steps of γ over 180°: a hundredth of a degree."""
+
+
+class Detector(Description, abc.ABC):
+    """Something that records light.
+
+    Parameters
+    ----------
+    name : str
+        For results and messages.
+    """
+
+    name: str = ""
+
+    @abc.abstractmethod
+    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:
+        """The detector as the core takes it; `observers` are those of the scene by name.
+
+        Raises
+        ------
+        ArgumentError, UnknownNameError, FormatError, OSError
+            If it does not fit.
+        """
+
+
+class RayCollector(Detector, Placement):
+    """A ray collecting surface: every ray that passes it, with place, direction and flux (thesis section 2.2.1).
+
+    Parameters
+    ----------
+    shape : Shape
+    trim : Trim
+    at, toward, axis, angle, rotation, spin
+        Where it stands.
+
+    Examples
+    --------
+    >>> plane = RayCollector(shape={"kind": "rectangle", "width": 70, "height": 70}, at=[0, 0, 30])
+    >>> plane.record(Files(), {})["kind"]
+    'rays'
+    """
+
+    kind: Literal["rays"] = "rays"
+    shape: Annotated[Shape, Family(SHAPES)]
+    trim: Trim = WHOLE
+
+    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:  # noqa: ARG002
+        """The trimmed shape and its place."""
+        sheet = self.shape.sheet(self.trim, files)
+        return {"kind": "rays", "shape": sheet.shape, "frame": self.frame().record(), "trims": sheet.trims}
+
+
+class Illuminance(Detector, Placement):
+    """An illuminance meter: a grid on a rectangle, for light that arrives on the side of its +z.
+
+    Parameters
+    ----------
+    width, height : number
+        Along its x and y [mm], > 0.
+    columns, rows : int
+        Cells along x and y.
+    at, toward, axis, angle, rotation, spin
+        Where it stands.
+
+    Examples
+    --------
+    >>> floor = Illuminance(width=1000, height=500, columns=20, rows=10)
+    >>> floor.record(Files(), {})["columns"]
+    20
+    """
+
+    kind: Literal["illuminance"] = "illuminance"
+    width: Length
+    height: Length
+    columns: Pixels
+    rows: Pixels
+
+    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:  # noqa: ARG002
+        """The grid and its place."""
+        return {
+            "kind": "illuminance",
+            "frame": self.frame().record(),
+            "width": self.width,
+            "height": self.height,
+            "columns": self.columns,
+            "rows": self.rows,
+        }
+
+
+class FarField(Detector):
+    """A goniophotometer infinitely far away: the intensity of the light that leaves the scene.
+
+    Parameters
+    ----------
+    c_planes : int
+        C planes over 360°.
+    gamma_step : number
+        [°] Between the angles γ, from 0° to 180°, which it divides.
+
+    Examples
+    --------
+    >>> FarField(c_planes=24, gamma_step=5).record(Files(), {})
+    {'kind': 'intensity', 'planes': 24, 'gammas': 37}
+    """
+
+    kind: Literal["intensity"] = "intensity"
+    c_planes: Pixels = 36
+    gamma_step: Annotated[Number, Gt(0.0), Le(90.0)] = 2.5
+
+    @model_validator(mode="after")
+    def _divides(self) -> Self:
+        steps = round(180.0 / self.gamma_step)
+        if steps > MOST_STEPS or not math.isclose(steps * self.gamma_step, 180.0, rel_tol=1e-9):
+            raise ValueError(
+                f"'gamma_step' is {self.gamma_step:g}°, which does not divide 180° in up to {MOST_STEPS} steps"
+            )
+        return self
+
+    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:  # noqa: ARG002
+        """The numbers of planes and of angles, 0° and 180° among them."""
+        return {"kind": "intensity", "planes": self.c_planes, "gammas": round(180.0 / self.gamma_step) + 1}
+
+
+class LightImage(Detector):
+    """A luminance image made forwards: every diffuse scatter is connected to an observer's eye.
+
+    Parameters
+    ----------
+    observer : str
+        Name of one of the scene's observers.
+
+    Examples
+    --------
+    >>> LightImage(observer="front").kind
+    'image'
+    """
+
+    kind: Literal["image"] = "image"
+    observer: str
+
+    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:  # noqa: ARG002
+        """The observer's view of its screen."""
+        if self.observer not in observers:
+            raise UnknownNameError("observer", self.observer, observers)
+        keys = observers[self.observer]
+        return {"kind": "image", "view": keys.screen.screen().core_view(keys.observer())}
+
+
+DETECTORS: dict[str, type[Detector]] = {
+    cls.model_fields["kind"].default: cls for cls in (RayCollector, Illuminance, FarField, LightImage)
+}
+"""Every detector by its kind."""
+
+AnyDetector = Annotated[Detector, Family(DETECTORS)]

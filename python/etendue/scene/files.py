@@ -1,0 +1,81 @@
+"""Files that a scene names: where they are looked for, and tables of two columns."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import FormatError
+
+Array = npt.NDArray[np.float64]
+
+LARGEST_TABLE = 1 << 26
+"""Most bytes of a table in a text file."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Files:
+    """The folder from which relative paths of a scene count.
+
+    Examples
+    --------
+    >>> Files(Path("luminaires")).find("led.tm25ray").as_posix()
+    'luminaires/led.tm25ray'
+    """
+
+    folder: Path = Path()
+
+    def find(self, name: str | Path) -> Path:
+        """The path of a file that the scene names."""
+        return self.folder / name
+
+
+def read_columns(path: Path) -> Array:
+    r"""Two columns of numbers from a text file, sorted by the first, shape (n, 2).
+
+    Columns are parted by commas, semicolons or blanks; what follows ``#`` is left out.
+
+    Raises
+    ------
+    FormatError
+        If a line does not hold two finite numbers, or the first column holds a number twice.
+    OSError
+        If the file cannot be opened.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "index.csv"
+    ...     _ = path.write_text("700, 1.4\n400, 1.6")
+    ...     read_columns(path).tolist()
+    [[400.0, 1.6], [700.0, 1.4]]
+    """
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        text = file.read(LARGEST_TABLE + 1)
+    if len(text) > LARGEST_TABLE:
+        raise FormatError(path, "length", "more than 64 MiB", "A table of a material has some hundred lines.")
+    rows: list[tuple[float, float]] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
+        if not words:
+            continue
+        try:
+            first, second = map(float, words)
+        except ValueError:
+            found = f"{line[:60]!r}"
+            raise FormatError(
+                path, f"line {number}", found, "Each line holds two numbers; # begins a remark."
+            ) from None
+        rows.append((first, second))
+    table = np.array(sorted(rows), dtype=np.float64).reshape(-1, 2)
+    if not len(table):
+        raise FormatError(path, "whole file", "there are no numbers", "Each line holds two numbers.")
+    if not np.isfinite(table).all():
+        raise FormatError(path, "numbers", "one is not finite", "Take the line out.")
+    if (np.diff(table[:, 0]) <= 0.0).any():
+        raise FormatError(path, "first column", "a number stands there twice", "Keep one of the lines.")
+    return table

@@ -1,0 +1,137 @@
+"""From pydantic's findings to sentences: where in the scene, what was found, and what it should be."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from etendue.errors import SceneError, nearest_name
+
+BY_NAME, DESCRIBED, NUMBER, TABLE = "(name)", "(description)", "(number)", "(table)"
+"""What may stand in one place, where two different things may; pydantic puts these into its places, we leave them out."""
+
+LONGEST = 60
+"""Letters of a wrong value that a message repeats."""
+
+
+def scene_error(error: ValidationError, data: Any, source: object) -> SceneError:
+    """All findings of a validation as one `SceneError`.
+
+    Parameters
+    ----------
+    error : ValidationError
+        Of pydantic.
+    data : object
+        What was validated; it tells the names of sources, solids and so on.
+    source : object
+        The file, or what was being made.
+    """
+    mistakes: list[tuple[str, str]] = []
+    for details in error.errors():
+        place = place_of(details["loc"], data)
+        cause = details.get("ctx", {}).get("error")
+        if isinstance(cause, SceneError):
+            mistakes += [(join(place, inner), text) for inner, text in cause.mistakes]
+        else:
+            mistakes.append((place, sentence(details)))
+    return SceneError(source, mistakes)
+
+
+def join(place: str, inner: str) -> str:
+    """A place within a place.
+
+    Examples
+    --------
+    >>> join("solids[0]", "shape"), join('solids[1] "lens"', "shape")
+    ('solids[0].shape', 'solids[1] "lens": shape')
+    """
+    if not place or not inner or inner.startswith("["):
+        return place + inner
+    return f"{place}: {inner}" if place.endswith('"') else f"{place}.{inner}"
+
+
+def place_of(location: Sequence[int | str], data: Any) -> str:
+    """Where a finding is, as one finds it in the file.
+
+    Examples
+    --------
+    >>> scene = {"solids": [{"name": "lens", "shape": {"kind": "ball", "radius": -1}}]}
+    >>> place_of(("solids", 0, "shape", "ball", "radius"), scene)
+    'solids[0] "lens": shape.radius'
+    """
+    text = ""
+    for element in location:
+        if isinstance(element, int):
+            text += f"[{element}]"
+            data = data[element] if isinstance(data, list | tuple) and element < len(data) else None
+            name = _get(data, "name")
+            text += f' "{name}": ' if isinstance(name, str) and name else ""
+        elif not _is_tag(element, data):
+            text += element if not text or text.endswith(": ") else f".{element}"
+            data = _get(data, element)
+    return text.removesuffix(": ")
+
+
+def _is_tag(element: str, data: Any) -> bool:
+    """Whether an element is the kind that was chosen at a place, and no key."""
+    return element in (BY_NAME, DESCRIBED, NUMBER, TABLE) or (
+        _get(data, "kind") == element and _get(data, element) is None
+    )
+
+
+def _get(data: Any, key: str) -> Any:
+    if isinstance(data, Mapping):
+        return data.get(key)
+    return getattr(data, key, None) if isinstance(data, BaseModel) else None
+
+
+def sentence(details: Mapping[str, Any]) -> str:
+    """What was found and what is asked for."""
+    context = details.get("ctx", {})
+    found = _shown(details["input"])
+    match details["type"]:
+        case "missing":
+            return "is missing"
+        case "union_tag_invalid":
+            return _wrong_kind(details["input"], context)
+        case "literal_error":
+            choices = re.findall(r"'([^']*)'", context["expected"])
+            near = nearest_name(str(details["input"]), choices)
+            hint = f" Did you mean {near!r}?" if near else ""
+            return f"is {found}.{hint} Known: {', '.join(choices)}."
+        case "greater_than":
+            return f"is {found}; it must be greater than {context['gt']:g}"
+        case "greater_than_equal":
+            return f"is {found}; it must be at least {context['ge']:g}"
+        case "less_than_equal":
+            return f"is {found}; it must be at most {context['le']:g}"
+        case "finite_number":
+            return f"is {found}; it must be finite"
+        case "unknown_key":
+            return str(details["msg"])
+        case "value_error" | "assertion_error":
+            text = str(context.get("error", details["msg"]))
+            return f"is {found}, {text}" if text.startswith("not a ") else text
+        case _:
+            return f"is {found}: {details['msg'][:1].lower()}{details['msg'][1:]}"
+
+
+def _wrong_kind(value: Any, context: Mapping[str, Any]) -> str:
+    tags = re.findall(r"'([^']*)'", context["expected_tags"])
+    known = [tag for tag in tags if tag != BY_NAME]
+    kinds = f"Known kinds: {', '.join(known)}."
+    if not isinstance(value, Mapping | BaseModel):
+        return f"is {_shown(value)}, not a {'name or a ' if BY_NAME in tags else ''}table with a 'kind'. {kinds}"
+    if not context["tag"]:
+        return f"'kind' is missing. {kinds}"
+    near = nearest_name(str(context["tag"]), known)
+    hint = f" Did you mean {near!r}?" if near else ""
+    return f"unknown kind {context['tag']!r}.{hint} {kinds}"
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"

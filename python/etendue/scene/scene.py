@@ -1,0 +1,229 @@
+"""A scene: sources, solids, surfaces, detectors and observers, as a user describes them."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from annotated_types import Le, MaxLen
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
+
+from etendue.errors import SceneError
+from etendue.formats.output import atomic_output
+from etendue.scene.description import Description
+from etendue.scene.detectors import AnyDetector
+from etendue.scene.families import Family
+from etendue.scene.files import Files
+from etendue.scene.finishes import BUILT_IN, AnyFinish
+from etendue.scene.media import Medium, MediumOrName
+from etendue.scene.media_library import MEDIA
+from etendue.scene.mistakes import scene_error
+from etendue.scene.observers import ObserverKeys
+from etendue.scene.sources import SOURCES
+from etendue.scene.sources.source import Source
+from etendue.scene.things import Solid, Surface
+from etendue.scene.toml import to_toml
+from etendue.scene.values import AsRow, Positive
+
+MOST = 100_000
+"""Sources, solids, surfaces, detectors or observers of one scene."""
+
+LARGEST_FILE = 1 << 28
+"""Most bytes of a scene's file."""
+
+
+class Scene(Description):
+    """What light meets on its way, and where it is looked for.
+
+    The same keys in Python and in a TOML file; docs/scenes.md explains every one.
+
+    Parameters
+    ----------
+    name : str
+    wavelength : number
+        [nm], of sources that state none.
+    surroundings : str or Medium
+        What is where no solid is.
+    media : mapping
+        Media by name, beside those of the library.
+    finishes : mapping
+        Optical properties of surfaces by name, beside those that are built in.
+    sources, solids, surfaces, detectors, observers : sequence
+
+    Raises
+    ------
+    SceneError
+        With every mistake: unknown keys, values out of their domain, names that stand for nothing.
+
+    Examples
+    --------
+    >>> scene = Scene(
+    ...     sources=[{"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 100}],
+    ...     solids=[{"name": "dome", "shape": {"kind": "dome", "radius": 3}, "medium": "silicone"}],
+    ...     detectors=[{"kind": "intensity"}],
+    ... )
+    >>> Scene.from_dict(scene.to_dict()) == scene
+    True
+    """
+
+    name: str = ""
+    wavelength: Annotated[Positive, Le(1e9)] = 555.0
+    surroundings: MediumOrName = "air"
+    media: dict[str, Medium] = Field(default_factory=dict)
+    finishes: dict[str, AnyFinish] = Field(default_factory=dict)
+    sources: Annotated[tuple[Annotated[Source, Family(SOURCES)], ...], MaxLen(MOST), AsRow] = Field(default=())
+    solids: Annotated[tuple[Solid, ...], MaxLen(MOST), AsRow] = Field(default=())
+    surfaces: Annotated[tuple[Surface, ...], MaxLen(MOST), AsRow] = Field(default=())
+    detectors: Annotated[tuple[AnyDetector, ...], MaxLen(MOST), AsRow] = Field(default=())
+    observers: Annotated[tuple[ObserverKeys, ...], MaxLen(MOST), AsRow] = Field(default=())
+    _folder: Path = PrivateAttr(default=Path())
+
+    @model_validator(mode="after")
+    def _names_are_names(self) -> Self:
+        mistakes = [
+            (f"{key}.{name}", f"{name!r} is built in; choose another name")
+            for key, known in (("media", MEDIA), ("finishes", BUILT_IN))
+            for name in getattr(self, key)
+            if name in known
+        ]
+        # Solids and surfaces appear side by side in ledgers.
+        for family in (("sources",), ("solids", "surfaces"), ("detectors",), ("observers",)):
+            taken: dict[str, str] = {}
+            for key in family:
+                for i, thing in enumerate(getattr(self, key)):
+                    place = f"{key}[{i}]"
+                    if thing.name and taken.setdefault(thing.name, place) != place:
+                        mistakes.append((f"{place}.name", f"{thing.name!r} is the name of {taken[thing.name]} already"))
+        if mistakes:
+            raise SceneError("scene", mistakes)
+        return self
+
+    @property
+    def files(self) -> Files:
+        """Where files are looked for that the scene names with a relative path."""
+        return Files(self._folder)
+
+    @classmethod
+    def from_dict(
+        cls, data: Mapping[str, Any], *, folder: str | os.PathLike[str] = ".", source: object = "scene"
+    ) -> Self:
+        """A scene from a mapping as a TOML or JSON file holds it.
+
+        Parameters
+        ----------
+        data : mapping
+            Keys and values.
+        folder : path
+            From which relative paths count.
+        source : object
+            What messages call the scene: the name of its file.
+
+        Raises
+        ------
+        SceneError
+            With every mistake.
+        """
+        try:
+            scene = cls.model_validate(dict(data))
+        except ValidationError as error:
+            raise scene_error(error, data, source) from None
+        return scene._at(Path(folder))  # noqa: SLF001 - an alternative constructor
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a TOML file.
+
+        Raises
+        ------
+        SceneError
+            If the file is no TOML, with line and column, or with every mistake in the scene.
+        OSError
+            If the file cannot be opened.
+
+        Examples
+        --------
+        >>> from tempfile import TemporaryDirectory
+        >>> with TemporaryDirectory() as folder:
+        ...     Scene(name="nothing").save(Path(folder) / "nothing.toml")
+        ...     Scene.load(Path(folder) / "nothing.toml").name
+        'nothing'
+        """
+        path = Path(path)
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_FILE + 1)
+        if len(raw) > LARGEST_FILE:
+            raise SceneError(path, [("", "more than 256 MiB; this is no description of a scene")])
+        try:
+            data = tomllib.loads(raw.decode("utf-8-sig"))
+        except UnicodeDecodeError as error:
+            raise SceneError(path, [(f"byte {error.start}", "no UTF-8, which TOML files are written in")]) from None
+        except (tomllib.TOMLDecodeError, RecursionError) as error:
+            raise SceneError(path, [("", f"no TOML: {error}")]) from None
+        return cls.from_dict(data, folder=path.parent, source=path)
+
+    def to_toml(self) -> str:
+        """The scene as the text of a TOML file in the folder from which its relative paths count.
+
+        Examples
+        --------
+        >>> print(Scene(name="empty", wavelength=450).to_toml(), end="")
+        name = "empty"
+        wavelength = 450
+        """
+        return to_toml(self.to_dict())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a TOML file, whole or not at all; relative paths are written as seen from its folder.
+
+        Raises
+        ------
+        SceneError
+            If something lives in memory only.
+        ArgumentError
+            If the folder does not exist.
+        """
+        data = _moved(self.to_dict(), self._folder, Path(path).parent)
+        with atomic_output(path) as temporary:
+            temporary.write_text(to_toml(data), encoding="utf-8")
+
+    @classmethod
+    def json_schema(cls) -> dict[str, Any]:
+        """JSON Schema of a scene's file, for editors.
+
+        Examples
+        --------
+        >>> sorted(Scene.json_schema()["properties"])[:4]
+        ['detectors', 'finishes', 'media', 'name']
+        """
+        return cls.model_json_schema()
+
+    def replace(self, **changes: Any) -> Self:
+        """The same with other values for some keys, checked again; paths still count from the same folder.
+
+        Examples
+        --------
+        >>> Scene(name="a").replace(name="b").name
+        'b'
+        """
+        return super().replace(**changes)._at(self._folder)  # noqa: SLF001 - its own kind
+
+    def _at(self, folder: Path) -> Self:
+        self._folder = folder
+        return self
+
+
+def _moved(value: Any, start: Path, end: Path) -> Any:
+    """Descriptions with every relative ``file`` as seen from another folder."""
+    if isinstance(value, list):
+        return [_moved(held, start, end) for held in value]
+    if not isinstance(value, dict):
+        return value
+    return {
+        key: Path(os.path.relpath(start / held, end)).as_posix()
+        if key == "file" and isinstance(held, str) and not Path(held).is_absolute()
+        else _moved(held, start, end)
+        for key, held in value.items()
+    }

@@ -1,0 +1,193 @@
+"""Sources that were measured or fitted: ray files, light fields, intensity distributions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import InstanceOf, model_validator
+from pydantic.json_schema import SkipJsonSchema
+
+from etendue.errors import ArgumentError
+from etendue.formats.intensity import read_intensity
+from etendue.formats.rays import read_rays
+from etendue.lightfield.light_field import LightField
+from etendue.quantities.intensity import Intensity
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import RayStream
+from etendue.quantities.spectrum import Spectrum
+from etendue.scene.files import Files
+from etendue.scene.sources.source import Emitter, Source
+from etendue.scene.values import Positive
+from etendue.units import FluxUnit
+
+
+class Rays(Source):
+    """The rays of a ray file, each as it is.
+
+    Parameters
+    ----------
+    file : path
+        Any ray file that `etendue.read_rays` reads.
+    rays : RayStream
+        In Python, instead of a file.
+    flux : number, optional
+        Total flux that overrides the file's [`flux_unit`].
+    flux_unit : {"lm", "W"}, optional
+        Turns the rays into this unit, through the spectrum of the file; the file's own if left out.
+
+    Examples
+    --------
+    >>> source = Rays(rays=RaySet([[0, 0, 0]], [[0, 0, 1]], [2.0]), flux=3)
+    >>> source.emitters(Files())[0].record["scale"]
+    1.5
+    """
+
+    IN_MEMORY: ClassVar[tuple[str, ...]] = ("rays",)
+
+    kind: Literal["rays"] = "rays"
+    file: Path | None = None
+    rays: SkipJsonSchema[InstanceOf[RayStream] | None] = None
+    flux: Positive | None = None
+    flux_unit: FluxUnit | None = None
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> Self:
+        if (self.file is None) == (self.rays is None):
+            raise ValueError("'file' is missing" if self.file is None else "'file' and 'rays' are both given; use one")
+        return self
+
+    def emitters(self, files: Files) -> tuple[Emitter, ...]:
+        """The rays and the factor from their stored flux."""
+        rays: RayStream = read_rays(files.find(self.file)) if self.file is not None else self.rays  # type: ignore[assignment]
+        if self.flux_unit is not None and self.flux_unit != rays.flux_unit and self.flux is None:
+            if not isinstance(rays, RaySet):
+                raise ArgumentError(f"flux_unit: the rays are in {rays.flux_unit}, and cannot be turned into lm or W")
+            rays = rays.in_unit(self.flux_unit)
+        total = rays.total_flux
+        if not total > 0.0:
+            raise ArgumentError("the rays carry no flux")
+        factor = 1.0 if self.flux is None else self.flux / total
+        if not rays.has_position:
+            raise ArgumentError("the rays have directions only; use their intensity as a point source")
+        record = {
+            "kind": "rays",
+            "rays": rays.core_source(),
+            "scale": rays.flux_scale * factor,
+            "flux": total * factor,
+        }
+        unit = self.flux_unit if self.flux_unit is not None else rays.flux_unit
+        return (Emitter(record, unit, *_colours_of(rays)),)
+
+
+def _colours_of(rays: RayStream) -> tuple[Spectrum | None, str, tuple[str, ...]]:
+    """The one spectrum of a set, its name within the source (none), and what cannot be taken over."""
+    if not isinstance(rays, RaySet):
+        return None, "", ()
+    if rays.meaning.single_wavelength is not None:
+        return Spectrum(np.array([rays.meaning.single_wavelength]), np.array([1.0])), "", ()
+    if len(rays.spectra) == 1:
+        return rays.spectra[0], "", ()
+    if rays.spectra or "wavelength" in rays.columns:
+        return None, "", ("every ray has a colour of its own in the file; state wavelength or spectrum for all",)
+    return None, "", ()
+
+
+class Field(Source):
+    """A light field, as `etendue.LightField.save` writes it.
+
+    Parameters
+    ----------
+    file : path
+        Of the light field.
+    field : LightField
+        In Python, instead of a file.
+    flux : number, optional
+        Total flux that overrides the field's [its own unit].
+
+    Examples
+    --------
+    >>> Field(file="led.h5").kind
+    'light-field'
+    """
+
+    IN_MEMORY: ClassVar[tuple[str, ...]] = ("field",)
+
+    kind: Literal["light-field"] = "light-field"
+    file: Path | None = None
+    field: SkipJsonSchema[InstanceOf[LightField] | None] = None
+    flux: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> Self:
+        if (self.file is None) == (self.field is None):
+            raise ValueError("'file' is missing" if self.file is None else "'file' and 'field' are both given; use one")
+        return self
+
+    def emitters(self, files: Files) -> tuple[Emitter, ...]:
+        """The field and its flux."""
+        field: LightField = LightField.load(files.find(self.file)) if self.file is not None else self.field  # type: ignore[assignment]
+        if not field.total_flux > 0.0:
+            raise ArgumentError("the light field carries no flux")
+        flux = field.total_flux if self.flux is None else self.flux
+        return (Emitter({"kind": "field", "field": field.core, "flux": flux}, field.flux_unit),)
+
+
+class Point(Source):
+    """A point with an intensity distribution, or the same intensity in all directions.
+
+    γ counts from the local +Z, C from local +X towards +Y. Luminaire files count from the direction of their light,
+    which is mostly down: ``toward = [0, 0, -1]`` hangs such a luminaire.
+
+    Parameters
+    ----------
+    file : path, optional
+        An IES or EULUMDAT file; isotropic without it.
+    intensity : Intensity
+        In Python, instead of a file.
+    flux : number, optional
+        Total flux [`flux_unit`], which overrides the file's; needed without a file.
+    flux_unit : {"lm", "W"}
+        Of `flux`, if there is no file.
+
+    Examples
+    --------
+    >>> Point(flux=4).emitters(Files())[0].record["values"].tolist()
+    [[1.0, 1.0]]
+    """
+
+    IN_MEMORY: ClassVar[tuple[str, ...]] = ("intensity",)
+
+    kind: Literal["point"] = "point"
+    file: Path | None = None
+    intensity: SkipJsonSchema[InstanceOf[Intensity] | None] = None
+    flux: Positive | None = None
+    flux_unit: FluxUnit | None = None
+
+    @model_validator(mode="after")
+    def _has_flux(self) -> Self:
+        given = self.file is not None or self.intensity is not None
+        if self.file is not None and self.intensity is not None:
+            raise ValueError("'file' and 'intensity' are both given; use one")
+        if not given and self.flux is None:
+            raise ValueError("'flux' is missing; only a file could tell it")
+        if given and self.flux_unit is not None:
+            raise ValueError("'flux_unit' is the file's own; leave it out")
+        return self
+
+    def emitters(self, files: Files) -> tuple[Emitter, ...]:
+        """The table and its flux."""
+        table = read_intensity(files.find(self.file)) if self.file is not None else self.intensity
+        if table is None:
+            table = Intensity(np.zeros(1), np.array([0.0, 180.0]), np.ones((1, 2)), flux_unit=self.flux_unit or "lm")
+        if (table.values < 0.0).any() or not table.flux > 0.0:
+            raise ArgumentError("the intensity is negative somewhere, or 0 everywhere")
+        record = {
+            "kind": "point",
+            "gamma": np.radians(table.gamma),
+            "c": np.radians(table.c),
+            "values": np.array(table.values),
+            "flux": table.flux if self.flux is None else self.flux,
+        }
+        return (Emitter(record, table.flux_unit),)

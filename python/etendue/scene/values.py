@@ -1,0 +1,54 @@
+"""Numbers and rows of numbers as users write them: what a key of a scene may hold."""
+
+from __future__ import annotations
+
+import numbers
+from typing import Annotated, Any
+
+import numpy as np
+from annotated_types import Ge, Gt, Le, MaxLen, MinLen
+from pydantic import AllowInfNan, BeforeValidator
+
+
+def _number(value: Any) -> Any:
+    """A float from any real number; text that looks like one is a mistake, and so is a truth value."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+        raise ValueError("not a number")  # noqa: TRY004 - a TypeError would not reach the list of mistakes
+    return float(value)
+
+
+def _count(value: Any) -> Any:
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral):
+        raise ValueError("not a whole number")  # noqa: TRY004 - likewise
+    return int(value)
+
+
+def _row(value: Any) -> Any:
+    """A tuple from a list or an array; a set has no order and a text is no row."""
+    if isinstance(value, np.ndarray):
+        return tuple(value.tolist())
+    if not isinstance(value, list | tuple):
+        raise ValueError("not a row of values in [ ]")  # noqa: TRY004 - likewise
+    return tuple(value)
+
+
+Bound = Annotated[float, BeforeValidator(_number, json_schema_input_type=float)]
+"""A number or an infinity."""
+Number = Annotated[Bound, AllowInfNan(False)]
+Positive = Annotated[Number, Gt(0.0)]
+NotNegative = Annotated[Number, Ge(0.0)]
+LONGEST = 1e9
+"""Largest length [mm] in a scene: a thousand kilometres. Squares and products of lengths then stay far from overflow."""
+Length = Annotated[Number, Gt(0.0), Le(LONGEST)]
+LengthOrZero = Annotated[Number, Ge(0.0), Le(LONGEST)]
+Coordinate = Annotated[Number, Ge(-LONGEST), Le(LONGEST)]
+Share = Annotated[Number, Ge(0.0), Le(1.0)]
+Count = Annotated[int, BeforeValidator(_count, json_schema_input_type=int), Ge(1)]
+
+AsRow = BeforeValidator(_row)
+Vector = Annotated[tuple[Number, Number, Number], AsRow]
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], AsRow]
+Interval = Annotated[tuple[Bound, Bound], AsRow]
+Numbers = Annotated[tuple[Number, ...], AsRow]
+SomeNumbers = Annotated[tuple[Number, ...], MinLen(1), AsRow]
+Vertices = Annotated[tuple[Annotated[tuple[Coordinate, Coordinate], AsRow], ...], MinLen(3), MaxLen(1 << 16), AsRow]

@@ -1,0 +1,69 @@
+"""Bodies are closed, their normals point outwards, and they hold the volume that they should."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from etendue.scene import Scene, compile_scene
+from etendue.scene.bodies import BODIES as REGISTRY
+from oracles.border import hits
+from oracles.scenes import BODIES
+
+Faces = list[dict[str, Any]]
+TURNED = {"at": [1.0, -2.0, 0.5], "axis": [1.0, 2.0, -0.5], "angle": 40.0}
+
+
+def faces_of(kind: str, keys: dict[str, Any], place: dict[str, Any] = TURNED) -> Faces:
+    scene = Scene(solids=[{"shape": {"kind": kind, **keys}, "medium": "BK7", **place}])
+    faces: Faces = compile_scene(scene).record["faces"]
+    return faces
+
+
+def test_every_body_is_tested() -> None:
+    assert set(BODIES) == set(REGISTRY)
+
+
+@pytest.mark.parametrize("kind", BODIES)
+def test_lines_enter_and_leave_in_turn(kind: str) -> None:
+    """A line meets a closed surface an even number of times, and n · d is negative and positive in turn.
+
+    This fails for a gap that is seen under more than some 1/1000 of the lines, for a normal that points inwards, and for
+    faces that overlap. 4000 lines through points near the body; none is expected to meet an edge exactly.
+    """
+    faces = faces_of(kind, BODIES[kind][0])
+    rng = np.random.default_rng(5)
+    met = 0
+    for _ in range(4000):
+        d = rng.normal(size=3)
+        found = hits(faces, rng.uniform(-2.5, 2.5, 3) + TURNED["at"], d / np.linalg.norm(d))
+        cosines = [cosine for _, cosine, _ in found]
+        assert len(found) % 2 == 0, found
+        assert all(c < 0 for c in cosines[::2]), found
+        assert all(c > 0 for c in cosines[1::2]), found
+        met += bool(found)
+    assert met > 500
+
+
+@pytest.mark.parametrize("kind", BODIES)
+def test_volume(kind: str) -> None:
+    """V = ∫∫ Σ (t_out - t_in) dx dy over parallel lines, by the midpoint rule on 120² lines; known in closed form.
+
+    The rule's error on a body with kinks is of the order of one cell in 120 along its outline: 4 % at worst, 0.4 % in
+    truth, because errors along the outline cancel.
+    """
+    keys, volume = BODIES[kind]
+    faces = faces_of(kind, keys)
+    axes = np.linalg.qr(np.random.default_rng(6).normal(size=(3, 3)))[0]
+    side, n = 12.0, 120
+    at = (np.arange(n) + 0.5) / n * side - side / 2
+    total = 0.0
+    for u in at:
+        for v in at:
+            # Lines farther from the middle than any body reaches cannot meet it.
+            if u * u + v * v < 36:
+                o = np.array([1.0, -2.0, 0.5]) + axes[:, 0] * u + axes[:, 1] * v
+                t = [hit[0] for hit in hits(faces, o, axes[:, 2])]
+                total += sum(t[1::2]) - sum(t[::2])
+    assert total * (side / n) ** 2 == pytest.approx(volume, rel=8e-3)
