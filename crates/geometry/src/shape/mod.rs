@@ -54,7 +54,7 @@ impl Shape {
     #[inline]
     pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], leaving: bool, mut visit: impl FnMut(Crossing)) {
         let mut keep = |t: f64| {
-            if t >= range[0] && t <= range[1] {
+            if t >= range[0] && t <= range[1] && t.is_finite() {
                 visit(Crossing {
                     t,
                     ..Crossing::default()
