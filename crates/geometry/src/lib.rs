@@ -4,6 +4,9 @@
 //! records in memory or in a mapped file. `tally`: the flux account of a pass. `scan`: the statistics of a ray set in one pass.
 
 pub mod batch;
+pub mod bounds;
+pub mod bvh;
+pub mod mesh;
 pub mod scan;
 pub mod source;
 pub mod table;

@@ -1,0 +1,153 @@
+//! A tree of boxes over anything that has bounds: which primitives may a ray meet, nearest first?
+//!
+//! Eight children per node, their boxes in f32 rounded outward, laid out so that one instruction serves all eight.
+//! `build`: from bounds to the tree. `probe`: the ray as the boxes see it, and the proof that no box is missed.
+//!
+//! The traversal is inlined into its caller, who compiles it once per instruction set (`multiversion`) around a loop
+//! over rays, so that nothing is dispatched per node.
+
+mod build;
+mod probe;
+
+use etendue_math::Vec3;
+
+use crate::bounds::Bounds;
+pub use probe::Probe;
+
+/// Children per node.
+const WIDTH: usize = 8;
+
+/// This bit of a child tells a leaf from a node.
+const LEAF: u32 = 1 << 31;
+
+/// Room on a stack: each of at most [`build::DEPTH`] levels leaves seven siblings behind, and the last one eight.
+const ROOM: usize = build::DEPTH * (WIDTH - 1) + WIDTH + 1;
+
+/// Eight boxes, a structure of arrays: rows lo x, y, z, hi x, y, z.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+struct Node {
+    planes: [[f32; WIDTH]; 6],
+    /// Nodes, or leaves with the bit [`LEAF`].
+    child: [u32; WIDTH],
+    /// One bit per child in use.
+    used: u32,
+}
+
+/// A tree over primitives 0, 1, … known by their bounds.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    nodes: Vec<Node>,
+    /// The primitives in the order of the leaves.
+    order: Vec<u32>,
+    /// Leaf i holds `order[leaves[i]..leaves[i + 1]]`.
+    leaves: Vec<u32>,
+    bounds: Bounds,
+}
+
+/// What is left to visit, for one ray after the other: the child, and where the ray enters it (f32 bits, in the high
+/// half, so that entries sort by distance).
+#[derive(Clone, Debug)]
+pub struct Stack([u64; ROOM]);
+
+impl Default for Stack {
+    fn default() -> Self {
+        Self([0; ROOM])
+    }
+}
+
+impl Bvh {
+    /// A tree over primitives with these bounds, at most `leaf` (1 or more) of them in a leaf.
+    ///
+    /// Bounds that are infinite or NaN on a side are never culled there; empty ones are culled always. None if there
+    /// are 2³¹ primitives or more.
+    #[must_use]
+    pub fn new(bounds: &[Bounds], leaf: usize) -> Option<Self> {
+        build::build(bounds, leaf)
+    }
+
+    /// A box around everything.
+    #[must_use]
+    pub const fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// The primitives of every leaf, in the order of the leaves.
+    pub fn leaves(&self) -> impl Iterator<Item = &[u32]> {
+        self.leaves
+            .windows(2)
+            .map(|ends| &self.order[ends[0] as usize..ends[1] as usize])
+    }
+
+    /// Visits all primitives whose bounds the ray o + t d meets for a t in \[`t_lo`, `t_max`\], and few others: boxes in
+    /// the order in which the ray enters them, those behind `t_max` left out. `visit` may lower `t_max` as it finds hits.
+    ///
+    /// A ray that is not finite meets nothing. Compile the caller with `multiversion`.
+    #[inline(always)]
+    pub fn traverse(&self, o: Vec3, d: Vec3, t_lo: f64, t_max: &mut f64, mut visit: impl FnMut(u32, &mut f64)) {
+        let probe = Probe::new(o, d, t_lo);
+        self.walk(&probe, t_max, &mut Stack::default(), |leaf, t_max| {
+            for &primitive in &self.order[self.leaves[leaf] as usize..self.leaves[leaf + 1] as usize] {
+                visit(primitive, t_max);
+            }
+        });
+    }
+
+    /// As [`Bvh::traverse`], leaf by leaf: leaves are numbered as [`Bvh::leaves`] yields them.
+    #[inline(always)]
+    pub fn walk(
+        &self,
+        probe: &Probe,
+        t_max: &mut f64,
+        Stack(stack): &mut Stack,
+        mut visit: impl FnMut(usize, &mut f64),
+    ) {
+        let Some(mut limit) = probe.limit(*t_max) else {
+            return;
+        };
+        let mut top = 0;
+        let mut child = 0_u32;
+        loop {
+            if child & LEAF == 0 {
+                let node = &self.nodes[child as usize];
+                let (enter, mut hits) = probe.enter(&node.planes, limit);
+                hits &= node.used;
+                if hits != 0 {
+                    let first = top;
+                    while hits != 0 {
+                        let lane = (hits.trailing_zeros() & 7) as usize;
+                        hits &= hits - 1;
+                        // Farthest first; in an array this short insertion is fastest.
+                        let entry = u64::from(enter[lane].to_bits()) << 32 | u64::from(node.child[lane]);
+                        let mut at = top;
+                        while at > first && stack[at - 1] < entry {
+                            stack[at] = stack[at - 1];
+                            at -= 1;
+                        }
+                        stack[at] = entry;
+                        top += 1;
+                    }
+                }
+            } else {
+                visit((child & !LEAF) as usize, t_max);
+                let Some(lower) = probe.limit(*t_max) else {
+                    return;
+                };
+                limit = lower;
+            }
+            loop {
+                if top == 0 {
+                    return;
+                }
+                top -= 1;
+                let entry = stack[top];
+                #[allow(clippy::cast_possible_truncation, reason = "the two halves")]
+                let (enter, low) = (f32::from_bits((entry >> 32) as u32), entry as u32);
+                if enter <= limit {
+                    child = low;
+                    break;
+                }
+            }
+        }
+    }
+}
