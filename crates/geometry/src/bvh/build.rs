@@ -240,7 +240,7 @@ fn flatten(sets: &[Set], items: &[Item], root: u32, tree: &mut Bvh) -> u32 {
     tree.nodes.push(Node {
         planes: [[f32::NAN; WIDTH]; 6],
         child: [0; WIDTH],
-        used: (1 << count) - 1,
+        used: 0x0101_0101_0101_0101 >> (8 * (WIDTH - count)),
     });
     for (lane, child) in children[..count].iter().enumerate() {
         let set = &sets[*child as usize];

@@ -30,8 +30,8 @@ struct Node {
     planes: [[f32; WIDTH]; 6],
     /// Nodes, or leaves with the bit [`LEAF`].
     child: [u32; WIDTH],
-    /// One bit per child in use.
-    used: u32,
+    /// One byte per child, 1 if it is in use.
+    used: u64,
 }
 
 /// A tree over primitives 0, 1, … known by their bounds.
@@ -115,7 +115,7 @@ impl Bvh {
                 if hits != 0 {
                     let first = top;
                     while hits != 0 {
-                        let lane = (hits.trailing_zeros() & 7) as usize;
+                        let lane = (hits.trailing_zeros() >> 3 & 7) as usize;
                         hits &= hits - 1;
                         // Farthest first; in an array this short insertion is fastest.
                         let entry = u64::from(enter[lane].to_bits()) << 32 | u64::from(node.child[lane]);

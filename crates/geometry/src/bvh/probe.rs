@@ -18,75 +18,91 @@
 //!
 //! A start other than t = 0 moves the origin along the ray; o⁻ and o⁺ hold the rounding of that move too.
 
+use std::hint::black_box;
+
 use etendue_math::Vec3;
 
 use super::WIDTH;
-use crate::bounds::round_up;
 
-/// What f64 may have lost, as a part of the distance from the origin: here by moving the start, in the tests of the
-/// primitives by finding t. Either is a few roundings of 2⁻⁵³ each.
-const SLACK: f64 = 16.0 * f64::EPSILON;
+/// The part by which origin and reciprocals are moved outward: twice the rounding to f32, so that something is left for
+/// what f64 has lost, here by moving the start and in the tests of the primitives by finding t (a few 2⁻⁵³).
+const SLACK: f64 = 1.0 / (1 << 23) as f64;
 
 /// A ray prepared for boxes: see the head of this file.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
-    /// Rows of the planes through which the ray enters and leaves the slab of each axis.
-    rows: [[usize; 2]; 3],
-    /// The origin for either plane.
-    origin: [[f32; 2]; 3],
-    /// The reciprocal of the direction for either plane, with its sign.
-    inverse: [[f32; 2]; 3],
+    axes: [Axis; 3],
     /// Boxes count t from here.
     start: f64,
     finite: bool,
 }
 
+/// One axis of a ray, for the planes through which it enters and leaves a slab.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    /// The rows of those planes in a node.
+    rows: [usize; 2],
+    origin: [f32; 2],
+    /// The reciprocal of the direction, with its sign.
+    inverse: [f32; 2],
+}
+
+impl Axis {
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation, reason = "rounded outward beforehand")]
+    fn new(axis: usize, o: f64, d: f64, t_lo: f64) -> Self {
+        let start = o + t_lo * d;
+        let slack = (o.abs() + (t_lo * d).abs()) * SLACK + f64::from(f32::MIN_POSITIVE);
+        // Beyond the range of f32 the outer number may become infinite, the inner one may not.
+        let below = ((start - slack) as f32).min(f32::MAX);
+        let above = ((start + slack) as f32).max(f32::MIN);
+        let inverse = 1.0 / d;
+        let near = ((inverse * (1.0 - SLACK)) as f32).clamp(f32::MIN, f32::MAX);
+        let far = (inverse * (1.0 + 4.0 * SLACK)) as f32;
+        let backward = d.is_sign_negative();
+        Self {
+            rows: if backward { [axis + 3, axis] } else { [axis, axis + 3] },
+            origin: if backward { [below, above] } else { [above, below] },
+            inverse: [near, far],
+        }
+    }
+}
+
 impl Probe {
-    /// The ray o + t d from t = `t_lo` on, which must be finite.
+    /// The ray o + t d from t = `t_lo` on, which must be finite; d is a unit vector.
     #[inline(always)]
     #[must_use]
-    #[allow(clippy::cast_possible_truncation, reason = "rounded outward afterwards")]
     pub fn new(o: Vec3, d: Vec3, t_lo: f64) -> Self {
-        let axis = |axis: usize, o: f64, d: f64| {
-            let moved = o + t_lo * d;
-            let error = (o.abs() + (t_lo * d).abs()) * SLACK;
-            let (below, above) = (((moved - error) as f32).next_down(), ((moved + error) as f32).next_up());
-            let near = (1.0 / d) as f32;
-            let far = ((1.0 / d) * (1.0 + 2.0 * f64::from(f32::EPSILON))) as f32;
-            if d.is_sign_negative() {
-                ([axis + 3, axis], [below, above], [near.next_up(), far.next_down()])
-            } else {
-                ([axis, axis + 3], [above, below], [near.next_down(), far.next_up()])
-            }
-        };
-        let [x, y, z] = [axis(0, o.x, d.x), axis(1, o.y, d.y), axis(2, o.z, d.z)];
         Self {
-            rows: [x.0, y.0, z.0],
-            origin: [x.1, y.1, z.1],
-            inverse: [x.2, y.2, z.2],
+            axes: [
+                Axis::new(0, o.x, d.x, t_lo),
+                Axis::new(1, o.y, d.y, t_lo),
+                Axis::new(2, o.z, d.z, t_lo),
+            ],
             start: t_lo,
-            finite: (0.0 * (o.x + o.y + o.z) + 0.0 * (d.x + d.y + d.z) + 0.0 * t_lo) == 0.0,
+            finite: 0.0 * (o.x + o.y + o.z + d.x + d.y + d.z + t_lo) == 0.0,
         }
     }
 
     /// The end of the ray for boxes; None if nothing is left of it.
     #[inline(always)]
     #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "rounded outward beforehand")]
     pub fn limit(&self, t_max: f64) -> Option<f32> {
         let length = t_max - self.start;
-        (self.finite && length >= 0.0).then(|| round_up(length + t_max.abs() * SLACK).next_up())
+        let slack = t_max.abs().max(length) * (4.0 * SLACK) + f64::from(f32::MIN_POSITIVE);
+        (self.finite && length >= 0.0).then_some((length + slack) as f32)
     }
 
-    /// Where the ray enters each of eight boxes, at 0 or later, and a bit for each that it meets before `limit`.
+    /// Where the ray enters each of eight boxes, at 0 or later, and a byte for each, 1 if it meets it before `limit`.
     ///
     /// `if a > b { a } else { b }` is one instruction, and b if a is NaN.
     #[inline(always)]
     #[must_use]
-    pub fn enter(&self, planes: &[[f32; WIDTH]; 6], limit: f32) -> ([f32; WIDTH], u32) {
+    pub fn enter(&self, planes: &[[f32; WIDTH]; 6], limit: f32) -> ([f32; WIDTH], u64) {
         let (mut enter, mut leave) = ([0.0_f32; WIDTH], [limit; WIDTH]);
-        for axis in 0..3 {
-            let [near, far] = self.rows[axis].map(|row| &planes[row]);
-            let (origin, inverse) = (self.origin[axis], self.inverse[axis]);
+        for Axis { rows, origin, inverse } in self.axes {
+            let (near, far) = (&planes[rows[0]], &planes[rows[1]]);
             for i in 0..WIDTH {
                 let a = (near[i] - origin[0]) * inverse[0];
                 let b = (far[i] - origin[1]) * inverse[1];
@@ -94,10 +110,12 @@ impl Probe {
                 leave[i] = if b < leave[i] { b } else { leave[i] };
             }
         }
-        let mut hits = 0;
+        let (enter, leave) = (&*black_box(&mut enter), &*black_box(&mut leave));
+        let mut hits = [0; WIDTH];
         for i in 0..WIDTH {
-            hits |= u32::from(enter[i] <= leave[i]) << i;
+            hits[i] = u8::from(enter[i] <= leave[i]);
         }
-        (enter, hits)
+        // Held in memory, the bytes are written by one comparison; in a register they would be gathered one by one.
+        (*enter, u64::from_le_bytes(*black_box(&mut hits)))
     }
 }

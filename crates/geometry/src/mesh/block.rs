@@ -8,6 +8,8 @@
 //! two rounded products has the right sign or is 0, and 0 counts as inside on either side. Where the area is so small
 //! against the rounding that weights would be worthless, they are worked out again without error ([`exact_edges`]).
 
+use std::hint::black_box;
+
 use etendue_math::Vec3;
 
 /// The part of its longest side by which a triangle's box is widened, so that the box holds all hits that are accepted.
@@ -82,20 +84,19 @@ pub(super) struct Shear {
 impl Shear {
     #[inline(always)]
     pub(super) fn new(o: Vec3, d: Vec3) -> Self {
-        let (o, d) = ([o.x, o.y, o.z], [d.x, d.y, d.z]);
-        let [x, y, z] = d.map(f64::abs);
-        let axes = if x > y && x > z {
-            [1, 2, 0]
+        let (x, y, z) = (d.x.abs(), d.y.abs(), d.z.abs());
+        let (axes, origin, d) = if x > y && x > z {
+            ([1, 2, 0], [o.y, o.z, o.x], [d.y, d.z, d.x])
         } else if y > z {
-            [2, 0, 1]
+            ([2, 0, 1], [o.z, o.x, o.y], [d.z, d.x, d.y])
         } else {
-            [0, 1, 2]
+            ([0, 1, 2], [o.x, o.y, o.z], [d.x, d.y, d.z])
         };
-        let inverse = 1.0 / d[axes[2]];
+        let inverse = 1.0 / d[2];
         Self {
             axes,
-            origin: axes.map(|axis| o[axis]),
-            shear: [d[axes[0]] * inverse, d[axes[1]] * inverse, inverse],
+            origin,
+            shear: [d[0] * inverse, d[1] * inverse, inverse],
         }
     }
 }
@@ -136,24 +137,26 @@ impl Block {
         }
         let [a, b, c] = &plane;
         let (mut u, mut v, mut w) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        let mut inside = 0_u32;
         for i in 0..LANES {
             u[i] = c[0][i] * b[1][i] - c[1][i] * b[0][i];
             v[i] = a[0][i] * c[1][i] - a[1][i] * c[0][i];
             w[i] = b[0][i] * a[1][i] - b[1][i] * a[0][i];
         }
+        let (u, v, w) = (&*black_box(&mut u), &*black_box(&mut v), &*black_box(&mut w));
+        let mut signs = [0; LANES];
         for i in 0..LANES {
             let left = (u[i] >= 0.0) & (v[i] >= 0.0) & (w[i] >= 0.0);
             let right = (u[i] <= 0.0) & (v[i] <= 0.0) & (w[i] <= 0.0);
-            inside |= u32::from(left | right) << i;
+            signs[i] = u8::from(left | right);
         }
+        let mut inside = u64::from_le_bytes(*black_box(&mut signs));
         while inside != 0 {
-            let i = (inside.trailing_zeros() & 7) as usize;
+            let i = (inside.trailing_zeros() >> 3 & 7) as usize;
             inside &= inside - 1;
             let mut weights = [u[i], v[i], w[i]];
             let mut twice_area = weights[0] + weights[1] + weights[2];
             if twice_area.abs() <= self.thin[i] {
-                weights = exact_edges(plane.map(|[x, y]| [x[i], y[i]]));
+                weights = exact_edges([[a[0][i], a[1][i]], [b[0][i], b[1][i]], [c[0][i], c[1][i]]]);
                 twice_area = weights[0] + weights[1] + weights[2];
                 let all = |sign: f64| weights.iter().all(|w| w * sign >= 0.0);
                 if twice_area == 0.0 || !(all(1.0) || all(-1.0)) {

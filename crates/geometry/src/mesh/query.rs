@@ -75,8 +75,9 @@ fn nearest(mesh: &Mesh, o: Vec3, d: Vec3, t_max: f64, leaving: &[u32]) -> MeshHi
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn nearest_block(mesh: &Mesh, rays: Rays<'_>, leaving: &[[u32; LEAVING]], found: Found<'_>) {
     let count = leaving.len();
-    let [ox, oy, oz] = rays.origin.map(|v| &v[..count]);
-    let [dx, dy, dz] = rays.direction.map(|v| &v[..count]);
+    let Rays { origin: [ox, oy, oz], direction: [dx, dy, dz] } = rays;
+    let (ox, oy, oz) = (&ox[..count], &oy[..count], &oz[..count]);
+    let (dx, dy, dz) = (&dx[..count], &dy[..count], &dz[..count]);
     let (t, triangle) = (&mut found.t[..count], &mut found.triangle[..count]);
     let (u, v) = (&mut found.u[..count], &mut found.v[..count]);
     let mut stack = Stack::default();
