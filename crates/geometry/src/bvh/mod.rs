@@ -12,6 +12,7 @@ mod probe;
 use etendue_math::Vec3;
 
 use crate::bounds::Bounds;
+use probe::Lanes;
 pub use probe::Probe;
 
 /// Children per node.
@@ -46,13 +47,19 @@ pub struct Bvh {
 }
 
 /// What is left to visit, for one ray after the other: the child, and where the ray enters it (f32 bits, in the high
-/// half, so that entries sort by distance).
+/// half, so that entries sort by distance). And what the ray has to do with the children of the node at hand.
 #[derive(Clone, Debug)]
-pub struct Stack([u64; ROOM]);
+pub struct Stack {
+    entries: [u64; ROOM],
+    lanes: Lanes,
+}
 
 impl Default for Stack {
     fn default() -> Self {
-        Self([0; ROOM])
+        Self {
+            entries: [0; ROOM],
+            lanes: Lanes::default(),
+        }
     }
 }
 
@@ -95,38 +102,41 @@ impl Bvh {
 
     /// As [`Bvh::traverse`], leaf by leaf: leaves are numbered as [`Bvh::leaves`] yields them.
     #[inline(always)]
-    pub fn walk(
-        &self,
-        probe: &Probe,
-        t_max: &mut f64,
-        Stack(stack): &mut Stack,
-        mut visit: impl FnMut(usize, &mut f64),
-    ) {
+    pub fn walk(&self, probe: &Probe, t_max: &mut f64, stack: &mut Stack, mut visit: impl FnMut(usize, &mut f64)) {
         let Some(mut limit) = probe.limit(*t_max) else {
             return;
         };
+        let Stack { entries, lanes } = stack;
         let mut top = 0;
         let mut child = 0_u32;
         loop {
             if child & LEAF == 0 {
                 let node = &self.nodes[child as usize];
-                let (enter, mut hits) = probe.enter(&node.planes, limit);
-                hits &= node.used;
-                if hits != 0 {
+                probe.enter(&node.planes, limit, lanes);
+                let mut hits = u64::from_le_bytes(lanes.hit) & node.used;
+                let mut next = || {
+                    let lane = (hits.trailing_zeros() >> 3) as usize % WIDTH;
+                    hits &= hits.wrapping_sub(1);
+                    let entry = u64::from(lanes.enter[lane].to_bits()) << 32 | u64::from(node.child[lane]);
+                    (entry, hits != 0)
+                };
+                if node.used & u64::from_le_bytes(lanes.hit) != 0 {
+                    let (mut nearest, mut more) = next();
                     let first = top;
-                    while hits != 0 {
-                        let lane = (hits.trailing_zeros() >> 3 & 7) as usize;
-                        hits &= hits - 1;
-                        // Farthest first; in an array this short insertion is fastest.
-                        let entry = u64::from(enter[lane].to_bits()) << 32 | u64::from(node.child[lane]);
+                    while more {
+                        let (mut entry, still) = next();
+                        more = still;
+                        (nearest, entry) = (nearest.min(entry), nearest.max(entry));
                         let mut at = top;
-                        while at > first && stack[at - 1] < entry {
-                            stack[at] = stack[at - 1];
+                        while at > first && entries[at - 1] < entry {
+                            entries[at] = entries[at - 1];
                             at -= 1;
                         }
-                        stack[at] = entry;
+                        entries[at] = entry;
                         top += 1;
                     }
+                    child = low(nearest);
+                    continue;
                 }
             } else {
                 visit((child & !LEAF) as usize, t_max);
@@ -140,14 +150,24 @@ impl Bvh {
                     return;
                 }
                 top -= 1;
-                let entry = stack[top];
-                #[allow(clippy::cast_possible_truncation, reason = "the two halves")]
-                let (enter, low) = (f32::from_bits((entry >> 32) as u32), entry as u32);
-                if enter <= limit {
-                    child = low;
+                if enter(entries[top]) <= limit {
+                    child = low(entries[top]);
                     break;
                 }
             }
         }
     }
+}
+
+/// The child of an entry.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, reason = "the lower half")]
+const fn low(entry: u64) -> u32 {
+    entry as u32
+}
+
+/// Where the ray enters the child of an entry.
+#[inline(always)]
+const fn enter(entry: u64) -> f32 {
+    f32::from_bits((entry >> 32) as u32)
 }

@@ -18,8 +18,6 @@
 //!
 //! A start other than t = 0 moves the origin along the ray; o⁻ and o⁺ hold the rounding of that move too.
 
-use std::hint::black_box;
-
 use etendue_math::Vec3;
 
 use super::WIDTH;
@@ -94,12 +92,11 @@ impl Probe {
         (self.finite && length >= 0.0).then_some((length + slack) as f32)
     }
 
-    /// Where the ray enters each of eight boxes, at 0 or later, and a byte for each, 1 if it meets it before `limit`.
+    /// Finds where the ray enters each of eight boxes, at 0 or later, and which it meets before `limit`.
     ///
     /// `if a > b { a } else { b }` is one instruction, and b if a is NaN.
     #[inline(always)]
-    #[must_use]
-    pub fn enter(&self, planes: &[[f32; WIDTH]; 6], limit: f32) -> ([f32; WIDTH], u64) {
+    pub(super) fn enter(&self, planes: &[[f32; WIDTH]; 6], limit: f32, lanes: &mut Lanes) {
         let (mut enter, mut leave) = ([0.0_f32; WIDTH], [limit; WIDTH]);
         for Axis { rows, origin, inverse } in self.axes {
             let (near, far) = (&planes[rows[0]], &planes[rows[1]]);
@@ -110,12 +107,20 @@ impl Probe {
                 leave[i] = if b < leave[i] { b } else { leave[i] };
             }
         }
-        let (enter, leave) = (&*black_box(&mut enter), &*black_box(&mut leave));
-        let mut hits = [0; WIDTH];
         for i in 0..WIDTH {
-            hits[i] = u8::from(enter[i] <= leave[i]);
+            lanes.enter[i] = enter[i];
         }
-        // Held in memory, the bytes are written by one comparison; in a register they would be gathered one by one.
-        (*enter, u64::from_le_bytes(*black_box(&mut hits)))
+        for i in 0..WIDTH {
+            lanes.hit[i] = u8::from(enter[i] <= leave[i]);
+        }
     }
+}
+
+/// What a ray has to do with eight boxes. It stays in memory, where one instruction writes it and children are looked up.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lanes {
+    /// Where the ray enters each box.
+    pub(super) enter: [f32; WIDTH],
+    /// 1 if it does, else 0.
+    pub(super) hit: [u8; WIDTH],
 }

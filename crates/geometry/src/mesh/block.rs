@@ -8,8 +8,6 @@
 //! two rounded products has the right sign or is 0, and 0 counts as inside on either side. Where the area is so small
 //! against the rounding that weights would be worthless, they are worked out again without error ([`exact_edges`]).
 
-use std::hint::black_box;
-
 use etendue_math::Vec3;
 
 /// The part of its longest side by which a triangle's box is widened, so that the box holds all hits that are accepted.
@@ -60,6 +58,21 @@ impl MeshHit {
     pub(super) fn before(&self, other: &Self) -> bool {
         self.t < other.t || (self.t == other.t && other.triangle != NO_TRIANGLE && self.triangle < other.triangle)
     }
+}
+
+/// What a ray has to do with eight triangles. It stays in memory, where one instruction writes a row of it and a hit is
+/// looked up.
+#[derive(Clone, Debug, Default)]
+#[repr(align(64))]
+pub(super) struct Lanes {
+    /// The vertices in the plane across the ray.
+    plane: [[[f64; LANES]; 2]; 3],
+    /// The vertices along the axis of the shear.
+    depth: [[f64; LANES]; 3],
+    /// The edge functions opposite to them.
+    weight: [[f64; LANES]; 3],
+    /// 1 if the ray's line meets the triangle, else 0.
+    inside: [u8; LANES],
 }
 
 /// Up to eight triangles, a structure of arrays. Lanes not in use have NaN for coordinates, which nothing hits.
@@ -121,35 +134,37 @@ impl Block {
 
     /// Reports every triangle that the ray's line meets.
     #[inline(always)]
-    pub(super) fn meet(&self, ray: &Shear, mut hit: impl FnMut(MeshHit)) {
+    pub(super) fn meet(&self, ray: &Shear, lanes: &mut Lanes, mut hit: impl FnMut(MeshHit)) {
         let [kx, ky, kz] = ray.axes;
         let [ox, oy, oz] = ray.origin;
         let [sx, sy, sz] = ray.shear;
-        let mut plane = [[[0.0; LANES]; 2]; 3];
-        let mut depth = [[0.0; LANES]; 3];
-        for (corner, (p, z)) in self.corners.iter().zip(plane.iter_mut().zip(&mut depth)) {
-            let [x, y] = p;
+        let Lanes { plane, depth, weight, inside } = lanes;
+        for k in 0..3 {
+            let corner = &self.corners[k];
+            let (x, y, z) = (&corner[kx], &corner[ky], &corner[kz]);
             for i in 0..LANES {
-                z[i] = corner[kz][i] - oz;
-                x[i] = (corner[kx][i] - ox) - sx * z[i];
-                y[i] = (corner[ky][i] - oy) - sy * z[i];
+                depth[k][i] = z[i] - oz;
+            }
+            for i in 0..LANES {
+                plane[k][0][i] = (x[i] - ox) - sx * depth[k][i];
+            }
+            for i in 0..LANES {
+                plane[k][1][i] = (y[i] - oy) - sy * depth[k][i];
             }
         }
-        let [a, b, c] = &plane;
-        let (mut u, mut v, mut w) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            u[i] = c[0][i] * b[1][i] - c[1][i] * b[0][i];
-            v[i] = a[0][i] * c[1][i] - a[1][i] * c[0][i];
-            w[i] = b[0][i] * a[1][i] - b[1][i] * a[0][i];
+        let [a, b, c] = &*plane;
+        for (w, (p, q)) in weight.iter_mut().zip([(c, b), (a, c), (b, a)]) {
+            for i in 0..LANES {
+                w[i] = p[0][i] * q[1][i] - p[1][i] * q[0][i];
+            }
         }
-        let (u, v, w) = (&*black_box(&mut u), &*black_box(&mut v), &*black_box(&mut w));
-        let mut signs = [0; LANES];
+        let [u, v, w] = &*weight;
         for i in 0..LANES {
             let left = (u[i] >= 0.0) & (v[i] >= 0.0) & (w[i] >= 0.0);
             let right = (u[i] <= 0.0) & (v[i] <= 0.0) & (w[i] <= 0.0);
-            signs[i] = u8::from(left | right);
+            inside[i] = u8::from(left | right);
         }
-        let mut inside = u64::from_le_bytes(*black_box(&mut signs));
+        let mut inside = u64::from_le_bytes(*inside);
         while inside != 0 {
             let i = (inside.trailing_zeros() >> 3 & 7) as usize;
             inside &= inside - 1;

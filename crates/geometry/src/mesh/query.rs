@@ -4,7 +4,7 @@
 use etendue_math::Vec3;
 use multiversion::multiversion;
 
-use super::block::Shear;
+use super::block::{Lanes, Shear};
 use super::{Mesh, MeshHit, NO_TRIANGLE};
 use crate::bvh::{Probe, Stack};
 
@@ -31,6 +31,13 @@ pub struct Found<'a> {
     pub u: &'a mut [f64],
     /// Weight of its third vertex.
     pub v: &'a mut [f64],
+}
+
+/// What a search keeps in memory.
+#[derive(Default)]
+struct Scratch {
+    stack: Stack,
+    lanes: Lanes,
 }
 
 impl Mesh {
@@ -68,7 +75,7 @@ fn nearest(mesh: &Mesh, o: Vec3, d: Vec3, t_max: f64, leaving: &[u32]) -> MeshHi
         d,
         t_max,
         |triangle| leaving.contains(&triangle),
-        &mut Stack::default(),
+        &mut Scratch::default(),
     )
 }
 
@@ -80,12 +87,12 @@ fn nearest_block(mesh: &Mesh, rays: Rays<'_>, leaving: &[[u32; LEAVING]], found:
     let (dx, dy, dz) = (&dx[..count], &dy[..count], &dz[..count]);
     let (t, triangle) = (&mut found.t[..count], &mut found.triangle[..count]);
     let (u, v) = (&mut found.u[..count], &mut found.v[..count]);
-    let mut stack = Stack::default();
+    let mut scratch = Scratch::default();
     for i in 0..count {
         let (o, d) = (Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]));
         let out = leaving[i];
         let is_left = |triangle| out[0] == triangle || out[1] == triangle || out[2] == triangle || out[3] == triangle;
-        let hit = nearest_of(mesh, o, d, t[i], is_left, &mut stack);
+        let hit = nearest_of(mesh, o, d, t[i], is_left, &mut scratch);
         (t[i], triangle[i], u[i], v[i]) = (hit.t, hit.triangle, hit.u, hit.v);
     }
 }
@@ -94,8 +101,9 @@ fn nearest_block(mesh: &Mesh, rays: Rays<'_>, leaving: &[[u32; LEAVING]], found:
 fn between<F: FnMut(MeshHit)>(mesh: &Mesh, o: Vec3, d: Vec3, [t_lo, t_hi]: [f64; 2], leaving: &[u32], mut visit: F) {
     let (probe, ray) = (Probe::new(o, d, t_lo), Shear::new(o, d));
     let mut end = t_hi;
-    mesh.tree.walk(&probe, &mut end, &mut Stack::default(), |leaf, _| {
-        mesh.blocks[leaf].meet(&ray, |hit| {
+    let Scratch { stack, lanes } = &mut Scratch::default();
+    mesh.tree.walk(&probe, &mut end, stack, |leaf, _| {
+        mesh.blocks[leaf].meet(&ray, lanes, |hit| {
             if t_lo <= hit.t && hit.t <= t_hi && !leaving.contains(&hit.triangle) {
                 visit(hit);
             }
@@ -104,12 +112,12 @@ fn between<F: FnMut(MeshHit)>(mesh: &Mesh, o: Vec3, d: Vec3, [t_lo, t_hi]: [f64;
 }
 
 #[inline(always)]
-fn nearest_of(mesh: &Mesh, o: Vec3, d: Vec3, t_max: f64, is_left: impl Fn(u32) -> bool, stack: &mut Stack) -> MeshHit {
+fn nearest_of(mesh: &Mesh, o: Vec3, d: Vec3, t_max: f64, is_left: impl Fn(u32) -> bool, Scratch { stack, lanes }: &mut Scratch) -> MeshHit {
     let (probe, ray) = (Probe::new(o, d, 0.0), Shear::new(o, d));
     let mut best = MeshHit::none(t_max);
     let mut end = t_max;
     mesh.tree.walk(&probe, &mut end, stack, |leaf, end| {
-        mesh.blocks[leaf].meet(&ray, |hit| {
+        mesh.blocks[leaf].meet(&ray, lanes, |hit| {
             if hit.t > 0.0 && hit.before(&best) && !is_left(hit.triangle) {
                 best = hit;
                 *end = hit.t;
