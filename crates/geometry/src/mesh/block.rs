@@ -132,9 +132,15 @@ impl Block {
         block
     }
 
-    /// Reports every triangle that the ray's line meets.
+    /// Reports every triangle that the ray's line meets, but for those to `skip`.
     #[inline(always)]
-    pub(super) fn meet(&self, ray: &Shear, lanes: &mut Lanes, mut hit: impl FnMut(MeshHit)) {
+    pub(super) fn meet(
+        &self,
+        ray: &Shear,
+        lanes: &mut Lanes,
+        skip: impl Fn(u32) -> bool,
+        mut hit: impl FnMut(MeshHit),
+    ) {
         let [kx, ky, kz] = ray.axes;
         let [ox, oy, oz] = ray.origin;
         let [sx, sy, sz] = ray.shear;
@@ -168,6 +174,9 @@ impl Block {
         while inside != 0 {
             let i = (inside.trailing_zeros() >> 3 & 7) as usize;
             inside &= inside - 1;
+            if skip(self.triangle[i]) {
+                continue;
+            }
             let mut weights = [u[i], v[i], w[i]];
             let mut twice_area = weights[0] + weights[1] + weights[2];
             if twice_area.abs() <= self.thin[i] {

@@ -103,8 +103,8 @@ fn between<F: FnMut(MeshHit)>(mesh: &Mesh, o: Vec3, d: Vec3, [t_lo, t_hi]: [f64;
     let mut end = t_hi;
     let Scratch { stack, lanes } = &mut Scratch::default();
     mesh.tree.walk(&probe, &mut end, stack, |leaf, _| {
-        mesh.blocks[leaf].meet(&ray, lanes, |hit| {
-            if t_lo <= hit.t && hit.t <= t_hi && !leaving.contains(&hit.triangle) {
+        mesh.blocks[leaf].meet(&ray, lanes, |triangle| leaving.contains(&triangle), |hit| {
+            if t_lo <= hit.t && hit.t <= t_hi {
                 visit(hit);
             }
         });
@@ -117,8 +117,8 @@ fn nearest_of(mesh: &Mesh, o: Vec3, d: Vec3, t_max: f64, is_left: impl Fn(u32) -
     let mut best = MeshHit::none(t_max);
     let mut end = t_max;
     mesh.tree.walk(&probe, &mut end, stack, |leaf, end| {
-        mesh.blocks[leaf].meet(&ray, lanes, |hit| {
-            if hit.t > 0.0 && hit.before(&best) && !is_left(hit.triangle) {
+        mesh.blocks[leaf].meet(&ray, lanes, &is_left, |hit| {
+            if hit.t > 0.0 && hit.before(&best) {
                 best = hit;
                 *end = hit.t;
             }
