@@ -6,7 +6,7 @@
 //! neighbours differs in sign alone. So the sheared triangles meet edge to edge as the mesh does, and a ray slips
 //! through nowhere if the signs of edge functions are those of the exact ones. Rounding is monotone: a difference of
 //! two rounded products has the right sign or is 0, and 0 counts as inside on either side. Where the area is so small
-//! against the rounding that weights would be worthless, they are worked out again without error ([`exact_edges`]).
+//! against the rounding that weights would be worthless, they are worked out again without error.
 
 use etendue_math::Vec3;
 
@@ -65,11 +65,7 @@ impl MeshHit {
 #[derive(Clone, Debug, Default)]
 #[repr(align(64))]
 pub(super) struct Lanes {
-    /// The vertices in the plane across the ray.
-    plane: [[[f64; LANES]; 2]; 3],
-    /// The vertices along the axis of the shear.
-    depth: [[f64; LANES]; 3],
-    /// The edge functions opposite to them.
+    /// The edge functions opposite to the vertices.
     weight: [[f64; LANES]; 3],
     /// 1 if the ray's line meets the triangle, else 0.
     inside: [u8; LANES],
@@ -82,7 +78,7 @@ pub(super) struct Block {
     /// Coordinates by vertex and axis.
     corners: [[[f64; LANES]; 3]; 3],
     /// Twice the projected area below which the exact edge functions are asked.
-    thin: [f64; LANES],
+    thin: f64,
     pub(super) triangle: [u32; LANES],
 }
 
@@ -118,7 +114,7 @@ impl Block {
     pub(super) fn new(triangles: &[(u32, [Vec3; 3])]) -> Self {
         let mut block = Self {
             corners: [[[f64::NAN; LANES]; 3]; 3],
-            thin: [0.0; LANES],
+            thin: 0.0,
             triangle: [NO_TRIANGLE; LANES],
         };
         for (lane, (index, corners)) in triangles.iter().enumerate() {
@@ -127,7 +123,7 @@ impl Block {
                 (rows[0][lane], rows[1][lane], rows[2][lane]) = (p.x, p.y, p.z);
             }
             let side = super::longest_side(*corners);
-            block.thin[lane] = THIN * side * side;
+            block.thin = block.thin.max(THIN * side * side);
         }
         block
     }
@@ -144,24 +140,18 @@ impl Block {
         let [kx, ky, kz] = ray.axes;
         let [ox, oy, oz] = ray.origin;
         let [sx, sy, sz] = ray.shear;
-        let Lanes { plane, depth, weight, inside } = lanes;
-        for k in 0..3 {
-            let corner = &self.corners[k];
-            let (x, y, z) = (&corner[kx], &corner[ky], &corner[kz]);
+        let Lanes { weight, inside } = lanes;
+        let (mut x, mut y) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        for (corner, (x, y)) in self.corners.iter().zip(x.iter_mut().zip(&mut y)) {
             for i in 0..LANES {
-                depth[k][i] = z[i] - oz;
-            }
-            for i in 0..LANES {
-                plane[k][0][i] = (x[i] - ox) - sx * depth[k][i];
-            }
-            for i in 0..LANES {
-                plane[k][1][i] = (y[i] - oy) - sy * depth[k][i];
+                let depth = corner[kz][i] - oz;
+                x[i] = (corner[kx][i] - ox) - sx * depth;
+                y[i] = (corner[ky][i] - oy) - sy * depth;
             }
         }
-        let [a, b, c] = &*plane;
-        for (w, (p, q)) in weight.iter_mut().zip([(c, b), (a, c), (b, a)]) {
+        for (w, [p, q]) in weight.iter_mut().zip([[2, 1], [0, 2], [1, 0]]) {
             for i in 0..LANES {
-                w[i] = p[0][i] * q[1][i] - p[1][i] * q[0][i];
+                w[i] = x[p][i] * y[q][i] - y[p][i] * x[q][i];
             }
         }
         let [u, v, w] = &*weight;
@@ -178,9 +168,10 @@ impl Block {
                 continue;
             }
             let mut weights = [u[i], v[i], w[i]];
+            let depth = [0, 1, 2].map(|k: usize| self.corners[k][kz][i] - oz);
             let mut twice_area = weights[0] + weights[1] + weights[2];
-            if twice_area.abs() <= self.thin[i] {
-                weights = exact_edges([[a[0][i], a[1][i]], [b[0][i], b[1][i]], [c[0][i], c[1][i]]]);
+            if twice_area.abs() <= self.thin {
+                weights = self.exact_weights(ray, i);
                 twice_area = weights[0] + weights[1] + weights[2];
                 let all = |sign: f64| weights.iter().all(|w| w * sign >= 0.0);
                 if twice_area == 0.0 || !(all(1.0) || all(-1.0)) {
@@ -188,7 +179,7 @@ impl Block {
                 }
             }
             let scale = 1.0 / twice_area;
-            let along = weights[0] * depth[0][i] + weights[1] * depth[1][i] + weights[2] * depth[2][i];
+            let along = weights[0] * depth[0] + weights[1] * depth[1] + weights[2] * depth[2];
             hit(MeshHit {
                 t: along * sz * scale,
                 triangle: self.triangle[i],
@@ -197,13 +188,21 @@ impl Block {
             });
         }
     }
-}
 
-/// The edge functions of a triangle in the plane, each to one rounding and of the right sign.
-#[cold]
-#[inline(never)]
-fn exact_edges([a, b, c]: [[f64; 2]; 3]) -> [f64; 3] {
-    [cross(c, b), cross(a, c), cross(b, a)]
+    /// The edge functions of one triangle, each to one rounding and of the right sign.
+    #[cold]
+    #[inline(never)]
+    fn exact_weights(&self, ray: &Shear, lane: usize) -> [f64; 3] {
+        let ([kx, ky, kz], [ox, oy, oz], [sx, sy, _]) = (ray.axes, ray.origin, ray.shear);
+        let [a, b, c] = self.corners.each_ref().map(|corner| {
+            let depth = corner[kz][lane] - oz;
+            [
+                (corner[kx][lane] - ox) - sx * depth,
+                (corner[ky][lane] - oy) - sy * depth,
+            ]
+        });
+        [cross(c, b), cross(a, c), cross(b, a)]
+    }
 }
 
 /// p₀ q₁ − p₁ q₀ to a relative error of 2⁻⁵²: products without error, and their difference in double-double
