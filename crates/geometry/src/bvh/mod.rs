@@ -8,6 +8,9 @@
 
 mod build;
 mod probe;
+#[cfg(test)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small numbers")]
+mod tests;
 
 use etendue_math::Vec3;
 

@@ -4,6 +4,9 @@
 
 mod block;
 mod query;
+#[cfg(test)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small numbers")]
+mod tests;
 mod topology;
 
 use std::fmt;

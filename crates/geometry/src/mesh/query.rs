@@ -35,9 +35,9 @@ pub struct Found<'a> {
 
 /// What a search keeps in memory.
 #[derive(Default)]
-struct Scratch {
+pub(super) struct Scratch {
     stack: Stack,
-    lanes: Lanes,
+    pub(super) lanes: Lanes,
 }
 
 impl Mesh {
@@ -82,7 +82,10 @@ fn nearest(mesh: &Mesh, o: Vec3, d: Vec3, t_max: f64, leaving: &[u32]) -> MeshHi
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn nearest_block(mesh: &Mesh, rays: Rays<'_>, leaving: &[[u32; LEAVING]], found: Found<'_>) {
     let count = leaving.len();
-    let Rays { origin: [ox, oy, oz], direction: [dx, dy, dz] } = rays;
+    let Rays {
+        origin: [ox, oy, oz],
+        direction: [dx, dy, dz],
+    } = rays;
     let (ox, oy, oz) = (&ox[..count], &oy[..count], &oz[..count]);
     let (dx, dy, dz) = (&dx[..count], &dy[..count], &dz[..count]);
     let (t, triangle) = (&mut found.t[..count], &mut found.triangle[..count]);
@@ -103,16 +106,28 @@ fn between<F: FnMut(MeshHit)>(mesh: &Mesh, o: Vec3, d: Vec3, [t_lo, t_hi]: [f64;
     let mut end = t_hi;
     let Scratch { stack, lanes } = &mut Scratch::default();
     mesh.tree.walk(&probe, &mut end, stack, |leaf, _| {
-        mesh.blocks[leaf].meet(&ray, lanes, |triangle| leaving.contains(&triangle), |hit| {
-            if t_lo <= hit.t && hit.t <= t_hi {
-                visit(hit);
-            }
-        });
+        mesh.blocks[leaf].meet(
+            &ray,
+            lanes,
+            |triangle| leaving.contains(&triangle),
+            |hit| {
+                if t_lo <= hit.t && hit.t <= t_hi {
+                    visit(hit);
+                }
+            },
+        );
     });
 }
 
 #[inline(always)]
-fn nearest_of(mesh: &Mesh, o: Vec3, d: Vec3, t_max: f64, is_left: impl Fn(u32) -> bool, Scratch { stack, lanes }: &mut Scratch) -> MeshHit {
+fn nearest_of(
+    mesh: &Mesh,
+    o: Vec3,
+    d: Vec3,
+    t_max: f64,
+    is_left: impl Fn(u32) -> bool,
+    Scratch { stack, lanes }: &mut Scratch,
+) -> MeshHit {
     let (probe, ray) = (Probe::new(o, d, 0.0), Shear::new(o, d));
     let mut best = MeshHit::none(t_max);
     let mut end = t_max;
