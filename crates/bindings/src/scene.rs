@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use etendue_geometry::face::{Face, HalfSpace};
+use etendue_geometry::mesh::Mesh;
 use etendue_geometry::shape::{Asphere, Flat, Outline, Quadric, Shape, Torus};
 use etendue_math::{Frame, Vec3};
 use etendue_optics::finish::Finish;
@@ -12,11 +13,13 @@ use etendue_optics::table::{Curve, Table};
 use etendue_trace::detector::Detector;
 use etendue_trace::reverse::lanterns;
 use etendue_trace::scene::{Part, Scene as CoreScene};
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::field::LightField;
+use crate::surface::vectors;
 use crate::view::View;
 
 type Dict<'a, 'py> = &'a Bound<'py, PyDict>;
@@ -107,6 +110,21 @@ fn shape(dict: Dict<'_, '_>) -> PyResult<Shape> {
             major: get(dict, "major")?,
             minor: get(dict, "minor")?,
         }),
+        "mesh" => {
+            let vertices: PyReadonlyArray2<'_, f64> = get(dict, "vertices")?;
+            let triangles: PyReadonlyArray2<'_, u32> = get(dict, "triangles")?;
+            let normals: Option<PyReadonlyArray2<'_, f64>> = optional(dict, "normals")?;
+            let points = |array: &PyReadonlyArray2<'_, f64>| -> PyResult<Vec<Vec3>> {
+                Ok(vectors(array)?.into_iter().map(Vec3::from).collect())
+            };
+            if triangles.shape()[1] != 3 {
+                return Err(refuse("triangles of shape (m, 3) are needed"));
+            }
+            let corners = triangles.as_slice()?.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+            let normals = normals.as_ref().map(points).transpose()?;
+            let mesh = Mesh::new(points(&vertices)?, corners, normals);
+            Shape::Mesh(Arc::new(mesh.map_err(|error| refuse(error.to_string()))?))
+        }
         other => return Err(refuse(format!("no shape is called {other}"))),
     })
 }

@@ -11,7 +11,6 @@ use etendue_geometry::batch::BLOCK;
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_math::Vec3;
 use etendue_optics::finish::{Incidence, Lobe, pick};
-use etendue_optics::fresnel::{reflect, refract};
 use etendue_optics::source::surface::about;
 use etendue_sampling::ordered::BATCH;
 use etendue_sampling::philox::Stream;
@@ -20,7 +19,7 @@ use rayon::prelude::*;
 use crate::detector::{Detector, illuminance_cell, intensity_cell};
 use crate::inside::Inside;
 use crate::ledger::{Fate, Ledger};
-use crate::meeting::{Fillings, Loss, Meeting, meet, place, transmittance};
+use crate::meeting::{Fillings, Loss, Meeting, meet, place_near, transmittance};
 use crate::scene::Scene;
 
 /// The purpose under which the events of traced rays are drawn (see [`Stream::new`]).
@@ -206,7 +205,15 @@ fn trace_batch(scene: &Scene, run: &Run<'_>, batch: u64) -> Yield {
                 let ray = batch * BATCH + u64::from(mark);
                 if births.usable(i) {
                     let wavelength = source.wavelength(run.seed, number as u64, start + i as u64);
-                    walk.start(births.position(i), births.direction(i), flux, wavelength, ray, mark);
+                    let rider = Rider {
+                        flux,
+                        wavelength,
+                        ray,
+                        mark,
+                        event: 0,
+                        inside: Inside::default(),
+                    };
+                    walk.start(births.position(i), births.direction(i), rider, &scene.near[number]);
                 } else {
                     walk.out.ledger.book(Fate::Lost(Loss::NotFinite, NONE), flux);
                 }
@@ -223,20 +230,13 @@ fn trace_batch(scene: &Scene, run: &Run<'_>, batch: u64) -> Yield {
 type Next = Result<(Vec3, Vec3, Leaving), Fate>;
 
 impl Walk<'_> {
-    fn start(&mut self, o: Vec3, d: Vec3, flux: f64, wavelength: f64, ray: u64, mark: u32) {
-        match place(self.scene, o, d) {
+    fn start(&mut self, o: Vec3, d: Vec3, rider: Rider, near: &[u32]) {
+        match place_near(self.scene, o, d, near) {
             Ok((inside, leaving)) => {
                 self.lines.push(o, d, leaving);
-                self.riders.push(Rider {
-                    flux,
-                    wavelength,
-                    ray,
-                    mark,
-                    event: 0,
-                    inside,
-                });
+                self.riders.push(Rider { inside, ..rider });
             }
-            Err((loss, face)) => self.out.ledger.book(Fate::Lost(loss, face), flux),
+            Err((loss, face)) => self.out.ledger.book(Fate::Lost(loss, face), rider.flux),
         }
     }
 
@@ -317,11 +317,11 @@ impl Walk<'_> {
             rider.inside = meeting.after;
         }
         let d = match lobe {
-            Lobe::SpecularReflection => reflect(d, meeting.normal, light.cosine),
-            Lobe::SpecularTransmission if light.n1 == light.n2 => d,
-            Lobe::SpecularTransmission => refract(d, meeting.normal, light.cosine, light.n1 / light.n2, across),
-            Lobe::DiffuseReflection => about(meeting.normal, (1.0 - numbers[1]).sqrt(), numbers[2]),
-            Lobe::DiffuseTransmission => about(-meeting.normal, (1.0 - numbers[1]).sqrt(), numbers[2]),
+            Lobe::SpecularReflection => meeting.mirrored(d, light.cosine),
+            Lobe::SpecularTransmission => meeting.refracted(d, light.cosine, light.n1 / light.n2, across),
+            // Diffuse light is spread about the surface itself, so that none of it starts behind it.
+            Lobe::DiffuseReflection => about(meeting.side, (1.0 - numbers[1]).sqrt(), numbers[2]),
+            Lobe::DiffuseTransmission => about(-meeting.side, (1.0 - numbers[1]).sqrt(), numbers[2]),
         };
         Ok((meeting.point, d, meeting.leaving))
     }
@@ -342,7 +342,7 @@ impl Walk<'_> {
             let away = view.eye - meeting.point;
             let distance = away.length();
             let k = away * (1.0 / distance);
-            let cosine = k.dot(meeting.normal);
+            let cosine = k.dot(meeting.side);
             let Some(pixel) = view.pixel(meeting.point, k) else { continue };
             let bsdf = finish.bsdf(light, cosine < 0.0);
             if bsdf == 0.0 || cosine == 0.0 {

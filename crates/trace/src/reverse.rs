@@ -13,7 +13,6 @@ use etendue_geometry::assembly::Leaving;
 use etendue_lightfield::View;
 use etendue_math::Vec3;
 use etendue_optics::finish::{Finish, Incidence};
-use etendue_optics::fresnel::{reflect, refract};
 use etendue_optics::source::surface::about;
 use etendue_optics::source::{Lantern, Numbers};
 use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
@@ -352,12 +351,10 @@ impl<'a> Path<'a> {
         let smooth = [shares[0], through];
         let seen = if branch.seen == Seen::Smooth { Seen::Smooth } else { Seen::Caustic };
         let go = |transmitted: bool, weight: f64| {
-            let d = if !transmitted {
-                reflect(branch.d, meeting.normal, cosine)
-            } else if n1 == n2 {
-                branch.d
+            let d = if transmitted {
+                meeting.refracted(branch.d, cosine, n1 / n2, across)
             } else {
-                refract(branch.d, meeting.normal, cosine, n1 / n2, across)
+                meeting.mirrored(branch.d, cosine)
             };
             Branch {
                 o: meeting.point,
@@ -431,7 +428,7 @@ impl<'a> Path<'a> {
         let (side, turn, height) = (self.numbers.next(), self.numbers.next(), self.numbers.next());
         let through = side >= transmits[0];
         let chance = transmits[usize::from(through)];
-        let normal = if through { -meeting.normal } else { meeting.normal };
+        let normal = if through { -meeting.side } else { meeting.side };
         let cosine = (1.0 - height).sqrt();
         let light = Incidence {
             cosine,
@@ -487,7 +484,7 @@ impl<'a> Path<'a> {
             let source = &scene.sources[number];
             let Some(beacon) = lantern.pick(source, meeting.point, &mut self.numbers) else { continue };
             let k = (beacon.point - meeting.point).normalized();
-            let height = k.dot(meeting.normal);
+            let height = k.dot(meeting.side);
             let through = height < 0.0;
             let cosine = height.abs();
             let light = Incidence {

@@ -1,10 +1,13 @@
 //! Points spread evenly over the area of a shape.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use etendue_math::{Interval, Vec3};
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::alias::Alias;
+
+use crate::mesh::Mesh;
 
 use super::{Asphere, Flat, Outline, Quadric, Shape, Torus};
 
@@ -28,6 +31,7 @@ enum Kind {
     /// Triangles, and the table that picks one by its area.
     Polygon(Vec<[[f64; 2]; 3]>, Alias),
     Rotation(Outlined, Vec<Stretch>, Alias),
+    Mesh(Arc<Mesh>),
 }
 
 /// What is turned about the z axis: the parameter s runs along its outline.
@@ -128,6 +132,17 @@ fn squared_radius(q: &Quadric, z: f64) -> f64 {
     -((q.z2 * z + q.z1) * z + q.z0) / q.r2
 }
 
+/// The largest √(x² + y²) of a quadric and its range of z; None if it has no end or no points.
+pub(super) fn reach(q: &Quadric) -> Option<(f64, [f64; 2])> {
+    let ranges = quadric_ranges(q)?;
+    let z = [ranges.first()?[0], ranges.last()?[1]];
+    // r² is of second order in z: largest at an end, or where its slope is 0.
+    let flat = -0.5 * q.z1 / q.z2;
+    let places = ranges.iter().flatten().copied().chain(ranges.iter().map(|r| flat.max(r[0]).min(r[1])));
+    let most = places.map(|z| squared_radius(q, z)).fold(0.0, f64::max).sqrt();
+    Some((most.min(q.r[1]), z))
+}
+
 /// Where, on the z axis, `lowest` ≤ r² ≤ `highest`: between the zeros of two functions of second order.
 fn quadric_ranges(q: &Quadric) -> Option<Vec<[f64; 2]>> {
     let zeros = |level: f64| -> Vec<f64> {
@@ -201,6 +216,10 @@ impl AreaSampler {
             Shape::Quadric(q) => rotation(Outlined::Quadric(*q))?,
             Shape::Asphere(a) => rotation(Outlined::Asphere(a.clone()))?,
             Shape::Torus(t) => rotation(Outlined::Torus(*t))?,
+            Shape::Mesh(mesh) => Self {
+                area: mesh.area(),
+                kind: Kind::Mesh(Arc::clone(mesh)),
+            },
         };
         (sampler.area > 0.0 && sampler.area.is_finite()).then_some(sampler)
     }
@@ -211,10 +230,11 @@ impl AreaSampler {
         self.area
     }
 
-    /// A point of the surface; takes numbers between 0 and 1 from `next` as it needs them.
+    /// A point of the surface and the part that it lies on; takes numbers between 0 and 1 from `next` as it needs them.
     #[must_use]
-    pub fn draw(&self, next: &mut impl FnMut() -> f64) -> Vec3 {
-        match &self.kind {
+    pub fn draw(&self, next: &mut impl FnMut() -> f64) -> (Vec3, u32) {
+        let point = match &self.kind {
+            Kind::Mesh(mesh) => return mesh.sample(next(), next(), next()),
             Kind::Rectangle([width, height]) => Vec3::new((next() - 0.5) * width, (next() - 0.5) * height, 0.0),
             Kind::Annulus([inner, outer]) => {
                 let (x, y) = etendue_sampling::warp::square_to_annulus(next(), next(), *inner, *outer);
@@ -231,10 +251,11 @@ impl AreaSampler {
                 let stretch = stretches[table.pick(next())];
                 let s = stretch.from + next() * (stretch.to - stretch.from);
                 if next() * stretch.most <= outlined.density(s) {
-                    return outlined.point(s, next());
+                    break outlined.point(s, next());
                 }
             },
-        }
+        };
+        (point, 0)
     }
 }
 
@@ -321,7 +342,7 @@ mod tests {
                 }
                 k += 1;
                 numbers[k - 1]
-            }));
+            }).0);
         }
         points
     }
@@ -417,7 +438,7 @@ mod tests {
             let places: Vec<f64> = points.iter().map(|p| share(*p)).collect();
             assert!(chi_square(&places, 50) < 95.2, "{shape:?}");
             for p in points.iter().take(1000) {
-                assert!((shape.settle(*p).0 - *p).length() < 1e-12);
+                assert!((shape.settle(*p, 0).0 - *p).length() < 1e-12);
             }
         }
     }

@@ -100,8 +100,8 @@ impl Lantern {
         match &source.emitter {
             Emitter::Surface(surface) => {
                 let (shape, flipped) = surface.shape();
-                shape.crossings(p, k, [0.0, reach], false, |crossing| {
-                    let (_, normal) = shape.settle(p + k * crossing.t);
+                shape.crossings(p, k, [0.0, reach], &[], |crossing| {
+                    let (_, normal) = shape.settle(p + k * crossing.t, crossing.part);
                     let cosine = if flipped { k.dot(normal) } else { -k.dot(normal) };
                     if crossing.t > 0.0 && cosine > 0.0 {
                         visit(Lit {

@@ -9,6 +9,8 @@ pub mod surface;
 use std::ops::Range;
 use std::sync::Arc;
 
+use etendue_geometry::Face;
+use etendue_geometry::bounds::Bounds;
 use etendue_geometry::shape::Shape;
 use etendue_geometry::shape::sample::AreaSampler;
 use etendue_geometry::{RayBatch, RaySource};
@@ -70,6 +72,34 @@ pub struct Source {
 }
 
 impl Source {
+    /// A box in the world that holds every start point; not finite for ray sets, which are not looked through for it.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let face = |shape: Shape| {
+            let (frame, trims) = (self.frame, Vec::new());
+            Face {
+                shape,
+                frame,
+                trims,
+                flipped: false,
+            }
+            .bounds()
+        };
+        match &self.emitter {
+            Emitter::Surface(surface) => face(surface.shape().0.clone()),
+            Emitter::Point(_) => Bounds::of([self.frame.origin]).widened(f64::EPSILON * self.frame.origin.length()),
+            Emitter::Field(sampler) => {
+                // A part reaches no farther from its origin than this in any direction.
+                let boxes = sampler.field().parts.iter().map(|part| {
+                    let centre = self.frame.point_to_world(part.part.frame.origin);
+                    Bounds::of([centre]).widened(part.part.reach() * (1.0 + 1e-9))
+                });
+                boxes.fold(Bounds::EMPTY, Bounds::union)
+            }
+            Emitter::Beam(_) | Emitter::Rays { .. } => Bounds::of([f64::NEG_INFINITY, f64::INFINITY].map(|v| Vec3::new(v, v, v))),
+        }
+    }
+
     /// The wavelength of ray `index` of source number `source` \[nm\].
     #[inline]
     #[must_use]
@@ -115,7 +145,7 @@ impl Source {
             Emitter::Surface(surface) => self.draw(source, range, count, seed, batch, |n| surface.draw(n)),
             Emitter::Point(point) => self.draw(source, range, count, seed, batch, |n| (Vec3::default(), point.draw(n))),
             Emitter::Beam(area) => self.draw(source, range, count, seed, batch, |n| {
-                (area.draw(&mut || n.next()), Vec3::new(0.0, 0.0, 1.0))
+                (area.draw(&mut || n.next()).0, Vec3::new(0.0, 0.0, 1.0))
             }),
         }
         for i in 0..batch.len {

@@ -52,7 +52,8 @@ impl SurfaceSource {
     /// A point spread evenly over the area, and the normal on the emitting side.
     #[must_use]
     pub fn draw_point(&self, numbers: &mut Numbers) -> (Vec3, Vec3) {
-        let (point, normal) = self.shape.settle(self.sampler.draw(&mut || numbers.next()));
+        let (point, part) = self.sampler.draw(&mut || numbers.next());
+        let (point, normal) = self.shape.settle(point, part);
         (point, if self.flipped { -normal } else { normal })
     }
 
