@@ -19,7 +19,7 @@ use crate::view::View;
 
 fn entries<'py>(py: Python<'py>, entries: &[Entry]) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u64>>) {
     (
-        PyArray1::from_iter(py, entries.iter().map(|e| e.flux)),
+        PyArray1::from_iter(py, entries.iter().map(|e| e.flux())),
         PyArray1::from_iter(py, entries.iter().map(|e| e.rays)),
     )
 }

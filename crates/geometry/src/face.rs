@@ -114,6 +114,14 @@ impl Face {
     #[inline]
     #[must_use]
     pub fn foot(&self, o: Vec3, d: Vec3, crossing: &Crossing) -> Foot {
+        if let Shape::Flat(_) = self.shape {
+            // Down to the plane along its normal, without a detour through the coordinates of the shape.
+            let (p, n) = (o + d * crossing.t, self.frame.z);
+            return Foot {
+                point: p - n * (p - self.frame.origin).dot(n),
+                normal: if self.flipped { -n } else { n },
+            };
+        }
         let p = self.frame.point_to_local(o) + self.frame.direction_to_local(d) * crossing.t;
         let (p, n) = self.shape.settle(p, crossing.part);
         let n = self.frame.direction_to_world(n);

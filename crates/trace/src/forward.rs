@@ -13,7 +13,7 @@ use etendue_math::Vec3;
 use etendue_optics::finish::{Incidence, Lobe, pick};
 use etendue_optics::source::surface::about;
 use etendue_sampling::ordered::BATCH;
-use etendue_sampling::philox::Stream;
+use etendue_sampling::philox::{Stream, fill_uniforms};
 use rayon::prelude::*;
 
 use crate::detector::{Detector, illuminance_cell, intensity_cell};
@@ -128,9 +128,9 @@ pub fn trace(scene: &Scene, run: &Run<'_>, batches: Range<u64>) -> Harvest {
     };
     for part in parts {
         let [emitted, fates] = part.ledger.balance();
-        let scale = if emitted.flux > 0.0 { emitted.flux } else { 1.0 };
+        let scale = if emitted.flux() > 0.0 { emitted.flux() } else { 1.0 };
         let lost = if emitted.rays == fates.rays { 0.0 } else { f64::INFINITY };
-        harvest.imbalance = harvest.imbalance.max((emitted.flux - fates.flux).abs() / scale + lost);
+        harvest.imbalance = harvest.imbalance.max((emitted.flux() - fates.flux()).abs() / scale + lost);
         harvest.rays += emitted.rays;
         harvest.ledger.merge(&part.ledger);
         for (cells, mut marks) in harvest.cells.iter_mut().zip(part.marks) {
@@ -171,6 +171,9 @@ struct Walk<'a> {
     lines: Lines,
     riders: Vec<Rider>,
     hits: Hits,
+    /// Rays and events whose random numbers are wanted, and the numbers.
+    addresses: [Vec<u64>; 2],
+    numbers: [Vec<f64>; 4],
     out: Yield,
 }
 
@@ -183,6 +186,8 @@ fn trace_batch(scene: &Scene, run: &Run<'_>, batch: u64) -> Yield {
         lines: Lines::default(),
         riders: Vec::with_capacity(BLOCK),
         hits: Hits::default(),
+        addresses: Default::default(),
+        numbers: Default::default(),
         out: Yield {
             ledger: Ledger::new(scene),
             marks: vec![Vec::new(); scene.detectors.len()],
@@ -245,6 +250,12 @@ impl Walk<'_> {
         while !self.lines.is_empty() {
             let mut hits = std::mem::take(&mut self.hits);
             self.scene.assembly.nearest(&self.lines, &mut hits);
+            let [ray, event] = &mut self.addresses;
+            ray.clear();
+            ray.extend(self.riders.iter().map(|r| r.ray));
+            event.clear();
+            event.extend(self.riders.iter().map(|r| u64::from(r.event)));
+            fill_uniforms(self.stream, ray, event, &mut self.numbers);
             self.out.ledger.segments += self.lines.len() as u64;
             let mut kept = 0;
             for i in 0..self.lines.len() {
@@ -268,7 +279,7 @@ impl Walk<'_> {
     fn step(&mut self, hits: &Hits, i: usize, rider: &mut Rider) -> Next {
         let scene = self.scene;
         let d = self.lines.direction(i);
-        let numbers = self.stream.uniforms(rider.ray, u64::from(rider.event));
+        let numbers = self.numbers.each_ref().map(|v| v[i]);
         let filling = self.fillings.at(scene, rider.inside.top(), rider.wavelength);
         if filling.absorption > 0.0 && -numbers[3].ln() < filling.absorption * hits.t[i] {
             return Err(Fate::InMedium(scene.medium(rider.inside.top())));

@@ -104,6 +104,7 @@ impl Loss {
 ///
 /// # Errors
 /// The reason and the face, if the ray is lost.
+#[inline(always)]
 pub fn meet(
     scene: &Scene,
     lines: &Lines,
@@ -118,8 +119,59 @@ pub fn meet(
         let group = tied(scene, o, d, &lines.leaving(i), nearest);
         resolve(scene, o, d, &group, inside, detected)
     } else {
-        resolve(scene, o, d, &[nearest], inside, detected)
+        alone(scene, o, d, nearest, inside, detected)
     }
+}
+
+/// One face met alone: what [`resolve`] comes to then, without its lists.
+#[inline(always)]
+fn alone(
+    scene: &Scene,
+    o: Vec3,
+    d: Vec3,
+    (index, crossing): (u32, Crossing),
+    inside: Inside,
+    mut detected: impl FnMut(u32, Vec3, Vec3),
+) -> Result<Meeting, (Loss, u32)> {
+    let face = &scene.assembly.faces()[index as usize];
+    let role = scene.roles[index as usize];
+    let foot = face.foot(o, d, &crossing);
+    let front = d.dot(foot.normal) < 0.0;
+    let (mut after, mut finish) = (inside, None);
+    match role.act {
+        Act::Detect(detector) => detected(detector, foot.point, foot.normal),
+        Act::Optical(number) if role.solid == 0 => finish = Some(number),
+        Act::Optical(number) => {
+            if front == inside.contains(role.solid) {
+                if crossing.t > TIE * (o.x.abs() + o.y.abs() + o.z.abs()) {
+                    return Err((Loss::Contradiction, index));
+                }
+            } else {
+                after = inside.crossed(role.solid).ok_or((Loss::TooDeep, index))?;
+                // Hidden in a solid that is listed later.
+                finish = (role.solid >= inside.top().min(after.top())).then_some(number);
+            }
+        }
+    }
+    let side = if front { foot.normal } else { -foot.normal };
+    let normal = face.shading_normal(&crossing).map_or(side, |n| {
+        let n = if front { n } else { -n };
+        if d.dot(n) < 0.0 { n } else { side }
+    });
+    let mut leaving = Leaving::default();
+    (leaving.face[0], leaving.part[0]) = (index, crossing.part);
+    Ok(Meeting {
+        point: foot.point,
+        normal,
+        side,
+        face: index,
+        front,
+        finish,
+        before: inside,
+        after,
+        leaving,
+        t: crossing.t,
+    })
 }
 
 /// What a single ray meets first at 0 < t < `reach`; None if it meets nothing.
@@ -143,7 +195,7 @@ pub fn meet_one(
         let group = tied(scene, o, d, leaving, (face, crossing));
         resolve(scene, o, d, &group, inside, ignore).map(Some)
     } else {
-        resolve(scene, o, d, &[(face, crossing)], inside, ignore).map(Some)
+        alone(scene, o, d, (face, crossing), inside, ignore).map(Some)
     }
 }
 
@@ -246,6 +298,7 @@ pub fn tied(scene: &Scene, o: Vec3, d: Vec3, leaving: &Leaving, nearest: (u32, C
     group
 }
 
+#[cold]
 fn resolve(
     scene: &Scene,
     o: Vec3,

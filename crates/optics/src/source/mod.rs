@@ -16,7 +16,7 @@ use etendue_geometry::shape::sample::AreaSampler;
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_lightfield::field::draw::{FieldRays, Sampler};
 use etendue_math::{Frame, Vec3};
-use etendue_sampling::philox::Stream;
+use etendue_sampling::philox::{Stream, fill_uniforms};
 
 pub use lit::{Beacon, Lantern, Lit};
 pub use numbers::Numbers;
@@ -175,8 +175,11 @@ impl Source {
         batch.defects = Default::default();
         batch.norm_error = 0.0;
         batch.flux[..batch.len].fill(self.flux / count as f64);
-        for (i, index) in range.enumerate() {
-            let (x, k) = ray(&mut Numbers::new(stream, index, 0));
+        let indices: Vec<u64> = range.collect();
+        let mut four: [Vec<f64>; 4] = Default::default();
+        fill_uniforms(stream, &indices, &vec![0; indices.len()], &mut four);
+        for (i, index) in indices.into_iter().enumerate() {
+            let (x, k) = ray(&mut Numbers::begun(stream, index, four.each_ref().map(|v| v[i])));
             for (axis, (x, k)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
                 batch.position[axis][i] = x;
                 batch.direction[axis][i] = k;
