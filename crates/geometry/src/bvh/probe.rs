@@ -107,9 +107,7 @@ impl Probe {
                 leave[i] = if b < leave[i] { b } else { leave[i] };
             }
         }
-        for i in 0..WIDTH {
-            lanes.enter[i] = enter[i];
-        }
+        lanes.enter = enter;
         for i in 0..WIDTH {
             lanes.hit[i] = u8::from(enter[i] <= leave[i]);
         }
