@@ -1,14 +1,16 @@
 //! A ray as the boxes see it: in f32, and never too short.
 //!
-//! The slab test of Kay and Kajiya (1986) asks where the ray enters the last of three slabs and leaves the first. Here
-//! all roundings err towards a hit, so that no box that the exact ray meets is missed. With u = 2⁻²⁴:
+//! The slab test of Kay and Kajiya (1986, `[KayKajiya1986]`) asks whether the ray enters the last of three slabs before it
+//! leaves the first. Here all roundings err towards a hit, so that no box that the exact ray meets is missed. With
+//! u = 2⁻²⁴:
 //!
-//! 1. Boxes are rounded outward (`Bounds::outward`), the origin o both ways to o⁻ < o < o⁺, 1/|d| both ways to r⁻ and r⁺.
-//!    For d > 0 the ray enters at (lo − o)/d ≥ (lo − o⁺) r⁻ if that is positive, and leaves at (hi − o)/d ≤ (hi − o⁻) r⁺.
-//!    For d < 0 the slab is entered through hi, and o⁻ and o⁺ change places.
-//! 2. The subtraction rounds: fl(lo − o⁺) ≤ (1 + u)(lo − o⁺), fl(hi − o⁻) ≥ (1 − u)(hi − o⁻). For the ray to leave no
-//!    earlier than it enters it suffices that r⁺ ≥ (1 + 3u)/|d|, as (1 − u)(1 + 3u) ≥ 1 + u for u ≤ 1/3. The code takes
-//!    1 + 4u; the fourth u pays for the rounding of r⁺ itself.
+//! 1. Boxes are rounded outward (`Bounds::outward`). The origin o is moved by more than 2u |o| to o⁻ and o⁺ and the
+//!    reciprocal of |d| to r⁻ = (1 − 2u)/|d| and r⁺ = (1 + 8u)/|d| before they round to f32, which is u each. For d > 0 the
+//!    ray enters at (lo − o)/d ≥ (lo − o⁺) r⁻ if that is positive, and leaves at (hi − o)/d ≤ (hi − o⁻) r⁺. For d < 0 the
+//!    slab is entered through hi, and o⁻ and o⁺ change places.
+//! 2. The subtraction rounds: fl(lo − o⁺) ≤ (1 + u)(lo − o⁺), fl(hi − o⁻) ≥ (1 − u)(hi − o⁻). So for the ray to leave no
+//!    earlier than it enters it suffices that r⁺/r⁻ ≥ (1 + u)/(1 − u), about 1 + 2u; after rounding it is 1 + 8u or more.
+//!    Likewise the end of the ray is moved by 8u, against (1 + u)² in the entry.
 //! 3. The product rounds to nearest, which is monotone: if its exact operands are in order, so are its results, also
 //!    where they underflow or overflow.
 //! 4. A ray that enters before its start has a product ≤ 0 of whatever size; the interval starts at 0.
@@ -107,9 +109,7 @@ impl Probe {
                 leave[i] = if b < leave[i] { b } else { leave[i] };
             }
         }
-        for i in 0..WIDTH {
-            lanes.enter[i] = enter[i];
-        }
+        lanes.enter = enter;
         for i in 0..WIDTH {
             lanes.hit[i] = u8::from(enter[i] <= leave[i]);
         }

@@ -87,7 +87,8 @@ pub(super) struct Block {
 pub(super) struct Shear {
     axes: [usize; 3],
     origin: [f64; 3],
-    shear: [f64; 3],
+    /// Across per along, twice, and length per along.
+    slope: [f64; 3],
 }
 
 impl Shear {
@@ -105,7 +106,7 @@ impl Shear {
         Self {
             axes,
             origin,
-            shear: [d[0] * inverse, d[1] * inverse, inverse],
+            slope: [d[0] * inverse, d[1] * inverse, inverse],
         }
     }
 }
@@ -139,7 +140,7 @@ impl Block {
     ) {
         let [kx, ky, kz] = ray.axes;
         let [ox, oy, oz] = ray.origin;
-        let [sx, sy, sz] = ray.shear;
+        let [sx, sy, sz] = ray.slope;
         let Lanes { weight, inside } = lanes;
         let (mut x, mut y) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
         for (corner, (x, y)) in self.corners.iter().zip(x.iter_mut().zip(&mut y)) {
@@ -193,7 +194,7 @@ impl Block {
     #[cold]
     #[inline(never)]
     fn exact_weights(&self, ray: &Shear, lane: usize) -> [f64; 3] {
-        let ([kx, ky, kz], [ox, oy, oz], [sx, sy, _]) = (ray.axes, ray.origin, ray.shear);
+        let ([kx, ky, kz], [ox, oy, oz], [sx, sy, _]) = (ray.axes, ray.origin, ray.slope);
         let [a, b, c] = self.corners.each_ref().map(|corner| {
             let depth = corner[kz][lane] - oz;
             [

@@ -55,7 +55,7 @@ impl Mesh {
     /// triangles of each, filled up with [`NO_TRIANGLE`].
     ///
     /// # Panics
-    /// If the slices are not all of the same length.
+    /// If a slice is shorter than `leaving`, which says how many rays there are.
     pub fn nearest_block(&self, rays: Rays<'_>, leaving: &[[u32; LEAVING]], found: Found<'_>) {
         nearest_block(self, rays, leaving, found);
     }
