@@ -270,7 +270,10 @@ fn detector(dict: &Bound<'_, PyDict>) -> PyResult<Detector> {
             planes: get(dict, "planes")?,
             steps: get::<u32>(dict, "gammas")? - 1,
         },
-        "image" => Detector::Image(get::<View>(dict, "view")?.core()),
+        "image" => Detector::Image {
+            view: get::<View>(dict, "view")?.core(),
+            complement: optional(dict, "complement")?.unwrap_or(false),
+        },
         other => return Err(refuse(format!("no detector is called {other}"))),
     })
 }

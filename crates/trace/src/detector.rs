@@ -33,7 +33,13 @@ pub enum Detector {
         steps: u32,
     },
     /// The light image: every diffuse scatter, connected to the eye of an observer.
-    Image(View),
+    Image {
+        /// What he sees.
+        view: View,
+        /// Whether only light counts that the reverse tracer cannot find, or leaves to the light image: of sources that
+        /// cannot be seen backwards, and of all sources through smooth surfaces onto the first diffuse one.
+        complement: bool,
+    },
 }
 
 impl Detector {
@@ -55,7 +61,7 @@ impl Detector {
                 trims: vec![],
                 flipped: false,
             }),
-            Self::Intensity { .. } | Self::Image(_) => None,
+            Self::Intensity { .. } | Self::Image { .. } => None,
         }
     }
 
@@ -66,7 +72,7 @@ impl Detector {
             Self::Rays(_) => 0,
             Self::Illuminance { columns, rows, .. } => *columns as usize * *rows as usize,
             Self::Intensity { planes, steps } => *planes as usize * (*steps as usize + 1),
-            Self::Image(view) => view.pixels(),
+            Self::Image { view, .. } => view.pixels(),
         }
     }
 }

@@ -10,7 +10,7 @@ use etendue_geometry::assembly::{Hits, Leaving, Lines, NONE};
 use etendue_geometry::batch::BLOCK;
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_math::Vec3;
-use etendue_optics::finish::{Incidence, Lobe, pick};
+use etendue_optics::finish::{Finish, Incidence, Lobe, pick};
 use etendue_optics::source::surface::about;
 use etendue_sampling::ordered::BATCH;
 use etendue_sampling::philox::{Stream, fill_uniforms};
@@ -161,6 +161,10 @@ struct Rider {
     mark: u32,
     event: u32,
     inside: Inside,
+    /// Whether it has met a diffuse surface.
+    scattered: bool,
+    /// Whether the reverse tracer does not find it, or leaves it to the light image.
+    unseen: bool,
 }
 
 struct Walk<'a> {
@@ -217,6 +221,8 @@ fn trace_batch(scene: &Scene, run: &Run<'_>, batch: u64) -> Yield {
                         mark,
                         event: 0,
                         inside: Inside::default(),
+                        scattered: false,
+                        unseen: !source.is_visible(),
                     };
                     walk.start(births.position(i), births.direction(i), rider, &scene.near[number]);
                 } else {
@@ -317,7 +323,7 @@ impl Walk<'_> {
         if !(light.n1 > 0.0 && light.n2 > 0.0) {
             return Err(Fate::Lost(Loss::NoIndex, meeting.face));
         }
-        if finish.is_diffuse() {
+        if finish.is_diffuse() && !self.scene.detectors.is_empty() {
             self.show(meeting, finish, &light, rider);
         }
         let (shares, across) = finish.shares(&light);
@@ -327,6 +333,10 @@ impl Walk<'_> {
         if lobe.is_transmission() {
             rider.inside = meeting.after;
         }
+        // Smooth surfaces before the first diffuse one; an interface of equal media is none.
+        let nothing = matches!(finish, Finish::Interface) && light.n1 == light.n2;
+        rider.unseen |= lobe.is_specular() && !rider.scattered && !nothing;
+        rider.scattered |= !lobe.is_specular();
         let d = match lobe {
             Lobe::SpecularReflection => meeting.mirrored(d, light.cosine),
             Lobe::SpecularTransmission => meeting.refracted(d, light.cosine, light.n1 / light.n2, across),
@@ -347,9 +357,12 @@ impl Walk<'_> {
     }
 
     /// Connects a diffuse scatter to the eye of every light image.
-    fn show(&mut self, meeting: &Meeting, finish: &etendue_optics::finish::Finish, light: &Incidence, rider: &Rider) {
+    fn show(&mut self, meeting: &Meeting, finish: &Finish, light: &Incidence, rider: &Rider) {
         for (number, detector) in self.scene.detectors.iter().enumerate() {
-            let Detector::Image(view) = detector else { continue };
+            let Detector::Image { view, complement } = detector else { continue };
+            if *complement && !rider.unseen {
+                continue;
+            }
             let away = view.eye - meeting.point;
             let distance = away.length();
             let k = away * (1.0 / distance);
@@ -401,6 +414,6 @@ fn detect(scene: &Scene, out: &mut Yield, detector: u32, point: Vec3, d: Vec3, r
                 out.marks[number].push((cell, rider.mark, rider.flux));
             }
         }
-        Detector::Intensity { .. } | Detector::Image(_) => {}
+        Detector::Intensity { .. } | Detector::Image { .. } => {}
     }
 }

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from etendue.errors import EtendueError, SceneError, UnknownNameError
+from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
 from etendue.scene.finishes import BUILT_IN, Finish
 from etendue.scene.media import Medium
 from etendue.scene.media_library import MEDIA
@@ -200,6 +201,9 @@ class _Compiler:
         entered = False
         with self._at(join(place, "shape")):
             faces = solid.shape.faces(self.files)
+            for doubt in (doubt for face in faces for doubt in face.doubts):
+                warnings.warn(f"{place}: {doubt}", SceneWarning, stacklevel=5)
+                self.notes.append(f"{place}: {doubt}")
             self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(faces)]
             for face in faces:
                 given = solid.finish_of(face)

@@ -100,6 +100,12 @@ impl Source {
         }
     }
 
+    /// Whether it can be seen or connected to from a point that it lights: a set of rays or a beam cannot.
+    #[must_use]
+    pub const fn is_visible(&self) -> bool {
+        !matches!(self.emitter, Emitter::Rays { .. } | Emitter::Beam(_))
+    }
+
     /// The wavelength of ray `index` of source number `source` \[nm\].
     #[inline]
     #[must_use]
