@@ -102,9 +102,14 @@ fn shape(dict: Dict<'_, '_>) -> PyResult<Shape> {
         }),
         "asphere" => {
             let coefficients = get(dict, "coefficients")?;
-            Asphere::new(get(dict, "curvature")?, get(dict, "conic")?, coefficients, get(dict, "r")?)
-                .map(Shape::Asphere)
-                .ok_or_else(|| refuse("an asphere that ends inside its radii, or is not finite"))?
+            Asphere::new(
+                get(dict, "curvature")?,
+                get(dict, "conic")?,
+                coefficients,
+                get(dict, "r")?,
+            )
+            .map(Shape::Asphere)
+            .ok_or_else(|| refuse("an asphere that ends inside its radii, or is not finite"))?
         }
         "torus" => Shape::Torus(Torus {
             major: get(dict, "major")?,
@@ -120,7 +125,11 @@ fn shape(dict: Dict<'_, '_>) -> PyResult<Shape> {
             if triangles.shape()[1] != 3 {
                 return Err(refuse("triangles of shape (m, 3) are needed"));
             }
-            let corners = triangles.as_slice()?.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+            let corners = triangles
+                .as_slice()?
+                .chunks_exact(3)
+                .map(|t| [t[0], t[1], t[2]])
+                .collect();
             let normals = normals.as_ref().map(points).transpose()?;
             let mesh = Mesh::new(points(&vertices)?, corners, normals);
             Shape::Mesh(Arc::new(mesh.map_err(|error| refuse(error.to_string()))?))
@@ -179,7 +188,9 @@ fn table(dict: Dict<'_, '_>, key: &str) -> PyResult<Table> {
     let rows: Vec<Vec<f64>> = get(&table, "values")?;
     let wavelength: Vec<f64> = get(&table, "wavelength")?;
     if rows.iter().any(|row| row.len() != wavelength.len()) {
-        return Err(refuse(format!("{key}: rows of values and wavelengths differ in number")));
+        return Err(refuse(format!(
+            "{key}: rows of values and wavelengths differ in number"
+        )));
     }
     Table::new(get(&table, "angle")?, wavelength, rows.concat())
         .ok_or_else(|| refuse(format!("{key}: not a table over increasing angles and wavelengths")))
@@ -219,6 +230,9 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
         }
         "surface" => {
             let flip = optional(dict, "flip")?.unwrap_or(false);
+            if optional::<Vec<[f64; 4]>>(dict, "trims")?.is_some_and(|trims| !trims.is_empty()) {
+                return Err(refuse("an emitting surface cannot be cut by half spaces; cut it by z and r, or make it a mesh"));
+            }
             let surface = SurfaceSource::new(shape(&inner(dict, "shape")?)?, flip, get(dict, "exponent")?);
             Emitter::Surface(surface.ok_or_else(|| refuse("an emitting surface needs a finite area and exponent"))?)
         }
@@ -274,6 +288,7 @@ fn detector(dict: &Bound<'_, PyDict>) -> PyResult<Detector> {
             view: get::<View>(dict, "view")?.core(),
             complement: optional(dict, "complement")?.unwrap_or(false),
         },
+        "scatter" => Detector::Events,
         other => return Err(refuse(format!("no detector is called {other}"))),
     })
 }
@@ -312,9 +327,15 @@ impl Scene {
         let parts = each("faces")?.iter().map(part).collect::<PyResult<_>>()?;
         let finishes = each("finishes")?.iter().map(finish).collect::<PyResult<_>>()?;
         let media = each("media")?.iter().map(medium).collect::<PyResult<_>>()?;
-        let solids = each("solids")?.iter().map(|s| get(s, "medium")).collect::<PyResult<_>>()?;
+        let solids = each("solids")?
+            .iter()
+            .map(|s| get(s, "medium"))
+            .collect::<PyResult<_>>()?;
         let mut sets = Vec::new();
-        let sources = each("sources")?.iter().map(|s| source(s, &mut sets)).collect::<PyResult<_>>()?;
+        let sources = each("sources")?
+            .iter()
+            .map(|s| source(s, &mut sets))
+            .collect::<PyResult<_>>()?;
         let detectors = each("detectors")?.iter().map(detector).collect::<PyResult<_>>()?;
         let core = CoreScene::new(parts, finishes, media, solids, sources, detectors).map_err(refuse)?;
         Ok(Self {

@@ -174,7 +174,12 @@ struct Scratch {
 
 impl Scratch {
     fn resize(&mut self, n: usize) {
-        for list in self.origin.iter_mut().chain(&mut self.direction).chain([&mut self.t, &mut self.u, &mut self.v]) {
+        for list in self
+            .origin
+            .iter_mut()
+            .chain(&mut self.direction)
+            .chain([&mut self.t, &mut self.u, &mut self.v])
+        {
             list.resize(n, 0.0);
         }
         self.leaving.resize(n, [NONE; MOST_LEFT]);
@@ -292,7 +297,13 @@ impl Assembly {
                 face: hits.face[i],
                 part: hits.part[i],
             };
-            self.try_one(&self.others, lines.origin(i), lines.direction(i), &lines.leaving(i), &mut one);
+            self.try_one(
+                &self.others,
+                lines.origin(i),
+                lines.direction(i),
+                &lines.leaving(i),
+                &mut one,
+            );
             hits.t[i] = one.t;
             hits.second[i] = one.second;
             hits.face[i] = one.face;
@@ -416,7 +427,9 @@ impl Assembly {
         }
         if let Some((tree, numbers)) = &self.tree {
             let mut reach = range[1];
-            tree.traverse(o, d, range[0], &mut reach, |primitive, _| look(numbers[primitive as usize]));
+            tree.traverse(o, d, range[0], &mut reach, |primitive, _| {
+                look(numbers[primitive as usize])
+            });
         }
     }
 }
@@ -459,7 +472,10 @@ fn try_simple(faces: &[Face], which: &[u32], lines: &Lines, hits: &mut Hits) {
                     [meet_annulus(inner, outer, o, d, leaving), f64::INFINITY]
                 }),
                 Outline::Rectangle { width, height } => sweep(&face.frame, index, lines, hits, |o, d, leaving| {
-                    [meet_rectangle([0.5 * width, 0.5 * height], o, d, leaving), f64::INFINITY]
+                    [
+                        meet_rectangle([0.5 * width, 0.5 * height], o, d, leaving),
+                        f64::INFINITY,
+                    ]
                 }),
                 Outline::Whole | Outline::Polygon { .. } => sweep(&face.frame, index, lines, hits, |o, d, leaving| {
                     [meet_annulus(0.0, f64::INFINITY, o, d, leaving), f64::INFINITY]
@@ -474,13 +490,7 @@ fn try_simple(faces: &[Face], which: &[u32], lines: &Lines, hits: &mut Hits) {
 }
 
 #[inline(always)]
-fn sweep(
-    frame: &Frame,
-    index: u32,
-    lines: &Lines,
-    hits: &mut Hits,
-    meet: impl Fn(Vec3, Vec3, bool) -> [f64; 2],
-) {
+fn sweep(frame: &Frame, index: u32, lines: &Lines, hits: &mut Hits, meet: impl Fn(Vec3, Vec3, bool) -> [f64; 2]) {
     let n = lines.len();
     let [ox, oy, oz] = lines.origin.each_ref().map(|v| &v[..n]);
     let [dx, dy, dz] = lines.direction.each_ref().map(|v| &v[..n]);

@@ -65,7 +65,9 @@ impl Face {
     #[must_use]
     pub fn shading_normal(&self, crossing: &Crossing) -> Option<Vec3> {
         let Shape::Mesh(mesh) = &self.shape else { return None };
-        let n = self.frame.direction_to_world(mesh.shading_normal(crossing.part, crossing.uv[0], crossing.uv[1]));
+        let n = self
+            .frame
+            .direction_to_world(mesh.shading_normal(crossing.part, crossing.uv[0], crossing.uv[1]));
         Some(if self.flipped { -n } else { n })
     }
 

@@ -87,7 +87,8 @@ impl Finish {
     pub fn scatter(shares: [Table; 4]) -> Option<Self> {
         let tables = &shares;
         // Sums of bilinear functions are extreme at the nodes of any of them.
-        let collect = |pick: fn(&Table) -> &[f64]| -> Vec<f64> { tables.iter().flat_map(|t| pick(t).to_vec()).collect() };
+        let collect =
+            |pick: fn(&Table) -> &[f64]| -> Vec<f64> { tables.iter().flat_map(|t| pick(t).to_vec()).collect() };
         let angles = collect(|t| t.nodes().0);
         let wavelengths = collect(|t| t.nodes().1);
         let sound = tables.iter().all(|t| t.least() >= 0.0)
@@ -132,6 +133,15 @@ impl Finish {
                 }
                 (shares, across)
             }
+        }
+    }
+
+    /// The shares of the lobes, if they are the same for all light.
+    #[must_use]
+    pub fn constant(&self) -> Option<Shares> {
+        match self {
+            Self::Interface => None,
+            Self::Scatter(scatter) => scatter.constant,
         }
     }
 

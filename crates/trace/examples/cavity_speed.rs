@@ -61,7 +61,10 @@ fn scene() -> Result<Scene, String> {
         z: [0.0, HEIGHT],
         r: [0.0, f64::INFINITY],
     });
-    let mut parts = vec![part(wall, at(0.0, 0.0, 0.0), 0), part(disk(RADIUS), at(0.0, 0.0, 0.0), 0)];
+    let mut parts = vec![
+        part(wall, at(0.0, 0.0, 0.0), 0),
+        part(disk(RADIUS), at(0.0, 0.0, 0.0), 0),
+    ];
     let mut sources = Vec::new();
     for (x, y) in [(10.0, 0.0), (-10.0, 0.0), (0.0, 10.0), (0.0, -10.0)] {
         parts.push(part(disk(2.5), at(x, y, 5e-4), 1));

@@ -23,7 +23,11 @@ impl Entry {
     #[inline]
     fn plus(&mut self, flux: f64) {
         let sum = self.sum + flux;
-        let (large, small) = if self.sum.abs() >= flux.abs() { (self.sum, flux) } else { (flux, self.sum) };
+        let (large, small) = if self.sum.abs() >= flux.abs() {
+            (self.sum, flux)
+        } else {
+            (flux, self.sum)
+        };
         self.rest += (large - sum) + small;
         self.sum = sum;
     }
@@ -140,7 +144,12 @@ impl Ledger {
             })
         };
         let fates = [self.escaped, self.terminated];
-        let mut all = self.on_face.iter().chain(&self.in_medium).chain(&self.lost).chain(&fates);
+        let mut all = self
+            .on_face
+            .iter()
+            .chain(&self.in_medium)
+            .chain(&self.lost)
+            .chain(&fates);
         [sum(&mut self.emitted.iter()), sum(&mut all)]
     }
 }

@@ -65,7 +65,11 @@ impl Meeting {
     #[inline]
     fn kept(&self, d: Vec3, sign: f64) -> Vec3 {
         let height = d.dot(self.side);
-        if height * sign < 0.0 { d - self.side * (2.0 * height) } else { d }
+        if height * sign < 0.0 {
+            d - self.side * (2.0 * height)
+        } else {
+            d
+        }
     }
 }
 
@@ -227,9 +231,8 @@ pub fn transmittance(
             Ok(Some(meeting)) => {
                 let blocked = meeting.finish.is_some_and(|finish| {
                     // Nothing is seen of an interface between equal media.
-                    let mut same = |a: u16, b: u16| {
-                        fillings.at(scene, a, wavelength).n == fillings.at(scene, b, wavelength).n
-                    };
+                    let mut same =
+                        |a: u16, b: u16| fillings.at(scene, a, wavelength).n == fillings.at(scene, b, wavelength).n;
                     !(matches!(scene.finishes[finish as usize], Finish::Interface)
                         && same(meeting.before.top(), meeting.after.top()))
                 });
@@ -289,12 +292,14 @@ pub fn tied(scene: &Scene, o: Vec3, d: Vec3, leaving: &Leaving, nearest: (u32, C
     };
     let base = slack(nearest.0, &nearest.1);
     let t = nearest.1.t;
-    scene.assembly.crossings(o, d, [(t - reach).max(0.0), t + reach], leaving, |index, crossing| {
-        let same = index == nearest.0 && crossing.part == nearest.1.part && crossing.t == t;
-        if !same && crossing.t > 0.0 && (crossing.t - t).abs() <= (base + slack(index, &crossing)).min(reach) {
-            group.push((index, crossing));
-        }
-    });
+    scene
+        .assembly
+        .crossings(o, d, [(t - reach).max(0.0), t + reach], leaving, |index, crossing| {
+            let same = index == nearest.0 && crossing.part == nearest.1.part && crossing.t == t;
+            if !same && crossing.t > 0.0 && (crossing.t - t).abs() <= (base + slack(index, &crossing)).min(reach) {
+                group.push((index, crossing));
+            }
+        });
     group
 }
 
@@ -329,7 +334,10 @@ fn resolve(
                     decides = Some((u32::MAX, at, finish));
                     continue;
                 }
-                if group[..at].iter().any(|(f, _)| scene.roles[*f as usize].solid == role.solid) {
+                if group[..at]
+                    .iter()
+                    .any(|(f, _)| scene.roles[*f as usize].solid == role.solid)
+                {
                     continue;
                 }
                 match crossed(scene, group, at, role.solid, o, d, inside) {
@@ -410,9 +418,15 @@ fn crossed(scene: &Scene, group: &[(u32, Crossing)], at: usize, solid: u16, o: V
 /// If it is in more than four solids.
 pub fn place(scene: &Scene, o: Vec3, d: Vec3) -> Result<(Inside, Leaving), (Loss, u32)> {
     let mut start = Start::new(o, d);
-    scene.assembly.crossings(o, d, [-start.reach, f64::INFINITY], &Leaving::default(), |index, crossing| {
-        start.note(scene, index, crossing);
-    });
+    scene.assembly.crossings(
+        o,
+        d,
+        [-start.reach, f64::INFINITY],
+        &Leaving::default(),
+        |index, crossing| {
+            start.note(scene, index, crossing);
+        },
+    );
     start.settled(scene)
 }
 

@@ -124,10 +124,9 @@ impl Shape {
                 Outline::Annulus { outer, .. } => around(*outer, [0.0, 0.0]),
                 Outline::Polygon { vertices } => Bounds::of(vertices.iter().map(|v| Vec3::new(v[0], v[1], 0.0))),
             },
-            Self::Quadric(quadric) => sample::reach(quadric).map_or_else(
-                || around(quadric.r[1], quadric.z),
-                |(r, z)| around(r, z),
-            ),
+            Self::Quadric(quadric) => {
+                sample::reach(quadric).map_or_else(|| around(quadric.r[1], quadric.z), |(r, z)| around(r, z))
+            }
             Self::Asphere(asphere) => {
                 let sag = asphere.sag_range();
                 around(asphere.radii()[1], [sag.lo, sag.hi])
@@ -149,9 +148,9 @@ pub fn size(v: Vec3) -> f64 {
 pub(crate) fn step_down(p: Vec3, value: f64, gradient: Vec3) -> (Vec3, Vec3) {
     let square = gradient.dot(gradient);
     // At the apex of a cone there is no gradient; any normal is as good as another.
-    if square > 0.0 {
-        (p - gradient * (value / square), gradient * (1.0 / square.sqrt()))
-    } else {
-        (p, Vec3::new(0.0, 0.0, 1.0))
-    }
+    let sound = square > 0.0;
+    let (step, scale) = if sound { (value / square, 1.0 / square.sqrt()) } else { (0.0, 0.0) };
+    let normal = gradient * scale;
+    let z = if sound { normal.z } else { 1.0 };
+    (p - gradient * step, Vec3::new(normal.x, normal.y, z))
 }

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use etendue_math::{Interval, Vec3};
 use etendue_math::trig::sin_cos_turns;
+use etendue_math::{Interval, Vec3};
 use etendue_sampling::alias::Alias;
 
 use crate::mesh::Mesh;
@@ -88,8 +88,15 @@ impl Outlined {
                 // g + g'²/4 is of second order in z: largest at an end, or at its own extreme.
                 let [a, b] = [-q.z2 / q.r2, -q.z1 / q.r2];
                 let (second, first) = (a + a * a, b + a * b);
-                let middle = if second < 0.0 { (-0.5 * first / second).clamp(from, to) } else { from };
-                [from, to, middle].map(|s| self.density(s)).into_iter().fold(0.0, f64::max)
+                let middle = if second < 0.0 {
+                    (-0.5 * first / second).clamp(from, to)
+                } else {
+                    from
+                };
+                [from, to, middle]
+                    .map(|s| self.density(s))
+                    .into_iter()
+                    .fold(0.0, f64::max)
             }
             Self::Asphere(a) => {
                 let [_, slope] = a.sag_over(Interval::new(from, to));
@@ -138,7 +145,11 @@ pub(super) fn reach(q: &Quadric) -> Option<(f64, [f64; 2])> {
     let z = [ranges.first()?[0], ranges.last()?[1]];
     // r² is of second order in z: largest at an end, or where its slope is 0.
     let flat = -0.5 * q.z1 / q.z2;
-    let places = ranges.iter().flatten().copied().chain(ranges.iter().map(|r| flat.max(r[0]).min(r[1])));
+    let places = ranges
+        .iter()
+        .flatten()
+        .copied()
+        .chain(ranges.iter().map(|r| flat.max(r[0]).min(r[1])));
     let most = places.map(|z| squared_radius(q, z)).fold(0.0, f64::max).sqrt();
     Some((most.min(q.r[1]), z))
 }
@@ -267,7 +278,11 @@ fn rotation(outlined: Outlined) -> Option<AreaSampler> {
             let at = |i: usize| from + (to - from) * (i as f64 / STRETCHES as f64);
             let (from, to) = (at(i), at(i + 1));
             let most = outlined.bound(from, to);
-            area += (to - from) * GAUSS.iter().map(|[x, w]| w * outlined.density(from + x * (to - from))).sum::<f64>();
+            area += (to - from)
+                * GAUSS
+                    .iter()
+                    .map(|[x, w]| w * outlined.density(from + x * (to - from)))
+                    .sum::<f64>();
             // Picked by the area under the bound: rejection leaves the area under the density.
             areas.push((to - from) * most);
             stretches.push(Stretch { from, to, most });
@@ -305,7 +320,9 @@ fn triangulate(vertices: &[[f64; 2]]) -> Vec<[[f64; 2]; 3]> {
             let corner = [rest[(i + n - 1) % n], rest[i], rest[(i + 1) % n]];
             let holds = |p: &[f64; 2]| {
                 let [a, b, c] = corner;
-                [[a, b, *p], [b, c, *p], [c, a, *p]].into_iter().all(|t| twice_area(t) >= 0.0)
+                [[a, b, *p], [b, c, *p], [c, a, *p]]
+                    .into_iter()
+                    .all(|t| twice_area(t) >= 0.0)
             };
             twice_area(corner) > 0.0 && !rest.iter().filter(|p| !corner.contains(p)).any(holds)
         });
@@ -336,13 +353,17 @@ mod tests {
         let mut points = Vec::new();
         for i in 0..n {
             let (mut block, mut k, mut numbers) = (0, 4, [0.0; 4]);
-            points.push(sampler.draw(&mut || {
-                if k == 4 {
-                    (numbers, k, block) = (stream.uniforms(i, block), 0, block + 1);
-                }
-                k += 1;
-                numbers[k - 1]
-            }).0);
+            points.push(
+                sampler
+                    .draw(&mut || {
+                        if k == 4 {
+                            (numbers, k, block) = (stream.uniforms(i, block), 0, block + 1);
+                        }
+                        k += 1;
+                        numbers[k - 1]
+                    })
+                    .0,
+            );
         }
         points
     }
@@ -379,7 +400,10 @@ mod tests {
         near(area(&paraboloid), exact);
         let same = Asphere::new(1.0 / (2.0 * f), -1.0, vec![], [0.0, rim]).expect("sound");
         near(area(&Shape::Asphere(same)), exact);
-        near(area(&Shape::Torus(Torus { major: 3.0, minor: 1.0 })), 4.0 * PI * PI * 3.0);
+        near(
+            area(&Shape::Torus(Torus { major: 3.0, minor: 1.0 })),
+            4.0 * PI * PI * 3.0,
+        );
         // A cone from its apex: π r s.
         let cone = Shape::Quadric(Quadric {
             r2: 1.0,
@@ -391,8 +415,18 @@ mod tests {
         });
         near(area(&cone), PI * 2.0 * 20.0_f64.sqrt());
         let l = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
-        near(area(&Shape::Flat(Flat { outline: Outline::Polygon { vertices: l } })), 3.0);
-        assert!(AreaSampler::new(&Shape::Flat(Flat { outline: Outline::Whole })).is_none());
+        near(
+            area(&Shape::Flat(Flat {
+                outline: Outline::Polygon { vertices: l },
+            })),
+            3.0,
+        );
+        assert!(
+            AreaSampler::new(&Shape::Flat(Flat {
+                outline: Outline::Whole
+            }))
+            .is_none()
+        );
     }
 
     /// χ² of counts in bins of equal share.
@@ -430,7 +464,13 @@ mod tests {
                         vertices: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]],
                     },
                 }),
-                |p| if p.x < 1.0 { 2.0 * p.x / 3.0 } else { (2.0 + (p.x - 1.0)) / 3.0 },
+                |p| {
+                    if p.x < 1.0 {
+                        2.0 * p.x / 3.0
+                    } else {
+                        (2.0 + (p.x - 1.0)) / 3.0
+                    }
+                },
             ),
         ];
         for (shape, share) in cases {

@@ -96,7 +96,9 @@ impl Source {
                 });
                 boxes.fold(Bounds::EMPTY, Bounds::union)
             }
-            Emitter::Beam(_) | Emitter::Rays { .. } => Bounds::of([f64::NEG_INFINITY, f64::INFINITY].map(|v| Vec3::new(v, v, v))),
+            Emitter::Beam(_) | Emitter::Rays { .. } => {
+                Bounds::of([f64::NEG_INFINITY, f64::INFINITY].map(|v| Vec3::new(v, v, v)))
+            }
         }
     }
 
@@ -121,7 +123,8 @@ impl Source {
     /// Puts rays `range` of `count` (at most a block) into `batch`, in world coordinates: together the `count` rays carry
     /// the flux of the source.
     ///
-    /// A set of n rays is gone through once: ray i of `count` is ray ⌊i n/count⌋ of the set, with n/count of its flux.
+    /// A set of n rays is gone through once: ray i of `count` is ray ⌊i n/count⌋ of the set, in an order that mixes the file,
+    /// with n/count of its flux.
     pub fn emit(
         &self,
         source: u64,
@@ -194,32 +197,83 @@ impl Source {
     }
 }
 
-/// Rays ⌊i n/count⌋ of a set for i in `range`.
+/// Records that stay together when a set is gone through.
+const CHUNK: u64 = 256;
+
+/// Record number `i` of a set of `n` in the order in which it is gone through: chunks of records in steps of the golden
+/// section, so that every beginning of a run is spread over the whole file, however that is ordered.
+fn scattered(i: u64, n: u64) -> u64 {
+    let chunks = n / CHUNK;
+    let chunk = i / CHUNK;
+    if chunk >= chunks {
+        return i;
+    }
+    // A step that shares no factor with the number of chunks visits each of them once.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of chunks")]
+    let golden = (chunks as f64 * 0.618_033_988_749_895) as u64;
+    let common = |mut a: u64, mut b: u64| {
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    let step = (golden..).find(|step| common(*step, chunks) == 1).unwrap_or(1);
+    #[allow(clippy::cast_possible_truncation, reason = "below the number of chunks")]
+    let place = (u128::from(chunk) * u128::from(step) % u128::from(chunks)) as u64;
+    place * CHUNK + i % CHUNK
+}
+
+/// Rays ⌊i n/count⌋ of a set for i in `range`, counted in the order of [`scattered`].
 #[allow(clippy::cast_possible_truncation, reason = "quotients are below the set's length; ranges are at most a block")]
 fn resample(set: &dyn RaySource, range: Range<u64>, count: u64, batch: &mut RayBatch) {
     let n = set.len();
-    if n == count {
-        set.fill(range, batch);
-        return;
-    }
-    let record = |i: u64| (u128::from(i) * u128::from(n) / u128::from(count)) as u64;
     let len = (range.end - range.start) as usize;
-    let mut one = RayBatch::default();
-    let mut held = u64::MAX;
+    let mut part = RayBatch::default();
     batch.len = len;
     batch.defects = Default::default();
-    for (slot, i) in range.enumerate() {
-        let wanted = record(i);
-        if wanted != held {
-            set.fill(wanted..wanted + 1, &mut one);
-            held = wanted;
+    batch.norm_error = 0.0;
+    let number = |i: u64| (u128::from(i) * u128::from(n) / u128::from(count)) as u64;
+    let (mut slot, mut i) = (0, range.start);
+    while i < range.end {
+        // The stretch of one chunk that these rays lie in.
+        let first = number(i);
+        let last = (first / CHUNK + 1) * CHUNK;
+        let mut end = i + 1;
+        while end < range.end && number(end) < last {
+            end += 1;
         }
-        for axis in 0..3 {
-            batch.position[axis][slot] = one.position[axis][0];
-            batch.direction[axis][slot] = one.direction[axis][0];
+        let begin = scattered(first, n);
+        let width = number(end - 1) - first + 1;
+        set.fill(begin..begin + width, &mut part);
+        for k in i..end {
+            let at = (number(k) - first) as usize;
+            for axis in 0..3 {
+                batch.position[axis][slot] = part.position[axis][at];
+                batch.direction[axis][slot] = part.direction[axis][at];
+            }
+            batch.flux[slot] = part.flux[at];
+            slot += 1;
         }
-        batch.flux[slot] = one.flux[0];
-        batch.norm_error = batch.norm_error.max(one.norm_error);
-        batch.defects.iter_mut().zip(one.defects).for_each(|(a, b)| *a += b);
+        batch.norm_error = batch.norm_error.max(part.norm_error);
+        i = end;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_record_is_gone_through_once_and_every_beginning_is_spread_out() {
+        for n in [1, 255, 256, 1000, 100_000, 256 * 377] {
+            let mut seen: Vec<u64> = (0..n).map(|i| scattered(i, n)).collect();
+            if n > 10_000 {
+                // The mean of the first tenth is near the middle of the file.
+                let mean = seen[..n as usize / 10].iter().map(|r| *r as f64).sum::<f64>() / (n as f64 / 10.0);
+                assert!((mean / n as f64 - 0.5).abs() < 0.05, "{n}: {mean}");
+            }
+            seen.sort_unstable();
+            assert!(seen.into_iter().eq(0..n));
+        }
     }
 }

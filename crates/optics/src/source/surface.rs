@@ -46,7 +46,11 @@ impl SurfaceSource {
     #[must_use]
     pub fn luminance(&self, cosine: f64) -> f64 {
         let scale = (self.exponent + 1.0) / (2.0 * std::f64::consts::PI * self.sampler.area());
-        if self.exponent == 1.0 { scale } else { scale * cosine.powf(self.exponent - 1.0) }
+        if self.exponent == 1.0 {
+            scale
+        } else {
+            scale * cosine.powf(self.exponent - 1.0)
+        }
     }
 
     /// A point spread evenly over the area, and the normal on the emitting side.
@@ -73,7 +77,7 @@ impl SurfaceSource {
 }
 
 /// The unit vector at an angle with this cosine from the unit vector `axis`, at an azimuth in turns.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn about(axis: Vec3, cosine: f64, turn: f64) -> Vec3 {
     let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
@@ -86,7 +90,7 @@ pub fn about(axis: Vec3, cosine: f64, turn: f64) -> Vec3 {
 ///
 /// Duff, Burgess, Christensen, Hery, Kensler, Liani, Villemin, "Building an orthonormal basis, revisited" (2017),
 /// `[Duff2017]`.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn across(n: Vec3) -> [Vec3; 2] {
     let sign = 1.0_f64.copysign(n.z);
