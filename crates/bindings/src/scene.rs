@@ -231,7 +231,9 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
         "surface" => {
             let flip = optional(dict, "flip")?.unwrap_or(false);
             if optional::<Vec<[f64; 4]>>(dict, "trims")?.is_some_and(|trims| !trims.is_empty()) {
-                return Err(refuse("an emitting surface cannot be cut by half spaces; cut it by z and r, or make it a mesh"));
+                return Err(refuse(
+                    "an emitting surface cannot be cut by half spaces; cut it by z and r, or make it a mesh",
+                ));
             }
             let surface = SurfaceSource::new(shape(&inner(dict, "shape")?)?, flip, get(dict, "exponent")?);
             Emitter::Surface(surface.ok_or_else(|| refuse("an emitting surface needs a finite area and exponent"))?)

@@ -46,7 +46,11 @@ fn ledger_dict<'py>(py: Python<'py>, ledger: &Ledger) -> PyResult<Bound<'py, PyD
 fn cell_arrays<'py>(
     py: Python<'py>,
     cells: &[Cell],
-) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u64>>) {
+) -> (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<u64>>,
+) {
     (
         PyArray1::from_iter(py, cells.iter().map(|c| c.sum)),
         PyArray1::from_iter(py, cells.iter().map(|c| c.squares)),
@@ -195,7 +199,11 @@ pub fn trace_trails<'py>(
         .collect()
 }
 
-type Crossings<'py> = (Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>);
+type Crossings<'py> = (
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<f64>>,
+);
 
 /// Every crossing of lines with faces at 0 < t: number of the line, face, t \[mm\].
 #[pyfunction]
@@ -214,11 +222,14 @@ pub fn scene_crossings<'py>(
         for (line, (o, d)) in (0..).zip(points.iter().zip(&directions)) {
             let (o, d) = (Vec3::from(*o), Vec3::from(*d).normalized());
             let range = [0.0, f64::INFINITY];
-            scene.core().assembly.crossings(o, d, range, &Leaving::default(), |face, crossing| {
-                lines.push(line);
-                faces.push(face);
-                distances.push(crossing.t);
-            });
+            scene
+                .core()
+                .assembly
+                .crossings(o, d, range, &Leaving::default(), |face, crossing| {
+                    lines.push(line);
+                    faces.push(face);
+                    distances.push(crossing.t);
+                });
         }
     });
     Ok((
@@ -240,7 +251,15 @@ fn event_array<'py>(py: Python<'py>, events: &[Event]) -> PyResult<Bound<'py, Py
         let places = u64::from(e.face) << 32 | u64::from(e.part);
         let unseen = u64::from(e.unseen);
         [
-            a, b, c, d, f, g, h, i, j,
+            a,
+            b,
+            c,
+            d,
+            f,
+            g,
+            h,
+            i,
+            j,
             e.flux.to_bits(),
             e.wavelength.to_bits(),
             e.ray,
@@ -255,7 +274,13 @@ fn event_array<'py>(py: Python<'py>, events: &[Event]) -> PyResult<Bound<'py, Py
 }
 
 fn event(row: &[u64]) -> Event {
-    let at = |k: usize| Vec3::new(f64::from_bits(row[k]), f64::from_bits(row[k + 1]), f64::from_bits(row[k + 2]));
+    let at = |k: usize| {
+        Vec3::new(
+            f64::from_bits(row[k]),
+            f64::from_bits(row[k + 1]),
+            f64::from_bits(row[k + 2]),
+        )
+    };
     #[allow(clippy::cast_possible_truncation, reason = "the halves of a word")]
     let (face, part) = ((row[12] >> 32) as u32, row[12] as u32);
     Event {
@@ -287,7 +312,9 @@ pub fn look_at_events<'py>(
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     if events.shape()[1] != EVENT {
-        return Err(PyValueError::new_err(format!("events of shape (n, {EVENT}) are needed")));
+        return Err(PyValueError::new_err(format!(
+            "events of shape (n, {EVENT}) are needed"
+        )));
     }
     let (core, view) = (scene.core(), view.core());
     let events: Vec<Event> = events.as_slice()?.chunks_exact(EVENT).map(event).collect();
@@ -295,11 +322,17 @@ pub fn look_at_events<'py>(
     let known = |e: &Event| {
         (e.face as usize) < core.roles.len()
             && (e.finish as usize) < core.finishes.len()
-            && [e.before, e.after].iter().all(|i| i.solids().iter().all(|s| usize::from(*s) <= solids))
+            && [e.before, e.after]
+                .iter()
+                .all(|i| i.solids().iter().all(|s| usize::from(*s) <= solids))
     };
     if !events.iter().all(known) {
         return Err(PyValueError::new_err("the events are of another scene"));
     }
-    let cells = py.detach(|| within(threads.unwrap_or(0), |_| eye::look_at_events(core, &events, &view, complement)));
+    let cells = py.detach(|| {
+        within(threads.unwrap_or(0), |_| {
+            eye::look_at_events(core, &events, &view, complement)
+        })
+    });
     Ok(cell_arrays(py, &cells).into_pyobject(py)?.into_any())
 }

@@ -203,6 +203,15 @@ impl Hits {
         self.part.resize(n, (0, [0.0; 2]));
     }
 
+    /// Puts what is known of ray `from` in the place of ray `to`.
+    #[inline(always)]
+    pub fn keep(&mut self, from: usize, to: usize) {
+        self.t[to] = self.t[from];
+        self.second[to] = self.second[from];
+        self.face[to] = self.face[from];
+        self.part[to] = self.part[from];
+    }
+
     /// The nearest crossing of ray `i`.
     #[inline(always)]
     #[must_use]

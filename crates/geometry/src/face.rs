@@ -91,6 +91,21 @@ impl Face {
         });
     }
 
+    /// Whether a point may lie within `reach` of the face, by a look at its equation; often true where it does not.
+    #[inline]
+    #[must_use]
+    pub fn may_hold(&self, point: Vec3, reach: f64) -> bool {
+        match &self.shape {
+            Shape::Flat(_) => (point - self.frame.origin).dot(self.frame.z).abs() <= 2.0 * reach,
+            Shape::Quadric(quadric) => {
+                // Near the surface F is the distance times the length of its gradient.
+                let (value, gradient) = quadric.slope(self.frame.point_to_local(point));
+                value * value <= 16.0 * reach * reach * gradient.dot(gradient)
+            }
+            _ => true,
+        }
+    }
+
     /// The first crossing of the line o + t d at 0 < t < `reach`.
     #[inline]
     #[must_use]

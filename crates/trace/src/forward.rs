@@ -239,7 +239,10 @@ pub fn trails(scene: &Scene, run: &Run<'_>, far: f64) -> Vec<Vec<Vec3>> {
 impl<'a> Walk<'a> {
     fn new(scene: &'a Scene, run: &'a Run<'a>) -> Self {
         // Detectors of scattered light, absorbing surroundings and trails want to know of every scatter by itself.
-        let watched = scene.detectors.iter().any(|d| matches!(d, Detector::Image { .. } | Detector::Events));
+        let watched = scene
+            .detectors
+            .iter()
+            .any(|d| matches!(d, Detector::Image { .. } | Detector::Events));
         let clear = scene.media[0].absorption.range() == [0.0, 0.0];
         let bouncers = if clear && !watched { bouncers(scene) } else { Vec::new() };
         Self {
@@ -336,13 +339,14 @@ impl Walk<'_> {
         while !self.lines.is_empty() {
             let mut hits = std::mem::take(&mut self.hits);
             self.scene.assembly.nearest(&self.lines, &mut hits);
+            self.out.ledger.segments += self.lines.len() as u64;
+            self.let_go(&mut hits);
             let [ray, event] = &mut self.addresses;
             ray.clear();
             ray.extend(self.riders.iter().map(|r| r.ray));
             event.clear();
             event.extend(self.riders.iter().map(|r| u64::from(r.event)));
             fill_uniforms(self.stream, ray, event, &mut self.numbers);
-            self.out.ledger.segments += self.lines.len() as u64;
             let mut kept = 0;
             for list in &mut self.bounced {
                 list.clear();
@@ -383,13 +387,56 @@ impl Walk<'_> {
             for (index, which) in (0..).zip(&self.bounced) {
                 if let (Some(bouncer), false) = (self.bouncers[index as usize], which.is_empty()) {
                     let face = &self.scene.assembly.faces()[index as usize];
-                    bounce(face, index, bouncer, which, &hits.t, &self.numbers, &mut self.lines, &mut self.gathered);
+                    bounce(
+                        face,
+                        index,
+                        bouncer,
+                        which,
+                        &hits.t,
+                        &self.numbers,
+                        &mut self.lines,
+                        &mut self.gathered,
+                    );
                 }
             }
             self.lines.truncate(kept);
             self.riders.truncate(kept);
             self.hits = hits;
         }
+    }
+
+    /// Rays that meet nothing and cannot be absorbed on their way leave, before anything is worked out for them.
+    fn let_go(&mut self, hits: &mut Hits) {
+        let scene = self.scene;
+        let clear = |solid: u16| scene.media[scene.medium(solid)].absorption.range() == [0.0, 0.0];
+        let clear_outside = clear(0);
+        let mut kept = 0;
+        for i in 0..self.lines.len() {
+            let rider = self.riders[i];
+            let top = rider.inside.top();
+            if hits.face[i] == NONE && (if top == 0 { clear_outside } else { clear(top) }) {
+                let (o, d) = (self.lines.origin(i), self.lines.direction(i));
+                if let Some(trails) = &mut self.trails {
+                    trails[slot(&rider)].push(o + d * self.far);
+                }
+                self.escape(d, &rider);
+                self.out.ledger.book(Fate::Escaped, rider.flux);
+            } else {
+                if kept < i {
+                    self.lines.set(
+                        kept,
+                        self.lines.origin(i),
+                        self.lines.direction(i),
+                        self.lines.leaving(i),
+                    );
+                    self.riders[kept] = rider;
+                    hits.keep(i, kept);
+                }
+                kept += 1;
+            }
+        }
+        self.lines.truncate(kept);
+        self.riders.truncate(kept);
     }
 
     /// The face off which ray `i` is bounced together with others, if it is.

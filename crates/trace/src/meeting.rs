@@ -442,6 +442,9 @@ pub fn place_near(scene: &Scene, o: Vec3, d: Vec3, near: &[u32]) -> Result<(Insi
     let mut start = Start::new(o, d);
     for &index in near {
         let solid = scene.roles[index as usize].solid != 0;
+        if !solid && !scene.assembly.faces()[index as usize].may_hold(o, start.reach) {
+            continue;
+        }
         let range = [-start.reach, if solid { f64::INFINITY } else { start.reach }];
         scene.assembly.faces()[index as usize].crossings(o, d, range, &[], |crossing| {
             start.note(scene, index, crossing);

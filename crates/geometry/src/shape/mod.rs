@@ -149,7 +149,11 @@ pub(crate) fn step_down(p: Vec3, value: f64, gradient: Vec3) -> (Vec3, Vec3) {
     let square = gradient.dot(gradient);
     // At the apex of a cone there is no gradient; any normal is as good as another.
     let sound = square > 0.0;
-    let (step, scale) = if sound { (value / square, 1.0 / square.sqrt()) } else { (0.0, 0.0) };
+    let (step, scale) = if sound {
+        (value / square, 1.0 / square.sqrt())
+    } else {
+        (0.0, 0.0)
+    };
     let normal = gradient * scale;
     let z = if sound { normal.z } else { 1.0 };
     (p - gradient * step, Vec3::new(normal.x, normal.y, z))

@@ -69,8 +69,16 @@ impl Quadric {
     #[inline(always)]
     #[must_use]
     pub fn settle(&self, p: Vec3) -> (Vec3, Vec3) {
+        let (value, gradient) = self.slope(p);
+        step_down(p, value, gradient)
+    }
+
+    /// F and its gradient at a point.
+    #[inline(always)]
+    #[must_use]
+    pub fn slope(&self, p: Vec3) -> (f64, Vec3) {
         let gradient = Vec3::new(2.0 * self.r2 * p.x, 2.0 * self.r2 * p.y, 2.0 * self.z2 * p.z + self.z1);
-        step_down(p, self.value(p), gradient)
+        (self.value(p), gradient)
     }
 }
 

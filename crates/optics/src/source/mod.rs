@@ -187,6 +187,11 @@ impl Source {
         let indices: Vec<u64> = range.collect();
         let mut four: [Vec<f64>; 4] = Default::default();
         fill_uniforms(stream, &indices, &vec![0; indices.len()], &mut four);
+        if let Emitter::Surface(surface) = &self.emitter {
+            if surface.draw_block(&four, &mut batch.position, &mut batch.direction) {
+                return;
+            }
+        }
         for (i, index) in indices.into_iter().enumerate() {
             let (x, k) = ray(&mut Numbers::begun(stream, index, four.each_ref().map(|v| v[i])));
             for (axis, (x, k)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
@@ -209,7 +214,11 @@ fn scattered(i: u64, n: u64) -> u64 {
         return i;
     }
     // A step that shares no factor with the number of chunks visits each of them once.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of chunks")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "below the number of chunks"
+    )]
     let golden = (chunks as f64 * 0.618_033_988_749_895) as u64;
     let common = |mut a: u64, mut b: u64| {
         while b != 0 {
@@ -224,7 +233,10 @@ fn scattered(i: u64, n: u64) -> u64 {
 }
 
 /// Rays ⌊i n/count⌋ of a set for i in `range`, counted in the order of [`scattered`].
-#[allow(clippy::cast_possible_truncation, reason = "quotients are below the set's length; ranges are at most a block")]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "quotients are below the set's length; ranges are at most a block"
+)]
 fn resample(set: &dyn RaySource, range: Range<u64>, count: u64, batch: &mut RayBatch) {
     let n = set.len();
     let len = (range.end - range.start) as usize;
