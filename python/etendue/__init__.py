@@ -29,6 +29,7 @@ from etendue.plot import (
     plot_map,
     plot_threshold_sweep,
 )
+from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
@@ -36,6 +37,7 @@ from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
 from etendue.scene import Scene
 from etendue.sources.ring_source import RingSource
+from etendue.tracing import TraceResult, trace, trace_rounds
 
 __all__ = [
     "Box",
@@ -44,6 +46,7 @@ __all__ = [
     "Dome",
     "GriddedSource",
     "Hemisphere",
+    "IlluminanceMap",
     "Intensity",
     "LightField",
     "LuminanceMap",
@@ -56,6 +59,7 @@ __all__ = [
     "Screen",
     "Spectrum",
     "Sphere",
+    "TraceResult",
     "combine_maps",
     "compare",
     "cross_section",
@@ -75,6 +79,8 @@ __all__ = [
     "read_map",
     "read_rays",
     "threshold_sweep",
+    "trace",
+    "trace_rounds",
     "write_intensity",
     "write_rays",
 ]
