@@ -8,7 +8,7 @@
 """
 
 from etendue.formats.intensity import read_intensity, write_intensity
-from etendue.formats.maps import read_map
+from etendue.formats.maps import read_illuminance_map, read_map
 from etendue.formats.rays import read_rays, write_rays
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.goniophotometry.threshold_sweep import threshold_sweep
@@ -75,6 +75,7 @@ __all__ = [
     "plot_intensity",
     "plot_map",
     "plot_threshold_sweep",
+    "read_illuminance_map",
     "read_intensity",
     "read_map",
     "read_rays",

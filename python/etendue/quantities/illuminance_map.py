@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.luminance_map import PLOT_MAP, SAVE_MAP
 from etendue.quantities.observer import Screen
 from etendue.quantities.provenance import Provenance
 from etendue.units import FLUX_UNITS, ILLUMINANCE_NAME, ILLUMINANCE_UNIT, MM2_PER_M2, FluxUnit
@@ -133,3 +136,49 @@ class IlluminanceMap:
     def replace(self, **changes: Any) -> IlluminanceMap:
         """A copy with some fields changed (`dataclasses.replace`)."""
         return dataclasses.replace(self, **changes)
+
+    def save(self, path: str | os.PathLike[str]) -> tuple[str, ...]:
+        """Write the map; the format follows the extension: .exr .tif .npz .csv, and .png for a picture.
+
+        Returns
+        -------
+        tuple of str
+            What the format could not express, one sentence each; empty when it holds everything.
+        """
+        return SAVE_MAP[0](self, Path(path))
+
+    def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+        """Draw the map in false colour; see `etendue.plot.plot_map` for the options."""
+        return PLOT_MAP[0](self, path, **options)
+
+    def header(self) -> dict[str, Any]:
+        """Everything but the arrays, as plain data for file headers."""
+        return {
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "flux_unit": self.flux_unit,
+            "screen": dataclasses.asdict(self.screen),
+            "centre": list(self.centre),
+            "right": list(self.right),
+            "up": list(self.up),
+            "provenance": self.provenance.to_dict(),
+            "notes": list(self.notes),
+        }
+
+    @classmethod
+    def from_header(
+        cls, header: dict[str, Any], values: Array, standard_error: Array, rays: npt.NDArray[np.int64]
+    ) -> IlluminanceMap:
+        """Inverse of `header`, for readers."""
+        return cls(
+            values,
+            standard_error,
+            rays,
+            Screen(**header["screen"]),
+            header["centre"],
+            header["right"],
+            header["up"],
+            header["flux_unit"],
+            Provenance.from_dict(header["provenance"]),
+            tuple(header["notes"]),
+        )

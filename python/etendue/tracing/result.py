@@ -177,6 +177,7 @@ class TraceResult:
 
     @property
     def _origin(self) -> Origin:
+        """What all quantities have in common."""
         return Origin(self.plan.flux_unit, self.provenance, self.notes)
 
     # --- keeping -------------------------------------------------------------------------------------------------------
@@ -205,6 +206,16 @@ class TraceResult:
             If it is none, or damaged.
         OSError
             If it cannot be opened.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> from tempfile import TemporaryDirectory
+        >>> result = et.trace(et.Scene(sources=[{"kind": "point", "flux": 1}]), rays=1000)
+        >>> with TemporaryDirectory() as folder:
+        ...     result.save(Path(folder) / "result.h5")
+        ...     TraceResult.load(Path(folder) / "result.h5").ledger == result.ledger
+        True
         """
         from etendue.tracing.storage import load_result  # noqa: PLC0415 - likewise
 

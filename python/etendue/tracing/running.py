@@ -110,16 +110,16 @@ def trace_rounds(
     most_events: int = MOST_EVENTS,
     threads: int | None = None,
     resume: Resume = None,
-) -> Iterator[TraceResult]:
+) -> Rounds:
     """Trace, and yield the result so far after each round of about a million rays.
 
     Each result is complete in itself and does not change any more: keep the last one, whatever stops the loop, and go on
     from it later with ``resume=``. The parameters are those of `trace`; mistakes in them are found at once.
 
-    Yields
-    ------
-    TraceResult
-        The last one is what `trace` returns.
+    Returns
+    -------
+    Rounds
+        An iterator of `TraceResult`, the last of which is what `trace` returns; `Rounds.plan` says what will be traced.
 
     Raises
     ------
@@ -148,31 +148,46 @@ def trace_rounds(
     if resume is not None:
         start = resume if isinstance(resume, TraceResult) else TraceResult.load(Path(resume))
         plan.check_same(start.plan)
-    return _rounds(_core.Scene(compiled.record), plan, start, until, threads)
+    return Rounds(_core.Scene(compiled.record), plan, start, until, threads)
 
 
-def _rounds(
-    core: _core.Scene, plan: Plan, start: TraceResult | None, until: float | None, threads: int | None
-) -> Iterator[TraceResult]:
-    batches = -(-plan.rays // _core.batch_size())
-    sums: Sums | None = None
-    if start is not None:
+class Rounds(Iterator[TraceResult]):
+    """The rounds of a trace, each of which is worked on when its result is asked for; see `trace_rounds`.
+
+    Parameters
+    ----------
+    core : _core.Scene
+    plan : Plan
+        What is traced.
+    start : TraceResult, optional
+        Where to go on; it comes first.
+    until, threads
+        As of `trace`.
+    """
+
+    def __init__(
+        self, core: _core.Scene, plan: Plan, start: TraceResult | None, until: float | None, threads: int | None
+    ) -> None:
+        self.plan = plan
+        self._core = core
+        self._until = until
+        self._threads = threads
         # Names and notes are those of here, the sums those of there.
-        sums = start.sums
-        result = TraceResult(plan, sums)
-        yield result
-        if _reached(result, until):
-            return
-    while sums is None or sums.batches < batches:
+        self._start = None if start is None else TraceResult(plan, start.sums)
+        self._last: TraceResult | None = None
+
+    def __next__(self) -> TraceResult:
+        """The result after one round more."""
+        last = self._last
+        if last is None and self._start is not None:
+            self._last = self._start
+            return self._start
+        if last is not None and (last.complete or (self._until is not None and last.relative_error < self._until)):
+            raise StopIteration
+        plan, sums = self.plan, None if last is None else last.sums
         first = 0 if sums is None else sums.batches
-        last = min(first + ROUND, batches)
-        harvest = _core.trace_batches(core, plan.rays, plan.seed, plan.most_events, first, last, threads)
-        sums = Sums.first(harvest, last) if sums is None else sums.then(harvest, last)
-        result = TraceResult(plan, sums)
-        yield result
-        if _reached(result, until):
-            return
-
-
-def _reached(result: TraceResult, until: float | None) -> bool:
-    return until is not None and result.relative_error < until
+        end = min(first + ROUND, -(-plan.rays // _core.batch_size()))
+        harvest = _core.trace_batches(self._core, plan.rays, plan.seed, plan.most_events, first, end, self._threads)
+        result = TraceResult(plan, Sums.first(harvest, end) if sums is None else sums.then(harvest, end))
+        self._last = result
+        return result

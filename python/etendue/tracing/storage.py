@@ -133,7 +133,9 @@ def _put_array(group: Any, name: str, values: npt.NDArray[Any]) -> None:
         group.create_dataset(name, data=values)
         return
     chunks = (min(len(values), CHUNK), *values.shape[1:])
-    group.create_dataset(name, data=values, chunks=chunks, shuffle=True, compression="gzip", fletcher32=True)
+    # The digits of rays are as good as random: packing them takes long and saves little.
+    packed = {} if values.ndim > 1 else {"shuffle": True, "compression": "gzip"}
+    group.create_dataset(name, data=values, chunks=chunks, fletcher32=True, **packed)
 
 
 def _put_text(group: Any, name: str, text: str) -> None:
