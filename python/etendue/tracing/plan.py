@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import struct
-from collections.abc import Iterable, Mapping
-from typing import Any
-
-import numpy as np
+from collections.abc import Iterable
 
 from etendue import _core
 from etendue.errors import ArgumentError, SceneError
+from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.provenance import Provenance
 from etendue.scene import Compiled, Scene
 from etendue.tracing.detections import (
@@ -28,9 +24,6 @@ DEFAULT_RAYS = 10**7
 MOST_RAYS = 1 << 50
 MOST_EVENTS = 10**9
 MOST_SEED = (1 << 64) - 1
-
-SAMPLE = 1 << 16
-"""Rays at both ends of a set that its fingerprint is made of."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +107,7 @@ def make_plan(scene: Scene, compiled: Compiled, rays: float | None, seed: int, m
     return Plan(
         scene.name,
         _text(scene),
-        fingerprint(compiled),
+        fingerprint(compiled.record),
         count,
         seed,
         most_events,
@@ -181,47 +174,3 @@ def _detections(scene: Scene, compiled: Compiled) -> Iterable[Detection]:
             case _:
                 seen = observers[described.observer]  # type: ignore[attr-defined]
                 yield LightImage(name, seen.observer(), seen.screen.screen())
-
-
-def fingerprint(compiled: Compiled) -> str:
-    """SHA-256 of a scene as the tracer takes it.
-
-    Of ray sets, the number of rays and those at both ends stand for all.
-    """
-    digest = hashlib.sha256()
-    _feed(digest, compiled.record)
-    return digest.hexdigest()
-
-
-def _feed(digest: Any, value: Any) -> None:
-    """Add a plain value to a digest, with its kind and length, so that no two values look alike."""
-    match value:
-        case Mapping():
-            digest.update(b"{%d" % len(value))
-            for key in sorted(value):
-                _feed(digest, key)
-                _feed(digest, value[key])
-        case list() | tuple():
-            digest.update(b"[%d" % len(value))
-            for held in value:
-                _feed(digest, held)
-        case str():
-            digest.update(b"s%d:" % len(value) + value.encode())
-        case bool() | None:
-            digest.update(repr(value).encode())
-        case int() | float() | np.number():
-            digest.update(b"f" + struct.pack("<d", float(value)))
-        case np.ndarray():
-            digest.update(f"a{value.dtype.kind}{value.shape}".encode())
-            digest.update(np.ascontiguousarray(value).data)
-        case _core.LightField():
-            _feed(digest, value.flux())
-            spread = np.random.default_rng(1).random((SAMPLE >> 4, 4))
-            for part in range(len(value.flux())):
-                _feed(digest, value.at(part, spread)[0])
-        case _:
-            n = len(value)
-            _feed(digest, n)
-            for start, stop in ((0, min(n, SAMPLE)), (max(n - SAMPLE, 0), n)):
-                for array in _core.read_rays(value, start, stop):
-                    _feed(digest, array)
