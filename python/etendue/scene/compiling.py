@@ -206,11 +206,9 @@ class _Compiler:
                 self.notes.append(f"{place}: {doubt}")
             self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(faces)]
             for face in faces:
-                given = solid.finish_of(face)
-                key = "finish" if given is solid.finish else f"finishes.{face.name}"
-                finish, lets_in = self._finish(
-                    join(place, key), name if key == "finish" else f"{name}.{face.name}", given
-                )
+                key, given = solid.finish_of(face)
+                where, owner = ("finish", name) if key is None else (f"finishes.{key}", f"{name}.{key}")
+                finish, lets_in = self._finish(join(place, where), owner, given)
                 entered |= lets_in
                 self._face(
                     f"{name}.{face.name}", face.shape, frame.then(face.frame).record(), [], number, face.flip, finish
