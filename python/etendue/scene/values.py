@@ -45,6 +45,7 @@ LONGEST = 1e9
 Length = Annotated[Number, Gt(0.0), Le(LONGEST)]
 LengthOrZero = Annotated[Number, Ge(0.0), Le(LONGEST)]
 Coordinate = Annotated[Number, Ge(-LONGEST), Le(LONGEST)]
+Wavelength = Annotated[Number, Gt(0.0), Le(1e9)]
 Share = Annotated[Number, Ge(0.0), Le(1.0)]
 Index = Annotated[int, BeforeValidator(_count, json_schema_input_type=int), Ge(0), Le((1 << 31) - 1)]
 Count = Annotated[int, BeforeValidator(_count, json_schema_input_type=int), Ge(1)]

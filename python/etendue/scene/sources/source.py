@@ -8,19 +8,18 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Le, MaxLen, MinLen
+from annotated_types import MaxLen, MinLen
 from pydantic import model_validator
 
 from etendue.quantities.spectrum import Spectrum, photopic_efficiency
 from etendue.scene.files import Files
 from etendue.scene.placement import Placement
-from etendue.scene.values import AsRow, NotNegative, Positive
+from etendue.scene.values import AsRow, NotNegative, Wavelength
 from etendue.units import FluxUnit
 
 Array = npt.NDArray[np.float64]
 Record = dict[str, Any]
-Line = Annotated[tuple[Positive, NotNegative], AsRow]
-Wavelength = Annotated[Positive, Le(1e9)]
+Line = Annotated[tuple[Wavelength, NotNegative], AsRow]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
