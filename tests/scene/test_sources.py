@@ -51,6 +51,13 @@ def test_rays_of_a_file_that_states_relative_flux(tmp_path: Path) -> None:
         assert len(record["rays"]) == 2
 
 
+def test_rays_in_memory_with_relative_flux() -> None:
+    """Stored 1 and 3, which share 10 lm: a factor of 2.5, and twice that for 20 lm."""
+    relative = rays().replace(declared_flux=10.0)
+    assert source(sources.Rays(rays=relative))["scale"] == pytest.approx(2.5)
+    assert source(sources.Rays(rays=relative, flux=20))["scale"] == pytest.approx(5.0)
+
+
 def test_watts_become_lumens_through_the_spectrum() -> None:
     """683 lm/W at 555 nm; with a flux of one's own the unit is a statement about that flux."""
     line = rays(flux_unit="W", spectra=(et.Spectrum([555.0], [1.0]),))

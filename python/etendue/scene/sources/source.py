@@ -119,7 +119,7 @@ def lines_of(spectrum: Spectrum, flux_unit: FluxUnit) -> tuple[Array, Array]:
     wavelength, weight = spectrum.wavelength, spectrum.weight
     if wavelength.size > 1:
         gaps = np.diff(wavelength)
-        weight = weight * (np.append(gaps, 0.0) + np.insert(gaps, 0, 0.0)) / 2.0
+        weight = weight * (np.append(gaps, 0.0) + np.insert(gaps, 0, 0.0))  # twice the trapezoids; only ratios count
     if flux_unit == "lm":
         weight = weight * photopic_efficiency(wavelength)
     kept = weight > 0.0
