@@ -178,6 +178,15 @@ def test_names_of_finishes_and_faces() -> None:
     assert len(set(compiled.finish_names)) == len(compiled.finish_names) == 5
 
 
+def test_interfaces_on_surfaces_are_told_of() -> None:
+    """The same medium lies on both sides of a surface, so nothing happens there."""
+    disk = {"shape": {"kind": "disk", "radius": 1}}
+    for finish in ("interface", {"kind": "interface"}):
+        (note,) = compile_scene(Scene(surfaces=[{**disk, "name": "pane", "finish": finish}])).notes
+        assert note.startswith("pane: an interface changes nothing")
+    assert compile_scene(Scene(surfaces=[{**disk, "finish": "mirror"}])).notes == ()
+
+
 def test_built_in_finishes() -> None:
     assert set(BUILT_IN) == {"interface", "absorber", "mirror", "transparent"}
     transparent = BUILT_IN["transparent"].record(HERE)

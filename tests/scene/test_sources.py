@@ -175,6 +175,32 @@ def test_surfaces_emit_on_the_side_that_is_asked_for() -> None:
         assert (record["flip"], record["exponent"], record["trims"]) == (flip, 0.0, [(1.0, 0.0, 0.0, 0.0)])
 
 
+@pytest.mark.parametrize(
+    ("shape", "trim", "finite"),
+    [
+        ({"kind": "plane"}, {}, False),
+        ({"kind": "plane"}, {"radius": [0, 3]}, True),
+        ({"kind": "sphere", "radius": 1}, {}, True),
+        ({"kind": "cylinder", "radius": 1, "height": 1}, {}, True),
+        ({"kind": "paraboloid", "focal_length": 1}, {}, False),
+        ({"kind": "paraboloid", "focal_length": 1}, {"z": [1, float("inf")]}, False),
+        ({"kind": "paraboloid", "focal_length": 1}, {"z": [float("-inf"), 5]}, True),
+        ({"kind": "paraboloid", "focal_length": 1, "radius": 3}, {}, True),
+        ({"kind": "ellipsoid", "focus": 1, "second_focus": 2}, {}, True),
+        ({"kind": "hyperboloid", "focus": 1, "virtual_focus": 2}, {}, False),
+        ({"kind": "hyperboloid", "focus": 1, "virtual_focus": 2}, {"z": [float("-inf"), 5]}, True),
+    ],
+)
+def test_surfaces_without_an_end_cannot_emit(shape: dict[str, Any], trim: dict[str, Any], finite: bool) -> None:
+    """Flux over an infinite area is no luminance at all."""
+    given = sources.Surface(shape=shape, flux=1, trim=trim)
+    if finite:
+        assert source(given)["flux"] == 1.0
+    else:
+        with pytest.raises(SceneError, match=r"sources\[0\]: shape: this surface has no end"):
+            compiled(given)
+
+
 def test_rings_are_annuli_with_their_own_flux() -> None:
     """Thesis section 2.3, in its place: three sources that share a frame and a colour."""
     found = compiled(sources.Rings(name="led", radii=[10, 20, 30], flux=[300, 200, 100], at=[0, 0, 5], wavelength=450))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
-from etendue.scene.finishes import BUILT_IN, Finish
+from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
 from etendue.scene.media_library import MEDIA
 from etendue.scene.mistakes import join
@@ -224,6 +224,8 @@ class _Compiler:
         with self._at(join(place, "shape")):
             sheet = surface.shape.sheet(surface.trim, self.files)
             finish, _ = self._finish(join(place, "finish"), name, surface.finish)
+            if surface.finish in ("interface", Interface()):
+                self.notes.append(f"{name}: an interface changes nothing on a surface that is no solid's")
             self._face(name, sheet.shape, surface.frame().record(), sheet.trims, None, False, finish)
 
     def _face(
