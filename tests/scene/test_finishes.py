@@ -156,7 +156,7 @@ def test_more_light_than_arrives() -> None:
 def test_names_of_finishes_and_faces() -> None:
     """Every face has the finish that is nearest to it: its own, its group's, the solid's."""
     prism = {"kind": "prism", "vertices": [(0, 0), (1, 0), (0, 1)], "height": 1}
-    keys = {"side": "absorber", "side 2": "mirror", "top": {"kind": "lambertian", "reflectance": 0.5}}
+    keys = {"side": {"kind": "absorber"}, "side 2": "mirror", "top": {"kind": "lambertian", "reflectance": 0.5}}
     scene = Scene(
         finishes={"grey": {"kind": "mirror", "reflectance": 0.5}},
         solids=[{"name": "p", "shape": prism, "medium": "PC", "finishes": keys, "finish": "grey"}],
@@ -168,14 +168,23 @@ def test_names_of_finishes_and_faces() -> None:
         for name, face in zip(compiled.face_names, compiled.record["faces"], strict=True)
     }
     assert found == {
-        "p.side 1": "absorber",
+        "p.side 1": "p.side.finish",
         "p.side 2": "mirror",
-        "p.side 3": "absorber",
+        "p.side 3": "p.side.finish",
         "p.bottom": "grey",
         "p.top": "p.top.finish",
         "s": "absorber",
     }
-    assert compiled.finish_names.count("absorber") == 1
+    assert len(set(compiled.finish_names)) == len(compiled.finish_names) == 5
+
+
+def test_interfaces_on_surfaces_are_told_of() -> None:
+    """The same medium lies on both sides of a surface, so nothing happens there."""
+    disk = {"shape": {"kind": "disk", "radius": 1}}
+    for finish in ("interface", {"kind": "interface"}):
+        (note,) = compile_scene(Scene(surfaces=[{**disk, "name": "pane", "finish": finish}])).notes
+        assert note.startswith("pane: an interface changes nothing")
+    assert compile_scene(Scene(surfaces=[{**disk, "finish": "mirror"}])).notes == ()
 
 
 def test_built_in_finishes() -> None:

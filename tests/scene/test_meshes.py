@@ -18,6 +18,7 @@ from etendue.scene import Scene, bodies, compile_scene
 from etendue.scene.files import Files
 from etendue.scene.mesh_files import MESH_FORMATS, read_mesh
 from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
+from oracles import step
 from oracles.scenes import OCTAHEDRON, OCTANTS
 
 CORNERS = np.array(OCTAHEDRON)
@@ -115,15 +116,35 @@ def test_an_octahedron_comes_back_from_every_format(name: str, tmp_path: Path) -
 @pytest.mark.skipif(importlib.util.find_spec("cascadio") is None, reason="STEP files need the extra [step]")
 def test_step_files_are_read(tmp_path: Path) -> None:
     """A tetrahedron with legs of 30 mm, as a faceted boundary representation: 30³/6 mm³."""
-    (tmp_path / "body.step").write_text(TETRAHEDRON_STEP, encoding="ascii")
+    (tmp_path / "body.step").write_text(step.tetrahedron(30.0), encoding="ascii")
     vertices, triangles = welded(*read_mesh(tmp_path / "body.step", None))
     assert volume(vertices, triangles) == pytest.approx(30**3 / 6, rel=1e-5)
     with pytest.raises(FormatError, match="state their unit themselves"):
         read_mesh(tmp_path / "body.step", "mm")
 
 
+@pytest.mark.skipif(importlib.util.find_spec("cascadio") is None, reason="STEP files need the extra [step]")
+@pytest.mark.parametrize("tolerance", [None, 0.1, 0.002])
+def test_step_surfaces_are_met_within_the_tolerance(tolerance: float | None, tmp_path: Path) -> None:
+    """A sphere of 10 mm: corners lie on it, and the volume is short of 4/3 π R³ by at most area times tolerance."""
+    (tmp_path / "ball.step").write_text(step.sphere(10.0), encoding="ascii")
+    shape = {"kind": "mesh", "file": "ball.step"} | ({} if tolerance is None else {"tolerance": tolerance})
+    scene = Scene.from_dict({"solids": [{"shape": shape, "medium": "BK7"}]}, folder=tmp_path)
+    (face,) = compile_scene(scene).record["faces"]
+    assert np.linalg.norm(face["shape"]["vertices"], axis=1) == pytest.approx(10.0, rel=1e-6)
+    whole = 4 / 3 * np.pi * 1000
+    found = volume(face["shape"]["vertices"], face["shape"]["triangles"])
+    assert whole - 400 * np.pi * (tolerance or 0.01) < found < whole
+
+
+def test_tolerances_are_for_surfaces_that_are_no_triangles_yet(tmp_path: Path) -> None:
+    (tmp_path / "body").write_bytes(stl(1.0))
+    with pytest.raises(FormatError, match="made of triangles already"):
+        read_mesh(tmp_path / "body", None, 0.1)
+
+
 def test_step_without_its_library_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "body.step").write_text(TETRAHEDRON_STEP, encoding="ascii")
+    (tmp_path / "body.step").write_text(step.tetrahedron(30.0), encoding="ascii")
     monkeypatch.setitem(sys.modules, "cascadio", None)
     with pytest.raises(FormatError, match=r"pip install 'etendue\[step\]'"):
         read_mesh(tmp_path / "body.step", None)
@@ -263,68 +284,3 @@ def test_meshes_that_cannot_be_used() -> None:
     ):
         with pytest.raises(SceneError, match=words):
             compile_scene(Scene(surfaces=[{**thing, "finish": "mirror"}]))
-
-
-def _tetrahedron_step() -> str:
-    """ISO 10303-21 by hand: a closed shell of four plane faces with legs of 30 mm along the axes."""
-    corners = [(0, 0, 0), (30, 0, 0), (0, 30, 0), (0, 0, 30)]
-    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
-    lines: list[str] = []
-
-    def add(text: str) -> str:
-        lines.append(f"#{len(lines) + 1}={text};")
-        return f"#{len(lines)}"
-
-    def vector(v: Any) -> str:
-        unit = np.asarray(v, dtype=float) / np.linalg.norm(v)
-        return add("DIRECTION('',({:.15f},{:.15f},{:.15f}))".format(*unit))
-
-    points = [add("CARTESIAN_POINT('',({}.,{}.,{}.))".format(*c)) for c in corners]
-    vertices = [add(f"VERTEX_POINT('',{p})") for p in points]
-    edges: dict[tuple[int, int], str] = {}
-    for face in faces:
-        for a, b in zip(face, (*face[1:], face[0]), strict=True):
-            low, high = sorted((a, b))
-            if (low, high) not in edges:
-                along = np.subtract(corners[high], corners[low])
-                course = add(f"VECTOR('',{vector(along)},1.)")
-                line = add(f"LINE('',{points[low]},{course})")
-                edges[low, high] = add(f"EDGE_CURVE('',{vertices[low]},{vertices[high]},{line},.T.)")
-    shell = []
-    for face in faces:
-        oriented = []
-        for a, b in zip(face, (*face[1:], face[0]), strict=True):
-            sense = ".T." if a < b else ".F."
-            oriented.append(add(f"ORIENTED_EDGE('',*,*,{edges[min(a, b), max(a, b)]},{sense})"))
-        loop = add(f"EDGE_LOOP('',({','.join(oriented)}))")
-        p, q, r = (np.array(corners[i], dtype=float) for i in face)
-        place = add(f"AXIS2_PLACEMENT_3D('',{points[face[0]]},{vector(np.cross(q - p, r - p))},{vector(q - p)})")
-        plane = add(f"PLANE('',{place})")
-        bound = add(f"FACE_OUTER_BOUND('',{loop},.T.)")
-        shell.append(add(f"ADVANCED_FACE('',({bound}),{plane},.T.)"))
-    closed = add(f"CLOSED_SHELL('',({','.join(shell)}))")
-    solid = add(f"MANIFOLD_SOLID_BREP('',{closed})")
-    length = add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
-    angle = add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
-    sphere = add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
-    error = add(f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),{length},'d','')")
-    context = add(
-        "(GEOMETRIC_REPRESENTATION_CONTEXT(3)"
-        f"GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({error}))"
-        f"GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{sphere}))REPRESENTATION_CONTEXT('',''))"
-    )
-    shape = add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',({solid}),{context})")
-    application = add("APPLICATION_CONTEXT('automotive design')")
-    context_of_product = add(f"PRODUCT_CONTEXT('',{application},'mechanical')")
-    product = add(f"PRODUCT('t','t','',({context_of_product}))")
-    formation = add(f"PRODUCT_DEFINITION_FORMATION('','',{product})")
-    view = add(f"PRODUCT_DEFINITION_CONTEXT('part definition',{application},'design')")
-    definition = add(f"PRODUCT_DEFINITION('design','',{formation},{view})")
-    defined = add(f"PRODUCT_DEFINITION_SHAPE('','',{definition})")
-    add(f"SHAPE_DEFINITION_REPRESENTATION({defined},{shape})")
-    head = "HEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
-    head += "FILE_SCHEMA(('AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }'));\nENDSEC;\n"
-    return "ISO-10303-21;\n" + head + "DATA;\n" + "\n".join(lines) + "\nENDSEC;\nEND-ISO-10303-21;\n"
-
-
-TETRAHEDRON_STEP = _tetrahedron_step()

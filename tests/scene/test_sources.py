@@ -8,6 +8,7 @@ from typing import Any
 import etendue as et
 import numpy as np
 import pytest
+from etendue import _core
 from etendue.errors import SceneError
 from etendue.quantities.ray_set import RaySetMeaning
 from etendue.quantities.spectrum import photopic_efficiency
@@ -32,7 +33,7 @@ def rays(**keys: Any) -> et.RaySet:
 
 
 def test_every_source_is_tested() -> None:
-    assert set(sources.SOURCES) == {"rays", "light-field", "surface", "rings", "point", "beam"}
+    assert set(sources.SOURCES) == {"rays", "light-field", "gridded", "surface", "rings", "point", "beam"}
     assert set(detectors.DETECTORS) == {"rays", "illuminance", "intensity", "image"}
 
 
@@ -49,6 +50,13 @@ def test_rays_of_a_file_that_states_relative_flux(tmp_path: Path) -> None:
         assert record["flux"] == pytest.approx(total, rel=1e-6)
         assert record["scale"] * stored == pytest.approx(total, rel=1e-6)
         assert len(record["rays"]) == 2
+
+
+def test_rays_in_memory_with_relative_flux() -> None:
+    """Stored 1 and 3, which share 10 lm: a factor of 2.5, and twice that for 20 lm."""
+    relative = rays().replace(declared_flux=10.0)
+    assert source(sources.Rays(rays=relative))["scale"] == pytest.approx(2.5)
+    assert source(sources.Rays(rays=relative, flux=20))["scale"] == pytest.approx(5.0)
 
 
 def test_watts_become_lumens_through_the_spectrum() -> None:
@@ -160,12 +168,57 @@ def test_a_light_field(tmp_path: Path) -> None:
     assert source(sources.Field(field=field, flux=5))["flux"] == 5.0
 
 
+def test_a_gridded_source_is_the_rays_that_it_draws(tmp_path: Path) -> None:
+    """From a file and from memory: the same bits as drawn by hand, with the flux of the tables or the one that is stated."""
+    made = et.RingSource(rays=20_000)
+    batch = next(made.batches(20_000))
+    et.write_rays(tmp_path / "rings.tm25ray", et.RaySet(batch.position, batch.direction, batch.flux))
+    rays_read = et.read_rays(tmp_path / "rings.tm25ray")
+    grid = et.GriddedSource.fit(rays_read, et.parse_surface("disk:radius=30"), 10.0, 5.0)
+    drawn = grid.sample(1000, 7)
+    keys = {"surface": "disk:radius=30", "pixel": 10, "threshold": 5, "draws": 1000, "seed": 7}
+    by_file = {"kind": "gridded", "file": "rings.tm25ray", **keys}
+    scene = Scene.from_dict({"sources": [by_file]}, folder=tmp_path)
+    in_memory = sources.Gridded(gridded=grid, draws=1000, seed=7, flux=5)
+    for record, flux in ((compile_scene(scene).record["sources"][0], grid.table_flux), (source(in_memory), 5.0)):
+        found = _core.read_rays(record["rays"], 0, 1000)
+        assert np.array_equal(found[0], drawn.position)
+        assert record["flux"] == pytest.approx(flux, rel=1e-9)
+        assert record["scale"] * found[2].sum() == pytest.approx(flux, rel=1e-6)
+
+
 def test_surfaces_emit_on_the_side_that_is_asked_for() -> None:
     for side, flip in (("front", False), ("back", True)):
         record = source(
             sources.Surface(shape=DISK, flux=1, side=side, exponent=0, trim={"half_spaces": [{"normal": [1, 0, 0]}]})
         )
         assert (record["flip"], record["exponent"], record["trims"]) == (flip, 0.0, [(1.0, 0.0, 0.0, 0.0)])
+
+
+@pytest.mark.parametrize(
+    ("shape", "trim", "finite"),
+    [
+        ({"kind": "plane"}, {}, False),
+        ({"kind": "plane"}, {"radius": [0, 3]}, True),
+        ({"kind": "sphere", "radius": 1}, {}, True),
+        ({"kind": "cylinder", "radius": 1, "height": 1}, {}, True),
+        ({"kind": "paraboloid", "focal_length": 1}, {}, False),
+        ({"kind": "paraboloid", "focal_length": 1}, {"z": [1, float("inf")]}, False),
+        ({"kind": "paraboloid", "focal_length": 1}, {"z": [float("-inf"), 5]}, True),
+        ({"kind": "paraboloid", "focal_length": 1, "radius": 3}, {}, True),
+        ({"kind": "ellipsoid", "focus": 1, "second_focus": 2}, {}, True),
+        ({"kind": "hyperboloid", "focus": 1, "virtual_focus": 2}, {}, False),
+        ({"kind": "hyperboloid", "focus": 1, "virtual_focus": 2}, {"z": [float("-inf"), 5]}, True),
+    ],
+)
+def test_surfaces_without_an_end_cannot_emit(shape: dict[str, Any], trim: dict[str, Any], finite: bool) -> None:
+    """Flux over an infinite area is no luminance at all."""
+    given = sources.Surface(shape=shape, flux=1, trim=trim)
+    if finite:
+        assert source(given)["flux"] == 1.0
+    else:
+        with pytest.raises(SceneError, match=r"sources\[0\]: shape: this surface has no end"):
+            compiled(given)
 
 
 def test_rings_are_annuli_with_their_own_flux() -> None:
@@ -185,6 +238,8 @@ def test_rings_are_annuli_with_their_own_flux() -> None:
         ({"kind": "rings", "radii": [2, 1], "flux": [1, 1]}, "must rise"),
         ({"kind": "beam", "shape": {"kind": "plane"}, "flux": 1}, "unknown kind 'plane'"),
         ({"kind": "beam", "shape": {"kind": "sphere", "radius": 1}, "flux": 1}, "unknown kind 'sphere'"),
+        ({"kind": "gridded", "file": "a"}, "'surface' belongs to 'file'"),
+        ({"kind": "gridded", "file": "a", "surface": "plain:z=0"}, "unknown .*'plain'"),
         ({"kind": "surface", "shape": DISK, "flux": 0}, "must be greater than 0"),
         ({"kind": "surface", "shape": DISK, "flux": 1, "exponent": -1}, "must be at least 0"),
         ({"kind": "rays", "file": "a", "flux_unit": "lumen"}, "flux_unit: is 'lumen'. Did you mean 'lm'"),

@@ -21,6 +21,9 @@ Triangles = npt.NDArray[np.int64]
 LARGEST_FILE = 1 << 31
 """Most bytes of a mesh file."""
 
+TOLERANCE = 0.01
+"""Largest distance [mm] between a surface of a STEP file and its triangles, unless another is asked for."""
+
 HEAD = 512
 """Bytes that tell a format."""
 
@@ -79,7 +82,7 @@ MESH_FORMATS: dict[str, MeshFormat] = {
 unit, and reach us in metres."""
 
 
-def read_mesh(path: Path, unit: str | None) -> tuple[Array, Triangles]:
+def read_mesh(path: Path, unit: str | None, tolerance: float | None = None) -> tuple[Array, Triangles]:
     r"""Vertices [mm], shape (n, 3), and triangles, shape (m, 3), of everything in a file, as it is stored.
 
     Parameters
@@ -88,11 +91,14 @@ def read_mesh(path: Path, unit: str | None) -> tuple[Array, Triangles]:
         Of the file.
     unit : str or None
         A key of `etendue.units.MM_PER_LENGTH_UNIT` that overrides the format's; None: the format's own, or mm.
+    tolerance : float, optional
+        Largest distance [mm] between the surfaces of a STEP file and the triangles made of them; `TOLERANCE` if None.
 
     Raises
     ------
     FormatError
-        If the file is of no known format or damaged, or if its library is not installed.
+        If the file is of no known format or damaged, if its library is not installed, or if it does not take the unit or
+        the tolerance.
     OSError
         If the file cannot be opened.
 
@@ -119,20 +125,23 @@ def read_mesh(path: Path, unit: str | None) -> tuple[Array, Triangles]:
             raise FormatError(path, "size", f"{size:,} bytes", f"A mesh may have {LARGEST_FILE:,}; make it coarser.")
         file.seek(0)
         raw = file.read()
-    vertices, triangles = _load(path, form, raw)
+    if form.name != "step" and tolerance is not None:
+        raise FormatError(path, "tolerance", f"{form.title} is made of triangles already", "Leave the tolerance out.")
+    if form.name == "step" and unit is not None:
+        raise FormatError(path, "unit", f"{unit!r}, and STEP files state their unit themselves", "Leave it out.")
+    options = {"tol_linear": TOLERANCE if tolerance is None else tolerance} if form.name == "step" else {}
+    vertices, triangles = _load(path, form, raw, options)
     if not len(triangles):
         raise FormatError(path, "whole file", "there are no triangles", "Export the body as a triangle mesh.")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise FormatError(path, "triangles", "one names a vertex that is not there", "The file is damaged.")
     if not np.isfinite(vertices).all():
         raise FormatError(path, "vertices", "a coordinate is not finite", "The file is damaged.")
-    if form.name == "step" and unit is not None:
-        raise FormatError(path, "unit", f"{unit!r}, and STEP files state their unit themselves", "Leave it out.")
     mm = MM_PER_LENGTH_UNIT[unit] if unit is not None else form.mm or 1.0
     return vertices * mm, triangles
 
 
-def _load(path: Path, form: MeshFormat, raw: bytes) -> tuple[Array, Triangles]:
+def _load(path: Path, form: MeshFormat, raw: bytes, options: dict[str, float]) -> tuple[Array, Triangles]:
     if form.name == "step":
         try:
             import cascadio  # noqa: F401, PLC0415 - an extra, which only STEP files need
@@ -148,6 +157,7 @@ def _load(path: Path, form: MeshFormat, raw: bytes) -> tuple[Array, Triangles]:
             file_type=form.name,
             process=False,
             resolver=trimesh.resolvers.FilePathResolver(os.fspath(path)),
+            **options,
         )
         vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)

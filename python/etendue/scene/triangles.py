@@ -29,8 +29,7 @@ def welded(vertices: Array, triangles: Triangles) -> tuple[Array, Triangles]:
     >>> len(kept), faces.tolist()
     (4, [[0, 2, 1], [2, 3, 1]])
     """
-    # Adding 0 turns -0 into 0, which is the same point in other bits.
-    kept, number = np.unique(vertices + 0.0, axis=0, return_inverse=True)
+    kept, number = np.unique(vertices, axis=0, return_inverse=True)
     triangles = number.reshape(-1)[triangles]
     normals, _ = directed_areas(kept, triangles)
     triangles = triangles[(normals != 0.0).any(axis=1)]
@@ -132,7 +131,7 @@ def smooth_normals(vertices: Array, triangles: Triangles, crease_angle: float) -
     found /= np.linalg.norm(found, axis=1, keepdims=True)
     corner_normal = np.zeros_like(found)
     corner_normal[order] = found
-    key = np.concatenate([corner_vertex[:, None].astype(np.float64), corner_normal + 0.0], axis=1)
+    key = np.concatenate([corner_vertex[:, None].astype(np.float64), corner_normal], axis=1)
     split, number = np.unique(key, axis=0, return_inverse=True)
     return vertices[split[:, 0].astype(np.int64)], number.reshape(-1, 3), split[:, 1:]
 

@@ -16,7 +16,7 @@ from etendue.scene.files import Files
 from etendue.scene.mesh_files import read_mesh
 from etendue.scene.shapes.shape import Record, Shape, Sheet, Trim
 from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
-from etendue.scene.values import LONGEST, AsRow, Index, Number, Point
+from etendue.scene.values import LONGEST, AsRow, Index, Length, Number, Point
 
 Array = npt.NDArray[np.float64]
 Triangle = Annotated[tuple[Index, Index, Index], AsRow]
@@ -62,6 +62,8 @@ class Mesh(Shape):
         in mm. glTF is in m. STEP knows its own.
     scale : number
         By which all lengths are multiplied.
+    tolerance : number, optional
+        Of STEP files: largest distance between a surface and the triangles made of it [mm]; 0.01 if left out.
     crease_angle : number, optional
         [°] Neighbours whose normals differ by less are one smooth surface, with interpolated normals. Flat triangles
         without it.
@@ -78,6 +80,7 @@ class Mesh(Shape):
     triangles: Annotated[tuple[Triangle, ...], MinLen(1), MaxLen(1 << 21), AsRow] | None = None
     unit: Unit | None = None
     scale: Annotated[Number, Ge(1e-9), Le(1e9)] = 1.0
+    tolerance: Annotated[Length, Ge(1e-4)] | None = None
     crease_angle: Annotated[Number, Ge(0.0), Le(180.0)] | None = None
 
     @model_validator(mode="after")
@@ -87,8 +90,9 @@ class Mesh(Shape):
         if (self.file is None) == (self.vertices is None):
             raise ValueError("give either a 'file', or 'vertices' and 'triangles'")
         if self.vertices is not None and self.triangles is not None:
-            if self.unit is not None:
-                raise ValueError("'unit' is that of a file; 'vertices' are in mm")
+            for key in ("unit", "tolerance"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"{key!r} is that of a file; 'vertices' are in mm, and exact")
             largest = max(map(max, self.triangles))
             if largest >= len(self.vertices):
                 raise ValueError(f"'triangles' name vertex {largest}, and there are {len(self.vertices)}, from 0")
@@ -107,7 +111,7 @@ class Mesh(Shape):
             If the file cannot be opened.
         """
         if self.file is not None:
-            vertices, triangles = read_mesh(files.find(self.file), self.unit)
+            vertices, triangles = read_mesh(files.find(self.file), self.unit, self.tolerance)
         else:
             vertices, triangles = np.array(self.vertices), np.array(self.triangles, dtype=np.int64)
         vertices = vertices * self.scale
