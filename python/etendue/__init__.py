@@ -7,6 +7,9 @@
 ((16, 16), 'cd/m²')
 """
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from etendue.formats.intensity import read_intensity, write_intensity
 from etendue.formats.maps import read_illuminance_map, read_map
 from etendue.formats.rays import read_rays, write_rays
@@ -35,9 +38,12 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
-from etendue.scene import Scene
 from etendue.sources.ring_source import RingSource
 from etendue.tracing import TraceResult, trace, trace_rounds
+
+if TYPE_CHECKING:
+    from etendue import scene
+    from etendue.scene import Scene
 
 __all__ = [
     "Box",
@@ -79,9 +85,19 @@ __all__ = [
     "read_intensity",
     "read_map",
     "read_rays",
+    "scene",
     "threshold_sweep",
     "trace",
     "trace_rounds",
     "write_intensity",
     "write_rays",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # Scenes are checked by pydantic, which takes as long to import as all the rest: only when somebody asks for one.
+    if name == "scene":
+        return importlib.import_module("etendue.scene")
+    if name == "Scene":
+        return importlib.import_module("etendue.scene").Scene
+    raise AttributeError(f"module 'etendue' has no attribute {name!r}")

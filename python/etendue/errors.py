@@ -68,6 +68,10 @@ class SceneError(EtendueError, ValueError):
             super().__init__("\n  ".join([f"{source}: {len(lines)} mistakes", *lines]))
 
 
+class SceneWarning(UserWarning):
+    """Something in a scene that can be computed with, and is probably not what was meant."""
+
+
 def nearest_name(name: str, known: Iterable[str]) -> str | None:
     """The known name that somebody who wrote `name` may have meant, if there is one; capitals do not matter."""
     by_folded = {choice.casefold(): choice for choice in sorted(known)}

@@ -193,6 +193,7 @@ WITHOUT_EXAMPLE = {
     "etendue.scene.finishes.Scattering": "likewise",
     "etendue.scene.mistakes": "what messages are made of; docs/scenes.md shows one",
     "etendue.scene.shapes.conics.Mirror": "what its kinds share; each has an example",
+    "etendue.scene.shapes.conics.Revolved": "likewise",
     "etendue.scene.shapes.flat.Flat": "likewise",
     "etendue.scene.shapes.round.Quadric": "likewise",
     "etendue.scene.shapes.shape.Shape": "likewise",

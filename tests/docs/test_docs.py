@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import etendue as et
@@ -13,6 +14,16 @@ from etendue.formats.intensity import INTENSITY_FORMATS
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import RAY_FORMATS
 from etendue.luminance.filters import FILTERS
+from etendue.scene import MEDIA, Medium, Scene, Solid, Surface
+from etendue.scene.bodies import BODIES
+from etendue.scene.description import Description
+from etendue.scene.detectors import DETECTORS
+from etendue.scene.finishes import FINISHES
+from etendue.scene.observers import ObserverKeys, ScreenKeys
+from etendue.scene.placement import Placement
+from etendue.scene.shapes import SHAPES, HalfSpace, Trim
+from etendue.scene.shapes.conics import Profile
+from etendue.scene.sources import SOURCES, Source
 
 from docs.pages import PAGES, ROOT, anchors, blocks, links, name_of, prose
 
@@ -141,6 +152,43 @@ def test_the_page_of_intensity_files_lists_every_format_with_its_extension() -> 
 def test_the_page_of_map_files_lists_every_extension() -> None:
     listed = re.findall(r"^\| (`\.[^|]*)\|", prose(page("formats/maps.md")), re.MULTILINE)
     assert set(re.findall(r"\.\w+", " ".join(listed))) == {*MAP_EXTENSIONS, *PICTURE_EXTENSIONS}
+
+
+FAMILIES: dict[str, Mapping[str, type[Description]]] = {
+    "Sources": SOURCES,
+    "Finishes": FINISHES,
+    "Solids": BODIES,
+    "Surfaces": SHAPES,
+    "Detectors": DETECTORS,
+}
+"""Families of a scene's parts, by the section that lists them."""
+
+TOLD_OF_ALL = {*Source.model_fields, "kind"}
+"""Keys that the page explains once for all: name, place and colours."""
+
+
+@pytest.mark.parametrize("section", FAMILIES)
+def test_the_page_of_scenes_names_every_kind_and_every_key(section: str) -> None:
+    text = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8").split(f"\n## {section}\n")[1].split("\n## ")[0]
+    rows = dict(re.findall(r"^\| `([a-z-]+)` \| ([^|]*)\|", text, re.MULTILINE))
+    assert set(FAMILIES[section]) <= set(rows)
+    for kind, member in FAMILIES[section].items():
+        keys = set(member.model_fields) - TOLD_OF_ALL
+        assert set(re.findall(r"`(\w+)`", rows[kind])) == keys, kind
+
+
+@pytest.mark.parametrize(
+    "part", [Scene, Placement, Medium, Solid, Surface, Trim, HalfSpace, Profile, ScreenKeys, ObserverKeys]
+)
+def test_the_page_of_scenes_names_every_key(part: type[Description]) -> None:
+    text = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
+    missing = [key for key in part.model_fields if f"`{key}`" not in text]
+    assert not missing
+
+
+def test_the_page_of_scenes_names_every_medium() -> None:
+    text = prose(page("scenes.md"))
+    assert all(f"`{name}`" in text for name in MEDIA)
 
 
 def test_theory_names_every_filter() -> None:

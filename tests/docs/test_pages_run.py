@@ -16,14 +16,16 @@ from typing import Any
 import etendue as et
 import numpy as np
 import pytest
+from etendue.scene import compile_scene
 
 from docs.pages import PAGES, ROOT, Block, blocks, name_of
 
-LANGUAGES = {"python", "console", "text", "sh"}
-"""``python`` and ``console`` run here; ``text`` is shown only; ``sh`` installs and checks, which CI does."""
+LANGUAGES = {"python", "console", "toml", "text", "sh"}
+"""``python`` and ``console`` run here, ``toml`` is a scene that is compiled; ``text`` is shown only; ``sh`` installs and
+checks, which CI does."""
 
-RUNNABLE = {"python", "console"}
-FEWEST = {"python": 15, "console": 8}
+RUNNABLE = {"python", "console", "toml"}
+FEWEST = {"python": 15, "console": 8, "toml": 8}
 """Blocks that must be found, so that a page that moved does not silence this test."""
 
 DOCTEST_FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
@@ -44,10 +46,10 @@ def materials(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The files that the pages speak of: one LED in lumens, one in watts with wavelengths, a white one in two files."""
     folder = tmp_path_factory.mktemp("materials")
     rng = np.random.default_rng(20)
-    position, direction = lobe(rng, 60_000, 1.2)
-    et.write_rays(folder / "led.tm25ray", et.RaySet(position, direction, np.full(60_000, 250.0 / 60_000)))
+    position, direction = lobe(rng, 20_000, 1.2)
+    et.write_rays(folder / "led.tm25ray", et.RaySet(position, direction, np.full(20_000, 250.0 / 20_000)))
     for file, kind, n, watts, low, high in (
-        ("watts.tm25ray", "tm25", 20_000, 0.6, 500, 660),
+        ("watts.tm25ray", "tm25", 10_000, 0.6, 500, 660),
         ("blue.ray", "lighttools", 20_000, 0.4, 440, 470),
         ("yellow.ray", "lighttools", 30_000, 0.5, 510, 680),
     ):
@@ -83,6 +85,16 @@ def test_blocks_run(page: Path, materials: Path, tmp_path: Path, monkeypatch: py
             run_python(block, name_of(page), names)
         elif block.language == "console":
             run_console(block, name_of(page))
+        elif block.language == "toml":
+            compile_toml(block, name_of(page))
+
+
+def compile_toml(block: Block, page: str) -> None:
+    """Keep a scene under the name in its first line, for the blocks that follow, and compile it."""
+    name = re.fullmatch(r"# (\w+\.toml)", block.text.splitlines()[0])
+    assert name, f"{page}:{block.line}: the first line of a scene is a remark with the name of its file"
+    Path(name[1]).write_text(block.text, encoding="utf-8")
+    compile_scene(et.Scene.load(name[1]))
 
 
 def run_python(block: Block, page: str, names: dict[str, Any]) -> None:

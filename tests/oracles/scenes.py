@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+OCTAHEDRON = [(2.0, 0.0, 0.0), (-2.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, -2.0, 0.0), (0.0, 0.0, 2.0), (0.0, 0.0, -2.0)]
+OCTANTS = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
+"""Corners, and triangles that run counter-clockwise seen from outside."""
+
 BODIES: dict[str, tuple[dict[str, Any], float]] = {
     "ball": ({"radius": 2.0}, 4 / 3 * math.pi * 8),
     "dome": ({"radius": 2.0}, 2 / 3 * math.pi * 8),
@@ -25,6 +29,9 @@ BODIES: dict[str, tuple[dict[str, Any], float]] = {
         },
         2 * math.pi / 3 * (15 - 1) + math.pi * 9,
     ),
+    "torus": ({"major_radius": 2.0, "minor_radius": 0.7}, 2 * math.pi**2 * 2 * 0.49),
+    # An octahedron, 4/3 r³, whose triangles run clockwise seen from outside.
+    "mesh": ({"vertices": OCTAHEDRON, "triangles": [tuple(reversed(t)) for t in OCTANTS]}, 4 / 3 * 8),
 }
 """Keys of a body and its volume [mm³]."""
 
@@ -43,5 +50,7 @@ SHAPES: dict[str, dict[str, Any]] = {
     "paraboloid": {"focal_length": 2.0, "radius": 6.0},
     "ellipsoid": {"focus": 2.0, "second_focus": 8.0, "radius": 3.0},
     "hyperboloid": {"focus": 2.0, "virtual_focus": 6.0, "radius": 5.0},
+    "torus": {"major_radius": 2.0, "minor_radius": 0.7},
+    "mesh": {"vertices": OCTAHEDRON, "triangles": OCTANTS[:5]},
 }
 """Keys of a shape of a surface."""

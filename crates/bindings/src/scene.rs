@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use etendue_geometry::face::{Face, HalfSpace};
+use etendue_geometry::mesh::Mesh;
 use etendue_geometry::shape::{Asphere, Flat, Outline, Quadric, Shape, Torus};
 use etendue_math::{Frame, Vec3};
 use etendue_optics::finish::Finish;
@@ -12,11 +13,13 @@ use etendue_optics::table::{Curve, Table};
 use etendue_trace::detector::Detector;
 use etendue_trace::reverse::lanterns;
 use etendue_trace::scene::{Part, Scene as CoreScene};
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::field::LightField;
+use crate::surface::vectors;
 use crate::view::View;
 
 type Dict<'a, 'py> = &'a Bound<'py, PyDict>;
@@ -99,14 +102,38 @@ fn shape(dict: Dict<'_, '_>) -> PyResult<Shape> {
         }),
         "asphere" => {
             let coefficients = get(dict, "coefficients")?;
-            Asphere::new(get(dict, "curvature")?, get(dict, "conic")?, coefficients, get(dict, "r")?)
-                .map(Shape::Asphere)
-                .ok_or_else(|| refuse("an asphere that ends inside its radii, or is not finite"))?
+            Asphere::new(
+                get(dict, "curvature")?,
+                get(dict, "conic")?,
+                coefficients,
+                get(dict, "r")?,
+            )
+            .map(Shape::Asphere)
+            .ok_or_else(|| refuse("an asphere that ends inside its radii, or is not finite"))?
         }
         "torus" => Shape::Torus(Torus {
             major: get(dict, "major")?,
             minor: get(dict, "minor")?,
         }),
+        "mesh" => {
+            let vertices: PyReadonlyArray2<'_, f64> = get(dict, "vertices")?;
+            let triangles: PyReadonlyArray2<'_, u32> = get(dict, "triangles")?;
+            let normals: Option<PyReadonlyArray2<'_, f64>> = optional(dict, "normals")?;
+            let points = |array: &PyReadonlyArray2<'_, f64>| -> PyResult<Vec<Vec3>> {
+                Ok(vectors(array)?.into_iter().map(Vec3::from).collect())
+            };
+            if triangles.shape()[1] != 3 {
+                return Err(refuse("triangles of shape (m, 3) are needed"));
+            }
+            let corners = triangles
+                .as_slice()?
+                .chunks_exact(3)
+                .map(|t| [t[0], t[1], t[2]])
+                .collect();
+            let normals = normals.as_ref().map(points).transpose()?;
+            let mesh = Mesh::new(points(&vertices)?, corners, normals);
+            Shape::Mesh(Arc::new(mesh.map_err(|error| refuse(error.to_string()))?))
+        }
         other => return Err(refuse(format!("no shape is called {other}"))),
     })
 }
@@ -161,7 +188,9 @@ fn table(dict: Dict<'_, '_>, key: &str) -> PyResult<Table> {
     let rows: Vec<Vec<f64>> = get(&table, "values")?;
     let wavelength: Vec<f64> = get(&table, "wavelength")?;
     if rows.iter().any(|row| row.len() != wavelength.len()) {
-        return Err(refuse(format!("{key}: rows of values and wavelengths differ in number")));
+        return Err(refuse(format!(
+            "{key}: rows of values and wavelengths differ in number"
+        )));
     }
     Table::new(get(&table, "angle")?, wavelength, rows.concat())
         .ok_or_else(|| refuse(format!("{key}: not a table over increasing angles and wavelengths")))
@@ -201,6 +230,11 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
         }
         "surface" => {
             let flip = optional(dict, "flip")?.unwrap_or(false);
+            if optional::<Vec<[f64; 4]>>(dict, "trims")?.is_some_and(|trims| !trims.is_empty()) {
+                return Err(refuse(
+                    "an emitting surface cannot be cut by half spaces; cut it by z and r, or make it a mesh",
+                ));
+            }
             let surface = SurfaceSource::new(shape(&inner(dict, "shape")?)?, flip, get(dict, "exponent")?);
             Emitter::Surface(surface.ok_or_else(|| refuse("an emitting surface needs a finite area and exponent"))?)
         }
@@ -252,7 +286,11 @@ fn detector(dict: &Bound<'_, PyDict>) -> PyResult<Detector> {
             planes: get(dict, "planes")?,
             steps: get::<u32>(dict, "gammas")? - 1,
         },
-        "image" => Detector::Image(get::<View>(dict, "view")?.core()),
+        "image" => Detector::Image {
+            view: get::<View>(dict, "view")?.core(),
+            complement: optional(dict, "complement")?.unwrap_or(false),
+        },
+        "scatter" => Detector::Events,
         other => return Err(refuse(format!("no detector is called {other}"))),
     })
 }
@@ -291,9 +329,15 @@ impl Scene {
         let parts = each("faces")?.iter().map(part).collect::<PyResult<_>>()?;
         let finishes = each("finishes")?.iter().map(finish).collect::<PyResult<_>>()?;
         let media = each("media")?.iter().map(medium).collect::<PyResult<_>>()?;
-        let solids = each("solids")?.iter().map(|s| get(s, "medium")).collect::<PyResult<_>>()?;
+        let solids = each("solids")?
+            .iter()
+            .map(|s| get(s, "medium"))
+            .collect::<PyResult<_>>()?;
         let mut sets = Vec::new();
-        let sources = each("sources")?.iter().map(|s| source(s, &mut sets)).collect::<PyResult<_>>()?;
+        let sources = each("sources")?
+            .iter()
+            .map(|s| source(s, &mut sets))
+            .collect::<PyResult<_>>()?;
         let detectors = each("detectors")?.iter().map(detector).collect::<PyResult<_>>()?;
         let core = CoreScene::new(parts, finishes, media, solids, sources, detectors).map_err(refuse)?;
         Ok(Self {

@@ -56,7 +56,16 @@ pub enum Finish {
     /// Measured or chosen shares by angle of incidence and wavelength, in the order of [`Lobe::ALL`].
     ///
     /// A diffuse share ρ(θ) spreads evenly over projected solid angle, BSDF ρ(θ)/π: eqs. 4.1 and 4.2 of \[Audenaert2014\].
-    Scatter(Box<[Table; 4]>),
+    Scatter(Box<Scatter>),
+}
+
+/// Shares of the lobes by angle of incidence and wavelength.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scatter {
+    tables: [Table; 4],
+    /// The shares, if they are the same for all angles and wavelengths.
+    constant: Option<Shares>,
+    diffuse: bool,
 }
 
 /// The light at a surface.
@@ -76,10 +85,10 @@ impl Finish {
     /// None if a share is negative or they exceed 1 together at some angle and wavelength.
     #[must_use]
     pub fn scatter(shares: [Table; 4]) -> Option<Self> {
-        let finish = Self::Scatter(Box::new(shares));
-        let Self::Scatter(tables) = &finish else { return None };
+        let tables = &shares;
         // Sums of bilinear functions are extreme at the nodes of any of them.
-        let collect = |pick: fn(&Table) -> &[f64]| -> Vec<f64> { tables.iter().flat_map(|t| pick(t).to_vec()).collect() };
+        let collect =
+            |pick: fn(&Table) -> &[f64]| -> Vec<f64> { tables.iter().flat_map(|t| pick(t).to_vec()).collect() };
         let angles = collect(|t| t.nodes().0);
         let wavelengths = collect(|t| t.nodes().1);
         let sound = tables.iter().all(|t| t.least() >= 0.0)
@@ -89,7 +98,15 @@ impl Finish {
                     sum <= 1.0 + 1e-9
                 })
             });
-        sound.then_some(finish)
+        if !sound {
+            return None;
+        }
+        let constant = tables.iter().all(|t| t.nodes().0.len() * t.nodes().1.len() == 1);
+        Some(Self::Scatter(Box::new(Scatter {
+            constant: constant.then(|| tables.each_ref().map(Table::least)),
+            diffuse: !(tables[2].is_zero() && tables[3].is_zero()),
+            tables: shares,
+        })))
     }
 
     /// The shares of the lobes, and the cosine of the angle of refraction (0 beyond the critical angle).
@@ -101,8 +118,9 @@ impl Finish {
                 let f = fresnel(light.cosine, light.n1, light.n2);
                 ([f.reflectance, 1.0 - f.reflectance, 0.0, 0.0], f.cosine)
             }
-            Self::Scatter(tables) => {
-                let mut shares = tables.each_ref().map(|t| t.at(light.cosine, light.wavelength));
+            Self::Scatter(scatter) => {
+                let at = |t: &Table| t.at(light.cosine, light.wavelength);
+                let mut shares = scatter.constant.unwrap_or_else(|| scatter.tables.each_ref().map(at));
                 let mut across = light.cosine;
                 if shares[1] > 0.0 && light.n1 != light.n2 {
                     let f = fresnel(light.cosine, light.n1, light.n2);
@@ -118,12 +136,22 @@ impl Finish {
         }
     }
 
+    /// The shares of the lobes, if they are the same for all light.
+    #[must_use]
+    pub fn constant(&self) -> Option<Shares> {
+        match self {
+            Self::Interface => None,
+            Self::Scatter(scatter) => scatter.constant,
+        }
+    }
+
     /// Whether any light can go into a diffuse lobe.
+    #[inline]
     #[must_use]
     pub fn is_diffuse(&self) -> bool {
         match self {
             Self::Interface => false,
-            Self::Scatter(tables) => !(tables[2].is_zero() && tables[3].is_zero()),
+            Self::Scatter(scatter) => scatter.diffuse,
         }
     }
 
@@ -134,8 +162,8 @@ impl Finish {
     pub fn bsdf(&self, light: &Incidence, through: bool) -> f64 {
         match self {
             Self::Interface => 0.0,
-            Self::Scatter(tables) => {
-                tables[if through { 3 } else { 2 }].at(light.cosine, light.wavelength) * FRAC_1_PI
+            Self::Scatter(scatter) => {
+                scatter.tables[if through { 3 } else { 2 }].at(light.cosine, light.wavelength) * FRAC_1_PI
             }
         }
     }

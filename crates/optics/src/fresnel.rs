@@ -34,7 +34,7 @@ pub fn fresnel(cosine: f64, n1: f64, n2: f64) -> Fresnel {
 }
 
 /// The direction after reflection. `normal` faces the light: d·n = −`cosine`.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn reflect(d: Vec3, normal: Vec3, cosine: f64) -> Vec3 {
     renormalized(d + normal * (2.0 * cosine))
@@ -49,7 +49,7 @@ pub fn refract(d: Vec3, normal: Vec3, cosine: f64, ratio: f64, across: f64) -> V
 
 /// One step of Newton's method towards length 1: exact to rounding for a vector whose length is 1 but for rounding, and
 /// without it a long chain of reflections would drift.
-#[inline]
+#[inline(always)]
 fn renormalized(d: Vec3) -> Vec3 {
     d * (1.5 - 0.5 * d.dot(d))
 }

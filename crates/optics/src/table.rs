@@ -107,13 +107,21 @@ impl Table {
         let (j, v) = place(&self.wavelength, wavelength);
         let row = |i: usize| {
             let low = self.values[i * columns + j];
-            if v == 0.0 { low } else { (1.0 - v) * low + v * self.values[i * columns + j + 1] }
+            if v == 0.0 {
+                low
+            } else {
+                (1.0 - v) * low + v * self.values[i * columns + j + 1]
+            }
         };
         if self.angle.len() == 1 {
             return row(0);
         }
         let (i, u) = place(&self.angle, cosine.clamp(-1.0, 1.0).acos());
-        if u == 0.0 { row(i) } else { (1.0 - u) * row(i) + u * row(i + 1) }
+        if u == 0.0 {
+            row(i)
+        } else {
+            (1.0 - u) * row(i) + u * row(i + 1)
+        }
     }
 
     /// Whether it is 0 everywhere.
@@ -141,7 +149,12 @@ mod tests {
 
     #[test]
     fn a_table_is_bilinear_between_its_nodes_and_constant_outside() {
-        let table = Table::new(vec![0.0, 1.0], vec![400.0, 500.0, 700.0], vec![1.0, 2.0, 6.0, 3.0, 8.0, 0.0]).expect("sound");
+        let table = Table::new(
+            vec![0.0, 1.0],
+            vec![400.0, 500.0, 700.0],
+            vec![1.0, 2.0, 6.0, 3.0, 8.0, 0.0],
+        )
+        .expect("sound");
         let at = |angle: f64, wavelength| table.at(angle.cos(), wavelength);
         assert!((at(0.25, 450.0) - (0.75 * 1.5 + 0.25 * 5.5)).abs() < 1e-12);
         assert!((at(0.5, 600.0) - (0.5 * 4.0 + 0.5 * 4.0)).abs() < 1e-12);

@@ -33,7 +33,15 @@ pub enum Detector {
         steps: u32,
     },
     /// The light image: every diffuse scatter, connected to the eye of an observer.
-    Image(View),
+    Image {
+        /// What he sees.
+        view: View,
+        /// Whether only light counts that the reverse tracer cannot find, or leaves to the light image: of sources that
+        /// cannot be seen backwards, and of all sources through smooth surfaces onto the first diffuse one.
+        complement: bool,
+    },
+    /// Every diffuse scatter, to be looked at later from anywhere.
+    Events,
 }
 
 impl Detector {
@@ -55,7 +63,7 @@ impl Detector {
                 trims: vec![],
                 flipped: false,
             }),
-            Self::Intensity { .. } | Self::Image(_) => None,
+            Self::Intensity { .. } | Self::Image { .. } | Self::Events => None,
         }
     }
 
@@ -63,17 +71,21 @@ impl Detector {
     #[must_use]
     pub fn cells(&self) -> usize {
         match self {
-            Self::Rays(_) => 0,
+            Self::Rays(_) | Self::Events => 0,
             Self::Illuminance { columns, rows, .. } => *columns as usize * *rows as usize,
             Self::Intensity { planes, steps } => *planes as usize * (*steps as usize + 1),
-            Self::Image(view) => view.pixels(),
+            Self::Image { view, .. } => view.pixels(),
         }
     }
 }
 
 /// The cell of an illuminance detector that a point of it lies in, for light along `d`; None if it arrives from behind.
 #[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the number of cells")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "inside the number of cells"
+)]
 pub fn illuminance_cell(frame: &Frame, size: [f64; 2], cells: [u32; 2], point: Vec3, d: Vec3) -> Option<u32> {
     if d.dot(frame.z) >= 0.0 {
         return None;
@@ -88,7 +100,11 @@ pub fn illuminance_cell(frame: &Frame, size: [f64; 2], cells: [u32; 2], point: V
 /// The cell of a C-γ table whose node is nearest to a direction: γ from +z, C from +x towards +y; the nodes at the poles
 /// have one cell each, that of the first plane.
 #[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the number of cells")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "inside the number of cells"
+)]
 pub fn intensity_cell(planes: u32, steps: u32, d: Vec3) -> u32 {
     let gamma = d.x.hypot(d.y).atan2(d.z);
     let row = ((gamma * f64::from(steps) / PI).round() as u32).min(steps);
@@ -111,14 +127,26 @@ mod tests {
             y: Vec3::new(0.0, 1.0, 0.0),
             z: Vec3::new(0.0, 0.0, 1.0),
         };
-        let cell = |x, y, dz| illuminance_cell(&frame, [4.0, 2.0], [4, 2], Vec3::new(x, y, 3.0), Vec3::new(0.0, 0.0, dz));
+        let cell = |x, y, dz| {
+            illuminance_cell(
+                &frame,
+                [4.0, 2.0],
+                [4, 2],
+                Vec3::new(x, y, 3.0),
+                Vec3::new(0.0, 0.0, dz),
+            )
+        };
         assert_eq!(cell(-0.9, 2.9, -1.0), Some(0));
         assert_eq!(cell(2.9, 2.9, -1.0), Some(3));
         assert_eq!(cell(-0.9, 1.1, -1.0), Some(4));
         assert_eq!(cell(0.5, 2.5, 1.0), None);
         let towards = |gamma: f64, c: f64| {
             let (gamma, c) = (gamma.to_radians(), c.to_radians());
-            intensity_cell(36, 72, Vec3::new(gamma.sin() * c.cos(), gamma.sin() * c.sin(), gamma.cos()))
+            intensity_cell(
+                36,
+                72,
+                Vec3::new(gamma.sin() * c.cos(), gamma.sin() * c.sin(), gamma.cos()),
+            )
         };
         assert_eq!(towards(1.0, 200.0), 0);
         assert_eq!(towards(45.0, 90.0), 9 * 73 + 18);

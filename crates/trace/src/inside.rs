@@ -8,6 +8,18 @@
 pub struct Inside(u64);
 
 impl Inside {
+    /// As one number, for storage.
+    #[must_use]
+    pub const fn bits(self) -> u64 {
+        self.0
+    }
+
+    /// From a number that [`Inside::bits`] gave.
+    #[must_use]
+    pub const fn from_bits(bits: u64) -> Self {
+        Self(bits)
+    }
+
     /// The solid that the space belongs to; 0 outside of all.
     #[inline(always)]
     #[must_use]

@@ -3,26 +3,46 @@
 use crate::meeting::Loss;
 use crate::scene::Scene;
 
-/// Flux and number of rays.
+/// Flux and number of rays. The sum is kept with what rounding takes from it (Neumaier), so that accounts of any length
+/// close to rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Entry {
-    /// \[flux unit\].
-    pub flux: f64,
+    sum: f64,
+    rest: f64,
     /// Rays.
     pub rays: u64,
 }
 
 impl Entry {
+    /// \[flux unit\].
+    #[must_use]
+    pub fn flux(&self) -> f64 {
+        self.sum + self.rest
+    }
+
+    #[inline]
+    fn plus(&mut self, flux: f64) {
+        let sum = self.sum + flux;
+        let (large, small) = if self.sum.abs() >= flux.abs() {
+            (self.sum, flux)
+        } else {
+            (flux, self.sum)
+        };
+        self.rest += (large - sum) + small;
+        self.sum = sum;
+    }
+
     /// One ray more.
     #[inline]
     pub fn add(&mut self, flux: f64) {
-        self.flux += flux;
+        self.plus(flux);
         self.rays += 1;
     }
 
     /// Another entry's sums.
     pub fn merge(&mut self, other: &Self) {
-        self.flux += other.flux;
+        self.plus(other.sum);
+        self.rest += other.rest;
         self.rays += other.rays;
     }
 }
@@ -124,7 +144,12 @@ impl Ledger {
             })
         };
         let fates = [self.escaped, self.terminated];
-        let mut all = self.on_face.iter().chain(&self.in_medium).chain(&self.lost).chain(&fates);
+        let mut all = self
+            .on_face
+            .iter()
+            .chain(&self.in_medium)
+            .chain(&self.lost)
+            .chain(&fates);
         [sum(&mut self.emitted.iter()), sum(&mut all)]
     }
 }

@@ -5,10 +5,11 @@
 //! listed last before the others; else the face of the last listed solid among those crossed decides, unless the space on
 //! both sides belongs to the same, later listed solid: then the face is hidden.
 
-use etendue_geometry::assembly::{Hits, Leaving, Lines, TIE};
+use etendue_geometry::assembly::{Hits, Leaving, Lines, MOST_LEFT, NONE, TIE};
 use etendue_geometry::shape::{Crossing, ROUNDING};
 use etendue_math::Vec3;
 use etendue_optics::finish::Finish;
+use etendue_optics::fresnel::{reflect, refract};
 use etendue_optics::medium::Filling;
 
 use crate::inside::Inside;
@@ -22,8 +23,10 @@ type Group = Vec<(u32, Crossing)>;
 pub struct Meeting {
     /// Where.
     pub point: Vec3,
-    /// Unit normal of the deciding face, against the ray.
+    /// Unit normal of the deciding face, against the ray: that which a mesh states at its corners, interpolated, if it does.
     pub normal: Vec3,
+    /// The normal of the surface itself, against the ray.
+    pub side: Vec3,
     /// The deciding face; the first one met, if none decides.
     pub face: u32,
     /// Whether the ray meets the front of the deciding face.
@@ -38,6 +41,36 @@ pub struct Meeting {
     pub leaving: Leaving,
     /// Distance travelled \[mm\].
     pub t: f64,
+}
+
+impl Meeting {
+    /// The direction of light that arrived along `d` and was mirrored.
+    #[inline]
+    #[must_use]
+    pub fn mirrored(&self, d: Vec3, cosine: f64) -> Vec3 {
+        self.kept(reflect(d, self.normal, cosine), 1.0)
+    }
+
+    /// The direction of light that arrived along `d` and was refracted; `across` is the cosine of the angle of refraction.
+    #[inline]
+    #[must_use]
+    pub fn refracted(&self, d: Vec3, cosine: f64, ratio: f64, across: f64) -> Vec3 {
+        if ratio == 1.0 {
+            return d;
+        }
+        self.kept(refract(d, self.normal, cosine, ratio, across), -1.0)
+    }
+
+    /// An interpolated normal may send light to the wrong side of the surface; then its direction is mirrored on the surface.
+    #[inline]
+    fn kept(&self, d: Vec3, sign: f64) -> Vec3 {
+        let height = d.dot(self.side);
+        if height * sign < 0.0 {
+            d - self.side * (2.0 * height)
+        } else {
+            d
+        }
+    }
 }
 
 /// Why a ray was lost.
@@ -75,6 +108,7 @@ impl Loss {
 ///
 /// # Errors
 /// The reason and the face, if the ray is lost.
+#[inline(always)]
 pub fn meet(
     scene: &Scene,
     lines: &Lines,
@@ -86,11 +120,62 @@ pub fn meet(
     let (o, d) = (lines.origin(i), lines.direction(i));
     let nearest = (hits.face[i], hits.crossing(i));
     if hits.tied(i, o) {
-        let group = tied(scene, o, d, &lines.leaving[i], nearest);
+        let group = tied(scene, o, d, &lines.leaving(i), nearest);
         resolve(scene, o, d, &group, inside, detected)
     } else {
-        resolve(scene, o, d, &[nearest], inside, detected)
+        alone(scene, o, d, nearest, inside, detected)
     }
+}
+
+/// One face met alone: what [`resolve`] comes to then, without its lists.
+#[inline(always)]
+fn alone(
+    scene: &Scene,
+    o: Vec3,
+    d: Vec3,
+    (index, crossing): (u32, Crossing),
+    inside: Inside,
+    mut detected: impl FnMut(u32, Vec3, Vec3),
+) -> Result<Meeting, (Loss, u32)> {
+    let face = &scene.assembly.faces()[index as usize];
+    let role = scene.roles[index as usize];
+    let foot = face.foot(o, d, &crossing);
+    let front = d.dot(foot.normal) < 0.0;
+    let (mut after, mut finish) = (inside, None);
+    match role.act {
+        Act::Detect(detector) => detected(detector, foot.point, foot.normal),
+        Act::Optical(number) if role.solid == 0 => finish = Some(number),
+        Act::Optical(number) => {
+            if front == inside.contains(role.solid) {
+                if crossing.t > TIE * (o.x.abs() + o.y.abs() + o.z.abs()) {
+                    return Err((Loss::Contradiction, index));
+                }
+            } else {
+                after = inside.crossed(role.solid).ok_or((Loss::TooDeep, index))?;
+                // Hidden in a solid that is listed later.
+                finish = (role.solid >= inside.top().min(after.top())).then_some(number);
+            }
+        }
+    }
+    let side = if front { foot.normal } else { -foot.normal };
+    let normal = face.shading_normal(&crossing).map_or(side, |n| {
+        let n = if front { n } else { -n };
+        if d.dot(n) < 0.0 { n } else { side }
+    });
+    let mut leaving = Leaving::default();
+    (leaving.face[0], leaving.part[0]) = (index, crossing.part);
+    Ok(Meeting {
+        point: foot.point,
+        normal,
+        side,
+        face: index,
+        front,
+        finish,
+        before: inside,
+        after,
+        leaving,
+        t: crossing.t,
+    })
 }
 
 /// What a single ray meets first at 0 < t < `reach`; None if it meets nothing.
@@ -114,7 +199,7 @@ pub fn meet_one(
         let group = tied(scene, o, d, leaving, (face, crossing));
         resolve(scene, o, d, &group, inside, ignore).map(Some)
     } else {
-        resolve(scene, o, d, &[(face, crossing)], inside, ignore).map(Some)
+        alone(scene, o, d, (face, crossing), inside, ignore).map(Some)
     }
 }
 
@@ -146,9 +231,8 @@ pub fn transmittance(
             Ok(Some(meeting)) => {
                 let blocked = meeting.finish.is_some_and(|finish| {
                     // Nothing is seen of an interface between equal media.
-                    let mut same = |a: u16, b: u16| {
-                        fillings.at(scene, a, wavelength).n == fillings.at(scene, b, wavelength).n
-                    };
+                    let mut same =
+                        |a: u16, b: u16| fillings.at(scene, a, wavelength).n == fillings.at(scene, b, wavelength).n;
                     !(matches!(scene.finishes[finish as usize], Finish::Interface)
                         && same(meeting.before.top(), meeting.after.top()))
                 });
@@ -208,15 +292,18 @@ pub fn tied(scene: &Scene, o: Vec3, d: Vec3, leaving: &Leaving, nearest: (u32, C
     };
     let base = slack(nearest.0, &nearest.1);
     let t = nearest.1.t;
-    scene.assembly.crossings(o, d, [(t - reach).max(0.0), t + reach], leaving, |index, crossing| {
-        let same = index == nearest.0 && crossing.part == nearest.1.part && crossing.t == t;
-        if !same && crossing.t > 0.0 && (crossing.t - t).abs() <= (base + slack(index, &crossing)).min(reach) {
-            group.push((index, crossing));
-        }
-    });
+    scene
+        .assembly
+        .crossings(o, d, [(t - reach).max(0.0), t + reach], leaving, |index, crossing| {
+            let same = index == nearest.0 && crossing.part == nearest.1.part && crossing.t == t;
+            if !same && crossing.t > 0.0 && (crossing.t - t).abs() <= (base + slack(index, &crossing)).min(reach) {
+                group.push((index, crossing));
+            }
+        });
     group
 }
 
+#[cold]
 fn resolve(
     scene: &Scene,
     o: Vec3,
@@ -247,7 +334,10 @@ fn resolve(
                     decides = Some((u32::MAX, at, finish));
                     continue;
                 }
-                if group[..at].iter().any(|(f, _)| scene.roles[*f as usize].solid == role.solid) {
+                if group[..at]
+                    .iter()
+                    .any(|(f, _)| scene.roles[*f as usize].solid == role.solid)
+                {
                     continue;
                 }
                 match crossed(scene, group, at, role.solid, o, d, inside) {
@@ -271,9 +361,17 @@ fn resolve(
         (group[at].0, if at == 0 { first } else { feet(at) })
     });
     let front = d.dot(foot.normal) < 0.0;
+    let side = if front { foot.normal } else { -foot.normal };
+    let at = decided.map_or(0, |(_, at, _)| at);
+    let normal = faces[face as usize].shading_normal(&group[at].1).map_or(side, |n| {
+        let n = if front { n } else { -n };
+        // Seen from behind, an interpolated normal says nothing.
+        if d.dot(n) < 0.0 { n } else { side }
+    });
     Ok(Meeting {
         point: foot.point,
-        normal: if front { foot.normal } else { -foot.normal },
+        normal,
+        side,
         face,
         front,
         finish: decided.map(|(_, _, finish)| finish),
@@ -312,36 +410,97 @@ fn crossed(scene: &Scene, group: &[(u32, Crossing)], at: usize, solid: u16, o: V
     }
 }
 
-/// The solids that a point is in, for a ray that starts there along `d`, and the faces that it starts on.
+/// The solids that a ray starts in, and the faces that it starts on.
 ///
-/// A point on a face is on the side that the ray goes to.
+/// A start point on a face is on the side that the ray goes to.
 ///
 /// # Errors
 /// If it is in more than four solids.
 pub fn place(scene: &Scene, o: Vec3, d: Vec3) -> Result<(Inside, Leaving), (Loss, u32)> {
-    let mut leaving = Leaving::default();
-    let reach = 64.0 * ROUNDING * (o.x.abs() + o.y.abs() + o.z.abs());
-    // The nearest crossing of each solid ahead of the start tells whether the ray leaves it there.
-    let mut nearest: Vec<(u16, f64, u32, Crossing)> = Vec::new();
-    scene.assembly.crossings(o, d, [-reach, f64::INFINITY], &Leaving::default(), |index, crossing| {
-        if crossing.t <= reach {
-            leaving.add(index, crossing.part);
+    let mut start = Start::new(o, d);
+    scene.assembly.crossings(
+        o,
+        d,
+        [-start.reach, f64::INFINITY],
+        &Leaving::default(),
+        |index, crossing| {
+            start.note(scene, index, crossing);
+        },
+    );
+    start.settled(scene)
+}
+
+/// As [`place`], for a ray that can start only on or in what the faces in `near` say.
+///
+/// # Errors
+/// If it is in more than four solids.
+#[inline]
+pub fn place_near(scene: &Scene, o: Vec3, d: Vec3, near: &[u32]) -> Result<(Inside, Leaving), (Loss, u32)> {
+    if near.is_empty() {
+        return Ok((Inside::default(), Leaving::default()));
+    }
+    let mut start = Start::new(o, d);
+    for &index in near {
+        let solid = scene.roles[index as usize].solid != 0;
+        if !solid && !scene.assembly.faces()[index as usize].may_hold(o, start.reach) {
+            continue;
+        }
+        let range = [-start.reach, if solid { f64::INFINITY } else { start.reach }];
+        scene.assembly.faces()[index as usize].crossings(o, d, range, &[], |crossing| {
+            start.note(scene, index, crossing);
+        });
+    }
+    start.settled(scene)
+}
+
+/// What is known of a start point.
+struct Start {
+    o: Vec3,
+    d: Vec3,
+    /// Crossings no farther than this are at the start itself.
+    reach: f64,
+    leaving: Leaving,
+    /// The nearest crossing of each solid ahead tells whether the ray leaves it there.
+    nearest: Vec<(u16, u32, Crossing)>,
+}
+
+impl Start {
+    const fn new(o: Vec3, d: Vec3) -> Self {
+        Self {
+            o,
+            d,
+            reach: 64.0 * ROUNDING * (o.x.abs() + o.y.abs() + o.z.abs()),
+            leaving: Leaving {
+                face: [NONE; MOST_LEFT],
+                part: [NONE; MOST_LEFT],
+            },
+            nearest: Vec::new(),
+        }
+    }
+
+    fn note(&mut self, scene: &Scene, index: u32, crossing: Crossing) {
+        if crossing.t <= self.reach {
+            self.leaving.add(index, crossing.part);
             return;
         }
         let solid = scene.roles[index as usize].solid;
         if solid != 0 {
-            match nearest.iter_mut().find(|entry| entry.0 == solid) {
-                Some(entry) if entry.1 <= crossing.t => {}
-                Some(entry) => *entry = (solid, crossing.t, index, crossing),
-                None => nearest.push((solid, crossing.t, index, crossing)),
+            match self.nearest.iter_mut().find(|entry| entry.0 == solid) {
+                Some(entry) if entry.2.t <= crossing.t => {}
+                Some(entry) => *entry = (solid, index, crossing),
+                None => self.nearest.push((solid, index, crossing)),
             }
         }
-    });
-    let mut inside = Inside::default();
-    for (solid, _, index, crossing) in nearest {
-        if d.dot(scene.assembly.faces()[index as usize].foot(o, d, &crossing).normal) > 0.0 {
-            inside = inside.crossed(solid).ok_or((Loss::TooDeep, index))?;
-        }
     }
-    Ok((inside, leaving))
+
+    fn settled(self, scene: &Scene) -> Result<(Inside, Leaving), (Loss, u32)> {
+        let mut inside = Inside::default();
+        for (solid, index, crossing) in self.nearest {
+            let foot = scene.assembly.faces()[index as usize].foot(self.o, self.d, &crossing);
+            if self.d.dot(foot.normal) > 0.0 {
+                inside = inside.crossed(solid).ok_or((Loss::TooDeep, index))?;
+            }
+        }
+        Ok((inside, self.leaving))
+    }
 }

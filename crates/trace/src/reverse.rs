@@ -13,7 +13,6 @@ use etendue_geometry::assembly::Leaving;
 use etendue_lightfield::View;
 use etendue_math::Vec3;
 use etendue_optics::finish::{Finish, Incidence};
-use etendue_optics::fresnel::{reflect, refract};
 use etendue_optics::source::surface::about;
 use etendue_optics::source::{Lantern, Numbers};
 use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
@@ -85,7 +84,11 @@ impl<'a> Lit<'a> {
     #[must_use]
     pub fn new(scene: &'a Scene, lanterns: &'a [Option<Lantern>]) -> Self {
         let total: f64 = scene.sources.iter().map(|s| s.flux).sum();
-        let mut wavelengths: Vec<f64> = scene.sources.iter().flat_map(|s| s.spectrum.iter().map(|l| l.0)).collect();
+        let mut wavelengths: Vec<f64> = scene
+            .sources
+            .iter()
+            .flat_map(|s| s.spectrum.iter().map(|l| l.0))
+            .collect();
         wavelengths.sort_by(f64::total_cmp);
         wavelengths.dedup();
         let (mut lines, mut sum) = (Vec::new(), 0.0);
@@ -234,7 +237,9 @@ impl<'a> Path<'a> {
         self.wavelength = line.1;
         self.colour = &line.2;
         self.sum = [0.0; 2];
-        let Ok((inside, leaving)) = place(self.lit.scene, eye, d) else { return };
+        let Ok((inside, leaving)) = place(self.lit.scene, eye, d) else {
+            return;
+        };
         self.branches.push(Branch {
             o: eye,
             d,
@@ -299,7 +304,9 @@ impl<'a> Path<'a> {
         // A source that lies on the surface behind it is in front of it.
         let reach = reach * (1.0 + 1e-12);
         for (number, source) in scene.sources.iter().enumerate() {
-            let Some(lantern) = &self.lit.lanterns[number] else { continue };
+            let Some(lantern) = &self.lit.lanterns[number] else {
+                continue;
+            };
             let flux = self.colour[number];
             let before = if number == 0 { 0.0 } else { self.lit.shares[number - 1] };
             let share = self.lit.shares[number] - before;
@@ -350,14 +357,16 @@ impl<'a> Path<'a> {
             0.0
         };
         let smooth = [shares[0], through];
-        let seen = if branch.seen == Seen::Smooth { Seen::Smooth } else { Seen::Caustic };
+        let seen = if branch.seen == Seen::Smooth {
+            Seen::Smooth
+        } else {
+            Seen::Caustic
+        };
         let go = |transmitted: bool, weight: f64| {
-            let d = if !transmitted {
-                reflect(branch.d, meeting.normal, cosine)
-            } else if n1 == n2 {
-                branch.d
+            let d = if transmitted {
+                meeting.refracted(branch.d, cosine, n1 / n2, across)
             } else {
-                refract(branch.d, meeting.normal, cosine, n1 / n2, across)
+                meeting.mirrored(branch.d, cosine)
             };
             Branch {
                 o: meeting.point,
@@ -389,18 +398,32 @@ impl<'a> Path<'a> {
             return;
         }
         // What survives is drawn by the shares of the flux; radiance carries its factor (n₁/n₂)² besides.
-        let chances = [shares[0], shares[1], if finish.is_diffuse() { (diffuse[0] + diffuse[1]).max(0.05) } else { 0.0 }];
+        let chances = [
+            shares[0],
+            shares[1],
+            if finish.is_diffuse() {
+                (diffuse[0] + diffuse[1]).max(0.05)
+            } else {
+                0.0
+            },
+        ];
         let total: f64 = chances.iter().sum();
-        let alive = if branch.scatters > SURE || branch.weight <= SPLIT { total.min(1.0) } else { 1.0 };
+        let alive = if branch.scatters > SURE || branch.weight <= SPLIT {
+            total.min(1.0)
+        } else {
+            1.0
+        };
         let mut number = self.numbers.next();
         if total <= 0.0 || number >= alive {
             return;
         }
         number *= total / alive;
         if number < chances[0] {
-            self.branches.push(go(false, branch.weight * smooth[0] / chances[0] * total / alive));
+            self.branches
+                .push(go(false, branch.weight * smooth[0] / chances[0] * total / alive));
         } else if number < chances[0] + chances[1] {
-            self.branches.push(go(true, branch.weight * smooth[1] / chances[1] * total / alive));
+            self.branches
+                .push(go(true, branch.weight * smooth[1] / chances[1] * total / alive));
         } else if chances[2] > 0.0 {
             self.scatter(branch, meeting, finish, n1, n2, total / (alive * chances[2]));
         }
@@ -413,9 +436,23 @@ impl<'a> Path<'a> {
         // How much may come from each side: the shares at the angle of the eye stand for those at the unknown angle.
         let sides = {
             let at = |cosine, n1, n2, through| {
-                std::f64::consts::PI * finish.bsdf(&Incidence { cosine, wavelength, n1, n2 }, through)
+                std::f64::consts::PI
+                    * finish.bsdf(
+                        &Incidence {
+                            cosine,
+                            wavelength,
+                            n1,
+                            n2,
+                        },
+                        through,
+                    )
             };
-            let probe = |n1, n2, through| [0.9, 0.5, 0.1].map(|c| at(c, n1, n2, through)).into_iter().fold(0.0, f64::max);
+            let probe = |n1, n2, through| {
+                [0.9, 0.5, 0.1]
+                    .map(|c| at(c, n1, n2, through))
+                    .into_iter()
+                    .fold(0.0, f64::max)
+            };
             [probe(n1, n2, false), probe(n2, n1, true)]
         };
         let total = sides[0] + sides[1];
@@ -431,7 +468,7 @@ impl<'a> Path<'a> {
         let (side, turn, height) = (self.numbers.next(), self.numbers.next(), self.numbers.next());
         let through = side >= transmits[0];
         let chance = transmits[usize::from(through)];
-        let normal = if through { -meeting.normal } else { meeting.normal };
+        let normal = if through { -meeting.side } else { meeting.side };
         let cosine = (1.0 - height).sqrt();
         let light = Incidence {
             cosine,
@@ -473,11 +510,17 @@ impl<'a> Path<'a> {
             0..scene.sources.len()
         } else {
             let number = self.numbers.next();
-            let pick = self.lit.shares.partition_point(|s| *s < number).min(scene.sources.len() - 1);
+            let pick = self
+                .lit
+                .shares
+                .partition_point(|s| *s < number)
+                .min(scene.sources.len() - 1);
             pick..pick + 1
         };
         for number in numbers {
-            let Some(lantern) = &self.lit.lanterns[number] else { continue };
+            let Some(lantern) = &self.lit.lanterns[number] else {
+                continue;
+            };
             let picked = if all {
                 1.0
             } else {
@@ -485,9 +528,11 @@ impl<'a> Path<'a> {
                 self.lit.shares[number] - before
             };
             let source = &scene.sources[number];
-            let Some(beacon) = lantern.pick(source, meeting.point, &mut self.numbers) else { continue };
+            let Some(beacon) = lantern.pick(source, meeting.point, &mut self.numbers) else {
+                continue;
+            };
             let k = (beacon.point - meeting.point).normalized();
-            let height = k.dot(meeting.normal);
+            let height = k.dot(meeting.side);
             let through = height < 0.0;
             let cosine = height.abs();
             let light = Incidence {

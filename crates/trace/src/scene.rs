@@ -1,7 +1,10 @@
 //! What is traced: faces with their optical properties, solids with their media, sources, detectors.
 
+use std::collections::HashMap;
+
 use etendue_geometry::Face;
 use etendue_geometry::assembly::Assembly;
+use etendue_geometry::bounds::Bounds;
 use etendue_optics::finish::Finish;
 use etendue_optics::medium::Medium;
 use etendue_optics::source::Source;
@@ -43,6 +46,8 @@ pub struct Scene {
     pub sources: Vec<Source>,
     /// What collects.
     pub detectors: Vec<Detector>,
+    /// For each source, the faces that its rays may start on, and those of the solids that they may start in.
+    pub near: Vec<Vec<u32>>,
 }
 
 /// A face and what it does, as a scene is made of.
@@ -54,6 +59,25 @@ pub struct Part {
     pub solid: Option<usize>,
     /// Number of its finish.
     pub finish: usize,
+}
+
+/// The faces that rays of a source may start on or in, by the boxes around them.
+#[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
+fn near(source: &Source, assembly: &Assembly, roles: &[Role]) -> Vec<u32> {
+    let around = source.bounds();
+    // A box around each solid.
+    let mut solids: HashMap<u16, Bounds> = HashMap::new();
+    for (role, bounds) in roles.iter().zip(assembly.bounds()) {
+        let all = solids.entry(role.solid).or_insert(Bounds::EMPTY);
+        *all = all.union(*bounds);
+    }
+    let each = roles.iter().zip(assembly.bounds()).zip(0..);
+    each.filter(|((role, bounds), _)| {
+        let reach = if role.solid == 0 { **bounds } else { solids[&role.solid] };
+        around.touches(reach)
+    })
+    .map(|(_, index)| index)
+    .collect()
 }
 
 impl Scene {
@@ -104,8 +128,11 @@ impl Scene {
                 faces.push(face);
             }
         }
+        let assembly = Assembly::new(faces);
+        let near = sources.iter().map(|source| near(source, &assembly, &roles)).collect();
         Ok(Self {
-            assembly: Assembly::new(faces),
+            assembly,
+            near,
             roles,
             finishes,
             media,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from etendue.errors import EtendueError, SceneError, UnknownNameError
-from etendue.scene.finishes import BUILT_IN, Finish
+from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
+from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
 from etendue.scene.media_library import MEDIA
 from etendue.scene.mistakes import join
@@ -200,13 +201,14 @@ class _Compiler:
         entered = False
         with self._at(join(place, "shape")):
             faces = solid.shape.faces(self.files)
+            for doubt in (doubt for face in faces for doubt in face.doubts):
+                warnings.warn(f"{place}: {doubt}", SceneWarning, stacklevel=5)
+                self.notes.append(f"{place}: {doubt}")
             self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(faces)]
             for face in faces:
-                given = solid.finish_of(face)
-                key = "finish" if given is solid.finish else f"finishes.{face.name}"
-                finish, lets_in = self._finish(
-                    join(place, key), name if key == "finish" else f"{name}.{face.name}", given
-                )
+                key, given = solid.finish_of(face)
+                where, owner = ("finish", name) if key is None else (f"finishes.{key}", f"{name}.{key}")
+                finish, lets_in = self._finish(join(place, where), owner, given)
                 entered |= lets_in
                 self._face(
                     f"{name}.{face.name}", face.shape, frame.then(face.frame).record(), [], number, face.flip, finish
@@ -222,6 +224,8 @@ class _Compiler:
         with self._at(join(place, "shape")):
             sheet = surface.shape.sheet(surface.trim, self.files)
             finish, _ = self._finish(join(place, "finish"), name, surface.finish)
+            if surface.finish in ("interface", Interface()):
+                self.notes.append(f"{name}: an interface changes nothing on a surface that is no solid's")
             self._face(name, sheet.shape, surface.frame().record(), sheet.trims, None, False, finish)
 
     def _face(

@@ -23,7 +23,7 @@ class Description(BaseModel):
     once, in one `SceneError`.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     IN_MEMORY: ClassVar[tuple[str, ...]] = ()
     """Fields that hold something that only Python can hand over, and no file can."""

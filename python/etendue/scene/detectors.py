@@ -133,7 +133,7 @@ class FarField(Detector):
 
     @model_validator(mode="after")
     def _divides(self) -> Self:
-        steps = round(180.0 / self.gamma_step)
+        steps = round(180.0 / max(self.gamma_step, 1e-9))
         if steps > MOST_STEPS or not math.isclose(steps * self.gamma_step, 180.0, rel_tol=1e-9):
             raise ValueError(
                 f"'gamma_step' is {self.gamma_step:g}°, which does not divide 180° in up to {MOST_STEPS} steps"

@@ -15,14 +15,14 @@ from etendue.errors import ArgumentError
 from etendue.scene.description import Description
 from etendue.scene.files import Files, read_columns
 from etendue.scene.mistakes import BY_NAME, DESCRIBED, NUMBER, TABLE
-from etendue.scene.values import AsRow, NotNegative, Number, Positive
+from etendue.scene.values import AsRow, NotNegative, Number, Wavelength
 from etendue.units import NM_PER_UM
 
 Array = npt.NDArray[np.float64]
 Record = dict[str, Any]
 
 Index = Annotated[Number, Ge(1.0), Le(10.0)]
-Rising = Annotated[tuple[Positive, ...], MinLen(1), MaxLen(1 << 20), AsRow]
+Rising = Annotated[tuple[Wavelength, ...], MinLen(1), MaxLen(1 << 20), AsRow]
 
 
 def rises(name: str, values: tuple[float, ...]) -> None:

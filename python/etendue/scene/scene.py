@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from annotated_types import Le, MaxLen
+from annotated_types import MaxLen
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from etendue.errors import SceneError
@@ -26,7 +26,7 @@ from etendue.scene.sources import SOURCES
 from etendue.scene.sources.source import Source
 from etendue.scene.things import Solid, Surface
 from etendue.scene.toml import to_toml
-from etendue.scene.values import AsRow, Positive
+from etendue.scene.values import AsRow, Wavelength
 
 MOST = 100_000
 """Sources, solids, surfaces, detectors or observers of one scene."""
@@ -70,7 +70,7 @@ class Scene(Description):
     """
 
     name: str = ""
-    wavelength: Annotated[Positive, Le(1e9)] = 555.0
+    wavelength: Wavelength = 555.0
     surroundings: MediumOrName = "air"
     media: dict[str, Medium] = Field(default_factory=dict)
     finishes: dict[str, AnyFinish] = Field(default_factory=dict)

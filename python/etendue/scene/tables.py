@@ -129,7 +129,7 @@ class ShareTable(Description):
     def _given(self) -> Grid:
         try:
             values = np.array(self.values, dtype=np.float64)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):
             raise ValueError("'values' must be numbers, or rows of the same length") from None
         if not (np.isfinite(values).all() and (values >= 0.0).all() and (values <= 1.0).all()):
             raise ValueError("'values' must lie between 0 and 1")

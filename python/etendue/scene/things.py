@@ -49,12 +49,12 @@ class Solid(Placement):
     finish: FinishOrName = "interface"
     finishes: dict[str, FinishOrName] = Field(default_factory=dict)
 
-    def finish_of(self, face: Face) -> Finish | str:
-        """The finish of one face: by its own name, by that of its group, else the solid's."""
+    def finish_of(self, face: Face) -> tuple[str | None, Finish | str]:
+        """The finish of one face, and under which name it stands: that of the face, of its group, or none."""
         for name in (face.name, face.group):
             if name is not None and name in self.finishes:
-                return self.finishes[name]
-        return self.finish
+                return name, self.finishes[name]
+        return None, self.finish
 
     def check_names(self, faces: tuple[Face, ...]) -> Iterator[tuple[str, str]]:
         """Mistakes in `finishes`: names that no face has."""

@@ -14,7 +14,10 @@ def _number(value: Any) -> Any:
     """A float from any real number; text that looks like one is a mistake, and so is a truth value."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
         raise ValueError("not a number")  # noqa: TRY004 - a TypeError would not reach the list of mistakes
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError("not a number of a size that can be worked with") from None
 
 
 def _count(value: Any) -> Any:
@@ -42,7 +45,9 @@ LONGEST = 1e9
 Length = Annotated[Number, Gt(0.0), Le(LONGEST)]
 LengthOrZero = Annotated[Number, Ge(0.0), Le(LONGEST)]
 Coordinate = Annotated[Number, Ge(-LONGEST), Le(LONGEST)]
+Wavelength = Annotated[Number, Gt(0.0), Le(1e9)]
 Share = Annotated[Number, Ge(0.0), Le(1.0)]
+Index = Annotated[int, BeforeValidator(_count, json_schema_input_type=int), Ge(0), Le((1 << 31) - 1)]
 Count = Annotated[int, BeforeValidator(_count, json_schema_input_type=int), Ge(1)]
 
 AsRow = BeforeValidator(_row)

@@ -23,7 +23,10 @@ impl Asphere {
     /// None if the conic ends inside the range of r, or a number is not finite.
     #[must_use]
     pub fn new(curvature: f64, conic: f64, coefficients: Vec<f64>, r: [f64; 2]) -> Option<Self> {
-        let finite = [curvature, conic, r[0], r[1]].iter().chain(&coefficients).all(|x| x.is_finite());
+        let finite = [curvature, conic, r[0], r[1]]
+            .iter()
+            .chain(&coefficients)
+            .all(|x| x.is_finite());
         let ends = (1.0 + conic) * curvature * curvature * r[1] * r[1] > 1.0;
         if !finite || ends || !(0.0 <= r[0] && r[0] < r[1]) {
             return None;
@@ -85,8 +88,11 @@ impl Asphere {
         }
         [
             point(c) * s * (point(1.0) + root).reciprocal() + s.squared() * value,
-            if c == 0.0 { point(0.0) } else { point(0.5 * c) * root.reciprocal() }
-                + s * (point(2.0) * value + s * slope),
+            if c == 0.0 {
+                point(0.0)
+            } else {
+                point(0.5 * c) * root.reciprocal()
+            } + s * (point(2.0) * value + s * slope),
         ]
     }
 
@@ -173,7 +179,9 @@ struct Along<'a> {
 impl Bounded for Along<'_> {
     fn at(&self, t: f64) -> [f64; 2] {
         let from = t - self.closest;
-        let [sag, slope] = self.surface.sag_at((self.least + self.across * from * from).min(self.largest));
+        let [sag, slope] = self
+            .surface
+            .sag_at((self.least + self.across * from * from).min(self.largest));
         [self.z + self.dz * t - sag, self.dz - slope * 2.0 * self.across * from]
     }
 
@@ -220,7 +228,13 @@ mod tests {
                 z1: -2.0,
                 z0: 0.0,
                 // The branch at the vertex.
-                z: if 1.0 + k > 0.0 { [f64::min(lo, hi), f64::max(lo, hi)] } else if c > 0.0 { [0.0, 99.0] } else { [-99.0, 0.0] },
+                z: if 1.0 + k > 0.0 {
+                    [f64::min(lo, hi), f64::max(lo, hi)]
+                } else if c > 0.0 {
+                    [0.0, 99.0]
+                } else {
+                    [-99.0, 0.0]
+                },
                 r,
             };
             let mut met = 0;
@@ -228,10 +242,18 @@ mod tests {
                 let f = |g: f64| (0.5 + f64::from(i) * g).fract() - 0.5;
                 let o = Vec3::new(f(0.754_877) * 6.0, f(0.569_840) * 6.0, f(0.618_034) * 6.0);
                 let d = direction(i);
-                let mut expected: Vec<f64> = quadric.crossings(o, d, false).into_iter().filter(|t| *t >= 0.0 && t.is_finite()).collect();
+                let mut expected: Vec<f64> = quadric
+                    .crossings(o, d, false)
+                    .into_iter()
+                    .filter(|t| *t >= 0.0 && t.is_finite())
+                    .collect();
                 expected.sort_by(f64::total_cmp);
                 let found = crossings(&asphere, o, d, false);
-                assert_eq!(found.len(), expected.len(), "{c} {k} {o:?} {d:?} {found:?} {expected:?}");
+                assert_eq!(
+                    found.len(),
+                    expected.len(),
+                    "{c} {k} {o:?} {d:?} {found:?} {expected:?}"
+                );
                 for (a, b) in found.iter().zip(expected) {
                     assert!((a - b).abs() < 1e-11);
                 }

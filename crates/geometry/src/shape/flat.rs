@@ -132,7 +132,8 @@ mod tests {
                 let at = |k: i32| 2.4 * (f64::from(k) + 0.5) / f64::from(n) - 0.2;
                 let o = Vec3::new(at(i), at(j), 3.0);
                 let t = flat.crossing(o, Vec3::new(0.0, 0.0, -1.0), false);
-                let expected = at(i) > 0.0 && at(j) > 0.0 && at(i) < 2.0 && at(j) < 2.0 && !(at(i) > 1.0 && at(j) > 1.0);
+                let expected =
+                    at(i) > 0.0 && at(j) > 0.0 && at(i) < 2.0 && at(j) < 2.0 && !(at(i) > 1.0 && at(j) > 1.0);
                 assert_eq!(t == 3.0, expected, "{} {}", at(i), at(j));
                 cells += i32::from(t == 3.0);
             }
@@ -160,7 +161,11 @@ mod tests {
         for i in 0..10_000 {
             let f = |g: f64| (0.5 + f64::from(i) * g).fract();
             let target = Vec3::new(1.0 / 3.0, 0.3 * f(0.754_877) - 0.15, 0.0);
-            let o = Vec3::new(f(0.569_840) * 7.0 - 3.0, f(0.362_911) * 5.0 - 2.0, 1e3 * f(0.618_034) + 0.1);
+            let o = Vec3::new(
+                f(0.569_840) * 7.0 - 3.0,
+                f(0.362_911) * 5.0 - 2.0,
+                1e3 * f(0.618_034) + 0.1,
+            );
             let d = (target - o).normalized();
             let shift = |c: f64| o - Vec3::new(c, 0.0, 0.0);
             let left = meet_rectangle([half, 1.0], shift(1.0 / 3.0 - half), d, false);

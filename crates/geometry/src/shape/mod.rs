@@ -12,7 +12,12 @@ pub mod roots;
 pub mod sample;
 pub mod torus;
 
+use std::sync::Arc;
+
 use etendue_math::Vec3;
+
+use crate::bounds::Bounds;
+use crate::mesh::Mesh;
 
 pub use asphere::Asphere;
 pub use flat::{Flat, Outline};
@@ -45,14 +50,27 @@ pub enum Shape {
     Asphere(Asphere),
     /// A torus about the z axis; its normal points out of it.
     Torus(Torus),
+    /// Triangles, counter-clockwise seen from outside.
+    Mesh(Arc<Mesh>),
 }
 
 impl Shape {
     /// Calls `visit` for each crossing of the line o + t d with `from` ≤ t ≤ `to`, in no order.
     ///
-    /// `leaving`: the line starts on the shape, so that t = 0 is no crossing.
+    /// `parts`: the parts of the shape (triangles of a mesh) on which the line starts, so that t = 0 is no crossing; none if
+    /// it starts elsewhere.
     #[inline]
-    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], leaving: bool, mut visit: impl FnMut(Crossing)) {
+    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], parts: &[u32], mut visit: impl FnMut(Crossing)) {
+        let leaving = !parts.is_empty();
+        if let Self::Mesh(mesh) = self {
+            return mesh.between(o, d, range[0], range[1], parts, |hit| {
+                visit(Crossing {
+                    t: hit.t,
+                    part: hit.triangle,
+                    uv: [hit.u, hit.v],
+                });
+            });
+        }
         let mut keep = |t: f64| {
             if t >= range[0] && t <= range[1] && t.is_finite() {
                 visit(Crossing {
@@ -66,18 +84,55 @@ impl Shape {
             Self::Quadric(quadric) => quadric.crossings(o, d, leaving).into_iter().for_each(keep),
             Self::Asphere(asphere) => asphere.crossings(o, d, range, leaving, keep),
             Self::Torus(torus) => torus.crossings(o, d, range, leaving, keep),
+            Self::Mesh(_) => {}
         }
     }
 
     /// The point of the shape next to `p`, which lies off it by a rounding error, and the unit normal there.
     #[inline]
     #[must_use]
-    pub fn settle(&self, p: Vec3) -> (Vec3, Vec3) {
+    pub fn settle(&self, p: Vec3, part: u32) -> (Vec3, Vec3) {
         match self {
+            Self::Mesh(mesh) => {
+                let (n, [corner, ..]) = (mesh.normal(part), mesh.triangle(part));
+                (p - n * (p - corner).dot(n), n)
+            }
             Self::Flat(_) => (Vec3::new(p.x, p.y, 0.0), Vec3::new(0.0, 0.0, 1.0)),
             Self::Quadric(quadric) => quadric.settle(p),
             Self::Asphere(asphere) => asphere.settle(p),
             Self::Torus(torus) => torus.settle(p),
+        }
+    }
+}
+
+impl Shape {
+    /// A box that holds the shape; not finite if the shape has no end.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let inf = f64::INFINITY;
+        let around = |r: f64, z: [f64; 2]| Bounds {
+            lo: Vec3::new(-r, -r, z[0]),
+            hi: Vec3::new(r, r, z[1]),
+        };
+        match self {
+            Self::Flat(Flat { outline }) => match outline {
+                Outline::Whole => around(inf, [0.0, 0.0]),
+                Outline::Rectangle { width, height } => Bounds {
+                    lo: Vec3::new(-0.5 * width, -0.5 * height, 0.0),
+                    hi: Vec3::new(0.5 * width, 0.5 * height, 0.0),
+                },
+                Outline::Annulus { outer, .. } => around(*outer, [0.0, 0.0]),
+                Outline::Polygon { vertices } => Bounds::of(vertices.iter().map(|v| Vec3::new(v[0], v[1], 0.0))),
+            },
+            Self::Quadric(quadric) => {
+                sample::reach(quadric).map_or_else(|| around(quadric.r[1], quadric.z), |(r, z)| around(r, z))
+            }
+            Self::Asphere(asphere) => {
+                let sag = asphere.sag_range();
+                around(asphere.radii()[1], [sag.lo, sag.hi])
+            }
+            Self::Torus(torus) => around(torus.major + torus.minor, [-torus.minor, torus.minor]),
+            Self::Mesh(mesh) => mesh.bounds(),
         }
     }
 }
@@ -93,9 +148,13 @@ pub fn size(v: Vec3) -> f64 {
 pub(crate) fn step_down(p: Vec3, value: f64, gradient: Vec3) -> (Vec3, Vec3) {
     let square = gradient.dot(gradient);
     // At the apex of a cone there is no gradient; any normal is as good as another.
-    if square > 0.0 {
-        (p - gradient * (value / square), gradient * (1.0 / square.sqrt()))
+    let sound = square > 0.0;
+    let (step, scale) = if sound {
+        (value / square, 1.0 / square.sqrt())
     } else {
-        (p, Vec3::new(0.0, 0.0, 1.0))
-    }
+        (0.0, 0.0)
+    };
+    let normal = gradient * scale;
+    let z = if sound { normal.z } else { 1.0 };
+    (p - gradient * step, Vec3::new(normal.x, normal.y, z))
 }

@@ -69,12 +69,16 @@ impl Quadric {
     #[inline(always)]
     #[must_use]
     pub fn settle(&self, p: Vec3) -> (Vec3, Vec3) {
-        let gradient = Vec3::new(
-            2.0 * self.r2 * p.x,
-            2.0 * self.r2 * p.y,
-            2.0 * self.z2 * p.z + self.z1,
-        );
-        step_down(p, self.value(p), gradient)
+        let (value, gradient) = self.slope(p);
+        step_down(p, value, gradient)
+    }
+
+    /// F and its gradient at a point.
+    #[inline(always)]
+    #[must_use]
+    pub fn slope(&self, p: Vec3) -> (f64, Vec3) {
+        let gradient = Vec3::new(2.0 * self.r2 * p.x, 2.0 * self.r2 * p.y, 2.0 * self.z2 * p.z + self.z1);
+        (self.value(p), gradient)
     }
 }
 
@@ -109,7 +113,11 @@ mod tests {
                 let n = Vec3::new(f(0.754_877), f(0.569_840), f(0.618_034)).normalized();
                 let (p, normal) = ball.settle(n * radius);
                 let d = Vec3::new(f(0.819_173), f(0.671_044), f(0.549_700)).normalized();
-                let hits: Vec<f64> = ball.crossings(p, d, true).into_iter().filter(|t| *t > 0.0 && t.is_finite()).collect();
+                let hits: Vec<f64> = ball
+                    .crossings(p, d, true)
+                    .into_iter()
+                    .filter(|t| *t > 0.0 && t.is_finite())
+                    .collect();
                 let cosine = d.dot(normal);
                 assert_eq!(hits.len(), usize::from(cosine < 0.0), "{radius} {cosine}");
                 if let [t] = hits[..] {

@@ -1,10 +1,13 @@
 //! Points spread evenly over the area of a shape.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
-use etendue_math::{Interval, Vec3};
 use etendue_math::trig::sin_cos_turns;
+use etendue_math::{Interval, Vec3};
 use etendue_sampling::alias::Alias;
+
+use crate::mesh::Mesh;
 
 use super::{Asphere, Flat, Outline, Quadric, Shape, Torus};
 
@@ -28,6 +31,7 @@ enum Kind {
     /// Triangles, and the table that picks one by its area.
     Polygon(Vec<[[f64; 2]; 3]>, Alias),
     Rotation(Outlined, Vec<Stretch>, Alias),
+    Mesh(Arc<Mesh>),
 }
 
 /// What is turned about the z axis: the parameter s runs along its outline.
@@ -84,8 +88,15 @@ impl Outlined {
                 // g + g'²/4 is of second order in z: largest at an end, or at its own extreme.
                 let [a, b] = [-q.z2 / q.r2, -q.z1 / q.r2];
                 let (second, first) = (a + a * a, b + a * b);
-                let middle = if second < 0.0 { (-0.5 * first / second).clamp(from, to) } else { from };
-                [from, to, middle].map(|s| self.density(s)).into_iter().fold(0.0, f64::max)
+                let middle = if second < 0.0 {
+                    (-0.5 * first / second).clamp(from, to)
+                } else {
+                    from
+                };
+                [from, to, middle]
+                    .map(|s| self.density(s))
+                    .into_iter()
+                    .fold(0.0, f64::max)
             }
             Self::Asphere(a) => {
                 let [_, slope] = a.sag_over(Interval::new(from, to));
@@ -126,6 +137,21 @@ impl Outlined {
 /// r² of a quadric at z.
 fn squared_radius(q: &Quadric, z: f64) -> f64 {
     -((q.z2 * z + q.z1) * z + q.z0) / q.r2
+}
+
+/// The largest √(x² + y²) of a quadric and its range of z; None if it has no end or no points.
+pub(super) fn reach(q: &Quadric) -> Option<(f64, [f64; 2])> {
+    let ranges = quadric_ranges(q)?;
+    let z = [ranges.first()?[0], ranges.last()?[1]];
+    // r² is of second order in z: largest at an end, or where its slope is 0.
+    let flat = -0.5 * q.z1 / q.z2;
+    let places = ranges
+        .iter()
+        .flatten()
+        .copied()
+        .chain(ranges.iter().map(|r| flat.max(r[0]).min(r[1])));
+    let most = places.map(|z| squared_radius(q, z)).fold(0.0, f64::max).sqrt();
+    Some((most.min(q.r[1]), z))
 }
 
 /// Where, on the z axis, `lowest` ≤ r² ≤ `highest`: between the zeros of two functions of second order.
@@ -201,6 +227,10 @@ impl AreaSampler {
             Shape::Quadric(q) => rotation(Outlined::Quadric(*q))?,
             Shape::Asphere(a) => rotation(Outlined::Asphere(a.clone()))?,
             Shape::Torus(t) => rotation(Outlined::Torus(*t))?,
+            Shape::Mesh(mesh) => Self {
+                area: mesh.area(),
+                kind: Kind::Mesh(Arc::clone(mesh)),
+            },
         };
         (sampler.area > 0.0 && sampler.area.is_finite()).then_some(sampler)
     }
@@ -211,10 +241,11 @@ impl AreaSampler {
         self.area
     }
 
-    /// A point of the surface; takes numbers between 0 and 1 from `next` as it needs them.
+    /// A point of the surface and the part that it lies on; takes numbers between 0 and 1 from `next` as it needs them.
     #[must_use]
-    pub fn draw(&self, next: &mut impl FnMut() -> f64) -> Vec3 {
-        match &self.kind {
+    pub fn draw(&self, next: &mut impl FnMut() -> f64) -> (Vec3, u32) {
+        let point = match &self.kind {
+            Kind::Mesh(mesh) => return mesh.sample(next(), next(), next()),
             Kind::Rectangle([width, height]) => Vec3::new((next() - 0.5) * width, (next() - 0.5) * height, 0.0),
             Kind::Annulus([inner, outer]) => {
                 let (x, y) = etendue_sampling::warp::square_to_annulus(next(), next(), *inner, *outer);
@@ -231,10 +262,11 @@ impl AreaSampler {
                 let stretch = stretches[table.pick(next())];
                 let s = stretch.from + next() * (stretch.to - stretch.from);
                 if next() * stretch.most <= outlined.density(s) {
-                    return outlined.point(s, next());
+                    break outlined.point(s, next());
                 }
             },
-        }
+        };
+        (point, 0)
     }
 }
 
@@ -246,7 +278,11 @@ fn rotation(outlined: Outlined) -> Option<AreaSampler> {
             let at = |i: usize| from + (to - from) * (i as f64 / STRETCHES as f64);
             let (from, to) = (at(i), at(i + 1));
             let most = outlined.bound(from, to);
-            area += (to - from) * GAUSS.iter().map(|[x, w]| w * outlined.density(from + x * (to - from))).sum::<f64>();
+            area += (to - from)
+                * GAUSS
+                    .iter()
+                    .map(|[x, w]| w * outlined.density(from + x * (to - from)))
+                    .sum::<f64>();
             // Picked by the area under the bound: rejection leaves the area under the density.
             areas.push((to - from) * most);
             stretches.push(Stretch { from, to, most });
@@ -284,7 +320,9 @@ fn triangulate(vertices: &[[f64; 2]]) -> Vec<[[f64; 2]; 3]> {
             let corner = [rest[(i + n - 1) % n], rest[i], rest[(i + 1) % n]];
             let holds = |p: &[f64; 2]| {
                 let [a, b, c] = corner;
-                [[a, b, *p], [b, c, *p], [c, a, *p]].into_iter().all(|t| twice_area(t) >= 0.0)
+                [[a, b, *p], [b, c, *p], [c, a, *p]]
+                    .into_iter()
+                    .all(|t| twice_area(t) >= 0.0)
             };
             twice_area(corner) > 0.0 && !rest.iter().filter(|p| !corner.contains(p)).any(holds)
         });
@@ -315,13 +353,17 @@ mod tests {
         let mut points = Vec::new();
         for i in 0..n {
             let (mut block, mut k, mut numbers) = (0, 4, [0.0; 4]);
-            points.push(sampler.draw(&mut || {
-                if k == 4 {
-                    (numbers, k, block) = (stream.uniforms(i, block), 0, block + 1);
-                }
-                k += 1;
-                numbers[k - 1]
-            }));
+            points.push(
+                sampler
+                    .draw(&mut || {
+                        if k == 4 {
+                            (numbers, k, block) = (stream.uniforms(i, block), 0, block + 1);
+                        }
+                        k += 1;
+                        numbers[k - 1]
+                    })
+                    .0,
+            );
         }
         points
     }
@@ -358,7 +400,10 @@ mod tests {
         near(area(&paraboloid), exact);
         let same = Asphere::new(1.0 / (2.0 * f), -1.0, vec![], [0.0, rim]).expect("sound");
         near(area(&Shape::Asphere(same)), exact);
-        near(area(&Shape::Torus(Torus { major: 3.0, minor: 1.0 })), 4.0 * PI * PI * 3.0);
+        near(
+            area(&Shape::Torus(Torus { major: 3.0, minor: 1.0 })),
+            4.0 * PI * PI * 3.0,
+        );
         // A cone from its apex: π r s.
         let cone = Shape::Quadric(Quadric {
             r2: 1.0,
@@ -370,8 +415,18 @@ mod tests {
         });
         near(area(&cone), PI * 2.0 * 20.0_f64.sqrt());
         let l = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
-        near(area(&Shape::Flat(Flat { outline: Outline::Polygon { vertices: l } })), 3.0);
-        assert!(AreaSampler::new(&Shape::Flat(Flat { outline: Outline::Whole })).is_none());
+        near(
+            area(&Shape::Flat(Flat {
+                outline: Outline::Polygon { vertices: l },
+            })),
+            3.0,
+        );
+        assert!(
+            AreaSampler::new(&Shape::Flat(Flat {
+                outline: Outline::Whole
+            }))
+            .is_none()
+        );
     }
 
     /// χ² of counts in bins of equal share.
@@ -409,7 +464,13 @@ mod tests {
                         vertices: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]],
                     },
                 }),
-                |p| if p.x < 1.0 { 2.0 * p.x / 3.0 } else { (2.0 + (p.x - 1.0)) / 3.0 },
+                |p| {
+                    if p.x < 1.0 {
+                        2.0 * p.x / 3.0
+                    } else {
+                        (2.0 + (p.x - 1.0)) / 3.0
+                    }
+                },
             ),
         ];
         for (shape, share) in cases {
@@ -417,7 +478,7 @@ mod tests {
             let places: Vec<f64> = points.iter().map(|p| share(*p)).collect();
             assert!(chi_square(&places, 50) < 95.2, "{shape:?}");
             for p in points.iter().take(1000) {
-                assert!((shape.settle(*p).0 - *p).length() < 1e-12);
+                assert!((shape.settle(*p, 0).0 - *p).length() < 1e-12);
             }
         }
     }

@@ -62,12 +62,22 @@ impl Torus {
         let half = half.sqrt();
         let origin = if leaving { 0.0 } else { middle };
         let p = o + d * origin;
-        let (lo, hi) = (range[0].max(middle - half) - origin, range[1].min(middle + half) - origin);
+        let (lo, hi) = (
+            range[0].max(middle - half) - origin,
+            range[1].min(middle + half) - origin,
+        );
         let lo = if leaving { lo.max(0.0) } else { lo };
-        let (pd, w) = (p.dot(d), p.dot(p) + (self.major + self.minor) * (self.major - self.minor));
+        let (pd, w) = (
+            p.dot(d),
+            p.dot(p) + (self.major + self.minor) * (self.major - self.minor),
+        );
         let k = 4.0 * self.major * self.major;
         let along = Along([
-            if leaving { 0.0 } else { w * w - k * (p.x * p.x + p.y * p.y) },
+            if leaving {
+                0.0
+            } else {
+                w * w - k * (p.x * p.x + p.y * p.y)
+            },
             4.0 * w * pd - 2.0 * k * (p.x * d.x + p.y * d.y),
             2.0 * w + 4.0 * pd * pd - k * (d.x * d.x + d.y * d.y),
             4.0 * pd,

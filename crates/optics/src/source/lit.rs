@@ -69,17 +69,30 @@ impl Lantern {
             });
         };
         let field = sampler.field();
-        let fluxes: Vec<f64> = field.parts.iter().map(etendue_lightfield::field::PartField::flux).collect();
+        let fluxes: Vec<f64> = field
+            .parts
+            .iter()
+            .map(etendue_lightfield::field::PartField::flux)
+            .collect();
         let total: f64 = fluxes.iter().sum();
         let parts = field.parts.iter().zip(&fluxes).map(|(part, flux)| {
             let [n1, n2, n3, n4] = part.cells;
             let means = part.cell_means(1);
-            let light: Vec<f64> = means.chunks(n3 * n4).map(|cell| cell.iter().map(|r| r.value).sum()).collect();
+            let light: Vec<f64> = means
+                .chunks(n3 * n4)
+                .map(|cell| cell.iter().map(|r| r.value).sum())
+                .collect();
             let sum: f64 = light.iter().sum();
             let even = 1.0 / light.len() as f64;
             let shares: Vec<f64> = light
                 .iter()
-                .map(|l| if sum > 0.0 { (1.0 - EVEN) * l / sum + EVEN * even } else { even })
+                .map(|l| {
+                    if sum > 0.0 {
+                        (1.0 - EVEN) * l / sum + EVEN * even
+                    } else {
+                        even
+                    }
+                })
                 .collect();
             Some(PlaceTable {
                 share: flux / total,
@@ -100,8 +113,8 @@ impl Lantern {
         match &source.emitter {
             Emitter::Surface(surface) => {
                 let (shape, flipped) = surface.shape();
-                shape.crossings(p, k, [0.0, reach], false, |crossing| {
-                    let (_, normal) = shape.settle(p + k * crossing.t);
+                shape.crossings(p, k, [0.0, reach], &[], |crossing| {
+                    let (_, normal) = shape.settle(p + k * crossing.t, crossing.part);
                     let cosine = if flipped { k.dot(normal) } else { -k.dot(normal) };
                     if crossing.t > 0.0 && cosine > 0.0 {
                         visit(Lit {
@@ -211,7 +224,11 @@ fn towards(point: Vec3, normal: Vec3, p: Vec3) -> Option<(f64, f64)> {
 
 impl PlaceTable {
     /// Density of a place by its share of the area, times that of the part.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places lie in 0..1")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "places lie in 0..1"
+    )]
     fn density(&self, place: [f64; 2]) -> f64 {
         let [n1, n2] = self.cells;
         let at = |x: f64, n: usize| ((x * n as f64) as usize).min(n - 1);

@@ -30,6 +30,16 @@ impl Numbers {
         }
     }
 
+    /// Those of ray `index` from the beginning, the first four being known.
+    #[inline]
+    #[must_use]
+    pub const fn begun(stream: Stream, index: u64, four: [f64; 4]) -> Self {
+        let mut numbers = Self::new(stream, index, 1);
+        numbers.held = four;
+        numbers.used = 0;
+        numbers
+    }
+
     /// The coordinates of a point, then those of ray `index`.
     #[must_use]
     pub const fn after(point: [f64; DIMENSIONS], stream: Stream, index: u64) -> Self {

@@ -57,7 +57,11 @@ impl PointSource {
     /// The two planes of cell `i` and the angle between them.
     fn planes(&self, i: usize) -> (usize, usize, f64) {
         let next = (i + 1) % self.c.len();
-        let width = if next == 0 { self.c[0] + 2.0 * PI - self.c[i] } else { self.c[next] - self.c[i] };
+        let width = if next == 0 {
+            self.c[0] + 2.0 * PI - self.c[i]
+        } else {
+            self.c[next] - self.c[i]
+        };
         (i, next, width)
     }
 
@@ -84,7 +88,11 @@ impl PointSource {
         let j = (self.gamma.partition_point(|g| *g <= gamma).max(1) - 1).min(n - 2);
         let v = (gamma - self.gamma[j]) / (self.gamma[j + 1] - self.gamma[j]);
         // Before the first plane lies the cell after the last one.
-        let i = self.c.partition_point(|c| *c <= turn).checked_sub(1).unwrap_or(self.c.len() - 1);
+        let i = self
+            .c
+            .partition_point(|c| *c <= turn)
+            .checked_sub(1)
+            .unwrap_or(self.c.len() - 1);
         let (a, b, width) = self.planes(i);
         let u = (turn - self.c[i]).rem_euclid(2.0 * PI) / width;
         let at = |plane: usize| (1.0 - v) * self.values[plane * n + j] + v * self.values[plane * n + j + 1];
@@ -123,7 +131,9 @@ mod tests {
     fn lopsided() -> PointSource {
         let c = [0.3, 1.0, 2.5, 5.0].to_vec();
         let gamma = [0.1, 0.6, 1.2, 2.0].to_vec();
-        let values = [1.0, 3.0, 2.0, 0.0, 2.0, 0.5, 4.0, 1.0, 0.0, 1.0, 0.2, 0.1, 5.0, 1.0, 1.0, 2.0];
+        let values = [
+            1.0, 3.0, 2.0, 0.0, 2.0, 0.5, 4.0, 1.0, 0.0, 1.0, 0.2, 0.1, 5.0, 1.0, 1.0, 2.0,
+        ];
         PointSource::new(c, gamma, &values).expect("sound")
     }
 

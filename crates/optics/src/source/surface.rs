@@ -1,9 +1,11 @@
 //! Surfaces that emit.
 
-use etendue_geometry::shape::Shape;
 use etendue_geometry::shape::sample::AreaSampler;
+use etendue_geometry::shape::{Outline, Shape};
 use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
+use etendue_sampling::warp::square_to_annulus;
+use multiversion::multiversion;
 
 use super::numbers::Numbers;
 
@@ -46,14 +48,38 @@ impl SurfaceSource {
     #[must_use]
     pub fn luminance(&self, cosine: f64) -> f64 {
         let scale = (self.exponent + 1.0) / (2.0 * std::f64::consts::PI * self.sampler.area());
-        if self.exponent == 1.0 { scale } else { scale * cosine.powf(self.exponent - 1.0) }
+        if self.exponent == 1.0 {
+            scale
+        } else {
+            scale * cosine.powf(self.exponent - 1.0)
+        }
     }
 
     /// A point spread evenly over the area, and the normal on the emitting side.
     #[must_use]
     pub fn draw_point(&self, numbers: &mut Numbers) -> (Vec3, Vec3) {
-        let (point, normal) = self.shape.settle(self.sampler.draw(&mut || numbers.next()));
+        let (point, part) = self.sampler.draw(&mut || numbers.next());
+        let (point, normal) = self.shape.settle(point, part);
         (point, if self.flipped { -normal } else { normal })
+    }
+
+    /// A block of rays of a Lambertian disk, annulus or rectangle, from four numbers each, several at a time: what
+    /// [`SurfaceSource::draw`] draws. False, and nothing is done, for other surfaces.
+    pub fn draw_block(
+        &self,
+        numbers: &[Vec<f64>; 4],
+        position: &mut [Vec<f64>; 3],
+        direction: &mut [Vec<f64>; 3],
+    ) -> bool {
+        let Shape::Flat(flat) = &self.shape else { return false };
+        let sign = if self.flipped { -1.0 } else { 1.0 };
+        match flat.outline {
+            _ if self.exponent != 1.0 => return false,
+            Outline::Annulus { inner, outer } => draw_annulus([inner, outer], sign, numbers, position, direction),
+            Outline::Rectangle { width, height } => draw_rectangle([width, height], sign, numbers, position, direction),
+            Outline::Whole | Outline::Polygon { .. } => return false,
+        }
+        true
     }
 
     /// A ray with density ∝ cosⁿθ.
@@ -71,8 +97,54 @@ impl SurfaceSource {
     }
 }
 
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn draw_annulus(
+    radii: [f64; 2],
+    sign: f64,
+    numbers: &[Vec<f64>; 4],
+    position: &mut [Vec<f64>; 3],
+    direction: &mut [Vec<f64>; 3],
+) {
+    draw_flat(sign, numbers, position, direction, |u, v| {
+        square_to_annulus(u, v, radii[0], radii[1])
+    });
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn draw_rectangle(
+    sides: [f64; 2],
+    sign: f64,
+    numbers: &[Vec<f64>; 4],
+    position: &mut [Vec<f64>; 3],
+    direction: &mut [Vec<f64>; 3],
+) {
+    draw_flat(sign, numbers, position, direction, |u, v| {
+        ((u - 0.5) * sides[0], (v - 0.5) * sides[1])
+    });
+}
+
+#[inline(always)]
+fn draw_flat(
+    sign: f64,
+    numbers: &[Vec<f64>; 4],
+    position: &mut [Vec<f64>; 3],
+    direction: &mut [Vec<f64>; 3],
+    place: impl Fn(f64, f64) -> (f64, f64),
+) {
+    let n = numbers[0].len();
+    let [a, b, c, d] = numbers.each_ref().map(|v| &v[..n]);
+    let [px, py, pz] = position.each_mut().map(|v| &mut v[..n]);
+    let [kx, ky, kz] = direction.each_mut().map(|v| &mut v[..n]);
+    for i in 0..n {
+        (px[i], py[i]) = place(a[i], b[i]);
+        pz[i] = 0.0;
+        let k = about(Vec3::new(0.0, 0.0, sign), (1.0 - c[i]).sqrt(), d[i]);
+        (kx[i], ky[i], kz[i]) = (k.x, k.y, k.z);
+    }
+}
+
 /// The unit vector at an angle with this cosine from the unit vector `axis`, at an azimuth in turns.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn about(axis: Vec3, cosine: f64, turn: f64) -> Vec3 {
     let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
@@ -85,7 +157,7 @@ pub fn about(axis: Vec3, cosine: f64, turn: f64) -> Vec3 {
 ///
 /// Duff, Burgess, Christensen, Hery, Kensler, Liani, Villemin, "Building an orthonormal basis, revisited" (2017),
 /// `[Duff2017]`.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn across(n: Vec3) -> [Vec3; 2] {
     let sign = 1.0_f64.copysign(n.z);

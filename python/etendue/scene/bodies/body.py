@@ -27,6 +27,8 @@ class Face:
         Whether the shape's own normal points into the body.
     group : str, optional
         A name that it shares with like faces.
+    doubts : tuple of str
+        What makes one doubt that the body is closed.
 
     Examples
     --------
@@ -39,6 +41,7 @@ class Face:
     frame: Frame = HERE
     flip: bool = False
     group: str | None = None
+    doubts: tuple[str, ...] = ()
 
 
 class Body(Description, abc.ABC):

@@ -122,28 +122,21 @@ class Profile(Description):
         return record
 
 
-class Asphere(Shape):
-    """A conic or even asphere with its vertex in the origin, about the z axis; its normal points to positive z.
+class Revolved(Shape, abc.ABC):
+    """What surfaces with a sag share: the vertex in the origin, the axis along z, the normal with positive z.
 
     Parameters
     ----------
-    radius_of_curvature, conic, coefficients
+    radius_of_curvature, conic
         As of `Profile`.
     radius : number
         Of the rim [mm], > 0.
     inner_radius : number
         Of a round hole about the axis [mm].
-
-    Examples
-    --------
-    >>> Asphere(radius_of_curvature=10, conic=-1, coefficients=[1e-5], radius=8).profile().sag(2.0)
-    0.20016
     """
 
-    kind: Literal["asphere"] = "asphere"
     radius_of_curvature: Number | None = None
     conic: Number = 0.0
-    coefficients: Coefficients = Field(default=())
     radius: Length
     inner_radius: LengthOrZero = 0.0
 
@@ -154,9 +147,9 @@ class Asphere(Shape):
             raise ValueError(f"'inner_radius' is {self.inner_radius:g}; it must be below 'radius'")
         return self
 
+    @abc.abstractmethod
     def profile(self) -> Profile:
         """The sag."""
-        return Profile(radius_of_curvature=self.radius_of_curvature, conic=self.conic, coefficients=self.coefficients)
 
     def sheet(self, trim: Trim, files: Files) -> Sheet:  # noqa: ARG002 - other shapes come from files
         """The surface; ranges of radii narrow its own, ranges of z are half spaces."""
@@ -166,8 +159,13 @@ class Asphere(Shape):
         return Sheet(self.profile().record(inner, outer), [*trim.planes(), *trim.planes_of_z()])
 
 
-class Conic(Asphere):
-    """A conic of revolution by its sag: an `Asphere` without coefficients.
+class Conic(Revolved):
+    """A conic of revolution by its sag.
+
+    Parameters
+    ----------
+    radius_of_curvature, conic, radius, inner_radius
+        As of `Revolved`.
 
     Examples
     --------
@@ -175,8 +173,35 @@ class Conic(Asphere):
     -0.2
     """
 
-    kind: Literal["conic"] = "conic"  # type: ignore[assignment]
-    coefficients: Annotated[Numbers, MaxLen(0)] = Field(default=())
+    kind: Literal["conic"] = "conic"
+
+    def profile(self) -> Profile:
+        """The sag, without coefficients."""
+        return Profile(radius_of_curvature=self.radius_of_curvature, conic=self.conic)
+
+
+class Asphere(Revolved):
+    """An even asphere.
+
+    Parameters
+    ----------
+    radius_of_curvature, conic, radius, inner_radius
+        As of `Revolved`.
+    coefficients : numbers
+        As of `Profile`.
+
+    Examples
+    --------
+    >>> Asphere(radius_of_curvature=10, conic=-1, coefficients=[1e-5], radius=8).profile().sag(2.0)
+    0.20016
+    """
+
+    kind: Literal["asphere"] = "asphere"
+    coefficients: Coefficients = Field(default=())
+
+    def profile(self) -> Profile:
+        """The sag with all its terms."""
+        return Profile(radius_of_curvature=self.radius_of_curvature, conic=self.conic, coefficients=self.coefficients)
 
 
 class Mirror(Quadric, abc.ABC):

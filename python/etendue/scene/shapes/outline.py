@@ -62,12 +62,10 @@ def simple_polygon(vertices: npt.ArrayLike) -> None:
         others = others[(low[others, 1] <= high[side, 1]) & (high[others, 1] >= low[side, 1])]
         for other in others[_touch(start[side], end[side], start[others], end[others])]:
             first, second = sorted((int(side), int(other)))
+            # Neighbours share a corner. If the second ran back along the first, its other end, or that of the first,
+            # would lie on it, and so would the side that begins or ends there.
             if second - first in (1, n - 1):
-                follows, leads = (second, first) if second - first == 1 else (first, second)
-                # Neighbours share a corner; they touch elsewhere only if the second runs back along the first.
-                back, on = start[leads] - end[leads], end[follows] - start[follows]
-                if back[0] * on[1] - back[1] * on[0] != 0.0 or back @ on < 0.0:
-                    continue
+                continue
             raise ValueError(f"'vertices': sides {first} and {second} touch or cross")
     if signed_area(start) == 0.0:
         raise ValueError("'vertices': the polygon has no area")

@@ -133,6 +133,27 @@ class Shape(Description, abc.ABC):
         """
 
 
+def is_bounded(shape: Record) -> bool:
+    """Whether a shape, as the core takes it, has an end in all directions; half spaces do not count.
+
+    Examples
+    --------
+    >>> is_bounded({"kind": "flat", "outline": {"kind": "whole"}})
+    False
+    """
+    if shape["kind"] == "flat":
+        return bool(shape["outline"]["kind"] != "whole")
+    if shape["kind"] != "quadric" or shape["r"][1] < math.inf:
+        return True
+    r2, z2, z1, z0 = (shape[name] for name in ("r2", "z2", "z1", "z0"))
+    # Far up and far down, r² = -(z2 z² + z1 z + z0)/r2 has the sign of its leading term; below 0 there is no surface.
+    for end, sign in zip(shape["z"], (-1.0, 1.0), strict=True):
+        leading = -(z2 or z1 * sign or z0) / r2
+        if math.isinf(end) and leading > 0.0:
+            return False
+    return True
+
+
 def overlap(own: tuple[float, float], other: tuple[float, float] | None) -> tuple[float, float]:
     """The part that two ranges have in common; empty ranges end before they begin.
 

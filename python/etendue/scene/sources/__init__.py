@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from etendue.scene.sources.from_files import Field, Point, Rays
+from etendue.scene.sources.gridded import Gridded
 from etendue.scene.sources.source import Source
 from etendue.scene.sources.surfaces import Beam, Rings, Surface
 
 SOURCES: dict[str, type[Source]] = {
-    cls.model_fields["kind"].default: cls for cls in (Rays, Field, Surface, Rings, Point, Beam)
+    cls.model_fields["kind"].default: cls for cls in (Rays, Field, Gridded, Surface, Rings, Point, Beam)
 }
 """Every source by its kind."""
 
-__all__ = ["SOURCES", "Beam", "Field", "Point", "Rays", "Rings", "Source", "Surface"]
+__all__ = ["SOURCES", "Beam", "Field", "Gridded", "Point", "Rays", "Rings", "Source", "Surface"]

@@ -8,19 +8,18 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Le, MaxLen, MinLen
+from annotated_types import MaxLen, MinLen
 from pydantic import model_validator
 
 from etendue.quantities.spectrum import Spectrum, photopic_efficiency
 from etendue.scene.files import Files
 from etendue.scene.placement import Placement
-from etendue.scene.values import AsRow, NotNegative, Positive
+from etendue.scene.values import AsRow, NotNegative, Wavelength
 from etendue.units import FluxUnit
 
 Array = npt.NDArray[np.float64]
 Record = dict[str, Any]
-Line = Annotated[tuple[Positive, NotNegative], AsRow]
-Wavelength = Annotated[Positive, Le(1e9)]
+Line = Annotated[tuple[Wavelength, NotNegative], AsRow]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -120,7 +119,7 @@ def lines_of(spectrum: Spectrum, flux_unit: FluxUnit) -> tuple[Array, Array]:
     wavelength, weight = spectrum.wavelength, spectrum.weight
     if wavelength.size > 1:
         gaps = np.diff(wavelength)
-        weight = weight * (np.append(gaps, 0.0) + np.insert(gaps, 0, 0.0)) / 2.0
+        weight = weight * (np.append(gaps, 0.0) + np.insert(gaps, 0, 0.0))  # twice the trapezoids; only ratios count
     if flux_unit == "lm":
         weight = weight * photopic_efficiency(wavelength)
     kept = weight > 0.0

@@ -8,11 +8,12 @@ from typing import Annotated, Literal, Self
 from annotated_types import Ge, Le, MaxLen, MinLen
 from pydantic import model_validator
 
+from etendue.errors import ArgumentError
 from etendue.scene.families import Family
 from etendue.scene.files import Files
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.flat import FLAT, Plane
-from etendue.scene.shapes.shape import WHOLE, Shape, Trim
+from etendue.scene.shapes.shape import WHOLE, Shape, Trim, is_bounded
 from etendue.scene.sources.source import Emitter, Source
 from etendue.scene.values import AsRow, Length, Number, Positive
 from etendue.units import FluxUnit
@@ -53,6 +54,10 @@ class Surface(Source):
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The trimmed shape."""
         sheet = self.shape.sheet(self.trim, files)
+        if not is_bounded(sheet.shape):
+            raise ArgumentError(
+                "shape: this surface has no end, so its luminance would be 0; give a radius, or trim it"
+            )
         record = {
             "kind": "surface",
             "shape": sheet.shape,

@@ -1,0 +1,138 @@
+"""Triangle meshes as surfaces, from files or from numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from annotated_types import Ge, Le, MaxLen, MinLen
+from pydantic import model_validator
+
+from etendue.errors import ArgumentError
+from etendue.scene.files import Files
+from etendue.scene.mesh_files import read_mesh
+from etendue.scene.shapes.shape import Record, Shape, Sheet, Trim
+from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
+from etendue.scene.values import LONGEST, AsRow, Index, Length, Number, Point
+
+Array = npt.NDArray[np.float64]
+Triangle = Annotated[tuple[Index, Index, Index], AsRow]
+Unit = Literal["nm", "um", "mm", "cm", "m", "inch", "feet"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Triangulation:
+    """A mesh, welded, in mm: vertices (n, 3), triangles (m, 3), and edges that no two triangles share (k, 2).
+
+    Examples
+    --------
+    >>> triangle = Mesh(vertices=[(0, 0, 0), (1, 0, 0), (0, 1, 0)], triangles=[(0, 1, 2)])
+    >>> len(triangle.triangulation(Files()).open_edges)
+    3
+    """
+
+    vertices: Array
+    triangles: npt.NDArray[np.int64]
+    open_edges: npt.NDArray[np.int64]
+
+    @property
+    def volume(self) -> float:
+        """Volume within [mm³], if the mesh is closed."""
+        return volume(self.vertices, self.triangles)
+
+
+class Mesh(Shape):
+    """A triangle mesh, as a surface or as a solid. Its normal is on the side from which triangles run counter-clockwise.
+
+    As a solid it has the face ``surface``.
+
+    Parameters
+    ----------
+    file : path, optional
+        STL, OBJ, PLY or glTF; STEP with ``pip install 'etendue[step]'``. All bodies of the file are taken as one.
+    vertices : rows of 3 numbers, optional
+        Instead of a file [mm].
+    triangles : rows of 3 integers, optional
+        Numbers of vertices, from 0.
+    unit : str, optional
+        Of the file's lengths: nm, um, mm, cm, m, inch, feet. STL, OBJ and PLY do not say; without it they are taken to be
+        in mm. glTF is in m. STEP knows its own.
+    scale : number
+        By which all lengths are multiplied.
+    tolerance : number, optional
+        Of STEP files: largest distance between a surface and the triangles made of it [mm]; 0.01 if left out.
+    crease_angle : number, optional
+        [°] Neighbours whose normals differ by less are one smooth surface, with interpolated normals. Flat triangles
+        without it.
+
+    Examples
+    --------
+    >>> Mesh(file="reflector.stl", unit="inch").unit
+    'inch'
+    """
+
+    kind: Literal["mesh"] = "mesh"
+    file: Path | None = None
+    vertices: Annotated[tuple[Point, ...], MinLen(3), MaxLen(1 << 20), AsRow] | None = None
+    triangles: Annotated[tuple[Triangle, ...], MinLen(1), MaxLen(1 << 21), AsRow] | None = None
+    unit: Unit | None = None
+    scale: Annotated[Number, Ge(1e-9), Le(1e9)] = 1.0
+    tolerance: Annotated[Length, Ge(1e-4)] | None = None
+    crease_angle: Annotated[Number, Ge(0.0), Le(180.0)] | None = None
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> Self:
+        if (self.vertices is None) != (self.triangles is None):
+            raise ValueError("'vertices' and 'triangles' belong together: give both or neither")
+        if (self.file is None) == (self.vertices is None):
+            raise ValueError("give either a 'file', or 'vertices' and 'triangles'")
+        if self.vertices is not None and self.triangles is not None:
+            for key in ("unit", "tolerance"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"{key!r} is that of a file; 'vertices' are in mm, and exact")
+            largest = max(map(max, self.triangles))
+            if largest >= len(self.vertices):
+                raise ValueError(f"'triangles' name vertex {largest}, and there are {len(self.vertices)}, from 0")
+        return self
+
+    def triangulation(self, files: Files) -> Triangulation:
+        """The mesh, welded.
+
+        Raises
+        ------
+        FormatError
+            If the file is no mesh.
+        ArgumentError
+            If it is larger than any scene, or no triangle has an area.
+        OSError
+            If the file cannot be opened.
+        """
+        if self.file is not None:
+            vertices, triangles = read_mesh(files.find(self.file), self.unit, self.tolerance)
+        else:
+            vertices, triangles = np.array(self.vertices), np.array(self.triangles, dtype=np.int64)
+        vertices = vertices * self.scale
+        if not np.abs(vertices).max() <= LONGEST:
+            raise ArgumentError(
+                f"the mesh reaches {np.abs(vertices).max():.3g} mm, more than {LONGEST:g}; check its unit"
+            )
+        vertices, triangles = welded(vertices, triangles)
+        if not len(triangles):
+            raise ArgumentError("no triangle of the mesh has an area")
+        return Triangulation(vertices, triangles, open_edges(triangles))
+
+    def record(self, mesh: Triangulation) -> Record:
+        """The mesh as the core takes it, with normals if creases are given."""
+        if self.crease_angle is None:
+            return {"kind": "mesh", "vertices": mesh.vertices, "triangles": mesh.triangles, "normals": None}
+        vertices, triangles, normals = smooth_normals(mesh.vertices, mesh.triangles, self.crease_angle)
+        return {"kind": "mesh", "vertices": vertices, "triangles": triangles, "normals": normals}
+
+    def sheet(self, trim: Trim, files: Files) -> Sheet:
+        """The mesh within half spaces; ranges of z are half spaces too."""
+        if trim.radius is not None:
+            raise ArgumentError("trim.radius: a mesh is trimmed by z and half spaces only")
+        return Sheet(self.record(self.triangulation(files)), [*trim.planes(), *trim.planes_of_z()])

@@ -1,0 +1,83 @@
+"""Ray files as surface sources with intensity tables, the method of thesis chapter 3, as sources of scenes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal, Self
+
+from annotated_types import Le
+from pydantic import InstanceOf, model_validator
+from pydantic.json_schema import SkipJsonSchema
+
+from etendue.formats.rays import read_rays
+from etendue.lightfield.gridded.gridded_source import GriddedSource
+from etendue.lightfield.surfaces import parse_surface
+from etendue.scene.files import Files
+from etendue.scene.sources.source import Emitter, Source
+from etendue.scene.values import Count, Index, Length, Positive
+
+
+class Gridded(Source):
+    """Rays drawn from the patches of a `GriddedSource`: a ray file sampled on a surface, pixel by pixel.
+
+    Parameters
+    ----------
+    file : path
+        A ray file.
+    surface : str
+        The carrier surface as on the command line, for example ``"plane:z=0"``.
+    pixel : number
+        Side of the pixels [mm].
+    threshold : number
+        Largest error of the flux of a pixel [%].
+    gridded : GriddedSource
+        In Python, instead of these four.
+    draws : int
+        Rays that are drawn, all of the same flux.
+    seed : int
+        Of the draws.
+    flux : number, optional
+        Total flux that overrides that of the tables [the file's own unit].
+
+    Examples
+    --------
+    >>> Gridded(file="led.tm25ray", surface="plane:z=0", pixel=0.5).draws
+    1000000
+    """
+
+    IN_MEMORY: ClassVar[tuple[str, ...]] = ("gridded",)
+
+    kind: Literal["gridded"] = "gridded"
+    file: Path | None = None
+    surface: str | None = None
+    pixel: Length = 1.0
+    threshold: Positive = 0.021
+    gridded: SkipJsonSchema[InstanceOf[GriddedSource] | None] = None
+    draws: Annotated[Count, Le(1 << 31)] = 1_000_000
+    seed: Index = 1
+    flux: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> Self:
+        if (self.file is None) == (self.gridded is None):
+            raise ValueError(
+                "'file' is missing" if self.file is None else "'file' and 'gridded' are both given; use one"
+            )
+        if (self.file is None) != (self.surface is None):
+            raise ValueError("'surface' belongs to 'file': the carrier surface, for example \"plane:z=0\"")
+        if self.surface is not None:
+            parse_surface(self.surface)
+        return self
+
+    def emitters(self, files: Files) -> tuple[Emitter, ...]:
+        """The rays that were drawn."""
+        gridded = self.gridded
+        if self.file is not None and self.surface is not None:
+            rays = read_rays(files.find(self.file))
+            gridded = GriddedSource.fit(rays, parse_surface(self.surface), self.pixel, self.threshold)
+        assert gridded is not None  # noqa: S101 - one of the two is given
+        drawn = gridded.sample(self.draws, self.seed)
+        flux = drawn.total_flux if self.flux is None else self.flux
+        scale = drawn.flux_scale * flux / drawn.total_flux
+        record = {"kind": "rays", "rays": drawn.core_source(), "scale": scale, "flux": flux}
+        return (Emitter(record, gridded.flux_unit),)

@@ -1,0 +1,201 @@
+"""Finishes: shares of light against what is written, thesis eqs. 4.1 and 4.2, and what cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from etendue.errors import ArgumentError, SceneError
+from etendue.scene import Scene, compile_scene, finishes
+from etendue.scene.files import Files
+from etendue.scene.finishes import BUILT_IN, FINISHES, PARTS
+from etendue.scene.tables import Grid, on_common_nodes
+from scipy.interpolate import RegularGridInterpolator
+
+HERE = Files(Path())
+
+SPECIMENS: dict[str, dict[str, Any]] = {
+    "interface": {},
+    "mirror": {"reflectance": 0.9},
+    "absorber": {},
+    "lambertian": {"reflectance": 0.4, "transmittance": 0.5},
+    "diffuse-specular": {"total_reflectance": 0.9, "specular_reflectance": 0.1},
+    "transmitter": {"transmittance": 0.7},
+    "mixed": {
+        "specular_reflectance": 0.1,
+        "specular_transmittance": 0.2,
+        "diffuse_reflectance": 0.3,
+        "diffuse_transmittance": 0.4,
+    },
+}
+EXPECTED: dict[str, tuple[float, float, float, float]] = {
+    "mirror": (0.9, 0, 0, 0),
+    "absorber": (0, 0, 0, 0),
+    "lambertian": (0, 0, 0.4, 0.5),
+    "diffuse-specular": (0.1, 0, 0.8, 0),
+    "transmitter": (0, 0.7, 0, 0),
+    "mixed": (0.1, 0.2, 0.3, 0.4),
+}
+"""Shares in the order of `PARTS`."""
+
+
+def test_every_finish_is_tested() -> None:
+    assert set(SPECIMENS) == set(FINISHES)
+    assert set(EXPECTED) == set(FINISHES) - {"interface"}
+
+
+@pytest.mark.parametrize("kind", FINISHES)
+def test_shares(kind: str) -> None:
+    """The four shares by hand; an interface leaves them to the media."""
+    record = FINISHES[kind](**SPECIMENS[kind]).record(HERE)
+    if kind == "interface":
+        assert record == {"kind": "fresnel"}
+    else:
+        assert [float(record[part]["values"][0, 0]) for part in PARTS] == pytest.approx(EXPECTED[kind])
+        assert all(record[part]["values"].shape == (1, 1) for part in PARTS)
+
+
+@pytest.mark.parametrize("kind", FINISHES)
+def test_whether_light_gets_in(kind: str) -> None:
+    """Transmission decides, and an interface always lets light in."""
+    transmits = kind == "interface" or EXPECTED[kind][1] + EXPECTED[kind][3] > 0
+    assert FINISHES[kind](**SPECIMENS[kind]).lets_light_in() is transmits
+
+
+def bilinear(record: dict[str, Any], angle: float, wavelength: float) -> float:
+    """A table of the record by scipy, clamped to its edges."""
+    nodes = [record["angle"], record["wavelength"]]
+    values = record["values"]
+    for axis, row in enumerate(nodes):
+        if len(row) == 1:  # scipy asks for two nodes
+            nodes[axis] = np.array([row[0], row[0] + 1.0])
+            values = np.repeat(values, 2, axis=axis)
+    at = [np.clip(v, row[0], row[-1]) for v, row in zip((angle, wavelength), nodes, strict=True)]
+    return float(RegularGridInterpolator(nodes, values)(at)[0])
+
+
+def test_the_diffuse_part_is_what_the_specular_part_leaves() -> None:
+    """Eq. 4.2 at any angle and wavelength: R_diff = R_total(λ) - R_spec(θ), although their nodes differ."""
+    paint = finishes.DiffuseSpecular(
+        total_reflectance={"wavelength": [400, 500, 700], "values": [0.8, 0.95, 0.9]},
+        specular_reflectance={"angle": [5, 45, 80], "values": [0.04, 0.06, 0.5]},
+    )
+    record = paint.record(HERE)
+    rng = np.random.default_rng(3)
+    for angle, wavelength in zip(rng.uniform(0, np.pi / 2, 50), rng.uniform(350, 750, 50), strict=True):
+        total = np.interp(wavelength, [400, 500, 700], [0.8, 0.95, 0.9])
+        specular = np.interp(np.degrees(angle), [5, 45, 80], [0.04, 0.06, 0.5])
+        assert bilinear(record["specular_reflectance"], angle, wavelength) == pytest.approx(specular, abs=1e-12)
+        assert bilinear(record["diffuse_reflectance"], angle, wavelength) == pytest.approx(total - specular, abs=1e-12)
+
+
+def test_tables_on_common_nodes_are_the_same_functions() -> None:
+    """Bilinear between nodes and constant outside, before and after."""
+    rng = np.random.default_rng(4)
+    grids = [
+        Grid(np.sort(rng.uniform(0, 90, n)), np.sort(rng.uniform(400, 700, m)), rng.random((n, m)))
+        for n, m in ((3, 2), (1, 5), (4, 1))
+    ]
+    angle, wavelength, values = on_common_nodes(grids)
+    at = rng.uniform(-10, 100, 40), rng.uniform(300, 800, 40)
+    for grid, common in zip(grids, values, strict=True):
+        again = Grid(angle, wavelength, common)
+        assert again.at(*map(np.sort, at)) == pytest.approx(grid.at(*map(np.sort, at)), abs=1e-13)
+
+
+def test_tables_from_files(tmp_path: Path) -> None:
+    (tmp_path / "r.txt").write_text("0 0.1\n90 0.9\n", encoding="utf-8")
+    for by, angle in (("angle", [0.0, np.pi / 2]), ("wavelength", [0.0])):
+        if by == "wavelength":
+            (tmp_path / "r.txt").write_text("400 0.1\n700 0.9\n", encoding="utf-8")
+        record = finishes.Mirror(reflectance={"file": "r.txt", "by": by}).record(Files(tmp_path))[
+            "specular_reflectance"
+        ]
+        assert record["angle"].tolist() == angle
+        assert record["values"].ravel().tolist() == [0.1, 0.9]
+    (tmp_path / "r.txt").write_text("0 0.1\n91 0.9\n", encoding="utf-8")
+    with pytest.raises(ArgumentError, match="0 to 90°"):
+        finishes.Mirror(reflectance={"file": "r.txt", "by": "angle"}).record(Files(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"values": [1.0]}, "give 'angle', 'wavelength' or both"),
+        ({"angle": [0, 90]}, "give either 'values', or a 'file'"),
+        ({"angle": [0, 91], "values": [0, 0]}, r"angle\[1\]: is 91; it must be at most 90"),
+        ({"angle": [10, 0], "values": [0, 0]}, "'angle' must rise"),
+        ({"angle": [0, 90], "values": [0.5, 1.5]}, "between 0 and 1"),
+        ({"angle": [0, 90], "values": [0.5]}, "the nodes ask for 2 values"),
+        ({"angle": [0, 90], "wavelength": [400, 700], "values": [0.5, 0.5]}, "2 rows of 2 values"),
+        ({"angle": [0, 90], "values": ["a", "b"]}, "must be numbers"),
+        ({"angle": [0, 90], "values": [[0.1], [0.1, 0.2]]}, "must be numbers, or rows"),
+        ({"file": "r.txt"}, "'file' and 'by' belong together"),
+        ({"file": "r.txt", "by": "angle", "angle": [0]}, "columns of the file"),
+        ({"file": "r.txt", "by": "angel"}, "Did you mean 'angle'"),
+    ],
+)
+def test_tables_that_are_none(table: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneError, match=f"reflectance.*{words}"):
+        finishes.Mirror(reflectance=table)
+
+
+def test_more_light_than_arrives() -> None:
+    """At one angle only, and where the specular part exceeds the total."""
+    rising = {"angle": [0, 60, 90], "values": [0.1, 0.2, 0.7]}
+    with pytest.raises(ArgumentError, match=r"add up to 1.2 at 90° and 555 nm"):
+        finishes.Mixed(specular_reflectance=rising, diffuse_transmittance=0.5).record(HERE)
+    with pytest.raises(ArgumentError, match=r"specular_reflectance 0.7 is more than total_reflectance 0.5 at 90°"):
+        finishes.DiffuseSpecular(total_reflectance=0.5, specular_reflectance=rising).record(HERE)
+    # 0.1 + 0.2 + 0.7 exceeds 1 by rounding alone.
+    finishes.Mixed(specular_reflectance=0.1, diffuse_reflectance=0.2, diffuse_transmittance=0.7).record(HERE)
+
+
+def test_names_of_finishes_and_faces() -> None:
+    """Every face has the finish that is nearest to it: its own, its group's, the solid's."""
+    prism = {"kind": "prism", "vertices": [(0, 0), (1, 0), (0, 1)], "height": 1}
+    keys = {"side": {"kind": "absorber"}, "side 2": "mirror", "top": {"kind": "lambertian", "reflectance": 0.5}}
+    scene = Scene(
+        finishes={"grey": {"kind": "mirror", "reflectance": 0.5}},
+        solids=[{"name": "p", "shape": prism, "medium": "PC", "finishes": keys, "finish": "grey"}],
+        surfaces=[{"name": "s", "shape": {"kind": "disk", "radius": 1}, "finish": "absorber"}],
+    )
+    compiled = compile_scene(scene)
+    found = {
+        name: compiled.finish_names[face["finish"]]
+        for name, face in zip(compiled.face_names, compiled.record["faces"], strict=True)
+    }
+    assert found == {
+        "p.side 1": "p.side.finish",
+        "p.side 2": "mirror",
+        "p.side 3": "p.side.finish",
+        "p.bottom": "grey",
+        "p.top": "p.top.finish",
+        "s": "absorber",
+    }
+    assert len(set(compiled.finish_names)) == len(compiled.finish_names) == 5
+
+
+def test_interfaces_on_surfaces_are_told_of() -> None:
+    """The same medium lies on both sides of a surface, so nothing happens there."""
+    disk = {"shape": {"kind": "disk", "radius": 1}}
+    for finish in ("interface", {"kind": "interface"}):
+        (note,) = compile_scene(Scene(surfaces=[{**disk, "name": "pane", "finish": finish}])).notes
+        assert note.startswith("pane: an interface changes nothing")
+    assert compile_scene(Scene(surfaces=[{**disk, "finish": "mirror"}])).notes == ()
+
+
+def test_built_in_finishes() -> None:
+    assert set(BUILT_IN) == {"interface", "absorber", "mirror", "transparent"}
+    transparent = BUILT_IN["transparent"].record(HERE)
+    assert transparent["specular_transmittance"]["values"].tolist() == [[1.0]]
+
+
+def test_a_solid_that_no_light_enters_needs_no_medium() -> None:
+    """A metal block; but not if one face transmits."""
+    block = {"shape": {"kind": "block", "width": 1, "height": 1, "depth": 1}, "finish": "mirror"}
+    assert compile_scene(Scene(solids=[block])).record["solids"] == [{"medium": 0}]
+    with pytest.raises(SceneError, match=r"solids\[0\].medium: is missing"):
+        compile_scene(Scene(solids=[{**block, "finishes": {"top": "interface"}}]))

@@ -1,0 +1,286 @@
+"""Meshes: files of every format, written here byte by byte, and what is done to their triangles."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import json
+import struct
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from etendue.errors import FormatError, SceneError, SceneWarning
+from etendue.scene import Scene, bodies, compile_scene
+from etendue.scene.files import Files
+from etendue.scene.mesh_files import MESH_FORMATS, read_mesh
+from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
+from oracles import step
+from oracles.scenes import OCTAHEDRON, OCTANTS
+
+CORNERS = np.array(OCTAHEDRON)
+
+
+def stl(scale: float) -> bytes:
+    rows = b"".join(struct.pack("<12fH", 0, 0, 0, *(CORNERS[list(t)].ravel() * scale), 0) for t in OCTANTS)
+    return b"solid but binary".ljust(80) + struct.pack("<I", len(OCTANTS)) + rows
+
+
+def stl_ascii(scale: float) -> bytes:
+    facets = []
+    for t in OCTANTS:
+        vertices = "\n".join("vertex {:g} {:g} {:g}".format(*(CORNERS[i] * scale)) for i in t)
+        facets.append(f"facet normal 0 0 0\nouter loop\n{vertices}\nendloop\nendfacet")
+    return ("solid octahedron\n" + "\n".join(facets) + "\nendsolid octahedron\n").encode()
+
+
+def obj(scale: float) -> bytes:
+    lines = ["# an octahedron", *("v {:g} {:g} {:g}".format(*(c * scale)) for c in CORNERS)]
+    return "\n".join([*lines, *("f {} {} {}".format(*(i + 1 for i in t)) for t in OCTANTS), ""]).encode()
+
+
+def ply(scale: float) -> bytes:
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(CORNERS)}\nproperty double x\nproperty double y\nproperty double z\n"
+    head += f"element face {len(OCTANTS)}\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = ["{:g} {:g} {:g}".format(*(c * scale)) for c in CORNERS] + ["3 {} {} {}".format(*t) for t in OCTANTS]
+    return (head + "\n".join(rows) + "\n").encode()
+
+
+def gltf_parts(scale: float) -> tuple[dict[str, Any], bytes]:
+    data = (CORNERS * scale).astype("<f4").tobytes() + np.array(OCTANTS, dtype="<u2").tobytes()
+    corners = len(CORNERS) * 12
+    views = [
+        {"buffer": 0, "byteOffset": 0, "byteLength": corners},
+        {"buffer": 0, "byteOffset": corners, "byteLength": 48},
+    ]
+    low, high = (CORNERS.min(axis=0) * scale).tolist(), (CORNERS.max(axis=0) * scale).tolist()
+    accessors = [
+        {"bufferView": 0, "componentType": 5126, "count": len(CORNERS), "type": "VEC3", "min": low, "max": high},
+        {"bufferView": 1, "componentType": 5123, "count": len(OCTANTS) * 3, "type": "SCALAR"},
+    ]
+    tree = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": len(data)}],
+        "bufferViews": views,
+        "accessors": accessors,
+    }
+    return tree, data
+
+
+def gltf(scale: float) -> bytes:
+    tree, data = gltf_parts(scale)
+    tree["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    return json.dumps(tree).encode()
+
+
+def glb(scale: float) -> bytes:
+    tree, data = gltf_parts(scale)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    data += b"\0" * (-len(data) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+WRITERS: dict[str, Callable[[float], bytes]] = {
+    "stl": stl, "stl_ascii": stl_ascii, "obj": obj, "ply": ply, "gltf": gltf, "glb": glb
+}  # fmt: skip
+
+
+def test_every_format_is_tested() -> None:
+    assert {*WRITERS, "step"} == set(MESH_FORMATS)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_an_octahedron_comes_back_from_every_format(name: str, tmp_path: Path) -> None:
+    """The content tells the format, whatever the name; the unit is the format's, and 4/3 r³ is the volume with it."""
+    path = tmp_path / "body.cad"
+    path.write_bytes(WRITERS[name](1e-3 if name in ("gltf", "glb") else 1.0))
+    vertices, triangles = welded(*read_mesh(path, None))
+    assert len(vertices) == 6
+    assert len(triangles) == 8
+    assert not len(open_edges(triangles))
+    assert volume(vertices, triangles) == pytest.approx(4 / 3 * 8, rel=1e-6)
+    path.write_bytes(WRITERS[name](1.0))
+    inches = bodies.Mesh(file="body.cad", unit="inch", scale=0.5).faces(Files(tmp_path))[0].shape["vertices"]
+    assert np.abs(inches).max() == pytest.approx(25.4, rel=1e-6)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("cascadio") is None, reason="STEP files need the extra [step]")
+def test_step_files_are_read(tmp_path: Path) -> None:
+    """A tetrahedron with legs of 30 mm, as a faceted boundary representation: 30³/6 mm³."""
+    (tmp_path / "body.step").write_text(step.tetrahedron(30.0), encoding="ascii")
+    vertices, triangles = welded(*read_mesh(tmp_path / "body.step", None))
+    assert volume(vertices, triangles) == pytest.approx(30**3 / 6, rel=1e-5)
+    with pytest.raises(FormatError, match="state their unit themselves"):
+        read_mesh(tmp_path / "body.step", "mm")
+
+
+@pytest.mark.skipif(importlib.util.find_spec("cascadio") is None, reason="STEP files need the extra [step]")
+@pytest.mark.parametrize("tolerance", [None, 0.1, 0.002])
+def test_step_surfaces_are_met_within_the_tolerance(tolerance: float | None, tmp_path: Path) -> None:
+    """A sphere of 10 mm: corners lie on it, and the volume is short of 4/3 π R³ by at most area times tolerance."""
+    (tmp_path / "ball.step").write_text(step.sphere(10.0), encoding="ascii")
+    shape = {"kind": "mesh", "file": "ball.step"} | ({} if tolerance is None else {"tolerance": tolerance})
+    scene = Scene.from_dict({"solids": [{"shape": shape, "medium": "BK7"}]}, folder=tmp_path)
+    (face,) = compile_scene(scene).record["faces"]
+    assert np.linalg.norm(face["shape"]["vertices"], axis=1) == pytest.approx(10.0, rel=1e-6)
+    whole = 4 / 3 * np.pi * 1000
+    found = volume(face["shape"]["vertices"], face["shape"]["triangles"])
+    assert whole - 400 * np.pi * (tolerance or 0.01) < found < whole
+
+
+def test_tolerances_are_for_surfaces_that_are_no_triangles_yet(tmp_path: Path) -> None:
+    (tmp_path / "body").write_bytes(stl(1.0))
+    with pytest.raises(FormatError, match="made of triangles already"):
+        read_mesh(tmp_path / "body", None, 0.1)
+
+
+def test_step_without_its_library_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "body.step").write_text(step.tetrahedron(30.0), encoding="ascii")
+    monkeypatch.setitem(sys.modules, "cascadio", None)
+    with pytest.raises(FormatError, match=r"pip install 'etendue\[step\]'"):
+        read_mesh(tmp_path / "body.step", None)
+
+
+@pytest.mark.parametrize(
+    ("raw", "words"),
+    [
+        (b"\0" * 100, "begins no mesh file"),
+        (b"", "begins no mesh file"),
+        (b"ply\nformat", "damaged"),
+        (b"glTF" + b"\xff" * 40, "damaged"),
+        (b'{"asset": ', "damaged"),
+        (b"solid nothing\nendsolid\n", "no triangles"),
+        (b"v 0 0 0\nv 1 0 0\nf 1 2 9\n\n", "damaged"),
+        (b"v 0 0 nan\nv 1 0 0\nv 1 1 0\nf 1 2 3\n\n", "not finite"),
+        (stl(1.0)[:200], "begins no mesh file|damaged|no triangles"),
+    ],
+)
+def test_files_that_are_no_meshes(raw: bytes, words: str, tmp_path: Path) -> None:
+    (tmp_path / "bad").write_bytes(raw)
+    with pytest.raises(FormatError, match=words):
+        read_mesh(tmp_path / "bad", None)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_truncated_files_are_refused_or_smaller(name: str, tmp_path: Path) -> None:
+    """Cut anywhere, a file is an error of ours, or fewer triangles that are those of the file."""
+    whole = WRITERS[name](1.0)
+    for cut in range(0, len(whole), max(1, len(whole) // 23)):
+        (tmp_path / "cut").write_bytes(whole[:cut])
+        try:
+            vertices, triangles = read_mesh(tmp_path / "cut", "mm")
+        except FormatError:
+            continue
+        assert len(triangles) <= 8
+        assert np.abs(vertices).max() <= 2.0
+
+
+def test_open_and_twisted_meshes_are_doubted() -> None:
+    """A missing triangle, and one that is turned over, leave three edges each."""
+    for triangles in (OCTANTS[1:], [tuple(reversed(OCTANTS[0])), *OCTANTS[1:]]):
+        mesh = {"kind": "mesh", "vertices": OCTAHEDRON, "triangles": triangles}
+        scene = Scene(solids=[{"name": "gem", "shape": mesh, "medium": "BK7"}])
+        with pytest.warns(SceneWarning, match=r'solids\[0\] "gem": the mesh is open: 3 edges'):
+            compiled = compile_scene(scene)
+        assert "the mesh is open" in compiled.notes[0]
+
+
+def test_a_mesh_inside_out_is_turned() -> None:
+    """Its face is flipped; that of a proper one is not."""
+    for triangles, flip in ((OCTANTS, False), ([t[::-1] for t in OCTANTS], True)):
+        mesh = {"kind": "mesh", "vertices": OCTAHEDRON, "triangles": triangles}
+        (face,) = compile_scene(Scene(solids=[{"shape": mesh, "medium": "BK7"}])).record["faces"]
+        assert face["flip"] is flip
+
+
+def test_welding_keeps_the_surface() -> None:
+    """Eight triangles with corners of their own, one of them twice and one without an area: 6 corners, 8 triangles."""
+    corners = CORNERS[np.array(OCTANTS).ravel()]
+    corners = np.concatenate([corners, [[0.0, 0, 0], [-0.0, 0, 0], [1, 0, 0]]])
+    vertices, triangles = welded(corners, np.arange(27).reshape(9, 3))
+    assert len(vertices) == 6
+    assert len(triangles) == 8
+    assert volume(vertices, triangles) == pytest.approx(4 / 3 * 8, rel=1e-15)
+
+
+def tube(facets: int) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """A closed prism of many sides about the z axis, radius 1, height 1, with two lids."""
+    angle = 2 * np.pi * np.arange(facets) / facets
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(facets)], axis=1)
+    vertices = np.concatenate([ring, np.add(ring, [0, 0, 1]), [[0, 0, 0], [0, 0, 1]]])
+    i, j = np.arange(facets), (np.arange(facets) + 1) % facets
+    sides = [np.stack([i, j, j + facets], axis=1), np.stack([i, j + facets, i + facets], axis=1)]
+    lids = [np.stack([j, i, np.full(facets, 2 * facets)], 1), np.stack([i, j, np.full(facets, 1)], 1) + facets]
+    lids[1][:, 2] = 2 * facets + 1
+    return vertices, np.concatenate([*sides, *lids])
+
+
+def test_normals_of_a_tube_are_radial_and_its_lids_stay_flat() -> None:
+    """With a crease of 30°, sides of 7.5° each are smooth: at every corner the normal is radial (theirs is, by symmetry),
+    or along the axis. The lids meet the sides at 90°, so each corner of a ring is there twice.
+    """
+    vertices, triangles = tube(48)
+    assert not len(open_edges(triangles))
+    split, faces, normals = smooth_normals(vertices, triangles, 30.0)
+    assert len(split) == 4 * 48 + 2
+    assert np.array_equal(split[faces], vertices[triangles])
+    radial = np.abs(normals[:, 2]) < 0.5
+    assert np.allclose(normals[radial, :2], split[radial, :2], atol=1e-12)
+    assert np.allclose(np.abs(normals[~radial]), [0, 0, 1], atol=1e-12)
+    # Without smoothing every side has its own normals, and with everything smooth every corner has one.
+    assert len(smooth_normals(vertices, triangles, 5.0)[0]) == 2 * 48 * 2 + 2 * 48 + 2
+    assert len(smooth_normals(vertices, triangles, 180.0)[0]) == len(vertices)
+
+
+def test_normals_of_a_sphere() -> None:
+    """An octahedron divided four times, on the unit sphere: normals differ from the radius by less than a facet does."""
+    vertices, triangles = CORNERS / 2, np.array(OCTANTS)
+    for _ in range(4):
+        a, b, c = (vertices[triangles[:, k]] for k in range(3))
+        middles = [(p + q) / np.linalg.norm(p + q, axis=1, keepdims=True) for p, q in ((a, b), (b, c), (c, a))]
+        parts = [(a, middles[0], middles[2]), (b, middles[1], middles[0]), (c, middles[2], middles[1]), tuple(middles)]
+        corners = np.concatenate([np.stack(part, axis=1) for part in parts]).reshape(-1, 3)
+        vertices, triangles = welded(corners, np.arange(len(corners)).reshape(-1, 3))
+    split, _, normals = smooth_normals(vertices, triangles, 45.0)
+    assert len(split) == len(vertices) == 1026
+    cosine = np.einsum("ij,ij->i", split, normals)
+    assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < 1.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({}, "give either a 'file'"),
+        ({"file": "a.stl", "vertices": OCTAHEDRON, "triangles": OCTANTS}, "give either a 'file'"),
+        ({"vertices": OCTAHEDRON}, "belong together"),
+        ({"vertices": OCTAHEDRON, "triangles": [(0, 1, 6)]}, "name vertex 6, and there are 6"),
+        ({"vertices": OCTAHEDRON, "triangles": [(0, 1, -1)]}, "must be at least 0"),
+        ({"vertices": OCTAHEDRON, "triangles": OCTANTS, "unit": "mm"}, "'unit' is that of a file"),
+        ({"file": "a.stl", "unit": "ft"}, "unit: is 'ft'.* Known: nm, um, mm"),
+    ],
+)
+def test_meshes_that_are_none(keys: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        bodies.Mesh(**keys)
+
+
+def test_meshes_that_cannot_be_used() -> None:
+    flat = {"kind": "mesh", "vertices": OCTAHEDRON, "triangles": [(0, 0, 1)]}
+    huge = {"kind": "mesh", "vertices": OCTAHEDRON, "triangles": OCTANTS, "scale": 1e9}
+    trimmed = {"shape": {"kind": "mesh", "vertices": OCTAHEDRON, "triangles": OCTANTS}, "trim": {"radius": [0, 1]}}
+    for thing, words in (
+        ({"shape": flat}, "no triangle of the mesh has an area"),
+        ({"shape": huge}, "check its unit"),
+        (trimmed, "trimmed by z and half spaces only"),
+    ):
+        with pytest.raises(SceneError, match=words):
+            compile_scene(Scene(surfaces=[{**thing, "finish": "mirror"}]))

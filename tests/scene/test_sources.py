@@ -1,0 +1,279 @@
+"""Sources of scenes: flux, units, colours and tables against what their files hold; detectors and observers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue import _core
+from etendue.errors import SceneError
+from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.spectrum import photopic_efficiency
+from etendue.scene import Compiled, Scene, compile_scene, detectors, sources
+from etendue.scene.sources.source import lines_of
+
+DISK = {"kind": "disk", "radius": 1}
+
+
+def compiled(*given: Any, **keys: Any) -> Compiled:
+    return compile_scene(Scene(sources=given, **keys))
+
+
+def source(*given: Any, **keys: Any) -> dict[str, Any]:
+    (record,) = compiled(*given, **keys).record["sources"]
+    found: dict[str, Any] = record
+    return found
+
+
+def rays(**keys: Any) -> et.RaySet:
+    return et.RaySet([[0, 0, 0], [1, 0, 0]], [[0, 0, 1], [0, 0.6, 0.8]], [1.0, 3.0], **keys)
+
+
+def test_every_source_is_tested() -> None:
+    assert set(sources.SOURCES) == {"rays", "light-field", "gridded", "surface", "rings", "point", "beam"}
+    assert set(detectors.DETECTORS) == {"rays", "illuminance", "intensity", "image"}
+
+
+# --- rays --------------------------------------------------------------------------------------------------------------
+
+
+def test_rays_of_a_file_that_states_relative_flux(tmp_path: Path) -> None:
+    """Scale times the sum of stored fluxes is the total: the file's, or the one that is asked for."""
+    et.write_rays(tmp_path / "led.tm25ray", rays())
+    stored = et.read_rays(tmp_path / "led.tm25ray").tally.flux
+    for keys, total in (({}, 4.0), ({"flux": 900}, 900.0)):
+        scene = Scene.from_dict({"sources": [{"kind": "rays", "file": "led.tm25ray", **keys}]}, folder=tmp_path)
+        (record,) = compile_scene(scene).record["sources"]
+        assert record["flux"] == pytest.approx(total, rel=1e-6)
+        assert record["scale"] * stored == pytest.approx(total, rel=1e-6)
+        assert len(record["rays"]) == 2
+
+
+def test_rays_in_memory_with_relative_flux() -> None:
+    """Stored 1 and 3, which share 10 lm: a factor of 2.5, and twice that for 20 lm."""
+    relative = rays().replace(declared_flux=10.0)
+    assert source(sources.Rays(rays=relative))["scale"] == pytest.approx(2.5)
+    assert source(sources.Rays(rays=relative, flux=20))["scale"] == pytest.approx(5.0)
+
+
+def test_watts_become_lumens_through_the_spectrum() -> None:
+    """683 lm/W at 555 nm; with a flux of one's own the unit is a statement about that flux."""
+    line = rays(flux_unit="W", spectra=(et.Spectrum([555.0], [1.0]),))
+    assert source(sources.Rays(rays=line))["flux"] == pytest.approx(4.0)
+    assert compiled(sources.Rays(rays=line)).flux_unit == "W"
+    lumens = compiled(sources.Rays(rays=line, flux_unit="lm"))
+    assert lumens.flux_unit == "lm"
+    assert lumens.record["sources"][0]["flux"] == pytest.approx(4 * 683.0)
+    stated = compiled(sources.Rays(rays=rays(flux_unit="W"), flux_unit="lm", flux=10))
+    assert (stated.flux_unit, stated.record["sources"][0]["flux"]) == ("lm", 10.0)
+    with pytest.raises(SceneError, match=r"sources\[0\]: .*spectrum"):
+        compiled(sources.Rays(rays=rays(flux_unit="W"), flux_unit="lm"))
+
+
+def test_streams_of_rays_are_sources_too() -> None:
+    """A source that draws its rays, in memory."""
+    record = source(sources.Rays(rays=et.RingSource(rays=1000)))
+    assert record["flux"] == pytest.approx(600.0)
+    with pytest.raises(SceneError, match="cannot be turned into"):
+        compiled(sources.Rays(rays=et.RingSource(rays=1000), flux_unit="W"))
+
+
+def test_rays_that_cannot_be_used(tmp_path: Path) -> None:
+    dark = et.RaySet([[0, 0, 0]], [[0, 0, 1]], [0.0])
+    with pytest.raises(SceneError, match="carry no flux"):
+        compiled(sources.Rays(rays=dark))
+    far = et.RaySet.from_records(
+        np.array([((0, 0, 1), 1.0)], dtype=[("direction", "<f8", (3,)), ("flux", "<f8")]), RaySetMeaning()
+    )
+    with pytest.raises(SceneError, match="directions only"):
+        compiled(sources.Rays(rays=far))
+    (tmp_path / "no.ray").write_bytes(b"nothing")
+    scene = Scene.from_dict({"sources": [{"kind": "rays", "file": "no.ray"}]}, folder=tmp_path)
+    with pytest.raises(SceneError, match="begins no ray file"):
+        compile_scene(scene)
+
+
+# --- colours -----------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_stated_goes_before_the_file_and_the_file_before_the_scene() -> None:
+    blue = rays(spectra=(et.Spectrum([450.0], [1.0]),))
+    assert source(sources.Rays(rays=rays()), wavelength=600)["wavelengths"].tolist() == [600]
+    assert source(sources.Rays(rays=blue), wavelength=600)["wavelengths"].tolist() == [450]
+    assert source(sources.Rays(rays=blue, wavelength=500))["wavelengths"].tolist() == [500]
+    lines = source(sources.Rays(rays=blue, spectrum=[[500, 1], [600, 3]]))
+    assert lines["wavelengths"].tolist() == [500, 600]
+    assert lines["shares"].tolist() == [0.25, 0.75]
+
+
+def test_rays_with_a_colour_each_are_told_of() -> None:
+    coloured = rays(wavelength=[450.0, 600.0])
+    found = compiled(sources.Rays(rays=coloured, name="led"))
+    assert found.record["sources"][0]["wavelengths"].tolist() == [555]
+    assert found.notes == ("led: every ray has a colour of its own in the file; state wavelength or spectrum for all",)
+    assert compiled(sources.Rays(rays=coloured, name="led", wavelength=500)).notes == ()
+
+
+def test_a_spectrum_as_lines() -> None:
+    """Trapezoids around the nodes; in lumens every node counts with V(λ), and the mean wavelength is that integral's."""
+    nodes = np.array([400.0, 500.0, 550.0, 700.0, 900.0])
+    weight = np.array([1.0, 2.0, 4.0, 1.0, 1.0])
+    wavelength, shares = lines_of(et.Spectrum(nodes, weight), "W")
+    widths = np.array([50.0, 75.0, 100.0, 175.0, 100.0])
+    assert shares == pytest.approx(weight * widths / (weight * widths).sum())
+    assert wavelength.tolist() == nodes.tolist()
+    wavelength, shares = lines_of(et.Spectrum(nodes, weight), "lm")
+    bright = weight * widths * photopic_efficiency(nodes)
+    assert wavelength.tolist() == nodes[:4].tolist()  # V is 0 at 900 nm
+    assert shares == pytest.approx((bright / bright.sum())[:4])
+
+
+# --- tables and surfaces -----------------------------------------------------------------------------------------------
+
+
+def test_an_intensity_file_as_a_point(tmp_path: Path) -> None:
+    """The table in radians; its flux, or the one that is stated."""
+    spot = et.Intensity(c=[0, 90, 180, 270], gamma=[0, 30, 90], values=[[9, 4, 0], [9, 3, 0], [9, 2, 0], [9, 1, 0]])
+    et.write_intensity(tmp_path / "spot.ies", spot)
+    for keys, flux in (({}, spot.flux), ({"flux": 700}, 700.0)):
+        scene = Scene.from_dict({"sources": [{"kind": "point", "file": "spot.ies", **keys}]}, folder=tmp_path)
+        (record,) = compile_scene(scene).record["sources"]
+        assert record["flux"] == pytest.approx(flux, rel=1e-4)
+        assert np.degrees(record["gamma"]).tolist() == pytest.approx([0, 30, 90])
+        assert np.degrees(record["c"]).tolist() == pytest.approx([0, 90, 180, 270])
+        assert record["values"][2] == pytest.approx([9, 2, 0])
+    in_memory = source(sources.Point(intensity=spot))
+    assert in_memory["flux"] == pytest.approx(spot.flux)
+
+
+def test_points_that_cannot_be() -> None:
+    dark = et.Intensity(c=[0], gamma=[0, 90], values=[[0.0, 0.0]])
+    with pytest.raises(SceneError, match="0 everywhere"):
+        compiled(sources.Point(intensity=dark))
+    with pytest.raises(SceneError, match="'flux_unit' is the file's own"):
+        sources.Point(file="a.ies", flux_unit="W")
+
+
+def test_a_light_field(tmp_path: Path) -> None:
+    """Its flux, or the one that is stated; from a file and from memory."""
+    field = et.LightField.fit(et.RingSource(rays=50_000), et.Disk(radius=30), depths=(2, 2, 2, 2))
+    field.save(tmp_path / "led.h5")
+    scene = Scene.from_dict({"sources": [{"kind": "light-field", "file": "led.h5"}]}, folder=tmp_path)
+    (record,) = compile_scene(scene).record["sources"]
+    assert record["flux"] == pytest.approx(600.0, rel=1e-3)
+    assert sum(record["field"].flux()) == pytest.approx(600.0, rel=1e-3)
+    assert source(sources.Field(field=field, flux=5))["flux"] == 5.0
+
+
+def test_a_gridded_source_is_the_rays_that_it_draws(tmp_path: Path) -> None:
+    """From a file and from memory: the same bits as drawn by hand, with the flux of the tables or the one that is stated."""
+    made = et.RingSource(rays=20_000)
+    batch = next(made.batches(20_000))
+    et.write_rays(tmp_path / "rings.tm25ray", et.RaySet(batch.position, batch.direction, batch.flux))
+    rays_read = et.read_rays(tmp_path / "rings.tm25ray")
+    grid = et.GriddedSource.fit(rays_read, et.parse_surface("disk:radius=30"), 10.0, 5.0)
+    drawn = grid.sample(1000, 7)
+    keys = {"surface": "disk:radius=30", "pixel": 10, "threshold": 5, "draws": 1000, "seed": 7}
+    by_file = {"kind": "gridded", "file": "rings.tm25ray", **keys}
+    scene = Scene.from_dict({"sources": [by_file]}, folder=tmp_path)
+    in_memory = sources.Gridded(gridded=grid, draws=1000, seed=7, flux=5)
+    for record, flux in ((compile_scene(scene).record["sources"][0], grid.table_flux), (source(in_memory), 5.0)):
+        found = _core.read_rays(record["rays"], 0, 1000)
+        assert np.array_equal(found[0], drawn.position)
+        assert record["flux"] == pytest.approx(flux, rel=1e-9)
+        assert record["scale"] * found[2].sum() == pytest.approx(flux, rel=1e-6)
+
+
+def test_surfaces_emit_on_the_side_that_is_asked_for() -> None:
+    for side, flip in (("front", False), ("back", True)):
+        record = source(
+            sources.Surface(shape=DISK, flux=1, side=side, exponent=0, trim={"half_spaces": [{"normal": [1, 0, 0]}]})
+        )
+        assert (record["flip"], record["exponent"], record["trims"]) == (flip, 0.0, [(1.0, 0.0, 0.0, 0.0)])
+
+
+@pytest.mark.parametrize(
+    ("shape", "trim", "finite"),
+    [
+        ({"kind": "plane"}, {}, False),
+        ({"kind": "plane"}, {"radius": [0, 3]}, True),
+        ({"kind": "sphere", "radius": 1}, {}, True),
+        ({"kind": "cylinder", "radius": 1, "height": 1}, {}, True),
+        ({"kind": "paraboloid", "focal_length": 1}, {}, False),
+        ({"kind": "paraboloid", "focal_length": 1}, {"z": [1, float("inf")]}, False),
+        ({"kind": "paraboloid", "focal_length": 1}, {"z": [float("-inf"), 5]}, True),
+        ({"kind": "paraboloid", "focal_length": 1, "radius": 3}, {}, True),
+        ({"kind": "ellipsoid", "focus": 1, "second_focus": 2}, {}, True),
+        ({"kind": "hyperboloid", "focus": 1, "virtual_focus": 2}, {}, False),
+        ({"kind": "hyperboloid", "focus": 1, "virtual_focus": 2}, {"z": [float("-inf"), 5]}, True),
+    ],
+)
+def test_surfaces_without_an_end_cannot_emit(shape: dict[str, Any], trim: dict[str, Any], finite: bool) -> None:
+    """Flux over an infinite area is no luminance at all."""
+    given = sources.Surface(shape=shape, flux=1, trim=trim)
+    if finite:
+        assert source(given)["flux"] == 1.0
+    else:
+        with pytest.raises(SceneError, match=r"sources\[0\]: shape: this surface has no end"):
+            compiled(given)
+
+
+def test_rings_are_annuli_with_their_own_flux() -> None:
+    """Thesis section 2.3, in its place: three sources that share a frame and a colour."""
+    found = compiled(sources.Rings(name="led", radii=[10, 20, 30], flux=[300, 200, 100], at=[0, 0, 5], wavelength=450))
+    assert found.source_names == ("led.ring 1", "led.ring 2", "led.ring 3")
+    edges = [(r["shape"]["outline"]["inner"], r["shape"]["outline"]["outer"]) for r in found.record["sources"]]
+    assert edges == [(0, 10), (10, 20), (20, 30)]
+    assert [r["flux"] for r in found.record["sources"]] == [300, 200, 100]
+    assert all(r["frame"][2] == 5 and r["wavelengths"].tolist() == [450] for r in found.record["sources"])
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"kind": "rings", "radii": [1, 2], "flux": [1]}, "one for each ring"),
+        ({"kind": "rings", "radii": [2, 1], "flux": [1, 1]}, "must rise"),
+        ({"kind": "beam", "shape": {"kind": "plane"}, "flux": 1}, "unknown kind 'plane'"),
+        ({"kind": "beam", "shape": {"kind": "sphere", "radius": 1}, "flux": 1}, "unknown kind 'sphere'"),
+        ({"kind": "gridded", "file": "a"}, "'surface' belongs to 'file'"),
+        ({"kind": "gridded", "file": "a", "surface": "plain:z=0"}, "unknown .*'plain'"),
+        ({"kind": "surface", "shape": DISK, "flux": 0}, "must be greater than 0"),
+        ({"kind": "surface", "shape": DISK, "flux": 1, "exponent": -1}, "must be at least 0"),
+        ({"kind": "rays", "file": "a", "flux_unit": "lumen"}, "flux_unit: is 'lumen'. Did you mean 'lm'"),
+    ],
+)
+def test_sources_that_are_none(keys: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        Scene(sources=[keys])
+
+
+# --- detectors ---------------------------------------------------------------------------------------------------------
+
+
+def test_an_image_is_its_observers_view() -> None:
+    keys = {"width": 10, "height": 20, "columns": 4, "rows": 8}
+    scene = Scene(
+        detectors=[{"kind": "image", "observer": "me"}],
+        observers=[{"name": "me", "theta": 30, "phi": 40, "distance": 500, "target": [1, 2, 3], "screen": keys}],
+    )
+    observer = et.Observer(30, 40, 500, (1, 2, 3))
+    assert compile_scene(scene).record["detectors"][0]["view"] == et.Screen(**keys).core_view(observer)
+    assert scene.observers[0].observer() == observer
+    assert scene.observers[0].screen.screen() == et.Screen(**keys)
+
+
+def test_detectors_in_place() -> None:
+    """Frames, trims and cells, and names in order."""
+    rcs = {"kind": "rays", "name": "rcs", "shape": {"kind": "plane"}, "trim": {"radius": [0, 5]}, "at": [0, 0, 30]}
+    grid = {"kind": "illuminance", "width": 4, "height": 2, "columns": 8, "rows": 3, "toward": [0, 0, -1]}
+    found = compile_scene(Scene(detectors=[rcs, grid, {"kind": "intensity", "c_planes": 24, "gamma_step": 10}]))
+    assert found.detector_names == ("rcs", "detectors[1]", "detectors[2]")
+    first, second, third = found.record["detectors"]
+    assert first["shape"]["outline"] == {"kind": "annulus", "inner": 0.0, "outer": 5.0}
+    assert first["frame"][:3] == [0, 0, 30]
+    assert second["frame"][9:] == [0, 0, -1]
+    assert (second["columns"], second["rows"]) == (8, 3)
+    assert third == {"kind": "intensity", "planes": 24, "gammas": 19}
