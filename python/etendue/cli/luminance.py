@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,22 +17,36 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.lightfield.light_field import LightField
 from etendue.luminance.estimate import METHODS, Acceptance, luminance_map
+from etendue.luminance.scene_map import DEFAULT_RAYS_PER_PIXEL
 from etendue.plot.map_picture import SCALES, plot_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import PLANES, Observer, Screen
 from etendue.quantities.ray_set import RaySet
+from etendue.scene import Scene
+
+SCENE_EXTENSION = ".toml"
 
 
 def luminance(
-    file: Annotated[Path, typer.Argument(help="A ray file of any format, or a light field.")],
-    observer: Annotated[
-        list[str], typer.Option("--observer", help="θ,φ in degrees; may be given several times.", metavar="THETA,PHI")
-    ],
-    size: Annotated[str, typer.Option("--size", help="Width and height of the screen in mm.", metavar="W,H")],
+    file: Annotated[Path, typer.Argument(help="A ray file of any format, a light field, or a scene (.toml).")],
     output: Annotated[
         list[Path],
-        typer.Option("-o", "--output", help="Map to write; several are allowed. {theta} and {phi} are filled in."),
+        typer.Option(
+            "-o", "--output", help="Map to write; several are allowed. {theta}, {phi} and {observer} are filled in."
+        ),
     ],
+    observer: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--observer",
+            help="θ,φ in degrees; may be given several times. Of a scene, its own observers if not given.",
+            metavar="THETA,PHI",
+        ),
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option("--size", help="Width and height of the screen in mm; needed with --observer.", metavar="W,H"),
+    ] = None,
     distance: Annotated[float, typer.Option("--distance", help="From target to observer in mm.")] = 1000.0,
     target: Annotated[str, typer.Option("--target", help="Point looked at, in mm.", metavar="X,Y,Z")] = "0,0,0",
     pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
@@ -52,8 +67,20 @@ def luminance(
         typer.Option("--surface", help="Carrier surface of the light field, as for fit [auto].", show_default=False),
     ] = None,
     samples: Annotated[
-        int, typer.Option("--samples", help="Points per pixel at which a light field is read.", min=1)
-    ] = 16,
+        int | None,
+        typer.Option(
+            "--samples", help="Points per pixel at which a light field is read [16].", min=1, show_default=False
+        ),
+    ] = None,
+    rays_per_pixel: Annotated[
+        int | None,
+        typer.Option("--rays-per-pixel", help="Lines of sight per pixel of a scene [256].", min=1, show_default=False),
+    ] = None,
+    until: Annotated[
+        float | None,
+        typer.Option("--until", help="Of a scene: follow more until this median relative error is reached, e.g. 0.01."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Of a scene [1].", min=0, show_default=False)] = None,
     flux: Annotated[
         str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")
     ] = None,
@@ -62,52 +89,104 @@ def luminance(
     threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Luminance maps with a standard error per pixel, from rays or from a light field, for any number of observers."""
+    """Luminance maps with a standard error per pixel, from rays, a light field or a scene, for any number of observers."""
     one_of(method, METHODS, "--method")
     one_of(plane, PLANES, "--plane")
     one_of(scale, SCALES, "--scale")
     x, y, z = numbers(target, 3, "--target", "0,0,0")
-    angles = [numbers(text, 2, "--observer", "30,0") for text in observer]
-    observers = [Observer(theta, phi, distance, (x, y, z)) for theta, phi in angles]
-    width, height = numbers(size, 2, "--size", "25,25")
-    columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
-    screen = Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")
-    targets = [[_named(path, o) for path in output] for o in observers]
+    scene = Scene.load(file) if file.suffix.lower() == SCENE_EXTENSION else None
+    if scene is not None and observer is None and size is None:
+        seen = [(keys.name, keys.observer(), keys.screen.screen()) for keys in scene.observers]
+        if not seen:
+            raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
+    else:
+        screen = _screen(size, pixels, plane)
+        seen = [("", Observer(theta, phi, distance, (x, y, z)), screen) for theta, phi in _angles(observer)]
+    targets = [[_named(path, o, name) for path in output] for name, o, _ in seen]
     everything = [path for paths in targets for path in paths]
     if len(set(everything)) < len(everything):
-        raise ArgumentError("several observers would write to the same file; put {theta} and {phi} into its name.")
+        raise ArgumentError(
+            "several observers would write to the same file; put {theta} and {phi}, or {observer}, into its name."
+        )
     check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
 
-    cone = None if acceptance is None else _acceptance(acceptance)
-    carrier = "auto" if surface is None else surface_option(surface)
     for_rays = {"--method": "cone" if method == "cone" else None, "--acceptance": acceptance, "--surface": surface}
-    source = read_source(file, flux, unit, for_rays)
-    with progress_bar("rays", len(source)) if isinstance(source, RaySet) else nullcontext() as progress:
-        maps = luminance_map(
-            source,
-            observers,
-            screen,
-            method="cone" if method == "cone" else "lightfield" if method == "lightfield" else "auto",
-            acceptance=cone,
-            surface=carrier,
-            samples=samples,
-            threads=threads,
-            progress=progress,
-        )
+    observers, screens = [o for _, o, _ in seen], [s for _, _, s in seen]
+    source: RaySet | LightField | None = None
+    if scene is not None:
+        for_others = {
+            "--method": None if method == "auto" else method,
+            "--acceptance": acceptance,
+            "--surface": surface,
+            "--samples": samples,
+            "--flux": flux,
+            "--unit": unit,
+        }
+        _refuse(for_others, f"for rays and light fields; {file} is a scene")
+        paths_asked = (rays_per_pixel or DEFAULT_RAYS_PER_PIXEL) * sum(s.columns * s.rows for s in screens)
+        with progress_bar("lines of sight", paths_asked) as progress:
+            maps = luminance_map(
+                scene,
+                observers,
+                screens,
+                rays_per_pixel=rays_per_pixel,
+                until=until,
+                seed=seed,
+                threads=threads,
+                progress=progress,
+            )
+    else:
+        for_scenes = {"--rays-per-pixel": rays_per_pixel, "--until": until, "--seed": seed}
+        _refuse(for_scenes, f"for scenes; {file} is none")
+        cone = None if acceptance is None else _acceptance(acceptance)
+        carrier = "auto" if surface is None else surface_option(surface)
+        source = read_source(file, flux, unit, for_rays)
+        with progress_bar("rays", len(source)) if isinstance(source, RaySet) else nullcontext() as progress:
+            maps = luminance_map(
+                source,
+                observers,
+                screens,
+                method="cone" if method == "cone" else "lightfield" if method == "lightfield" else "auto",
+                acceptance=cone,
+                surface=carrier,
+                samples=samples,
+                threads=threads,
+                progress=progress,
+            )
     losses = [note for lmap, paths in zip(maps, targets, strict=True) for note in write_map(lmap, paths, scale)]
-    complaints = complaints_of(source)
+    complaints = [] if source is None else complaints_of(source)
     if json:
         summaries = [summary(lmap) | {"outputs": paths} for lmap, paths in zip(maps, targets, strict=True)]
         print_json({"file": file, "maps": summaries, "complaints": complaints, "notes": losses})
         return
     for line in (*complaints, *(f"note: {note}" for note in losses)):
         complain(line)
-    if not any((lmap.values > 0).any() for lmap in maps):
-        _hint(source, (x, y, z), max(width, height))
+    if source is not None and not any((lmap.values > 0).any() for lmap in maps):
+        _hint(source, (x, y, z), max(screens[0].width, screens[0].height))
     for lmap, paths in zip(maps, targets, strict=True):
         print_map(lmap)
         for path in paths:
             say(f"  {path}")
+
+
+def _angles(observer: list[str] | None) -> list[tuple[float, ...]]:
+    if not observer:
+        raise typer.BadParameter("give at least one, e.g. --observer 30,0", param_hint="--observer")
+    return [numbers(text, 2, "--observer", "30,0") for text in observer]
+
+
+def _screen(size: str | None, pixels: str, plane: str) -> Screen:
+    if size is None:
+        raise typer.BadParameter("give the screen's width and height in mm, e.g. --size 25,25", param_hint="--size")
+    width, height = numbers(size, 2, "--size", "25,25")
+    columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
+    return Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")
+
+
+def _refuse(options: Mapping[str, object], why: str) -> None:
+    needless = [option for option, value in options.items() if value is not None]
+    if needless:
+        raise typer.BadParameter(f"{', '.join(needless)}: {why}")
 
 
 def _acceptance(text: str) -> Acceptance:
@@ -137,8 +216,10 @@ def write_map(lmap: LuminanceMap, paths: list[Path], scale: str) -> list[str]:
     return notes
 
 
-def _named(path: Path, observer: Observer) -> Path:
+def _named(path: Path, observer: Observer, name: str) -> Path:
     angles = {"theta": f"{observer.theta:g}", "phi": f"{observer.phi:g}"}
+    # A name may hold anything, a file name may not.
+    angles["observer"] = re.sub(r"[^\w.+-]+", "-", name) or f"{angles['theta']}-{angles['phi']}"
 
     def value(match: re.Match[str]) -> str:
         if match[1] not in angles:

@@ -9,8 +9,8 @@ from typing import Any
 
 from etendue.units import FluxUnit
 
-CLOSED = 2.0 * 65536 * 2.0**-53
-"""Share of the emitted flux that rounding may let the fates of a batch differ from it: two sums of 65 536 fluxes."""
+CLOSED = 1e-12
+"""Share of the emitted flux that rounding may let the fates of a batch differ from it."""
 
 NOTEWORTHY = 1e-9
 """Share of the emitted flux above which lost rays are told."""
