@@ -126,10 +126,12 @@ class Mesh(Shape):
 
     def record(self, mesh: Triangulation) -> Record:
         """The mesh as the core takes it, with normals if creases are given."""
-        if self.crease_angle is None:
-            return {"kind": "mesh", "vertices": mesh.vertices, "triangles": mesh.triangles, "normals": None}
-        vertices, triangles, normals = smooth_normals(mesh.vertices, mesh.triangles, self.crease_angle)
-        return {"kind": "mesh", "vertices": vertices, "triangles": triangles, "normals": normals}
+        vertices, triangles, normals = mesh.vertices, mesh.triangles, None
+        if self.crease_angle is not None:
+            vertices, triangles, normals = smooth_normals(vertices, triangles, self.crease_angle)
+        if len(vertices) > np.iinfo(np.uint32).max:
+            raise ArgumentError(f"{len(vertices):,} vertices are more than a mesh can have; make it coarser")
+        return {"kind": "mesh", "vertices": vertices, "triangles": triangles.astype(np.uint32), "normals": normals}
 
     def sheet(self, trim: Trim, files: Files) -> Sheet:
         """The mesh within half spaces; ranges of z are half spaces too."""
