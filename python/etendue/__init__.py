@@ -11,7 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from etendue.formats.intensity import read_intensity, write_intensity
-from etendue.formats.maps import read_map
+from etendue.formats.maps import read_illuminance_map, read_map
 from etendue.formats.rays import read_rays, write_rays
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.goniophotometry.threshold_sweep import threshold_sweep
@@ -32,12 +32,14 @@ from etendue.plot import (
     plot_map,
     plot_threshold_sweep,
 )
+from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
 from etendue.sources.ring_source import RingSource
+from etendue.tracing import TraceResult, trace, trace_rounds
 
 if TYPE_CHECKING:
     from etendue import scene
@@ -50,6 +52,7 @@ __all__ = [
     "Dome",
     "GriddedSource",
     "Hemisphere",
+    "IlluminanceMap",
     "Intensity",
     "LightField",
     "LuminanceMap",
@@ -62,6 +65,7 @@ __all__ = [
     "Screen",
     "Spectrum",
     "Sphere",
+    "TraceResult",
     "combine_maps",
     "compare",
     "cross_section",
@@ -77,11 +81,14 @@ __all__ = [
     "plot_intensity",
     "plot_map",
     "plot_threshold_sweep",
+    "read_illuminance_map",
     "read_intensity",
     "read_map",
     "read_rays",
     "scene",
     "threshold_sweep",
+    "trace",
+    "trace_rounds",
     "write_intensity",
     "write_rays",
 ]

@@ -69,6 +69,25 @@ class _Counts(TypedDict):
     unmet_flux: float
     tally: _Tally
 
+_Entries: TypeAlias = tuple[_Floats, npt.NDArray[np.uint64]]
+
+class _Ledger(TypedDict):
+    emitted: _Entries
+    escaped: _Entries
+    on_face: _Entries
+    in_medium: _Entries
+    terminated: _Entries
+    lost: _Entries
+    lost_at: list[int | None]
+    segments: int
+
+class _Harvest(TypedDict):
+    ledger: _Ledger
+    cells: list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]]
+    records: list[_Floats]
+    rays: int
+    imbalance: float
+
 @final
 class RayTable:
     """Ray records over the bytes of an array: in memory, or mapped from a file."""
@@ -121,6 +140,12 @@ class FieldRays:
 
     def __new__(cls, field: LightField, rays: int, seed: int) -> FieldRays: ...
     def __len__(self) -> int: ...
+
+@final
+class Scene:
+    """A scene, ready to be traced and to be looked at; `record` is what `etendue.scene.compile_scene` makes."""
+
+    def __new__(cls, record: dict[str, Any]) -> Scene: ...
 
 _Source: TypeAlias = RayTable | RingSource | FieldRays
 
@@ -191,3 +216,37 @@ def select_subset(start: int, stop: int, n: int, k: int, taken: int, seed: int) 
 
 def deal_parts(start: int, stop: int, parts: int, seed: int) -> npt.NDArray[np.uint32]:
     """The part of each ray in ``start..stop``."""
+
+def losses() -> list[str]:
+    """Why rays are lost, in the order of a ledger."""
+
+def batch_size() -> int:
+    """Rays of a batch."""
+
+def trace_batches(
+    scene: Scene,
+    rays: int,
+    seed: int,
+    most_events: int,
+    first: int,
+    last: int,
+    threads: int | None = None,
+) -> _Harvest:
+    """Traces batches ``first..last`` of a run of `rays` rays.
+
+    Of the ledger each entry is (flux, rays), by source, face, medium or reason. Cells of each detector are (Σ w, Σ w², rays
+    that contributed); records are rows of position [mm], direction, flux, wavelength [nm], shape (n, 8).
+    """
+
+def look_at_scene(
+    scene: Scene,
+    view: _View,
+    paths: int,
+    seed: int,
+    most_events: int,
+    without_caustics: bool,
+    first: int,
+    last: int,
+    threads: int | None = None,
+) -> list[_Floats]:
+    """For each pixel Σ mean, Σ mean² and Σ deviation of the sources over passes ``first..last`` of `paths` paths each."""

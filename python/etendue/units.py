@@ -45,6 +45,12 @@ INTENSITY_UNIT: dict[FluxUnit, str] = {"lm": "cd", "W": "W/sr"}
 INTENSITY_NAME: dict[FluxUnit, str] = {"lm": "luminous intensity", "W": "radiant intensity"}
 """Name of the quantity whose unit is `INTENSITY_UNIT`."""
 
+ILLUMINANCE_UNIT: dict[FluxUnit, str] = {"lm": "lx", "W": "W/m²"}
+"""Unit of the flux density on a surface that was made from flux in the given unit."""
+
+ILLUMINANCE_NAME: dict[FluxUnit, str] = {"lm": "illuminance", "W": "irradiance"}
+"""Name of the quantity whose unit is `ILLUMINANCE_UNIT`."""
+
 LUMENS_PER_KILOLUMEN = 1e3
 """Turns the cd/klm of EULUMDAT into cd."""
 

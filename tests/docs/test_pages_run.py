@@ -46,10 +46,10 @@ def materials(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The files that the pages speak of: one LED in lumens, one in watts with wavelengths, a white one in two files."""
     folder = tmp_path_factory.mktemp("materials")
     rng = np.random.default_rng(20)
-    position, direction = lobe(rng, 60_000, 1.2)
-    et.write_rays(folder / "led.tm25ray", et.RaySet(position, direction, np.full(60_000, 250.0 / 60_000)))
+    position, direction = lobe(rng, 20_000, 1.2)
+    et.write_rays(folder / "led.tm25ray", et.RaySet(position, direction, np.full(20_000, 250.0 / 20_000)))
     for file, kind, n, watts, low, high in (
-        ("watts.tm25ray", "tm25", 20_000, 0.6, 500, 660),
+        ("watts.tm25ray", "tm25", 10_000, 0.6, 500, 660),
         ("blue.ray", "lighttools", 20_000, 0.4, 440, 470),
         ("yellow.ray", "lighttools", 30_000, 0.5, 510, 680),
     ):

@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError
-from etendue.goniophotometry.far_field import Cells, intensity_distribution
+from etendue.goniophotometry.far_field import intensity_distribution
+from etendue.quantities.intensity_cells import Cells
 from etendue.quantities.ray_set import RaySetMeaning
 from scipy.stats import chi2
 

@@ -66,7 +66,8 @@ pub struct LightField {
 }
 
 impl LightField {
-    fn sampler(&self, py: Python<'_>) -> PyResult<Arc<Sampler>> {
+    /// What draws rays from it.
+    pub fn sampler(&self, py: Python<'_>) -> PyResult<Arc<Sampler>> {
         let make = || Sampler::new(Arc::clone(&self.field)).map(Arc::new);
         let sampler = py.detach(|| self.sampler.get_or_init(make).clone());
         sampler.ok_or_else(|| PyValueError::new_err("a light field needs flux"))

@@ -9,9 +9,11 @@ mod field;
 mod polya;
 mod run;
 mod scan;
+mod scene;
 mod source;
 mod subset;
 mod surface;
+mod trace;
 mod view;
 
 use pyo3::prelude::*;
@@ -23,6 +25,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<source::RingSource>()?;
     module.add_class::<field::LightField>()?;
     module.add_class::<field::FieldRays>()?;
+    module.add_class::<scene::Scene>()?;
     module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;
     module.add_function(wrap_pyfunction!(scan::scan, module)?)?;
     module.add_function(wrap_pyfunction!(cone::cone_sums, module)?)?;
@@ -33,5 +36,12 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(polya::polya_evidence, module)?)?;
     module.add_function(wrap_pyfunction!(subset::select_subset, module)?)?;
     module.add_function(wrap_pyfunction!(subset::deal_parts, module)?)?;
+    module.add_function(wrap_pyfunction!(trace::losses, module)?)?;
+    module.add_function(wrap_pyfunction!(trace::batch_size, module)?)?;
+    module.add_function(wrap_pyfunction!(trace::trace_batches, module)?)?;
+    module.add_function(wrap_pyfunction!(trace::look_at_scene, module)?)?;
+    module.add_function(wrap_pyfunction!(trace::look_at_events, module)?)?;
+    module.add_function(wrap_pyfunction!(trace::trace_trails, module)?)?;
+    module.add_function(wrap_pyfunction!(trace::scene_crossings, module)?)?;
     Ok(())
 }

@@ -6,7 +6,7 @@ use etendue_geometry::table::{Float, Layout, RayTable as CoreTable};
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_lightfield::field::draw::FieldRays as CoreFieldRays;
 use etendue_optics::source::{Ring, RingSource as CoreRings};
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -108,19 +108,43 @@ impl RaySource for Source<'_> {
     }
 }
 
+/// A Python source, held open for the time of a call.
+pub enum Opened<'py> {
+    Table(PyReadonlyArray1<'py, u8>, Layout),
+    Rings(Bound<'py, RingSource>),
+    Field(Bound<'py, FieldRays>),
+}
+
+impl<'py> Opened<'py> {
+    /// The source behind a Python object.
+    pub fn new(source: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if let Ok(table) = source.cast::<RayTable>() {
+            let table = table.get();
+            Ok(Self::Table(table.bytes.bind(source.py()).readonly(), table.layout))
+        } else if let Ok(rays) = source.cast::<FieldRays>() {
+            Ok(Self::Field(rays.clone()))
+        } else {
+            Ok(Self::Rings(source.cast::<RingSource>()?.clone()))
+        }
+    }
+
+    /// The core's view of it.
+    pub fn core(&self) -> PyResult<Source<'_>> {
+        Ok(match self {
+            Self::Table(bytes, layout) => Source::Table(
+                CoreTable::new(bytes.as_slice()?, *layout)
+                    .ok_or_else(|| PyValueError::new_err("the ray table changed its size"))?,
+            ),
+            Self::Rings(rings) => Source::Rings(&rings.get().0),
+            Self::Field(rays) => Source::Field(rays.get().core()),
+        })
+    }
+}
+
 /// Calls `body` with the core's view of a Python source.
 pub fn with_source<R>(source: &Bound<'_, PyAny>, body: impl FnOnce(&Source<'_>) -> PyResult<R>) -> PyResult<R> {
-    if let Ok(table) = source.cast::<RayTable>() {
-        let table = table.get();
-        let bytes = table.bytes.bind(source.py()).readonly();
-        let core = CoreTable::new(bytes.as_slice()?, table.layout)
-            .ok_or_else(|| PyValueError::new_err("the ray table changed its size"))?;
-        body(&Source::Table(core))
-    } else if let Ok(rays) = source.cast::<FieldRays>() {
-        body(&Source::Field(rays.get().core()))
-    } else {
-        body(&Source::Rings(&source.cast::<RingSource>()?.get().0))
-    }
+    let opened = Opened::new(source)?;
+    body(&opened.core()?)
 }
 
 type RayArrays<'py> = (

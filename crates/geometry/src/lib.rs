@@ -1,14 +1,25 @@
-//! Rays: where they are kept, how they are read in batches, what they amount to.
+//! Rays and the surfaces they meet.
 //!
-//! `batch`: a structure of arrays that the inner loops run over. `source`: anything that yields rays by index. `table`:
-//! records in memory or in a mapped file. `tally`: the flux account of a pass. `scan`: the statistics of a ray set in one pass.
+//! Rays: `batch` is a structure of arrays that the inner loops run over, `source` anything that yields rays by index, `table`
+//! records in memory or in a mapped file, `tally` the flux account of a pass, `scan` the statistics of a ray set in one pass.
+//!
+//! Surfaces: `shape` holds the kinds of surface, `mesh` triangles, `face` a shape in its place, `assembly` many faces
+//! together, `bounds` and `bvh` what spares the tests that cannot succeed.
 
+pub mod assembly;
 pub mod batch;
+pub mod bounds;
+pub mod bvh;
+pub mod face;
+pub mod mesh;
 pub mod scan;
+pub mod shape;
 pub mod source;
 pub mod table;
 pub mod tally;
 
+pub use assembly::Assembly;
 pub use batch::RayBatch;
+pub use face::Face;
 pub use source::RaySource;
 pub use tally::Tally;

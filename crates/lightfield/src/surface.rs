@@ -156,6 +156,16 @@ impl Part {
         }
     }
 
+    /// Largest distance of a point of the part from the origin of its frame \[mm\].
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        match self.shape {
+            Shape::Rectangle { width, height } => 0.5 * width.hypot(height),
+            Shape::Disk { radius } | Shape::Hemisphere { radius } => radius,
+            Shape::Tube { radius, height } => radius.hypot(0.5 * height),
+        }
+    }
+
     /// Étendue \[mm² sr\] of all light that can leave the part: π times its area.
     #[must_use]
     pub fn etendue(&self) -> f64 {

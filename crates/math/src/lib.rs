@@ -1,12 +1,14 @@
 //! Numbers and vectors: f64, no I/O, no state.
 //!
-//! `vector`: points and directions. `frame`: where something stands and how it is turned. `trig` and `special`: sine,
-//! cosine, arc tangent, exponential, logarithm and ln Γ that give the same bits on every platform.
+//! `vector`: points and directions. `frame`: where something stands and how it is turned. `interval`: bounds of a function.
+//! `trig` and `special`: sine, cosine, arc tangent, exponential, logarithm and ln Γ that give the same bits on every platform.
 
 pub mod frame;
+pub mod interval;
 pub mod special;
 pub mod trig;
 pub mod vector;
 
 pub use frame::Frame;
+pub use interval::Interval;
 pub use vector::Vec3;

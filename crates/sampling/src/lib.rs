@@ -5,6 +5,7 @@
 //! have the same bits for any number of threads.
 
 pub mod alias;
+pub mod lattice;
 pub mod ordered;
 pub mod philox;
 pub mod subset;

@@ -2,6 +2,8 @@
 //!
 //! Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11 (2011), `[Salmon2011]`.
 
+use multiversion::multiversion;
+
 const M0: u64 = 0xD2E7_470E_E14C_6C93;
 const M1: u64 = 0xCA5A_8263_9512_1157;
 const W0: u64 = 0x9E37_79B9_7F4A_7C15;
@@ -77,6 +79,23 @@ impl Stream {
     }
 }
 
+/// Four uniform numbers for each of many addresses, as [`Stream::uniforms`] has them, several at a time.
+///
+/// `index` and `block` hold the addresses, one after the other; the result is written number by number.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+pub fn fill_uniforms(stream: Stream, index: &[u64], block: &[u64], out: &mut [Vec<f64>; 4]) {
+    let n = index.len();
+    let block = &block[..n];
+    let [a, b, c, d] = out;
+    for list in [&mut *a, &mut *b, &mut *c, &mut *d] {
+        list.resize(n, 0.0);
+    }
+    let (a, b, c, d) = (&mut a[..n], &mut b[..n], &mut c[..n], &mut d[..n]);
+    for i in 0..n {
+        [a[i], b[i], c[i], d[i]] = stream.uniforms(index[i], block[i]);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,6 +121,19 @@ mod tests {
                 0xa09c_aebf_594f_0ba0
             ]
         );
+    }
+
+    #[test]
+    fn many_addresses_have_the_numbers_of_each() {
+        let index: Vec<u64> = (0..77).map(|i| i * i + 3).collect();
+        let block: Vec<u64> = (0..77).map(|i| i % 5).collect();
+        let mut out = Default::default();
+        let stream = Stream::new(9, 4);
+        fill_uniforms(stream, &index, &block, &mut out);
+        for i in 0..77 {
+            let expected = stream.uniforms(index[i], block[i]);
+            assert_eq!(expected, std::array::from_fn(|k| out[k][i]));
+        }
     }
 
     #[test]

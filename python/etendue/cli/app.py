@@ -9,13 +9,10 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli import compare, convert, demo, filter_, fit, info, intensity, luminance, patches, sample
-from etendue.cli.terminal import complain, spell_out_unknown_letters
+from etendue.cli import compare, convert, demo, filter_, fit, info, intensity, luminance, patches, sample, trace
+from etendue.cli.terminal import INTERRUPTED, complain, spell_out_unknown_letters
 from etendue.errors import EtendueError
 from etendue.quantities.provenance import version
-
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells have it (128 + SIGINT)."""
 
 app = typer.Typer(
     help="Luminance maps of light sources and luminaires from ray files, with an error bar in every pixel.",
@@ -31,6 +28,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "luminance": luminance.luminance,
     "sample": sample.sample,
     "intensity": intensity.intensity,
+    "trace": trace.trace,
     "patches": patches.patches,
     "filter": filter_.filter_,
     "compare": compare.compare,
@@ -76,7 +74,7 @@ def main() -> None:
             raise
         show()
         sys.exit(getattr(error, "exit_code", 2))
-    # The parser returns this status for Ctrl-C as well.
+    # The parser returns this status for Ctrl-C as well; a trace has said what it kept.
     if status == INTERRUPTED:
         complain("stopped; no file was left half-written")
     sys.exit(status if isinstance(status, int) else 0)

@@ -17,10 +17,11 @@ from etendue.formats.intensity import (
     write_intensity,
 )
 from etendue.formats.maps import PICTURE_EXTENSIONS
-from etendue.goniophotometry.far_field import Cells, intensity_distribution
+from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.lightfield.light_field import LightField
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
 from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
+from etendue.quantities.intensity_cells import Cells
 
 
 def intensity(

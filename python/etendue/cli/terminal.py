@@ -26,6 +26,10 @@ errors = Console(stderr=True, soft_wrap=True, highlight=False)
 """Complaints and progress, on standard error."""
 
 
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it (128 + SIGINT)."""
+
+
 def complain(message: str) -> None:
     """Print one line to standard error."""
     errors.print(message, markup=False)

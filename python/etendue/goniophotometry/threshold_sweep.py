@@ -14,13 +14,14 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.goniophotometry.comparison import compare_intensities
-from etendue.goniophotometry.far_field import Cells, intensity_distribution
+from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.fitting import Batches, Bins, LitPixels, all_batches, fill_bins, lit_pixels, patches_of
 from etendue.lightfield.gridded.gridded_source import GriddedSource, check_threshold
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
 from etendue.lightfield.gridded.sampling import RECORD
 from etendue.lightfield.surfaces import Surface
+from etendue.quantities.intensity_cells import Cells
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import Progress, RayBatch, RayStream
 from etendue.quantities.spool import spool

@@ -1,8 +1,7 @@
 """Light fields as HDF5 files; docs/formats/light-fields.md describes them field by field.
 
 Files hold what the field is worth and no more: the ratio to a sixteenth of its standard deviation, which leaves long
-runs of zero bits. They are written so that the HDF5 library finds damage by itself: a checksum on every header (file
-format 1.10) and on every chunk.
+runs of zero bits.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import dataclasses
 import io
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -20,8 +19,9 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
 from etendue.formats.output import atomic_output
-from etendue.lightfield.counting import MOST_CELLS, FloatArray
+from etendue.lightfield.counting import MOST_CELLS
 from etendue.lightfield.light_field import FitReport, LightField, PartField
 from etendue.lightfield.rounding import digits_for, rounded
 from etendue.lightfield.surfaces import SURFACES, Part, Surface
@@ -31,12 +31,6 @@ from etendue.units import LUMINANCE_UNIT, FluxUnit
 
 FORMAT = "etendue light field"
 VERSION = 1
-
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""The first bytes of an HDF5 file."""
-
-LIBRARY = ("v110", "v110")
-"""The oldest HDF5 that reads the files: the first with checksums on all that tells where data are."""
 
 STEPS = 16.0
 """The ratio is rounded to at least so many steps per standard deviation: it adds 1/3072 to the loss to be expected."""
@@ -54,9 +48,6 @@ CHUNK_SIDE = 16
 """Cells of a chunk along each coordinate. Trees are constant over boxes, and blocks cut fewer boxes than slices do."""
 
 DEFLATE = 9
-DEFLATE_RATIO = 1032
-"""The largest factor by which deflate can shrink anything: 258 bytes into 2 bits."""
-
 SAME_FLUX = 1e-9
 """Relative difference between the stated flux of a part and the one worked out that rounding may make."""
 
@@ -77,10 +68,10 @@ def is_field_file(path: str | Path) -> bool:
     import h5py  # noqa: PLC0415 - only who has such a file needs the library
 
     path = Path(path)
-    if not _begins_as_hdf5(path):
+    if not begins_as_hdf5(path):
         return False
-    with contextlib.suppress(FormatError), _reading(path, "HDF5"), h5py.File(path, "r") as file:
-        return _Node(path, file).has_text("format", FORMAT)
+    with contextlib.suppress(FormatError), reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
+        return Node(path, file, DAMAGED).has_text("format", FORMAT)
     return True
 
 
@@ -104,10 +95,10 @@ def load_field(path: Path) -> LightField:
     """See `LightField.load`."""
     import h5py  # noqa: PLC0415
 
-    if not _begins_as_hdf5(path):
+    if not begins_as_hdf5(path):
         raise FormatError(path, "byte 0", "this is no HDF5 file", FOREIGN)
-    with _reading(path, "HDF5"), h5py.File(path, "r") as file:
-        return _read(_Node(path, file))
+    with reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
+        return _read(Node(path, file, DAMAGED))
 
 
 def as_stored(field: LightField) -> LightField:
@@ -131,38 +122,21 @@ def _rounded_part(part: PartField) -> PartField:
     return PartField(ratio, deviation, space, direction, part.level)
 
 
-def _begins_as_hdf5(path: Path) -> bool:
-    with path.open("rb") as stream:
-        return stream.read(len(SIGNATURE)) == SIGNATURE
-
-
-@contextlib.contextmanager
-def _reading(path: Path, place: str) -> Iterator[None]:
-    """Turn whatever is raised over damaged or foreign content into a `FormatError` that names file and place."""
-    try:
-        yield
-    except (FormatError, MemoryError):
-        raise
-    # The library raises anything from OSError to KeyError over damaged files, our own constructors ArgumentError.
-    except Exception as error:
-        raise FormatError(path, place, f"{type(error).__name__}: {error}", DAMAGED) from error
-
-
 # --- writing ---------------------------------------------------------------------------------------------------------
 
 
 def _write(file: Any, field: LightField) -> None:
     unit = f"{field.flux_unit}/(mm2 sr)"
-    _put(file, format=FORMAT, version=VERSION, flux_unit=field.flux_unit, length_unit="mm", level_unit=unit)
-    _put(file, provenance=json.dumps(field.provenance.to_dict(), sort_keys=True), notes=json.dumps(field.notes))
+    put(file, format=FORMAT, version=VERSION, flux_unit=field.flux_unit, length_unit="mm", level_unit=unit)
+    put(file, provenance=json.dumps(field.provenance.to_dict(), sort_keys=True), notes=json.dumps(field.notes))
     surface = {f.name: getattr(field.surface, f.name) for f in dataclasses.fields(field.surface)}
     known = {name: value for name, value in surface.items() if value is not None}
-    _put(file.create_group("surface"), name=field.surface.NAME, spec=field.surface.spec, **known)
-    _put(file.create_group("report"), **_report_values(field.report))
+    put(file.create_group("surface"), name=field.surface.NAME, spec=field.surface.spec, **known)
+    put(file.create_group("report"), **_report_values(field.report))
     parts = file.create_group("parts")
     for index, (chart, part, flux) in enumerate(zip(field.surface.parts(), field.parts, field.part_flux, strict=True)):
         group = parts.create_group(str(index))
-        _put(group, **_chart(chart), level=float(part.level), flux=flux)
+        put(group, **_chart(chart), level=float(part.level), flux=flux)
         _put_array(group, "ratio", part.ratio, "luminance / (level * space * direction) at the centres of equal cells")
         _put_array(group, "deviation", part.deviation, "standard deviation of ratio")
         for name, factor, meaning in (
@@ -184,31 +158,18 @@ def _report_values(report: FitReport) -> dict[str, Any]:
     return {name: json.dumps(v) if hints[name] == tuple[str, ...] else v for name, v in values.items()}
 
 
-def _put(node: Any, **values: Any) -> None:
-    """Attributes: texts in UTF-8, numbers and arrays of numbers as they are."""
-    import h5py  # noqa: PLC0415
-
-    for name, value in values.items():
-        if isinstance(value, str):
-            # Of fixed length, because the heap that holds texts of any length has no checksum.
-            encoded = value.encode("utf-8")
-            node.attrs.create(name, encoded, dtype=h5py.string_dtype("utf-8", max(len(encoded), 1)))
-        else:
-            node.attrs[name] = value
-
-
 def _put_array(group: Any, name: str, values: npt.NDArray[Any], meaning: str) -> None:
     chunks = tuple(min(n, CHUNK_SIDE) for n in values.shape) if values.ndim == 4 else values.shape
     dataset = group.create_dataset(
         name, data=values, chunks=chunks, shuffle=True, compression="gzip", compression_opts=DEFLATE, fletcher32=True
     )
-    _put(dataset, unit="1", meaning=meaning)
+    put(dataset, unit="1", meaning=meaning)
 
 
 # --- reading ---------------------------------------------------------------------------------------------------------
 
 
-def _read(file: _Node) -> LightField:
+def _read(file: Node) -> LightField:
     if not file.has_text("format", FORMAT):
         raise file.error("attribute 'format'", f"it is not {FORMAT!r}", FOREIGN)
     version = file.integer("version")
@@ -227,19 +188,19 @@ def _read(file: _Node) -> LightField:
     for index, (stated, found) in enumerate(zip(flux, field.part_flux, strict=True)):
         if not math.isclose(stated, found, rel_tol=SAME_FLUX):
             place = f"/parts/{index}, attribute 'flux'"
-            raise file.error(place, f"{stated!r} {field.flux_unit}, but the arrays hold {found!r}", DAMAGED)
+            raise file.error(place, f"{stated!r} {field.flux_unit}, but the arrays hold {found!r}")
     return field
 
 
-def _flux_unit(file: _Node) -> FluxUnit:
+def _flux_unit(file: Node) -> FluxUnit:
     stored = file.text("flux_unit")
     for known in LUMINANCE_UNIT:
         if stored == known:
             return known
-    raise file.error("attribute 'flux_unit'", f"{stored!r} is none of {', '.join(LUMINANCE_UNIT)}", DAMAGED)
+    raise file.error("attribute 'flux_unit'", f"{stored!r} is none of {', '.join(LUMINANCE_UNIT)}")
 
 
-def _surface(group: _Node) -> Surface:
+def _surface(group: Node) -> Surface:
     kind = SURFACES[group.text("name")]
     hints = get_type_hints(kind)
     known = [f.name for f in dataclasses.fields(kind) if f.name in group.node.attrs]
@@ -253,15 +214,15 @@ def _surface(group: _Node) -> Surface:
     }
     surface = kind(**dimensions)
     if surface.spec != group.text("spec"):
-        raise group.error("attribute 'spec'", f"the dimensions are those of {surface.spec}", DAMAGED)
+        raise group.error("attribute 'spec'", f"the dimensions are those of {surface.spec}")
     return surface
 
 
-def _parts(group: _Node, surface: Surface) -> tuple[tuple[PartField, ...], list[float]]:
+def _parts(group: Node, surface: Surface) -> tuple[tuple[PartField, ...], list[float]]:
     """The fields of all parts, and the fluxes that the file states for them."""
     charts = surface.parts()
     if len(group.node) != len(charts):
-        raise group.error("members", f"{len(group.node)} parts, expected {len(charts)} of {surface.spec}", DAMAGED)
+        raise group.error("members", f"{len(group.node)} parts, expected {len(charts)} of {surface.spec}")
     parts, flux = [], []
     for index, chart in enumerate(charts):
         part = group.group(str(index))
@@ -269,18 +230,18 @@ def _parts(group: _Node, surface: Surface) -> tuple[tuple[PartField, ...], list[
             stored = part.text(name) if isinstance(value, str) else part.numbers(name, np.shape(value))
             agrees = stored == value if isinstance(value, str) else np.allclose(stored, value, rtol=1e-12, atol=1e-12)
             if not agrees:
-                raise part.error(f"attribute {name!r}", f"{stored!r}, but {surface.spec} has {value!r}", DAMAGED)
-        ratio = part.array("ratio", np.dtype("<f4"), 4)
-        deviation = part.array("deviation", np.dtype("<f4"), 4)
+                raise part.error(f"attribute {name!r}", f"{stored!r}, but {surface.spec} has {value!r}")
+        ratio = _array(part, "ratio", np.dtype("<f4"), 4)
+        deviation = _array(part, "deviation", np.dtype("<f4"), 4)
         space, direction = (
-            part.array(name, np.dtype("<f8"), 2) if name in part.node else None for name in ("space", "direction")
+            _array(part, name, np.dtype("<f8"), 2) if name in part.node else None for name in ("space", "direction")
         )
         parts.append(PartField(ratio, deviation, space, direction, part.number("level")))
         flux.append(part.number("flux"))
     return tuple(parts), flux
 
 
-def _report(group: _Node) -> FitReport:
+def _report(group: Node) -> FitReport:
     readers: Mapping[Any, Callable[[str], Any]] = {
         int: group.integer,
         float: lambda name: group.number(name, finite=False),
@@ -293,112 +254,25 @@ def _report(group: _Node) -> FitReport:
         del hints["symmetry"]
     report = FitReport(**{name: readers[hint](name) for name, hint in hints.items()})
     if report.symmetry not in {"none", *SYMMETRIES}:
-        raise group.error("attribute 'symmetry'", f"{report.symmetry!r} is none of {', '.join(SYMMETRIES)}", DAMAGED)
+        raise group.error("attribute 'symmetry'", f"{report.symmetry!r} is none of {', '.join(SYMMETRIES)}")
     return report
 
 
-def _provenance(file: _Node) -> Provenance:
+def _provenance(file: Node) -> Provenance:
     provenance = Provenance.from_dict(json.loads(file.text("provenance")))
     texts = (provenance.source, provenance.format, provenance.fingerprint, provenance.software, *provenance.steps)
     if not all(isinstance(text, str) for text in texts):
-        raise file.error("attribute 'provenance'", "something else than texts", DAMAGED)
+        raise file.error("attribute 'provenance'", "something else than texts")
     return provenance
 
 
-@dataclasses.dataclass(frozen=True)
-class _Node:
-    """A group of the file. Nothing is read of which kind and size were not looked at before.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file, for messages.
-    node : h5py.Group
-    """
-
-    path: Path
-    node: Any
-
-    def error(self, place: str, found: str, advice: str) -> FormatError:
-        """A complaint about something in this group."""
-        return FormatError(self.path, f"{self.node.name.rstrip('/')}/ {place}", found, advice)
-
-    def group(self, name: str) -> _Node:
-        """A group in this one."""
-        return _Node(self.path, self._member(name, "group"))
-
-    def array(self, name: str, dtype: np.dtype[Any], axes: int) -> npt.NDArray[Any]:
-        """A dataset with 2^k cells along each of its axes, finite and not negative."""
-        data = self._member(name, "dataset")
-        place = f"dataset {name!r}"
-        if data.dtype != dtype or len(data.shape or ()) != axes:
-            raise self.error(place, f"{data.dtype} of shape {data.shape}, expected {dtype} with {axes} axes", DAMAGED)
-        if not all(n > 0 and n & (n - 1) == 0 for n in data.shape) or math.prod(data.shape) > MOST_CELLS:
-            raise self.error(place, f"shape {data.shape}, expected powers of two, {MOST_CELLS} at most", DAMAGED)
-        # Memory is set aside only for what the file can hold; and nothing is followed to other files.
-        if data.external or data.is_virtual or data.nbytes > DEFLATE_RATIO * data.id.get_storage_size():
-            raise self.error(place, f"the {data.nbytes} bytes of shape {data.shape} are not in it", DAMAGED)
-        if data.chunks is not None and math.prod(data.chunks) > data.size:
-            raise self.error(place, f"chunks of shape {data.chunks} in shape {data.shape}", DAMAGED)
-        values: npt.NDArray[Any] = data[()]
-        if not (np.isfinite(values).all() and (values >= 0).all()):
-            raise self.error(place, "a value that is negative or not finite", DAMAGED)
-        return values
-
-    def text(self, name: str) -> str:
-        """An attribute that is a text."""
-        stored = self._attribute(name, (), "SO")
-        return stored.decode("utf-8") if isinstance(stored, bytes) else str(stored)
-
-    def has_text(self, name: str, text: str) -> bool:
-        """Whether there is such an attribute with just this text, whatever else it may be."""
-        fits = name in self.node.attrs and self.node.attrs.get_id(name).dtype.kind in "SO"
-        return fits and self.node.attrs.get_id(name).shape == () and self.text(name) == text
-
-    def texts(self, name: str) -> tuple[str, ...]:
-        """An attribute that is a list of texts, as JSON."""
-        stored = json.loads(self.text(name))
-        if not (isinstance(stored, list) and all(isinstance(item, str) for item in stored)):
-            raise self.error(f"attribute {name!r}", "it is not a list of texts", DAMAGED)
-        return tuple(stored)
-
-    def integer(self, name: str) -> int:
-        """An attribute that is a whole number."""
-        return int(self._attribute(name, (), "iu"))
-
-    def truth(self, name: str) -> bool:
-        """An attribute that is true or false."""
-        return bool(self._attribute(name, (), "b"))
-
-    def number(self, name: str, *, finite: bool = True) -> float:
-        """An attribute that is a number."""
-        return float(self._numbers(name, (), finite=finite))
-
-    def numbers(self, name: str, shape: tuple[int, ...] | None) -> FloatArray:
-        """An attribute that is an array of finite numbers; shape None: of any length."""
-        return self._numbers(name, shape, finite=True)
-
-    def _numbers(self, name: str, shape: tuple[int, ...] | None, *, finite: bool) -> FloatArray:
-        values = np.asarray(self._attribute(name, shape, "iuf"), dtype=np.float64)
-        if finite and not np.isfinite(values).all():
-            raise self.error(f"attribute {name!r}", f"{values} is not finite", DAMAGED)
-        return values
-
-    def _attribute(self, name: str, shape: tuple[int, ...] | None, kinds: str) -> Any:
-        if name not in self.node.attrs:
-            raise self.error(f"attribute {name!r}", "there is none", DAMAGED)
-        stored = self.node.attrs.get_id(name)
-        fits = stored.shape == shape if shape is not None else stored.shape is not None and len(stored.shape) == 1
-        if not fits or stored.dtype.kind not in kinds or stored.get_storage_size() > self.path.stat().st_size:
-            raise self.error(f"attribute {name!r}", f"{stored.dtype} of shape {stored.shape}", DAMAGED)
-        return self.node.attrs[name]
-
-    def _member(self, name: str, kind: str) -> Any:
-        import h5py  # noqa: PLC0415
-
-        link = self.node.get(name, getlink=True)
-        # Soft and external links lead elsewhere, out of the file even.
-        member = self.node[name] if isinstance(link, h5py.HardLink) and name in self.node else None
-        if not isinstance(member, h5py.Group if kind == "group" else h5py.Dataset):
-            raise self.error(f"{kind} {name!r}", "there is none", DAMAGED)
-        return member
+def _array(group: Node, name: str, dtype: np.dtype[Any], axes: int) -> npt.NDArray[Any]:
+    """A dataset with 2^k cells along each of its axes, finite and not negative."""
+    data = group.dataset(name, dtype, axes)
+    place = f"dataset {name!r}"
+    if not all(n > 0 and n & (n - 1) == 0 for n in data.shape) or math.prod(data.shape) > MOST_CELLS:
+        raise group.error(place, f"shape {data.shape}, expected powers of two, {MOST_CELLS} at most")
+    values: npt.NDArray[Any] = data[()]
+    if not (np.isfinite(values).all() and (values >= 0).all()):
+        raise group.error(place, "a value that is negative or not finite")
+    return values

@@ -1,4 +1,4 @@
-"""From rays, or from the light field fitted to them, to luminance maps."""
+"""From rays, from the light field fitted to them, or from a scene, to luminance maps."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from etendue.lightfield.surfaces import Surface
 from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
 from etendue.luminance.cone import ConeEstimate, ConeView, check_acceptance, cone_estimates
 from etendue.luminance.looking import look_at_field
+from etendue.luminance.scene_map import Looking, look_at_scene
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally
+from etendue.scene import Scene
 
 Method = Literal["auto", "cone", "lightfield"]
 METHODS: tuple[str, ...] = get_args(Method)
@@ -24,6 +26,10 @@ DEFAULT_ACCEPTANCE = 1.5
 """Half-angle [°] of the cone in [Audenaert2014]_ section 2.3.2."""
 
 Acceptance = float | Literal["auto"] | None
+
+
+DEFAULT_SAMPLES = 16
+"""Points per pixel at which a light field is read."""
 
 
 @overload
@@ -35,7 +41,7 @@ def luminance_map(
     method: Method = ...,
     acceptance: Acceptance = ...,
     surface: Surface | Literal["auto"] = ...,
-    samples: int = ...,
+    samples: int | None = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> LuminanceMap: ...
@@ -48,32 +54,62 @@ def luminance_map(
     method: Method = ...,
     acceptance: Acceptance = ...,
     surface: Surface | Literal["auto"] = ...,
-    samples: int = ...,
+    samples: int | None = ...,
+    threads: int | None = ...,
+    progress: Progress | None = ...,
+) -> list[LuminanceMap]: ...
+@overload
+def luminance_map(
+    source: Scene,
+    observer: Observer,
+    screen: Screen,
+    *,
+    rays_per_pixel: int | None = ...,
+    until: float | None = ...,
+    seed: int | None = ...,
+    threads: int | None = ...,
+    progress: Progress | None = ...,
+) -> LuminanceMap: ...
+@overload
+def luminance_map(
+    source: Scene,
+    observer: Sequence[Observer] | None = ...,
+    screen: Screen | Sequence[Screen] | None = ...,
+    *,
+    rays_per_pixel: int | None = ...,
+    until: float | None = ...,
+    seed: int | None = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> list[LuminanceMap]: ...
 def luminance_map(
-    source: RayStream | LightField,
-    observer: Observer | Sequence[Observer],
-    screen: Screen | Sequence[Screen],
+    source: RayStream | LightField | Scene,
+    observer: Observer | Sequence[Observer] | None = None,
+    screen: Screen | Sequence[Screen] | None = None,
     *,
     method: Method = "auto",
     acceptance: Acceptance = None,
     surface: Surface | Literal["auto"] = "auto",
-    samples: int = 16,
+    samples: int | None = None,
+    rays_per_pixel: int | None = None,
+    until: float | None = None,
+    seed: int | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> LuminanceMap | list[LuminanceMap]:
     """What an observer sees of a source: luminance per pixel, with its standard error.
 
     Rays travel in free space, forwards and backwards along their lines: where on its line a ray starts has no influence.
+    In a scene, lines of sight are followed from the eye through the optics to the sources; those that meet smooth surfaces
+    only have no noise but that of the places within a pixel.
 
     Parameters
     ----------
-    source : RayStream or LightField
-        A ray set, a source that draws its rays on demand, or the light field that was fitted to one.
+    source : RayStream, LightField or Scene
+        A ray set, a source that draws its rays on demand, the light field that was fitted to one, or a scene. Ray sets in
+        a scene are fitted first, since rays have no luminance that a line of sight could meet.
     observer : Observer or sequence of Observer
-        Any number is served by one pass over the rays.
+        Any number is served by one pass over the rays. Of a scene, None: its own observers with their screens.
     screen : Screen or sequence of Screen
         One for all observers, or one each.
     method : {"auto", "cone", "lightfield"}
@@ -83,8 +119,16 @@ def luminance_map(
         Half-angle α of the cone [°]; None: 1.5; ``"auto"``: the one of least estimated error, and the map's notes say why.
     surface : Surface or "auto"
         Carrier surface of the light field; ``"auto"``: the one that foretells held-out rays best.
-    samples : int
-        Points per pixel at which a light field is read.
+    samples : int, optional
+        Points per pixel at which a light field is read; 16 if None.
+    rays_per_pixel : int, optional
+        Of a scene: lines of sight per pixel, in 16 independent passes (at least 4) whose spread gives the standard error;
+        256 if None.
+    until : float, optional
+        Of a scene: more passes are made until the median relative error of the pixels with light is below it, up to 64
+        times `rays_per_pixel`. What light fields do not know of themselves does not count here, but in the map's errors.
+    seed : int, optional
+        Of a scene; 1 if None.
     threads : int, optional
         All cores if None. The result has the same bits for any number.
     progress : callable, optional
@@ -98,7 +142,10 @@ def luminance_map(
     Raises
     ------
     ArgumentError
-        If the rays have no position, an angle is out of its domain, or the numbers of observers and screens differ.
+        If the rays have no position, an angle is out of its domain, the numbers of observers and screens differ, or an
+        option belongs to another kind of source.
+    SceneError
+        If a scene has mistakes.
     UnknownNameError
         If there is no such method.
 
@@ -110,9 +157,33 @@ def luminance_map(
     >>> truth = rays.luminance(0, 0)
     >>> bool(abs(lmap.values[0, 0] - truth) < 3 * lmap.standard_error[0, 0] + 0.25 * truth)
     True
+    >>> sky = {"kind": "surface", "shape": {"kind": "sphere", "radius": 100}, "side": "back", "flux": 1000}
+    >>> ball = et.Scene(sources=[sky], solids=[{"shape": {"kind": "ball", "radius": 3}, "medium": "BK7"}])
+    >>> seen = et.luminance_map(ball, et.Observer(30, 20, 90), et.Screen(8, 8, 4, 4), rays_per_pixel=16)
+    >>> float(np.ptp(seen.values) / seen.values.max()) < 1e-9        # glass in an even surround cannot be seen
+    True
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
+    for_scenes = {"rays_per_pixel": rays_per_pixel, "until": until, "seed": seed}
+    for_others = {
+        "method": None if method == "auto" else method,
+        "acceptance": acceptance,
+        "surface": None if surface == "auto" else surface,
+        "samples": samples,
+    }
+    is_scene = isinstance(source, Scene)
+    needless = [name for name, value in (for_others if is_scene else for_scenes).items() if value is not None]
+    if needless:
+        owner, here = ("rays and light fields", "scene") if is_scene else ("scenes", "ray set or light field")
+        raise ArgumentError(f"{', '.join(needless)}: for {owner}, and the source is a {here}; leave it out.")
+    if isinstance(source, Scene) and observer is None and screen is None:
+        if not source.observers:
+            raise ArgumentError("the scene has no observers; give an observer and a screen.")
+        observer = [keys.observer() for keys in source.observers]
+        screen = [keys.screen.screen() for keys in source.observers]
+    if observer is None or screen is None:
+        raise ArgumentError("give an observer and a screen.")
     observers = [observer] if isinstance(observer, Observer) else list(observer)
     screens = [screen] * len(observers) if isinstance(screen, Screen) else list(screen)
     if len(observers) != len(screens) or not observers:
@@ -120,6 +191,11 @@ def luminance_map(
     pairs = list(zip(observers, screens, strict=True))
     # A stated acceptance asks for the cone.
     by_cone = method == "cone" or (method == "auto" and acceptance is not None)
+    if isinstance(source, Scene):
+        given = {name: value for name, value in for_scenes.items() if value is not None}
+        maps = look_at_scene(source, pairs, Looking(**given, threads=threads), progress)  # type: ignore[arg-type]
+        return maps[0] if isinstance(observer, Observer) else maps
+    samples = DEFAULT_SAMPLES if samples is None else samples
     if isinstance(source, LightField):
         if by_cone:
             raise ArgumentError("a light field has no rays that a cone could accept; leave method and acceptance out.")

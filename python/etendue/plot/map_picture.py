@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.plot import style
+from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
 
@@ -33,7 +34,7 @@ DECADES = 4
 
 
 def plot_map(
-    lmap: LuminanceMap,
+    lmap: LuminanceMap | IlluminanceMap,
     path: str | os.PathLike[str] | None = None,
     scale: Scale = "linear",
     *,
@@ -46,7 +47,7 @@ def plot_map(
 
     Parameters
     ----------
-    lmap : LuminanceMap
+    lmap : LuminanceMap or IlluminanceMap
         The map.
     path : path, optional
         Where to write the picture, .png or .pdf. The same map gives the same bytes.
@@ -57,9 +58,9 @@ def plot_map(
         four decades under the highest on a logarithmic scale, at most down to the lowest) and the highest value.
         Values beyond get the colour of the end, and the colour bar an arrow.
     title : str, optional
-        First line; "Luminance" or "Radiance" if not given.
+        First line; the name of the quantity if not given.
     show : {"value", "relative-error"}
-        The luminance, or its standard error in per cent of it.
+        The value, or its standard error in per cent of it.
 
     Returns
     -------
@@ -104,12 +105,18 @@ def plot_map(
     left, top = layout.text_left, layout.height
     heading = title if title is not None else lmap.quantity.capitalize()
     style.add_text(figure, left, top - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
-    plane = ", on the fixed XY plane" if lmap.screen.plane == "xy" else ""
-    seen = f"seen at {style.describe_observer(lmap.observer)}{plane}"
-    style.add_text(figure, left, top - 0.54, seen, size=style.LABEL_SIZE, color=style.FAINT)
+    style.add_text(figure, left, top - 0.54, _geometry(lmap), size=style.LABEL_SIZE, color=style.FAINT)
     for number, line in enumerate(reversed(layout.caption)):
         style.add_text(figure, left, 0.14 + 0.15 * number, line, size=style.CAPTION_SIZE, color=style.FAINT)
     return style.finish(figure, path)
+
+
+def _geometry(lmap: LuminanceMap | IlluminanceMap) -> str:
+    if isinstance(lmap, IlluminanceMap):
+        centre, normal = (", ".join(f"{x:.4g}" for x in point) for point in (lmap.centre, lmap.normal))
+        return f"around ({centre}) mm, facing ({normal})"
+    plane = ", on the fixed XY plane" if lmap.screen.plane == "xy" else ""
+    return f"seen at {style.describe_observer(lmap.observer)}{plane}"
 
 
 def colour_map(colours: str) -> Colormap:
@@ -195,7 +202,7 @@ def draw_colour_bar(figure: Figure, axes: Axes, image: AxesImage, data: Array, l
     style.dress(axes)
 
 
-def _relative_error(lmap: LuminanceMap) -> Array:
+def _relative_error(lmap: LuminanceMap | IlluminanceMap) -> Array:
     """Standard error in per cent of the value; NaN where there is no value above 0."""
     positive = (lmap.values > 0.0) & np.isfinite(lmap.values)
     result = np.full(lmap.values.shape, np.nan)
@@ -203,7 +210,7 @@ def _relative_error(lmap: LuminanceMap) -> Array:
     return result
 
 
-def _facts(lmap: LuminanceMap, data: Array, show: str) -> Iterator[str]:
+def _facts(lmap: LuminanceMap | IlluminanceMap, data: Array, show: str) -> Iterator[str]:
     """What the picture rests on, fact by fact. Black pixels would only pull the medians to 0."""
     lit = (lmap.values > 0.0) & np.isfinite(lmap.values)
     if lit.any():

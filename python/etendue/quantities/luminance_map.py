@@ -18,8 +18,9 @@ from etendue.units import FLUX_UNITS, LUMINANCE_NAME, LUMINANCE_UNIT, MM2_PER_M2
 
 MapValues = npt.NDArray[np.float64]
 
-SAVE_MAP: list[Callable[[LuminanceMap, Path], tuple[str, ...]]] = []
-"""The door through which a map leaves to a file; `etendue.formats` opens it (floors import downwards only)."""
+SAVE_MAP: list[Callable[[Any, Path], tuple[str, ...]]] = []
+"""The door through which a map, of luminance or of illuminance, leaves to a file; `etendue.formats` opens it (floors
+import downwards only)."""
 
 PLOT_MAP: list[Callable[..., Any]] = []
 """The door through which a map becomes a picture; `etendue.plot` opens it."""

@@ -13,6 +13,85 @@ MEMORY_LIMIT = 64 << 20
 """Bytes that stay in memory; beyond, the records go to a nameless temporary file, which is then mapped."""
 
 
+class Spool:
+    """Records that are appended stretch by stretch, and can be looked at in between.
+
+    An interruption at any moment leaves what was appended before as it was.
+
+    Parameters
+    ----------
+    dtype : structured dtype
+        Of the records.
+    memory_limit : int
+        Bytes that stay in memory.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> records = Spool(np.dtype("f4,f4"))
+    >>> records.append(np.zeros(2, "f4,f4"))
+    >>> early = records.array()
+    >>> records.append(np.ones(1, "f4,f4"))
+    >>> len(early), len(records.array()), len(records.array(1))
+    (2, 3, 1)
+    """
+
+    def __init__(self, dtype: np.dtype[Any], memory_limit: int = MEMORY_LIMIT) -> None:
+        self._dtype = dtype
+        self._limit = memory_limit
+        # The file has no name and dies with the last map of it, whatever happens.
+        self._file: Any = None
+        # Bytes in the file, and what is not there yet: replaced together, in one step.
+        self._state: tuple[int, tuple[npt.NDArray[Any], ...]] = (0, ())
+
+    def append(self, part: npt.NDArray[Any]) -> None:
+        """Append a stretch.
+
+        Raises
+        ------
+        OSError
+            If the temporary folder is full.
+        """
+        written, held = self._state
+        held = (*held, np.ascontiguousarray(part, dtype=self._dtype))
+        self._state = (written, held)
+        if sum(stretch.nbytes for stretch in held) > self._limit:
+            self._flush()
+
+    def __len__(self) -> int:
+        """Number of records."""
+        written, held = self._state
+        return written // self._dtype.itemsize + sum(map(len, held))
+
+    def array(self, count: int | None = None) -> npt.NDArray[Any]:
+        """The first `count` records, or all of them, read-only: in memory if few and as a map of the file if not."""
+        count = len(self) if count is None else count
+        if self._file is None:
+            _, held = self._state
+            gathered = np.concatenate(held, dtype=self._dtype)[:count] if held else np.zeros(0, self._dtype)
+            gathered.setflags(write=False)
+            return gathered
+        self._flush()
+        self._file.flush()
+        return np.memmap(self._file, dtype=self._dtype, mode="r", shape=(count,)) if count else np.zeros(0, self._dtype)
+
+    def _flush(self) -> None:
+        written, held = self._state
+        if self._file is None:
+            self._file = tempfile.TemporaryFile(prefix="etendue-")  # noqa: SIM115 - it lives as long as the spool
+        self._file.seek(written)
+        for part in held:
+            # Not ndarray.tofile, which closes its own buffer without looking whether the last bytes found room.
+            self._file.write(part.view(np.uint8).data)
+            written += part.nbytes
+        self._state = (written, ())
+
+    def close(self) -> None:
+        """Give the file back; arrays that were handed out stay."""
+        if self._file is not None:
+            self._file.close()
+
+
 def spool(
     parts: Iterable[npt.NDArray[Any]], dtype: np.dtype[Any], memory_limit: int = MEMORY_LIMIT
 ) -> npt.NDArray[Any]:
@@ -38,28 +117,10 @@ def spool(
     >>> spool([np.zeros(2, "f4,f4"), np.ones(1, "f4,f4")], np.dtype("f4,f4")).shape
     (3,)
     """
-    held: list[npt.NDArray[Any]] = []
-    held_bytes, records = 0, 0
-    # The file has no name and dies with the last map of it, whatever happens.
-    with tempfile.TemporaryFile(prefix="etendue-") as file:
+    records = Spool(dtype, memory_limit)
+    try:
         for part in parts:
-            held.append(np.ascontiguousarray(part, dtype=dtype))
-            held_bytes += part.nbytes
-            records += len(part)
-            if held_bytes > memory_limit:
-                _flush(held, file)
-                held_bytes = 0
-        if file.tell() == 0:
-            gathered = np.concatenate(held, dtype=dtype) if held else np.zeros(0, dtype)
-            gathered.setflags(write=False)
-            return gathered
-        _flush(held, file)
-        file.flush()
-        return np.memmap(file, dtype=dtype, mode="r", shape=(records,))
-
-
-def _flush(held: list[npt.NDArray[Any]], file: Any) -> None:
-    for part in held:
-        # Not ndarray.tofile, which closes its own buffer without looking whether the last bytes found room.
-        file.write(part.view(np.uint8).data)
-    held.clear()
+            records.append(part)
+        return records.array()
+    finally:
+        records.close()

@@ -1,5 +1,291 @@
-//! Sources of rays.
+//! Sources: what emits rays, where it stands, how much flux it has and of which wavelengths.
 
+pub mod lit;
+pub mod numbers;
+mod point;
 mod rings;
+pub mod surface;
 
+use std::ops::Range;
+use std::sync::Arc;
+
+use etendue_geometry::Face;
+use etendue_geometry::bounds::Bounds;
+use etendue_geometry::shape::Shape;
+use etendue_geometry::shape::sample::AreaSampler;
+use etendue_geometry::{RayBatch, RaySource};
+use etendue_lightfield::field::draw::{FieldRays, Sampler};
+use etendue_math::{Frame, Vec3};
+use etendue_sampling::philox::{Stream, fill_uniforms};
+
+pub use lit::{Beacon, Lantern, Lit};
+pub use numbers::Numbers;
+pub use point::PointSource;
 pub use rings::{Ring, RingSource};
+pub use surface::SurfaceSource;
+
+/// The purpose under which the rays of traced sources are drawn (see [`Stream::new`]); each source has one of its own.
+const PURPOSE_EMIT: u64 = 0x454D_4954 << 32;
+
+/// The purpose under which their wavelengths are drawn.
+const PURPOSE_COLOUR: u64 = 0x434F_4C52 << 32;
+
+/// What emits, in its own coordinates.
+#[derive(Clone, Debug)]
+pub enum Emitter {
+    /// The rays of a set, by its number among those that a trace is given.
+    Rays {
+        /// Which set.
+        set: usize,
+        /// From stored flux to flux unit.
+        scale: f64,
+    },
+    /// A light field, drawn from.
+    Field(Arc<Sampler>),
+    /// An emitting surface.
+    Surface(SurfaceSource),
+    /// A point with an intensity distribution.
+    Point(PointSource),
+    /// Parallel light along +z from a piece of the plane z = 0.
+    Beam(AreaSampler),
+}
+
+impl Emitter {
+    /// A collimated beam; None if the shape is not flat or has no finite area.
+    #[must_use]
+    pub fn beam(shape: &Shape) -> Option<Self> {
+        matches!(shape, Shape::Flat(_)).then(|| AreaSampler::new(shape).map(Self::Beam))?
+    }
+}
+
+/// A source in its place.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// What emits.
+    pub emitter: Emitter,
+    /// Where it stands.
+    pub frame: Frame,
+    /// \[flux unit\].
+    pub flux: f64,
+    /// Wavelengths \[nm\], and the share of the flux up to each of them; the last one is 1.
+    pub spectrum: Vec<(f64, f64)>,
+}
+
+impl Source {
+    /// A box in the world that holds every start point; not finite for ray sets, which are not looked through for it.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let face = |shape: Shape| {
+            let (frame, trims) = (self.frame, Vec::new());
+            Face {
+                shape,
+                frame,
+                trims,
+                flipped: false,
+            }
+            .bounds()
+        };
+        match &self.emitter {
+            Emitter::Surface(surface) => face(surface.shape().0.clone()),
+            Emitter::Point(_) => Bounds::of([self.frame.origin]).widened(f64::EPSILON * self.frame.origin.length()),
+            Emitter::Field(sampler) => {
+                // A part reaches no farther from its origin than this in any direction.
+                let boxes = sampler.field().parts.iter().map(|part| {
+                    let centre = self.frame.point_to_world(part.part.frame.origin);
+                    Bounds::of([centre]).widened(part.part.reach() * (1.0 + 1e-9))
+                });
+                boxes.fold(Bounds::EMPTY, Bounds::union)
+            }
+            Emitter::Beam(_) | Emitter::Rays { .. } => {
+                Bounds::of([f64::NEG_INFINITY, f64::INFINITY].map(|v| Vec3::new(v, v, v)))
+            }
+        }
+    }
+
+    /// Whether it can be seen or connected to from a point that it lights: a set of rays or a beam cannot.
+    #[must_use]
+    pub const fn is_visible(&self) -> bool {
+        !matches!(self.emitter, Emitter::Rays { .. } | Emitter::Beam(_))
+    }
+
+    /// The wavelength of ray `index` of source number `source` \[nm\].
+    #[inline]
+    #[must_use]
+    pub fn wavelength(&self, seed: u64, source: u64, index: u64) -> f64 {
+        if let [(wavelength, _)] = self.spectrum[..] {
+            return wavelength;
+        }
+        let [number, ..] = Stream::new(seed, PURPOSE_COLOUR + source).uniforms(index, 0);
+        let line = self.spectrum.partition_point(|(_, share)| *share < number);
+        self.spectrum[line.min(self.spectrum.len() - 1)].0
+    }
+
+    /// Puts rays `range` of `count` (at most a block) into `batch`, in world coordinates: together the `count` rays carry
+    /// the flux of the source.
+    ///
+    /// A set of n rays is gone through once: ray i of `count` is ray ⌊i n/count⌋ of the set, in an order that mixes the file,
+    /// with n/count of its flux.
+    pub fn emit(
+        &self,
+        source: u64,
+        range: Range<u64>,
+        count: u64,
+        seed: u64,
+        sets: &[&dyn RaySource],
+        batch: &mut RayBatch,
+    ) {
+        match &self.emitter {
+            Emitter::Rays { set, scale } => {
+                resample(sets[*set], range, count, batch);
+                let scale = scale * sets[*set].len() as f64 / count as f64;
+                batch.flux[..batch.len].iter_mut().for_each(|w| *w *= scale);
+            }
+            Emitter::Field(sampler) => {
+                let rays = FieldRays {
+                    sampler,
+                    rays: count,
+                    seed: seed.wrapping_add(source << 48),
+                };
+                rays.fill(range, batch);
+                // The field's own flux may have been restated.
+                let flux = self.flux / count as f64;
+                batch.flux[..batch.len].fill(flux);
+            }
+            Emitter::Surface(surface) => self.draw(source, range, count, seed, batch, |n| surface.draw(n)),
+            Emitter::Point(point) => self.draw(source, range, count, seed, batch, |n| (Vec3::default(), point.draw(n))),
+            Emitter::Beam(area) => self.draw(source, range, count, seed, batch, |n| {
+                (area.draw(&mut || n.next()).0, Vec3::new(0.0, 0.0, 1.0))
+            }),
+        }
+        for i in 0..batch.len {
+            if batch.usable(i) {
+                let x = self.frame.point_to_world(batch.position(i));
+                let k = self.frame.direction_to_world(batch.direction(i));
+                for (axis, (x, k)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
+                    batch.position[axis][i] = x;
+                    batch.direction[axis][i] = k;
+                }
+            }
+        }
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "a range of at most a block")]
+    fn draw(
+        &self,
+        source: u64,
+        range: Range<u64>,
+        count: u64,
+        seed: u64,
+        batch: &mut RayBatch,
+        ray: impl Fn(&mut Numbers) -> (Vec3, Vec3),
+    ) {
+        let stream = Stream::new(seed, PURPOSE_EMIT + source);
+        batch.len = (range.end - range.start) as usize;
+        batch.defects = Default::default();
+        batch.norm_error = 0.0;
+        batch.flux[..batch.len].fill(self.flux / count as f64);
+        let indices: Vec<u64> = range.collect();
+        let mut four: [Vec<f64>; 4] = Default::default();
+        fill_uniforms(stream, &indices, &vec![0; indices.len()], &mut four);
+        if let Emitter::Surface(surface) = &self.emitter {
+            if surface.draw_block(&four, &mut batch.position, &mut batch.direction) {
+                return;
+            }
+        }
+        for (i, index) in indices.into_iter().enumerate() {
+            let (x, k) = ray(&mut Numbers::begun(stream, index, four.each_ref().map(|v| v[i])));
+            for (axis, (x, k)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
+                batch.position[axis][i] = x;
+                batch.direction[axis][i] = k;
+            }
+        }
+    }
+}
+
+/// Records that stay together when a set is gone through.
+const CHUNK: u64 = 256;
+
+/// Record number `i` of a set of `n` in the order in which it is gone through: chunks of records in steps of the golden
+/// section, so that every beginning of a run is spread over the whole file, however that is ordered.
+fn scattered(i: u64, n: u64) -> u64 {
+    let chunks = n / CHUNK;
+    let chunk = i / CHUNK;
+    if chunk >= chunks {
+        return i;
+    }
+    // A step that shares no factor with the number of chunks visits each of them once.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "below the number of chunks"
+    )]
+    let golden = (chunks as f64 * 0.618_033_988_749_895) as u64;
+    let common = |mut a: u64, mut b: u64| {
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    let step = (golden..).find(|step| common(*step, chunks) == 1).unwrap_or(1);
+    #[allow(clippy::cast_possible_truncation, reason = "below the number of chunks")]
+    let place = (u128::from(chunk) * u128::from(step) % u128::from(chunks)) as u64;
+    place * CHUNK + i % CHUNK
+}
+
+/// Rays ⌊i n/count⌋ of a set for i in `range`, counted in the order of [`scattered`].
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "quotients are below the set's length; ranges are at most a block"
+)]
+fn resample(set: &dyn RaySource, range: Range<u64>, count: u64, batch: &mut RayBatch) {
+    let n = set.len();
+    let len = (range.end - range.start) as usize;
+    let mut part = RayBatch::default();
+    batch.len = len;
+    batch.defects = Default::default();
+    batch.norm_error = 0.0;
+    let number = |i: u64| (u128::from(i) * u128::from(n) / u128::from(count)) as u64;
+    let (mut slot, mut i) = (0, range.start);
+    while i < range.end {
+        // The stretch of one chunk that these rays lie in.
+        let first = number(i);
+        let last = (first / CHUNK + 1) * CHUNK;
+        let mut end = i + 1;
+        while end < range.end && number(end) < last {
+            end += 1;
+        }
+        let begin = scattered(first, n);
+        let width = number(end - 1) - first + 1;
+        set.fill(begin..begin + width, &mut part);
+        for k in i..end {
+            let at = (number(k) - first) as usize;
+            for axis in 0..3 {
+                batch.position[axis][slot] = part.position[axis][at];
+                batch.direction[axis][slot] = part.direction[axis][at];
+            }
+            batch.flux[slot] = part.flux[at];
+            slot += 1;
+        }
+        batch.norm_error = batch.norm_error.max(part.norm_error);
+        i = end;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_record_is_gone_through_once_and_every_beginning_is_spread_out() {
+        for n in [1, 255, 256, 1000, 100_000, 256 * 377] {
+            let mut seen: Vec<u64> = (0..n).map(|i| scattered(i, n)).collect();
+            if n > 10_000 {
+                // The mean of the first tenth is near the middle of the file.
+                let mean = seen[..n as usize / 10].iter().map(|r| *r as f64).sum::<f64>() / (n as f64 / 10.0);
+                assert!((mean / n as f64 - 0.5).abs() < 0.05, "{n}: {mean}");
+            }
+            seen.sort_unstable();
+            assert!(seen.into_iter().eq(0..n));
+        }
+    }
+}

@@ -1,4 +1,4 @@
-"""Files that hold luminance maps: one module per format, one registry, found by content."""
+"""Files that hold maps of luminance or of illuminance: one module per format, one registry, found by content."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from pathlib import Path
 
 from etendue.errors import FormatError, UnknownNameError
 from etendue.formats.maps import csv, exr, hdr, npz, tiff
-from etendue.formats.maps.map_format import MapFormat
+from etendue.formats.maps.map_format import AnyMap, MapFormat
 from etendue.formats.output import atomic_output
+from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import SAVE_MAP, LuminanceMap
 
 MAP_FORMATS: dict[str, MapFormat] = {module.FORMAT.name: module.FORMAT for module in (exr, hdr, tiff, npz, csv)}
@@ -58,7 +59,47 @@ def read_map(path: str | os.PathLike[str]) -> LuminanceMap:
     ...     read_map(Path(folder) / "map.npz").values.tolist(), lost
     ([[3.0, nan]], ())
     """
-    path = Path(path)
+    lmap = _read(Path(path))
+    if not isinstance(lmap, LuminanceMap):
+        raise FormatError(path, "header", f"this is a map of {lmap.quantity}", "Read it with read_illuminance_map.")
+    return lmap
+
+
+def read_illuminance_map(path: str | os.PathLike[str]) -> IlluminanceMap:
+    """Read a map of illuminance that `save_map` wrote; the format is found from the content.
+
+    Parameters
+    ----------
+    path : path
+        A file of any of `MAP_FORMATS` but .hdr.
+
+    Returns
+    -------
+    IlluminanceMap
+        The map. From .npz and .csv exactly the one that was saved; from .exr and .tif rounded to float32.
+
+    Raises
+    ------
+    FormatError, OSError
+        As `read_map`.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from etendue.quantities.observer import Screen
+    >>> desk = IlluminanceMap([[500.0]], [[5.0]], [[900]], Screen(20, 10, 1, 1, "xy"), centre=(1, 2, 3))
+    >>> with TemporaryDirectory() as folder:
+    ...     lost = desk.save(Path(folder) / "desk.csv")
+    ...     read_illuminance_map(Path(folder) / "desk.csv").centre, lost
+    ((1.0, 2.0, 3.0), ())
+    """
+    lmap = _read(Path(path))
+    if not isinstance(lmap, IlluminanceMap):
+        raise FormatError(path, "header", f"this is a map of {lmap.quantity}", "Read it with read_map.")
+    return lmap
+
+
+def _read(path: Path) -> AnyMap:
     with path.open("rb") as stream:
         head = stream.read(SNIFFED_BYTES)
     for candidate in MAP_FORMATS.values():
@@ -68,15 +109,15 @@ def read_map(path: str | os.PathLike[str]) -> LuminanceMap:
     raise FormatError(path, "first bytes", found, f"étendue reads the maps it wrote: {', '.join(MAP_EXTENSIONS)}.")
 
 
-def save_map(lmap: LuminanceMap, path: str | os.PathLike[str]) -> tuple[str, ...]:
-    """Write a luminance map; the format follows the extension.
+def save_map(lmap: AnyMap, path: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Write a map of luminance or of illuminance; the format follows the extension.
 
     The file appears whole or not at all, and the same map gives the same bytes.
 
     Parameters
     ----------
-    lmap : LuminanceMap
-        The map.
+    lmap : LuminanceMap or IlluminanceMap
+        The map; .hdr holds luminance only.
     path : path
         Ends with an extension of one of `MAP_FORMATS`, or with one of `PICTURE_EXTENSIONS` for a picture.
 

@@ -10,10 +10,12 @@ import numpy as np
 
 from etendue.errors import FormatError
 from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
-from etendue.formats.maps.map_format import DAMAGED, MapFormat, parsing
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, parsing
+from etendue.units import ILLUMINANCE_NAME
 
 TITLE = "# etendue luminance map"
+ILLUMINANCE_TITLE = "# etendue illuminance map"
+TITLES = (TITLE.encode("ascii"), ILLUMINANCE_TITLE.encode("ascii"))
 COLUMNS = {
     "row": np.int64,
     "column": np.int64,
@@ -25,18 +27,19 @@ COLUMNS = {
 }
 
 
-def write(lmap: LuminanceMap, path: Path) -> tuple[str, ...]:
+def write(lmap: AnyMap, path: Path) -> tuple[str, ...]:
     """Write a title, the JSON header behind ``#``, the column names and one line per pixel; nothing is lost.
 
     Numbers have as many digits as it takes to read the same float64 back; ``nan`` stands for a dead pixel.
     """
     with path.open("w", encoding="ascii", newline="\n") as stream:
-        stream.write(f"{TITLE}\n# {header_text(lmap)}\n{','.join(COLUMNS)}\n")
+        title = ILLUMINANCE_TITLE if lmap.quantity in ILLUMINANCE_NAME.values() else TITLE
+        stream.write(f"{title}\n# {header_text(lmap)}\n{','.join(COLUMNS)}\n")
         stream.writelines(_rows(lmap))
     return ()
 
 
-def _rows(lmap: LuminanceMap) -> Iterator[str]:
+def _rows(lmap: AnyMap) -> Iterator[str]:
     """The lines of one row of pixels at a time."""
     x = lmap.screen.x.tolist()
     for row, y in enumerate(lmap.screen.y.tolist()):
@@ -47,12 +50,12 @@ def _rows(lmap: LuminanceMap) -> Iterator[str]:
         )
 
 
-def read(path: Path) -> LuminanceMap:
+def read(path: Path) -> AnyMap:
     """Read what `write` wrote; line ends may have become those of another system."""
     with path.open("rb") as stream:
         top = [stream.readline().rstrip(b"\r\n") for _ in range(3)]
         lines, ended = _count_lines(stream)
-    if top[0] != TITLE.encode("ascii") or not top[1].startswith(b"# "):
+    if top[0] not in TITLES or not top[1].startswith(b"# "):
         raise FormatError(path, "lines 1 and 2", "not the title and header of an étendue map", FOREIGN)
     if top[2] != ",".join(COLUMNS).encode("ascii"):
         raise FormatError(path, "line 3", f"found {top[2][:80]!r}", f"It must be {','.join(COLUMNS)!r}.")
@@ -78,4 +81,4 @@ def _count_lines(stream: BinaryIO) -> tuple[int, bool]:
     return lines, last == b"\n"
 
 
-FORMAT = MapFormat("csv", (".csv",), lambda head: head.startswith(TITLE.encode("ascii")), read, write)
+FORMAT = MapFormat("csv", (".csv",), lambda head: head.startswith(TITLES), read, write)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
-from etendue.formats.maps.map_format import DAMAGED, MapFormat, check_room, parsing
+from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, check_room, parsing
 from etendue.formats.maps.narrow import narrowed, rays_from_uint32, rays_to_uint32
 from etendue.quantities.luminance_map import LuminanceMap
 
@@ -35,7 +35,7 @@ LINES_PER_CHUNK = {0: 1, 2: 1, 3: 16}
 """Of the compressions none, ZIPS and ZIP, by their number in the file."""
 
 
-def write(lmap: LuminanceMap, path: Path) -> tuple[str, ...]:
+def write(lmap: AnyMap, path: Path) -> tuple[str, ...]:
     """Write channels ``Y`` [cd/m²], ``standard_error`` (float32) and ``rays`` (uint32, 2³²-1 where unknown).
 
     NaN in ``Y`` is a dead pixel. The attribute ``etendue`` holds the exact header as JSON; the others repeat its main
@@ -60,15 +60,22 @@ def write(lmap: LuminanceMap, path: Path) -> tuple[str, ...]:
     return lost
 
 
-def _plain_attributes(lmap: LuminanceMap) -> dict[str, Any]:
-    observer, screen = lmap.observer, lmap.screen
+def _plain_attributes(lmap: AnyMap) -> dict[str, Any]:
+    screen = lmap.screen
+    if isinstance(lmap, LuminanceMap):
+        observer = lmap.observer
+        place: dict[str, Any] = {
+            "observerTheta": float(observer.theta),
+            "observerPhi": float(observer.phi),
+            "observerDistance": float(observer.distance),
+            "observerTarget": observer.target,
+        }
+    else:
+        place = {"screenCentre": lmap.centre, "screenRight": lmap.right, "screenUp": lmap.up}
     return {
         "quantity": lmap.quantity,
         "unit": lmap.unit,
-        "observerTheta": float(observer.theta),
-        "observerPhi": float(observer.phi),
-        "observerDistance": float(observer.distance),
-        "observerTarget": observer.target,
+        **place,
         "screenWidth": float(screen.width),
         "screenHeight": float(screen.height),
         "screenPlane": screen.plane,
@@ -83,7 +90,7 @@ def _encodable(text: str) -> str:
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
-def read(path: Path) -> LuminanceMap:
+def read(path: Path) -> AnyMap:
     """Read what `write` wrote."""
     data = path.read_bytes()
     with parsing(path, "header"):

@@ -11,7 +11,7 @@ import numpy as np
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.maps import rgbe
 from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
-from etendue.formats.maps.map_format import DAMAGED, MapFormat, check_room, parsing
+from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, check_room, parsing
 from etendue.quantities.luminance_map import LuminanceMap, MapValues
 from etendue.units import RADIANCE_WHITE_EFFICACY, FluxUnit
 
@@ -33,13 +33,17 @@ NARROWEST_VIEW, WIDEST_VIEW = 1.1e-6, 179.9999
 LOST = "a Radiance picture has 8 bits per value (±0.4 %), no standard errors and no ray counts"
 
 
-def write(lmap: LuminanceMap, path: Path) -> tuple[str, ...]:
+def write(lmap: AnyMap, path: Path) -> tuple[str, ...]:
     """Write a 32-bit_rle_rgbe picture.
 
     A luminance is written as luminance / 179 in red, green and blue, as Radiance computes it back; a radiance as it
     is. A dead pixel is the all-zero pixel. VIEW is the observer's view of the screen, lengths in mm. Lines that begin
     with ``ETENDUE=`` hold the exact header as JSON.
     """
+    if not isinstance(lmap, LuminanceMap):
+        raise ArgumentError(
+            f"a Radiance picture holds luminance, and this map is {lmap.quantity}. Save it as .exr or .npz."
+        )
     grey = lmap.values / _unit_in_file(lmap.flux_unit)
     lost = [LOST, *_out_of_range(grey)]
     mantissa, exponent = rgbe.encode_grey(grey)
@@ -119,7 +123,7 @@ def _numbers(vector: MapValues) -> str:
     return " ".join(f"{number + 0.0:.9g}" for number in vector)
 
 
-def read(path: Path) -> LuminanceMap:
+def read(path: Path) -> AnyMap:
     """Read what `write` wrote; a change of exposure by another tool is undone, and noted."""
     data = path.read_bytes()
     end = data.find(b"\n\n")

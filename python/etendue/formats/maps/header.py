@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
-from etendue.formats.maps.map_format import DAMAGED, parsing
+from etendue.formats.maps.map_format import DAMAGED, AnyMap, parsing
+from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap, MapValues
-from etendue.units import FLUX_UNITS
+from etendue.units import FLUX_UNITS, ILLUMINANCE_NAME
 
 VERSION = 1
 VERSION_KEY = "etendue_map"
@@ -27,12 +28,12 @@ FOREIGN = (
 )
 
 
-def header_text(lmap: LuminanceMap) -> str:
+def header_text(lmap: AnyMap) -> str:
     """Everything but the arrays as one line of ASCII JSON.
 
     Parameters
     ----------
-    lmap : LuminanceMap
+    lmap : LuminanceMap or IlluminanceMap
         The map *as the file holds it*: with its values rounded as the format rounds them, because the checksum
         covers what will be read back.
     """
@@ -52,7 +53,7 @@ class MapHeader:
     place : str
         Where in the file the header stands.
     data : dict
-        What `LuminanceMap.header` gave.
+        What the map's `header` gave.
     checksum : str
         SHA-256 over header and arrays.
     rows, columns : int
@@ -111,13 +112,13 @@ class MapHeader:
         *,
         sealed: bool = True,
         notes: tuple[str, ...] = (),
-    ) -> LuminanceMap:
+    ) -> AnyMap:
         """Make the map from the arrays that the file held.
 
         Parameters
         ----------
         values, standard_error, rays : array, shape (rows, columns)
-            As `LuminanceMap` wants them.
+            As the map wants them.
         sealed : bool
             Whether the checksum must agree.
         notes : tuple of str
@@ -133,7 +134,8 @@ class MapHeader:
             raise FormatError(self.path, self.place, found, DAMAGED)
         with parsing(self.path, self.place):
             _check_plain(self.data)
-            lmap = LuminanceMap.from_header(self.data, values, standard_error, rays)
+            kind = IlluminanceMap if self.data["quantity"] in ILLUMINANCE_NAME.values() else LuminanceMap
+            lmap = kind.from_header(self.data, values, standard_error, rays)
         return lmap.replace(notes=(*lmap.notes, *notes))
 
 

@@ -1,4 +1,4 @@
-"""What every file format for luminance maps has to offer, and the guards its reader stands behind."""
+"""What every file format for maps has to offer, and the guards its reader stands behind."""
 
 from __future__ import annotations
 
@@ -8,9 +8,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from etendue.errors import FormatError
+from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 
-DAMAGED = "The file is damaged or cut short: copy it again, or make it again with LuminanceMap.save."
+AnyMap = LuminanceMap | IlluminanceMap
+"""What a map file may hold: its header names the quantity."""
+
+DAMAGED = "The file is damaged or cut short: copy it again, or make it again with the map's save."
 
 DEFLATE_RATIO = 1032
 """The largest factor by which deflate can shrink anything: 258 bytes into 2 bits."""
@@ -18,7 +22,7 @@ DEFLATE_RATIO = 1032
 
 @dataclasses.dataclass(frozen=True)
 class MapFormat:
-    """One file format for luminance maps.
+    """One file format for maps of luminance, and of illuminance where it has room for them.
 
     Parameters
     ----------
@@ -37,8 +41,8 @@ class MapFormat:
     name: str
     extensions: tuple[str, ...]
     sniff: Callable[[bytes], bool]
-    read: Callable[[Path], LuminanceMap]
-    write: Callable[[LuminanceMap, Path], tuple[str, ...]]
+    read: Callable[[Path], AnyMap]
+    write: Callable[[AnyMap, Path], tuple[str, ...]]
 
 
 @contextlib.contextmanager

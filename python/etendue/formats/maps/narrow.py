@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.luminance_map import LuminanceMap, MapValues
+from etendue.formats.maps.map_format import AnyMap
+from etendue.quantities.luminance_map import MapValues
 
 UNKNOWN_RAYS = 2**32 - 1
 """Stands for "number of rays unknown" (-1 in a `LuminanceMap`) in a channel that has no negative numbers."""
@@ -14,18 +15,18 @@ UNKNOWN_RAYS = 2**32 - 1
 MAX_RAYS = UNKNOWN_RAYS - 1
 
 
-def narrowed(lmap: LuminanceMap) -> tuple[LuminanceMap, tuple[str, ...]]:
+def narrowed(lmap: AnyMap) -> tuple[AnyMap, tuple[str, ...]]:
     """Round a map to what float32 and uint32 hold.
 
     Parameters
     ----------
-    lmap : LuminanceMap
+    lmap : LuminanceMap or IlluminanceMap
         Any map.
 
     Returns
     -------
-    LuminanceMap
-        The map that will be read back: luminances and errors rounded to 24 bits (relative 6e-8).
+    LuminanceMap or IlluminanceMap
+        The map that will be read back: values and errors rounded to 24 bits (relative 6e-8).
     tuple of str
         What was lost, one sentence each.
 

@@ -11,13 +11,12 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
-from etendue.formats.maps.map_format import DAMAGED, MapFormat, parsing
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, parsing
 
 ARRAYS = {"values": np.dtype("<f8"), "standard_error": np.dtype("<f8"), "rays": np.dtype("<i8")}
 
 
-def write(lmap: LuminanceMap, path: Path) -> tuple[str, ...]:
+def write(lmap: AnyMap, path: Path) -> tuple[str, ...]:
     """Write arrays ``values``, ``standard_error``, ``rays`` and the JSON text ``header``; nothing is lost."""
     arrays = {name: getattr(lmap, name).astype(dtype) for name, dtype in ARRAYS.items()}
     # An open file, because to a path that does not end with ".npz" in lower case numpy would add it.
@@ -26,7 +25,7 @@ def write(lmap: LuminanceMap, path: Path) -> tuple[str, ...]:
     return ()
 
 
-def read(path: Path) -> LuminanceMap:
+def read(path: Path) -> AnyMap:
     """Read what `write` wrote."""
     with parsing(path, "zip archive"), zipfile.ZipFile(path) as archive:
         missing = [f"{name}.npy" for name in ("header", *ARRAYS) if f"{name}.npy" not in archive.namelist()]

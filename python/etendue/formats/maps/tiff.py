@@ -8,9 +8,8 @@ import numpy as np
 
 from etendue.errors import FormatError
 from etendue.formats.maps.header import FOREIGN, VERSION_KEY, MapHeader, header_text
-from etendue.formats.maps.map_format import DAMAGED, MapFormat, check_room, parsing
+from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, check_room, parsing
 from etendue.formats.maps.narrow import narrowed, rays_from_uint32, rays_to_uint32
-from etendue.quantities.luminance_map import LuminanceMap
 
 PAGES = {"values": np.dtype(np.float32), "standard_error": np.dtype(np.float32), "rays": np.dtype(np.uint32)}
 
@@ -23,7 +22,7 @@ PAGE_NAME = 285
 """Number of the TIFF tag PageName."""
 
 
-def write(lmap: LuminanceMap, path: Path) -> tuple[str, ...]:
+def write(lmap: AnyMap, path: Path) -> tuple[str, ...]:
     """Write pages of luminance [cd/m²] and standard error (float32) and of rays (uint32, 2³²-1 where unknown).
 
     NaN in the first page is a dead pixel. The description of the first page holds the header as JSON, its resolution
@@ -55,7 +54,7 @@ def write(lmap: LuminanceMap, path: Path) -> tuple[str, ...]:
     return lost
 
 
-def read(path: Path) -> LuminanceMap:
+def read(path: Path) -> AnyMap:
     """Read what `write` wrote."""
     import tifffile
 

@@ -1,0 +1,338 @@
+//! Tracing: a number of batches at a time, so that Python can report progress, look at errors and stop in between.
+
+use std::ops::Range;
+
+use etendue_geometry::RaySource;
+use etendue_geometry::assembly::Leaving;
+use etendue_math::Vec3;
+use etendue_sampling::ordered::{BATCH, within};
+use etendue_trace::eye::{self, Event};
+use etendue_trace::forward::{Cell, Harvest, Record, Run, trace, trails};
+use etendue_trace::inside::Inside;
+use etendue_trace::ledger::{Entry, Ledger};
+use etendue_trace::meeting::Loss;
+use etendue_trace::reverse::{Lit, Method, Pixel};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::scene::Scene;
+use crate::source::{Opened, Source};
+use crate::surface::vectors;
+use crate::view::View;
+
+fn entries<'py>(py: Python<'py>, entries: &[Entry]) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u64>>) {
+    (
+        PyArray1::from_iter(py, entries.iter().map(|e| e.flux())),
+        PyArray1::from_iter(py, entries.iter().map(|e| e.rays)),
+    )
+}
+
+/// A ledger as a dictionary of (flux, rays) arrays.
+fn ledger_dict<'py>(py: Python<'py>, ledger: &Ledger) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("emitted", entries(py, &ledger.emitted))?;
+    dict.set_item("escaped", entries(py, &[ledger.escaped]))?;
+    dict.set_item("on_face", entries(py, &ledger.on_face))?;
+    dict.set_item("in_medium", entries(py, &ledger.in_medium))?;
+    dict.set_item("terminated", entries(py, &[ledger.terminated]))?;
+    dict.set_item("lost", entries(py, &ledger.lost))?;
+    dict.set_item("lost_at", ledger.lost_at.to_vec())?;
+    dict.set_item("segments", ledger.segments)?;
+    Ok(dict)
+}
+
+fn cell_arrays<'py>(
+    py: Python<'py>,
+    cells: &[Cell],
+) -> (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<u64>>,
+) {
+    (
+        PyArray1::from_iter(py, cells.iter().map(|c| c.sum)),
+        PyArray1::from_iter(py, cells.iter().map(|c| c.squares)),
+        PyArray1::from_iter(py, cells.iter().map(|c| c.rays)),
+    )
+}
+
+/// Rows of position, direction, flux, wavelength.
+fn record_array<'py>(py: Python<'py>, records: &[Record]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let rows = records.iter().flat_map(|r| {
+        let [x, y, z] = r.position;
+        let [kx, ky, kz] = r.direction;
+        [x, y, z, kx, ky, kz, r.flux, r.wavelength]
+    });
+    PyArray1::from_iter(py, rows).reshape([records.len(), 8])
+}
+
+/// Why rays are lost, in the order of a ledger.
+#[pyfunction]
+pub fn losses() -> Vec<&'static str> {
+    Loss::ALL.iter().map(|loss| loss.name()).collect()
+}
+
+/// Rays of a batch.
+#[pyfunction]
+pub fn batch_size() -> u64 {
+    BATCH
+}
+
+/// The ray sets of a scene's sources.
+fn open<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Vec<Opened<'py>>> {
+    scene.sets().iter().map(|s| Opened::new(s.bind(py))).collect()
+}
+
+/// Traces batches `first..last` of a run of `rays` rays.
+#[pyfunction]
+#[pyo3(signature = (scene, rays, seed, most_events, first, last, threads=None))]
+pub fn trace_batches<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    rays: u64,
+    seed: u64,
+    most_events: u32,
+    first: u64,
+    last: u64,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyDict>> {
+    if first > last || last > rays.div_ceil(BATCH) {
+        return Err(PyValueError::new_err(format!("batches {first}..{last} of {rays} rays")));
+    }
+    let sets = open(py, scene)?;
+    let sets: Vec<Source<'_>> = sets.iter().map(Opened::core).collect::<PyResult<_>>()?;
+    let sets: Vec<&dyn RaySource> = sets.iter().map(|s| s as &dyn RaySource).collect();
+    let run = Run {
+        rays,
+        seed,
+        most_events,
+        sets: &sets,
+    };
+    let core = scene.core();
+    let batches: Range<u64> = first..last;
+    let harvest: Harvest = py.detach(|| within(threads.unwrap_or(0), |_| trace(core, &run, batches.clone())));
+    let dict = PyDict::new(py);
+    dict.set_item("ledger", ledger_dict(py, &harvest.ledger)?)?;
+    let cells = PyList::empty(py);
+    for detector in &harvest.cells {
+        cells.append(cell_arrays(py, detector))?;
+    }
+    dict.set_item("cells", cells)?;
+    let records = PyList::empty(py);
+    for detector in &harvest.records {
+        records.append(record_array(py, detector)?)?;
+    }
+    dict.set_item("records", records)?;
+    let events = PyList::empty(py);
+    for detector in &harvest.events {
+        events.append(event_array(py, detector)?)?;
+    }
+    dict.set_item("events", events)?;
+    dict.set_item("rays", harvest.rays)?;
+    dict.set_item("imbalance", harvest.imbalance)?;
+    Ok(dict)
+}
+
+/// Looks at a scene: for each pixel, row by row, the sums over passes `first..last` of the mean luminance of a pass, of its
+/// square, and of the sources' own deviation \[flux unit/(mm² sr)\].
+#[pyfunction]
+#[pyo3(signature = (scene, view, paths, seed, most_events, without_caustics, first, last, threads=None))]
+pub fn look_at_scene<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    view: View,
+    paths: u32,
+    seed: u64,
+    most_events: u32,
+    without_caustics: bool,
+    first: u32,
+    last: u32,
+    threads: Option<usize>,
+) -> PyResult<[Bound<'py, PyArray2<f64>>; 3]> {
+    let view = view.core();
+    let method = Method {
+        paths,
+        seed,
+        most_events,
+        without_caustics,
+    };
+    let pixels = py.detach(|| {
+        let lit = Lit::new(scene.core(), scene.lanterns());
+        within(threads.unwrap_or(0), |_| lit.look(&view, &method, first..last))
+    });
+    let shape = [view.rows as usize, view.columns as usize];
+    let array = |pick: fn(&Pixel) -> f64| PyArray1::from_iter(py, pixels.iter().map(pick)).reshape(shape);
+    Ok([array(|p| p.sum)?, array(|p| p.squares)?, array(|p| p.deviation)?])
+}
+
+/// Where the first `rays` rays of a run of as many start, turn and end: one (k, 3) array each \[mm\]; a ray that escapes ends
+/// `far` from its last turn.
+#[pyfunction]
+#[pyo3(signature = (scene, rays, seed, most_events, far))]
+pub fn trace_trails<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    rays: u64,
+    seed: u64,
+    most_events: u32,
+    far: f64,
+) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+    let sets = open(py, scene)?;
+    let sets: Vec<Source<'_>> = sets.iter().map(Opened::core).collect::<PyResult<_>>()?;
+    let sets: Vec<&dyn RaySource> = sets.iter().map(|s| s as &dyn RaySource).collect();
+    let run = Run {
+        rays,
+        seed,
+        most_events,
+        sets: &sets,
+    };
+    let core = scene.core();
+    let found = py.detach(|| trails(core, &run, far));
+    found
+        .into_iter()
+        .map(|trail| {
+            let points = trail.iter().flat_map(|p| [p.x, p.y, p.z]);
+            PyArray1::from_iter(py, points).reshape([trail.len(), 3])
+        })
+        .collect()
+}
+
+type Crossings<'py> = (
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+/// Every crossing of lines with faces at 0 < t: number of the line, face, t \[mm\].
+#[pyfunction]
+pub fn scene_crossings<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    points: PyReadonlyArray2<'py, f64>,
+    directions: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Crossings<'py>> {
+    let (points, directions) = (vectors(&points)?, vectors(&directions)?);
+    if points.len() != directions.len() {
+        return Err(PyValueError::new_err("points and directions differ in number"));
+    }
+    let (mut lines, mut faces, mut distances) = (Vec::new(), Vec::new(), Vec::new());
+    py.detach(|| {
+        for (line, (o, d)) in (0..).zip(points.iter().zip(&directions)) {
+            let (o, d) = (Vec3::from(*o), Vec3::from(*d).normalized());
+            let range = [0.0, f64::INFINITY];
+            scene
+                .core()
+                .assembly
+                .crossings(o, d, range, &Leaving::default(), |face, crossing| {
+                    lines.push(line);
+                    faces.push(face);
+                    distances.push(crossing.t);
+                });
+        }
+    });
+    Ok((
+        PyArray1::from_vec(py, lines),
+        PyArray1::from_vec(py, faces),
+        PyArray1::from_vec(py, distances),
+    ))
+}
+
+/// Numbers of an event as a table row has them.
+const EVENT: usize = 17;
+
+/// Rows of point, side, direction, flux, wavelength, ray, face, part, finish, and the bits of the solids on both sides: all
+/// 64-bit, whole numbers as their bits.
+fn event_array<'py>(py: Python<'py>, events: &[Event]) -> PyResult<Bound<'py, PyArray2<u64>>> {
+    let rows = events.iter().flat_map(|e| {
+        let reals = [e.point, e.side, e.direction].map(|v| [v.x, v.y, v.z].map(f64::to_bits));
+        let [[a, b, c], [d, f, g], [h, i, j]] = reals;
+        let places = u64::from(e.face) << 32 | u64::from(e.part);
+        let unseen = u64::from(e.unseen);
+        [
+            a,
+            b,
+            c,
+            d,
+            f,
+            g,
+            h,
+            i,
+            j,
+            e.flux.to_bits(),
+            e.wavelength.to_bits(),
+            e.ray,
+            places,
+            u64::from(e.finish),
+            e.before.bits(),
+            e.after.bits(),
+            unseen,
+        ]
+    });
+    PyArray1::from_iter(py, rows).reshape([events.len(), EVENT])
+}
+
+fn event(row: &[u64]) -> Event {
+    let at = |k: usize| {
+        Vec3::new(
+            f64::from_bits(row[k]),
+            f64::from_bits(row[k + 1]),
+            f64::from_bits(row[k + 2]),
+        )
+    };
+    #[allow(clippy::cast_possible_truncation, reason = "the halves of a word")]
+    let (face, part) = ((row[12] >> 32) as u32, row[12] as u32);
+    Event {
+        point: at(0),
+        side: at(3),
+        direction: at(6),
+        flux: f64::from_bits(row[9]),
+        wavelength: f64::from_bits(row[10]),
+        ray: row[11],
+        face,
+        part,
+        #[allow(clippy::cast_possible_truncation, reason = "checked by the caller")]
+        finish: row[13] as u32,
+        before: Inside::from_bits(row[14]),
+        after: Inside::from_bits(row[15]),
+        unseen: row[16] != 0,
+    }
+}
+
+/// The light image of stored scatter events, as (Σ w, Σ w², rays) of each pixel.
+#[pyfunction]
+#[pyo3(signature = (scene, events, view, complement, threads=None))]
+pub fn look_at_events<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    events: PyReadonlyArray2<'py, u64>,
+    view: View,
+    complement: bool,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyAny>> {
+    if events.shape()[1] != EVENT {
+        return Err(PyValueError::new_err(format!(
+            "events of shape (n, {EVENT}) are needed"
+        )));
+    }
+    let (core, view) = (scene.core(), view.core());
+    let events: Vec<Event> = events.as_slice()?.chunks_exact(EVENT).map(event).collect();
+    let solids = core.solids.len();
+    let known = |e: &Event| {
+        (e.face as usize) < core.roles.len()
+            && (e.finish as usize) < core.finishes.len()
+            && [e.before, e.after]
+                .iter()
+                .all(|i| i.solids().iter().all(|s| usize::from(*s) <= solids))
+    };
+    if !events.iter().all(known) {
+        return Err(PyValueError::new_err("the events are of another scene"));
+    }
+    let cells = py.detach(|| {
+        within(threads.unwrap_or(0), |_| {
+            eye::look_at_events(core, &events, &view, complement)
+        })
+    });
+    Ok(cell_arrays(py, &cells).into_pyobject(py)?.into_any())
+}

@@ -1,0 +1,183 @@
+//! Axis-aligned boxes.
+
+use etendue_math::Vec3;
+
+/// An axis-aligned box in f64 \[mm\]. A box with a `lo` above its `hi` is empty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// The smallest coordinates.
+    pub lo: Vec3,
+    /// The largest coordinates.
+    pub hi: Vec3,
+}
+
+impl Bounds {
+    /// The box that holds nothing: the neutral element of [`Bounds::union`].
+    pub const EMPTY: Self = Self {
+        lo: Vec3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
+        hi: Vec3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
+    };
+
+    /// The smallest box around some points; [`Bounds::EMPTY`] around none.
+    #[must_use]
+    pub fn of(points: impl IntoIterator<Item = Vec3>) -> Self {
+        points.into_iter().fold(Self::EMPTY, Self::grow)
+    }
+
+    /// Whether the box holds no point.
+    #[must_use]
+    pub fn is_empty(self) -> bool {
+        !(self.lo.x <= self.hi.x && self.lo.y <= self.hi.y && self.lo.z <= self.hi.z)
+    }
+
+    /// Whether all six coordinates are finite; an empty box may be.
+    #[must_use]
+    pub fn is_finite(self) -> bool {
+        [self.lo, self.hi]
+            .iter()
+            .all(|p| p.x.is_finite() && p.y.is_finite() && p.z.is_finite())
+    }
+
+    /// The smallest box that holds this one and a point.
+    #[inline]
+    #[must_use]
+    pub fn grow(self, p: Vec3) -> Self {
+        self.union(Self { lo: p, hi: p })
+    }
+
+    /// The smallest box that holds both. A NaN coordinate counts as nothing.
+    #[inline]
+    #[must_use]
+    pub fn union(self, o: Self) -> Self {
+        Self {
+            lo: Vec3::new(self.lo.x.min(o.lo.x), self.lo.y.min(o.lo.y), self.lo.z.min(o.lo.z)),
+            hi: Vec3::new(self.hi.x.max(o.hi.x), self.hi.y.max(o.hi.y), self.hi.z.max(o.hi.z)),
+        }
+    }
+
+    /// The box moved outward by `margin` on every side.
+    #[must_use]
+    pub fn widened(self, margin: f64) -> Self {
+        let m = Vec3::new(margin, margin, margin);
+        Self {
+            lo: self.lo - m,
+            hi: self.hi + m,
+        }
+    }
+
+    /// Whether a point lies in the box or on its faces.
+    #[must_use]
+    pub fn contains(self, p: Vec3) -> bool {
+        let inside = |lo: f64, p: f64, hi: f64| lo <= p && p <= hi;
+        inside(self.lo.x, p.x, self.hi.x) && inside(self.lo.y, p.y, self.hi.y) && inside(self.lo.z, p.z, self.hi.z)
+    }
+
+    /// Whether the two boxes have a point in common.
+    #[must_use]
+    pub fn touches(self, o: Self) -> bool {
+        let overlap = |lo: f64, hi: f64, from: f64, to: f64| lo <= to && from <= hi;
+        overlap(self.lo.x, self.hi.x, o.lo.x, o.hi.x)
+            && overlap(self.lo.y, self.hi.y, o.lo.y, o.hi.y)
+            && overlap(self.lo.z, self.hi.z, o.lo.z, o.hi.z)
+    }
+
+    /// Lengths of the sides; not above 0 somewhere if the box is empty or flat.
+    #[must_use]
+    pub fn sides(self) -> Vec3 {
+        self.hi - self.lo
+    }
+
+    /// Area of the surface; 0 if the box is empty.
+    #[inline]
+    #[must_use]
+    pub fn area(self) -> f64 {
+        let s = self.sides();
+        if self.is_empty() {
+            0.0
+        } else {
+            2.0 * (s.x * s.y + s.y * s.z + s.z * s.x)
+        }
+    }
+
+    /// The box in f32, rounded outward: `lo` and `hi` per axis.
+    #[must_use]
+    pub fn outward(self) -> [[f32; 3]; 2] {
+        [
+            [self.lo.x, self.lo.y, self.lo.z].map(round_down),
+            [self.hi.x, self.hi.y, self.hi.z].map(round_up),
+        ]
+    }
+}
+
+/// The largest f32 that is not above `v`; NaN stays NaN.
+#[inline(always)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation, reason = "rounded, then corrected downward")]
+pub fn round_down(v: f64) -> f32 {
+    let near = v as f32;
+    if f64::from(near) > v { near.next_down() } else { near }
+}
+
+/// The smallest f32 that is not below `v`; NaN stays NaN.
+#[inline(always)]
+#[must_use]
+pub fn round_up(v: f64) -> f32 {
+    -round_down(-v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use etendue_sampling::philox::Stream;
+
+    #[test]
+    fn unions_hold_both_and_areas_are_those_of_cuboids() {
+        let a = Bounds::of([Vec3::new(0.0, 0.0, 0.0), Vec3::new(1.0, 2.0, 3.0)]);
+        assert_eq!(a.area(), 22.0);
+        assert_eq!(a.sides(), Vec3::new(1.0, 2.0, 3.0));
+        let b = a.grow(Vec3::new(-1.0, 5.0, 1.0));
+        assert_eq!(
+            b,
+            Bounds {
+                lo: Vec3::new(-1.0, 0.0, 0.0),
+                hi: Vec3::new(1.0, 5.0, 3.0)
+            }
+        );
+        assert!(b.contains(Vec3::new(-1.0, 0.0, 3.0)) && !b.contains(Vec3::new(-1.0, 0.0, 3.1)));
+        assert!(!b.contains(Vec3::new(f64::NAN, 1.0, 1.0)));
+        assert_eq!(b.union(Bounds::EMPTY), b);
+        assert!(b.is_finite() && !b.is_empty() && Bounds::EMPTY.is_empty() && !Bounds::EMPTY.is_finite());
+        assert_eq!(Bounds::EMPTY.area(), 0.0);
+        assert_eq!(b.widened(1.0).hi, Vec3::new(2.0, 6.0, 4.0));
+    }
+
+    #[test]
+    fn f32_boxes_hold_the_f64_box_and_are_one_step_away_at_most() {
+        let stream = Stream::new(1, 2);
+        let sign = |u: f64| if u < 0.5 { -1.0 } else { 1.0 };
+        let mut values: Vec<f64> = (0..100_000)
+            .map(|i| stream.uniforms(i, 0))
+            .map(|[u, v, w, _]| sign(w) * u * (v * 180.0 - 100.0).exp())
+            .collect();
+        values.extend([
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            0.1,
+            1e-300,
+            -1e-300,
+            1e39,
+            -1e39,
+            f64::MAX,
+            f64::INFINITY,
+            f64::from(f32::MAX),
+        ]);
+        for v in values {
+            let p = Vec3::new(v, v, v);
+            let [[lo, ..], [hi, ..]] = Bounds { lo: p, hi: p }.outward();
+            assert!(f64::from(lo) <= v && v <= f64::from(hi), "{v}");
+            assert!(lo == hi || lo.next_up() == hi, "{v}: {lo} {hi}");
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! A shape in its place: moved, turned and trimmed.
+
+use etendue_math::{Frame, Vec3};
+
+use crate::bounds::Bounds;
+use crate::shape::{Crossing, ROUNDING, Shape, size};
+
+/// The points p with n·p ≤ d, in the coordinates of the shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfSpace {
+    /// Unit normal, pointing out of the half space.
+    pub normal: Vec3,
+    /// Distance of its plane from the origin \[mm\].
+    pub offset: f64,
+}
+
+/// A shape, where it stands, and what is cut off.
+#[derive(Clone, Debug)]
+pub struct Face {
+    /// The surface.
+    pub shape: Shape,
+    /// Where it stands and how it is turned.
+    pub frame: Frame,
+    /// Only what lies in all of these is kept.
+    pub trims: Vec<HalfSpace>,
+    /// Whether the normal is that of the shape reversed.
+    pub flipped: bool,
+}
+
+/// A point of a face: what a ray that arrives there needs to know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foot {
+    /// The point, on the surface to within a rounding error \[mm\].
+    pub point: Vec3,
+    /// Unit normal of the surface, on the side that the face calls its front.
+    pub normal: Vec3,
+}
+
+impl Face {
+    /// A box in the world that holds the face; not finite if it has no end.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let local = self.shape.bounds();
+        if !local.is_finite() {
+            let inf = f64::INFINITY;
+            return Bounds {
+                lo: Vec3::new(-inf, -inf, -inf),
+                hi: Vec3::new(inf, inf, inf),
+            };
+        }
+        let corner = |i: u32| {
+            let pick = |bit: u32, lo: f64, hi: f64| if i >> bit & 1 == 0 { lo } else { hi };
+            self.frame.point_to_world(Vec3::new(
+                pick(0, local.lo.x, local.hi.x),
+                pick(1, local.lo.y, local.hi.y),
+                pick(2, local.lo.z, local.hi.z),
+            ))
+        };
+        let bounds = Bounds::of((0..8).map(corner));
+        bounds.widened(2.0 * ROUNDING * (size(self.frame.origin) + size(local.lo) + size(local.hi)))
+    }
+
+    /// The normal that a ray sees: that of the surface, or that which a mesh states at its corners, interpolated.
+    #[inline]
+    #[must_use]
+    pub fn shading_normal(&self, crossing: &Crossing) -> Option<Vec3> {
+        let Shape::Mesh(mesh) = &self.shape else { return None };
+        let n = self
+            .frame
+            .direction_to_world(mesh.shading_normal(crossing.part, crossing.uv[0], crossing.uv[1]));
+        Some(if self.flipped { -n } else { n })
+    }
+
+    /// Whether the point, in the coordinates of the shape, may lie in all half spaces.
+    #[inline]
+    #[must_use]
+    pub fn keeps(&self, p: Vec3, error: f64) -> bool {
+        self.trims.iter().all(|trim| trim.normal.dot(p) <= trim.offset + error)
+    }
+
+    /// Calls `visit` for each crossing of the line o + t d with `from` ≤ t ≤ `to`, in no order.
+    ///
+    /// `leaving`: the parts of the shape (triangles of a mesh) on which the line starts; none if it starts elsewhere.
+    #[inline]
+    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], leaving: &[u32], mut visit: impl FnMut(Crossing)) {
+        let (p, k) = (self.frame.point_to_local(o), self.frame.direction_to_local(d));
+        self.shape.crossings(p, k, range, leaving, |crossing| {
+            if self.trims.is_empty() || self.keeps(p + k * crossing.t, ROUNDING * (size(p) + crossing.t.abs())) {
+                visit(crossing);
+            }
+        });
+    }
+
+    /// Whether a point may lie within `reach` of the face, by a look at its equation; often true where it does not.
+    #[inline]
+    #[must_use]
+    pub fn may_hold(&self, point: Vec3, reach: f64) -> bool {
+        match &self.shape {
+            Shape::Flat(_) => (point - self.frame.origin).dot(self.frame.z).abs() <= 2.0 * reach,
+            Shape::Quadric(quadric) => {
+                // Near the surface F is the distance times the length of its gradient.
+                let (value, gradient) = quadric.slope(self.frame.point_to_local(point));
+                value * value <= 16.0 * reach * reach * gradient.dot(gradient)
+            }
+            _ => true,
+        }
+    }
+
+    /// The first crossing of the line o + t d at 0 < t < `reach`.
+    #[inline]
+    #[must_use]
+    pub fn first(&self, o: Vec3, d: Vec3, reach: f64, leaving: &[u32]) -> Option<Crossing> {
+        if let (Shape::Mesh(mesh), true) = (&self.shape, self.trims.is_empty()) {
+            let (p, k) = (self.frame.point_to_local(o), self.frame.direction_to_local(d));
+            return mesh.nearest(p, k, reach, leaving).map(|hit| Crossing {
+                t: hit.t,
+                part: hit.triangle,
+                uv: [hit.u, hit.v],
+            });
+        }
+        let mut found: Option<Crossing> = None;
+        self.crossings(o, d, [0.0, reach], leaving, |crossing| {
+            if crossing.t > 0.0 && crossing.t < found.map_or(reach, |f| f.t) {
+                found = Some(crossing);
+            }
+        });
+        found
+    }
+
+    /// The point where the line o + t d crosses the face, settled on it, and the normal there.
+    #[inline]
+    #[must_use]
+    pub fn foot(&self, o: Vec3, d: Vec3, crossing: &Crossing) -> Foot {
+        if let Shape::Flat(_) = self.shape {
+            // Down to the plane along its normal, without a detour through the coordinates of the shape.
+            let (p, n) = (o + d * crossing.t, self.frame.z);
+            return Foot {
+                point: p - n * (p - self.frame.origin).dot(n),
+                normal: if self.flipped { -n } else { n },
+            };
+        }
+        let p = self.frame.point_to_local(o) + self.frame.direction_to_local(d) * crossing.t;
+        let (p, n) = self.shape.settle(p, crossing.part);
+        let n = self.frame.direction_to_world(n);
+        Foot {
+            point: self.frame.point_to_world(p),
+            normal: if self.flipped { -n } else { n },
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Points that fill a cube more evenly than random ones: a rank-1 lattice, as a sequence, randomly shifted.
+
+/// Generating vector of the lattice sequence `lattice-32001-1024-1048576.3600` of Kuo, built as in Cools, Kuo, Nuyens,
+/// "Constructing embedded lattice rules for multivariate integration", SIAM J. Sci. Comput. 28 (2006), `[Cools2006]`:
+/// any 2^m of its points, m from 10 to 20, are a lattice of good quality.
+const GENERATOR: [u32; 12] = [
+    1, 182_667, 469_891, 498_753, 110_745, 446_247, 250_185, 118_627, 245_333, 283_199, 408_519, 391_023,
+];
+
+/// Dimensions of a point.
+pub const DIMENSIONS: usize = GENERATOR.len();
+
+/// Point `index` of the sequence, moved by `shift` (modulo 1) in each dimension: uniform if the shift is, and unbiased.
+#[inline]
+#[must_use]
+pub fn lattice_point(index: u32, shift: &[f64; DIMENSIONS]) -> [f64; DIMENSIONS] {
+    // The radical inverse in base 2 orders the points so that every beginning is spread out.
+    let phase = index.reverse_bits();
+    std::array::from_fn(|k| {
+        let turn = f64::from(phase.wrapping_mul(GENERATOR[k])) * (1.0 / 4_294_967_296.0) + shift[k];
+        let inside = turn - turn.floor();
+        // A number that rounds to 1 or is 0 is none that others draw.
+        inside.clamp(f64::EPSILON / 2.0, 1.0 - f64::EPSILON / 2.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_smooth_function_is_integrated_far_better_than_by_random_points() {
+        // Π (1 + (x² − 1/3)/2) has the mean 1; 2^12 random points are off by 7e-3 and more in 6 dimensions.
+        for d in [2, 6, 12] {
+            let shift = std::array::from_fn(|k| (0.37 + 0.618_034 * k as f64).fract());
+            let mean = (0..4096)
+                .map(|i| {
+                    let p = lattice_point(i, &shift);
+                    p[..d].iter().map(|x| 1.0 + (x * x - 1.0 / 3.0) / 2.0).product::<f64>()
+                })
+                .sum::<f64>()
+                / 4096.0;
+            assert!((mean - 1.0).abs() < 1e-3, "{d}: {mean}");
+        }
+    }
+
+    #[test]
+    fn every_dimension_is_stratified() {
+        for m in [1024_u32, 4096] {
+            for k in 0..DIMENSIONS {
+                let mut seen: Vec<f64> = (0..m).map(|i| lattice_point(i, &[0.0; DIMENSIONS])[k]).collect();
+                seen.sort_by(f64::total_cmp);
+                for (i, x) in (0..).zip(seen) {
+                    assert!((x - f64::from(i) / f64::from(m)).abs() < 1e-9);
+                }
+            }
+        }
+    }
+}

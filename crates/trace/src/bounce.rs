@@ -1,0 +1,134 @@
+//! Many rays at once off one sheet that mirrors and scatters alike in all directions and colours: walls and reflectors.
+//!
+//! What `meeting` and `forward` come to for such a sheet, without branches and several rays at a time.
+
+use etendue_geometry::Face;
+use etendue_geometry::assembly::{Leaving, Lines};
+use etendue_geometry::shape::{Outline, Shape};
+use etendue_math::Vec3;
+use etendue_optics::fresnel::reflect;
+use etendue_optics::source::surface::about;
+use multiversion::multiversion;
+
+use crate::scene::{Act, Scene};
+
+/// How a sheet that many rays are bounced off at once shares out light: mirrored, and mirrored or scattered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bouncer {
+    mirrored: f64,
+    kept: f64,
+}
+
+/// The faces of a scene that rays are bounced off many at a time; None for the others.
+#[must_use]
+pub fn bouncers(scene: &Scene) -> Vec<Option<Bouncer>> {
+    let faces = scene.assembly.faces().iter().zip(&scene.roles);
+    faces
+        .map(|(face, role)| {
+            let simple = match &face.shape {
+                Shape::Flat(flat) => !matches!(flat.outline, Outline::Polygon { .. }),
+                Shape::Quadric(_) => true,
+                _ => false,
+            };
+            let Act::Optical(finish) = role.act else { return None };
+            let [mirrored, through, scattered, behind] = scene.finishes[finish as usize].constant()?;
+            let sheet = role.solid == 0 && simple && through == 0.0 && behind == 0.0;
+            sheet.then_some(Bouncer {
+                mirrored,
+                kept: mirrored + scattered,
+            })
+        })
+        .collect()
+}
+
+impl Bouncer {
+    /// Whether the light that this number stands for is absorbed.
+    #[inline(always)]
+    #[must_use]
+    pub fn absorbs(self, number: f64) -> bool {
+        number >= self.kept
+    }
+}
+
+/// Rays of a block that meet one face, gathered. Structure of arrays.
+#[derive(Clone, Debug, Default)]
+pub struct Gathered {
+    o: [Vec<f64>; 3],
+    d: [Vec<f64>; 3],
+    t: Vec<f64>,
+    numbers: [Vec<f64>; 3],
+}
+
+/// Bounces the rays `which` of a block off a face: sets their new start points and directions in `lines`.
+pub fn bounce(
+    face: &Face,
+    index: u32,
+    bouncer: Bouncer,
+    which: &[u32],
+    distances: &[f64],
+    numbers: &[Vec<f64>; 4],
+    lines: &mut Lines,
+    room: &mut Gathered,
+) {
+    let n = which.len();
+    let Gathered { o, d, t, numbers: u } = room;
+    for list in o.iter_mut().chain(d.iter_mut()).chain([&mut *t]).chain(u.iter_mut()) {
+        list.resize(n, 0.0);
+    }
+    for (k, &i) in which.iter().enumerate() {
+        let i = i as usize;
+        for axis in 0..3 {
+            o[axis][k] = lines.origin[axis][i];
+            d[axis][k] = lines.direction[axis][i];
+            u[axis][k] = numbers[axis][i];
+        }
+        t[k] = distances[i];
+    }
+    off(face, bouncer, room);
+    let mut leaving = Leaving::default();
+    leaving.add(index, 0);
+    for (k, &i) in which.iter().enumerate() {
+        let at = |list: &[Vec<f64>; 3]| Vec3::new(list[0][k], list[1][k], list[2][k]);
+        lines.set(i as usize, at(&room.o), at(&room.d), leaving);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn off(face: &Face, bouncer: Bouncer, room: &mut Gathered) {
+    let frame = face.frame;
+    match &face.shape {
+        Shape::Quadric(quadric) => sweep(bouncer, room, |o, d, t| {
+            let p = frame.point_to_local(o) + frame.direction_to_local(d) * t;
+            let (p, n) = quadric.settle(p);
+            (frame.point_to_world(p), frame.direction_to_world(n))
+        }),
+        _ => sweep(bouncer, room, |o, d, t| {
+            let p = o + d * t;
+            (p - frame.z * (p - frame.origin).dot(frame.z), frame.z)
+        }),
+    }
+}
+
+#[inline(always)]
+fn sweep(bouncer: Bouncer, room: &mut Gathered, foot: impl Fn(Vec3, Vec3, f64) -> (Vec3, Vec3)) {
+    let n = room.t.len();
+    let [ox, oy, oz] = room.o.each_mut().map(|v| &mut v[..n]);
+    let [dx, dy, dz] = room.d.each_mut().map(|v| &mut v[..n]);
+    let [lobe, height, turn] = room.numbers.each_ref().map(|v| &v[..n]);
+    let t = &room.t[..n];
+    for k in 0..n {
+        let o = Vec3::new(ox[k], oy[k], oz[k]);
+        let d = Vec3::new(dx[k], dy[k], dz[k]);
+        let (p, normal) = foot(o, d, t[k]);
+        let height_in = d.dot(normal);
+        let sign = if height_in < 0.0 { 1.0 } else { -1.0 };
+        let side = normal * sign;
+        let mirrored = reflect(d, side, -height_in * sign);
+        let scattered = about(side, (1.0 - height[k]).sqrt(), turn[k]);
+        let mirror = lobe[k] < bouncer.mirrored;
+        (ox[k], oy[k], oz[k]) = (p.x, p.y, p.z);
+        dx[k] = if mirror { mirrored.x } else { scattered.x };
+        dy[k] = if mirror { mirrored.y } else { scattered.y };
+        dz[k] = if mirror { mirrored.z } else { scattered.z };
+    }
+}

@@ -1,0 +1,156 @@
+//! Detectors: what takes note of light and does not change it.
+
+use std::f64::consts::PI;
+
+use etendue_geometry::Face;
+use etendue_geometry::shape::{Flat, Outline, Shape};
+use etendue_lightfield::View;
+use etendue_math::{Frame, Vec3};
+
+/// A detector.
+#[derive(Clone, Debug)]
+pub enum Detector {
+    /// A ray collecting surface: keeps every ray that crosses it, from either side.
+    Rays(Face),
+    /// A rectangle in the plane z = 0 of its frame: flux that arrives on its front, by cells.
+    Illuminance {
+        /// Its centre and axes.
+        frame: Frame,
+        /// Along x \[mm\].
+        width: f64,
+        /// Along y \[mm\].
+        height: f64,
+        /// Cells along x.
+        columns: u32,
+        /// Cells along y; row 0 is the top, at the largest y.
+        rows: u32,
+    },
+    /// The far field: flux of what escapes, in the cells around the nodes of a C-γ table, plane by plane.
+    Intensity {
+        /// Planes, from C = 0 in equal steps.
+        planes: u32,
+        /// Steps of γ from 0 to π.
+        steps: u32,
+    },
+    /// The light image: every diffuse scatter, connected to the eye of an observer.
+    Image {
+        /// What he sees.
+        view: View,
+        /// Whether only light counts that the reverse tracer cannot find, or leaves to the light image: of sources that
+        /// cannot be seen backwards, and of all sources through smooth surfaces onto the first diffuse one.
+        complement: bool,
+    },
+    /// Every diffuse scatter, to be looked at later from anywhere.
+    Events,
+}
+
+impl Detector {
+    /// The face that rays cross, if there is one.
+    #[must_use]
+    pub fn face(&self) -> Option<Face> {
+        match self {
+            Self::Rays(face) => Some(face.clone()),
+            Self::Illuminance {
+                frame, width, height, ..
+            } => Some(Face {
+                shape: Shape::Flat(Flat {
+                    outline: Outline::Rectangle {
+                        width: *width,
+                        height: *height,
+                    },
+                }),
+                frame: *frame,
+                trims: vec![],
+                flipped: false,
+            }),
+            Self::Intensity { .. } | Self::Image { .. } | Self::Events => None,
+        }
+    }
+
+    /// Number of cells that flux is summed in.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        match self {
+            Self::Rays(_) | Self::Events => 0,
+            Self::Illuminance { columns, rows, .. } => *columns as usize * *rows as usize,
+            Self::Intensity { planes, steps } => *planes as usize * (*steps as usize + 1),
+            Self::Image { view, .. } => view.pixels(),
+        }
+    }
+}
+
+/// The cell of an illuminance detector that a point of it lies in, for light along `d`; None if it arrives from behind.
+#[must_use]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "inside the number of cells"
+)]
+pub fn illuminance_cell(frame: &Frame, size: [f64; 2], cells: [u32; 2], point: Vec3, d: Vec3) -> Option<u32> {
+    if d.dot(frame.z) >= 0.0 {
+        return None;
+    }
+    let p = frame.point_to_local(point);
+    let along = |x: f64, size: f64, n: u32| (((x / size + 0.5) * f64::from(n)) as u32).min(n - 1);
+    let column = along(p.x, size[0], cells[0]);
+    let row = along(-p.y, size[1], cells[1]);
+    Some(row * cells[0] + column)
+}
+
+/// The cell of a C-γ table whose node is nearest to a direction: γ from +z, C from +x towards +y; the nodes at the poles
+/// have one cell each, that of the first plane.
+#[must_use]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "inside the number of cells"
+)]
+pub fn intensity_cell(planes: u32, steps: u32, d: Vec3) -> u32 {
+    let gamma = d.x.hypot(d.y).atan2(d.z);
+    let row = ((gamma * f64::from(steps) / PI).round() as u32).min(steps);
+    if row == 0 || row == steps {
+        return row;
+    }
+    let plane = (d.y.atan2(d.x) * f64::from(planes) / (2.0 * PI)).round() as i64;
+    plane.rem_euclid(i64::from(planes)) as u32 * (steps + 1) + row
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_counted_from_the_top_left_and_planes_from_c_0() {
+        let frame = Frame {
+            origin: Vec3::new(1.0, 2.0, 3.0),
+            x: Vec3::new(1.0, 0.0, 0.0),
+            y: Vec3::new(0.0, 1.0, 0.0),
+            z: Vec3::new(0.0, 0.0, 1.0),
+        };
+        let cell = |x, y, dz| {
+            illuminance_cell(
+                &frame,
+                [4.0, 2.0],
+                [4, 2],
+                Vec3::new(x, y, 3.0),
+                Vec3::new(0.0, 0.0, dz),
+            )
+        };
+        assert_eq!(cell(-0.9, 2.9, -1.0), Some(0));
+        assert_eq!(cell(2.9, 2.9, -1.0), Some(3));
+        assert_eq!(cell(-0.9, 1.1, -1.0), Some(4));
+        assert_eq!(cell(0.5, 2.5, 1.0), None);
+        let towards = |gamma: f64, c: f64| {
+            let (gamma, c) = (gamma.to_radians(), c.to_radians());
+            intensity_cell(
+                36,
+                72,
+                Vec3::new(gamma.sin() * c.cos(), gamma.sin() * c.sin(), gamma.cos()),
+            )
+        };
+        assert_eq!(towards(1.0, 200.0), 0);
+        assert_eq!(towards(45.0, 90.0), 9 * 73 + 18);
+        assert_eq!(towards(45.0, 356.0), 18);
+        assert_eq!(towards(179.0, 200.0), 72);
+    }
+}

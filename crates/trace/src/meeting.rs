@@ -1,0 +1,506 @@
+//! A ray meets faces: which of them decides, and what it passes from and to.
+//!
+//! Faces may coincide: a lens on a dome, a die in its silicone. Crossings that rounding cannot tell apart are one event. Its
+//! rules: detectors take note first. Each solid whose faces agree is entered or left. A sheet decides before solids, the one
+//! listed last before the others; else the face of the last listed solid among those crossed decides, unless the space on
+//! both sides belongs to the same, later listed solid: then the face is hidden.
+
+use etendue_geometry::assembly::{Hits, Leaving, Lines, MOST_LEFT, NONE, TIE};
+use etendue_geometry::shape::{Crossing, ROUNDING};
+use etendue_math::Vec3;
+use etendue_optics::finish::Finish;
+use etendue_optics::fresnel::{reflect, refract};
+use etendue_optics::medium::Filling;
+
+use crate::inside::Inside;
+use crate::scene::{Act, Scene};
+
+/// Crossings in one event.
+type Group = Vec<(u32, Crossing)>;
+
+/// What a ray is at when it meets faces.
+#[derive(Clone, Copy, Debug)]
+pub struct Meeting {
+    /// Where.
+    pub point: Vec3,
+    /// Unit normal of the deciding face, against the ray: that which a mesh states at its corners, interpolated, if it does.
+    pub normal: Vec3,
+    /// The normal of the surface itself, against the ray.
+    pub side: Vec3,
+    /// The deciding face; the first one met, if none decides.
+    pub face: u32,
+    /// Whether the ray meets the front of the deciding face.
+    pub front: bool,
+    /// The finish of the deciding face; None: the ray goes on as if nothing were there.
+    pub finish: Option<u32>,
+    /// The solids on this side.
+    pub before: Inside,
+    /// The solids on the other side.
+    pub after: Inside,
+    /// What a ray that goes on from here starts on.
+    pub leaving: Leaving,
+    /// Distance travelled \[mm\].
+    pub t: f64,
+}
+
+impl Meeting {
+    /// The direction of light that arrived along `d` and was mirrored.
+    #[inline]
+    #[must_use]
+    pub fn mirrored(&self, d: Vec3, cosine: f64) -> Vec3 {
+        self.kept(reflect(d, self.normal, cosine), 1.0)
+    }
+
+    /// The direction of light that arrived along `d` and was refracted; `across` is the cosine of the angle of refraction.
+    #[inline]
+    #[must_use]
+    pub fn refracted(&self, d: Vec3, cosine: f64, ratio: f64, across: f64) -> Vec3 {
+        if ratio == 1.0 {
+            return d;
+        }
+        self.kept(refract(d, self.normal, cosine, ratio, across), -1.0)
+    }
+
+    /// An interpolated normal may send light to the wrong side of the surface; then its direction is mirrored on the surface.
+    #[inline]
+    fn kept(&self, d: Vec3, sign: f64) -> Vec3 {
+        let height = d.dot(self.side);
+        if height * sign < 0.0 {
+            d - self.side * (2.0 * height)
+        } else {
+            d
+        }
+    }
+}
+
+/// Why a ray was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    /// It left a solid that it was not in, or entered one that it was in: the solid is open, or its normals do not agree.
+    Contradiction,
+    /// It is in more than four solids at once.
+    TooDeep,
+    /// It has no direction or no position any more, or came without.
+    NotFinite,
+    /// A medium has no refractive index at its wavelength.
+    NoIndex,
+}
+
+impl Loss {
+    /// Every reason, in order.
+    pub const ALL: [Self; 4] = [Self::Contradiction, Self::TooDeep, Self::NotFinite, Self::NoIndex];
+
+    /// Its name for people.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Contradiction => "contradiction",
+            Self::TooDeep => "more than four solids at once",
+            Self::NotFinite => "not finite",
+            Self::NoIndex => "no refractive index",
+        }
+    }
+}
+
+/// Looks for faces that ray `i` of a block meets together with the nearest one, and settles what happens.
+///
+/// `detected` is called with each detector that the ray passes, its face's normal and the point.
+///
+/// # Errors
+/// The reason and the face, if the ray is lost.
+#[inline(always)]
+pub fn meet(
+    scene: &Scene,
+    lines: &Lines,
+    hits: &Hits,
+    i: usize,
+    inside: Inside,
+    detected: impl FnMut(u32, Vec3, Vec3),
+) -> Result<Meeting, (Loss, u32)> {
+    let (o, d) = (lines.origin(i), lines.direction(i));
+    let nearest = (hits.face[i], hits.crossing(i));
+    if hits.tied(i, o) {
+        let group = tied(scene, o, d, &lines.leaving(i), nearest);
+        resolve(scene, o, d, &group, inside, detected)
+    } else {
+        alone(scene, o, d, nearest, inside, detected)
+    }
+}
+
+/// One face met alone: what [`resolve`] comes to then, without its lists.
+#[inline(always)]
+fn alone(
+    scene: &Scene,
+    o: Vec3,
+    d: Vec3,
+    (index, crossing): (u32, Crossing),
+    inside: Inside,
+    mut detected: impl FnMut(u32, Vec3, Vec3),
+) -> Result<Meeting, (Loss, u32)> {
+    let face = &scene.assembly.faces()[index as usize];
+    let role = scene.roles[index as usize];
+    let foot = face.foot(o, d, &crossing);
+    let front = d.dot(foot.normal) < 0.0;
+    let (mut after, mut finish) = (inside, None);
+    match role.act {
+        Act::Detect(detector) => detected(detector, foot.point, foot.normal),
+        Act::Optical(number) if role.solid == 0 => finish = Some(number),
+        Act::Optical(number) => {
+            if front == inside.contains(role.solid) {
+                if crossing.t > TIE * (o.x.abs() + o.y.abs() + o.z.abs()) {
+                    return Err((Loss::Contradiction, index));
+                }
+            } else {
+                after = inside.crossed(role.solid).ok_or((Loss::TooDeep, index))?;
+                // Hidden in a solid that is listed later.
+                finish = (role.solid >= inside.top().min(after.top())).then_some(number);
+            }
+        }
+    }
+    let side = if front { foot.normal } else { -foot.normal };
+    let normal = face.shading_normal(&crossing).map_or(side, |n| {
+        let n = if front { n } else { -n };
+        if d.dot(n) < 0.0 { n } else { side }
+    });
+    let mut leaving = Leaving::default();
+    (leaving.face[0], leaving.part[0]) = (index, crossing.part);
+    Ok(Meeting {
+        point: foot.point,
+        normal,
+        side,
+        face: index,
+        front,
+        finish,
+        before: inside,
+        after,
+        leaving,
+        t: crossing.t,
+    })
+}
+
+/// What a single ray meets first at 0 < t < `reach`; None if it meets nothing.
+///
+/// # Errors
+/// The reason and the face, if the ray is lost.
+pub fn meet_one(
+    scene: &Scene,
+    o: Vec3,
+    d: Vec3,
+    leaving: &Leaving,
+    reach: f64,
+    inside: Inside,
+) -> Result<Option<Meeting>, (Loss, u32)> {
+    let Some((face, crossing, second)) = scene.assembly.first(o, d, leaving, reach) else {
+        return Ok(None);
+    };
+    let length = o.x.abs() + o.y.abs() + o.z.abs() + crossing.t;
+    let ignore = |_, _, _| {};
+    if second - crossing.t <= TIE * length {
+        let group = tied(scene, o, d, leaving, (face, crossing));
+        resolve(scene, o, d, &group, inside, ignore).map(Some)
+    } else {
+        alone(scene, o, d, (face, crossing), inside, ignore).map(Some)
+    }
+}
+
+/// The share of light that gets from a point to another without being scattered, reflected or refracted: what media do not
+/// absorb, 0 if there is a surface in between.
+#[must_use]
+pub fn transmittance(
+    scene: &Scene,
+    from: Vec3,
+    to: Vec3,
+    leaving: Leaving,
+    inside: Inside,
+    fillings: &mut Fillings,
+    wavelength: f64,
+) -> f64 {
+    let (mut o, mut leaving, mut inside, mut depth) = (from, leaving, inside, 0.0);
+    let d = (to - from).normalized();
+    loop {
+        let distance = (to - o).dot(d);
+        // What lies within rounding of the end is the surface that the end lies on.
+        let reach = distance - 64.0 * ROUNDING * (o.x.abs() + o.y.abs() + o.z.abs() + distance);
+        let absorption = fillings.at(scene, inside.top(), wavelength).absorption;
+        match meet_one(scene, o, d, &leaving, reach, inside) {
+            Err(_) => return 0.0,
+            Ok(None) => {
+                depth += absorption * distance;
+                return if depth == 0.0 { 1.0 } else { (-depth).exp() };
+            }
+            Ok(Some(meeting)) => {
+                let blocked = meeting.finish.is_some_and(|finish| {
+                    // Nothing is seen of an interface between equal media.
+                    let mut same =
+                        |a: u16, b: u16| fillings.at(scene, a, wavelength).n == fillings.at(scene, b, wavelength).n;
+                    !(matches!(scene.finishes[finish as usize], Finish::Interface)
+                        && same(meeting.before.top(), meeting.after.top()))
+                });
+                if blocked {
+                    return 0.0;
+                }
+                depth += absorption * meeting.t;
+                (o, leaving, inside) = (meeting.point, meeting.leaving, meeting.after);
+            }
+        }
+    }
+}
+
+/// The media of a scene at the wavelength that was last asked for, since one ray follows another of the same.
+#[derive(Clone, Debug)]
+pub struct Fillings {
+    at: Vec<(f64, Filling)>,
+}
+
+impl Fillings {
+    /// Nothing known yet.
+    #[must_use]
+    pub fn new(scene: &Scene) -> Self {
+        let unknown = Filling {
+            n: f64::NAN,
+            absorption: f64::NAN,
+        };
+        Self {
+            at: vec![(f64::NAN, unknown); scene.media.len()],
+        }
+    }
+
+    /// What fills the space of a solid (0: the surroundings) at a wavelength \[nm\].
+    #[inline]
+    pub fn at(&mut self, scene: &Scene, solid: u16, wavelength: f64) -> Filling {
+        let medium = scene.medium(solid);
+        let held = &mut self.at[medium];
+        if held.0 != wavelength {
+            *held = (wavelength, scene.media[medium].at(wavelength));
+        }
+        held.1
+    }
+}
+
+/// The crossings that rounding cannot tell from the nearest one.
+#[cold]
+pub fn tied(scene: &Scene, o: Vec3, d: Vec3, leaving: &Leaving, nearest: (u32, Crossing)) -> Group {
+    let length = o.x.abs() + o.y.abs() + o.z.abs() + nearest.1.t;
+    let reach = TIE * length;
+    let mut group = vec![nearest];
+    let faces = scene.assembly.faces();
+    // The error of a point is that of o + t d on both lines, and that of the place of each face.
+    let error = 4.0 * ROUNDING * length;
+    let slack = |index: u32, crossing: &Crossing| {
+        let foot = faces[index as usize].foot(o, d, crossing);
+        error / d.dot(foot.normal).abs().max(f64::MIN_POSITIVE)
+    };
+    let base = slack(nearest.0, &nearest.1);
+    let t = nearest.1.t;
+    scene
+        .assembly
+        .crossings(o, d, [(t - reach).max(0.0), t + reach], leaving, |index, crossing| {
+            let same = index == nearest.0 && crossing.part == nearest.1.part && crossing.t == t;
+            if !same && crossing.t > 0.0 && (crossing.t - t).abs() <= (base + slack(index, &crossing)).min(reach) {
+                group.push((index, crossing));
+            }
+        });
+    group
+}
+
+#[cold]
+fn resolve(
+    scene: &Scene,
+    o: Vec3,
+    d: Vec3,
+    group: &[(u32, Crossing)],
+    inside: Inside,
+    mut detected: impl FnMut(u32, Vec3, Vec3),
+) -> Result<Meeting, (Loss, u32)> {
+    let faces = scene.assembly.faces();
+    let (mut after, mut leaving) = (inside, Leaving::default());
+    // The best of what could decide: (rank, face, finish, foot), a sheet ranking above all solids.
+    let mut decides: Option<(u32, usize, u32)> = None;
+    let feet = |at: usize| {
+        let (index, crossing) = &group[at];
+        faces[*index as usize].foot(o, d, crossing)
+    };
+    let first = feet(0);
+    for (at, (index, _)) in group.iter().enumerate() {
+        leaving.add(*index, group[at].1.part);
+        let role = scene.roles[*index as usize];
+        match role.act {
+            Act::Detect(detector) => {
+                let foot = feet(at);
+                detected(detector, foot.point, foot.normal);
+            }
+            Act::Optical(finish) => {
+                if role.solid == 0 {
+                    decides = Some((u32::MAX, at, finish));
+                    continue;
+                }
+                if group[..at]
+                    .iter()
+                    .any(|(f, _)| scene.roles[*f as usize].solid == role.solid)
+                {
+                    continue;
+                }
+                match crossed(scene, group, at, role.solid, o, d, inside) {
+                    Cross::No => {}
+                    Cross::Against if group[0].1.t <= TIE * (o.x.abs() + o.y.abs() + o.z.abs()) || group.len() > 1 => {}
+                    Cross::Against => return Err((Loss::Contradiction, *index)),
+                    Cross::Yes => {
+                        after = after.crossed(role.solid).ok_or((Loss::TooDeep, *index))?;
+                        let rank = u32::from(role.solid);
+                        if decides.is_none_or(|(best, _, _)| rank > best) {
+                            decides = Some((rank, at, finish));
+                        }
+                    }
+                }
+            }
+        }
+    }
+    let hidden = |rank: u32| rank < u32::from(inside.top().min(after.top()));
+    let decided = decides.filter(|(rank, _, _)| !hidden(*rank));
+    let (face, foot) = decided.map_or((group[0].0, first), |(_, at, _)| {
+        (group[at].0, if at == 0 { first } else { feet(at) })
+    });
+    let front = d.dot(foot.normal) < 0.0;
+    let side = if front { foot.normal } else { -foot.normal };
+    let at = decided.map_or(0, |(_, at, _)| at);
+    let normal = faces[face as usize].shading_normal(&group[at].1).map_or(side, |n| {
+        let n = if front { n } else { -n };
+        // Seen from behind, an interpolated normal says nothing.
+        if d.dot(n) < 0.0 { n } else { side }
+    });
+    Ok(Meeting {
+        point: foot.point,
+        normal,
+        side,
+        face,
+        front,
+        finish: decided.map(|(_, _, finish)| finish),
+        before: inside,
+        after,
+        leaving,
+        t: group[0].1.t,
+    })
+}
+
+enum Cross {
+    /// The solid is touched only: entered and left at once.
+    No,
+    /// It is crossed, as the ray could.
+    Yes,
+    /// Its faces say that the ray enters a solid that it is in, or leaves one that it is not in.
+    Against,
+}
+
+/// What the faces of one solid in a group say, the first of them being `at`.
+fn crossed(scene: &Scene, group: &[(u32, Crossing)], at: usize, solid: u16, o: Vec3, d: Vec3, inside: Inside) -> Cross {
+    let faces = scene.assembly.faces();
+    let (mut enters, mut leaves) = (false, false);
+    for (index, crossing) in &group[at..] {
+        if scene.roles[*index as usize].solid == solid {
+            let inward = d.dot(faces[*index as usize].foot(o, d, crossing).normal) < 0.0;
+            (enters, leaves) = (enters | inward, leaves | !inward);
+        }
+    }
+    if enters && leaves {
+        Cross::No
+    } else if leaves == inside.contains(solid) {
+        Cross::Yes
+    } else {
+        Cross::Against
+    }
+}
+
+/// The solids that a ray starts in, and the faces that it starts on.
+///
+/// A start point on a face is on the side that the ray goes to.
+///
+/// # Errors
+/// If it is in more than four solids.
+pub fn place(scene: &Scene, o: Vec3, d: Vec3) -> Result<(Inside, Leaving), (Loss, u32)> {
+    let mut start = Start::new(o, d);
+    scene.assembly.crossings(
+        o,
+        d,
+        [-start.reach, f64::INFINITY],
+        &Leaving::default(),
+        |index, crossing| {
+            start.note(scene, index, crossing);
+        },
+    );
+    start.settled(scene)
+}
+
+/// As [`place`], for a ray that can start only on or in what the faces in `near` say.
+///
+/// # Errors
+/// If it is in more than four solids.
+#[inline]
+pub fn place_near(scene: &Scene, o: Vec3, d: Vec3, near: &[u32]) -> Result<(Inside, Leaving), (Loss, u32)> {
+    if near.is_empty() {
+        return Ok((Inside::default(), Leaving::default()));
+    }
+    let mut start = Start::new(o, d);
+    for &index in near {
+        let solid = scene.roles[index as usize].solid != 0;
+        if !solid && !scene.assembly.faces()[index as usize].may_hold(o, start.reach) {
+            continue;
+        }
+        let range = [-start.reach, if solid { f64::INFINITY } else { start.reach }];
+        scene.assembly.faces()[index as usize].crossings(o, d, range, &[], |crossing| {
+            start.note(scene, index, crossing);
+        });
+    }
+    start.settled(scene)
+}
+
+/// What is known of a start point.
+struct Start {
+    o: Vec3,
+    d: Vec3,
+    /// Crossings no farther than this are at the start itself.
+    reach: f64,
+    leaving: Leaving,
+    /// The nearest crossing of each solid ahead tells whether the ray leaves it there.
+    nearest: Vec<(u16, u32, Crossing)>,
+}
+
+impl Start {
+    const fn new(o: Vec3, d: Vec3) -> Self {
+        Self {
+            o,
+            d,
+            reach: 64.0 * ROUNDING * (o.x.abs() + o.y.abs() + o.z.abs()),
+            leaving: Leaving {
+                face: [NONE; MOST_LEFT],
+                part: [NONE; MOST_LEFT],
+            },
+            nearest: Vec::new(),
+        }
+    }
+
+    fn note(&mut self, scene: &Scene, index: u32, crossing: Crossing) {
+        if crossing.t <= self.reach {
+            self.leaving.add(index, crossing.part);
+            return;
+        }
+        let solid = scene.roles[index as usize].solid;
+        if solid != 0 {
+            match self.nearest.iter_mut().find(|entry| entry.0 == solid) {
+                Some(entry) if entry.2.t <= crossing.t => {}
+                Some(entry) => *entry = (solid, index, crossing),
+                None => self.nearest.push((solid, index, crossing)),
+            }
+        }
+    }
+
+    fn settled(self, scene: &Scene) -> Result<(Inside, Leaving), (Loss, u32)> {
+        let mut inside = Inside::default();
+        for (solid, index, crossing) in self.nearest {
+            let foot = scene.assembly.faces()[index as usize].foot(self.o, self.d, &crossing);
+            if self.d.dot(foot.normal) > 0.0 {
+                inside = inside.crossed(solid).ok_or((Loss::TooDeep, index))?;
+            }
+        }
+        Ok((inside, self.leaving))
+    }
+}

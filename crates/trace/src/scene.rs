@@ -1,0 +1,155 @@
+//! What is traced: faces with their optical properties, solids with their media, sources, detectors.
+
+use std::collections::HashMap;
+
+use etendue_geometry::Face;
+use etendue_geometry::assembly::Assembly;
+use etendue_geometry::bounds::Bounds;
+use etendue_optics::finish::Finish;
+use etendue_optics::medium::Medium;
+use etendue_optics::source::Source;
+
+use crate::detector::Detector;
+
+/// What a face does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Act {
+    /// It is a surface with optical properties: a finish, by its number.
+    Optical(u32),
+    /// It belongs to a detector, by its number; rays pass it unchanged.
+    Detect(u32),
+}
+
+/// What the tracer knows of a face besides its geometry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Role {
+    /// The solid it bounds, numbered from 1; 0 for a sheet.
+    pub solid: u16,
+    /// What it does.
+    pub act: Act,
+}
+
+/// A scene, complete and unchanging.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Every face: those of the scene, then those of its detectors.
+    pub assembly: Assembly,
+    /// One for each face.
+    pub roles: Vec<Role>,
+    /// Optical properties.
+    pub finishes: Vec<Finish>,
+    /// Media; the first one fills the surroundings.
+    pub media: Vec<Medium>,
+    /// The medium of each solid.
+    pub solids: Vec<u32>,
+    /// What emits.
+    pub sources: Vec<Source>,
+    /// What collects.
+    pub detectors: Vec<Detector>,
+    /// For each source, the faces that its rays may start on, and those of the solids that they may start in.
+    pub near: Vec<Vec<u32>>,
+}
+
+/// A face and what it does, as a scene is made of.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// The face.
+    pub face: Face,
+    /// The solid it bounds, numbered from 0; None for a sheet.
+    pub solid: Option<usize>,
+    /// Number of its finish.
+    pub finish: usize,
+}
+
+/// The faces that rays of a source may start on or in, by the boxes around them.
+#[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
+fn near(source: &Source, assembly: &Assembly, roles: &[Role]) -> Vec<u32> {
+    let around = source.bounds();
+    // A box around each solid.
+    let mut solids: HashMap<u16, Bounds> = HashMap::new();
+    for (role, bounds) in roles.iter().zip(assembly.bounds()) {
+        let all = solids.entry(role.solid).or_insert(Bounds::EMPTY);
+        *all = all.union(*bounds);
+    }
+    let each = roles.iter().zip(assembly.bounds()).zip(0..);
+    each.filter(|((role, bounds), _)| {
+        let reach = if role.solid == 0 { **bounds } else { solids[&role.solid] };
+        around.touches(reach)
+    })
+    .map(|(_, index)| index)
+    .collect()
+}
+
+impl Scene {
+    /// A scene from its parts.
+    ///
+    /// # Errors
+    /// Says what refers to something that does not exist, or what there is too much of.
+    pub fn new(
+        parts: Vec<Part>,
+        finishes: Vec<Finish>,
+        media: Vec<Medium>,
+        solids: Vec<u32>,
+        sources: Vec<Source>,
+        detectors: Vec<Detector>,
+    ) -> Result<Self, String> {
+        if media.is_empty() {
+            return Err("a scene needs at least the medium of its surroundings".into());
+        }
+        if solids.len() >= usize::from(u16::MAX) {
+            return Err(format!("{} solids; a scene has 65 534 at most", solids.len()));
+        }
+        if let Some(medium) = solids.iter().find(|m| **m as usize >= media.len()) {
+            return Err(format!("a solid of medium {medium}; there are {}", media.len()));
+        }
+        if parts.len() + detectors.len() >= (u32::MAX / 2) as usize {
+            return Err(format!("{} faces", parts.len()));
+        }
+        let (mut faces, mut roles) = (Vec::new(), Vec::new());
+        for (number, part) in parts.into_iter().enumerate() {
+            let solid = part.solid.map_or(0, |s| s + 1);
+            if solid > solids.len() || part.finish >= finishes.len() {
+                return Err(format!("face {number} names a solid or a finish that does not exist"));
+            }
+            #[allow(clippy::cast_possible_truncation, reason = "checked above")]
+            roles.push(Role {
+                solid: solid as u16,
+                act: Act::Optical(part.finish as u32),
+            });
+            faces.push(part.face);
+        }
+        for (number, detector) in detectors.iter().enumerate() {
+            if let Some(face) = detector.face() {
+                #[allow(clippy::cast_possible_truncation, reason = "checked above")]
+                roles.push(Role {
+                    solid: 0,
+                    act: Act::Detect(number as u32),
+                });
+                faces.push(face);
+            }
+        }
+        let assembly = Assembly::new(faces);
+        let near = sources.iter().map(|source| near(source, &assembly, &roles)).collect();
+        Ok(Self {
+            assembly,
+            near,
+            roles,
+            finishes,
+            media,
+            solids,
+            sources,
+            detectors,
+        })
+    }
+
+    /// The medium that fills the space of a solid, 0 being the surroundings.
+    #[inline]
+    #[must_use]
+    pub fn medium(&self, solid: u16) -> usize {
+        if solid == 0 {
+            0
+        } else {
+            self.solids[usize::from(solid) - 1] as usize
+        }
+    }
+}

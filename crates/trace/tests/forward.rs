@@ -1,0 +1,331 @@
+//! The forward trace as a whole: its ledger, its bits, and closed forms.
+
+use std::f64::consts::PI;
+
+use etendue_geometry::Face;
+use etendue_geometry::shape::{Flat, Outline, Quadric, Shape};
+use etendue_lightfield::View;
+use etendue_math::{Frame, Vec3};
+use etendue_optics::finish::Finish;
+use etendue_optics::medium::{Index, Medium};
+use etendue_optics::source::{Emitter, Source, SurfaceSource};
+use etendue_optics::table::{Curve, Table};
+use etendue_sampling::ordered::within;
+use etendue_trace::detector::Detector;
+use etendue_trace::forward::{Harvest, Run, trace};
+use etendue_trace::meeting::Loss;
+use etendue_trace::scene::{Part, Scene};
+
+const ALL_R: [f64; 2] = [0.0, f64::INFINITY];
+const ALL_Z: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+/// Somewhere, turned: z points along (0.48, 0.64, 0.6).
+fn turned(origin: Vec3) -> Frame {
+    Frame {
+        origin,
+        x: Vec3::new(0.36, 0.48, -0.8),
+        y: Vec3::new(-0.8, 0.6, 0.0),
+        z: Vec3::new(0.48, 0.64, 0.6),
+    }
+}
+
+fn straight(z: f64) -> Frame {
+    Frame {
+        origin: Vec3::new(0.0, 0.0, z),
+        x: Vec3::new(1.0, 0.0, 0.0),
+        y: Vec3::new(0.0, 1.0, 0.0),
+        z: Vec3::new(0.0, 0.0, 1.0),
+    }
+}
+
+fn disk(radius: f64) -> Shape {
+    Shape::Flat(Flat {
+        outline: Outline::Annulus {
+            inner: 0.0,
+            outer: radius,
+        },
+    })
+}
+
+fn sphere(radius: f64, z: [f64; 2]) -> Shape {
+    Shape::Quadric(Quadric {
+        r2: 1.0,
+        z2: 1.0,
+        z1: 0.0,
+        z0: -radius * radius,
+        z,
+        r: ALL_R,
+    })
+}
+
+fn part(shape: Shape, frame: Frame, solid: Option<usize>, finish: usize) -> Part {
+    Part {
+        face: Face {
+            shape,
+            frame,
+            trims: vec![],
+            flipped: false,
+        },
+        solid,
+        finish,
+    }
+}
+
+fn medium(n: f64, absorption: f64) -> Medium {
+    Medium {
+        index: Index::Table(Curve::constant(n)),
+        absorption: Curve::constant(absorption),
+    }
+}
+
+fn scatter(shares: [f64; 4]) -> Finish {
+    Finish::scatter(shares.map(Table::constant)).expect("at most 1")
+}
+
+fn lamp(shape: Shape, frame: Frame, flux: f64) -> Source {
+    Source {
+        emitter: Emitter::Surface(SurfaceSource::new(shape, false, 1.0).expect("finite")),
+        frame,
+        flux,
+        spectrum: vec![(500.0, 0.4), (600.0, 1.0)],
+    }
+}
+
+fn run(scene: &Scene, rays: u64, threads: usize) -> Harvest {
+    let run = Run {
+        rays,
+        seed: 7,
+        most_events: 10_000,
+        sets: &[],
+    };
+    within(threads, |_| trace(scene, &run, 0..rays.div_ceil(1 << 16)))
+}
+
+/// A ball lens, an open mirror, a wall that scatters and transmits, two lamps; nothing symmetric.
+fn mixed(watched: bool) -> Scene {
+    let view = View {
+        eye: Vec3::new(3.0, -40.0, 60.0),
+        target: Vec3::default(),
+        right: Vec3::new(1.0, 0.0, 0.0),
+        up: Vec3::new(0.0, 1.0, 0.0),
+        normal: Vec3::new(0.0, 0.0, 1.0),
+        width: 20.0,
+        height: 20.0,
+        columns: 8,
+        rows: 8,
+    };
+    let mut detectors = vec![Detector::Intensity { planes: 8, steps: 9 }];
+    if watched {
+        detectors.push(Detector::Image {
+            view,
+            complement: false,
+        });
+    }
+    Scene::new(
+        vec![
+            part(sphere(2.0, ALL_Z), turned(Vec3::new(1.0, 0.5, 4.0)), Some(0), 0),
+            part(sphere(9.0, [-9.0, -2.0]), turned(Vec3::new(0.0, 1.0, 3.0)), None, 1),
+            part(disk(6.0), turned(Vec3::new(-3.0, 0.0, 12.0)), None, 2),
+        ],
+        vec![
+            Finish::Interface,
+            scatter([0.6, 0.0, 0.3, 0.0]),
+            scatter([0.1, 0.2, 0.3, 0.25]),
+        ],
+        vec![medium(1.0, 0.0), medium(1.6, 0.05)],
+        vec![1],
+        vec![
+            lamp(disk(1.0), straight(0.2), 3.0),
+            lamp(sphere(0.4, [-0.1, 0.4]), turned(Vec3::new(2.0, -3.0, 1.0)), 1.7),
+        ],
+        detectors,
+    )
+    .expect("sound")
+}
+
+#[test]
+fn every_ray_has_one_fate_and_the_ledger_closes() {
+    let harvest = run(&mixed(false), 300_000, 2);
+    let [emitted, fates] = harvest.ledger.balance();
+    assert_eq!((emitted.rays, fates.rays), (300_000, 300_000));
+    assert!((emitted.flux() - 4.7).abs() < 1e-12 && (fates.flux() - 4.7).abs() < 1e-12);
+    assert!(harvest.imbalance < 1e-12);
+    assert!(harvest.ledger.lost.iter().all(|entry| entry.rays == 0));
+    let in_glass = harvest.ledger.in_medium[1].flux();
+    assert!(in_glass > 0.05 && harvest.ledger.on_face[2].flux() > 0.05);
+    // What escapes is what the far field holds.
+    let far: f64 = harvest.cells[0].iter().map(|cell| cell.sum).sum();
+    assert!((far / harvest.ledger.escaped.flux() - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn one_two_and_seven_threads_give_the_same_bits() {
+    let bits = |threads| {
+        let harvest = run(&mixed(true), 200_000, threads);
+        let cells = harvest
+            .cells
+            .iter()
+            .flatten()
+            .flat_map(|c| [c.sum.to_bits(), c.squares.to_bits(), c.rays]);
+        (harvest.ledger, cells.collect::<Vec<u64>>())
+    };
+    let one = bits(1);
+    assert_eq!(one, bits(2));
+    assert_eq!(one, bits(7));
+}
+
+#[test]
+fn rays_that_bounce_together_go_where_they_go_alone() {
+    // A detector of scattered light asks for every scatter by itself; the fates must not depend on it.
+    let (alone, together) = (
+        run(&mixed(true), 200_000, 2).ledger,
+        run(&mixed(false), 200_000, 2).ledger,
+    );
+    assert_eq!(alone.segments, together.segments);
+    assert_eq!(alone.escaped.rays, together.escaped.rays);
+    for (a, b) in alone.on_face.iter().zip(&together.on_face) {
+        assert_eq!(a.rays, b.rays);
+    }
+}
+
+#[test]
+fn a_sphere_absorbs_what_its_walls_do_not_reflect_and_a_port_lets_out_the_rest() {
+    // V6: of the light that first meets the wall, the port of area fraction f lets out ρ f/(1 − ρ (1 − f)).
+    let (rho, rim) = (0.9, -1.8);
+    let fraction = (2.0 + rim) / 4.0;
+    let scene = Scene::new(
+        vec![part(sphere(2.0, [rim, 2.0]), turned(Vec3::new(5.0, 1.0, 2.0)), None, 0)],
+        vec![scatter([0.0, 0.0, rho, 0.0])],
+        vec![medium(1.0, 0.0)],
+        vec![],
+        // A small lamp that looks away from the port.
+        vec![lamp(disk(0.05), turned(Vec3::new(5.2, 1.1, 2.1)), 1.0)],
+        vec![],
+    )
+    .expect("sound");
+    let rays = 1_000_000;
+    let ledger = run(&scene, rays, 2).ledger;
+    let expected = rho * fraction / (1.0 - rho * (1.0 - fraction));
+    let z = (ledger.escaped.flux() - expected) / (expected * (1.0 - expected) / rays as f64).sqrt();
+    assert!(z.abs() < 4.0, "{} {expected} {z}", ledger.escaped.flux());
+}
+
+#[test]
+fn an_open_solid_loses_rays_and_says_where() {
+    let scene = Scene::new(
+        vec![part(sphere(2.0, [-2.0, 1.0]), straight(0.0), Some(0), 0)],
+        vec![Finish::Interface],
+        vec![medium(1.0, 0.0), medium(1.5, 0.0)],
+        vec![1],
+        vec![lamp(disk(0.5), straight(-9.0), 1.0)],
+        vec![],
+    )
+    .expect("sound");
+    let ledger = run(&scene, 20_000, 1).ledger;
+    let lost = ledger.lost[Loss::Contradiction as usize];
+    assert!(ledger.lost_at[Loss::Contradiction as usize].is_none() || lost.rays > 0);
+    let from_above = Scene::new(
+        vec![part(sphere(2.0, [-2.0, 1.0]), straight(0.0), Some(0), 0)],
+        vec![Finish::Interface],
+        vec![medium(1.0, 0.0), medium(1.5, 0.0)],
+        vec![1],
+        vec![Source {
+            frame: Frame {
+                x: Vec3::new(1.0, 0.0, 0.0),
+                y: Vec3::new(0.0, -1.0, 0.0),
+                z: Vec3::new(0.0, 0.0, -1.0),
+                origin: Vec3::new(0.0, 0.0, 9.0),
+            },
+            ..lamp(disk(0.5), straight(0.0), 1.0)
+        }],
+        vec![],
+    )
+    .expect("sound");
+    let ledger = run(&from_above, 20_000, 1).ledger;
+    assert!(ledger.lost[Loss::Contradiction as usize].rays > 100);
+    assert_eq!(ledger.lost_at[Loss::Contradiction as usize], Some(0));
+}
+
+#[test]
+fn a_lens_cemented_on_a_dome_of_the_same_glass_is_one_body() {
+    // Coincident faces: the outer side of the dome is the inner side of a shell. With equal indices nothing is reflected
+    // there, and rays reach the far field as from one ball.
+    let glass = medium(1.5, 0.0);
+    let build = |shell: bool| {
+        let mut parts = vec![part(sphere(2.0, ALL_Z), straight(0.0), Some(0), 0)];
+        let mut solids = vec![1];
+        if shell {
+            let mut inner = part(sphere(1.0, ALL_Z), straight(0.0), Some(0), 0);
+            inner.face.flipped = true;
+            parts.push(inner);
+            parts.push(part(sphere(1.0, ALL_Z), straight(0.0), Some(1), 0));
+            solids.push(1);
+        }
+        Scene::new(
+            parts,
+            vec![Finish::Interface],
+            vec![medium(1.0, 0.0), glass.clone()],
+            solids,
+            vec![lamp(disk(0.3), turned(Vec3::new(0.1, 0.2, 0.3)), 1.0)],
+            vec![Detector::Intensity { planes: 4, steps: 6 }],
+        )
+        .expect("sound")
+    };
+    let rays = 200_000;
+    let (one, two) = (run(&build(false), rays, 2), run(&build(true), rays, 2));
+    assert!(two.ledger.lost.iter().all(|entry| entry.rays == 0));
+    // χ² of two counts of the same cells; 1e-4 point of 22 degrees of freedom: 55.
+    let chi2: f64 = one.cells[0]
+        .iter()
+        .zip(&two.cells[0])
+        .map(|(a, b)| (a.rays as f64, b.rays as f64))
+        .filter(|(a, b)| a + b > 0.0)
+        .map(|(a, b)| (a - b) * (a - b) / (a + b))
+        .sum();
+    assert!(chi2 < 55.0, "{chi2}");
+}
+
+#[test]
+fn illuminance_falls_with_the_square_of_the_distance_and_the_cosines() {
+    // A small lamp under an oblique plate: E = I cos θ cos θ'/s², I = Φ/π.
+    let plate = turned(Vec3::new(20.0, 30.0, 40.0));
+    let facing = Frame {
+        z: -plate.z,
+        x: -plate.x,
+        ..plate
+    };
+    let scene = Scene::new(
+        vec![],
+        vec![],
+        vec![medium(1.0, 0.0)],
+        vec![],
+        vec![lamp(disk(0.01), straight(0.0), 2.0)],
+        vec![Detector::Illuminance {
+            frame: facing,
+            width: 8.0,
+            height: 6.0,
+            columns: 4,
+            rows: 3,
+        }],
+    )
+    .expect("sound");
+    let harvest = run(&scene, 3_000_000, 2);
+    let (cw, ch) = (2.0, 2.0);
+    let mut chi2 = 0.0;
+    for (index, cell) in (0_u32..).zip(&harvest.cells[0]) {
+        let (row, column) = (f64::from(index / 4), f64::from(index % 4));
+        // The midpoint rule on 10 × 10 points of the cell.
+        let mut expected = 0.0;
+        for i in 0..100 {
+            let x = -4.0 + (column + (f64::from(i % 10) + 0.5) / 10.0) * cw;
+            let y = 3.0 - (row + (f64::from(i / 10) + 0.5) / 10.0) * ch;
+            let p = facing.point_to_world(Vec3::new(x, y, 0.0));
+            let s2 = p.dot(p);
+            let k = p * (1.0 / s2.sqrt());
+            expected += 2.0 / PI * k.z * -k.dot(facing.z) / s2 * cw * ch / 100.0;
+        }
+        chi2 += (cell.sum - expected).powi(2) / cell.squares;
+    }
+    // 12 degrees of freedom, 1e-4 point: 39.1.
+    assert!(chi2 < 39.1, "{chi2}");
+}

@@ -1,0 +1,210 @@
+"""``etendue trace``: light from the sources of a scene to its detectors."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from etendue.cli.terminal import INTERRUPTED, check_folder, complain, print_json, progress_bar, say
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
+from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
+from etendue.formats.rays import RAY_FORMATS, write_rays
+from etendue.plot.intensity_picture import plot_intensity
+from etendue.scene import Scene
+from etendue.tracing.plan import Plan
+from etendue.tracing.result import TraceResult
+from etendue.tracing.running import MOST_EVENTS, trace_rounds
+
+RESULT_EXTENSIONS = (".h5", ".hdf5")
+RAY_EXTENSIONS = tuple(e for f in RAY_FORMATS for e in f.extensions if e not in MAP_EXTENSIONS)
+
+Write = Callable[[TraceResult, str, Path], tuple[str, ...]]
+
+
+def _rays(result: TraceResult, name: str, path: Path) -> tuple[str, ...]:
+    return write_rays(path, result.rays[name])
+
+
+def _intensity(result: TraceResult, name: str, path: Path) -> tuple[str, ...]:
+    if path.suffix.lower() in PICTURE_EXTENSIONS:
+        plot_intensity(result.intensity[name], path)
+        return ()
+    return write_intensity(path, result.intensity[name])
+
+
+def _illuminance(result: TraceResult, name: str, path: Path) -> tuple[str, ...]:
+    return () if _picture(result.illuminance[name].plot, path) else result.illuminance[name].save(path)
+
+
+def _image(result: TraceResult, name: str, path: Path) -> tuple[str, ...]:
+    return () if _picture(result.images[name].plot, path) else result.images[name].save(path)
+
+
+def _picture(plot: Callable[[Path], Any], path: Path) -> bool:
+    if path.suffix.lower() in PICTURE_EXTENSIONS:
+        plot(path)
+        return True
+    return False
+
+
+OUTPUTS: dict[str, tuple[tuple[str, ...], Write]] = {
+    "rays": (RAY_EXTENSIONS, _rays),
+    "intensity": ((*INTENSITY_EXTENSIONS, *PICTURE_EXTENSIONS), _intensity),
+    "illuminance": ((*(e for e in MAP_EXTENSIONS if e != ".hdr"), *PICTURE_EXTENSIONS), _illuminance),
+    "image": ((*MAP_EXTENSIONS, *PICTURE_EXTENSIONS), _image),
+}
+"""By the kind of detector: extensions of the files that what it saw can be written to, and what writes them."""
+
+
+def trace(
+    file: Annotated[Path, typer.Argument(help="A scene, .toml")],
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="Whole result (.h5), or by extension what a detector saw: rays (.tm25ray …), intensity (.ies, .ldt), "
+            "illuminance and light images (.exr, .npz …), pictures (.png, .pdf). {detector} is filled in.",
+        ),
+    ] = None,
+    rays: Annotated[
+        str | None,
+        typer.Option(
+            "--rays", help="Rays of all sources, e.g. 1e8 [1e7; of ray files alone: all].", show_default=False
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="0 to 2^64 - 1.", min=0)] = 1,
+    until: Annotated[
+        float | None,
+        typer.Option(
+            "--until", help="Stop at this relative error (median over the flux) of every detector, e.g. 0.01."
+        ),
+    ] = None,
+    most_events: Annotated[
+        int, typer.Option("--most-events", help="Surfaces that a ray may meet before it is given up.", min=1)
+    ] = MOST_EVENTS,
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Result (.h5) of the same scene, rays and seed to go on from.")
+    ] = None,
+    threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Trace light through a scene: flux ledger, incident rays, intensity, illuminance. Ctrl-C keeps what was done."""
+    outputs = output or []
+    for path in outputs:
+        check_folder(path)
+    scene = Scene.load(file)
+    started = None if resume is None else TraceResult.load(resume)
+    count = _number_of_rays(rays, started)
+    rounds = trace_rounds(scene, count, seed, until=until, most_events=most_events, threads=threads, resume=started)
+    writers = _writers(outputs, rounds.plan)
+    result: TraceResult | None = started
+    interrupted = False
+    with progress_bar("rays", rounds.plan.rays) as progress:
+        try:
+            for result in rounds:
+                if progress is not None:
+                    progress(result.rays_done)
+        except KeyboardInterrupt:
+            if result is None:
+                raise
+            interrupted = True
+    assert result is not None  # noqa: S101 - there is at least one round
+    losses = []
+    written = [path for path in outputs if path.suffix.lower() in RESULT_EXTENSIONS]
+    written += [path for path, _, _ in writers]
+    for path in outputs:
+        if path.suffix.lower() in RESULT_EXTENSIONS:
+            result.save(path)
+    for path, name, write in writers:
+        losses += [f"{path}: {note}" for note in write(result, name, path)]
+    if interrupted:
+        complain(f"stopped; what was written is the valid result of {result.rays_done:,} of {result.rays_asked:,} rays")
+    if json:
+        print_json({"file": file, **result.to_dict(), "outputs": written, "losses": losses, "interrupted": interrupted})
+    else:
+        for note in losses:
+            complain(f"note: {note}")
+        print_result(result)
+        for path in written:
+            say(f"  {path}")
+    if interrupted:
+        raise typer.Exit(INTERRUPTED)
+
+
+def _number_of_rays(text: str | None, started: TraceResult | None) -> float | None:
+    """Rays that the option names; of a result that is gone on from, unless it names others."""
+    if text is None:
+        return None if started is None else started.rays_asked
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not value.is_integer():
+        raise typer.BadParameter(f"{text!r}: give a whole number, e.g. --rays 1e8")
+    return value
+
+
+def _writers(outputs: list[Path], plan: Plan) -> list[tuple[Path, str, Write]]:
+    """What is to be written where: path, detector, writer; the path with the detector's name filled in.
+
+    Raises
+    ------
+    ArgumentError
+        If no detector sees what a file would hold, or several do and would write to the same file.
+    """
+    found: list[tuple[Path, str, Write]] = []
+    for path in outputs:
+        extension = path.suffix.lower()
+        if extension in RESULT_EXTENSIONS:
+            continue
+        kinds = [kind for kind, (extensions, _) in OUTPUTS.items() if extension in extensions]
+        if not kinds:
+            known = sorted({e for extensions, _ in OUTPUTS.values() for e in extensions} | set(RESULT_EXTENSIONS))
+            raise ArgumentError(f"{path}: the extension {path.suffix!r} is none of the known ones: {', '.join(known)}.")
+        fitting = [d for d in plan.detections if d.KIND in kinds]
+        if not fitting:
+            raise ArgumentError(f"{path}: the scene has no detector of the kind {' or '.join(kinds)}.")
+        if len(fitting) > 1 and "{detector}" not in path.name:
+            names = ", ".join(d.name for d in fitting)
+            raise ArgumentError(f"{path}: {names} would all be written here; put {{detector}} into its name.")
+        found += [(_named(path, d.name), d.name, OUTPUTS[d.KIND][1]) for d in fitting]
+    return found
+
+
+def _named(path: Path, detector: str) -> Path:
+    def value(match: re.Match[str]) -> str:
+        if match[1] != "detector":
+            raise UnknownNameError(f"placeholder in the output {path}", match[1], ["detector"])
+        # A name may hold anything, a file name may not.
+        return re.sub(r"[^\w.+-]+", "-", detector).strip("-") or "detector"
+
+    return path.with_name(re.sub(r"\{(\w*)\}", value, path.name))
+
+
+def print_result(result: TraceResult) -> None:
+    """A trace in figures, for people."""
+    say(f"{result.plan.scene_name or 'scene'}: {result.rays_done:,} rays, seed {result.seed}")
+    for line in result.ledger.table().splitlines():
+        say(f"  {line}")
+    for detection in result.plan.detections:
+        match detection.KIND:
+            case "rays":
+                rays = result.rays[detection.name]
+                say(f"  {detection.name}: {len(rays):,} rays, {rays.total_flux:.6g} {rays.flux_unit}")
+            case "intensity":
+                far = result.intensity[detection.name]
+                say(f"  {detection.name}: {far.flux:.6g} {far.flux_unit}, maximum {far.maximum:.6g} {far.unit}")
+            case "illuminance":
+                seen = result.illuminance[detection.name]
+                say(f"  {detection.name}: mean {seen.mean:.6g} {seen.unit}, least/mean {seen.uniformity:.3f}")
+            case _:
+                image = result.images[detection.name]
+                say(f"  {detection.name}: maximum {image.values.max():.6g} {image.unit}")
+    for note in result.notes:
+        say(f"  {note}")

@@ -1,0 +1,239 @@
+"""Maps of a scene: lines of sight followed from the eye through the optics to the sources."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.formats.rays import read_rays
+from etendue.lightfield.light_field import LightField
+from etendue.quantities.fingerprint import fingerprint
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import Progress, checked_threads
+from etendue.scene import Compiled, Scene, compile_scene
+from etendue.scene.placement import Placement
+from etendue.scene.sources.from_files import Field, Rays
+from etendue.units import MM2_PER_M2
+
+Array = npt.NDArray[np.float64]
+
+DEFAULT_RAYS_PER_PIXEL = 256
+MOST_RAYS_PER_PIXEL = 1 << 24
+MOST_SEED = (1 << 64) - 1
+
+PASSES = 16
+"""Independent passes of a map, from whose spread the standard error of each pixel comes."""
+
+FEWEST_PASSES = 4
+
+MOST_TIMES = 64
+"""How many times `rays_per_pixel` are followed at most to reach `until`."""
+
+MOST_EVENTS = 10_000
+"""Surfaces that a line of sight may meet."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Looking:
+    """How maps of a scene are computed; the parameters are those of `luminance_map`."""
+
+    rays_per_pixel: int = DEFAULT_RAYS_PER_PIXEL
+    until: float | None = None
+    seed: int = 1
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        n = self.rays_per_pixel
+        if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_RAYS_PER_PIXEL:
+            raise ArgumentError(f"rays_per_pixel is {n!r}; give a whole number from 1 to {MOST_RAYS_PER_PIXEL:,}.")
+        if self.until is not None and not (math.isfinite(self.until) and self.until > 0.0):
+            raise ArgumentError(f"until is {self.until!r}; give the relative error to be reached, e.g. 0.01.")
+        if not (isinstance(self.seed, int) and 0 <= self.seed <= MOST_SEED):
+            raise ArgumentError(f"seed is {self.seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
+        checked_threads(self.threads)
+
+    @property
+    def passes(self) -> int:
+        """Passes that are made in any case."""
+        return min(PASSES, max(FEWEST_PASSES, self.rays_per_pixel))
+
+    @property
+    def paths(self) -> int:
+        """Lines of sight per pixel and pass."""
+        return -(-self.rays_per_pixel // self.passes)
+
+
+def look_at_scene(
+    scene: Scene, pairs: Sequence[tuple[Observer, Screen]], how: Looking, progress: Progress | None = None
+) -> list[LuminanceMap]:
+    """The maps of a scene for observers with their screens; see `luminance_map`.
+
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes.
+    ArgumentError
+        If it has no sources, or a screen has no apparent area.
+    """
+    views = [screen.core_view(observer) for observer, screen in pairs]
+    seeable, notes = with_fields(scene, how.threads)
+    compiled = compile_scene(seeable)
+    if not compiled.record["sources"]:
+        raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
+    core = _core.Scene(compiled.record)
+    notes = [*compiled.notes, *notes, *_unseen(compiled)]
+    origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
+    maps, done = [], 0
+    for (observer, screen), view in zip(pairs, views, strict=True):
+        passes = _Passes(screen.shape)
+        wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
+        while passes.done < wanted:
+            first = passes.done
+            sum_, _, deviation = _core.look_at_scene(
+                core, view, how.paths, how.seed, MOST_EVENTS, False, first, first + 1, how.threads
+            )
+            passes.add(sum_, deviation)
+            done += how.paths * screen.columns * screen.rows
+            if progress is not None:
+                progress(done)
+            if passes.done == wanted and how.until is not None:
+                wanted = passes.wanted(how.until, most)
+        paths = how.paths * passes.done
+        told = [f"{paths:,} lines of sight per pixel, in {passes.done} independent passes", *passes.notes(how.until)]
+        maps.append(
+            LuminanceMap(
+                passes.mean * MM2_PER_M2,
+                passes.standard_error * MM2_PER_M2,
+                np.full(screen.shape, paths),
+                observer,
+                screen,
+                compiled.flux_unit,
+                origin.then(f"luminance by {paths:,} lines of sight per pixel, seed {how.seed}"),
+                (*told, *notes),
+            )
+        )
+    return maps
+
+
+class _Passes:
+    """Mean and spread of independent passes, updated pass by pass (Welford): no difference of large numbers."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.done = 0
+        self.mean = np.zeros(shape)
+        self._spread = np.zeros(shape)
+        self._deviation = np.zeros(shape)
+
+    def add(self, values: Array, deviation: Array) -> None:
+        """One pass more: its mean luminances, and the deviation that sources state of theirs."""
+        self.done += 1
+        off = values - self.mean
+        self.mean = self.mean + off / self.done
+        self._spread = self._spread + off * (values - self.mean)
+        self._deviation = self._deviation + (deviation - self._deviation) / self.done
+
+    @property
+    def sampling_error(self) -> Array:
+        """Standard error of the mean, from the spread of the passes."""
+        error: Array = np.sqrt(self._spread / ((self.done - 1) * self.done))
+        return error
+
+    @property
+    def standard_error(self) -> Array:
+        """With what the sources do not know of themselves."""
+        return np.hypot(self.sampling_error, self._deviation)
+
+    def relative_error(self) -> float:
+        """Median of the sampling error over the value, of pixels with light; 0 if there are none."""
+        lit = self.mean > 0.0
+        return float(np.median(self.sampling_error[lit] / self.mean[lit])) if lit.any() else 0.0
+
+    def wanted(self, until: float, most: int) -> int:
+        """Passes that should be made to reach a relative error: as many as its fall with 1/√n asks for, twice at most."""
+        error = self.relative_error()
+        if error < until:
+            return self.done
+        return min(most, 2 * self.done, max(self.done + 1, math.ceil(1.1 * self.done * (error / until) ** 2)))
+
+    def notes(self, until: float | None) -> list[str]:
+        """How sure the map is."""
+        lit = self.mean > 0.0
+        if not lit.any():
+            return ["no line of sight met light: the map is dark"]
+        total = float(np.median(self.standard_error[lit] / self.mean[lit]))
+        notes = [f"median relative standard error {total:.2%} of the pixels with light"]
+        if until is not None and self.relative_error() >= until:
+            notes.append(f"stopped before {until:.2%} was reached, at {MOST_TIMES} times rays_per_pixel")
+        return notes
+
+
+def with_fields(scene: Scene, threads: int | None = None) -> tuple[Scene, list[str]]:
+    """The scene with a light field in the place of each ray set, which has no luminance that could be seen; and notes.
+
+    Raises
+    ------
+    SceneError, ArgumentError, FormatError, OSError
+        If rays cannot be read or fitted.
+    """
+    sources, notes = [], []
+    for i, source in enumerate(scene.sources):
+        if not isinstance(source, Rays):
+            sources.append(source)
+            continue
+        name = source.name or f"sources[{i}]"
+        field, surface, share = _fitted(source, scene, threads)
+        sources.append(field)
+        lost = f"; {share:.2%} of the flux does not come from it" if share > 1e-4 else ""
+        notes.append(f"{name}: a light field on {surface} was fitted to its rays{lost}")
+    return scene.replace(sources=tuple(sources)), notes
+
+
+def _fitted(source: Rays, scene: Scene, threads: int | None) -> tuple[Field, str, float]:
+    """The light field of a ray source in its place, its carrier surface, and the share of the flux it does not hold."""
+    rays: Any = read_rays(scene.files.find(source.file)) if source.file is not None else source.rays
+    unit = source.flux_unit if source.flux_unit is not None else rays.flux_unit
+    if unit != rays.flux_unit and source.flux is None and isinstance(rays, RaySet):
+        rays = rays.in_unit(unit)
+    (emitter,) = source.emitters(scene.files)
+    field = LightField.fit(rays, threads=threads)
+    scale = emitter.record["flux"] / rays.total_flux
+    wavelengths, shares = source.colours(emitter, scene.wavelength)
+    place = {key: getattr(source, key) for key in Placement.model_fields}
+    seen = Field(
+        name=source.name,
+        field=field.replace(flux_unit=unit),
+        flux=field.total_flux * scale,
+        spectrum=tuple(zip(wavelengths.tolist(), shares.tolist(), strict=True)),
+        **place,
+    )
+    return seen, field.surface.spec, 1.0 - field.total_flux / rays.total_flux
+
+
+def _unseen(compiled: Compiled) -> list[str]:
+    """What the eye cannot see of the sources, though they shine."""
+    names: dict[str, list[str]] = {"point": [], "beam": []}
+    for name, source in zip(compiled.source_names, compiled.record["sources"], strict=True):
+        if source["kind"] in names:
+            names[source["kind"]].append(name)
+    notes = []
+    if names["point"]:
+        notes.append(
+            f"{', '.join(names['point'])}: a point has no finite luminance; it is not seen itself, nor what it lights "
+            "through lenses and mirrors"
+        )
+    if names["beam"]:
+        notes.append(
+            f"{', '.join(names['beam'])}: parallel light is met by no line of sight; what it lights is not seen here, "
+            "but in a light image of a trace"
+        )
+    return notes

@@ -1,0 +1,281 @@
+"""From the sums of a detector to the quantity that it measures: one class per kind."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+from etendue.quantities.illuminance_map import IlluminanceMap, Point
+from etendue.quantities.intensity import Intensity
+from etendue.quantities.intensity_cells import MOST_CELLS, Cells
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.observer import Observer, Screen, observer_from_dict
+from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.tracing.sums import RECORD, Collected, Counts
+from etendue.units import MM2_PER_M2, FluxUnit
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Counted:
+    """The cells of a detector after a number of rays.
+
+    Parameters
+    ----------
+    flux : array
+        [flux unit], of each cell, scaled to the whole trace.
+    error : array
+        Its standard error; NaN for cells that no ray reached.
+    rays : array of int64
+    """
+
+    flux: Array
+    error: Array
+    rays: npt.NDArray[np.int64]
+
+    @classmethod
+    def of(cls, cells: tuple[Array, Array, Counts], rays: int, scale: float) -> Counted:
+        """Of sums over `rays` rays, of which a trace has `scale` times as many.
+
+        A ray adds w to a cell, mostly 0; rays are independent of each other. So the variance of Σ w is n times that of w:
+        Σ w² − (Σ w)²/n.
+        """
+        sum_, squares, count = cells
+        variance = np.maximum(squares - sum_ * sum_ / max(rays, 1), 0.0)
+        error = np.where(count > 0, np.sqrt(variance) * scale, np.nan)
+        return cls(sum_ * scale, error, count.astype(np.int64))
+
+    @property
+    def relative_error(self) -> float:
+        """Median over the flux of the relative standard errors of the cells; NaN if no ray reached any."""
+        lit = self.flux > 0.0
+        if not lit.any():
+            return float("nan")
+        share = self.error[lit] / self.flux[lit]
+        order = np.argsort(share)
+        below = np.cumsum(self.flux[lit][order])
+        return float(share[order][np.searchsorted(below, below[-1] / 2.0)])
+
+
+@dataclasses.dataclass(frozen=True)
+class Origin:
+    """What all quantities of a trace have in common."""
+
+    flux_unit: FluxUnit
+    provenance: Provenance
+    notes: tuple[str, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Detection(abc.ABC):
+    """What a detector of the scene measures.
+
+    Parameters
+    ----------
+    name : str
+        Of the detector.
+    """
+
+    KIND: ClassVar[str]
+    name: str
+
+    @property
+    def cells(self) -> int:
+        """Number of cells that flux is summed in."""
+        return 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for files."""
+        return {"kind": self.KIND, **dataclasses.asdict(self)}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Detection:
+        """Inverse of `to_dict`."""
+        return cls(**data)
+
+
+@dataclasses.dataclass(frozen=True)
+class IncidentRays(Detection):
+    """The rays that cross a ray collecting surface."""
+
+    KIND = "rays"
+
+    def read(self, collected: Collected, scale: float, origin: Origin) -> RaySet:
+        """The rays, with a wavelength each unless all have the same."""
+        records = collected.array()
+        meaning = RaySetMeaning(
+            flux_unit=origin.flux_unit,
+            stored_flux_scale=scale,
+            provenance=origin.provenance.then(f"rays incident on {self.name!r}"),
+        )
+        wavelength = records["wavelength"]
+        if len(records) and (wavelength == wavelength[0]).all():
+            names = [name for name in RECORD.names or () if name != "wavelength"]
+            # The same records, of which one field is passed over.
+            records = records[names]
+            meaning = dataclasses.replace(meaning, single_wavelength=float(wavelength[0]))
+        return RaySet.from_records(records, meaning)
+
+
+@dataclasses.dataclass(frozen=True)
+class FarFieldIntensity(Detection):
+    """The intensity of what leaves the scene.
+
+    Parameters
+    ----------
+    c_planes, gamma_step
+        As of `Cells`.
+    """
+
+    KIND = "intensity"
+    c_planes: int
+    gamma_step: float
+
+    @property
+    def table(self) -> Cells:
+        """The cells around the nodes."""
+        return Cells(self.c_planes, self.gamma_step)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells that flux is summed in."""
+        return self.table.c.size * self.table.gamma.size
+
+    def read(self, counted: Counted, origin: Origin) -> Intensity:
+        """Flux of each cell over its solid angle."""
+        cells = self.table
+        shape = (cells.c.size, cells.gamma.size)
+        values, error = (array.reshape(shape) / cells.solid_angle for array in (counted.flux, counted.error))
+        for table in (values, error):
+            table[:, [0, -1]] = table[0, [0, -1]]
+        return Intensity(
+            cells.c,
+            cells.gamma,
+            values,
+            error,
+            flux_unit=origin.flux_unit,
+            provenance=origin.provenance.then(f"far-field intensity by {self.name!r}"),
+            notes=("mean over the cell around each node", *origin.notes),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class GridIlluminance(Detection):
+    """Illuminance on a rectangle.
+
+    Parameters
+    ----------
+    width, height, columns, rows
+        Of the grid [mm].
+    centre, right, up
+        As of `IlluminanceMap`.
+    """
+
+    KIND = "illuminance"
+    width: float
+    height: float
+    columns: int
+    rows: int
+    centre: Point
+    right: Point
+    up: Point
+
+    @property
+    def cells(self) -> int:
+        """Number of cells that flux is summed in."""
+        return self.columns * self.rows
+
+    def read(self, counted: Counted, origin: Origin) -> IlluminanceMap:
+        """Flux of each cell over its area."""
+        screen = Screen(self.width, self.height, self.columns, self.rows, "xy")
+        area = screen.pixel_area / MM2_PER_M2
+        return IlluminanceMap(
+            counted.flux.reshape(screen.shape) / area,
+            counted.error.reshape(screen.shape) / area,
+            counted.rays.reshape(screen.shape),
+            screen,
+            self.centre,
+            self.right,
+            self.up,
+            origin.flux_unit,
+            origin.provenance.then(f"illuminance on {self.name!r}"),
+            origin.notes,
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class LightImage(Detection):
+    """The luminance of diffuse surfaces as an observer sees them: every scatter is connected to the eye.
+
+    Parameters
+    ----------
+    observer : Observer
+    screen : Screen
+    """
+
+    KIND = "image"
+    observer: Observer
+    screen: Screen
+
+    @property
+    def cells(self) -> int:
+        """Number of cells that flux is summed in."""
+        return self.screen.columns * self.screen.rows
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> LightImage:
+        """Inverse of `to_dict`."""
+        return cls(data["name"], observer_from_dict(data["observer"]), Screen(**data["screen"]))
+
+    def read(self, counted: Counted, origin: Origin) -> LuminanceMap:
+        """What the core sums is luminance in flux unit/(mm² sr)."""
+        shape = self.screen.shape
+        notes = ["light that reaches the eye from a diffuse surface directly; sources and mirrors are not seen in it"]
+        dark = int((counted.rays == 0).sum())
+        if dark:
+            notes.append(
+                f"{dark:,} of {counted.rays.size:,} pixels saw no scatter: their luminance is 0, its error unknown"
+            )
+        return LuminanceMap(
+            counted.flux.reshape(shape) * MM2_PER_M2,
+            counted.error.reshape(shape) * MM2_PER_M2,
+            counted.rays.reshape(shape),
+            self.observer,
+            self.screen,
+            origin.flux_unit,
+            origin.provenance.then(f"light image {self.name!r}"),
+            (*notes, *origin.notes),
+        )
+
+
+DETECTIONS: dict[str, type[Detection]] = {
+    cls.KIND: cls for cls in (IncidentRays, FarFieldIntensity, GridIlluminance, LightImage)
+}
+"""Every kind of detection."""
+
+
+def detection_from_dict(data: Mapping[str, Any]) -> Detection:
+    """Rebuild a detection from `Detection.to_dict`."""
+    rest = {key: tuple(value) if isinstance(value, list) else value for key, value in data.items() if key != "kind"}
+    return DETECTIONS[data["kind"]].from_dict(rest)
+
+
+def check_cells(detections: tuple[Detection, ...]) -> None:
+    """Refuse detectors with more cells than memory is meant for.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+    """
+    total = sum(detection.cells for detection in detections)
+    if total > MOST_CELLS:
+        raise ArgumentError(f"the detectors have {total:,} cells together; {MOST_CELLS:,} are the most. Use fewer.")

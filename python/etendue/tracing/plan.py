@@ -1,0 +1,176 @@
+"""What is to be traced: a scene with its names, how many rays, and a fingerprint that tells it from others."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+from etendue import _core
+from etendue.errors import ArgumentError, SceneError
+from etendue.quantities.fingerprint import fingerprint
+from etendue.quantities.provenance import Provenance
+from etendue.scene import Compiled, Scene
+from etendue.tracing.detections import (
+    Detection,
+    FarFieldIntensity,
+    GridIlluminance,
+    IncidentRays,
+    LightImage,
+    check_cells,
+)
+from etendue.units import FluxUnit
+
+DEFAULT_RAYS = 10**7
+MOST_RAYS = 1 << 50
+MOST_EVENTS = 10**9
+MOST_SEED = (1 << 64) - 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """What a trace is a trace of. Two traces with equal plans have the same bits.
+
+    Parameters
+    ----------
+    scene_name : str
+    scene_text : str
+        The scene as TOML; empty if parts of it live in memory only.
+    fingerprint : str
+        SHA-256 of the scene as the tracer takes it, files included (of ray sets, the rays at both ends).
+    rays, seed, most_events : int
+    flux_unit : {"lm", "W"}
+    source_names, face_names, medium_names, loss_names : tuple of str
+        Of the rows of the ledger.
+    detections : tuple of Detection
+    notes : tuple of str
+        What the user should know.
+    """
+
+    scene_name: str
+    scene_text: str
+    fingerprint: str
+    rays: int
+    seed: int
+    most_events: int
+    flux_unit: FluxUnit
+    source_names: tuple[str, ...]
+    face_names: tuple[str, ...]
+    medium_names: tuple[str, ...]
+    loss_names: tuple[str, ...]
+    detections: tuple[Detection, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def provenance(self) -> Provenance:
+        """Origin of what the trace finds."""
+        step = f"traced with {self.rays:,} rays, seed {self.seed}, at most {self.most_events:,} surfaces met by each"
+        return Provenance(self.scene_name or "scene", "traced scene", self.fingerprint, (step,))
+
+    def check_same(self, other: Plan) -> None:
+        """Refuse to go on with a trace of something else.
+
+        Raises
+        ------
+        ArgumentError
+            If so; says what differs.
+        """
+        differences = [
+            f"{what} is {getattr(other, name)!r} there and {getattr(self, name)!r} here"
+            for name, what in (("rays", "the number of rays"), ("seed", "the seed"), ("most_events", "most_events"))
+            if getattr(self, name) != getattr(other, name)
+        ]
+        if self.fingerprint != other.fingerprint:
+            differences.append("the scene, or a file that it names, is another one")
+        if differences:
+            raise ArgumentError(f"this result cannot be continued: {'; '.join(differences)}.")
+
+
+def make_plan(scene: Scene, compiled: Compiled, rays: float | None, seed: int, most_events: int) -> Plan:
+    """The plan of a trace.
+
+    Raises
+    ------
+    ArgumentError
+        If a number is out of its range, or the detectors have too many cells.
+    """
+    if not compiled.record["sources"]:
+        raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to trace.")
+    count, notes = _rays(compiled, rays)
+    if not (isinstance(seed, int) and 0 <= seed <= MOST_SEED):
+        raise ArgumentError(f"seed is {seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
+    if not (isinstance(most_events, int) and 1 <= most_events <= MOST_EVENTS):
+        raise ArgumentError(f"most_events is {most_events!r}; give a whole number from 1 to {MOST_EVENTS:,}.")
+    detections = tuple(_detections(scene, compiled))
+    check_cells(detections)
+    # The faces of detectors stand behind those of the scene.
+    detector_faces = [d.name for d in detections if isinstance(d, IncidentRays | GridIlluminance)]
+    return Plan(
+        scene.name,
+        _text(scene),
+        fingerprint(compiled.record),
+        count,
+        seed,
+        most_events,
+        compiled.flux_unit,
+        _unique(compiled.source_names),
+        _unique([*compiled.face_names, *detector_faces]),
+        _unique(compiled.medium_names),
+        tuple(_core.losses()),
+        detections,
+        (*compiled.notes, *notes),
+    )
+
+
+def _rays(compiled: Compiled, rays: float | None) -> tuple[int, list[str]]:
+    """Number of rays, and what is to be said about them."""
+    sets = [source["rays"] for source in compiled.record["sources"] if source["kind"] == "rays"]
+    notes: list[str] = []
+    if rays is None:
+        alone = len(sets) == len(compiled.record["sources"])
+        count = sum(map(len, sets)) if alone else DEFAULT_RAYS
+        if alone and len(sets) > 1:
+            notes.append(
+                f"{len(sets)} ray sets share {count:,} rays by their flux: each is gone through evenly, its rays used more "
+                "or less than once"
+            )
+    elif isinstance(rays, bool) or not 1 <= rays <= MOST_RAYS or int(rays) != rays:
+        raise ArgumentError(f"rays is {rays!r}; give a whole number from 1 to {MOST_RAYS:,}.")
+    else:
+        count = int(rays)
+    return count, notes
+
+
+def _text(scene: Scene) -> str:
+    try:
+        return scene.to_toml()
+    except SceneError:
+        return ""
+
+
+def _unique(names: Iterable[str]) -> tuple[str, ...]:
+    """Names of rows, of which no two are the same."""
+    taken: dict[str, int] = {}
+    result = []
+    for name in names:
+        taken[name] = taken.get(name, 0) + 1
+        result.append(name if taken[name] == 1 else f"{name} ({taken[name]})")
+    return tuple(result)
+
+
+def _detections(scene: Scene, compiled: Compiled) -> Iterable[Detection]:
+    observers = {observer.name: observer for observer in scene.observers}
+    rows = zip(_unique(compiled.detector_names), scene.detectors, compiled.record["detectors"], strict=True)
+    for name, described, record in rows:
+        match record["kind"]:
+            case "rays":
+                yield IncidentRays(name)
+            case "intensity":
+                yield FarFieldIntensity(name, record["planes"], 180.0 / (record["gammas"] - 1))
+            case "illuminance":
+                ox, oy, oz, xx, xy, xz, yx, yy, yz, *_ = record["frame"]
+                width, height = record["width"], record["height"]
+                axes = (ox, oy, oz), (xx, xy, xz), (yx, yy, yz)
+                yield GridIlluminance(name, width, height, record["columns"], record["rows"], *axes)
+            case _:
+                seen = observers[described.observer]  # type: ignore[attr-defined]
+                yield LightImage(name, seen.observer(), seen.screen.screen())

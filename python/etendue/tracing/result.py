@@ -1,0 +1,242 @@
+"""What a trace found."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from etendue.quantities.illuminance_map import IlluminanceMap
+from etendue.quantities.intensity import Intensity
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_set import RaySet
+from etendue.tracing.detections import (
+    Counted,
+    Detection,
+    FarFieldIntensity,
+    GridIlluminance,
+    IncidentRays,
+    LightImage,
+    Origin,
+)
+from etendue.tracing.ledger import Entry, Ledger, Loss
+from etendue.tracing.named import ByName
+from etendue.tracing.plan import Plan
+from etendue.tracing.sums import Array, Counts, Sums
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TraceResult:
+    """What the detectors of a scene saw, and what became of all light.
+
+    A result of n of N rays is a valid one: every flux is scaled by N/n, every standard error is that of n rays. `trace`
+    with ``resume=`` goes on from there, to the same bits as if it had never stopped.
+
+    Parameters
+    ----------
+    plan : Plan
+        What was to be traced.
+    sums : Sums
+        What the rounds done add up to.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> scene = et.Scene(
+    ...     sources=[{"name": "led", "kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 100}],
+    ...     surfaces=[{"name": "half", "shape": {"kind": "rectangle", "width": 1e3, "height": 2e3}, "at": [500, 0, 1],
+    ...                "finish": "absorber"}],
+    ...     detectors=[{"name": "far", "kind": "intensity", "c_planes": 4, "gamma_step": 10}],
+    ... )
+    >>> result = et.trace(scene, rays=100_000)
+    >>> result.ledger.closes, result.complete
+    (True, True)
+    >>> share = result.ledger.by_surface["half"].flux / 100
+    >>> bool(abs(share - 0.5) < 0.01), result.intensity["far"].unit
+    (True, 'cd')
+    """
+
+    plan: Plan
+    sums: Sums
+
+    @property
+    def rays_asked(self) -> int:
+        """Rays of the whole trace."""
+        return self.plan.rays
+
+    @property
+    def rays_done(self) -> int:
+        """Rays traced so far."""
+        return self.sums.rays
+
+    @property
+    def seed(self) -> int:
+        """Of the trace."""
+        return self.plan.seed
+
+    @property
+    def complete(self) -> bool:
+        """Whether all rays were traced."""
+        return self.rays_done == self.rays_asked
+
+    @property
+    def scale(self) -> float:
+        """Rays asked for over rays done."""
+        return self.rays_asked / self.rays_done
+
+    @property
+    def provenance(self) -> Provenance:
+        """Where the result comes from; its fingerprint is that of the scene with all its files."""
+        whole = self.plan.provenance
+        return whole if self.complete else whole.then(f"stopped after {self.rays_done:,} rays")
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know."""
+        notes = [*self.plan.notes, *self.ledger.notes()]
+        if not self.complete:
+            notes.append(
+                f"{self.rays_done:,} of {self.rays_asked:,} rays were traced; every flux is scaled by {self.scale:.6g}"
+            )
+        return tuple(notes)
+
+    @cached_property
+    def ledger(self) -> Ledger:
+        """The flux account."""
+        plan, rows = self.plan, self.sums.ledger
+        (escaped,), (terminated,) = self._entries(rows["escaped"]), self._entries(rows["terminated"])
+        lost = zip(plan.loss_names, self._entries(rows["lost"]), self.sums.lost_at, strict=True)
+        faces = plan.face_names
+        return Ledger(
+            plan.flux_unit,
+            dict(zip(plan.source_names, self._entries(rows["emitted"]), strict=True)),
+            escaped,
+            dict(zip(faces, self._entries(rows["on_face"]), strict=False)),
+            dict(zip(plan.medium_names, self._entries(rows["in_medium"]), strict=True)),
+            terminated,
+            tuple(
+                Loss(reason, faces[at] if at is not None and at < len(faces) else "", entry.flux, entry.rays)
+                for reason, entry, at in lost
+                if entry.rays
+            ),
+            self.sums.imbalance,
+        )
+
+    def _entries(self, row: tuple[Array, Counts]) -> list[Entry]:
+        flux, rays = row
+        return [Entry(f * self.scale, n) for f, n in zip(flux.tolist(), rays.tolist(), strict=True)]
+
+    # --- detectors -----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def rays(self) -> ByName[RaySet]:
+        """The rays that crossed each ray collecting surface, with a wavelength each."""
+        return ByName(
+            "ray collecting surface",
+            {
+                detection.name: detection.read(self.sums.collected[i], self.scale, self._origin)
+                for i, detection in enumerate(self.plan.detections)
+                if isinstance(detection, IncidentRays)
+            },
+        )
+
+    @cached_property
+    def intensity(self) -> ByName[Intensity]:
+        """The far field of the light that left the scene [cd or W/sr]."""
+        found = ((d, c) for d, c in self._counted if isinstance(d, FarFieldIntensity))
+        return ByName("far-field detector", {d.name: d.read(c, self._origin) for d, c in found})
+
+    @cached_property
+    def illuminance(self) -> ByName[IlluminanceMap]:
+        """Illuminance by each illuminance detector [lx or W/m²]."""
+        found = ((d, c) for d, c in self._counted if isinstance(d, GridIlluminance))
+        return ByName("illuminance detector", {d.name: d.read(c, self._origin) for d, c in found})
+
+    @cached_property
+    def images(self) -> ByName[LuminanceMap]:
+        """Light images of diffuse surfaces [cd/m² or W/(m² sr)]."""
+        found = ((d, c) for d, c in self._counted if isinstance(d, LightImage))
+        return ByName("light image", {d.name: d.read(c, self._origin) for d, c in found})
+
+    @cached_property
+    def relative_error(self) -> float:
+        """The largest, over the detectors with cells, of the flux-weighted median relative standard error of its cells.
+
+        NaN if a detector saw nothing yet, or the scene has none with cells.
+        """
+        errors = [counted.relative_error for _, counted in self._counted]
+        return max(errors) if errors and all(error == error for error in errors) else float("nan")  # noqa: PLR0124
+
+    @cached_property
+    def _counted(self) -> list[tuple[Detection, Counted]]:
+        pairs = zip(self.plan.detections, self.sums.cells, strict=True)
+        return [(d, Counted.of(cells, self.rays_done, self.scale)) for d, cells in pairs if d.cells]
+
+    @property
+    def _origin(self) -> Origin:
+        """What all quantities have in common."""
+        return Origin(self.plan.flux_unit, self.provenance, self.notes)
+
+    # --- keeping -------------------------------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the result as an HDF5 file, whole or not at all; docs/formats/trace-results.md describes it.
+
+        Raises
+        ------
+        ArgumentError
+            If the folder does not exist.
+        OSError
+            If there is no room for it.
+        """
+        from etendue.tracing.storage import save_result  # noqa: PLC0415 - it needs this class
+
+        save_result(self, Path(path))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> TraceResult:
+        """Read a file that `save` wrote.
+
+        Raises
+        ------
+        FormatError
+            If it is none, or damaged.
+        OSError
+            If it cannot be opened.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> from tempfile import TemporaryDirectory
+        >>> result = et.trace(et.Scene(sources=[{"kind": "point", "flux": 1}]), rays=1000)
+        >>> with TemporaryDirectory() as folder:
+        ...     result.save(Path(folder) / "result.h5")
+        ...     TraceResult.load(Path(folder) / "result.h5").ledger == result.ledger
+        True
+        """
+        from etendue.tracing.storage import load_result  # noqa: PLC0415 - likewise
+
+        return load_result(Path(path))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result in figures, as plain data for JSON."""
+        return {
+            "scene": self.plan.scene_name,
+            "fingerprint": self.plan.fingerprint,
+            "seed": self.seed,
+            "rays_asked": self.rays_asked,
+            "rays_done": self.rays_done,
+            "surfaces_met": self.sums.segments,
+            "relative_error": self.relative_error,
+            "ledger": self.ledger.to_dict(),
+            "detectors": [
+                {"name": d.name, "kind": d.KIND, "rays": len(self.rays[d.name])}
+                if isinstance(d, IncidentRays)
+                else {"name": d.name, "kind": d.KIND}
+                for d in self.plan.detections
+            ],
+            "notes": list(self.notes),
+        }

@@ -1,0 +1,234 @@
+"""Results of traces as HDF5 files; docs/formats/trace-results.md describes them field by field.
+
+A file holds the sums as they are, not the quantities made of them, so that a trace can go on from it to the same bits.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import FormatError
+from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
+from etendue.formats.output import atomic_output
+from etendue.quantities.spool import Spool
+from etendue.tracing.detections import check_cells, detection_from_dict
+from etendue.tracing.plan import Plan
+from etendue.tracing.result import TraceResult
+from etendue.tracing.sums import ENTRIES, RECORD, Collected, Sums
+from etendue.units import FLUX_UNITS
+
+FORMAT = "etendue trace result"
+VERSION = 1
+
+CHUNK = 1 << 13
+"""Rows of a chunk of rays: half a megabyte."""
+
+IMAGE_LIMIT = 1 << 28
+"""Bytes of a file that is made in memory and written in one go; larger ones are written where they stand."""
+
+NAMES = ("source_names", "face_names", "medium_names", "loss_names", "notes")
+NUMBERS = ("rays", "seed", "most_events")
+SUMS = ("batches", "rays", "segments")
+
+DAMAGED = "The file is damaged or cut short: copy it again, or trace the scene again."
+FOREIGN = "Give an HDF5 file that TraceResult.save wrote."
+
+
+def is_result_file(path: Path) -> bool:
+    """Whether a file is the result of a trace, by its content.
+
+    Raises
+    ------
+    OSError
+        If there is no such file.
+    """
+    import h5py  # noqa: PLC0415 - only who has such a file needs the library
+
+    if not begins_as_hdf5(path):
+        return False
+    try:
+        with reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
+            return Node(path, file, DAMAGED).has_text("format", FORMAT)
+    except FormatError:
+        return False
+
+
+def save_result(result: TraceResult, path: Path) -> None:
+    """See `TraceResult.save`."""
+    import h5py  # noqa: PLC0415
+
+    # Rows of 64 bytes, three numbers per cell, and room for the rest.
+    size = 64 * sum(held.count for held in result.sums.collected) + 24 * sum(len(c[0]) for c in result.sums.cells)
+    size += len(result.plan.scene_text.encode()) + (1 << 20)
+    with atomic_output(path) as temporary:
+        if size <= IMAGE_LIMIT:
+            # In one go, because an HDF5 library whose disk is full cannot even close its file.
+            image = io.BytesIO()
+            with h5py.File(image, "w", libver=LIBRARY) as file:
+                _write(file, result)
+            temporary.write_bytes(image.getbuffer())
+        else:
+            if shutil.disk_usage(temporary.parent).free < size:
+                raise OSError(errno.ENOSPC, f"no room for {size / 1e9:.1f} GB", str(path))
+            with h5py.File(temporary, "w", libver=LIBRARY) as file:
+                _write(file, result)
+
+
+def load_result(path: Path) -> TraceResult:
+    """See `TraceResult.load`."""
+    import h5py  # noqa: PLC0415
+
+    if not begins_as_hdf5(path):
+        raise FormatError(path, "byte 0", "this is no HDF5 file", FOREIGN)
+    with reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
+        node = Node(path, file, DAMAGED)
+        if not node.has_text("format", FORMAT):
+            raise node.error("attribute 'format'", f"it is not {FORMAT!r}", FOREIGN)
+        if node.integer("version") != VERSION:
+            found = f"version {node.integer('version')}"
+            raise node.error("attribute 'version'", found, f"This étendue reads {VERSION}; update it.")
+        plan = _plan(node.group("plan"))
+        return TraceResult(plan, _sums(node.group("sums"), plan))
+
+
+# --- writing ---------------------------------------------------------------------------------------------------------
+
+
+def _write(file: Any, result: TraceResult) -> None:
+    plan, sums = result.plan, result.sums
+    put(file, format=FORMAT, version=VERSION, length_unit="mm", wavelength_unit="nm", flux_unit=plan.flux_unit)
+    group = file.create_group("plan")
+    put(group, scene_name=plan.scene_name, fingerprint=plan.fingerprint, flux_unit=plan.flux_unit)
+    put(group, **{name: np.uint64(getattr(plan, name)) for name in NUMBERS})
+    _put_text(group, "scene", plan.scene_text)
+    for name in NAMES:
+        _put_text(group, name, json.dumps(getattr(plan, name)))
+    _put_text(group, "detectors", json.dumps([detection.to_dict() for detection in plan.detections]))
+    group = file.create_group("sums")
+    put(group, **{name: np.uint64(getattr(sums, name)) for name in SUMS}, imbalance=sums.imbalance)
+    put(group, lost_at=np.array([-1 if at is None else at for at in sums.lost_at], dtype=np.int64))
+    for name in ENTRIES:
+        entry = group.create_group(name)
+        flux, rays = sums.ledger[name]
+        _put_array(entry, "flux", flux)
+        _put_array(entry, "rays", rays)
+    for i, (cells, held) in enumerate(zip(sums.cells, sums.collected, strict=True)):
+        detector = group.create_group(f"detector_{i}")
+        for name, array in zip(("sum", "squares", "rays"), cells, strict=True):
+            _put_array(detector, name, array)
+        _put_array(detector, "records", held.array().view("<f8").reshape(-1, 8))
+
+
+def _put_array(group: Any, name: str, values: npt.NDArray[Any]) -> None:
+    if not values.size:
+        group.create_dataset(name, data=values)
+        return
+    chunks = (min(len(values), CHUNK), *values.shape[1:])
+    # The digits of rays are as good as random: packing them takes long and saves little.
+    packed = {} if values.ndim > 1 else {"shuffle": True, "compression": "gzip"}
+    group.create_dataset(name, data=values, chunks=chunks, fletcher32=True, **packed)
+
+
+def _put_text(group: Any, name: str, text: str) -> None:
+    """A text of any length, as its bytes in UTF-8: an attribute holds 64 kB at most."""
+    _put_array(group, name, np.frombuffer(text.encode("utf-8"), dtype=np.uint8))
+
+
+# --- reading ---------------------------------------------------------------------------------------------------------
+
+
+def _plan(group: Node) -> Plan:
+    unit = group.text("flux_unit")
+    if unit not in FLUX_UNITS:
+        raise group.error("attribute 'flux_unit'", f"{unit!r} is none of {', '.join(FLUX_UNITS)}")
+    detections = tuple(detection_from_dict(data) for data in json.loads(_text(group, "detectors")))
+    check_cells(detections)
+    return Plan(
+        scene_name=group.text("scene_name"),
+        scene_text=_text(group, "scene"),
+        fingerprint=group.text("fingerprint"),
+        flux_unit="W" if unit == "W" else "lm",
+        detections=detections,
+        rays=group.integer("rays"),
+        seed=group.integer("seed"),
+        most_events=group.integer("most_events"),
+        source_names=_texts(group, "source_names"),
+        face_names=_texts(group, "face_names"),
+        medium_names=_texts(group, "medium_names"),
+        loss_names=_texts(group, "loss_names"),
+        notes=_texts(group, "notes"),
+    )
+
+
+def _sums(group: Node, plan: Plan) -> Sums:
+    lengths = {
+        "emitted": len(plan.source_names),
+        "escaped": 1,
+        "on_face": len(plan.face_names),
+        "in_medium": len(plan.medium_names),
+        "terminated": 1,
+        "lost": len(plan.loss_names),
+    }
+    entries = {}
+    for name, length in lengths.items():
+        entry = group.group(name)
+        entries[name] = (_row(entry, "flux", "<f8", length), _row(entry, "rays", "<u8", length))
+    numbers = {name: group.integer(name) for name in SUMS}
+    if not 0 < numbers["rays"] <= plan.rays:
+        raise group.error("attribute 'rays'", f"{numbers['rays']} of {plan.rays} rays are done")
+    lost_at = group.numbers("lost_at", (lengths["lost"],)).astype(np.int64).tolist()
+    cells, collected = [], []
+    for i, detection in enumerate(plan.detections):
+        detector = group.group(f"detector_{i}")
+        sum_, squares = (_row(detector, name, "<f8", detection.cells) for name in ("sum", "squares"))
+        cells.append((sum_, squares, _row(detector, "rays", "<u8", detection.cells)))
+        spool, count = Spool(RECORD), 0
+        for part in _records(detector):
+            spool.append(part)
+            count += len(part)
+        collected.append(Collected(spool, count))
+    return Sums(
+        **numbers,
+        imbalance=group.number("imbalance"),
+        ledger=entries,
+        lost_at=tuple(None if at < 0 else at for at in lost_at),
+        cells=tuple(cells),
+        collected=tuple(collected),
+    )
+
+
+def _row(group: Node, name: str, dtype: str, length: int) -> npt.NDArray[Any]:
+    data = group.dataset(name, np.dtype(dtype), 1)
+    if data.shape != (length,):
+        raise group.error(f"dataset {name!r}", f"shape {data.shape}, expected ({length},)")
+    values: npt.NDArray[Any] = data[()]
+    return values
+
+
+def _records(group: Node) -> Iterator[npt.NDArray[Any]]:
+    """The rays of a detector, some megabytes at a time."""
+    data = group.dataset("records", np.dtype("<f8"), 2)
+    if data.shape[1] != RECORD.itemsize // 8:
+        raise group.error("dataset 'records'", f"shape {data.shape}, expected 8 columns")
+    for start in range(0, len(data), 16 * CHUNK):
+        yield np.ascontiguousarray(data[start : start + 16 * CHUNK]).view(RECORD).reshape(-1)
+
+
+def _text(group: Node, name: str) -> str:
+    return bytes(group.dataset(name, np.dtype("u1"), 1)[()]).decode("utf-8")
+
+
+def _texts(group: Node, name: str) -> tuple[str, ...]:
+    texts = json.loads(_text(group, name))
+    if not (isinstance(texts, list) and all(isinstance(text, str) for text in texts)):
+        raise group.error(f"dataset {name!r}", "it is not a list of texts")
+    return tuple(texts)

@@ -1,0 +1,116 @@
+"""What the rounds of a trace add up to."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.quantities.spool import Spool
+
+Array = npt.NDArray[np.float64]
+Counts = npt.NDArray[np.uint64]
+
+RECORD = np.dtype([("position", "<f8", 3), ("direction", "<f8", 3), ("flux", "<f8"), ("wavelength", "<f8")])
+"""A ray as a ray collecting surface keeps it."""
+
+ENTRIES = ("emitted", "escaped", "on_face", "in_medium", "terminated", "lost")
+"""Rows of the ledger, each of flux and numbers of rays."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Collected:
+    """The first `count` rays of a spool to which later rounds append.
+
+    Parameters
+    ----------
+    spool : Spool
+        Of `RECORD`.
+    count : int
+    """
+
+    spool: Spool
+    count: int
+
+    def array(self) -> npt.NDArray[Any]:
+        """The rays, shape (count,)."""
+        return self.spool.array(self.count)
+
+    def then(self, rows: Array) -> Collected:
+        """With the rays of the next round, shape (m, 8)."""
+        records = np.ascontiguousarray(rows).view(RECORD).reshape(-1)
+        if len(self.spool) != self.count:
+            # Another trace went on from here before: what it appended is not ours.
+            own = Spool(RECORD)
+            own.append(self.array())
+            own.append(records)
+            return Collected(own, self.count + len(records))
+        self.spool.append(records)
+        return Collected(self.spool, self.count + len(records))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums over the rounds done, in order. They never change: `then` makes new ones.
+
+    Parameters
+    ----------
+    batches, rays, segments : int
+        Done.
+    imbalance : float
+        Largest of a batch.
+    ledger : mapping
+        (flux, rays) of each of `ENTRIES`.
+    lost_at : tuple of int or None
+        The face at which the first ray of each reason was lost.
+    cells : tuple of (Σ w, Σ w², rays)
+        Of each detector; empty for those that have none.
+    collected : tuple of Collected
+        Of each detector; empty for those that collect no rays.
+    """
+
+    batches: int
+    rays: int
+    segments: int
+    imbalance: float
+    ledger: Mapping[str, tuple[Array, Counts]]
+    lost_at: tuple[int | None, ...]
+    cells: tuple[tuple[Array, Array, Counts], ...]
+    collected: tuple[Collected, ...]
+
+    @classmethod
+    def first(cls, harvest: _core._Harvest, batches: int) -> Sums:
+        """Those of the first round."""
+        return cls(
+            batches,
+            harvest["rays"],
+            harvest["ledger"]["segments"],
+            harvest["imbalance"],
+            _entries(harvest),
+            tuple(harvest["ledger"]["lost_at"]),
+            tuple(harvest["cells"]),
+            tuple(Collected(Spool(RECORD), 0).then(rows) for rows in harvest["records"]),
+        )
+
+    def then(self, harvest: _core._Harvest, batches: int) -> Sums:
+        """With those of the next round, after which so many batches are done."""
+        entries = _entries(harvest)
+        return Sums(
+            batches,
+            self.rays + harvest["rays"],
+            self.segments + harvest["ledger"]["segments"],
+            max(self.imbalance, harvest["imbalance"]),
+            {name: (flux + entries[name][0], rays + entries[name][1]) for name, (flux, rays) in self.ledger.items()},
+            tuple(a if a is not None else b for a, b in zip(self.lost_at, harvest["ledger"]["lost_at"], strict=True)),
+            tuple((a[0] + b[0], a[1] + b[1], a[2] + b[2]) for a, b in zip(self.cells, harvest["cells"], strict=True)),
+            tuple(held.then(rows) for held, rows in zip(self.collected, harvest["records"], strict=True)),
+        )
+
+
+def _entries(harvest: _core._Harvest) -> dict[str, tuple[Array, Counts]]:
+    ledger: Mapping[str, Any] = harvest["ledger"]
+    return {name: ledger[name] for name in ENTRIES}
