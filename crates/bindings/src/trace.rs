@@ -24,7 +24,7 @@ use crate::view::View;
 
 fn entries<'py>(py: Python<'py>, entries: &[Entry]) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u64>>) {
     (
-        PyArray1::from_iter(py, entries.iter().map(|e| e.flux())),
+        PyArray1::from_iter(py, entries.iter().map(etendue_trace::ledger::Entry::flux)),
         PyArray1::from_iter(py, entries.iter().map(|e| e.rays)),
     )
 }
@@ -43,14 +43,14 @@ fn ledger_dict<'py>(py: Python<'py>, ledger: &Ledger) -> PyResult<Bound<'py, PyD
     Ok(dict)
 }
 
-fn cell_arrays<'py>(
-    py: Python<'py>,
-    cells: &[Cell],
-) -> (
+/// Σ w, Σ w² and number of rays of each cell.
+type CellArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<u64>>,
-) {
+);
+
+fn cell_arrays<'py>(py: Python<'py>, cells: &[Cell]) -> CellArrays<'py> {
     (
         PyArray1::from_iter(py, cells.iter().map(|c| c.sum)),
         PyArray1::from_iter(py, cells.iter().map(|c| c.squares)),
@@ -87,6 +87,7 @@ fn open<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Vec<Opened<'py>>> {
 
 /// Traces batches `first..last` of a run of `rays` rays.
 #[pyfunction]
+#[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
 #[pyo3(signature = (scene, rays, seed, most_events, first, last, threads=None))]
 pub fn trace_batches<'py>(
     py: Python<'py>,
@@ -138,6 +139,7 @@ pub fn trace_batches<'py>(
 /// Looks at a scene: for each pixel, row by row, the sums over passes `first..last` of the mean luminance of a pass, of its
 /// square, and of the sources' own deviation \[flux unit/(mm² sr)\].
 #[pyfunction]
+#[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
 #[pyo3(signature = (scene, view, paths, seed, most_events, without_caustics, first, last, threads=None))]
 pub fn look_at_scene<'py>(
     py: Python<'py>,

@@ -437,7 +437,7 @@ impl Assembly {
         if let Some((tree, numbers)) = &self.tree {
             let mut reach = range[1];
             tree.traverse(o, d, range[0], &mut reach, |primitive, _| {
-                look(numbers[primitive as usize])
+                look(numbers[primitive as usize]);
             });
         }
     }

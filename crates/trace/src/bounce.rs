@@ -15,6 +15,7 @@ use crate::scene::{Act, Scene};
 /// How a sheet that many rays are bounced off at once shares out light: mirrored, and mirrored or scattered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bouncer {
+    face: u32,
     mirrored: f64,
     kept: f64,
 }
@@ -22,9 +23,9 @@ pub struct Bouncer {
 /// The faces of a scene that rays are bounced off many at a time; None for the others.
 #[must_use]
 pub fn bouncers(scene: &Scene) -> Vec<Option<Bouncer>> {
-    let faces = scene.assembly.faces().iter().zip(&scene.roles);
+    let faces = scene.assembly.faces().iter().zip(&scene.roles).zip(0..);
     faces
-        .map(|(face, role)| {
+        .map(|((face, role), index)| {
             let simple = match &face.shape {
                 Shape::Flat(flat) => !matches!(flat.outline, Outline::Polygon { .. }),
                 Shape::Quadric(_) => true,
@@ -34,6 +35,7 @@ pub fn bouncers(scene: &Scene) -> Vec<Option<Bouncer>> {
             let [mirrored, through, scattered, behind] = scene.finishes[finish as usize].constant()?;
             let sheet = role.solid == 0 && simple && through == 0.0 && behind == 0.0;
             sheet.then_some(Bouncer {
+                face: index,
                 mirrored,
                 kept: mirrored + scattered,
             })
@@ -62,7 +64,6 @@ pub struct Gathered {
 /// Bounces the rays `which` of a block off a face: sets their new start points and directions in `lines`.
 pub fn bounce(
     face: &Face,
-    index: u32,
     bouncer: Bouncer,
     which: &[u32],
     distances: &[f64],
@@ -86,7 +87,7 @@ pub fn bounce(
     }
     off(face, bouncer, room);
     let mut leaving = Leaving::default();
-    leaving.add(index, 0);
+    leaving.add(bouncer.face, 0);
     for (k, &i) in which.iter().enumerate() {
         let at = |list: &[Vec<f64>; 3]| Vec3::new(list[0][k], list[1][k], list[2][k]);
         lines.set(i as usize, at(&room.o), at(&room.d), leaving);

@@ -92,7 +92,7 @@ struct Yield {
 
 /// The rays of each source in batch `batch`: the first one's number among those of the source, and how many.
 ///
-/// After b batches, source s has had ⌊b B Q_s⌋ − ⌊b B Q_{s−1}⌋ rays, Q being the sums of the shares of the flux: every
+/// After b batches, source s has had ⌊b B `Q_s`⌋ − ⌊b B Q_{s−1}⌋ rays, Q being the sums of the shares of the flux: every
 /// beginning of a run serves all sources in proportion, and each number is known without counting.
 #[must_use]
 pub fn deal(scene: &Scene, rays: u64, batch: u64) -> Vec<Range<u64>> {
@@ -129,6 +129,7 @@ fn edges(scene: &Scene, done: u64) -> Vec<u64> {
 ///
 /// `stop` is looked at before each batch; batches from the first one that was not begun on are left out, and the number of
 /// batches done is returned.
+#[must_use]
 pub fn trace(scene: &Scene, run: &Run<'_>, batches: Range<u64>) -> Harvest {
     let parts: Vec<Yield> = batches
         .clone()
@@ -384,19 +385,11 @@ impl Walk<'_> {
                     Err(fate) => self.out.ledger.book(fate, rider.flux),
                 }
             }
-            for (index, which) in (0..).zip(&self.bounced) {
-                if let (Some(bouncer), false) = (self.bouncers[index as usize], which.is_empty()) {
-                    let face = &self.scene.assembly.faces()[index as usize];
-                    bounce(
-                        face,
-                        index,
-                        bouncer,
-                        which,
-                        &hits.t,
-                        &self.numbers,
-                        &mut self.lines,
-                        &mut self.gathered,
-                    );
+            let faces = self.scene.assembly.faces().iter().zip(&self.bouncers);
+            for ((face, bouncer), which) in faces.zip(&self.bounced) {
+                if let (Some(bouncer), false) = (bouncer, which.is_empty()) {
+                    let (lines, room) = (&mut self.lines, &mut self.gathered);
+                    bounce(face, *bouncer, which, &hits.t, &self.numbers, lines, room);
                 }
             }
             self.lines.truncate(kept);

@@ -104,13 +104,13 @@ impl Ledger {
     pub fn book(&mut self, fate: Fate, flux: f64) {
         match fate {
             Fate::Escaped => self.escaped.add(flux),
-            Fate::OnFace(face) => self.on_face[face as usize].add(flux),
+            Fate::OnFace(number) => self.on_face[number as usize].add(flux),
             Fate::InMedium(medium) => self.in_medium[medium].add(flux),
             Fate::Terminated => self.terminated.add(flux),
-            Fate::Lost(loss, face) => {
+            Fate::Lost(loss, number) => {
                 let reason = loss as usize;
                 self.lost[reason].add(flux);
-                self.lost_at[reason].get_or_insert(face);
+                self.lost_at[reason].get_or_insert(number);
             }
         }
     }

@@ -279,6 +279,7 @@ impl Fillings {
 
 /// The crossings that rounding cannot tell from the nearest one.
 #[cold]
+#[must_use]
 pub fn tied(scene: &Scene, o: Vec3, d: Vec3, leaving: &Leaving, nearest: (u32, Crossing)) -> Group {
     let length = o.x.abs() + o.y.abs() + o.z.abs() + nearest.1.t;
     let reach = TIE * length;
@@ -356,13 +357,13 @@ fn resolve(
         }
     }
     let hidden = |rank: u32| rank < u32::from(inside.top().min(after.top()));
-    let decided = decides.filter(|(rank, _, _)| !hidden(*rank));
-    let (face, foot) = decided.map_or((group[0].0, first), |(_, at, _)| {
+    let verdict = decides.filter(|(rank, _, _)| !hidden(*rank));
+    let (face, foot) = verdict.map_or((group[0].0, first), |(_, at, _)| {
         (group[at].0, if at == 0 { first } else { feet(at) })
     });
     let front = d.dot(foot.normal) < 0.0;
     let side = if front { foot.normal } else { -foot.normal };
-    let at = decided.map_or(0, |(_, at, _)| at);
+    let at = verdict.map_or(0, |(_, at, _)| at);
     let normal = faces[face as usize].shading_normal(&group[at].1).map_or(side, |n| {
         let n = if front { n } else { -n };
         // Seen from behind, an interpolated normal says nothing.
@@ -374,7 +375,7 @@ fn resolve(
         side,
         face,
         front,
-        finish: decided.map(|(_, _, finish)| finish),
+        finish: verdict.map(|(_, _, finish)| finish),
         before: inside,
         after,
         leaving,

@@ -214,7 +214,7 @@ impl<'a> Path<'a> {
             let point = lattice_point(index, &shift);
             let address = (pixel << 24 | u64::from(pass)) << 20;
             self.numbers = Numbers::after(point, stream, address.wrapping_add(u64::from(index)));
-            let (du, dv) = (self.numbers.next(), self.numbers.next());
+            let (du, dv) = (self.numbers.draw(), self.numbers.draw());
             let u = ((column + du) / f64::from(view.columns) - 0.5) * view.width;
             let v = (0.5 - (row + dv) / f64::from(view.rows)) * view.height;
             let through = view.target + view.right * u + view.up * v;
@@ -231,7 +231,7 @@ impl<'a> Path<'a> {
         let line = if lines.len() == 1 {
             &lines[0]
         } else {
-            let number = self.numbers.next();
+            let number = self.numbers.draw();
             &lines[lines.partition_point(|l| l.0 < number).min(lines.len() - 1)]
         };
         self.wavelength = line.1;
@@ -413,7 +413,7 @@ impl<'a> Path<'a> {
         } else {
             1.0
         };
-        let mut number = self.numbers.next();
+        let mut number = self.numbers.draw();
         if total <= 0.0 || number >= alive {
             return;
         }
@@ -465,7 +465,7 @@ impl<'a> Path<'a> {
         let weight = branch.weight * boost;
         self.connect(meeting, finish, [n1, n2], weight, transmits, all);
 
-        let (side, turn, height) = (self.numbers.next(), self.numbers.next(), self.numbers.next());
+        let (side, turn, height) = (self.numbers.draw(), self.numbers.draw(), self.numbers.draw());
         let through = side >= transmits[0];
         let chance = transmits[usize::from(through)];
         let normal = if through { -meeting.side } else { meeting.side };
@@ -509,7 +509,7 @@ impl<'a> Path<'a> {
         let numbers = if all {
             0..scene.sources.len()
         } else {
-            let number = self.numbers.next();
+            let number = self.numbers.draw();
             let pick = self
                 .lit
                 .shares

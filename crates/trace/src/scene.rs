@@ -132,13 +132,13 @@ impl Scene {
         let near = sources.iter().map(|source| near(source, &assembly, &roles)).collect();
         Ok(Self {
             assembly,
-            near,
             roles,
             finishes,
             media,
             solids,
             sources,
             detectors,
+            near,
         })
     }
 

@@ -139,6 +139,7 @@ impl Shape {
 
 /// The absolute values of the components, added up.
 #[inline(always)]
+#[must_use]
 pub fn size(v: Vec3) -> f64 {
     v.x.abs() + v.y.abs() + v.z.abs()
 }

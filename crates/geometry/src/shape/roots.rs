@@ -38,7 +38,7 @@ fn search(f: &impl Bounded, range: Interval, known: bool, depth: u32, visit: &mu
     // The mean value form is the tighter the shorter the range.
     let centred = Interval::point(f.at(middle)[0]) + slope * Interval::new(range.lo - middle, range.hi - middle);
     let found = value.intersection(centred);
-    if !known && !(found.lo <= 0.0 && found.hi >= 0.0) {
+    if !known && !found.has_zero() {
         return;
     }
     if depth == 0 || middle <= range.lo || middle >= range.hi {

@@ -441,11 +441,14 @@ mod tests {
         counts.iter().map(|n| (n - expected) * (n - expected) / expected).sum()
     }
 
+    /// A shape, and the share of its area that lies below a point.
+    type Case = (Shape, fn(Vec3) -> f64);
+
     #[test]
     fn points_are_spread_evenly() {
         // The area below a point, as a share of the whole, is uniform: χ² with 49 degrees of freedom, 1e-4 point 95.2.
         let torus = Torus { major: 3.0, minor: 1.0 };
-        let cases: [(Shape, fn(Vec3) -> f64); 4] = [
+        let cases: [Case; 4] = [
             (sphere(2.0, [-0.5, 1.7]), |p| (p.z + 0.5) / 2.2),
             (
                 Shape::Asphere(Asphere::new(1.0 / 3.0, -1.0, vec![], [0.0, 4.0]).expect("sound")),

@@ -182,7 +182,7 @@ impl Lantern {
     }
 
     fn pick_field(&self, field: &LightField, source: &Source, p: Vec3, numbers: &mut Numbers) -> Option<Beacon> {
-        let mut number = numbers.next();
+        let mut number = numbers.draw();
         let last = self.parts.len() - 1;
         let index = self.parts.iter().position(|table| {
             number -= table.share;
@@ -190,11 +190,11 @@ impl Lantern {
         });
         let index = index.unwrap_or(last);
         let (part, table) = (&field.parts[index], &self.parts[index]);
-        let cell = table.table.pick(numbers.next());
+        let cell = table.table.pick(numbers.draw());
         let [n1, n2] = table.cells;
         let place = [
-            ((cell / n2) as f64 + numbers.next()) / n1 as f64,
-            ((cell % n2) as f64 + numbers.next()) / n2 as f64,
+            ((cell / n2) as f64 + numbers.draw()) / n1 as f64,
+            ((cell % n2) as f64 + numbers.draw()) / n2 as f64,
         ];
         let (point, normal) = part.part.ray(place, [0.5, 0.5]);
         let (distance2, cosine) = towards(point, normal, p)?;

@@ -154,7 +154,7 @@ impl Source {
             Emitter::Surface(surface) => self.draw(source, range, count, seed, batch, |n| surface.draw(n)),
             Emitter::Point(point) => self.draw(source, range, count, seed, batch, |n| (Vec3::default(), point.draw(n))),
             Emitter::Beam(area) => self.draw(source, range, count, seed, batch, |n| {
-                (area.draw(&mut || n.next()).0, Vec3::new(0.0, 0.0, 1.0))
+                (area.draw(&mut || n.draw()).0, Vec3::new(0.0, 0.0, 1.0))
             }),
         }
         for i in 0..batch.len {
@@ -226,7 +226,9 @@ fn scattered(i: u64, n: u64) -> u64 {
         }
         a
     };
-    let step = (golden..).find(|step| common(*step, chunks) == 1).unwrap_or(1);
+    let step = (golden..golden + chunks)
+        .find(|step| common(*step, chunks) == 1)
+        .unwrap_or(1);
     #[allow(clippy::cast_possible_truncation, reason = "below the number of chunks")]
     let place = (u128::from(chunk) * u128::from(step) % u128::from(chunks)) as u64;
     place * CHUNK + i % CHUNK
@@ -276,6 +278,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[allow(clippy::cast_possible_truncation, reason = "small numbers")]
     fn every_record_is_gone_through_once_and_every_beginning_is_spread_out() {
         for n in [1, 255, 256, 1000, 100_000, 256 * 377] {
             let mut seen: Vec<u64> = (0..n).map(|i| scattered(i, n)).collect();

@@ -51,7 +51,7 @@ impl Numbers {
 
     /// The next one.
     #[inline]
-    pub fn next(&mut self) -> f64 {
+    pub fn draw(&mut self) -> f64 {
         if self.next < DIMENSIONS {
             self.next += 1;
             return self.point[self.next - 1];

@@ -103,18 +103,18 @@ impl PointSource {
     #[must_use]
     pub fn draw(&self, numbers: &mut Numbers) -> Vec3 {
         let n = self.gamma.len();
-        let cell = self.cells.pick(numbers.next());
+        let cell = self.cells.pick(numbers.draw());
         let (i, j) = (cell / (n - 1), cell % (n - 1));
         let (a, b, width) = self.planes(i);
         let corner = [a, b].map(|p| [self.values[p * n + j], self.values[p * n + j + 1]]);
         let most = corner.iter().flatten().copied().fold(0.0, f64::max);
         let (top, bottom) = (self.gamma[j].cos(), self.gamma[j + 1].cos());
         loop {
-            let (u, w) = (numbers.next(), numbers.next());
+            let (u, w) = (numbers.draw(), numbers.draw());
             let cosine = top + w * (bottom - top);
             let v = (cosine.clamp(-1.0, 1.0).acos() - self.gamma[j]) / (self.gamma[j + 1] - self.gamma[j]);
             let at = |k: usize| (1.0 - v) * corner[k][0] + v * corner[k][1];
-            if numbers.next() * most <= (1.0 - u) * at(0) + u * at(1) {
+            if numbers.draw() * most <= (1.0 - u) * at(0) + u * at(1) {
                 let (s, c) = sin_cos_turns(((self.c[i] + u * width) / (2.0 * PI)).fract());
                 let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
                 return Vec3::new(sine * c, sine * s, cosine);

@@ -58,7 +58,7 @@ impl SurfaceSource {
     /// A point spread evenly over the area, and the normal on the emitting side.
     #[must_use]
     pub fn draw_point(&self, numbers: &mut Numbers) -> (Vec3, Vec3) {
-        let (point, part) = self.sampler.draw(&mut || numbers.next());
+        let (point, part) = self.sampler.draw(&mut || numbers.draw());
         let (point, normal) = self.shape.settle(point, part);
         (point, if self.flipped { -normal } else { normal })
     }
@@ -87,7 +87,7 @@ impl SurfaceSource {
     pub fn draw(&self, numbers: &mut Numbers) -> (Vec3, Vec3) {
         let (point, normal) = self.draw_point(numbers);
         // ∫ cosⁿθ sin θ dθ from 0: 1 − cosⁿ⁺¹θ is uniform.
-        let (u, turn) = (numbers.next(), numbers.next());
+        let (u, turn) = (numbers.draw(), numbers.draw());
         let cosine = if self.exponent == 1.0 {
             (1.0 - u).sqrt()
         } else {
