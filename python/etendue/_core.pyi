@@ -259,8 +259,10 @@ def look_at_events(
     complement: bool,
     threads: int | None = None,
 ) -> tuple[_Floats, _Floats, npt.NDArray[np.uint64]]:
-    """The light image of stored scatter events (n, 17), as cells; `complement`: only of light that `look_at_scene` does not
-    find, or leaves out ``without_caustics``."""
+    """The light image of stored scatter events (n, 17), as cells.
+
+    `complement`: only of light that `look_at_scene` does not find, or leaves out ``without_caustics``.
+    """
 
 def trace_trails(scene: Scene, rays: int, seed: int, most_events: int, far: float) -> list[_Floats]:
     """The points (n, 3) that each ray passes; those that leave the scene end after `far`."""

@@ -66,7 +66,10 @@ def test_furnace(body: str) -> None:
 
 
 def test_a_mirror_shows_the_surround() -> None:
-    wall = {"shape": {"kind": "paraboloid", "focal_length": 3, "radius": 5}, "finish": {"kind": "mirror", "reflectance": 0.8}}
+    wall = {
+        "shape": {"kind": "paraboloid", "focal_length": 3, "radius": 5},
+        "finish": {"kind": "mirror", "reflectance": 0.8},
+    }
     lmap = seen(et.Observer(20, 30, 40), et.Screen(4, 3, 8, 6), sources=[sky()], surfaces=[wall])
     # One bounce, or two: nothing in between.
     bounces = np.log(lmap.values / 1e6) / np.log(0.8)
@@ -79,7 +82,12 @@ def test_a_mirror_shows_the_surround() -> None:
 def test_cosine_emitter(exponent: float, theta: float) -> None:
     """V2: L(θ) = Φ (n + 1)/(2π A) cosⁿ⁻¹θ."""
     flux, area = 80.0, 6.0 * 4.0
-    source = {"kind": "surface", "shape": {"kind": "rectangle", "width": 6, "height": 4}, "exponent": exponent, "flux": flux}
+    source = {
+        "kind": "surface",
+        "shape": {"kind": "rectangle", "width": 6, "height": 4},
+        "exponent": exponent,
+        "flux": flux,
+    }
     lmap = seen(et.Observer(theta, 40, 1e7), et.Screen(1, 1, 2, 2), rays_per_pixel=4, sources=[source])
     expected = flux * (exponent + 1) / (2 * np.pi * area) * math.cos(math.radians(theta)) ** (exponent - 1)
     assert np.allclose(lmap.values / 1e6, expected, rtol=1e-6)
@@ -88,8 +96,18 @@ def test_cosine_emitter(exponent: float, theta: float) -> None:
 def test_disk_in_a_dome() -> None:
     """V4: seen from afar at height h the line of sight starts at ρ = h/(n cos(i − i')), and L = T L₀/n²."""
     n, radius = 1.41, 3.0
-    source = {"kind": "surface", "shape": {"kind": "disk", "radius": 1.2}, "flux": math.pi * math.pi * 1.2**2, "at": [0, 0, 1e-9]}
-    dome = {"name": "dome", "shape": {"kind": "dome", "radius": radius}, "medium": "glass", "finishes": {"base": "absorber"}}
+    source = {
+        "kind": "surface",
+        "shape": {"kind": "disk", "radius": 1.2},
+        "flux": math.pi * math.pi * 1.2**2,
+        "at": [0, 0, 1e-9],
+    }
+    dome = {
+        "name": "dome",
+        "shape": {"kind": "dome", "radius": radius},
+        "medium": "glass",
+        "finishes": {"base": "absorber"},
+    }
     screen = et.Screen(5, 5, 25, 25)
     lmap = seen(et.Observer(0, 0, 1e7), screen, sources=[source], solids=[dome], media={"glass": {"index": n}})
     # Beyond the dome nothing is asked for.
@@ -115,7 +133,12 @@ def test_flashed_disk_of_a_parabola(tilt: float) -> None:
     f, a, reflectance = 10.0, 1.5, 0.85
     mirror = {"shape": {"kind": "paraboloid", "focal_length": f, "radius": 40},
               "finish": {"kind": "mirror", "reflectance": reflectance}}  # fmt: skip
-    lamp = {"kind": "surface", "shape": {"kind": "sphere", "radius": a}, "flux": math.pi * 4 * math.pi * a * a, "at": [0, 0, f]}
+    lamp = {
+        "kind": "surface",
+        "shape": {"kind": "sphere", "radius": a},
+        "flux": math.pi * 4 * math.pi * a * a,
+        "at": [0, 0, f],
+    }
     lmap = seen(
         et.Observer(tilt, 25, 1e7), et.Screen(90, 90, 90, 90), rays_per_pixel=256, sources=[lamp], surfaces=[mirror]
     )
@@ -133,7 +156,11 @@ def test_slab_that_absorbs() -> None:
     """All reflections in a slab of transmittance τ: L = L₀ (1−R)² τ/(1−R²τ²) at the angle of each pixel."""
     n, absorption, thickness, theta = 1.6, 0.15, 3.0, 50.0
     lamp = {"kind": "surface", "shape": {"kind": "rectangle", "width": 400, "height": 400}, "flux": math.pi * 400 * 400}
-    slab = {"shape": {"kind": "block", "width": 900, "height": 900, "depth": thickness}, "medium": "dark", "at": [0, 0, 5]}
+    slab = {
+        "shape": {"kind": "block", "width": 900, "height": 900, "depth": thickness},
+        "medium": "dark",
+        "at": [0, 0, 5],
+    }
     lmap = seen(
         et.Observer(theta, 70, 1e7), et.Screen(2, 2, 3, 3), sources=[lamp], solids=[slab], surfaces=[
             {"shape": {"kind": "rectangle", "width": 400, "height": 400}, "at": [0, 0, -1], "finish": "absorber"}],
@@ -156,14 +183,24 @@ def test_integrating_sphere() -> None:
     area = 4 * math.pi * radius**2
     port = (radius - top) / (2 * radius)
     inside = np.array([0.6, 0.64, -0.48])
-    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 0.01}, "flux": flux, "at": 9.99 * inside, "toward": -inside}
+    lamp = {
+        "kind": "surface",
+        "shape": {"kind": "disk", "radius": 0.01},
+        "flux": flux,
+        "at": 9.99 * inside,
+        "toward": -inside,
+    }
     wall = {"shape": {"kind": "sphere", "radius": radius}, "trim": {"z": [-11, top]},
             "finish": {"kind": "lambertian", "reflectance": reflectance}}  # fmt: skip
     hit = flux * (1 - port)
     reflected = reflectance * hit / (area * (1 - reflectance * (1 - port)))
     expected = reflectance / math.pi * (flux / area + reflected) * 1e6
     lmap = seen(
-        et.Observer(8, 200, 60, target=(0, 0, 8)), et.Screen(5, 4, 5, 4), rays_per_pixel=1024, sources=[lamp], surfaces=[wall]
+        et.Observer(8, 200, 60, target=(0, 0, 8)),
+        et.Screen(5, 4, 5, 4),
+        rays_per_pixel=1024,
+        sources=[lamp],
+        surfaces=[wall],
     )
     assert_agree(lmap.values, np.full(lmap.values.shape, expected), lmap.standard_error)
     assert abs(lmap.values.mean() / expected - 1) < 0.02
@@ -174,7 +211,13 @@ def test_diffuse_furnace() -> None:
     white = {"kind": "lambertian", "reflectance": 1.0}
     leaves = [
         {"shape": {"kind": "disk", "radius": 3}, "finish": white},
-        {"shape": {"kind": "rectangle", "width": 5, "height": 3}, "finish": white, "axis": [0, 1, 0], "angle": 60, "at": [2, 0, 2]},
+        {
+            "shape": {"kind": "rectangle", "width": 5, "height": 3},
+            "finish": white,
+            "axis": [0, 1, 0],
+            "angle": 60,
+            "at": [2, 0, 2],
+        },
     ]
     lmap = seen(
         et.Observer(35, 20, 40), et.Screen(7, 6, 7, 6), rays_per_pixel=1024, sources=[sky()], surfaces=leaves
@@ -191,13 +234,13 @@ def corner(**more: Any) -> dict[str, Any]:
     observers = [{"name": "eye", "theta": 40, "phi": 15, "distance": 300, "target": [3, 2, 2],
                   "screen": {"width": 26, "height": 20, "columns": 6, "rows": 5}}]  # fmt: skip
     return {
-        "sources": [{"kind": "surface", "shape": {"kind": "rectangle", "width": 2, "height": 1}, "flux": 100, "at": [4, 3, 11],
-                     "toward": [-0.3, -0.1, -1]}],
+        "sources": [{"kind": "surface", "shape": {"kind": "rectangle", "width": 2, "height": 1}, "flux": 100,
+                     "at": [4, 3, 11], "toward": [-0.3, -0.1, -1]}],
         "surfaces": [
             {"name": "floor", "shape": {"kind": "rectangle", "width": 30, "height": 24}, "finish": {"kind": "lambertian",
              "reflectance": 0.7}},
-            {"name": "side", "shape": {"kind": "rectangle", "width": 24, "height": 20}, "at": [-9, 0, 8], "toward": [1, 0.2, 0.1],
-             "finish": {"kind": "lambertian", "reflectance": 0.4}},
+            {"name": "side", "shape": {"kind": "rectangle", "width": 24, "height": 20}, "at": [-9, 0, 8],
+             "toward": [1, 0.2, 0.1], "finish": {"kind": "lambertian", "reflectance": 0.4}},
         ],
         "observers": observers,
         "detectors": [{"name": "image", "kind": "image", "observer": "eye"}],
@@ -224,7 +267,8 @@ def test_rings_through_a_collecting_surface() -> None:
     rings = et.RingSource(rays=1000)
     scene = et.Scene(
         sources=[{"kind": "rings", "radii": [10, 20, 30], "flux": list(rings.ring_flux), "at": [0, 0, 5]}],
-        detectors=[{"name": "rcs", "kind": "rays", "shape": {"kind": "rectangle", "width": 200, "height": 200}, "at": [3, -2, 25]}],
+        detectors=[{"name": "rcs", "kind": "rays", "at": [3, -2, 25],
+                    "shape": {"kind": "rectangle", "width": 200, "height": 200}}],
     )  # fmt: skip
     observer, screen = et.Observer(20, 30, 1000, target=(0, 0, 5)), et.Screen(72, 60, 12, 10, "xy")
     truth = rings.pixel_luminance(et.Observer(20, 30, 1000), screen)
@@ -245,13 +289,18 @@ def test_rings_through_a_collecting_surface() -> None:
 
 def test_cemented_bodies_are_one() -> None:
     """A rod in two halves of the same medium, and one within another: nothing is seen of where they touch."""
-    whole = [{"name": "rod", "shape": {"kind": "rod", "radius": 2, "height": 4}, "medium": "PC", "rotation": [30, 10, 0]}]
+    whole = [
+        {"name": "rod", "shape": {"kind": "rod", "radius": 2, "height": 4}, "medium": "PC", "rotation": [30, 10, 0]}
+    ]
     half = {"shape": {"kind": "rod", "radius": 2, "height": 2}, "medium": "PC"}
     tilt = et.Scene(solids=whole).solids[0].frame()
     up = tilt.axes[:, 2] * 2
     at = [list(tilt.origin), list(tilt.origin + up)]
     halves = [{"name": f"half{i}", **half, "rotation": [30, 10, 0], "at": at[i]} for i in (0, 1)]
-    nested = [*whole, {"name": "core", "shape": {"kind": "ball", "radius": 0.8}, "medium": "PC", "at": list(tilt.origin + up / 2)}]
+    nested = [
+        *whole,
+        {"name": "core", "shape": {"kind": "ball", "radius": 0.8}, "medium": "PC", "at": list(tilt.origin + up / 2)},
+    ]
     lamp = {"kind": "surface", "shape": {"kind": "rectangle", "width": 3, "height": 30}, "flux": 100, "at": [1, 0, -9]}
     maps = [
         seen(et.Observer(35, 20, 60), et.Screen(7, 7, 16, 16), sources=[lamp], solids=solids, rays_per_pixel=64)
@@ -270,7 +319,9 @@ def test_an_immersed_source_keeps_its_luminance() -> None:
     die = {"kind": "surface", "shape": {"kind": "rectangle", "width": 2, "height": 2}, "flux": 4 * math.pi}
     block = {"shape": {"kind": "block", "width": 40, "height": 40, "depth": 4}, "medium": "glass", "at": [0, 0, -1],
              "finishes": {"bottom": "absorber"}}  # fmt: skip
-    lmap = seen(et.Observer(0, 0, 1e6), et.Screen(1, 1, 2, 2), sources=[die], solids=[block], media={"glass": {"index": n}})
+    lmap = seen(
+        et.Observer(0, 0, 1e6), et.Screen(1, 1, 2, 2), sources=[die], solids=[block], media={"glass": {"index": n}}
+    )
     assert np.allclose(lmap.values / 1e6, 4 * n / (n + 1) ** 2 / n**2, rtol=1e-4)
 
 

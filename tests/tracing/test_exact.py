@@ -163,13 +163,15 @@ def test_slab_that_absorbs(angle: float) -> None:
         media={"dark": {"index": n, "absorption": absorption}},
         sources=[{"kind": "beam", "shape": {"kind": "disk", "radius": 1}, "flux": 1, "at": -9 * direction,
                   "toward": direction}],
-        solids=[{"name": "slab", "shape": {"kind": "block", "width": 900, "height": 900, "depth": thickness}, "medium": "dark",
-                 "at": [0, 0, 5]}],
+        solids=[{"name": "slab", "shape": {"kind": "block", "width": 900, "height": 900, "depth": thickness},
+                 "medium": "dark", "at": [0, 0, 5]}],
         surfaces=[{"name": "behind", "shape": wide, "at": [0, 0, 60], "finish": "absorber"},
                   {"name": "before", "shape": wide, "at": [0, 0, -60], "finish": "absorber"}],
     )  # fmt: skip
     ledger = result.ledger
-    found = np.array([ledger.by_surface["behind"].rays, ledger.by_surface["before"].rays, ledger.by_medium["dark"].rays])
+    found = np.array(
+        [ledger.by_surface["behind"].rays, ledger.by_surface["before"].rays, ledger.by_medium["dark"].rays]
+    )
     assert found.sum() == 400_000
     expected = 400_000 * np.array([through, back, 1 - through - back])
     assert chi2.sf(((found - expected) ** 2 / expected).sum(), 2) > SIGNIFICANCE
@@ -195,7 +197,13 @@ def test_mirrored_pipe(angle: float, length: float) -> None:
     # The opening is lit evenly, and the outside of the pipe is kept dark.
     baffle = {"name": "baffle", "shape": {"kind": "annulus", "inner_radius": radius, "outer_radius": 40},
               "finish": "absorber"}  # fmt: skip
-    beam = {"kind": "beam", "shape": {"kind": "disk", "radius": 2.2}, "flux": 1, "at": -20 * direction, "toward": direction}
+    beam = {
+        "kind": "beam",
+        "shape": {"kind": "disk", "radius": 2.2},
+        "flux": 1,
+        "at": -20 * direction,
+        "toward": direction,
+    }
     result = traced(
         4e5, 8, sources=[beam], surfaces=[pipe, baffle],
         detectors=[{"name": "in", **end, "at": [0, 0, 1e-6]}, {"name": "out", **end, "at": [0, 0, length - 1e-6]}],
@@ -231,7 +239,12 @@ def test_luminance_out_of_a_dome() -> None:
     n, flux = 1.5, 10.0
     transmittance = 4 * n / (n + 1) ** 2
     source = {"kind": "surface", "shape": {"kind": "disk", "radius": 1e-3}, "flux": flux, "at": [0, 0, 1e-4]}
-    dome = {"name": "dome", "shape": {"kind": "dome", "radius": 10}, "medium": "glass", "finishes": {"base": "absorber"}}
+    dome = {
+        "name": "dome",
+        "shape": {"kind": "dome", "radius": 10},
+        "medium": "glass",
+        "finishes": {"base": "absorber"},
+    }
     far = traced(
         5e5, 7, media={"glass": {"index": n}}, sources=[source], solids=[dome],
         detectors=[{"name": "far", "kind": "intensity", "c_planes": 4, "gamma_step": 10}],
