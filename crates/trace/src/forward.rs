@@ -145,6 +145,7 @@ pub fn trails(scene: &Scene, run: &Run<'_>, far: f64) -> Vec<Vec<Vec3>> {
     let mut walk = Walk::new(scene, run);
     walk.trails = Some(Vec::new());
     walk.bouncers.clear();
+    walk.bounced.clear();
     walk.far = far;
     walk.batch(0);
     walk.trails.unwrap_or_default()
