@@ -284,6 +284,45 @@ def test_rings_through_a_collecting_surface() -> None:
     assert_agree(cone.values[lit], reverse.values[lit], np.hypot(cone.standard_error, reverse.standard_error)[lit])
 
 
+def test_a_beam_on_paper() -> None:
+    """L = ρ E/π with E = Φ cos α/A within the spot: lines of sight do not find it, rays forwards do."""
+    tilt, radius, flux = math.radians(20), 6.0, 10.0
+    direction = np.array([math.sin(tilt), 0, -math.cos(tilt)])
+    scene = et.Scene(
+        sources=[{"kind": "beam", "shape": {"kind": "disk", "radius": radius}, "flux": flux, "at": -50 * direction,
+                  "toward": direction}],
+        surfaces=[{"shape": {"kind": "rectangle", "width": 60, "height": 60}, "finish": {"kind": "lambertian",
+                   "reflectance": 0.8}}],
+    )  # fmt: skip
+    eye, screen = et.Observer(35, 70, 300), et.Screen(6, 5, 6, 5, "xy")
+    assert (et.luminance_map(scene, eye, screen, rays_per_pixel=16).values == 0).all()
+    lmap = et.luminance_map(scene, eye, screen, rays_per_pixel=16, forward_rays=1e6)
+    expected = 0.8 / math.pi * flux * math.cos(tilt) / (math.pi * radius**2) * 1e6
+    assert_agree(lmap.values, np.full(lmap.values.shape, expected), lmap.standard_error)
+
+
+def test_no_light_is_counted_twice() -> None:
+    """A lens throws a caustic on the floor, part of which lights the wall: lines of sight and rays forwards share the light
+    out between them, and a whole light image has all of it, but for pixels in which the lens itself is seen."""
+    centre, radius = np.array([3.0, 2.0, 6.5]), 2.5
+    scene = et.Scene(**corner(
+        solids=[{"name": "lens", "shape": {"kind": "ball", "radius": radius}, "medium": "BK7", "at": centre}],
+    ))  # fmt: skip
+    image = et.trace(scene, 2e6, 3).images["image"]
+    (both,) = et.luminance_map(scene, rays_per_pixel=2048, seed=4, forward_rays=2e6)
+    (apart,) = et.luminance_map(scene, rays_per_pixel=64, seed=4)
+    assert np.median(both.standard_error) < np.median(apart.standard_error)
+    right, up, _ = image.screen.axes(image.observer)
+    points = np.array(image.observer.target) + image.screen.x[:, None] * right + image.screen.y[:, None, None] * up
+    sight = points - image.observer.position
+    sight /= np.linalg.norm(sight, axis=-1, keepdims=True)
+    off = np.linalg.norm(np.cross(image.observer.position - centre, sight), axis=-1)
+    clear = off > radius + math.hypot(26 / 6, 20 / 5) / 2
+    assert 10 < clear.sum() < clear.size
+    error = np.hypot(image.standard_error, both.standard_error)
+    assert_agree(both.values[clear], image.values[clear], error[clear])
+
+
 # --- solids that touch -----------------------------------------------------------------------------------------------
 
 
