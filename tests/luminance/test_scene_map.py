@@ -171,7 +171,10 @@ def test_slab_that_absorbs() -> None:
     R = (((c - n * across) / (c + n * across)) ** 2 + ((across - n * c) / (across + n * c)) ** 2) / 2
     tau = math.exp(-absorption * thickness / across)
     expected = (1 - R) ** 2 * tau / (1 - (R * tau) ** 2)
-    assert np.allclose(lmap.values / 1e6, expected, rtol=1e-4)
+    # Weak branches are drawn by chance: some noise, and no more.
+    assert (lmap.standard_error < 2e-3 * lmap.values).all()
+    error = lmap.standard_error.mean() / 3
+    assert abs(lmap.values.mean() - 1e6 * expected) < LARGEST_Z * error + 1e-5 * lmap.values.mean()
 
 
 # --- scattered light -------------------------------------------------------------------------------------------------
