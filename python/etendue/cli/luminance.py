@@ -81,6 +81,12 @@ def luminance(
         typer.Option("--until", help="Of a scene: follow more until this median relative error is reached, e.g. 0.01."),
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Of a scene [1].", min=0, show_default=False)] = None,
+    forward_rays: Annotated[
+        float | None,
+        typer.Option(
+            "--forward-rays", help="Of a scene: rays traced forwards besides, for caustics and beams, e.g. 1e7."
+        ),
+    ] = None,
     flux: Annotated[
         str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")
     ] = None,
@@ -132,11 +138,17 @@ def luminance(
                 rays_per_pixel=rays_per_pixel,
                 until=until,
                 seed=seed,
+                forward_rays=forward_rays,
                 threads=threads,
                 progress=progress,
             )
     else:
-        for_scenes = {"--rays-per-pixel": rays_per_pixel, "--until": until, "--seed": seed}
+        for_scenes = {
+            "--rays-per-pixel": rays_per_pixel,
+            "--until": until,
+            "--seed": seed,
+            "--forward-rays": forward_rays,
+        }
         _refuse(for_scenes, f"for scenes; {file} is none")
         cone = None if acceptance is None else _acceptance(acceptance)
         carrier = "auto" if surface is None else surface_option(surface)

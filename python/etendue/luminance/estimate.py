@@ -67,6 +67,7 @@ def luminance_map(
     rays_per_pixel: int | None = ...,
     until: float | None = ...,
     seed: int | None = ...,
+    forward_rays: float | None = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> LuminanceMap: ...
@@ -79,6 +80,7 @@ def luminance_map(
     rays_per_pixel: int | None = ...,
     until: float | None = ...,
     seed: int | None = ...,
+    forward_rays: float | None = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> list[LuminanceMap]: ...
@@ -94,6 +96,7 @@ def luminance_map(
     rays_per_pixel: int | None = None,
     until: float | None = None,
     seed: int | None = None,
+    forward_rays: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> LuminanceMap | list[LuminanceMap]:
@@ -129,6 +132,10 @@ def luminance_map(
         times `rays_per_pixel`. What light fields do not know of themselves does not count here, but in the map's errors.
     seed : int, optional
         Of a scene; 1 if None.
+    forward_rays : int, optional
+        Of a scene: so many rays are traced forwards besides, and what they send to the eye from diffuse surfaces is added:
+        light that reaches these through lenses and mirrors (caustics), which lines of sight find by chance only, or not
+        at all if it comes from points, and that of beams. No light is counted twice.
     threads : int, optional
         All cores if None. The result has the same bits for any number.
     progress : callable, optional
@@ -165,7 +172,7 @@ def luminance_map(
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
-    for_scenes = {"rays_per_pixel": rays_per_pixel, "until": until, "seed": seed}
+    for_scenes = {"rays_per_pixel": rays_per_pixel, "until": until, "seed": seed, "forward_rays": forward_rays}
     for_others = {
         "method": None if method == "auto" else method,
         "acceptance": acceptance,
