@@ -122,6 +122,7 @@ class FieldRays:
     def __new__(cls, field: LightField, rays: int, seed: int) -> FieldRays: ...
     def __len__(self) -> int: ...
 
+_Sums: TypeAlias = tuple[_Floats, _Floats, npt.NDArray[np.uint64]]
 _Source: TypeAlias = RayTable | RingSource | FieldRays
 
 def read_rays(source: _Source, start: int, stop: int) -> tuple[_Floats, _Floats, _Floats]:
@@ -135,7 +136,7 @@ def cone_sums(
     cones: Sequence[_Cone],
     threads: int | None = None,
     progress: _Progress | None = None,
-) -> tuple[list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]], _Tally]:
+) -> tuple[list[_Sums], _Tally]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the tally."""
 
 def index_leaf() -> int:
@@ -175,7 +176,7 @@ def index_sums(
     cones: Sequence[_Cone],
     threads: int | None = None,
     progress: _Progress | None = None,
-) -> list[tuple[tuple[_Floats, _Floats, npt.NDArray[np.uint64]], int]]:
+) -> list[tuple[_Sums, int]]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the rays looked at."""
 
 def count_rays(
