@@ -1,7 +1,5 @@
 //! A box of line coordinates, and whether an observer may see a line of it.
 
-use std::f64::consts::FRAC_PI_2;
-
 use etendue_math::{Frame, Vec3};
 
 use crate::cone::Cone;
@@ -17,8 +15,8 @@ pub type Bounds = [f32; 8];
 /// fraction of the distances involved. Both take less than twenty operations: below 40 · 2⁻⁵³ = 4.4e-15.
 const ROUNDING: f64 = 1e-13;
 
-/// The largest error \[rad\] of three angles from scalar products that are off by up to 1e-15: arccos near 1 makes √(2e-15)
-/// of it.
+/// More than the errors \[rad\] of all angles of a comparison together: a cosine or chord that is off by 1e-15 is an angle
+/// near 0 that is off by √(2e-15) = 4.5e-8.
 const ANGLE_ROUNDING: f64 = 1e-6;
 
 /// Coordinates (u, v, p, q) of the line of a ray with position `x` and unit direction `k`.
@@ -82,10 +80,11 @@ pub struct Sight {
     eye: [f64; 3],
     half: [f64; 2],
     half_pixel: [f64; 2],
-    /// The widest acceptance \[rad\].
-    reach: f64,
-    axis: Vec3,
+    /// Sine and cosine of the widest acceptance.
+    reach: (f64, f64),
+    /// That and the angle of the field \[rad\].
     field: f64,
+    axis: Vec3,
 }
 
 impl Sight {
@@ -94,6 +93,7 @@ impl Sight {
     pub fn new(cone: &Cone) -> Self {
         let view = &cone.view;
         let (axis, field) = view.field();
+        let widest = cone.acceptances.iter().fold(0.0, |a: f64, b| a.max(*b)) + ANGLE_ROUNDING;
         Self {
             view: *view,
             eye: along(view, view.eye - view.target),
@@ -102,9 +102,9 @@ impl Sight {
                 view.width / f64::from(view.columns) / 2.0,
                 view.height / f64::from(view.rows) / 2.0,
             ],
-            reach: cone.acceptances.iter().fold(0.0, |a: f64, b| a.max(*b)) + ANGLE_ROUNDING,
+            reach: widest.sin_cos(),
             axis,
-            field,
+            field: field + widest,
         }
     }
 
@@ -112,7 +112,7 @@ impl Sight {
     #[must_use]
     pub fn may_meet(&self, axis: Vec3, radius: f64) -> bool {
         let angle = self.axis.dot(axis).clamp(-1.0, 1.0).acos();
-        angle <= self.field + self.reach + radius
+        angle <= self.field + radius
     }
 
     /// The cell with this frame, in the axes of the screen.
@@ -147,30 +147,34 @@ impl SightedCell<'_> {
     /// Whether the cone may see a line within `bounds`. It may say yes in vain, and never no where the answer is yes;
     /// every comparison is put so that NaN says yes.
     ///
-    /// The lines cross the screen within a rectangle. Lines from there to the eye are within an angle of the one from its
-    /// middle, directions of the box within another of that of its middle, and the corners are the extremes of both: the
-    /// points of a plane, and likewise the (p, q), within less than 90° of a given direction form a convex set.
+    /// The lines cross the screen within a rectangle. Between the line from its middle to the eye and the one from any
+    /// other point there is an angle of at most arcsin(half the diagonal/distance of the eye); between the middle of the
+    /// directions and any other one a chord of at most the length of half the box' diagonal. A ray can be seen only if the
+    /// two middles are no farther apart than the acceptance and both angles together.
     #[must_use]
+    #[inline]
     pub fn may_see(&self, bounds: &Bounds) -> bool {
         let [u0, u1, v0, v1, p0, p1, q0, q1] = bounds.map(f64::from);
-        let r = [
-            root(1.0 - p0.abs().max(p1.abs()).powi(2) - q0.abs().max(q1.abs()).powi(2)),
-            root(1.0 - nearest_zero(p0, p1).powi(2) - nearest_zero(q0, q1).powi(2)),
-        ];
+        let r0 = root(1.0 - p0.abs().max(p1.abs()).powi(2) - q0.abs().max(q1.abs()).powi(2));
+        let r1 = root(1.0 - nearest_zero(p0, p1).powi(2) - nearest_zero(q0, q1).powi(2));
         let component = |axis: usize| {
-            let (p, q) = (times([p0, p1], self.x[axis]), times([q0, q1], self.y[axis]));
-            let r = times(r, self.z[axis]);
+            let (p, q, r) = (
+                times([p0, p1], self.x[axis]),
+                times([q0, q1], self.y[axis]),
+                times([r0, r1], self.z[axis]),
+            );
             [p[0] + q[0] + r[0], p[1] + q[1] + r[1]]
         };
         let towards = component(2);
-        let mut low = [0.0; 2];
-        let mut high = [0.0; 2];
+        let crosses = towards[0] > 0.0 || towards[1] < 0.0;
+        let (mut middle, mut diagonal) = ([0.0; 2], 0.0);
         for axis in 0..2 {
-            let [mut a, mut b] = [f64::NEG_INFINITY, f64::INFINITY];
-            if towards[0] > 0.0 || towards[1] < 0.0 {
+            let half = self.sight.half[axis];
+            let (mut low, mut high) = (-half, half);
+            if crosses {
                 let slopes = quotient(component(axis), towards);
                 // The crossing is linear in u, in v and in the slope m, each with the others held: corners are extreme.
-                let ranges = slopes.map(|m| {
+                let [a, b] = slopes.map(|m| {
                     let of = |v: &[f64; 3]| v[axis] - v[2] * m;
                     let (u, v) = (times([u0, u1], of(&self.x)), times([v0, v1], of(&self.y)));
                     let slack = self.slack * (1.0 + m.abs());
@@ -179,43 +183,45 @@ impl SightedCell<'_> {
                         of(&self.origin) + u[1] + v[1] + slack,
                     ]
                 });
-                if ranges.iter().flatten().all(|end| end.is_finite()) {
-                    (a, b) = (ranges[0][0].min(ranges[1][0]), ranges[0][1].max(ranges[1][1]));
+                if (a[0] > half && b[0] > half) || (a[1] < -half && b[1] < -half) {
+                    return false;
+                }
+                // Infinite or NaN: the whole screen.
+                if (a[0] - a[1] + b[0] - b[1]).is_finite() {
+                    (low, high) = (low.max(a[0].min(b[0])), high.min(a[1].max(b[1])));
                 }
             }
-            let half = self.sight.half[axis];
-            if a > half || b < -half {
-                return false;
-            }
-            low[axis] = a.max(-half) - self.sight.half_pixel[axis];
-            high[axis] = b.min(half) + self.sight.half_pixel[axis];
+            // The middles of pixels, to which sight lines go, are off the crossings by half a pixel at most.
+            middle[axis] = f64::midpoint(low, high);
+            diagonal += (f64::midpoint(high, -low) + self.sight.half_pixel[axis]).powi(2);
         }
         let eye = self.sight.eye;
-        let to_eye = |sx: f64, sy: f64| {
-            let (x, y, z) = (eye[0] - sx, eye[1] - sy, eye[2]);
-            let length = (x * x + y * y + z * z).sqrt();
-            [x / length, y / length, z / length]
-        };
-        let sight = to_eye(f64::midpoint(low[0], high[0]), f64::midpoint(low[1], high[1]));
-        let corners = [
-            (low[0], low[1]),
-            (low[0], high[1]),
-            (high[0], low[1]),
-            (high[0], high[1]),
-        ];
-        let spread = widest(corners.map(|(sx, sy)| dot(sight, to_eye(sx, sy))));
-        let local = |p: f64, q: f64| [p, q, root(1.0 - p * p - q * q)];
-        let middle = local(f64::midpoint(p0, p1), f64::midpoint(q0, q1));
-        let fan = widest([(p0, q0), (p0, q1), (p1, q0), (p1, q1)].map(|(p, q)| dot(middle, local(p, q))));
-        let heading: [f64; 3] =
-            std::array::from_fn(|i| middle[0] * self.x[i] + middle[1] * self.y[i] + middle[2] * self.z[i]);
-        let apart = angle(dot(sight, heading));
-        !(apart > self.sight.reach + spread + fan && spread < FRAC_PI_2)
+        let line = [eye[0] - middle[0], eye[1] - middle[1], eye[2]];
+        let distance2 = dot(line, line);
+        let sine2 = diagonal / distance2;
+        let (p, q) = (f64::midpoint(p0, p1), f64::midpoint(q0, q1));
+        let r = root(1.0 - p * p - q * q);
+        let chord2 = (p1 - p).powi(2) + (q1 - q).powi(2) + (r1 - r).max(r - r0).powi(2);
+        let heading: [f64; 3] = std::array::from_fn(|i| p * self.x[i] + q * self.y[i] + r * self.z[i]);
+        let apart = dot(line, heading) / distance2.sqrt();
+        let (sine, cosine) = plus(
+            (sine2.sqrt(), root(1.0 - sine2)),
+            (root(chord2 * (1.0 - 0.25 * chord2)), 1.0 - 0.5 * chord2),
+        );
+        let (sine, cosine) = plus((sine, cosine), self.sight.reach);
+        // Where the angles are too large for their sum to be below 180° by its sine, nothing is ruled out.
+        let ruled_out = apart < cosine && sine > 0.0 && sine2 < 1.0 && chord2 < 1.0;
+        !ruled_out
     }
 }
 
 fn root(square: f64) -> f64 {
     square.max(0.0).sqrt()
+}
+
+/// Sine and cosine of a sum of two angles.
+fn plus((s, c): (f64, f64), (t, d): (f64, f64)) -> (f64, f64) {
+    (s * d + c * t, c * d - s * t)
 }
 
 /// The value of least size in an interval.
@@ -239,21 +245,11 @@ fn times([low, high]: [f64; 2], factor: f64) -> [f64; 2] {
 
 /// Quotient of an interval by one without zero.
 fn quotient([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
-    let values = [a / c, a / d, b / c, b / d];
-    [
-        values.iter().copied().fold(f64::INFINITY, f64::min),
-        values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-    ]
+    let (c, d) = (1.0 / c, 1.0 / d);
+    let (first, second) = (times([a, b], c), times([a, b], d));
+    [first[0].min(second[0]), first[1].max(second[1])]
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn angle(cosine: f64) -> f64 {
-    cosine.clamp(-1.0, 1.0).acos()
-}
-
-fn widest(cosines: [f64; 4]) -> f64 {
-    angle(cosines.into_iter().fold(1.0, f64::min))
 }

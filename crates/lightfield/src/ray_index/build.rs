@@ -128,7 +128,11 @@ fn sorted(source: &impl RaySource, table: Option<&RayTable<'_>>, cells: Cells, r
             }
             if table.is_none() {
                 let columns = batch.position.iter().chain(&batch.direction).chain([&batch.flux]);
-                drawn.extend(columns.flat_map(|column| column[i].to_le_bytes()));
+                let mut record = [0; DRAWN.stride];
+                for (place, column) in record.chunks_exact_mut(8).zip(columns) {
+                    place.copy_from_slice(&column[i].to_le_bytes());
+                }
+                drawn.extend_from_slice(&record);
             }
         }
     });

@@ -5,11 +5,16 @@ use std::ops::{ControlFlow, Range};
 use etendue_geometry::table::RayTable;
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_math::Vec3;
+use etendue_sampling::ordered;
+use rayon::prelude::*;
 
 use super::LEAF;
 use super::bounds::{Bounds, Sight};
 use super::cells::Cells;
 use crate::cone::{Cone, Sums, cone_sums};
+
+/// Cells that a thread looks into at a time.
+const SOME: usize = 64;
 
 /// An index over borrowed memory: records in the order of their leaves, where cells start, the boxes of the leaves.
 #[derive(Clone, Copy, Debug)]
@@ -42,34 +47,72 @@ impl<'a> RayIndex<'a> {
 
     /// The rays of all leaves that a cone may see, as stretches of the index, rising.
     #[must_use]
-    pub fn candidates(&self, cone: &Cone) -> Vec<Range<u64>> {
+    pub fn candidates(&self, cone: &Cone, threads: usize) -> Vec<Range<u64>> {
         let sight = Sight::new(cone);
-        let mut stretches: Vec<Range<u64>> = Vec::new();
-        let mut bounds = self.bounds;
-        for ((cell, pair), leaves) in (0..).zip(self.starts.windows(2)).zip(super::leaves(self.starts)) {
-            #[allow(clippy::cast_possible_truncation, reason = "there are as many boxes in a slice")]
-            let (own, rest) = bounds.split_at(leaves as usize);
-            bounds = rest;
-            if own.is_empty() {
-                continue;
-            }
-            let frame = self.cells.frame(cell, self.centre);
-            if !sight.may_meet(frame.z, self.cells.radius()) {
-                continue;
-            }
-            let sighted = sight.cell(&frame);
-            for (start, bounds) in (pair[0]..).step_by(LEAF).zip(own) {
-                if sighted.may_see(bounds) {
-                    let stop = (start + LEAF as u64).min(pair[1]);
-                    match stretches.last_mut() {
-                        Some(last) if last.end == start => last.end = stop,
-                        _ => stretches.push(start..stop),
-                    }
+        let mut first = 0;
+        let cells: Vec<Cell> = (0..)
+            .zip(self.starts.windows(2).zip(super::leaves(self.starts)))
+            .filter(|(_, (_, leaves))| *leaves > 0)
+            .map(|(number, (pair, leaves))| {
+                #[allow(clippy::cast_possible_truncation, reason = "there are as many boxes in a slice")]
+                let leaves = first..first + leaves as usize;
+                first = leaves.end;
+                Cell {
+                    number,
+                    rays: pair[0]..pair[1],
+                    leaves,
                 }
+            })
+            .collect();
+        let look = |some: &[Cell]| {
+            let mut stretches = Vec::new();
+            some.iter()
+                .for_each(|cell| self.look_into(cell, &sight, &mut stretches));
+            stretches
+        };
+        let found: Vec<Vec<Range<u64>>> = ordered::within(threads, |parallel| {
+            if parallel {
+                cells.par_chunks(SOME).map(look).collect()
+            } else {
+                cells.chunks(SOME).map(look).collect()
             }
-        }
+        });
+        let mut stretches = Vec::new();
+        found
+            .into_iter()
+            .flatten()
+            .for_each(|stretch| join(&mut stretches, stretch));
         stretches
     }
+
+    fn look_into(&self, cell: &Cell, sight: &Sight, stretches: &mut Vec<Range<u64>>) {
+        let frame = self.cells.frame(cell.number, self.centre);
+        if !sight.may_meet(frame.z, self.cells.radius()) {
+            return;
+        }
+        let sighted = sight.cell(&frame);
+        let starts = (cell.rays.start..).step_by(LEAF);
+        for (start, bounds) in starts.zip(&self.bounds[cell.leaves.clone()]) {
+            if sighted.may_see(bounds) {
+                join(stretches, start..(start + LEAF as u64).min(cell.rays.end));
+            }
+        }
+    }
+}
+
+/// Adds a stretch to others that end before or where it begins.
+fn join(stretches: &mut Vec<Range<u64>>, stretch: Range<u64>) {
+    match stretches.last_mut() {
+        Some(last) if last.end == stretch.start => last.end = stretch.end,
+        _ => stretches.push(stretch),
+    }
+}
+
+/// A cell that holds rays, and where they and their boxes are.
+struct Cell {
+    number: u32,
+    rays: Range<u64>,
+    leaves: Range<usize>,
 }
 
 /// Some stretches of a table as a source of their own.
@@ -125,7 +168,7 @@ pub fn index_sums(
 ) -> Vec<(Sums, u64)> {
     let mut all = Vec::with_capacity(cones.len());
     for cone in cones {
-        let source = Stretches::new(index.rays, index.candidates(cone));
+        let source = Stretches::new(index.rays, index.candidates(cone, threads));
         let mut stopped = false;
         let (sums, _) = cone_sums(&source, std::slice::from_ref(cone), threads, |done| {
             let flow = progress(done);
