@@ -9,6 +9,8 @@ mod bounds;
 mod build;
 mod cells;
 mod query;
+#[cfg(test)]
+mod tests;
 
 pub use bounds::Bounds;
 pub use build::{arrange, count, place};
