@@ -21,8 +21,8 @@ Point = tuple[float, float, float]
 SIDES = (8, 16, 32, 64, 128, 256)
 """Numbers of cells of direction along a side of a hemisphere's square."""
 
-RAYS_PER_CELL = 4096
-"""Of a source that fills a hemisphere evenly: some 6 × 6 leaves, so that a box is as narrow in place as in direction."""
+RAYS_PER_CELL = 2048
+"""Of a source that fills a hemisphere evenly: some 4 × 4 leaves, so that boxes are narrow in direction and in place."""
 
 DRAWN = np.dtype([("position", "<f8", 3), ("direction", "<f8", 3), ("flux", "<f8")])
 """Records of rays that have none because they are drawn on demand."""
@@ -137,18 +137,7 @@ def count_rays(rays: RayStream, threads: int | None, progress: Progress | None) 
 def fill_index(
     rays: RayStream, counted: Counted, records: Records, threads: int | None, progress: Progress | None
 ) -> IndexTables:
-    """The other passes: the records into their places.
-
-    Parameters
-    ----------
-    rays : RayStream
-        That were counted.
-    counted : Counted
-    records : structured array, shape (counted.rays,), writable
-        In memory or mapped; filled here.
-    threads : int or None
-    progress : callable or None
-        Called with a number of rays that runs from a third of `rays` to all of them.
+    """The other passes: the records into their places, which are `records`, of shape (counted.rays,), mapped or not.
 
     Raises
     ------

@@ -102,7 +102,7 @@ def write_tables(path: Path, counted: Counted, tables: IndexTables, text: bytes)
     with path.open("r+b") as file:
         for at, data in ((place.json, text), (place.starts, tables.starts), (place.bounds, tables.bounds)):
             file.seek(at)
-            file.write(data)
+            file.write(data if isinstance(data, bytes) else data.tobytes())
         file.seek(0)
         header = HEADER.pack(
             MAGIC, VERSION, tables.side, counted.rays, counted.leaves, _core.index_leaf(), counted.dtype.itemsize,

@@ -150,7 +150,7 @@ class RayIndex(RaySet):
         >>> index = et.RayIndex.build(et.RingSource(rays=500_000))
         >>> view = et.Screen(70, 70, 4, 4).core_view(et.Observer(0, 0, 1000))
         >>> [((flux, squares, rays), looked)] = index.cone_sums([{"view": view, "acceptances": [0.026]}])
-        >>> rays.shape, looked < len(index) / 10
+        >>> rays.shape, looked < len(index) / 4
         ((1, 4, 4), True)
         """
         tables = self._tables
@@ -181,10 +181,8 @@ def write_index(
     lost = counted.tally.unusable
     if not lost:
         return ()
-    return (
-        f"{lost:,} of {counted.tally.rays:,} rays are not written: a value is not finite, the direction is missing or "
-        "the flux is negative.",
-    )
+    why = "a value is not finite, the direction is missing or the flux is negative"
+    return (f"{lost:,} of {counted.tally.rays:,} rays are not written: {why}.",)
 
 
 def _usable(tally: Tally) -> Tally:
