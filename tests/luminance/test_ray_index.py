@@ -47,9 +47,9 @@ OBSERVERS = [
 
 
 @pytest.mark.parametrize("plane", ["view", "xy"])
-@pytest.mark.parametrize("acceptance", [0.1, 1.5, 30.0])
+@pytest.mark.parametrize(("acceptance", "lit"), [(0.1, 4), (1.5, 10), (30.0, 16)])
 def test_counts_the_same_rays_for_every_observer(
-    cloud: et.RaySet, index: et.RayIndex, acceptance: float, plane: str
+    cloud: et.RaySet, index: et.RayIndex, acceptance: float, lit: int, plane: str
 ) -> None:
     observers = [et.Observer(*where, target=(0.5, -1.0, 0.25)) for where in OBSERVERS]
     screens = [et.Screen(9.0, 7.0, 6, 5, plane) if i % 2 else et.Screen(3.0, 30.0, 4, 40, plane) for i in range(18)]
@@ -57,7 +57,7 @@ def test_counts_the_same_rays_for_every_observer(
     fast = et.luminance_map(index, observers, screens, acceptance=acceptance)
     for found, expected in zip(fast, full, strict=True):
         assert_same_map(found, expected)
-    assert sum(lmap.rays.sum() > 0 for lmap in full) >= 14
+    assert sum(lmap.rays.sum() > 0 for lmap in full) >= lit
 
 
 def test_equals_the_equations_ray_by_ray(cloud: et.RaySet, index: et.RayIndex) -> None:
@@ -99,8 +99,6 @@ def test_the_index_is_what_auto_means_and_the_notes_say_how_much_was_looked_at(i
     looked = int(note.split()[3].replace(",", ""))
     assert lmap.rays.sum() <= looked < 0.2 * len(index)
     assert f"of {len(index):,} rays head for the observer within 1.5°" in lmap.notes[0]
-    fitted = et.luminance_map(index, observer, screen, method="lightfield", surface=et.Plane(z=0.5))
-    assert (fitted.rays < 0).all()
 
 
 def test_relative_flux_is_scaled_as_in_the_source(cloud: et.RaySet, tmp_path: Path) -> None:
@@ -165,9 +163,9 @@ def test_refusals() -> None:
     far = np.ones(3, dtype=[("direction", "<f4", 3), ("flux", "<f4")])
     with pytest.raises(ArgumentError, match="far-field"):
         et.RayIndex.build(et.RaySet.from_records(far, RaySetMeaning()))
-    with pytest.raises(ArgumentError, match="not one of 2 rays is usable"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", RayFileWarning)
-        et.RayIndex.build(et.RaySet([[0, 0, 0]] * 2, [[0, 0, 0]] * 2, [1.0, 1.0]))
+    nowhere = et.RaySet([[0, 0, 0]] * 2, [[0, 0, 0]] * 2, [1.0, 1.0])
+    with pytest.warns(RayFileWarning), pytest.raises(ArgumentError, match="not one of 2 rays is usable"):
+        et.RayIndex.build(nowhere)
     with pytest.raises(ArgumentError, match="threads"):
         et.RayIndex.build(et.RingSource(rays=1000), threads=0)
 
