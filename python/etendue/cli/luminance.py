@@ -23,7 +23,7 @@ from etendue.quantities.ray_set import RaySet
 
 
 def luminance(
-    file: Annotated[Path, typer.Argument(help="A ray file of any format, or a light field.")],
+    file: Annotated[Path, typer.Argument(help="A ray file of any format, an index of rays, or a light field.")],
     observer: Annotated[
         list[str], typer.Option("--observer", help="θ,φ in degrees; may be given several times.", metavar="THETA,PHI")
     ],
@@ -37,7 +37,11 @@ def luminance(
     pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
     plane: Annotated[str, typer.Option("--plane", help="view or xy.")] = "view",
     method: Annotated[
-        str, typer.Option("--method", help="auto, cone or lightfield; auto: the light field if no acceptance is given.")
+        str,
+        typer.Option(
+            "--method",
+            help="auto, cone or lightfield; auto: the light field, or the cone for an index or an acceptance.",
+        ),
     ] = "auto",
     acceptance: Annotated[
         str | None,

@@ -209,6 +209,8 @@ def _dtype(columns: Any, width: int) -> np.dtype[Any]:
     for column in columns:
         if not re.fullmatch(r"(<[fiu][248]|\|[iu]1)", column["type"]):
             raise ValueError(f"column {column['name']!r} of type {column['type']!r}")
+    if "position" not in {column["name"] for column in columns}:
+        raise ValueError("there is no column 'position'")
     return np.dtype(
         {
             "names": [column["name"] for column in columns],

@@ -12,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
+from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.output import atomic_output
 from etendue.formats.rays.index_building import Counted, IndexTables, Records, count_rays, fill_index
-from etendue.formats.rays.index_file import map_new, read_index, text_of, write_tables
+from etendue.formats.rays.index_file import DAMAGED, HEADER, map_new, read_index, text_of, write_tables
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 from etendue.quantities.report import Complaint
@@ -117,7 +118,13 @@ class RayIndex(RaySet):
         ...     print(et.RayIndex.open(path))
         <RayIndex of 1,000 rays in lm from rings.etd>
         """
-        return cls(*read_index(Path(path)))
+        path = Path(path)
+        records, meaning, tables, tally = read_index(path)
+        try:
+            return cls(records, meaning, tables, tally)
+        except (ArgumentError, UnknownNameError) as error:
+            place, found = f"byte {HEADER.size}", f"the JSON text is not that of an index: {error}"
+            raise FormatError(path, place, found, DAMAGED) from error
 
     @classmethod
     def from_records(cls, records: npt.NDArray[Any], meaning: RaySetMeaning) -> RaySet:
