@@ -209,7 +209,6 @@ pub fn arrange(
         }
         true
     });
-    drop(state);
     whole.then_some(bounds)
 }
 

@@ -66,8 +66,9 @@ impl<'a> RayIndex<'a> {
             .collect();
         let look = |some: &[Cell]| {
             let mut stretches = Vec::new();
-            some.iter()
-                .for_each(|cell| self.look_into(cell, &sight, &mut stretches));
+            for cell in some {
+                self.look_into(cell, &sight, &mut stretches);
+            }
             stretches
         };
         let found: Vec<Vec<Range<u64>>> = ordered::within(threads, |parallel| {
@@ -118,43 +119,39 @@ struct Cell {
 /// Some stretches of a table as a source of their own.
 struct Stretches<'a> {
     rays: RayTable<'a>,
-    stretches: Vec<Range<u64>>,
-    /// Index of each stretch's first ray in this source, and their total.
+    parts: Vec<Range<u64>>,
+    /// Index of each part's first ray in this source, and their total.
     starts: Vec<u64>,
 }
 
 impl<'a> Stretches<'a> {
-    fn new(rays: RayTable<'a>, stretches: Vec<Range<u64>>) -> Self {
+    fn new(rays: RayTable<'a>, parts: Vec<Range<u64>>) -> Self {
         let mut starts = vec![0];
         let mut total = 0;
-        starts.extend(stretches.iter().map(|stretch| {
-            total += stretch.end - stretch.start;
+        starts.extend(parts.iter().map(|part| {
+            total += part.end - part.start;
             total
         }));
-        Self {
-            rays,
-            stretches,
-            starts,
-        }
+        Self { rays, parts, starts }
     }
 }
 
 impl RaySource for Stretches<'_> {
     fn len(&self) -> u64 {
-        self.starts[self.stretches.len()]
+        self.starts[self.parts.len()]
     }
 
     fn fill(&self, range: Range<u64>, batch: &mut RayBatch) {
         let first = self.starts.partition_point(|start| *start <= range.start) - 1;
-        let parts = self.stretches[first..]
+        let pieces = self.parts[first..]
             .iter()
             .zip(&self.starts[first..])
             .take_while(|(_, start)| **start < range.end)
-            .map(|(stretch, start)| {
+            .map(|(part, start)| {
                 let skipped = range.start.saturating_sub(*start);
-                stretch.start + skipped..stretch.end.min(stretch.start + (range.end - start))
+                part.start + skipped..part.end.min(part.start + (range.end - start))
             });
-        self.rays.gather(parts, batch);
+        self.rays.gather(pieces, batch);
     }
 }
 

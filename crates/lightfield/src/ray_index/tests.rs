@@ -14,7 +14,7 @@ fn go(_: u64) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Numbers in 0..1 without a pattern (a Weyl sequence mixed by SplitMix64's finaliser).
+/// Numbers in 0..1 without a pattern (a Weyl sequence mixed by the finaliser of `SplitMix64`).
 struct Numbers(u64);
 
 impl Numbers {
