@@ -28,7 +28,9 @@ SCENE_EXTENSION = ".toml"
 
 
 def luminance(
-    file: Annotated[Path, typer.Argument(help="A ray file of any format, a light field, or a scene (.toml).")],
+    file: Annotated[
+        Path, typer.Argument(help="A ray file of any format, an index of rays, a light field, or a scene (.toml).")
+    ],
     output: Annotated[
         list[Path],
         typer.Option(
@@ -52,7 +54,11 @@ def luminance(
     pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
     plane: Annotated[str, typer.Option("--plane", help="view or xy.")] = "view",
     method: Annotated[
-        str, typer.Option("--method", help="auto, cone or lightfield; auto: the light field if no acceptance is given.")
+        str,
+        typer.Option(
+            "--method",
+            help="auto, cone or lightfield; auto: the light field, or the cone for an index or an acceptance.",
+        ),
     ] = "auto",
     acceptance: Annotated[
         str | None,

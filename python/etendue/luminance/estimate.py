@@ -8,6 +8,7 @@ from typing import Literal, get_args, overload
 import numpy as np
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.formats.rays.ray_index import RayIndex
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Surface
 from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
@@ -109,15 +110,16 @@ def luminance_map(
     Parameters
     ----------
     source : RayStream, LightField or Scene
-        A ray set, a source that draws its rays on demand, the light field that was fitted to one, or a scene. Ray sets in
-        a scene are fitted first, since rays have no luminance that a line of sight could meet.
+        A ray set, a source that draws its rays on demand, an index of rays, the light field that was fitted to one, or a
+        scene. Ray sets in a scene are fitted first, since rays have no luminance that a line of sight could meet.
     observer : Observer or sequence of Observer
         Any number is served by one pass over the rays. Of a scene, None: its own observers with their screens.
     screen : Screen or sequence of Screen
         One for all observers, or one each.
     method : {"auto", "cone", "lightfield"}
         ``"lightfield"``: fit a light field to all rays, then look at it. ``"cone"``: only rays that head for the observer,
-        eqs. 2.2 to 2.4 of [Audenaert2014]_. ``"auto"``: the light field, unless an acceptance is given.
+        eqs. 2.2 to 2.4 of [Audenaert2014]_. ``"auto"``: the light field, unless an acceptance is given or the rays are
+        indexed (`RayIndex`), which makes the cone a matter of milliseconds.
     acceptance : float, "auto" or None
         Half-angle α of the cone [°]; None: 1.5; ``"auto"``: the one of least estimated error, and the map's notes say why.
     surface : Surface or "auto"
@@ -196,8 +198,8 @@ def luminance_map(
     if len(observers) != len(screens) or not observers:
         raise ArgumentError(f"{len(observers)} observers and {len(screens)} screens; give one screen, or one for each.")
     pairs = list(zip(observers, screens, strict=True))
-    # A stated acceptance asks for the cone.
-    by_cone = method == "cone" or (method == "auto" and acceptance is not None)
+    # A stated acceptance asks for the cone, and so does an index, which was built for nothing else.
+    by_cone = method == "cone" or (method == "auto" and (acceptance is not None or isinstance(source, RayIndex)))
     if isinstance(source, Scene):
         given = {name: value for name, value in for_scenes.items() if value is not None}
         maps = look_at_scene(source, pairs, Looking(**given, threads=threads), progress)  # type: ignore[arg-type]
@@ -253,6 +255,8 @@ def _map(
         f"{counts.sum():,} of {tally.rays:,} rays head for the observer within {angle:.4g}° through the screen",
         f"{int(dead.sum()):,} of {dead.size:,} pixels are dead (no ray): NaN",
     ]
+    if isinstance(rays, RayIndex):
+        notes.append(f"by the index: {estimate.looked:,} rays were looked at, and no other can be seen")
     if not dead.all():
         notes.append(f"median relative standard error {np.median(error[~dead] / values[~dead]):.2%} of the live pixels")
     if tally.unusable:
