@@ -250,3 +250,11 @@ def look_at_scene(
     threads: int | None = None,
 ) -> list[_Floats]:
     """For each pixel Σ mean, Σ mean² and Σ deviation of the sources over passes ``first..last`` of `paths` paths each."""
+
+def trace_trails(scene: Scene, rays: int, seed: int, most_events: int, far: float) -> list[_Floats]:
+    """Where the first rays of a run (a batch at most) start, turn and end, shape (k, 3); escaping ones end `far` on [mm]."""
+
+def scene_crossings(
+    scene: Scene, points: _Floats, directions: _Floats
+) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint32], _Floats]:
+    """Every crossing of lines, given by points (n, 3) and directions (n, 3), with faces: line, face, distance [mm]."""

@@ -1,0 +1,439 @@
+"""What a drawing of a scene shows: sections with the curves of all that they cut, and how far everything reaches."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+from etendue.scene import MEDIA, Compiled, Medium, Scene, compile_scene
+from etendue.scene.extents import box_of
+from etendue.tracing.section_chains import rings
+from etendue.tracing.sections import Section, Window, cut_faces
+from etendue.tracing.trails import (
+    CANDIDATES,
+    MOST_TRACED,
+    MOST_TRAILS,
+    Trail,
+    near_section,
+    sample_source,
+    trace_trails,
+)
+
+Array = npt.NDArray[np.float64]
+Record = dict[str, Any]
+
+DEFAULT_SECTIONS = ("y=0", "x=0")
+MOST_SECTIONS = 3
+MARGIN = 0.12
+"""Of a frame around what is in it, as a share of the larger side; light that leaves is seen there."""
+NARROWEST = 0.3
+"""Smaller side of a frame, as a share of the larger one."""
+FARTHEST = 2.5
+"""A detector that would make the frame larger than this many times is only pointed at."""
+SAMPLE = 240
+"""Rays by which a source shows where and how it sends out light."""
+MOST_SAMPLED = 64
+"""Sources that are sampled; of more, every so manieth."""
+JOINED = 1e-6
+"""Of a solid's size: how far apart the ends of its faces may lie that meet."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Part:
+    """A solid, a surface, a source or a detector as a section shows it.
+
+    Parameters
+    ----------
+    name : str
+    kind : str
+        Of a face its finish: one of `FINISH_KINDS`; else ``source``, ``detector``.
+    curves : list of arrays, shape (k, 2)
+        [mm]
+    rings : list of arrays, shape (k, 2)
+        Of a solid: the borders of what it fills.
+    medium : int or None
+        Of a solid: its number.
+    """
+
+    name: str
+    kind: str
+    curves: list[Array]
+    rings: list[Array] = dataclasses.field(default_factory=list)
+    medium: int | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Glow:
+    """A source: where its light starts and where it goes [mm], projected onto a section.
+
+    Parameters
+    ----------
+    name : str
+    curves : list of arrays, shape (k, 2)
+        Where the section cuts a luminous surface.
+    start, direction : arrays, shape (n, 2)
+        Of rays; directions are shorter where they point out of the section.
+    """
+
+    name: str
+    curves: list[Array]
+    start: Array
+    direction: Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class View:
+    """One section with everything in it; lengths in mm.
+
+    Parameters
+    ----------
+    section : Section
+    window : left, right, bottom, top
+    faces : list of Part
+        One for each face that is cut.
+    solids : list of Part
+        One for each solid that is cut.
+    sources : list of Glow
+    detectors : list of Part
+    trails : list of Trail
+    """
+
+    section: Section
+    window: Window
+    faces: list[Part]
+    solids: list[Part]
+    sources: list[Glow]
+    detectors: list[Part]
+    trails: list[Trail]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SceneLayout:
+    """What a drawing of a scene shows.
+
+    Parameters
+    ----------
+    scene : Scene
+    compiled : Compiled
+    views : tuple of View
+    bounds : array, shape (2, 3)
+        Lowest and highest x, y, z of what is shown and has an end [mm]; NaN along an axis that no section shows.
+    media : dict
+        By number of the medium: name and refractive index.
+    wavelength : float
+        Of these indices [nm].
+    uncut : tuple of str
+        Solids and surfaces that no section cuts.
+    beyond : tuple of str
+        Detectors outside of the frames.
+    rays, seed : int
+    """
+
+    scene: Scene
+    compiled: Compiled
+    views: tuple[View, ...]
+    bounds: Array
+    media: dict[int, tuple[str, float]]
+    wavelength: float
+    uncut: tuple[str, ...]
+    beyond: tuple[str, ...]
+    rays: int
+    seed: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Bounds and names, as plain data [mm]."""
+        low, high = self.bounds.tolist()
+        return {
+            "scene": self.scene.name,
+            "bounds": {axis: [low[i], high[i]] for i, axis in enumerate("xyz")},
+            "sections": [
+                {
+                    "plane": f"{view.section.axis}={view.section.at:g}",
+                    "across": view.section.across,
+                    "up": view.section.up,
+                    "window": list(view.window),
+                    "faces": list(dict.fromkeys(face.name for face in view.faces)),
+                    "rays": len(view.trails),
+                }
+                for view in self.views
+            ],
+            "solids": list(self.compiled.solid_names),
+            "surfaces": [name for name, _ in _surfaces(self.compiled)],
+            "sources": [s.name or f"sources[{i}]" for i, s in enumerate(self.scene.sources)],
+            "detectors": list(self.compiled.detector_names),
+            "observers": [o.name or f"observers[{i}]" for i, o in enumerate(self.scene.observers)],
+            "media": {name: index for name, index in self.media.values()},
+            "wavelength": self.wavelength,
+            "not_cut": list(self.uncut),
+            "beyond": list(self.beyond),
+            "notes": list(self.compiled.notes),
+        }
+
+
+def lay_out_scene(
+    scene: Scene,
+    section: str | Sequence[str] = DEFAULT_SECTIONS,
+    *,
+    rays: int = 30,
+    seed: int = 1,
+    window: Sequence[float] | None = None,
+) -> SceneLayout:
+    """Cut a scene, and trace a few rays through it; `draw_scene` makes a picture of it.
+
+    Parameters
+    ----------
+    scene, section, rays, seed, window
+        As of `etendue.draw_scene`.
+
+    Raises
+    ------
+    SceneError, ArgumentError
+        As `etendue.draw_scene`.
+
+    Examples
+    --------
+    >>> ball = {"name": "ball", "shape": {"kind": "ball", "radius": 2}, "medium": "PMMA"}
+    >>> layout = lay_out_scene(Scene(solids=[ball]), "y=1")
+    >>> layout.bounds.round(6).tolist()[1], layout.views[0].faces[0].name
+    ([1.732051, nan, 1.732051], 'ball.surface')
+    """
+    planes = [Section.parse(text) for text in ([section] if isinstance(section, str) else section)]
+    if not 1 <= len(planes) <= MOST_SECTIONS:
+        raise ArgumentError(f"draw_scene: {len(planes)} sections; give 1 to {MOST_SECTIONS}.")
+    if isinstance(rays, bool) or not (isinstance(rays, int) and 0 <= rays <= MOST_TRAILS):
+        raise ArgumentError(f"draw_scene: rays is {rays!r}; give a whole number from 0 to {MOST_TRAILS:,}.")
+    if isinstance(seed, bool) or not (isinstance(seed, int) and 0 <= seed < 1 << 64):
+        raise ArgumentError(f"draw_scene: seed is {seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
+    frame = None if window is None else _checked(window)
+    return _Draughtsman(scene, planes, rays, seed, frame).layout()
+
+
+def _checked(window: Sequence[float]) -> Window:
+    left, right, bottom, top = window if len(window) == 4 else (0.0,) * 4
+    if not (np.isfinite([left, right, bottom, top]).all() and left < right and bottom < top):
+        raise ArgumentError(
+            f"draw_scene: window is {list(window)}; give left, right, bottom, top in mm with left < right and bottom < top."
+        )
+    return float(left), float(right), float(bottom), float(top)
+
+
+class _Draughtsman:
+    """The views of a scene under construction."""
+
+    def __init__(self, scene: Scene, planes: list[Section], rays: int, seed: int, window: Window | None) -> None:
+        self.scene, self.planes, self.rays, self.seed, self.window = scene, planes, rays, seed, window
+        self.compiled = compile_scene(scene)
+        self.record = self.compiled.record
+        step = -(-len(self.record["sources"]) // MOST_SAMPLED) or 1
+        self.sources = [
+            (name, source, *sample_source(self.compiled, source, SAMPLE, seed))
+            for name, source in list(zip(self.compiled.source_names, self.record["sources"], strict=True))[::step]
+        ]
+        self.bounds = np.array([[np.inf] * 3, [-np.inf] * 3])
+
+    def layout(self) -> SceneLayout:
+        faces = self.record["faces"]
+        endless = [not np.isfinite(box_of(face["shape"])).all() for face in faces]
+        curves = [self._cut([f if not e else None for f, e in zip(faces, endless, strict=True)], p) for p in self.planes]
+        glows = [self._glows(plane) for plane in self.planes]
+        for plane, cut, glow in zip(self.planes, curves, glows, strict=True):
+            self._reach(plane, [c for found in cut for c in found])
+            self._reach(plane, [c for g in glow for c in [*g.curves, g.start]])
+        shown, beyond = self._near_detectors()
+        windows = self._windows()
+        for i, (plane, frame) in enumerate(zip(self.planes, windows, strict=True)):
+            rest = self._cut([f if e else None for f, e in zip(faces, endless, strict=True)], plane, frame)
+            curves[i] = [a + b for a, b in zip(curves[i], rest, strict=True)]
+        trails = self._trails(windows)
+        views = tuple(
+            View(plane, window, self._faces(cut), self._solids(cut), glow, self._detectors(shown, plane), trail)
+            for plane, window, cut, glow, trail in zip(self.planes, windows, curves, glows, trails, strict=True)
+        )
+        bounds = np.where(np.isfinite(self.bounds), self.bounds, np.nan)
+        media, wavelength = self._media()
+        return SceneLayout(
+            self.scene, self.compiled, views, bounds, media, wavelength, self._uncut(curves), beyond, self.rays, self.seed
+        )
+
+    # --- what is cut ---------------------------------------------------------------------------------------------------
+
+    def _cut(self, faces: list[Record | None], plane: Section, window: Window | None = None) -> list[list[Array]]:
+        """Curves of each face; none of those that are left out."""
+        found = iter(cut_faces([face for face in faces if face is not None], plane, window))
+        return [[] if face is None else next(found) for face in faces]
+
+    def _reach(self, plane: Section, curves: list[Array]) -> None:
+        """Stretch the bounds over curves."""
+        for curve in curves:
+            if len(curve):
+                for i, axis in enumerate((plane.across, plane.up)):
+                    k = "xyz".index(axis)
+                    self.bounds[0, k] = min(self.bounds[0, k], curve[:, i].min())
+                    self.bounds[1, k] = max(self.bounds[1, k], curve[:, i].max())
+
+    def _faces(self, curves: list[list[Array]]) -> list[Part]:
+        kinds = [finish_kind(finish) for finish in self.record["finishes"]]
+        return [
+            Part(name, kinds[face["finish"]], found)
+            for name, face, found in zip(self.compiled.face_names, self.record["faces"], curves, strict=True)
+            if found
+        ]
+
+    def _solids(self, curves: list[list[Array]]) -> list[Part]:
+        borders: dict[int, list[Array]] = {}
+        for face, found in zip(self.record["faces"], curves, strict=True):
+            if face["solid"] is not None and found:
+                borders.setdefault(face["solid"], []).extend(found)
+        parts = []
+        for number in sorted(borders):
+            points = np.concatenate(borders[number])
+            reach = JOINED * float(np.ptp(points, axis=0).max())
+            filled = rings(borders[number], reach)
+            medium = None
+            if self.scene.solids[number].medium is not None:
+                medium = self.record["solids"][number]["medium"]
+            parts.append(Part(self.compiled.solid_names[number], "solid", borders[number], filled, medium))
+        return parts
+
+    def _uncut(self, curves: list[list[list[Array]]]) -> tuple[str, ...]:
+        cut = {i for view in curves for i, found in enumerate(view) if found}
+        solids = {self.record["faces"][i]["solid"] for i in cut}
+        missing = [name for i, name in enumerate(self.compiled.solid_names) if i not in solids]
+        return (*missing, *(name for name, i in _surfaces(self.compiled) if i not in cut))
+
+    # --- sources, detectors, rays --------------------------------------------------------------------------------------
+
+    def _glows(self, plane: Section) -> list[Glow]:
+        found = []
+        for name, source, start, direction in self.sources:
+            curves: list[Array] = []
+            if source["kind"] in {"surface", "beam"}:
+                (curves,) = cut_faces([source], plane)
+            found.append(Glow(name, curves, plane.flat(start), plane.flat(direction)))
+        return found
+
+    def _near_detectors(self) -> tuple[list[int], tuple[str, ...]]:
+        """Numbers of the detectors that are drawn, near ones first, and names of those that have a place beyond."""
+        boxes = {}
+        for i, detector in enumerate(self.record["detectors"]):
+            if detector["kind"] in {"rays", "illuminance"}:
+                boxes[i] = _placed_box(detector)
+        shown: list[int] = []
+        for i in sorted(boxes, key=lambda i: self._growth(boxes[i])):
+            alone = not np.isfinite(self.bounds).any()
+            if self.window is not None or (np.isfinite(boxes[i]).all() and (alone or self._growth(boxes[i]) <= FARTHEST)):
+                shown.append(i)
+                low, high = np.where(np.isfinite(boxes[i]), boxes[i], np.nan)
+                seen = sorted({"xyz".index(axis) for p in self.planes for axis in (p.across, p.up)})
+                self.bounds[0, seen] = np.fmin(self.bounds[0, seen], low[seen])
+                self.bounds[1, seen] = np.fmax(self.bounds[1, seen], high[seen])
+        return shown, tuple(self.compiled.detector_names[i] for i in boxes if i not in shown)
+
+    def _growth(self, box: Array) -> float:
+        """How many times larger the frame becomes with a box."""
+        both = np.array([np.fmin(self.bounds[0], box[0]), np.fmax(self.bounds[1], box[1])])
+        now = np.where(np.isfinite(self.bounds).all(axis=0), self.bounds[1] - self.bounds[0], 0.0).max()
+        return float((both[1] - both[0]).max()) / now if now > 0.0 else np.inf
+
+    def _detectors(self, shown: list[int], plane: Section) -> list[Part]:
+        faces = [_detector_face(self.record["detectors"][i]) for i in shown]
+        names = [self.compiled.detector_names[i] for i in shown]
+        return [Part(n, "detector", c) for n, c in zip(names, cut_faces(faces, plane), strict=True) if c]
+
+    def _trails(self, windows: list[Window]) -> list[list[Trail]]:
+        """For each view the rays that it shows, out of the same ones for all."""
+        corners = np.array([plane.points(np.array(w).reshape(2, 2).T) for plane, w in zip(self.planes, windows, strict=True)])
+        size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+        starts = [start for _, _, start, _ in self.sources if len(start)]
+        away = float(np.abs(np.concatenate(starts) - corners[0, 0]).max()) if starts else 0.0
+        traced = trace_trails(self.compiled, min(CANDIDATES * self.rays, MOST_TRACED), self.seed, 4.0 * (size + away))
+        return [near_section(traced, plane, self.rays, 0.1 * size) for plane in self.planes]
+
+    # --- frames and media ----------------------------------------------------------------------------------------------
+
+    def _windows(self) -> list[Window]:
+        """Frames of the views; those with the same axis upright have the same height."""
+        if self.window is not None:
+            return [self.window] * len(self.planes)
+        targets = [np.array([o.target, o.target]) for o in self.scene.observers]
+        for box in targets if not np.isfinite(self.bounds).any() else []:
+            self._reach(Section("y", 0.0), [Section("y", 0.0).flat(box)])
+            self._reach(Section("x", 0.0), [Section("x", 0.0).flat(box)])
+        low, high = np.where(np.isfinite(self.bounds), self.bounds, 0.0)
+        size = float((high - low).max())
+        size = size if size > 0.0 else max(1e-9 * float(np.abs(low).max()), 10.0)
+        middle, half = (low + high) / 2.0, np.maximum(high - low, NARROWEST * size) / 2.0 + MARGIN * size
+        left, right = middle - half, middle + half
+        pairs = [[("xyz").index(axis) for axis in (plane.across, plane.up)] for plane in self.planes]
+        return [(float(left[u]), float(right[u]), float(left[v]), float(right[v])) for u, v in pairs]
+
+    def _media(self) -> tuple[dict[int, tuple[str, float]], float]:
+        """Names and indices of the media that solids are filled with and of the surroundings, at the first source's wavelength."""
+        wavelength = self.scene.wavelength
+        if self.record["sources"]:
+            first = self.record["sources"][0]
+            wavelength = float(first["wavelengths"][np.argmax(first["shares"])])
+        given = {0: self.scene.surroundings}
+        for solid, record in zip(self.scene.solids, self.record["solids"], strict=True):
+            if solid.medium is not None:
+                given.setdefault(record["medium"], solid.medium)
+        media = {}
+        for number, what in given.items():
+            medium = what if isinstance(what, Medium) else self.scene.media.get(what) or MEDIA[what].medium
+            index = float(medium.index_at([wavelength], self.scene.files)[0])
+            media[number] = (self.compiled.medium_names[number], index)
+        return media, wavelength
+
+
+def _surfaces(compiled: Compiled) -> list[tuple[str, int]]:
+    """Names of the surfaces that are no solid's, and numbers of their faces."""
+    faces = zip(compiled.face_names, compiled.record["faces"], strict=True)
+    return [(name, i) for i, (name, face) in enumerate(faces) if face["solid"] is None]
+
+
+def _detector_face(detector: Record) -> Record:
+    if detector["kind"] == "rays":
+        return detector
+    outline = {"kind": "rectangle", "width": detector["width"], "height": detector["height"]}
+    return {"shape": {"kind": "flat", "outline": outline}, "frame": detector["frame"], "trims": []}
+
+
+def _placed_box(detector: Record) -> Array:
+    """The box around a detector in the world; infinite where it has no end."""
+    face = _detector_face(detector)
+    box, frame = box_of(face["shape"]), np.asarray(face["frame"], dtype=np.float64)
+    if not np.isfinite(box).all():
+        return np.array([[-np.inf] * 3, [np.inf] * 3])
+    corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) @ frame[3:].reshape(3, 3) + frame[:3]
+    return np.array([corners.min(axis=0), corners.max(axis=0)])
+
+
+FINISH_KINDS = ("interface", "mirror", "scatterer", "transparent", "absorber")
+
+
+def finish_kind(finish: Record) -> str:
+    """What a finish mostly does, as one of `FINISH_KINDS`: by the largest of its shares.
+
+    Examples
+    --------
+    >>> from etendue.scene.finishes import Lambertian
+    >>> from etendue.scene.files import Files
+    >>> finish_kind(Lambertian(reflectance=0.9).record(Files()))
+    'scatterer'
+    """
+    if finish["kind"] == "fresnel":
+        return "interface"
+    does = {
+        "specular_reflectance": "mirror",
+        "specular_transmittance": "transparent",
+        "diffuse_reflectance": "scatterer",
+        "diffuse_transmittance": "scatterer",
+    }
+    most = {part: float(np.max(finish[part]["values"])) for part in does}
+    part = max(most, key=lambda p: most[p])
+    return does[part] if most[part] > 0.0 else "absorber"
