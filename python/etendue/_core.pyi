@@ -85,6 +85,7 @@ class _Harvest(TypedDict):
     ledger: _Ledger
     cells: list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]]
     records: list[_Floats]
+    events: list[npt.NDArray[np.uint64]]
     rays: int
     imbalance: float
 
@@ -251,10 +252,22 @@ def look_at_scene(
 ) -> list[_Floats]:
     """For each pixel Σ mean, Σ mean² and Σ deviation of the sources over passes ``first..last`` of `paths` paths each."""
 
+def look_at_events(
+    scene: Scene,
+    events: npt.NDArray[np.uint64],
+    view: _View,
+    complement: bool,
+    threads: int | None = None,
+) -> tuple[_Floats, _Floats, npt.NDArray[np.uint64]]:
+    """The light image of stored scatter events (n, 17), as cells.
+
+    `complement`: only of light that `look_at_scene` does not find, or leaves out ``without_caustics``.
+    """
+
 def trace_trails(scene: Scene, rays: int, seed: int, most_events: int, far: float) -> list[_Floats]:
-    """Where the first rays of a run (a batch at most) start, turn and end, shape (k, 3); escaping ones end `far` on [mm]."""
+    """The points (n, 3) that each ray passes; those that leave the scene end after `far`."""
 
 def scene_crossings(
     scene: Scene, points: _Floats, directions: _Floats
 ) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint32], _Floats]:
-    """Every crossing of lines, given by points (n, 3) and directions (n, 3), with faces: line, face, distance [mm]."""
+    """Every crossing of lines with faces ahead: number of the line, face, distance."""

@@ -127,6 +127,9 @@ def test_the_schema_is_json_and_knows_every_kind() -> None:
         for kind in kinds:
             assert f'"const": "{kind}"' in text
     assert schema["additionalProperties"] is False
+    assert schema["$defs"]["Ball"]["properties"]["radius"]["exclusiveMinimum"] == 0
+    assert schema["$defs"]["Lambertian"]["properties"]["reflectance"]["oneOf"][0]["maximum"] == 1
+    assert not {key for key in ("gt", "ge", "le") if f'"{key}"' in text}, "words that JSON Schema does not know"
 
 
 MISTAKES: list[tuple[dict[str, Any], list[str]]] = [

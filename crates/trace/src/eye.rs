@@ -6,7 +6,7 @@ use etendue_math::Vec3;
 use etendue_optics::finish::Incidence;
 use rayon::prelude::*;
 
-use crate::forward::{Cell, gather};
+use crate::harvest::{Cell, gather};
 use crate::inside::Inside;
 use crate::meeting::{Fillings, Meeting, transmittance};
 use crate::scene::Scene;

@@ -19,10 +19,12 @@ use rayon::prelude::*;
 use crate::bounce::{Bouncer, Gathered, bounce, bouncers};
 use crate::detector::{Detector, illuminance_cell, intensity_cell};
 use crate::eye::Event;
+use crate::harvest::{Harvest, Record, Yield};
 use crate::inside::Inside;
-use crate::ledger::{Fate, Ledger};
-use crate::meeting::{Fillings, Loss, Meeting, meet, place_near};
+use crate::ledger::Fate;
+use crate::meeting::{Fillings, Loss, Meeting, meet};
 use crate::scene::Scene;
+use crate::start::place_near;
 
 /// The purpose under which the events of traced rays are drawn (see [`Stream::new`]).
 const PURPOSE_TRACE: u64 = 0x5452_4143;
@@ -38,56 +40,6 @@ pub struct Run<'a> {
     pub most_events: u32,
     /// The ray sets that sources refer to.
     pub sets: &'a [&'a dyn RaySource],
-}
-
-/// A ray as a collecting surface keeps it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Record {
-    /// \[mm\].
-    pub position: [f64; 3],
-    /// Unit vector.
-    pub direction: [f64; 3],
-    /// \[flux unit\].
-    pub flux: f64,
-    /// \[nm\].
-    pub wavelength: f64,
-}
-
-/// Sums of a cell: Σ w, Σ w² with w the contribution of one ray, and how many rays contributed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cell {
-    /// Σ w.
-    pub sum: f64,
-    /// Σ w².
-    pub squares: f64,
-    /// Rays.
-    pub rays: u64,
-}
-
-/// What a number of batches amount to.
-#[derive(Clone, Debug)]
-pub struct Harvest {
-    /// The flux account.
-    pub ledger: Ledger,
-    /// Cells of each detector that has some.
-    pub cells: Vec<Vec<Cell>>,
-    /// Rays of each collecting surface.
-    pub records: Vec<Vec<Record>>,
-    /// Diffuse scatters of each detector of them.
-    pub events: Vec<Vec<Event>>,
-    /// Rays that the sources gave out.
-    pub rays: u64,
-    /// Largest | emitted − Σ fates | / emitted of a batch.
-    pub imbalance: f64,
-}
-
-/// What one batch amounts to: contributions in the order in which they were made.
-struct Yield {
-    ledger: Ledger,
-    /// For each detector: cell, ray, contribution.
-    marks: Vec<Vec<(u32, u64, f64)>>,
-    records: Vec<Vec<Record>>,
-    events: Vec<Vec<Event>>,
 }
 
 /// The rays of each source in batch `batch`: the first one's number among those of the source, and how many.
@@ -136,50 +88,11 @@ pub fn trace(scene: &Scene, run: &Run<'_>, batches: Range<u64>) -> Harvest {
         .into_par_iter()
         .map(|b| trace_batch(scene, run, b))
         .collect();
-    let mut harvest = Harvest {
-        ledger: Ledger::new(scene),
-        cells: scene
-            .detectors
-            .iter()
-            .map(|d| vec![Cell::default(); d.cells()])
-            .collect(),
-        records: vec![Vec::new(); scene.detectors.len()],
-        events: vec![Vec::new(); scene.detectors.len()],
-        rays: 0,
-        imbalance: 0.0,
-    };
+    let mut harvest = Harvest::new(scene);
     for part in parts {
-        let [emitted, fates] = part.ledger.balance();
-        let scale = if emitted.flux() > 0.0 { emitted.flux() } else { 1.0 };
-        let lost = if emitted.rays == fates.rays { 0.0 } else { f64::INFINITY };
-        harvest.imbalance = harvest
-            .imbalance
-            .max((emitted.flux() - fates.flux()).abs() / scale + lost);
-        harvest.rays += emitted.rays;
-        harvest.ledger.merge(&part.ledger);
-        for (cells, marks) in harvest.cells.iter_mut().zip(part.marks) {
-            gather(cells, marks);
-        }
-        for (all, events) in harvest.events.iter_mut().zip(part.events) {
-            all.extend(events);
-        }
-        for (all, records) in harvest.records.iter_mut().zip(part.records) {
-            all.extend(records);
-        }
+        harvest.add(part);
     }
     harvest
-}
-
-/// Adds contributions (cell, ray, w) to cells. Those of one ray to one cell belong together: they are not independent.
-pub fn gather(cells: &mut [Cell], mut marks: Vec<(u32, u64, f64)>) {
-    marks.sort_by_key(|(cell, ray, _)| (*cell, *ray));
-    for same in marks.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let sum: f64 = same.iter().map(|(_, _, w)| w).sum();
-        let cell = &mut cells[same[0].0 as usize];
-        cell.sum += sum;
-        cell.squares += sum * sum;
-        cell.rays += 1;
-    }
 }
 
 /// A ray on its way, besides its line.
@@ -262,12 +175,7 @@ impl<'a> Walk<'a> {
             numbers: Default::default(),
             trails: None,
             far: 0.0,
-            out: Yield {
-                ledger: Ledger::new(scene),
-                marks: vec![Vec::new(); scene.detectors.len()],
-                records: vec![Vec::new(); scene.detectors.len()],
-                events: vec![Vec::new(); scene.detectors.len()],
-            },
+            out: Yield::new(scene),
         }
     }
 

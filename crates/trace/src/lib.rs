@@ -1,15 +1,22 @@
 //! Light through optics: from sources to detectors.
 //!
-//! `scene`: faces with their optical properties, solids with their media, sources, detectors. `inside`: which solids a ray is
-//! in. `meeting`: a ray meets faces, and which of them decides. `detector`: what takes note of light. `eye`: diffuse
-//! scatters connected to an observer. `ledger`: the flux account. `forward`: from the sources to the detectors. `reverse`: from the eye to the sources.
+//! `scene`: faces with their optical properties, solids with their media, sources, detectors. `start`: where a ray starts;
+//! `inside`: which solids it is in; `meeting`: which of the faces that it meets decides what becomes of it.
+//!
+//! `forward`: from the sources to the detectors; `bounce`: many rays at once off a plain wall; `detector`: what takes note of
+//! light; `ledger`: the flux account; `harvest`: what batches amount to. `eye`: diffuse scatters connected to an observer.
+//!
+//! `reverse`: from the eye to the sources; `wave`: a block of its paths.
 
 mod bounce;
 pub mod detector;
 pub mod eye;
 pub mod forward;
+pub mod harvest;
 pub mod inside;
 pub mod ledger;
 pub mod meeting;
 pub mod reverse;
 pub mod scene;
+mod start;
+mod wave;

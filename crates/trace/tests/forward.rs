@@ -12,7 +12,8 @@ use etendue_optics::source::{Emitter, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_sampling::ordered::within;
 use etendue_trace::detector::Detector;
-use etendue_trace::forward::{Harvest, Run, trace};
+use etendue_trace::forward::{Run, trace};
+use etendue_trace::harvest::Harvest;
 use etendue_trace::meeting::Loss;
 use etendue_trace::scene::{Part, Scene};
 

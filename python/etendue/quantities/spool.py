@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import weakref
 from collections.abc import Iterable
 from typing import Any
 
@@ -79,6 +80,7 @@ class Spool:
         written, held = self._state
         if self._file is None:
             self._file = tempfile.TemporaryFile(prefix="etendue-")  # noqa: SIM115 - it lives as long as the spool
+            weakref.finalize(self, self._file.close)
         self._file.seek(written)
         for part in held:
             # Not ndarray.tofile, which closes its own buffer without looking whether the last bytes found room.

@@ -17,10 +17,9 @@ from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.shape import WHOLE, Shape, Trim
-from etendue.scene.values import Count, Length, Number
+from etendue.scene.values import AsNumber, Finite, Length, Pixels
 
 Record = dict[str, Any]
-Pixels = Annotated[Count, Le(65536)]
 MOST_STEPS = 18_000
 """Steps of γ over 180°: a hundredth of a degree."""
 
@@ -129,7 +128,7 @@ class FarField(Detector):
 
     kind: Literal["intensity"] = "intensity"
     c_planes: Pixels = 36
-    gamma_step: Annotated[Number, Gt(0.0), Le(90.0)] = 2.5
+    gamma_step: Annotated[float, Finite, Gt(0.0), Le(90.0), AsNumber] = 2.5
 
     @model_validator(mode="after")
     def _divides(self) -> Self:

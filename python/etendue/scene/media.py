@@ -15,13 +15,13 @@ from etendue.errors import ArgumentError
 from etendue.scene.description import Description
 from etendue.scene.files import Files, read_columns
 from etendue.scene.mistakes import BY_NAME, DESCRIBED, NUMBER, TABLE
-from etendue.scene.values import AsRow, NotNegative, Number, Wavelength
+from etendue.scene.values import AsNumber, AsRow, Finite, NotNegative, Number, Wavelength
 from etendue.units import NM_PER_UM
 
 Array = npt.NDArray[np.float64]
 Record = dict[str, Any]
 
-Index = Annotated[Number, Ge(1.0), Le(10.0)]
+Index = Annotated[float, Finite, Ge(1.0), Le(10.0), AsNumber]
 Rising = Annotated[tuple[Wavelength, ...], MinLen(1), MaxLen(1 << 20), AsRow]
 
 

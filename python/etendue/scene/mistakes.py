@@ -133,5 +133,6 @@ def _wrong_kind(value: Any, context: Mapping[str, Any]) -> str:
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
+    # Whole numbers are floats by now, whichever way they were written.
+    text = str(int(value)) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else repr(value)
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"

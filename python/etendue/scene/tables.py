@@ -17,10 +17,10 @@ from etendue.scene.description import Description
 from etendue.scene.files import Files, read_columns
 from etendue.scene.media import Rising, rises
 from etendue.scene.mistakes import NUMBER, TABLE
-from etendue.scene.values import AsRow, Number, Share
+from etendue.scene.values import AsNumber, AsRow, Finite, Share
 
 Array = npt.NDArray[np.float64]
-Angle = Annotated[Number, Ge(0.0), Le(90.0)]
+Angle = Annotated[float, Finite, Ge(0.0), Le(90.0), AsNumber]
 Row = Annotated[tuple[Share, ...], MinLen(1), MaxLen(1 << 16), AsRow]
 
 

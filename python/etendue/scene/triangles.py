@@ -133,7 +133,7 @@ def smooth_normals(vertices: Array, triangles: Triangles, crease_angle: float) -
     corner_normal[order] = found
     key = np.concatenate([corner_vertex[:, None].astype(np.float64), corner_normal], axis=1)
     split, number = np.unique(key, axis=0, return_inverse=True)
-    return vertices[split[:, 0].astype(np.int64)], number.reshape(-1, 3), split[:, 1:]
+    return vertices[split[:, 0].astype(np.int64)], number.reshape(-1, 3), np.ascontiguousarray(split[:, 1:])
 
 
 def _mean_within(owner: Array, weighted: Array, rows: Triangles, least: float, found: Array) -> None:

@@ -35,25 +35,30 @@ def _row(value: Any) -> Any:
     return tuple(value)
 
 
-Bound = Annotated[float, BeforeValidator(_number, json_schema_input_type=float)]
-"""A number or an infinity."""
-Number = Annotated[Bound, AllowInfNan(False)]
-Positive = Annotated[Number, Gt(0.0)]
-NotNegative = Annotated[Number, Ge(0.0)]
+# The constraints stand inside, next to the type that JSON Schema knows, and what tells numbers from look-alikes outside.
+AsNumber = BeforeValidator(_number)
+AsCount = BeforeValidator(_count)
+AsRow = BeforeValidator(_row)
+Finite = AllowInfNan(False)
+
 LONGEST = 1e9
 """Largest length [mm] in a scene: a thousand kilometres. Squares and products of lengths then stay far from overflow."""
-Length = Annotated[Number, Gt(0.0), Le(LONGEST)]
-LengthOrZero = Annotated[Number, Ge(0.0), Le(LONGEST)]
-Coordinate = Annotated[Number, Ge(-LONGEST), Le(LONGEST)]
-Wavelength = Annotated[Number, Gt(0.0), Le(1e9)]
-Share = Annotated[Number, Ge(0.0), Le(1.0)]
-Index = Annotated[int, BeforeValidator(_count, json_schema_input_type=int), Ge(0), Le((1 << 31) - 1)]
-Count = Annotated[int, BeforeValidator(_count, json_schema_input_type=int), Ge(1)]
 
-AsRow = BeforeValidator(_row)
+Bound = Annotated[float, AsNumber]
+"""A number or an infinity."""
+Number = Annotated[float, Finite, AsNumber]
+Positive = Annotated[float, Finite, Gt(0.0), AsNumber]
+NotNegative = Annotated[float, Finite, Ge(0.0), AsNumber]
+Length = Annotated[float, Finite, Gt(0.0), Le(LONGEST), AsNumber]
+LengthOrZero = Annotated[float, Finite, Ge(0.0), Le(LONGEST), AsNumber]
+Coordinate = Annotated[float, Finite, Ge(-LONGEST), Le(LONGEST), AsNumber]
+Wavelength = Annotated[float, Finite, Gt(0.0), Le(1e9), AsNumber]
+Share = Annotated[float, Finite, Ge(0.0), Le(1.0), AsNumber]
+Index = Annotated[int, Ge(0), Le((1 << 31) - 1), AsCount]
+Pixels = Annotated[int, Ge(1), Le(65536), AsCount]
+
 Vector = Annotated[tuple[Number, Number, Number], AsRow]
 Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], AsRow]
 Interval = Annotated[tuple[Bound, Bound], AsRow]
 Numbers = Annotated[tuple[Number, ...], AsRow]
-SomeNumbers = Annotated[tuple[Number, ...], MinLen(1), AsRow]
 Vertices = Annotated[tuple[Annotated[tuple[Coordinate, Coordinate], AsRow], ...], MinLen(3), MaxLen(1 << 16), AsRow]

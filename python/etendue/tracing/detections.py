@@ -156,15 +156,21 @@ class FarFieldIntensity(Detection):
         values, error = (array.reshape(shape) / cells.solid_angle for array in (counted.flux, counted.error))
         for table in (values, error):
             table[:, [0, -1]] = table[0, [0, -1]]
-        return Intensity(
+        result = Intensity(
             cells.c,
             cells.gamma,
             values,
             error,
             flux_unit=origin.flux_unit,
             provenance=origin.provenance.then(f"far-field intensity by {self.name!r}"),
-            notes=("mean over the cell around each node", *origin.notes),
         )
+        unit, total = origin.flux_unit, float(counted.flux.sum())
+        notes = ["mean over the cell around each node"]
+        if total > 0.0:
+            deviation = f"{result.flux / total - 1.0:+.3%}".replace("-", "−")
+            found = f"the function of the table has {result.flux:.7g} {unit} ({deviation})"
+            notes.append(f"the cells hold {total:.7g} {unit}, {found}")
+        return result.replace(notes=(*notes, *origin.notes))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,7 +16,7 @@ from etendue.scene.files import Files
 from etendue.scene.mesh_files import read_mesh
 from etendue.scene.shapes.shape import Record, Shape, Sheet, Trim
 from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
-from etendue.scene.values import LONGEST, AsRow, Index, Length, Number, Point
+from etendue.scene.values import LONGEST, AsNumber, AsRow, Finite, Index, Point
 
 Array = npt.NDArray[np.float64]
 Triangle = Annotated[tuple[Index, Index, Index], AsRow]
@@ -79,9 +79,9 @@ class Mesh(Shape):
     vertices: Annotated[tuple[Point, ...], MinLen(3), MaxLen(1 << 20), AsRow] | None = None
     triangles: Annotated[tuple[Triangle, ...], MinLen(1), MaxLen(1 << 21), AsRow] | None = None
     unit: Unit | None = None
-    scale: Annotated[Number, Ge(1e-9), Le(1e9)] = 1.0
-    tolerance: Annotated[Length, Ge(1e-4)] | None = None
-    crease_angle: Annotated[Number, Ge(0.0), Le(180.0)] | None = None
+    scale: Annotated[float, Finite, Ge(1e-9), Le(1e9), AsNumber] = 1.0
+    tolerance: Annotated[float, Finite, Ge(1e-4), Le(LONGEST), AsNumber] | None = None
+    crease_angle: Annotated[float, Finite, Ge(0.0), Le(180.0), AsNumber] | None = None
 
     @model_validator(mode="after")
     def _one_origin(self) -> Self:
@@ -126,10 +126,12 @@ class Mesh(Shape):
 
     def record(self, mesh: Triangulation) -> Record:
         """The mesh as the core takes it, with normals if creases are given."""
-        if self.crease_angle is None:
-            return {"kind": "mesh", "vertices": mesh.vertices, "triangles": mesh.triangles, "normals": None}
-        vertices, triangles, normals = smooth_normals(mesh.vertices, mesh.triangles, self.crease_angle)
-        return {"kind": "mesh", "vertices": vertices, "triangles": triangles, "normals": normals}
+        vertices, triangles, normals = mesh.vertices, mesh.triangles, None
+        if self.crease_angle is not None:
+            vertices, triangles, normals = smooth_normals(vertices, triangles, self.crease_angle)
+        if len(vertices) > np.iinfo(np.uint32).max:
+            raise ArgumentError(f"{len(vertices):,} vertices are more than a mesh can have; make it coarser")
+        return {"kind": "mesh", "vertices": vertices, "triangles": triangles.astype(np.uint32), "normals": normals}
 
     def sheet(self, trim: Trim, files: Files) -> Sheet:
         """The mesh within half spaces; ranges of z are half spaces too."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
-from annotated_types import Le
+from annotated_types import Ge, Le
 from pydantic import InstanceOf, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
@@ -14,7 +14,7 @@ from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.surfaces import parse_surface
 from etendue.scene.files import Files
 from etendue.scene.sources.source import Emitter, Source
-from etendue.scene.values import Count, Index, Length, Positive
+from etendue.scene.values import AsCount, Index, Length, Positive
 
 
 class Gridded(Source):
@@ -53,7 +53,7 @@ class Gridded(Source):
     pixel: Length = 1.0
     threshold: Positive = 0.021
     gridded: SkipJsonSchema[InstanceOf[GriddedSource] | None] = None
-    draws: Annotated[Count, Le(1 << 31)] = 1_000_000
+    draws: Annotated[int, Ge(1), Le(1 << 31), AsCount] = 1_000_000
     seed: Index = 1
     flux: Positive | None = None
 

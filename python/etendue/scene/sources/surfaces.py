@@ -15,7 +15,7 @@ from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.flat import FLAT, Plane
 from etendue.scene.shapes.shape import WHOLE, Shape, Trim, is_bounded
 from etendue.scene.sources.source import Emitter, Source
-from etendue.scene.values import AsRow, Length, Number, Positive
+from etendue.scene.values import AsNumber, AsRow, Finite, Length, Positive
 from etendue.units import FluxUnit
 
 
@@ -47,7 +47,7 @@ class Surface(Source):
     shape: Annotated[Shape, Family(SHAPES)]
     trim: Trim = WHOLE
     side: Literal["front", "back"] = "front"
-    exponent: Annotated[Number, Ge(0.0), Le(1e6)] = 1.0
+    exponent: Annotated[float, Finite, Ge(0.0), Le(1e6), AsNumber] = 1.0
     flux: Positive
     flux_unit: FluxUnit = "lm"
 

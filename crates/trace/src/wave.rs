@@ -1,0 +1,549 @@
+//! A block of paths from the eye, all branches of which take their next steps together.
+
+use std::f64::consts::{FRAC_1_PI, PI};
+use std::ops::Range;
+
+use etendue_geometry::assembly::{Hits, Leaving, Lines, NONE, TIE};
+use etendue_lightfield::View;
+use etendue_math::Vec3;
+use etendue_optics::finish::{Finish, Incidence};
+use etendue_optics::source::Numbers;
+use etendue_optics::source::surface::about;
+use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
+use etendue_sampling::philox::Stream;
+
+use crate::inside::Inside;
+use crate::meeting::{Fillings, Meeting, meet, transmittance};
+use crate::reverse::{Lit, Method, Pixel};
+use crate::start::place;
+
+/// The purposes under which shifts of lattices and events of paths are drawn (see [`Stream::new`]).
+const PURPOSE_SHIFT: u64 = 0x5348_4946;
+const PURPOSE_PATH: u64 = 0x5041_5448;
+
+/// Chains of smooth surfaces are followed on every branch down to this weight; below, one branch is drawn.
+const SPLIT: f64 = 0.02;
+
+/// Diffuse scatters before a path may be ended by chance.
+const SURE: u32 = 3;
+
+/// Sources up to this number are all connected to at the first diffuse scatter; of more, one is drawn by its flux.
+const FEW: usize = 8;
+
+/// What a branch has seen on its way from the eye.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Seen {
+    /// Smooth surfaces, or nothing yet.
+    Smooth,
+    /// A diffuse surface, and nothing since: the density of its direction there, and the distance from there.
+    Diffuse { density: f64, travelled: f64, all: bool },
+    /// A diffuse surface, and smooth ones since.
+    Caustic,
+}
+
+/// What is known of a branch besides its line.
+#[derive(Clone, Copy, Debug)]
+struct Branch {
+    /// Number of its path in the block.
+    path: u32,
+    inside: Inside,
+    weight: f64,
+    seen: Seen,
+    events: u32,
+    scatters: u32,
+    /// Whether the eye sees the first diffuse surface directly.
+    direct: bool,
+}
+
+/// One path: its random numbers, its wavelength, and the light that it has found, with its deviation.
+struct Path {
+    numbers: Numbers,
+    line: usize,
+    sum: [f64; 2],
+}
+
+/// A connection of a diffuse surface to a source, that counts if nothing is in between.
+struct Connection {
+    path: u32,
+    light: [f64; 2],
+    inside: Inside,
+    to: Vec3,
+}
+
+/// Paths in one block.
+pub const BLOCK: usize = 1024;
+
+/// A block of paths, all branches of which take their next steps together.
+pub struct Wave<'a> {
+    lit: &'a Lit<'a>,
+    view: &'a View,
+    method: &'a Method,
+    fillings: Fillings,
+    hits: Hits,
+    paths: Vec<Path>,
+    /// Branches that are about to take a step, and those that come out of it.
+    lines: Lines,
+    branches: Vec<Branch>,
+    next_lines: Lines,
+    next: Vec<Branch>,
+    /// Connections that have to be looked at.
+    shadows: Lines,
+    connections: Vec<Connection>,
+    /// What the eye is in, and what it lies on; None if it cannot be anywhere.
+    eye: Option<(Inside, Leaving)>,
+}
+
+impl<'a> Wave<'a> {
+    /// An empty block.
+    pub fn new(lit: &'a Lit<'a>, view: &'a View, method: &'a Method) -> Self {
+        Self {
+            lit,
+            view,
+            method,
+            fillings: Fillings::new(lit.scene),
+            hits: Hits::default(),
+            paths: Vec::with_capacity(BLOCK),
+            lines: Lines::default(),
+            branches: Vec::new(),
+            next_lines: Lines::default(),
+            next: Vec::new(),
+            shadows: Lines::default(),
+            connections: Vec::new(),
+            eye: place(lit.scene, view.eye, (view.target - view.eye).normalized()).ok(),
+        }
+    }
+
+    /// Adds the passes to pixels from number `first` on.
+    pub fn paint(&mut self, first: usize, passes: Range<u32>, pixels: &mut [Pixel]) {
+        let paths = self.method.paths as usize;
+        let share = 1.0 / f64::from(self.method.paths);
+        let mut cells = vec![[0.0; 2]; pixels.len() * passes.len()];
+        let total = cells.len() * paths;
+        let mut shift = (usize::MAX, [0.0; DIMENSIONS]);
+        let mut begin = 0;
+        while begin < total {
+            let end = (begin + BLOCK).min(total);
+            self.paths.clear();
+            for flat in begin..end {
+                let (cell, index) = (flat / paths, flat % paths);
+                let pixel = (first + cell / passes.len()) as u64;
+                #[allow(clippy::cast_possible_truncation, reason = "a number of passes")]
+                let pass = passes.start + (cell % passes.len()) as u32;
+                if shift.0 != cell {
+                    shift = (cell, self.shift(pixel, pass));
+                }
+                #[allow(clippy::cast_possible_truncation, reason = "a number of paths")]
+                self.aim(pixel, pass, index as u32, &shift.1);
+            }
+            self.follow();
+            for (flat, path) in (begin..end).zip(&self.paths) {
+                let cell = &mut cells[flat / paths];
+                *cell = [cell[0] + path.sum[0] * share, cell[1] + path.sum[1] * share];
+            }
+            begin = end;
+        }
+        for (pixel, means) in pixels.iter_mut().zip(cells.chunks(passes.len().max(1))) {
+            for [mean, deviation] in means {
+                pixel.sum += mean;
+                pixel.squares += mean * mean;
+                pixel.deviation += deviation;
+            }
+        }
+    }
+
+    /// How the lattice of a pixel is moved in a pass.
+    fn shift(&self, pixel: u64, pass: u32) -> [f64; DIMENSIONS] {
+        let shifts = Stream::new(self.method.seed, PURPOSE_SHIFT);
+        let mut shift = [0.0; DIMENSIONS];
+        for (block, four) in (0_u64..).zip(shift.chunks_mut(4)) {
+            four.copy_from_slice(&shifts.uniforms(pixel, u64::from(pass) << 8 | block));
+        }
+        shift
+    }
+
+    /// A path from the eye through a point of a pixel.
+    fn aim(&mut self, pixel: u64, pass: u32, index: u32, shift: &[f64; DIMENSIONS]) {
+        let view = self.view;
+        let stream = Stream::new(self.method.seed, PURPOSE_PATH);
+        let address = ((pixel << 24 | u64::from(pass)) << 20).wrapping_add(u64::from(index));
+        let mut numbers = Numbers::after(lattice_point(index, shift), stream, address);
+        let columns = u64::from(view.columns);
+        let (row, column) = ((pixel / columns) as f64, (pixel % columns) as f64);
+        let (du, dv) = (numbers.draw(), numbers.draw());
+        let u = ((column + du) / f64::from(view.columns) - 0.5) * view.width;
+        let v = (0.5 - (row + dv) / f64::from(view.rows)) * view.height;
+        let through = view.target + view.right * u + view.up * v;
+        let d = (through - view.eye).normalized();
+        let lines = &self.lit.lines;
+        let line = if lines.len() == 1 {
+            0
+        } else {
+            let number = numbers.draw();
+            lines.partition_point(|l| l.0 < number).min(lines.len() - 1)
+        };
+        #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+        let path = self.paths.len() as u32;
+        self.paths.push(Path {
+            numbers,
+            line,
+            sum: [0.0; 2],
+        });
+        if let Some((inside, leaving)) = self.eye {
+            self.lines.push(view.eye, d, leaving);
+            self.branches.push(Branch {
+                path,
+                inside,
+                weight: 1.0,
+                seen: Seen::Smooth,
+                events: 0,
+                scatters: 0,
+                direct: true,
+            });
+        }
+    }
+
+    /// Follows all branches of the block to their ends.
+    fn follow(&mut self) {
+        while !self.branches.is_empty() {
+            let mut hits = std::mem::take(&mut self.hits);
+            self.lit.scene.assembly.nearest(&self.lines, &mut hits);
+            for i in 0..self.branches.len() {
+                self.step(&hits, i);
+            }
+            self.connect(&mut hits);
+            self.hits = hits;
+            std::mem::swap(&mut self.lines, &mut self.next_lines);
+            std::mem::swap(&mut self.branches, &mut self.next);
+            self.next_lines.truncate(0);
+            self.next.clear();
+        }
+        self.lines.truncate(0);
+    }
+
+    fn wavelength(&self, path: u32) -> f64 {
+        self.lit.lines[self.paths[path as usize].line].1
+    }
+
+    fn push(&mut self, meeting: &Meeting, d: Vec3, branch: Branch) {
+        self.next_lines.push(meeting.point, d, meeting.leaving);
+        self.next.push(branch);
+    }
+
+    fn step(&mut self, hits: &Hits, i: usize) {
+        let scene = self.lit.scene;
+        let (o, d) = (self.lines.origin(i), self.lines.direction(i));
+        let mut branch = self.branches[i];
+        let wavelength = self.wavelength(branch.path);
+        let absorption = self.fillings.at(scene, branch.inside.top(), wavelength).absorption;
+        self.gather(&branch, o, d, hits.t[i], absorption);
+        if hits.face[i] == NONE {
+            return;
+        }
+        let Ok(meeting) = meet(scene, &self.lines, hits, i, branch.inside, |_, _, _| {}) else {
+            return;
+        };
+        branch.events += 1;
+        if absorption > 0.0 {
+            branch.weight *= (-absorption * meeting.t).exp();
+        }
+        if branch.events > self.method.most_events || branch.weight == 0.0 {
+            return;
+        }
+        let n1 = self.fillings.at(scene, meeting.before.top(), wavelength).n;
+        let n2 = self.fillings.at(scene, meeting.after.top(), wavelength).n;
+        let finish = meeting.finish.map(|f| &scene.finishes[f as usize]);
+        match finish {
+            Some(finish) if !(matches!(finish, Finish::Interface) && n1 == n2) => {
+                self.meet(&branch, d, &meeting, finish, [n1, n2]);
+            }
+            _ => {
+                if let Seen::Diffuse { travelled, .. } = &mut branch.seen {
+                    *travelled += meeting.t;
+                }
+                branch.inside = meeting.after;
+                self.push(&meeting, d, branch);
+            }
+        }
+    }
+
+    /// Looks at the connections of the block: light counts that nothing stands in the way of.
+    fn connect(&mut self, hits: &mut Hits) {
+        let scene = self.lit.scene;
+        if self.connections.is_empty() {
+            return;
+        }
+        scene.assembly.nearest(&self.shadows, hits);
+        for (i, connection) in self.connections.iter().enumerate() {
+            let (o, wavelength) = (
+                self.shadows.origin(i),
+                self.lit.lines[self.paths[connection.path as usize].line].1,
+            );
+            let distance = (connection.to - o).length();
+            let absorption = self.fillings.at(scene, connection.inside.top(), wavelength).absorption;
+            // What lies within rounding of the end is the surface that the end lies on.
+            let free = if hits.t[i] >= distance * (1.0 - TIE) {
+                if absorption == 0.0 {
+                    1.0
+                } else {
+                    (-absorption * distance).exp()
+                }
+            } else {
+                let leaving = self.shadows.leaving(i);
+                transmittance(
+                    scene,
+                    o,
+                    connection.to,
+                    leaving,
+                    connection.inside,
+                    &mut self.fillings,
+                    wavelength,
+                )
+            };
+            let sum = &mut self.paths[connection.path as usize].sum;
+            *sum = [sum[0] + free * connection.light[0], sum[1] + free * connection.light[1]];
+        }
+        self.connections.clear();
+        self.shadows.truncate(0);
+    }
+
+    /// Adds the light of sources that the branch meets before `reach`.
+    fn gather(&mut self, branch: &Branch, o: Vec3, d: Vec3, reach: f64, absorption: f64) {
+        let scene = self.lit.scene;
+        if branch.seen == Seen::Caustic && self.method.without_caustics && branch.direct {
+            return;
+        }
+        // A source that lies on the surface behind it is in front of it.
+        let reach = reach * (1.0 + TIE);
+        let path = &mut self.paths[branch.path as usize];
+        let colour = &self.lit.lines[path.line].2;
+        let sum = &mut path.sum;
+        let mut before = 0.0;
+        for (number, source) in scene.sources.iter().enumerate() {
+            let share = self.lit.shares[number] - before;
+            before = self.lit.shares[number];
+            let Some(lantern) = &self.lit.lanterns[number] else {
+                continue;
+            };
+            lantern.along(source, o, d, reach, |lit| {
+                let mut weight = branch.weight * colour[number];
+                if absorption > 0.0 {
+                    weight *= (-absorption * lit.t).exp();
+                }
+                if let Seen::Diffuse {
+                    density,
+                    travelled,
+                    all,
+                } = branch.seen
+                {
+                    let distance = travelled + lit.t;
+                    let picked = if all { 1.0 } else { share };
+                    let other = picked * lit.density * distance * distance / lit.cosine;
+                    weight *= density / (density + other);
+                }
+                sum[0] += weight * lit.luminance;
+                sum[1] += weight * lit.deviation;
+            });
+        }
+    }
+
+    /// Branches at a surface.
+    fn meet(&mut self, branch: &Branch, d: Vec3, meeting: &Meeting, finish: &Finish, [n1, n2]: [f64; 2]) {
+        let cosine = (-d.dot(meeting.normal)).min(1.0);
+        let wavelength = self.wavelength(branch.path);
+        let here = Incidence {
+            cosine,
+            wavelength,
+            n1,
+            n2,
+        };
+        let (shares, across) = finish.shares(&here);
+        // Light that is transmitted to the eye arrives from the other side, at the angle of refraction.
+        let through = if shares[1] > 0.0 {
+            let there = Incidence {
+                cosine: across,
+                wavelength,
+                n1: n2,
+                n2: n1,
+            };
+            finish.shares(&there).0[1] * (n1 / n2) * (n1 / n2)
+        } else {
+            0.0
+        };
+        let smooth = [shares[0], through];
+        let seen = if branch.seen == Seen::Smooth {
+            Seen::Smooth
+        } else {
+            Seen::Caustic
+        };
+        let go = |wave: &mut Self, transmitted: bool, weight: f64| {
+            let d = if transmitted {
+                meeting.refracted(d, cosine, n1 / n2, across)
+            } else {
+                meeting.mirrored(d, cosine)
+            };
+            let branch = Branch {
+                inside: if transmitted { meeting.after } else { meeting.before },
+                weight,
+                seen,
+                direct: branch.direct && branch.scatters > 0,
+                ..*branch
+            };
+            wave.push(meeting, d, branch);
+        };
+        let diffuse = finish.is_diffuse();
+        // Chains of smooth surfaces branch; everything else is drawn.
+        if branch.seen == Seen::Smooth && branch.weight > SPLIT {
+            for (transmitted, share) in [(false, smooth[0]), (true, smooth[1])] {
+                if share > 0.0 {
+                    go(self, transmitted, branch.weight * share);
+                }
+            }
+            if diffuse {
+                self.scatter(branch, meeting, finish, [n1, n2], 1.0);
+            }
+            return;
+        }
+        // What goes on is drawn by the shares of the flux; radiance carries its factor (n₁/n₂)² besides. Whatever the diffuse
+        // share is from here, light may be scattered to here from elsewhere.
+        let scattered = if diffuse {
+            (shares[2] + shares[3]).max(0.05)
+        } else {
+            0.0
+        };
+        let total = shares[0] + shares[1] + scattered;
+        let mortal = branch.scatters > SURE || branch.weight <= SPLIT;
+        let alive = if mortal { total.min(1.0) } else { 1.0 };
+        let number = self.paths[branch.path as usize].numbers.draw();
+        if total <= 0.0 || number >= alive {
+            return;
+        }
+        let number = number * total / alive;
+        let boost = total / alive;
+        if number < shares[0] {
+            go(self, false, branch.weight * boost);
+        } else if number < shares[0] + shares[1] {
+            go(self, true, branch.weight * smooth[1] / shares[1] * boost);
+        } else if diffuse {
+            self.scatter(branch, meeting, finish, [n1, n2], boost / scattered);
+        }
+    }
+
+    /// A diffuse scatter: connections to sources, and one direction that is drawn. `boost` makes up for the chance that
+    /// it came to this.
+    fn scatter(&mut self, branch: &Branch, meeting: &Meeting, finish: &Finish, n: [f64; 2], boost: f64) {
+        let wavelength = self.wavelength(branch.path);
+        let [n1, n2] = n;
+        let sides = [(false, n1, n2), (true, n2, n1)].map(|(through, n1, n2)| {
+            // How much may come from each side: the angle at which it does is not known yet.
+            let at = |cosine| {
+                let light = Incidence {
+                    cosine,
+                    wavelength,
+                    n1,
+                    n2,
+                };
+                finish.bsdf(&light, through)
+            };
+            [0.9, 0.5, 0.1].map(at).into_iter().fold(0.0, f64::max)
+        });
+        let total = sides[0] + sides[1];
+        if total <= 0.0 {
+            return;
+        }
+        let chances = sides.map(|side| side / total);
+        let all = branch.scatters == 0 && self.lit.scene.sources.len() <= FEW;
+        let branch = Branch {
+            weight: branch.weight * boost,
+            ..*branch
+        };
+        self.reach_out(&branch, meeting, finish, n, chances, all);
+
+        let numbers = &mut self.paths[branch.path as usize].numbers;
+        let (side, turn, height) = (numbers.draw(), numbers.draw(), numbers.draw());
+        let through = side >= chances[0];
+        let chance = chances[usize::from(through)];
+        let normal = if through { -meeting.side } else { meeting.side };
+        let cosine = (1.0 - height).sqrt();
+        let light = Incidence {
+            cosine,
+            wavelength,
+            n1: if through { n2 } else { n1 },
+            n2: if through { n1 } else { n2 },
+        };
+        let share = PI * finish.bsdf(&light, through);
+        if share > 0.0 {
+            let next = Branch {
+                inside: if through { meeting.after } else { meeting.before },
+                weight: branch.weight * share / chance,
+                seen: Seen::Diffuse {
+                    density: chance * cosine * FRAC_1_PI,
+                    travelled: 0.0,
+                    all,
+                },
+                scatters: branch.scatters + 1,
+                ..branch
+            };
+            self.push(meeting, about(normal, cosine, turn), next);
+        }
+    }
+
+    /// Notes connections of a diffuse scatter to the sources.
+    fn reach_out(
+        &mut self,
+        branch: &Branch,
+        meeting: &Meeting,
+        finish: &Finish,
+        [n1, n2]: [f64; 2],
+        chances: [f64; 2],
+        all: bool,
+    ) {
+        let scene = self.lit.scene;
+        let path = &mut self.paths[branch.path as usize];
+        let (_, wavelength, colour) = &self.lit.lines[path.line];
+        let which = if all {
+            0..scene.sources.len()
+        } else {
+            let number = path.numbers.draw();
+            let last = scene.sources.len().saturating_sub(1);
+            let pick = self.lit.shares.partition_point(|s| *s < number).min(last);
+            pick..scene.sources.len().min(pick + 1)
+        };
+        for number in which {
+            let Some(lantern) = &self.lit.lanterns[number] else {
+                continue;
+            };
+            let before = if number == 0 { 0.0 } else { self.lit.shares[number - 1] };
+            let picked = if all { 1.0 } else { self.lit.shares[number] - before };
+            let source = &scene.sources[number];
+            let Some(beacon) = lantern.pick(source, meeting.point, &mut path.numbers) else {
+                continue;
+            };
+            let k = (beacon.point - meeting.point).normalized();
+            let height = k.dot(meeting.side);
+            let through = height < 0.0;
+            let cosine = height.abs();
+            let light = Incidence {
+                cosine,
+                wavelength: *wavelength,
+                n1: if through { n2 } else { n1 },
+                n2: if through { n1 } else { n2 },
+            };
+            let bsdf = finish.bsdf(&light, through);
+            if bsdf * cosine * beacon.irradiance <= 0.0 {
+                continue;
+            }
+            let mut share = branch.weight * colour[number] * bsdf * cosine / picked;
+            if beacon.density.is_finite() {
+                let mine = picked * beacon.density;
+                share *= mine / (mine + chances[usize::from(through)] * cosine * FRAC_1_PI);
+            }
+            self.shadows.push(meeting.point, k, meeting.leaving);
+            self.connections.push(Connection {
+                path: branch.path,
+                light: [share * beacon.irradiance, share * beacon.deviation],
+                inside: if through { meeting.after } else { meeting.before },
+                to: beacon.point,
+            });
+        }
+    }
+}

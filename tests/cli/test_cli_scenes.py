@@ -1,0 +1,185 @@
+"""The command line on scenes: every verb gives the numbers of the API, and an interruption leaves a valid result."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.cli import app as program
+from etendue.cli import trace as trace_verb
+from etendue.tracing.running import Rounds
+
+SCENE: dict[str, Any] = {
+    "name": "lamp",
+    "sources": [{"name": "led", "kind": "surface", "shape": {"kind": "rectangle", "width": 2, "height": 1}, "flux": 90}],
+    "surfaces": [{"name": "wall", "shape": {"kind": "rectangle", "width": 30, "height": 20}, "at": [9, 0, 5],
+                  "toward": [-1, 0, 0.2], "finish": {"kind": "lambertian", "reflectance": 0.7}}],
+    "detectors": [
+        {"name": "rcs", "kind": "rays", "shape": {"kind": "disk", "radius": 20}, "at": [0, 0, 15]},
+        {"name": "far", "kind": "intensity", "c_planes": 6, "gamma_step": 30},
+        {"name": "work top/2", "kind": "illuminance", "width": 40, "height": 30, "columns": 3, "rows": 2, "at": [0, 0, 30],
+         "toward": [0, 0, -1]},
+    ],
+    "observers": [
+        {"name": "left eye", "theta": 40, "phi": 10, "distance": 100,
+         "screen": {"width": 20, "height": 20, "columns": 5, "rows": 4}},
+        {"name": "right", "theta": 40, "phi": 20, "distance": 100,
+         "screen": {"width": 20, "height": 20, "columns": 5, "rows": 4}},
+    ],
+}  # fmt: skip
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Run the program in a folder with the scene, in this process."""
+    monkeypatch.setenv("COLUMNS", "300")
+    monkeypatch.chdir(tmp_path)
+    et.Scene(**SCENE).save(tmp_path / "lamp.toml")
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        capsys.readouterr()
+        monkeypatch.setattr(sys, "argv", ["etendue", *map(str, arguments)])
+        with pytest.raises(SystemExit) as leaving:
+            program.main()
+        out, err = capsys.readouterr()
+        return int(leaving.value.code or 0), out, err
+
+    return call
+
+
+def test_trace_is_the_trace_of_the_api(run: Run, tmp_path: Path) -> None:
+    outputs = ["r.h5", "rcs.tm25ray", "far.ies", "top.npz", "{detector}.png"]
+    status, out, _ = run(
+        "trace", "lamp.toml", "--rays", "1e5", "--seed", "3", "--json", *itertools.chain(*(["-o", o] for o in outputs))
+    )
+    assert status == 0
+    result = et.trace(et.Scene(**SCENE), 1e5, 3)
+    facts = json.loads(out)
+    assert facts["ledger"] == result.ledger.to_dict()
+    assert facts["rays_done"] == 100_000
+    assert set(facts["outputs"]) == {"r.h5", "rcs.tm25ray", "far.ies", "top.npz", "far.png", "work-top-2.png"}
+    assert all((tmp_path / name).exists() for name in facts["outputs"])
+    assert et.TraceResult.load(tmp_path / "r.h5").ledger == result.ledger
+    top = et.read_illuminance_map(tmp_path / "top.npz")
+    np.testing.assert_array_equal(top.values, result.illuminance.only.values)
+    assert len(et.read_rays(tmp_path / "rcs.tm25ray")) == len(result.rays.only)
+    assert et.read_intensity(tmp_path / "far.ies").maximum == pytest.approx(result.intensity.only.maximum, rel=1e-4)
+
+
+def test_trace_says_what_became_of_the_light(run: Run) -> None:
+    status, out, _ = run("trace", "lamp.toml", "--rays", "20000")
+    assert status == 0
+    for text in ("lamp: 20,000 rays", "emitted", "led", "wall", "escaped", "rcs:", "far:", "work top/2:"):
+        assert text in out
+
+
+def test_an_interruption_leaves_a_valid_result(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        rounds = et.trace_rounds(*arguments, **options)
+
+        class Interrupted(Rounds):
+            def __init__(self) -> None:
+                self.plan = rounds.plan
+                self._inner: Iterator[et.TraceResult] = itertools.islice(rounds, 2)
+
+            def __next__(self) -> et.TraceResult:
+                for result in self._inner:
+                    return result
+                raise KeyboardInterrupt
+
+        return Interrupted()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(trace_verb, "trace_rounds", interrupted)
+        status, out, err = run("trace", "lamp.toml", "--rays", "4e6", "-o", "part.h5", "-o", "top.csv")
+    assert status == 130
+    assert "valid result" in err
+    part = et.TraceResult.load(tmp_path / "part.h5")
+    assert part.rays_done == 2 << 20
+    assert part.ledger.closes
+    assert et.read_illuminance_map(tmp_path / "top.csv").mean == part.illuminance.only.mean
+    assert "were traced" in out
+    status, _, _ = run("trace", "lamp.toml", "--resume", "part.h5", "-o", "whole.h5")
+    assert status == 0
+    whole = et.TraceResult.load(tmp_path / "whole.h5")
+    assert whole.complete
+    assert whole.ledger == et.trace(et.Scene(**SCENE), 4e6).ledger
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "text"),
+    [
+        (["--rays", "many"], 2, "whole number"),
+        (["--rays", "1.5"], 2, "whole number"),
+        (["-o", "a.xyz"], 1, ".xyz"),
+        (["-o", "no/a.h5"], 1, "does not exist"),
+        (["-o", "both.png"], 1, "{detector}"),
+        (["-o", "{detctor}.png"], 1, "{detector}"),
+        (["-o", "picture.hdr"], 1, "no detector of the kind image"),
+        (["--until", "0"], 1, "until"),
+        (["--sed", "1"], 2, "--seed"),
+    ],
+)
+def test_mistakes_are_found_before_any_ray_is_traced(
+    arguments: list[str], status: int, text: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Rounds, "__next__", lambda _: pytest.fail("it began to trace"))
+    before = set(tmp_path.iterdir())
+    found, out, err = run("trace", "lamp.toml", *arguments)
+    assert found == status
+    assert text in out + err
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_luminance_of_the_observers_of_a_scene(run: Run, tmp_path: Path) -> None:
+    status, out, _ = run(
+        "luminance", "lamp.toml", "--rays-per-pixel", "16", "--seed", "2", "-o", "{observer}.npz", "--json"
+    )
+    assert status == 0
+    maps = et.luminance_map(et.Scene(**SCENE), rays_per_pixel=16, seed=2)
+    for name, lmap in zip(("left-eye", "right"), maps, strict=True):
+        np.testing.assert_array_equal(et.read_map(tmp_path / f"{name}.npz").values, lmap.values)
+    assert [m["outputs"] for m in json.loads(out)["maps"]] == [["left-eye.npz"], ["right.npz"]]
+
+
+def test_luminance_of_a_scene_for_another_observer(run: Run, tmp_path: Path) -> None:
+    view = ["--observer", "30,5", "--distance", "90", "--size", "10,8", "--pixels", "5,4"]
+    status, _, _ = run("luminance", "lamp.toml", *view, "--rays-per-pixel", "16", "--until", "0.2", "-o", "a.npz")
+    assert status == 0
+    expected = et.luminance_map(
+        et.Scene(**SCENE), et.Observer(30, 5, 90), et.Screen(10, 8, 5, 4), rays_per_pixel=16, until=0.2
+    )
+    np.testing.assert_array_equal(et.read_map(tmp_path / "a.npz").values, expected.values)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["lamp.toml", "--samples", "3", "-o", "{observer}.npz"], "--samples"),
+        (["lamp.toml", "--method", "cone", "-o", "{observer}.npz"], "--method"),
+        (["lamp.toml", "--unit", "W", "-o", "{observer}.npz"], "--unit"),
+        (["lamp.toml", "--observer", "3,4", "-o", "a.npz"], "--size"),
+        (["lamp.toml", "--size", "3,4", "-o", "a.npz"], "--observer"),
+        (["other.ray", "--observer", "0,0", "--size", "3,4", "--until", "0.1", "-o", "a.npz"], "--until"),
+        (["other.ray", "--size", "3,4", "-o", "a.npz"], "--observer"),
+    ],
+)
+def test_options_that_do_not_apply_are_refused(arguments: list[str], text: str, run: Run) -> None:
+    status, out, err = run("luminance", *arguments)
+    assert status == 2
+    assert text in out + err
+
+
+def test_several_observers_do_not_write_to_one_file(run: Run) -> None:
+    status, _, err = run("luminance", "lamp.toml", "-o", "a.npz")
+    assert status == 1
+    assert "{observer}" in err
