@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from etendue.plot import style
 from etendue.plot.labels import LabelPlacer
-from etendue.plot.scene_layout import FINISH_KINDS, Glow, SceneLayout, View
+from etendue.plot.scene_layout import SceneLayout
+from etendue.plot.scene_parts import FINISH_KINDS, Glow, View
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -31,11 +32,13 @@ FILLS = ("#d8e7f6", "#fbefbf", "#a9c6e3", "#e6cd8c", "#e3e3e8", "#7f9fc4", "#c4c
 OPAQUE = "#8d9199"
 """Of solids that no light enters."""
 SOURCE, RAY, DETECTOR, OBSERVER = "#d1622b", "#b8862b", "#8a4fa3", "#5b6770"
-FADE = 0.8
-"""Of a ray, from one part to the next; what is fainter than `FAINTEST` is not drawn."""
-FAINTEST = 0.08
+STRONGEST, FADE, FAINTEST = 0.85, 0.85, 0.06
+"""Opacity of a ray where it starts; what is left of it from one part to the next, beside the square of the cosine between
+the part and the section; and where the ray is given up: a scattered one soon is, one that stays in the section is not."""
 EMISSION = 0.035
 """Length of the light drawn at a source, as a share of the frame's smaller side."""
+DIRECTIONS = 16
+"""Strokes at a source that is no surface."""
 MOST_LABELS = 16
 LABEL_SIZE = 7.5
 
@@ -77,7 +80,10 @@ def legend_handles(layout: SceneLayout) -> list[tuple[Artist, str]]:
         name, index = layout.media[number]
         filled = [part.name for part in solids.values() if part.medium == number]
         if filled:
-            handles.append((Patch(facecolor=colour, **edge), f"{_short(', '.join(filled), 40)}: {name}, n = {index:.4g}"))
+            # A medium that is described in its solid has the solid's name.
+            what = "" if name in {f"{solid}.medium" for solid in filled} else f"{name}, "
+            text = f"{_short(', '.join(filled), 40)}: {what}n = {index:.4g}"
+            handles.append((Patch(facecolor=colour, **edge), text))
     if layout.media[0][1] != 1.0:
         name, index = layout.media[0]
         handles.append((Patch(facecolor="white", **edge), f"surroundings: {name}, n = {index:.4g}"))
@@ -176,29 +182,28 @@ def _trails(axes: Axes, view: View, placer: LabelPlacer) -> None:
 
     left, right, bottom, top = view.window
     segments, colours = [], []
-    for trail in view.trails:
-        strength = 0.85
-        flat = view.section.flat(trail.points)
-        step = np.diff(trail.points, axis=0)
-        length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(np.float64).tiny)
+    for points in view.trails:
+        strength = STRONGEST
+        flat = view.section.flat(points)
+        length = np.maximum(np.linalg.norm(np.diff(points, axis=0), axis=1), np.finfo(np.float64).tiny)
         along = np.hypot(*np.diff(flat, axis=0).T) / length
         last = None
-        for i in range(len(flat) - 1):
-            alpha = strength * (0.35 + 0.65 * along[i])
-            inside = _clip(flat[i], flat[i + 1], view.window)
-            if inside is not None:
-                segments.append(inside)
-                colours.append((*to_rgb(RAY), alpha))
-                last = inside, alpha
-                placer.draw(_inches(view, placer, inside), 0.25)
-            strength *= FADE
+        for a, b, share in zip(flat, flat[1:], along, strict=False):
+            strength *= share * share
             if strength < FAINTEST:
                 break
+            inside = _clip(a, b, view.window)
+            if inside is not None:
+                segments.append(inside)
+                colours.append((*to_rgb(RAY), strength))
+                last = inside, strength
+                placer.draw(_inches(view, placer, inside), 0.25)
+            strength *= FADE
         else:
-            if last is not None and trail.escaped:
+            if left < flat[-1, 0] < right and bottom < flat[-1, 1] < top:
+                axes.plot(*flat[-1], marker="o", markersize=2.2, color=RAY, markeredgewidth=0.0, zorder=4.1)
+            elif last is not None:
                 _arrow(axes, last[0], last[1], view)
-            elif not trail.escaped and left < flat[-1, 0] < right and bottom < flat[-1, 1] < top:
-                axes.plot(*flat[-1], marker="o", markersize=2.0, color=RAY, markeredgewidth=0.0, alpha=0.9, zorder=4.1)
     axes.add_collection(LineCollection(segments, colors=colours, linewidths=0.7, zorder=4.0), autolim=False)
 
 
@@ -242,20 +247,31 @@ def _glow(axes: Axes, view: View, glow: Glow, placer: LabelPlacer) -> None:
             strokes += _strokes(curve, glow, reach)
             placer.draw(_inches(view, placer, _thinned(curve)))
     elif len(glow.start):
-        one_point = bool((np.ptp(glow.start, axis=0) <= 1e-3 * reach).all())
-        if one_point:
-            axes.plot(*glow.start[0], marker="o", markersize=5.0, color=SOURCE, markeredgewidth=0.0, zorder=5.0)
-            strokes += [np.array([p + 1.3 * reach * d, p + 2.2 * reach * d]) for p, d in _few(glow, 24)]
+        spread = float(np.ptp(glow.start, axis=0).max())
+        if spread <= 1e-3 * reach:
+            axes.plot(*glow.start[0], marker="o", markersize=4.5, color=SOURCE, markeredgewidth=0.0, zorder=5.0)
+            strokes += _rays_of_a_point(glow, reach)
         else:
             axes.scatter(*glow.start.T, s=2.0, color=SOURCE, linewidths=0.0, alpha=0.7, zorder=5.0)
-            strokes += [np.array([p, p + 1.5 * reach * d]) for p, d in _few(glow, 24)]
+            few = zip(glow.start[:DIRECTIONS], glow.direction[:DIRECTIONS], strict=True)
+            strokes += [np.array([p, p + min(reach, spread) * d]) for p, d in few]
         for point in glow.start[:24]:
             placer.draw(_inches(view, placer, np.array([point, point])))
     axes.add_collection(LineCollection(strokes, colors=SOURCE, linewidths=0.8, zorder=5.0, alpha=0.9), autolim=False)
 
 
-def _few(glow: Glow, most: int) -> list[tuple[Array, Array]]:
-    return list(zip(glow.start[:most], glow.direction[:most], strict=True))
+def _rays_of_a_point(glow: Glow, reach: float) -> list[Array]:
+    """Strokes around a point source, the longer the more light goes their way."""
+    angle = np.arctan2(glow.direction[:, 1], glow.direction[:, 0])
+    sector = np.floor(angle * DIRECTIONS / (2.0 * np.pi) + 0.5).astype(np.int64) % DIRECTIONS
+    flux = np.bincount(sector, np.hypot(*glow.direction.T), DIRECTIONS)
+    found = []
+    for number, share in enumerate(flux / flux.max()):
+        turn = 2.0 * np.pi * number / DIRECTIONS
+        toward = np.array([np.cos(turn), np.sin(turn)])
+        if share > 0.02:
+            found.append(glow.start[0] + np.outer([0.8 * reach, (1.0 + share) * reach], toward))
+    return found
 
 
 def _strokes(curve: Array, glow: Glow, reach: float) -> list[Array]:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.plot.scene_parts import Glow, Part, View, finish_kind
 from etendue.scene import MEDIA, Compiled, Medium, Scene, compile_scene
 from etendue.scene.extents import box_of
 from etendue.tracing.section_chains import rings
@@ -18,7 +19,6 @@ from etendue.tracing.trails import (
     CANDIDATES,
     MOST_TRACED,
     MOST_TRAILS,
-    Trail,
     near_section,
     sample_source,
     trace_trails,
@@ -39,77 +39,10 @@ SAMPLE = 240
 """Rays by which a source shows where and how it sends out light."""
 MOST_SAMPLED = 64
 """Sources that are sampled; of more, every so manieth."""
+FAR = 1e3
+"""Times the size of it all: how far rays are followed that leave the scene, or go on to a plane without an end."""
 JOINED = 1e-6
 """Of a solid's size: how far apart the ends of its faces may lie that meet."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Part:
-    """A solid, a surface, a source or a detector as a section shows it.
-
-    Parameters
-    ----------
-    name : str
-    kind : str
-        Of a face its finish: one of `FINISH_KINDS`; else ``source``, ``detector``.
-    curves : list of arrays, shape (k, 2)
-        [mm]
-    rings : list of arrays, shape (k, 2)
-        Of a solid: the borders of what it fills.
-    medium : int or None
-        Of a solid: its number.
-    """
-
-    name: str
-    kind: str
-    curves: list[Array]
-    rings: list[Array] = dataclasses.field(default_factory=list)
-    medium: int | None = None
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Glow:
-    """A source: where its light starts and where it goes [mm], projected onto a section.
-
-    Parameters
-    ----------
-    name : str
-    curves : list of arrays, shape (k, 2)
-        Where the section cuts a luminous surface.
-    start, direction : arrays, shape (n, 2)
-        Of rays; directions are shorter where they point out of the section.
-    """
-
-    name: str
-    curves: list[Array]
-    start: Array
-    direction: Array
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class View:
-    """One section with everything in it; lengths in mm.
-
-    Parameters
-    ----------
-    section : Section
-    window : left, right, bottom, top
-    faces : list of Part
-        One for each face that is cut.
-    solids : list of Part
-        One for each solid that is cut.
-    sources : list of Glow
-    detectors : list of Part
-    trails : list of Trail
-    """
-
-    section: Section
-    window: Window
-    faces: list[Part]
-    solids: list[Part]
-    sources: list[Glow]
-    detectors: list[Part]
-    trails: list[Trail]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -122,7 +55,8 @@ class SceneLayout:
     compiled : Compiled
     views : tuple of View
     bounds : array, shape (2, 3)
-        Lowest and highest x, y, z of what is shown and has an end [mm]; NaN along an axis that no section shows.
+        Lowest and highest x, y, z of the boxes of all solids and surfaces that have an end, and of the sources [mm]; half
+        spaces that trim them do not count. NaN if there are none.
     media : dict
         By number of the medium: name and refractive index.
     wavelength : float
@@ -199,8 +133,8 @@ def lay_out_scene(
     --------
     >>> ball = {"name": "ball", "shape": {"kind": "ball", "radius": 2}, "medium": "PMMA"}
     >>> layout = lay_out_scene(Scene(solids=[ball]), "y=1")
-    >>> layout.bounds.round(6).tolist()[1], layout.views[0].faces[0].name
-    ([1.732051, nan, 1.732051], 'ball.surface')
+    >>> layout.bounds[1].tolist(), layout.views[0].faces[0].name
+    ([2.0, 2.0, 2.0], 'ball.surface')
     """
     planes = [Section.parse(text) for text in ([section] if isinstance(section, str) else section)]
     if not 1 <= len(planes) <= MOST_SECTIONS:
@@ -234,7 +168,7 @@ class _Draughtsman:
             (name, source, *sample_source(self.compiled, source, SAMPLE, seed))
             for name, source in list(zip(self.compiled.source_names, self.record["sources"], strict=True))[::step]
         ]
-        self.bounds = np.array([[np.inf] * 3, [-np.inf] * 3])
+        self.seen = np.array([[np.inf] * 3, [-np.inf] * 3])
 
     def layout(self) -> SceneLayout:
         faces = self.record["faces"]
@@ -254,10 +188,9 @@ class _Draughtsman:
             View(plane, window, self._faces(cut), self._solids(cut), glow, self._detectors(shown, plane), trail)
             for plane, window, cut, glow, trail in zip(self.planes, windows, curves, glows, trails, strict=True)
         )
-        bounds = np.where(np.isfinite(self.bounds), self.bounds, np.nan)
         media, wavelength = self._media()
         return SceneLayout(
-            self.scene, self.compiled, views, bounds, media, wavelength, self._uncut(curves), beyond, self.rays, self.seed
+            self.scene, self.compiled, views, self._extent(), media, wavelength, self._uncut(curves), beyond, self.rays, self.seed
         )
 
     # --- what is cut ---------------------------------------------------------------------------------------------------
@@ -273,8 +206,17 @@ class _Draughtsman:
             if len(curve):
                 for i, axis in enumerate((plane.across, plane.up)):
                     k = "xyz".index(axis)
-                    self.bounds[0, k] = min(self.bounds[0, k], curve[:, i].min())
-                    self.bounds[1, k] = max(self.bounds[1, k], curve[:, i].max())
+                    self.seen[0, k] = min(self.seen[0, k], curve[:, i].min())
+                    self.seen[1, k] = max(self.seen[1, k], curve[:, i].max())
+
+    def _extent(self) -> Array:
+        """Of all solids, surfaces and sources that have an end."""
+        things = [_placed_box(face) for face in (*self.record["faces"], *self.record["sources"]) if "shape" in face]
+        boxes = [box for box in things if np.isfinite(box).all()]
+        boxes += [np.array([start.min(axis=0), start.max(axis=0)]) for _, _, start, _ in self.sources if len(start)]
+        if not boxes:
+            return np.full((2, 3), np.nan)
+        return np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
 
     def _faces(self, curves: list[list[Array]]) -> list[Part]:
         kinds = [finish_kind(finish) for finish in self.record["finishes"]]
@@ -325,19 +267,19 @@ class _Draughtsman:
                 boxes[i] = _placed_box(detector)
         shown: list[int] = []
         for i in sorted(boxes, key=lambda i: self._growth(boxes[i])):
-            alone = not np.isfinite(self.bounds).any()
+            alone = not np.isfinite(self.seen).any()
             if self.window is not None or (np.isfinite(boxes[i]).all() and (alone or self._growth(boxes[i]) <= FARTHEST)):
                 shown.append(i)
                 low, high = np.where(np.isfinite(boxes[i]), boxes[i], np.nan)
                 seen = sorted({"xyz".index(axis) for p in self.planes for axis in (p.across, p.up)})
-                self.bounds[0, seen] = np.fmin(self.bounds[0, seen], low[seen])
-                self.bounds[1, seen] = np.fmax(self.bounds[1, seen], high[seen])
+                self.seen[0, seen] = np.fmin(self.seen[0, seen], low[seen])
+                self.seen[1, seen] = np.fmax(self.seen[1, seen], high[seen])
         return shown, tuple(self.compiled.detector_names[i] for i in boxes if i not in shown)
 
     def _growth(self, box: Array) -> float:
         """How many times larger the frame becomes with a box."""
-        both = np.array([np.fmin(self.bounds[0], box[0]), np.fmax(self.bounds[1], box[1])])
-        now = np.where(np.isfinite(self.bounds).all(axis=0), self.bounds[1] - self.bounds[0], 0.0).max()
+        both = np.array([np.fmin(self.seen[0], box[0]), np.fmax(self.seen[1], box[1])])
+        now = np.where(np.isfinite(self.seen).all(axis=0), self.seen[1] - self.seen[0], 0.0).max()
         return float((both[1] - both[0]).max()) / now if now > 0.0 else np.inf
 
     def _detectors(self, shown: list[int], plane: Section) -> list[Part]:
@@ -345,13 +287,14 @@ class _Draughtsman:
         names = [self.compiled.detector_names[i] for i in shown]
         return [Part(n, "detector", c) for n, c in zip(names, cut_faces(faces, plane), strict=True) if c]
 
-    def _trails(self, windows: list[Window]) -> list[list[Trail]]:
+    def _trails(self, windows: list[Window]) -> list[list[Array]]:
         """For each view the rays that it shows, out of the same ones for all."""
-        corners = np.array([plane.points(np.array(w).reshape(2, 2).T) for plane, w in zip(self.planes, windows, strict=True)])
-        size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-        starts = [start for _, _, start, _ in self.sources if len(start)]
-        away = float(np.abs(np.concatenate(starts) - corners[0, 0]).max()) if starts else 0.0
-        traced = trace_trails(self.compiled, min(CANDIDATES * self.rays, MOST_TRACED), self.seed, 4.0 * (size + away))
+        frames = [plane.points(np.array(w).reshape(2, 2).T) for plane, w in zip(self.planes, windows, strict=True)]
+        size = float(np.ptp(np.concatenate(frames), axis=0).max())
+        things = [_placed_box(thing) for key in ("faces", "detectors") for thing in self.record[key] if "frame" in thing]
+        points = np.concatenate([*frames, *things, *(start for _, _, start, _ in self.sources)])
+        far = FAR * float(np.ptp(np.where(np.isfinite(points), points, 0.0), axis=0).max())
+        traced = trace_trails(self.compiled, min(CANDIDATES * self.rays, MOST_TRACED), self.seed, far)
         return [near_section(traced, plane, self.rays, 0.1 * size) for plane in self.planes]
 
     # --- frames and media ----------------------------------------------------------------------------------------------
@@ -361,10 +304,10 @@ class _Draughtsman:
         if self.window is not None:
             return [self.window] * len(self.planes)
         targets = [np.array([o.target, o.target]) for o in self.scene.observers]
-        for box in targets if not np.isfinite(self.bounds).any() else []:
+        for box in targets if not np.isfinite(self.seen).any() else []:
             self._reach(Section("y", 0.0), [Section("y", 0.0).flat(box)])
             self._reach(Section("x", 0.0), [Section("x", 0.0).flat(box)])
-        low, high = np.where(np.isfinite(self.bounds), self.bounds, 0.0)
+        low, high = np.where(np.isfinite(self.seen), self.seen, 0.0)
         size = float((high - low).max())
         size = size if size > 0.0 else max(1e-9 * float(np.abs(low).max()), 10.0)
         middle, half = (low + high) / 2.0, np.maximum(high - low, NARROWEST * size) / 2.0 + MARGIN * size
@@ -397,43 +340,17 @@ def _surfaces(compiled: Compiled) -> list[tuple[str, int]]:
 
 
 def _detector_face(detector: Record) -> Record:
-    if detector["kind"] == "rays":
+    if "shape" in detector:
         return detector
     outline = {"kind": "rectangle", "width": detector["width"], "height": detector["height"]}
     return {"shape": {"kind": "flat", "outline": outline}, "frame": detector["frame"], "trims": []}
 
 
-def _placed_box(detector: Record) -> Array:
-    """The box around a detector in the world; infinite where it has no end."""
-    face = _detector_face(detector)
+def _placed_box(thing: Record) -> Array:
+    """The box around a face or a detector in the world; infinite if it has no end."""
+    face = _detector_face(thing)
     box, frame = box_of(face["shape"]), np.asarray(face["frame"], dtype=np.float64)
     if not np.isfinite(box).all():
         return np.array([[-np.inf] * 3, [np.inf] * 3])
     corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) @ frame[3:].reshape(3, 3) + frame[:3]
     return np.array([corners.min(axis=0), corners.max(axis=0)])
-
-
-FINISH_KINDS = ("interface", "mirror", "scatterer", "transparent", "absorber")
-
-
-def finish_kind(finish: Record) -> str:
-    """What a finish mostly does, as one of `FINISH_KINDS`: by the largest of its shares.
-
-    Examples
-    --------
-    >>> from etendue.scene.finishes import Lambertian
-    >>> from etendue.scene.files import Files
-    >>> finish_kind(Lambertian(reflectance=0.9).record(Files()))
-    'scatterer'
-    """
-    if finish["kind"] == "fresnel":
-        return "interface"
-    does = {
-        "specular_reflectance": "mirror",
-        "specular_transmittance": "transparent",
-        "diffuse_reflectance": "scatterer",
-        "diffuse_transmittance": "scatterer",
-    }
-    most = {part: float(np.max(finish[part]["values"])) for part in does}
-    part = max(most, key=lambda p: most[p])
-    return does[part] if most[part] > 0.0 else "absorber"

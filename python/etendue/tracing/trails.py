@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -24,28 +23,7 @@ MOST_TRACED = 20_000
 MOST_TRAILS = 1000
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Trail:
-    """Where a ray started, turned and ended.
-
-    Parameters
-    ----------
-    points : array, shape (k, 3)
-        [mm]
-    escaped : bool
-        Whether it left the scene; its last point then lies somewhere on its way.
-
-    Examples
-    --------
-    >>> Trail(np.zeros((2, 3)), escaped=False).escaped
-    False
-    """
-
-    points: Array
-    escaped: bool
-
-
-def trace_trails(compiled: Compiled, rays: int, seed: int, far: float) -> list[Trail]:
+def trace_trails(compiled: Compiled, rays: int, seed: int, far: float) -> list[Array]:
     """The trails of a number of rays, dealt to the sources by their flux.
 
     Parameters
@@ -55,35 +33,36 @@ def trace_trails(compiled: Compiled, rays: int, seed: int, far: float) -> list[T
         0 to `MOST_TRACED`.
     seed : int
     far : float
-        How far behind its last turn the trail of a ray ends that escapes [mm].
+        How far behind its last turn the trail of a ray ends that leaves the scene [mm]; more than the scene is wide.
+
+    Returns
+    -------
+    list of arrays, each of shape (k, 3), k ≥ 2
+        Where each ray starts, turns, passes a detector, and ends [mm].
 
     Examples
     --------
     >>> from etendue.scene import Scene, compile_scene
     >>> beam = {"kind": "beam", "shape": {"kind": "disk", "radius": 1}, "flux": 1}
     >>> mirror = {"shape": {"kind": "disk", "radius": 2}, "finish": "mirror", "at": [0, 0, 5]}
-    >>> trail = trace_trails(compile_scene(Scene(sources=[beam], surfaces=[mirror])), 1, 1, 100.0)[0]
-    >>> trail.points[:, 2].round(9).tolist(), trail.escaped
-    ([0.0, 5.0, -95.0], True)
+    >>> (trail,) = trace_trails(compile_scene(Scene(sources=[beam], surfaces=[mirror])), 1, 1, 100.0)
+    >>> trail[:, 2].round(9).tolist()
+    [0.0, 5.0, -95.0]
     """
     if not (rays and compiled.record["sources"]):
         return []
     found = _core.trace_trails(_core.Scene(compiled.record), rays, seed, MOST_EVENTS, far)
-    return [Trail(points, _ends_at(points, far)) for points in found if len(points) > 1]
+    return [points for points in found if len(points) > 1]
 
 
-def _ends_at(points: Array, far: float) -> bool:
-    return bool(abs(np.linalg.norm(points[-1] - points[-2]) - far) <= 1e-9 * far)
-
-
-def near_section(trails: list[Trail], section: Section, count: int, size: float) -> list[Trail]:
+def near_section(trails: list[Array], section: Section, count: int, size: float) -> list[Array]:
     """The trails that begin nearest to a section and most nearly along it.
 
     Only beginnings count, so that what becomes of the rays has no say in which of them are shown.
 
     Parameters
     ----------
-    trails : list of Trail
+    trails : list of arrays, each of shape (k, 3)
     section : Section
     count : int
         How many at most.
@@ -92,14 +71,14 @@ def near_section(trails: list[Trail], section: Section, count: int, size: float)
 
     Examples
     --------
-    >>> straight = [Trail(np.array([[0.0, y, 0], [0, y, 1]]), escaped=True) for y in (3.0, 1.0, 2.0)]
-    >>> [t.points[0, 1] for t in near_section(straight, Section("y", 0.0), 2, 1.0)]
+    >>> straight = [np.array([[0.0, y, 0.0], [0.0, y, 1.0]]) for y in (3.0, 1.0, 2.0)]
+    >>> [float(trail[0, 1]) for trail in near_section(straight, Section("y", 0.0), 2, 1.0)]
     [1.0, 2.0]
     """
     if not trails:
         return []
-    starts = np.array([trail.points[0] for trail in trails])
-    along = np.array([trail.points[1] for trail in trails]) - starts
+    starts = np.array([trail[0] for trail in trails])
+    along = np.array([trail[1] for trail in trails]) - starts
     lean = along / np.maximum(np.linalg.norm(along, axis=1), np.finfo(np.float64).tiny)[:, None]
     aside = np.abs(lean[:, section.index]) + np.abs(section.depth(starts)) / size
     kept = np.sort(np.argsort(aside, kind="stable")[:count])
