@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -66,7 +67,7 @@ class LabelPlacer:
 
     def draw(self, curve: Array, weight: float = 1.0) -> None:
         """Mark the cells along a line as less welcome."""
-        for a, b in zip(curve, curve[1:], strict=False):
+        for a, b in itertools.pairwise(curve):
             if not np.isfinite([a, b]).all():
                 continue
             low, high = np.minimum(a, b), np.maximum(a, b)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -10,28 +11,16 @@ import numpy.typing as npt
 from etendue.plot import style
 from etendue.plot.labels import LabelPlacer
 from etendue.plot.scene_layout import SceneLayout
+from etendue.plot.scene_legend import DETECTOR, FINISH_LINES, OBSERVER, OPAQUE, RAY, SOURCE, fill_colours, shortened
 from etendue.plot.scene_parts import FINISH_KINDS, Glow, View
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 Array = npt.NDArray[np.float64]
 
-FINISH_LINES: dict[str, dict[str, Any]] = {
-    "interface": {"color": "#4d5a66", "linewidth": 0.9},
-    "mirror": {"color": "#1f5aa6", "linewidth": 2.0},
-    "scatterer": {"color": "#3c8d5a", "linewidth": 2.4, "linestyle": (0, (1.6, 0.7))},
-    "transparent": {"color": "#6b6b76", "linewidth": 1.0, "linestyle": (0, (1.0, 1.5))},
-    "absorber": {"color": "#1c1c22", "linewidth": 2.4},
-}
-"""By what a finish does: told apart by width and dashes as well as by colour."""
-
-FILLS = ("#d8e7f6", "#fbefbf", "#a9c6e3", "#e6cd8c", "#e3e3e8", "#7f9fc4", "#c4c7d0", "#f3dcae")
-"""Of media: blues, yellows and greys in alternating depth, which all eyes tell apart."""
-OPAQUE = "#8d9199"
-"""Of solids that no light enters."""
-SOURCE, RAY, DETECTOR, OBSERVER = "#d1622b", "#b8862b", "#8a4fa3", "#5b6770"
+NEAR = 0.15
+"""Of the frame: rays that start so far from the section are drawn with 1/e of the opacity."""
 STRONGEST, FADE, FAINTEST = 0.85, 0.85, 0.06
 """Opacity of a ray where it starts; what is left of it from one part to the next, beside the square of the cosine between
 the part and the section; and where the ray is given up: a scattered one soon is, one that stays in the section is not."""
@@ -65,51 +54,9 @@ def draw_view(axes: Axes, view: View, layout: SceneLayout, inches: tuple[float, 
     _observers(axes, view, layout, placer)
     _names(axes, view, placer)
     if not (view.faces or view.sources or view.detectors):
-        axes.text(0.5, 0.5, "nothing is cut here", transform=axes.transAxes, ha="center", va="center", color=style.FAINT)
-
-
-def legend_handles(layout: SceneLayout) -> list[tuple[Artist, str]]:
-    """What the colours and lines mean: media with their solids, then finishes, sources, rays and detectors that are shown."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    handles: list[tuple[Artist, str]] = []
-    solids = {part.name: part for view in layout.views for part in view.solids}
-    edge = {"edgecolor": FINISH_LINES["interface"]["color"], "linewidth": 0.6}
-    for number, colour in fill_colours(layout).items():
-        name, index = layout.media[number]
-        filled = [part.name for part in solids.values() if part.medium == number]
-        if filled:
-            # A medium that is described in its solid has the solid's name.
-            what = "" if name in {f"{solid}.medium" for solid in filled} else f"{name}, "
-            text = f"{_short(', '.join(filled), 40)}: {what}n = {index:.4g}"
-            handles.append((Patch(facecolor=colour, **edge), text))
-    if layout.media[0][1] != 1.0:
-        name, index = layout.media[0]
-        handles.append((Patch(facecolor="white", **edge), f"surroundings: {name}, n = {index:.4g}"))
-    opaque = [part.name for part in solids.values() if part.medium is None]
-    if opaque:
-        handles.append((Patch(facecolor=OPAQUE, **edge), f"{_short(', '.join(opaque), 40)}: opaque"))
-    kinds = {face.kind for view in layout.views for face in view.faces}
-    handles += [(Line2D([], [], **FINISH_LINES[kind]), kind) for kind in FINISH_KINDS if kind in kinds]
-    if any(view.sources for view in layout.views):
-        handles.append((Line2D([], [], color=SOURCE, linewidth=2.6), "source"))
-    if any(view.trails for view in layout.views):
-        handles.append((Line2D([], [], color=RAY, linewidth=0.9), "ray"))
-    if any(view.detectors for view in layout.views):
-        handles.append((Line2D([], [], color=DETECTOR, linewidth=1.2, linestyle="--"), "detector"))
-    return handles
-
-
-def _short(text: str, most: int) -> str:
-    return text if len(text) <= most else text[: most - 2].rstrip(", ") + " …"
-
-
-def fill_colours(layout: SceneLayout) -> dict[int, str]:
-    """The colour of each medium that fills a solid; that of the surroundings is white."""
-    used = sorted({part.medium for view in layout.views for part in view.solids if part.medium is not None})
-    others = [number for number in used if number != 0]
-    return {n: "#ffffff" for n in used if n == 0} | {n: FILLS[i % len(FILLS)] for i, n in enumerate(others)}
+        axes.text(
+            0.5, 0.5, "nothing is cut here", transform=axes.transAxes, ha="center", va="center", color=style.FAINT
+        )
 
 
 def _fill(axes: Axes, view: View, layout: SceneLayout) -> None:
@@ -158,7 +105,9 @@ def _faces(axes: Axes, view: View, placer: LabelPlacer) -> None:
         curves = [curve for face in view.faces if face.kind == kind for curve in face.curves]
         if curves:
             # Butt ends, so that a face is as long as it is.
-            axes.add_collection(LineCollection(curves, **FINISH_LINES[kind], capstyle="butt", zorder=3.0), autolim=False)
+            axes.add_collection(
+                LineCollection(curves, **FINISH_LINES[kind], capstyle="butt", zorder=3.0), autolim=False
+            )
         for curve in curves:
             placer.draw(_inches(view, placer, _thinned(curve)))
 
@@ -182,8 +131,11 @@ def _trails(axes: Axes, view: View, placer: LabelPlacer) -> None:
 
     left, right, bottom, top = view.window
     segments, colours = [], []
-    for points in view.trails:
-        strength = STRONGEST
+    aside = [abs(float(view.section.depth(points[0]))) for points in view.trails]
+    size = max(right - left, top - bottom)
+    for points, away in zip(view.trails, aside, strict=True):
+        # Where no source lies in the section, the nearest one counts as if it did.
+        strength = STRONGEST * float(np.exp(-(away - min(aside)) / (NEAR * size)))
         flat = view.section.flat(points)
         length = np.maximum(np.linalg.norm(np.diff(points, axis=0), axis=1), np.finfo(np.float64).tiny)
         along = np.hypot(*np.diff(flat, axis=0).T) / length
@@ -246,13 +198,15 @@ def _glow(axes: Axes, view: View, glow: Glow, placer: LabelPlacer) -> None:
             axes.plot(*curve.T, color=SOURCE, linewidth=2.6, solid_capstyle="butt", zorder=5.0)
             strokes += _strokes(curve, glow, reach)
             placer.draw(_inches(view, placer, _thinned(curve)))
+    elif len(glow.start) and not glow.near:
+        axes.scatter(glow.start[:, 0], glow.start[:, 1], s=2.0, color=SOURCE, linewidths=0.0, alpha=0.25, zorder=2.0)
     elif len(glow.start):
         spread = float(np.ptp(glow.start, axis=0).max())
         if spread <= 1e-3 * reach:
             axes.plot(*glow.start[0], marker="o", markersize=4.5, color=SOURCE, markeredgewidth=0.0, zorder=5.0)
             strokes += _rays_of_a_point(glow, reach)
         else:
-            axes.scatter(*glow.start.T, s=2.0, color=SOURCE, linewidths=0.0, alpha=0.7, zorder=5.0)
+            axes.scatter(glow.start[:, 0], glow.start[:, 1], s=2.0, color=SOURCE, linewidths=0.0, alpha=0.7, zorder=5.0)
             few = zip(glow.start[:DIRECTIONS], glow.direction[:DIRECTIONS], strict=True)
             strokes += [np.array([p, p + min(reach, spread) * d]) for p, d in few]
         for point in glow.start[:24]:
@@ -328,9 +282,8 @@ def _observers(axes: Axes, view: View, layout: SceneLayout, placer: LabelPlacer)
 
 def _names(axes: Axes, view: View, placer: LabelPlacer) -> None:
     """Names of sources, detectors, surfaces and solids, the larger ones first if there are too many."""
-    things: list[tuple[str, list[Array], str]] = []
-    for glow in _merged(view.sources):
-        things.append((glow.name, glow.curves or [glow.start], SOURCE))
+    near = _merged([glow for glow in view.sources if glow.near])
+    things = [(glow.name, glow.curves or [glow.start], SOURCE) for glow in near]
     things += [(part.name, part.curves, DETECTOR) for part in view.detectors]
     solids = {part.name for part in view.solids}
     surfaces = [face for face in view.faces if not any(face.name.startswith(f"{name}.") for name in solids)]
@@ -348,9 +301,10 @@ def _merged(glows: list[Glow]) -> list[Glow]:
         if name in found:
             held = found[name]
             start = np.concatenate([held.start, glow.start])
-            found[name] = Glow(name, held.curves + glow.curves, start, np.concatenate([held.direction, glow.direction]))
+            direction = np.concatenate([held.direction, glow.direction])
+            found[name] = Glow(name, held.curves + glow.curves, start, direction, near=True)
         else:
-            found[name] = Glow(name, list(glow.curves), glow.start, glow.direction)
+            found[name] = dataclasses.replace(glow, name=name)
     return list(found.values())
 
 
@@ -361,7 +315,7 @@ def _extent(curves: list[Array]) -> float:
 def _name(axes: Axes, view: View, placer: LabelPlacer, text: str, curves: list[Array], colour: str) -> None:
     import matplotlib.patheffects as effects
 
-    text = _short(text, 28)
+    text = shortened(text, 28)
     label = placer.place(text, [_inches(view, placer, curve) for curve in curves if len(curve)])
     if label is None:
         return
@@ -370,7 +324,8 @@ def _name(axes: Axes, view: View, placer: LabelPlacer, text: str, curves: list[A
     if label.leads:
         axes.plot(*np.array([anchor, at]).T, transform=axes.transAxes, color=colour, linewidth=0.4, zorder=6.5)
     axes.text(
-        *at,
+        float(at[0]),
+        float(at[1]),
         text,
         transform=axes.transAxes,
         ha="center",
@@ -380,5 +335,3 @@ def _name(axes: Axes, view: View, placer: LabelPlacer, text: str, curves: list[A
         zorder=7.0,
         path_effects=[effects.withStroke(linewidth=2.0, foreground="white", alpha=0.85)],
     )
-
-

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.plot.scene_parts import Glow, Part, View, finish_kind
+from etendue.plot.scene_parts import Glow, Part, View, finish_kind, within
 from etendue.scene import MEDIA, Compiled, Medium, Scene, compile_scene
 from etendue.scene.extents import box_of
 from etendue.tracing.section_chains import rings
@@ -34,7 +34,7 @@ MARGIN = 0.12
 NARROWEST = 0.3
 """Smaller side of a frame, as a share of the larger one."""
 FARTHEST = 2.5
-"""A detector that would make the frame larger than this many times is only pointed at."""
+"""A detector, or a plane without an end, that would make the frame larger than this many times is left out."""
 SAMPLE = 240
 """Rays by which a source shows where and how it sends out light."""
 MOST_SAMPLED = 64
@@ -101,7 +101,7 @@ class SceneLayout:
             "sources": [s.name or f"sources[{i}]" for i, s in enumerate(self.scene.sources)],
             "detectors": list(self.compiled.detector_names),
             "observers": [o.name or f"observers[{i}]" for i, o in enumerate(self.scene.observers)],
-            "media": {name: index for name, index in self.media.values()},
+            "media": dict(self.media.values()),
             "wavelength": self.wavelength,
             "not_cut": list(self.uncut),
             "beyond": list(self.beyond),
@@ -173,24 +173,49 @@ class _Draughtsman:
     def layout(self) -> SceneLayout:
         faces = self.record["faces"]
         endless = [not np.isfinite(box_of(face["shape"])).all() for face in faces]
-        curves = [self._cut([f if not e else None for f, e in zip(faces, endless, strict=True)], p) for p in self.planes]
+        curves = [
+            self._cut([f if not e else None for f, e in zip(faces, endless, strict=True)], p) for p in self.planes
+        ]
         glows = [self._glows(plane) for plane in self.planes]
         for plane, cut, glow in zip(self.planes, curves, glows, strict=True):
             self._reach(plane, [c for found in cut for c in found])
             self._reach(plane, [c for g in glow for c in [*g.curves, g.start]])
-        shown, beyond = self._near_detectors()
+        shown = self._near_detectors()
+        without_end = [face if e else None for face, e in zip(faces, endless, strict=True)]
+        for plane, window in zip(self.planes, self._windows(FARTHEST), strict=True):
+            for found in self._cut(without_end, plane, window):
+                self._reach(plane, [self._nearest(plane, found)] if found else [])
         windows = self._windows()
-        for i, (plane, frame) in enumerate(zip(self.planes, windows, strict=True)):
-            rest = self._cut([f if e else None for f, e in zip(faces, endless, strict=True)], plane, frame)
-            curves[i] = [a + b for a, b in zip(curves[i], rest, strict=True)]
+        for i, (plane, window) in enumerate(zip(self.planes, windows, strict=True)):
+            curves[i] = [a + b for a, b in zip(curves[i], self._cut(without_end, plane, window), strict=True)]
         trails = self._trails(windows)
         views = tuple(
-            View(plane, window, self._faces(cut), self._solids(cut), glow, self._detectors(shown, plane), trail)
+            View(
+                plane,
+                window,
+                within(self._faces(cut), window),
+                within(self._solids(cut), window),
+                glow,
+                within(self._detectors(shown, plane), window),
+                trail,
+            )
             for plane, window, cut, glow, trail in zip(self.planes, windows, curves, glows, trails, strict=True)
         )
+        seen = {part.name for view in views for part in view.detectors}
+        placed = [i for i, detector in enumerate(self.record["detectors"]) if "frame" in detector]
+        beyond = tuple(self.compiled.detector_names[i] for i in placed if self.compiled.detector_names[i] not in seen)
         media, wavelength = self._media()
         return SceneLayout(
-            self.scene, self.compiled, views, self._extent(), media, wavelength, self._uncut(curves), beyond, self.rays, self.seed
+            self.scene,
+            self.compiled,
+            views,
+            self._extent(),
+            media,
+            wavelength,
+            self._uncut(curves),
+            beyond,
+            self.rays,
+            self.seed,
         )
 
     # --- what is cut ---------------------------------------------------------------------------------------------------
@@ -256,25 +281,33 @@ class _Draughtsman:
             curves: list[Array] = []
             if source["kind"] in {"surface", "beam"}:
                 (curves,) = cut_faces([source], plane)
-            found.append(Glow(name, curves, plane.flat(start), plane.flat(direction)))
+            depth = plane.depth(start)
+            slack = 1e-6 * float(np.ptp(start, axis=0).max(initial=0.0)) if len(start) else 0.0
+            flat = source["kind"] in {"surface", "beam"}
+            near = bool(curves) if flat else bool(len(start) and depth.min() <= slack and depth.max() >= -slack)
+            found.append(Glow(name, curves, plane.flat(start), plane.flat(direction), near))
         return found
 
-    def _near_detectors(self) -> tuple[list[int], tuple[str, ...]]:
-        """Numbers of the detectors that are drawn, near ones first, and names of those that have a place beyond."""
-        boxes = {}
-        for i, detector in enumerate(self.record["detectors"]):
-            if detector["kind"] in {"rays", "illuminance"}:
-                boxes[i] = _placed_box(detector)
+    def _near_detectors(self) -> list[int]:
+        """Numbers of the detectors that are drawn, near ones first."""
+        boxes = {i: _placed_box(d) for i, d in enumerate(self.record["detectors"]) if "frame" in d}
+        if self.window is not None:
+            return list(boxes)
         shown: list[int] = []
+        axes = sorted({"xyz".index(axis) for plane in self.planes for axis in (plane.across, plane.up)})
         for i in sorted(boxes, key=lambda i: self._growth(boxes[i])):
             alone = not np.isfinite(self.seen).any()
-            if self.window is not None or (np.isfinite(boxes[i]).all() and (alone or self._growth(boxes[i]) <= FARTHEST)):
+            if np.isfinite(boxes[i]).all() and (alone or self._growth(boxes[i]) <= FARTHEST):
                 shown.append(i)
-                low, high = np.where(np.isfinite(boxes[i]), boxes[i], np.nan)
-                seen = sorted({"xyz".index(axis) for p in self.planes for axis in (p.across, p.up)})
-                self.seen[0, seen] = np.fmin(self.seen[0, seen], low[seen])
-                self.seen[1, seen] = np.fmax(self.seen[1, seen], high[seen])
-        return shown, tuple(self.compiled.detector_names[i] for i in boxes if i not in shown)
+                self.seen[0, axes] = np.minimum(self.seen[0, axes], boxes[i][0, axes])
+                self.seen[1, axes] = np.maximum(self.seen[1, axes], boxes[i][1, axes])
+        return shown
+
+    def _nearest(self, plane: Section, curves: list[Array]) -> Array:
+        """The point of curves nearest to the middle of what is seen so far, shape (1, 2)."""
+        middle = plane.flat(np.where(np.isfinite(self.seen), self.seen, 0.0).mean(axis=0))
+        points = np.concatenate(curves)
+        return points[[np.argmin(np.hypot(*(points - middle).T))]]
 
     def _growth(self, box: Array) -> float:
         """How many times larger the frame becomes with a box."""
@@ -291,7 +324,9 @@ class _Draughtsman:
         """For each view the rays that it shows, out of the same ones for all."""
         frames = [plane.points(np.array(w).reshape(2, 2).T) for plane, w in zip(self.planes, windows, strict=True)]
         size = float(np.ptp(np.concatenate(frames), axis=0).max())
-        things = [_placed_box(thing) for key in ("faces", "detectors") for thing in self.record[key] if "frame" in thing]
+        things = [
+            _placed_box(thing) for key in ("faces", "detectors") for thing in self.record[key] if "frame" in thing
+        ]
         points = np.concatenate([*frames, *things, *(start for _, _, start, _ in self.sources)])
         far = FAR * float(np.ptp(np.where(np.isfinite(points), points, 0.0), axis=0).max())
         traced = trace_trails(self.compiled, min(CANDIDATES * self.rays, MOST_TRACED), self.seed, far)
@@ -299,8 +334,8 @@ class _Draughtsman:
 
     # --- frames and media ----------------------------------------------------------------------------------------------
 
-    def _windows(self) -> list[Window]:
-        """Frames of the views; those with the same axis upright have the same height."""
+    def _windows(self, larger: float = 1.0) -> list[Window]:
+        """Frames of the views, or frames so much larger; those with the same axis upright have the same height."""
         if self.window is not None:
             return [self.window] * len(self.planes)
         targets = [np.array([o.target, o.target]) for o in self.scene.observers]
@@ -310,13 +345,13 @@ class _Draughtsman:
         low, high = np.where(np.isfinite(self.seen), self.seen, 0.0)
         size = float((high - low).max())
         size = size if size > 0.0 else max(1e-9 * float(np.abs(low).max()), 10.0)
-        middle, half = (low + high) / 2.0, np.maximum(high - low, NARROWEST * size) / 2.0 + MARGIN * size
+        middle, half = (low + high) / 2.0, larger * (np.maximum(high - low, NARROWEST * size) / 2.0 + MARGIN * size)
         left, right = middle - half, middle + half
         pairs = [[("xyz").index(axis) for axis in (plane.across, plane.up)] for plane in self.planes]
         return [(float(left[u]), float(right[u]), float(left[v]), float(right[v])) for u, v in pairs]
 
     def _media(self) -> tuple[dict[int, tuple[str, float]], float]:
-        """Names and indices of the media that solids are filled with and of the surroundings, at the first source's wavelength."""
+        """Names and indices of media of solids and of the surroundings, at the first source's wavelength."""
         wavelength = self.scene.wavelength
         if self.record["sources"]:
             first = self.record["sources"][0]

@@ -52,12 +52,15 @@ class Glow:
         Where the section cuts a luminous surface.
     start, direction : arrays, shape (n, 2)
         Of rays; directions are shorter where they point out of the section.
+    near : bool
+        Whether the section passes through it.
     """
 
     name: str
     curves: list[Array]
     start: Array
     direction: Array
+    near: bool
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -107,3 +110,23 @@ def finish_kind(finish: Record) -> str:
     most = {part: float(np.max(finish[part]["values"])) for part in does}
     part = max(most, key=lambda p: most[p])
     return does[part] if most[part] > 0.0 else "absorber"
+
+
+def within(parts: list[Part], window: Window) -> list[Part]:
+    """The parts that reach into a window.
+
+    Examples
+    --------
+    >>> line = Part("line", "mirror", [np.array([[5.0, 0.0], [6.0, 0.0]])])
+    >>> within([line], (0.0, 4.0, -1.0, 1.0))
+    []
+    """
+    left, right, bottom, top = window
+    kept = []
+    for part in parts:
+        for curve in part.curves:
+            (low_u, low_v), (high_u, high_v) = curve.min(axis=0), curve.max(axis=0)
+            if low_u <= right and high_u >= left and low_v <= top and high_v >= bottom:
+                kept.append(part)
+                break
+    return kept

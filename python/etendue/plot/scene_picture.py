@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.plot import style
-from etendue.plot.scene_drawing import draw_view, legend_handles
+from etendue.plot.scene_drawing import draw_view
 from etendue.plot.scene_layout import DEFAULT_SECTIONS, SceneLayout, lay_out_scene
+from etendue.plot.scene_legend import legend_handles
 from etendue.scene import Scene
 
 if TYPE_CHECKING:
@@ -48,6 +50,7 @@ def draw_scene(
     Parameters
     ----------
     scene : Scene
+        What is drawn; all its mistakes are told first.
     path : path, optional
         Where to write the picture, .png or .pdf. The same scene gives the same bytes.
     section : str or sequence of str
@@ -85,9 +88,7 @@ def draw_scene(
     return plot_layout(lay_out_scene(scene, section, rays=rays, seed=seed, window=window), path, title=title)
 
 
-def plot_layout(
-    layout: SceneLayout, path: str | os.PathLike[str] | None = None, *, title: str | None = None
-) -> Figure:
+def plot_layout(layout: SceneLayout, path: str | os.PathLike[str] | None = None, *, title: str | None = None) -> Figure:
     """Draw what `lay_out_scene` found; see `draw_scene`.
 
     Examples
@@ -102,7 +103,9 @@ def plot_layout(
         axes = style.add_axes(figure, left, bottom, width, height)
         shares_height = number > 0 and places.side_by_side and view.section.up == layout.views[number - 1].section.up
         draw_view(axes, view, layout, (width, height), labelled=not shares_height)
-        style.add_text(figure, left, bottom + height + 0.07, str(view.section), size=style.TICK_SIZE, color=style.FAINT)
+        # In the middle: at the upper left, the axis may say its power of ten.
+        middle, over = left + width / 2, bottom + height + 0.07
+        style.add_text(figure, middle, over, str(view.section), ha="center", size=style.LABEL_SIZE, color=style.INK)
     heading = title if title is not None else layout.scene.name or "Scene"
     top = places.height
     style.add_text(figure, LEFT, top - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
@@ -165,20 +168,20 @@ class _Places(NamedTuple):
         count = len(spans)
         # All sections have one scale; side by side or one above the other, whichever makes it larger.
         beside = min((WIDEST - GAP * (count - 1)) / sum(w for w, _ in spans), HIGHEST / max(h for _, h in spans))
-        above = min(
-            WIDEST / max(w for w, _ in spans), (HIGHEST + 1.6 - 0.75 * (count - 1)) / sum(h for _, h in spans)
-        )
+        above = min(WIDEST / max(w for w, _ in spans), (HIGHEST + 1.6 - 0.75 * (count - 1)) / sum(h for _, h in spans))
         side_by_side = count == 1 or beside >= 0.7 * above
         scale = beside if side_by_side else above
         sizes = [(scale * w, scale * h) for w, h in spans]
         # A section with an upright axis of its own has its numbers beside it.
         ups = [view.section.up for view in layout.views]
-        gaps = [GAP if a == b else LEFT for a, b in zip(ups, ups[1:], strict=False)]
+        gaps = [GAP if a == b else LEFT for a, b in itertools.pairwise(ups)]
         across = sum(w for w, _ in sizes) + sum(gaps) if side_by_side else max(w for w, _ in sizes)
         width = max(NARROWEST, LEFT + across + RIGHT)
         caption = style.wrapped(_facts(layout), width - LEFT - RIGHT)
         texts = [text for _, text in legend_handles(layout)]
-        columns = max(1, min(len(texts), int((width - LEFT - RIGHT) / (0.65 + 0.062 * max(map(len, texts), default=1)))))
+        columns = max(
+            1, min(len(texts), int((width - LEFT - RIGHT) / (0.65 + 0.062 * max(map(len, texts), default=1))))
+        )
         lines = -(-len(texts) // columns)
         below = 0.3 + CAPTION_LINE * len(caption) + LEGEND_LINE * lines
         legend_top = below - 0.1
@@ -197,5 +200,3 @@ class _Places(NamedTuple):
                 at += h + 0.75
             high = at - 0.75 - bottom
         return cls(width, bottom + high + 0.72, views, side_by_side, legend_top, columns, caption)
-
-

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -81,7 +82,7 @@ def _quadric(shape: Record) -> tuple[float, float, float]:
     marks = sorted({z for z in (*marks, low, high) if low <= z <= high and math.isfinite(z)})
     ends = [low, *marks, high]
     reach: list[tuple[float, float, float]] = []
-    for start, end in zip(ends, ends[1:], strict=False):
+    for start, end in itertools.pairwise(ends):
         between = _between(start, end)
         r2 = float(np.polyval(squared, between))
         if start < end and inner**2 <= r2 <= outer**2:

@@ -27,6 +27,7 @@ def mesh_curves(shape: dict[str, Any], origin: Array, axes: Array, section: Sect
     origin, axes : arrays, shapes (3,) and (3, 3)
         Where the mesh stands; the rows are the images of its x, y and z.
     section : Section
+        The plane.
 
     Returns
     -------

@@ -170,8 +170,8 @@ def _rectangles(faces: Sequence[Mapping[str, Any]], section: Section) -> list[li
     cut = (depth > 0.0) != (np.roll(depth, -1, axis=1) > 0.0)
     found: list[list[Array]] = [[] for _ in faces]
     for i in np.flatnonzero(cut.any(axis=1)).tolist():
-        (a, b), after = np.flatnonzero(cut[i]), np.roll(np.arange(4), -1)
-        found[i] = [np.array([_between(flat[i], depth[i], k, after[k]) for k in (a, b)])]
+        ends = [_between(flat[i], depth[i], k, (k + 1) % 4) for k in np.flatnonzero(cut[i]).tolist()]
+        found[i] = [np.array(ends)]
     return found
 
 
@@ -228,9 +228,7 @@ def _trimmed(curve: Array, trims: list[Any], origin: Array, axes: Array, section
     return parts
 
 
-def _clipped(
-    curve: Array, normal: Array, offset: float, origin: Array, axes: Array, section: Section
-) -> list[Array]:
+def _clipped(curve: Array, normal: Array, offset: float, origin: Array, axes: Array, section: Section) -> list[Array]:
     height = (section.points(curve) - origin) @ axes.T @ normal - offset
     pieces: list[list[Array]] = [[]]
     for i, point in enumerate(curve):

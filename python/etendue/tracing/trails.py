@@ -29,9 +29,11 @@ def trace_trails(compiled: Compiled, rays: int, seed: int, far: float) -> list[A
     Parameters
     ----------
     compiled : Compiled
+        With any number of sources.
     rays : int
         0 to `MOST_TRACED`.
     seed : int
+        0 to 2⁶⁴ − 1.
     far : float
         How far behind its last turn the trail of a ray ends that leaves the scene [mm]; more than the scene is wide.
 
@@ -63,7 +65,9 @@ def near_section(trails: list[Array], section: Section, count: int, size: float)
     Parameters
     ----------
     trails : list of arrays, each of shape (k, 3)
+        [mm]
     section : Section
+        The plane.
     count : int
         How many at most.
     size : float
@@ -91,10 +95,13 @@ def sample_source(compiled: Compiled, source: dict[str, Any], rays: int, seed: i
     Parameters
     ----------
     compiled : Compiled
+        For its surroundings.
     source : mapping
         One of its sources.
     rays : int
+        How many.
     seed : int
+        0 to 2⁶⁴ − 1.
 
     Returns
     -------
