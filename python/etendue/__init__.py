@@ -26,6 +26,7 @@ from etendue.luminance.denoising import denoise_map
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
 from etendue.plot import (
+    draw_scene,
     plot_characteristic,
     plot_comparison,
     plot_cross_sections,
@@ -73,6 +74,7 @@ __all__ = [
     "cross_section",
     "denoise_map",
     "diagnose",
+    "draw_scene",
     "filter_map",
     "intensity_distribution",
     "luminance_map",

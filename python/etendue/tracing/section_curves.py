@@ -79,16 +79,14 @@ class _Face:
         length = np.hypot(*along.T)
         real = np.flatnonzero(length > 0.0)
         unit = along[real] / length[real, None]
-        lines, _, t = _core.scene_crossings(
-            self.core, self.section.points(starts[real]), self.section.directions(unit)
-        )
+        lines, _, t = _core.scene_crossings(self.core, self.section.points(starts[real]), self.section.directions(unit))
         number = real[lines.astype(np.int64)]
         kept = t <= length[number]
         number, t = number[kept], t[kept]
         return _Hits(number, starts[number] + (t / length[number])[:, None] * along[number])
 
     def nearest(self, middles: Array, normals: Array, low: Array, high: Array) -> tuple[npt.NDArray[np.bool_], Array]:
-        """Whether lines through `middles` along `normals` cross the face between two distances, and where nearest to the middle."""
+        """Whether lines through points cross the face between two distances from these, and where nearest to them."""
         hits = self.cross(middles + low[:, None] * normals, middles + high[:, None] * normals)
         gap = np.hypot(*(hits.points - middles[hits.line]).T)
         order = np.lexsort((gap, hits.line))
@@ -246,6 +244,7 @@ def crossed_curves(
     shape, frame, trims
         The face as the tracer takes it.
     section : Section
+        The plane.
     region : array, shape (2, 2)
         Left and bottom, right and top of what is looked at [mm].
 
@@ -291,7 +290,8 @@ def _columns(u: Array, v: float) -> Array:
 def _normals(along: Array) -> Array:
     """Unit vectors across."""
     length = np.maximum(np.hypot(*along.T), np.finfo(np.float64).tiny)
-    return np.stack([-along[:, 1], along[:, 0]], axis=1) / length[:, None]
+    normals: Array = np.stack([-along[:, 1], along[:, 0]], axis=1) / length[:, None]
+    return normals
 
 
 def _within(points: Array, directions: Array, cells: Array) -> tuple[Array, Array]:
