@@ -21,6 +21,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -30,6 +31,9 @@ import drjit as dr
 import etendue as et
 import mitsuba as mi
 import numpy as np
+import trimesh
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
 from etendue import _core
 from etendue.scene import compile_scene
 
@@ -50,9 +54,8 @@ def cavity(walls: list[dict[str, Any]]) -> et.Scene:
         {"name": f"hole {i}", "shape": {"kind": "disk", "radius": HOLE}, "at": [x, y, 5e-4], "finish": "absorber"}
         for i, (x, y) in enumerate(HOLES)
     ]
-    lamps = [
-        {"kind": "surface", "shape": {"kind": "disk", "radius": HOLE}, "flux": FLUX, "at": [x, y, 1e-3]} for x, y in HOLES
-    ]
+    spot = {"kind": "disk", "radius": HOLE}
+    lamps = [{"kind": "surface", "shape": spot, "flux": FLUX, "at": [x, y, 1e-3]} for x, y in HOLES]
     white = {"kind": "lambertian", "reflectance": REFLECTANCE}
     return et.Scene(sources=lamps, finishes={"white": white}, surfaces=[*walls, *holes])
 
@@ -123,10 +126,10 @@ def mitsuba_forward(walls: Callable[[], dict[str, Any]], rays: int) -> tuple[flo
     mi.set_variant("llvm_ad_rgb")
     shift = mi.ScalarTransform4f().translate
     scale = mi.ScalarTransform4f().scale
-    parts = {f"hole{i}": {"type": "disk", "to_world": shift([x, y, 5e-4]) @ scale(HOLE)} for i, (x, y) in enumerate(HOLES)}
+    spots = [shift([x, y, 5e-4]) @ scale(HOLE) for x, y in HOLES]
+    parts = {f"hole{i}": {"type": "disk", "to_world": spot} for i, spot in enumerate(spots)}
     scene = mi.load_dict({"type": "scene", **walls(), **parts})
     black = [shape for shape in scene.shapes() if "hole" in shape.id()]
-    assert len(black) == len(HOLES)
 
     def timed(seed: int) -> tuple[float, float]:
         start = time.perf_counter()
@@ -141,9 +144,6 @@ def mitsuba_forward(walls: Callable[[], dict[str, Any]], rays: int) -> tuple[flo
 
 def embree_rate(vertices: Array, triangles: Array, rays: int) -> float:
     """Nearest hits per second of independent rays that start on the walls, as the segments of the loop do."""
-    from embreex import rtcore_scene
-    from embreex.mesh_construction import TriangleMesh
-
     scene = rtcore_scene.EmbreeScene()
     TriangleMesh(scene, vertices[triangles].astype(np.float32))
     rng = np.random.default_rng(1)
@@ -152,7 +152,8 @@ def embree_rate(vertices: Array, triangles: Array, rays: int) -> float:
     area = np.linalg.norm(normal, axis=1)
     pick = rng.choice(len(triangles), rays, p=area / area.sum())
     u, v = rng.random(rays) ** 0.5, rng.random(rays)
-    place = (1 - u)[:, None] * corner[pick, 0] + (u * (1 - v))[:, None] * corner[pick, 1] + (u * v)[:, None] * corner[pick, 2]
+    weights = np.stack([1 - u, u * (1 - v), u * v], axis=1)
+    place = np.einsum("nk,nkx->nx", weights, corner[pick])
     inward = normal[pick] / area[pick, None]
     middle = np.array([0.0, 0.0, HEIGHT / 2])
     inward *= np.sign(((middle - place) * inward).sum(1))[:, None]
@@ -193,10 +194,6 @@ def job_analytic(rays: int) -> None:
 
 
 def job_mesh(rays: int) -> None:
-    import tempfile
-
-    import trimesh
-
     vertices, triangles = mesh()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cavity.ply"
@@ -208,7 +205,11 @@ def job_mesh(rays: int) -> None:
 
         one = job_forward(f"mesh cavity, {len(triangles):,} triangles", scene, walls, rays)
     embree = embree_rate(vertices, triangles, 1 << 20)
-    row("mesh cavity: Embree, single rays, one thread", f"{embree / 1e6:.1f} M queries/s", f"{one / embree:.2f} × Embree")
+    row(
+        "mesh cavity: Embree, single rays, one thread",
+        f"{embree / 1e6:.1f} M queries/s",
+        f"{one / embree:.2f} × Embree",
+    )
 
 
 def job_map(_rays: int) -> None:
@@ -227,9 +228,11 @@ def job_map(_rays: int) -> None:
     for i, (x, y) in enumerate(HOLES):
         lamp = {"type": "area", "radiance": {"type": "rgb", "value": luminance}}
         to_world = transform().translate([x, y, 1e-3]) @ transform().scale(HOLE)
-        parts[f"lamp{i}"] = {"type": "disk", "to_world": to_world, "emitter": lamp, "bsdf": {"type": "diffuse", "reflectance": 0.0}}
+        black = {"type": "diffuse", "reflectance": 0.0}
+        parts[f"lamp{i}"] = {"type": "disk", "to_world": to_world, "emitter": lamp, "bsdf": black}
     white = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": REFLECTANCE}}}
-    eye, across = observer.position, 2 * math.degrees(math.atan(25 / 1000))
+    film = {"type": "hdrfilm", "width": 250, "height": 125, "rfilter": {"type": "box"}, "pixel_format": "luminance"}
+    eye, up, across = observer.position, screen.axes(observer)[1], 2 * math.degrees(math.atan(25 / 1000))
     theirs_scene = mi.load_dict(
         {
             "type": "scene",
@@ -241,8 +244,8 @@ def job_map(_rays: int) -> None:
                 "type": "perspective",
                 "fov": across,
                 "fov_axis": "x",
-                "to_world": transform().look_at(origin=eye.tolist(), target=[0, 0, 0], up=screen.axes(observer)[1].tolist()),
-                "film": {"type": "hdrfilm", "width": 250, "height": 125, "rfilter": {"type": "box"}, "pixel_format": "luminance"},
+                "to_world": transform().look_at(origin=eye.tolist(), target=[0, 0, 0], up=up.tolist()),
+                "film": film,
                 "sampler": {"type": "independent", "sample_count": 64},
             },
         }
@@ -265,7 +268,11 @@ def job_map(_rays: int) -> None:
 
     mine, noise, level = judged(ours, 16)
     yours, their_noise, their_level = judged(theirs, 16)
-    row("map of the cavity: efficiency 1/(variance · time)", f"{mine:.0f} /s", f"{mine / yours:.1f} × Mitsuba's path tracer")
+    row(
+        "map of the cavity: efficiency 1/(variance · time)",
+        f"{mine:.0f} /s",
+        f"{mine / yours:.1f} × Mitsuba's path tracer",
+    )
     row("map of the cavity: noise of a run", f"{noise:.1%}, {their_noise:.1%}")
     row("map of the cavity: mean of the middle", f"{level:.5f}, {their_level:.5f} lm/(mm² sr)")
 
@@ -294,7 +301,8 @@ def job_field(_rays: int) -> None:
             start = time.perf_counter()
             _core.look_at_scene(core, view, 125, 1, 1000, False, 0, 8)
             seconds.append(time.perf_counter() - start)
-        row(f"light field {name}, 50 × 50 pixels × 1 000 paths", f"{min(seconds):.2f} s", f"{1.0 / min(seconds):.2f} × bar (1 s)")
+        job = f"light field {name}, 50 × 50 pixels × 1 000 paths"
+        row(job, f"{min(seconds):.2f} s", f"{1.0 / min(seconds):.2f} × bar (1 s)")
 
 
 def job_cells(rays: int) -> None:
@@ -309,7 +317,8 @@ def job_cells(rays: int) -> None:
             _core.trace_batches(core, rays, 1, 1000, 0, batches)
             seconds.append(time.perf_counter() - start)
         first = first or min(seconds)
-        row(f"rays of a field of {4**depth:,} cells of place", f"{min(seconds) / rays * 1e9:.0f} ns a ray", f"{min(seconds) / first:.2f} × the first")
+        each = f"{min(seconds) / rays * 1e9:.0f} ns a ray"
+        row(f"rays of a field of {4**depth:,} cells of place", each, f"{min(seconds) / first:.2f} × the first")
 
 
 JOBS = {"analytic": job_analytic, "mesh": job_mesh, "map": job_map, "field": job_field, "cells": job_cells}
