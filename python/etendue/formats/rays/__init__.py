@@ -81,7 +81,7 @@ def read_rays(path: str | os.PathLike[str], *, flux: float | None = None, flux_u
     Returns
     -------
     RaySet
-        Its `complaints` tell everything that is wrong with the file.
+        Its `complaints` tell everything that is wrong with the file. Of a ray index it is a `RayIndex`.
 
     Raises
     ------
