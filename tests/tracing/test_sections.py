@@ -160,6 +160,15 @@ def test_gaps_stay_gaps() -> None:
     np.testing.assert_allclose(ends(slotted), [(-3, 0), (-0.005, 0), (0.005, 0), (3, 0)], atol=1e-9)
 
 
+def test_slots_narrower_than_a_cell_are_found_wherever_they_are() -> None:
+    # 1/600 of the width each, a cell of the grid being 1/370: some lie between two lines of it.
+    slots = [(x, x + 0.01) for x in (0.31, 0.87, 1.512, 2.203, 2.94, 3.333, 4.1, 4.777, 5.5)]
+    teeth = [corner for x, end in slots for corner in ((x, 2), (x, 0.5), (end, 0.5), (end, 2))]
+    curves = cut("polygon", "y=1", vertices=[(0, 0), (0, 2), *teeth, (6, 2), (6, 0)])
+    expected = sorted([0.0, 6.0, *(x for slot in slots for x in slot)])
+    np.testing.assert_allclose([x for x, _ in ends(curves)], expected, atol=1e-9)
+
+
 @pytest.mark.parametrize("at", [1.9999, 1.99999])
 def test_a_trifle_of_a_face_is_found(at: float) -> None:
     (curve,) = cut("sphere", f"y={at}", radius=2)
