@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from etendue.formats.intensity import read_intensity, write_intensity
 from etendue.formats.maps import read_illuminance_map, read_map
 from etendue.formats.rays import read_rays, write_rays
+from etendue.formats.rays.ray_index import RayIndex
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.goniophotometry.threshold_sweep import threshold_sweep
 from etendue.lightfield.diagnostics import diagnose
@@ -59,6 +60,7 @@ __all__ = [
     "LuminanceMap",
     "Observer",
     "Plane",
+    "RayIndex",
     "RaySet",
     "Region",
     "RingSource",

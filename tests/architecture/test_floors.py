@@ -172,6 +172,7 @@ WITHOUT_EXAMPLE = {
     "etendue.lightfield.trees": "the optional Pólya tree over counts; docs/theory.md explains it",
     "etendue.formats.hdf5": "how files of light fields and of traces are written and read",
     "etendue.luminance.looking": "luminance_map is the door",
+    "etendue.luminance.scene_map": "luminance_map is the door",
     "etendue.tracing.detections": "how TraceResult makes quantities of sums; its properties are the door",
     "etendue.tracing.ledger.Entry": "Ledger shows it",
     "etendue.tracing.ledger.Loss": "a row of a Ledger",
