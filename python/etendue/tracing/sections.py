@@ -132,7 +132,7 @@ def cut_faces(faces: Sequence[Mapping[str, Any]], section: Section, window: Wind
     -------
     list of lists of arrays, each of shape (k, 2)
         For each face its curves: points in order along each [mm]; a closed curve ends in its first point. Every point lies
-        on the face, and between two of them the curve is nowhere farther from their chord than 2·10⁻⁵ of the face's size.
+        on the face, and between two of them the curve is nowhere farther from their chord than 3·10⁻⁵ of the face's size.
 
     Examples
     --------
