@@ -1,0 +1,223 @@
+"""Section 3.2 of the thesis with a remote phosphor made of parts, bare and under a film of prisms.
+
+    python examples/remote_phosphor.py              # few rays and coarse grids, seconds
+    python examples/remote_phosphor.py --full       # four million rays: the tables of docs/chapter-3.md
+
+A luminous plate, darker towards its rim, with and without a film of 240 prisms above it, is traced forwards onto a
+hemisphere far around it, prism by prism, as a goniophotometer would record it. From these rays alone the gridded algorithm
+and light fields make maps; lines of sight through film and plate make the maps they are compared with.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+import etendue as et
+import numpy as np
+from etendue.luminance.gridded_map import gridded_luminance_map
+from experiments.panels import LINES, QUICK, draw_maps, measures, new_figure, print_table, save
+
+RADIUS, RIM, FLUX = 11.2, 0.7, 800.0
+"""Of the plate [mm]; luminance at its rim over that in the middle; flux that it sends out itself [lm]."""
+
+RINGS = 28
+EXPONENT = 1.05
+"""Intensity of the plate is as cosⁿ: 8 % below Lambert's law at 80°."""
+
+TOP = {"bare": 0.0, "film": 1.05}
+"""Height of the topmost surface [mm]: the plate, or the ridges of a film 1 mm thick."""
+
+OBSERVERS = [et.Observer(theta, phi, 1000) for phi in (0, 90) for theta in (0, 30, 60, 80)]
+"""Of table 3.2. The prisms run along y: φ = 0° is across them."""
+
+THRESHOLDS = {"bare": (2.1,), "film": (2.1, 0.021)}
+"""E [%] of the gridded algorithm: the best of figures 3.8 and 3.9."""
+
+
+MAP = 23.0
+"""Width and height of the maps [mm]."""
+
+
+def lamp(kind: str) -> et.Scene:
+    """The plate in its housing, bare or under the film, and the hemisphere that collects its rays."""
+    edges = np.linspace(0.0, RADIUS, RINGS + 1)
+    inner, outer = edges[:-1], edges[1:]
+    # The mean of 1 - (1 - rim) (r/R)² over a ring, times its area.
+    weight = (outer**2 - inner**2) * (1.0 - (1.0 - RIM) * (outer**2 + inner**2) / (2.0 * RADIUS**2))
+    flux = FLUX * weight / weight.sum()
+    rings: list[dict[str, Any]] = [
+        {
+            "name": f"ring {i + 1}",
+            "kind": "surface",
+            "shape": {"kind": "annulus", "inner_radius": inner[i], "outer_radius": outer[i]}
+            if i
+            else {"kind": "disk", "radius": outer[i]},
+            "exponent": EXPONENT,
+            "flux": flux[i],
+        }
+        for i in range(RINGS)
+    ]
+    rough = {"kind": "lambertian", "reflectance": 0.5, "transmittance": 0.5}
+    film = {
+        "name": "film",
+        "shape": {"kind": "prismatic-film", "width": 24, "height": 24, "thickness": 0.95, "pitch": 0.1},
+        "medium": {"index": 1.59},
+        # Cut edges are rough: light that the film guides to them comes out there.
+        "finishes": dict.fromkeys(("left", "right", "front", "back"), rough),
+        "at": [0, 0, 0.05],
+    }
+    phosphor = {
+        "name": "phosphor",
+        "shape": {"kind": "disk", "radius": RADIUS},
+        "finish": {"kind": "lambertian", "reflectance": 0.7},
+    }
+    housing = {
+        "name": "housing",
+        "shape": {"kind": "annulus", "inner_radius": RADIUS, "outer_radius": 50},
+        "finish": "absorber",
+    }
+    return et.Scene(
+        name=f"remote phosphor, {kind}",
+        sources=rings,
+        solids=[film] if kind == "film" else [],
+        surfaces=[phosphor, housing],
+        detectors=[{"name": "near field", "kind": "rays", "shape": {"kind": "hemisphere", "radius": 40}}],
+    )
+
+
+def sources(kind: str, rays: et.RaySet, depths: tuple[int, int, int, int] | None) -> dict[str, et.LightField]:
+    """Light fields: on the plane of the topmost surface, as the thesis has it, and on a box whose sides shine too."""
+    found = {"field, plane": et.LightField.fit(rays, et.Plane(TOP[kind], 24.2, 24.2, centre=(0, 0)), depths=depths)}
+    if kind == "film":
+        box = et.Box(24.02, 24.02, TOP[kind], centre=(0, 0, TOP[kind] / 2))
+        found["field, box"] = et.LightField.fit(rays, box, depths=depths and (2, 2, 2, 2))  # six parts
+    return found
+
+
+def coarser(lmap: et.LuminanceMap, screen: et.Screen) -> et.LuminanceMap:
+    """The same map with fewer pixels, each the mean of a whole number of finer ones."""
+    k = lmap.screen.rows // screen.rows
+    blocks = (screen.rows, k, screen.columns, k)
+    return lmap.replace(
+        values=lmap.values.reshape(blocks).mean(axis=(1, 3)),
+        standard_error=np.sqrt((lmap.standard_error.reshape(blocks) ** 2).sum(axis=(1, 3))) / k**2,
+        rays=lmap.rays.reshape(blocks).sum(axis=(1, 3)),
+        screen=screen,
+    )
+
+
+def experiment(kind: str, options: argparse.Namespace) -> dict[float, dict[str, list[et.LuminanceMap]]]:
+    """Maps of every method by size of the pixels; ``"truth"`` are those of the lamp itself."""
+    scene = lamp(kind)
+    start = time.perf_counter()
+    result = et.trace(scene, rays=options.rays)
+    rays = result.rays.only
+    middle = time.perf_counter()
+    print(f"\n{kind}: {rays.total_flux:.1f} lm of {FLUX:g} lm leave it in {len(rays):,} rays of {options.rays:,}")
+    fields = sources(kind, rays, None if options.full else QUICK)
+    # Pixels are cut from the centre of a plane: this one brings them in line with those of the maps.
+    plane = et.Plane(TOP[kind], 27, 27, centre=(0.5, 0.5))
+    observers = [
+        et.Observer(o.theta, o.phi, o.distance, target=(0, 0, TOP[kind]))
+        for o in OBSERVERS
+        if kind == "film" or o.phi == 0
+    ]
+    found: dict[float, dict[str, list[et.LuminanceMap]]] = {}
+    for pixel in options.pixels:
+        count = round(MAP / pixel)
+        screen = et.Screen(MAP, MAP, count, count)
+        if pixel == options.pixels[0]:
+            truth = et.luminance_map(scene, observers, screen, rays_per_pixel=options.lines)
+        else:
+            truth = [coarser(lmap, screen) for lmap in truth]
+        found[pixel] = {"truth": truth}
+        for threshold in THRESHOLDS[kind]:
+            grid = et.GriddedSource.fit(rays, plane, pixel, threshold)
+            maps = [gridded_luminance_map(grid, observer, screen) for observer in observers]
+            found[pixel][f"gridded, {threshold:g} %"] = maps
+            print(f"    Δd = {pixel:g} mm, E = {threshold:g} %: {grid.notes[0]}")
+        for name, field in fields.items():
+            found[pixel][name] = et.luminance_map(field, observers, screen)
+    print(
+        f"    traced in {middle - start:.0f} s; fitted, and looked at all ways, in {time.perf_counter() - middle:.0f} s"
+    )
+    return found
+
+
+def print_tables(kind: str, found: dict[float, dict[str, list[et.LuminanceMap]]]) -> None:
+    """One row for each observer, three measures for each method."""
+    for pixel, maps in found.items():
+        print(f"\n{kind}, Δd = {pixel:g} mm: NCC / NRMSE of eq. 3.6 / true NRMSE [%]\n")
+        truth = maps["truth"]
+        methods = {name: seen for name, seen in maps.items() if name != "truth"}
+        rows = [
+            [
+                f"({t.observer.theta:g}°, {t.observer.phi:g}°)",
+                f"{t.values.max():,.0f}",
+                *(" / ".join(measures(seen[i], t)) for seen in methods.values()),
+            ]
+            for i, t in enumerate(truth)
+        ]
+        print_table(["observer", "brightest pixel [cd/m²]", *methods], rows)
+
+
+def draw_sections(path: Path, bare: list[et.LuminanceMap], film: list[et.LuminanceMap]) -> None:
+    """Figure 3.7 and what it stands on: horizontal cuts at several angles, with and without the film."""
+    made = new_figure(8.8, 3.4)
+    for axes, phi in zip(made.subplots(1, 2, sharey=True), (0, 90), strict=True):
+        for colour, theta in zip(LINES, (0, 30, 60, 80), strict=False):
+            for maps, style in ((film, "-"), (bare, ":")):
+                # The bare plate looks the same from all azimuths.
+                (lmap,) = [m for m in maps if m.observer.theta == theta and m.observer.phi in {phi, 0}][-1:]
+                cut = et.cross_section(lmap, y=0.1)
+                label = f"{theta}°" if style == "-" else None
+                axes.stairs(
+                    cut.values / 1000,
+                    np.append(cut.position - cut.pitch / 2, cut.position[-1] + cut.pitch / 2),
+                    baseline=None,
+                    color=colour,
+                    linestyle=style,
+                    label=label,
+                )
+        axes.set_title("across the prisms (φ = 0°)" if phi == 0 else "along the prisms (φ = 90°)", fontsize=10)
+        axes.set_xlabel("x on the screen [mm]")
+        axes.spines[["top", "right"]].set_visible(False)
+    made.axes[0].set_ylabel("luminance [10³ cd/m²]")
+    made.axes[0].legend(title="with film; dotted: bare", frameon=False, fontsize=8, title_fontsize=8)
+    save(made, path)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rays", type=int, default=50_000)
+    parser.add_argument("--lines", type=int, default=4, help="lines of sight per pixel of the maps of the lamp itself")
+    parser.add_argument("--full", action="store_true", help="four million rays, 256 lines, 0.5 mm and 1 mm, fine grids")
+    parser.add_argument("--output", type=Path, default=Path("remote-phosphor"), help="folder for the figures")
+    options = parser.parse_args()
+    options.pixels = (1.0,)
+    options.output.mkdir(parents=True, exist_ok=True)
+    if options.full:
+        options.rays, options.lines, options.pixels = 4_000_000, 256, (0.5, 1.0)
+    found = {kind: experiment(kind, options) for kind in ("bare", "film")}
+    for kind, maps in found.items():
+        print_tables(kind, maps)
+    truth = {kind: maps[options.pixels[0]]["truth"] for kind, maps in found.items()}
+    for kind, i in (("bare", 0), ("film", 0)):
+        print(f"\n{kind}: {truth[kind][i].intensity:.1f} cd on the axis", end="")
+    print(f", {truth['film'][0].intensity / truth['bare'][0].intensity:.3f} times as much")
+    maps = found["film"][options.pixels[0]]
+    titles = ["the lamp itself", *(name for name in maps if name != "truth")]
+    rows = [
+        (f"({t.observer.theta:g}°, {t.observer.phi:g}°)", [t, *(seen[i] for n, seen in maps.items() if n != "truth")])
+        for i, t in enumerate(maps["truth"])
+    ]
+    draw_maps(options.output / "remote-phosphor.png", titles, rows, size=1.6)
+    draw_sections(options.output / "remote-phosphor-sections.png", truth["bare"], truth["film"])
+    print(f"figures: {options.output}/")
+
+
+if __name__ == "__main__":
+    main()
