@@ -107,10 +107,8 @@ fn determinant(mut m: [[f64; 4]; 4]) -> f64 {
         }
         result *= m[k][k];
         for row in k + 1..4 {
-            let factor = m[row][k] / m[k][k];
-            for column in k..4 {
-                m[row][column] -= factor * m[k][column];
-            }
+            let (factor, upper) = (m[row][k] / m[k][k], m[k]);
+            m[row].iter_mut().zip(upper).for_each(|(a, b)| *a -= factor * b);
         }
     }
     result
