@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from etendue.formats.intensity import read_intensity, write_intensity
 from etendue.formats.maps import read_illuminance_map, read_map
 from etendue.formats.rays import read_rays, write_rays
+from etendue.formats.rays.ray_index import RayIndex
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.goniophotometry.threshold_sweep import threshold_sweep
 from etendue.lightfield.diagnostics import diagnose
@@ -25,6 +26,7 @@ from etendue.luminance.denoising import denoise_map
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
 from etendue.plot import (
+    draw_scene,
     plot_characteristic,
     plot_comparison,
     plot_cross_sections,
@@ -58,6 +60,7 @@ __all__ = [
     "LuminanceMap",
     "Observer",
     "Plane",
+    "RayIndex",
     "RaySet",
     "Region",
     "RingSource",
@@ -71,6 +74,7 @@ __all__ = [
     "cross_section",
     "denoise_map",
     "diagnose",
+    "draw_scene",
     "filter_map",
     "intensity_distribution",
     "luminance_map",

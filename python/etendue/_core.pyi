@@ -148,6 +148,7 @@ class Scene:
 
     def __new__(cls, record: dict[str, Any]) -> Scene: ...
 
+_Sums: TypeAlias = tuple[_Floats, _Floats, npt.NDArray[np.uint64]]
 _Source: TypeAlias = RayTable | RingSource | FieldRays
 
 def read_rays(source: _Source, start: int, stop: int) -> tuple[_Floats, _Floats, _Floats]:
@@ -161,8 +162,48 @@ def cone_sums(
     cones: Sequence[_Cone],
     threads: int | None = None,
     progress: _Progress | None = None,
-) -> tuple[list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]], _Tally]:
+) -> tuple[list[_Sums], _Tally]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the tally."""
+
+def index_leaf() -> int:
+    """Rays of a leaf of the ray index."""
+
+def index_count(
+    source: _Source, side: int, threads: int | None = None, progress: _Progress | None = None
+) -> tuple[npt.NDArray[np.uint64], _Tally]:
+    """Usable rays in each of the 2·side² cells of direction, and the tally."""
+
+def index_place(
+    source: _Source,
+    side: int,
+    starts: npt.NDArray[np.uint64],
+    out: npt.NDArray[np.uint8],
+    threads: int | None = None,
+    progress: _Progress | None = None,
+) -> bool:
+    """Records of the usable rays, cell by cell, into `out`; False if the rays are not those that were counted."""
+
+def index_arrange(
+    records: RayTable,
+    side: int,
+    starts: npt.NDArray[np.uint64],
+    centre: Sequence[float],
+    threads: int | None = None,
+    progress: _Progress | None = None,
+) -> npt.NDArray[np.float32]:
+    """Puts the records of a writable table in the order of their leaves; returns the leaves' boxes, shape (leaves, 8)."""
+
+def index_sums(
+    records: RayTable,
+    side: int,
+    starts: npt.NDArray[np.uint64],
+    bounds: npt.NDArray[np.float32],
+    centre: Sequence[float],
+    cones: Sequence[_Cone],
+    threads: int | None = None,
+    progress: _Progress | None = None,
+) -> list[tuple[_Sums, int]]:
+    """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the rays looked at."""
 
 def count_rays(
     source: _Source,

@@ -172,6 +172,7 @@ WITHOUT_EXAMPLE = {
     "etendue.lightfield.trees": "the optional Pólya tree over counts; docs/theory.md explains it",
     "etendue.formats.hdf5": "how files of light fields and of traces are written and read",
     "etendue.luminance.looking": "luminance_map is the door",
+    "etendue.luminance.scene_map": "luminance_map is the door",
     "etendue.tracing.detections": "how TraceResult makes quantities of sums; its properties are the door",
     "etendue.tracing.ledger.Entry": "Ledger shows it",
     "etendue.tracing.ledger.Loss": "a row of a Ledger",
@@ -300,7 +301,8 @@ def without_comments(source: str) -> str:
 
 
 def test_no_crate_is_unsafe_prints_or_opens_files() -> None:
-    sources = sorted(CRATES.rglob("*.rs"))
+    # Examples are programs of their own, which report what they measured.
+    sources = sorted(path for path in CRATES.rglob("*.rs") if "examples" not in path.parts)
     assert len(sources) > 10
     for path in sources:
         code = without_comments(path.read_text())

@@ -7,7 +7,6 @@ import pkgutil
 import struct
 import tracemalloc
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +18,14 @@ from etendue.formats import rays as package
 from etendue.formats.rays import RAY_FORMATS, detect_format, read_rays, write_rays
 from etendue.formats.rays.ray_format import Head, RayFormat
 from etendue.quantities.ray_set import RaySetMeaning
-from etendue.quantities.ray_stream import BATCH, RayBatch
+from etendue.quantities.ray_stream import BATCH
 from etendue.quantities.report import RayFileWarning
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 NAMES = (
     "tm25",
+    "etd",
     "lighttools",
     "zemax",
     "speos",
@@ -47,6 +47,9 @@ WITHOUT_TOTAL = ("speos-text",)
 FAR_FIELD = ("lighttools", "lighttools-text", "csv")
 """Formats that hold rays without start points."""
 
+WHOLE_ONLY = ("etd",)
+"""Formats of which a part is worth nothing, and is refused."""
+
 LUMENS_ONLY_BY_NAME = ("tracepro",)
 """Formats that do not say the unit of flux."""
 
@@ -67,13 +70,17 @@ def asymmetric(n: int = 6, unit: Any = "W", seed: int = 3, *, wavelength: bool =
 
 
 def assert_same_rays(back: et.RaySet, rays: et.RaySet, *through: str) -> None:
-    """32-bit floats keep seven digits; the total is kept by all formats on the way but those that have none."""
+    """32-bit floats keep seven digits; the total is kept by all formats on the way but those that have none, the order
+    by all but the index, which has its own: then rays are compared by their x, of which there are no two."""
     assert len(back) == len(rays)
-    assert np.allclose(back.position, rays.position, rtol=1e-6, atol=1e-6)
-    assert np.allclose(back.direction, rays.direction, rtol=0, atol=2e-7)
+    mine, theirs = (slice(None), slice(None))
+    if "etd" in (*through, back.provenance.format):
+        mine, theirs = np.argsort(back.position[:, 0]), np.argsort(rays.position[:, 0])
+    assert np.allclose(back.position[mine], rays.position[theirs], rtol=1e-6, atol=1e-6)
+    assert np.allclose(back.direction[mine], rays.direction[theirs], rtol=0, atol=2e-7)
     lost = not set(through).isdisjoint(WITHOUT_TOTAL)
     scale = rays.total_flux / back.total_flux if lost else 1.0
-    assert np.allclose(back.flux * scale, rays.flux, rtol=1e-6, atol=0)
+    assert np.allclose(back.flux[mine] * scale, rays.flux[theirs], rtol=1e-6, atol=0)
     assert back.total_flux * scale == pytest.approx(rays.total_flux, rel=1e-6)
 
 
@@ -99,7 +106,7 @@ def test_round_trip(ray_format: RayFormat, tmp_path: Path) -> None:
     assert back.provenance.format == ray_format.name
     assert_same_rays(back, rays, ray_format.name)
     if back.wavelength is not None:
-        assert np.allclose(back.wavelength, rays.wavelength, rtol=1e-6)
+        assert np.allclose(np.sort(back.wavelength), np.sort(rays.wavelength), rtol=1e-6)
     if ray_format.name not in LUMENS_ONLY_BY_NAME:
         assert back.flux_unit == "W"
     assert list(tmp_path.iterdir()) == [path]
@@ -254,7 +261,8 @@ def look_at_everything(path: Path) -> et.RaySet:
         assert len(rays.flux) == len(rays)
         assert rays.wavelength is None or len(rays.wavelength) == len(rays)
     usable = sum(len(batch.flux) for batch in rays.batches())
-    assert usable == len(rays) - rays.tally.unusable
+    # A pass, because an index says what its tally was and cannot know of records that were damaged since.
+    assert usable == len(rays) - rays.pass_over().unusable
     return rays
 
 
@@ -291,7 +299,7 @@ def test_cut_at_every_byte(ray_format: RayFormat, tmp_path: Path) -> None:
         complained = any(c.severity in ("warning", "error") for c in fresh)
         between_rays = ray_format.name in UNCOUNTED and len(rays) < len(whole)
         assert complained or between_rays or data[size:].strip() == b"", size
-    assert readable > 0
+    assert (readable > 0) == (ray_format.name not in WHOLE_ONLY)
 
 
 FILES: dict[str, bytes] = {}
@@ -381,28 +389,18 @@ def test_opening_a_large_file_costs_no_memory(name: str, tmp_path: Path) -> None
 # --- failure ---------------------------------------------------------------------------------------------------------
 
 
-class FailingSet(et.RaySet):
-    """A ray set whose disk dies after the first batch."""
-
-    failure: type[BaseException] = OSError
-
-    def batches(self, size: int = 1 << 18) -> Iterator[RayBatch]:
-        yield from super().batches(size)
-        raise self.failure("the disk died")
-
-
 @every_format
 @pytest.mark.parametrize("failure", [OSError, KeyboardInterrupt])
 @pytest.mark.parametrize("existing", [False, True])
 def test_failed_write_leaves_nothing(
     ray_format: RayFormat, failure: type[BaseException], existing: bool, tmp_path: Path
 ) -> None:
-    rays = asymmetric()
-    failing = FailingSet.from_records(rays.records, rays.meaning)
-    failing.failure = failure
+    def dying(_done: int) -> None:
+        raise failure("the disk died")
+
     path = tmp_path / "led.ray"
     if existing:
         path.write_bytes(b"old")
     with pytest.raises(failure):
-        write_rays(path, failing, ray_format.name)
+        write_rays(path, asymmetric().watched(dying), ray_format.name)
     assert [p.read_bytes() for p in tmp_path.iterdir()] == ([b"old"] if existing else [])

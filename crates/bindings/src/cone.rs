@@ -1,6 +1,6 @@
 //! The cone estimator.
 
-use etendue_lightfield::cone::{Cone as CoreCone, cone_sums as core_cone_sums};
+use etendue_lightfield::cone::{Cone as CoreCone, Sums, cone_sums as core_cone_sums};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -19,15 +19,27 @@ pub struct Cone {
 }
 
 impl Cone {
-    fn core(&self) -> CoreCone {
+    /// As the core takes it.
+    pub fn core(&self) -> CoreCone {
         CoreCone {
             view: self.view.core(),
             acceptances: self.acceptances.clone(),
         }
     }
+
+    /// The sums of this cone, each of shape (acceptances, rows, columns).
+    pub fn arrays<'py>(&self, py: Python<'py>, sums: Sums) -> PyResult<SumArrays<'py>> {
+        let view = self.view.core();
+        let shape = [self.acceptances.len(), view.rows as usize, view.columns as usize];
+        Ok((
+            PyArray1::from_vec(py, sums.flux).reshape(shape)?,
+            PyArray1::from_vec(py, sums.flux_squared).reshape(shape)?,
+            PyArray1::from_vec(py, sums.rays).reshape(shape)?,
+        ))
+    }
 }
 
-type SumArrays<'py> = (
+pub type SumArrays<'py> = (
     Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<u64>>,
@@ -49,18 +61,6 @@ pub fn cone_sums<'py>(
             core_cone_sums(source, &core, threads, tick)
         })
     })?;
-    let arrays = sums
-        .into_iter()
-        .zip(&cones)
-        .map(|(sum, cone)| {
-            let view = cone.view.core();
-            let shape = [cone.acceptances.len(), view.rows as usize, view.columns as usize];
-            Ok((
-                PyArray1::from_vec(py, sum.flux).reshape(shape)?,
-                PyArray1::from_vec(py, sum.flux_squared).reshape(shape)?,
-                PyArray1::from_vec(py, sum.rays).reshape(shape)?,
-            ))
-        })
-        .collect::<PyResult<_>>()?;
-    Ok((arrays, tally_dict(py, &tally)?))
+    let arrays = sums.into_iter().zip(&cones).map(|(sum, cone)| cone.arrays(py, sum));
+    Ok((arrays.collect::<PyResult<_>>()?, tally_dict(py, &tally)?))
 }

@@ -15,8 +15,8 @@ use crate::field::FieldRays;
 /// Ray records over the bytes of an array: in memory, or mapped from a file.
 #[pyclass(frozen, module = "etendue._core")]
 pub struct RayTable {
-    bytes: Py<PyArray1<u8>>,
-    layout: Layout,
+    pub bytes: Py<PyArray1<u8>>,
+    pub layout: Layout,
 }
 
 #[pymethods]

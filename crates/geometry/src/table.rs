@@ -64,6 +64,37 @@ impl<'a> RayTable<'a> {
             && fits(layout.flux, 1);
         valid.then_some(Self { bytes, layout })
     }
+
+    /// Where the columns lie.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The bytes of some records, as they are stored.
+    #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "indices lie inside a slice that is in memory"
+    )]
+    pub fn records(&self, range: Range<u64>) -> &'a [u8] {
+        let (start, stop) = (range.start as usize, range.end as usize);
+        &self.bytes[start * self.layout.stride..stop * self.layout.stride]
+    }
+
+    /// Puts rays of several ranges, together at most [`BLOCK`](crate::batch::BLOCK), one after another into `batch`,
+    /// settled.
+    pub fn gather(&self, ranges: impl Iterator<Item = Range<u64>>, batch: &mut RayBatch) {
+        batch.len = 0;
+        for range in ranges {
+            let records = self.records(range);
+            match self.layout.float {
+                Float::F32 => decode(records, &self.layout, batch, 4, read_f32),
+                Float::F64 => decode(records, &self.layout, batch, 8, read_f64),
+            }
+        }
+        batch.settle();
+    }
 }
 
 fn read_f32(record: &[u8], offset: usize) -> f64 {
@@ -80,12 +111,14 @@ fn read_f64(record: &[u8], offset: usize) -> f64 {
     f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]])
 }
 
-/// One pass over the records with the column reader known at compile time.
+/// One pass over the records with the column reader known at compile time; they come behind those of the batch.
 fn decode(records: &[u8], layout: &Layout, batch: &mut RayBatch, width: usize, read: impl Fn(&[u8], usize) -> f64) {
     let [px, py, pz] = &mut batch.position;
     let [kx, ky, kz] = &mut batch.direction;
     let scale = layout.length_scale;
-    for (i, record) in records.chunks_exact(layout.stride).enumerate() {
+    let first = batch.len;
+    batch.len += records.len() / layout.stride;
+    for (i, record) in (first..).zip(records.chunks_exact(layout.stride)) {
         if let Some(p) = layout.position {
             px[i] = read(record, p) * scale;
             py[i] = read(record, p + width) * scale;
@@ -105,19 +138,8 @@ impl RaySource for RayTable<'_> {
         (self.bytes.len() / self.layout.stride) as u64
     }
 
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "indices lie inside a slice that is in memory"
-    )]
     fn fill(&self, range: Range<u64>, batch: &mut RayBatch) {
-        let (start, stop) = (range.start as usize, range.end as usize);
-        let records = &self.bytes[start * self.layout.stride..stop * self.layout.stride];
-        batch.len = stop - start;
-        match self.layout.float {
-            Float::F32 => decode(records, &self.layout, batch, 4, read_f32),
-            Float::F64 => decode(records, &self.layout, batch, 8, read_f64),
-        }
-        batch.settle();
+        self.gather(std::iter::once(range), batch);
     }
 }
 

@@ -3,7 +3,7 @@
 //! What `meeting` and `forward` come to for such a sheet, without branches and several rays at a time.
 
 use etendue_geometry::Face;
-use etendue_geometry::assembly::{Leaving, Lines};
+use etendue_geometry::assembly::{Hits, Leaving, Lines};
 use etendue_geometry::shape::{Outline, Shape};
 use etendue_math::Vec3;
 use etendue_optics::fresnel::reflect;
@@ -29,6 +29,7 @@ pub fn bouncers(scene: &Scene) -> Vec<Option<Bouncer>> {
             let simple = match &face.shape {
                 Shape::Flat(flat) => !matches!(flat.outline, Outline::Polygon { .. }),
                 Shape::Quadric(_) => true,
+                Shape::Mesh(mesh) => !mesh.is_smooth() && face.trims.is_empty(),
                 _ => false,
             };
             let Act::Optical(finish) = role.act else { return None };
@@ -59,6 +60,9 @@ pub struct Gathered {
     d: [Vec<f64>; 3],
     t: Vec<f64>,
     numbers: [Vec<f64>; 3],
+    /// Normal and a point of the triangle that each ray meets, for meshes.
+    normal: [Vec<f64>; 3],
+    corner: [Vec<f64>; 3],
 }
 
 /// Bounces the rays `which` of a block off a face: sets their new start points and directions in `lines`.
@@ -66,13 +70,20 @@ pub fn bounce(
     face: &Face,
     bouncer: Bouncer,
     which: &[u32],
-    distances: &[f64],
+    hits: &Hits,
     numbers: &[Vec<f64>; 4],
     lines: &mut Lines,
     room: &mut Gathered,
 ) {
     let n = which.len();
-    let Gathered { o, d, t, numbers: u } = room;
+    let Gathered {
+        o,
+        d,
+        t,
+        numbers: u,
+        normal,
+        corner,
+    } = room;
     for list in o.iter_mut().chain(d.iter_mut()).chain([&mut *t]).chain(u.iter_mut()) {
         list.resize(n, 0.0);
     }
@@ -83,13 +94,25 @@ pub fn bounce(
             d[axis][k] = lines.direction[axis][i];
             u[axis][k] = numbers[axis][i];
         }
-        t[k] = distances[i];
+        t[k] = hits.t[i];
+    }
+    if let Shape::Mesh(mesh) = &face.shape {
+        for list in normal.iter_mut().chain(corner.iter_mut()) {
+            list.resize(n, 0.0);
+        }
+        for (k, &i) in which.iter().enumerate() {
+            let part = hits.part[i as usize].0;
+            let (a, p) = (mesh.normal(part), mesh.triangle(part)[0]);
+            (normal[0][k], normal[1][k], normal[2][k]) = (a.x, a.y, a.z);
+            (corner[0][k], corner[1][k], corner[2][k]) = (p.x, p.y, p.z);
+        }
     }
     off(face, bouncer, room);
     let mut leaving = Leaving::default();
-    leaving.add(bouncer.face, 0);
+    leaving.face[0] = bouncer.face;
     for (k, &i) in which.iter().enumerate() {
         let at = |list: &[Vec<f64>; 3]| Vec3::new(list[0][k], list[1][k], list[2][k]);
+        leaving.part[0] = hits.part[i as usize].0;
         lines.set(i as usize, at(&room.o), at(&room.d), leaving);
     }
 }
@@ -98,12 +121,26 @@ pub fn bounce(
 fn off(face: &Face, bouncer: Bouncer, room: &mut Gathered) {
     let frame = face.frame;
     match &face.shape {
-        Shape::Quadric(quadric) => sweep(bouncer, room, |o, d, t| {
+        Shape::Quadric(quadric) => sweep(bouncer, room, |_, o, d, t| {
             let p = frame.point_to_local(o) + frame.direction_to_local(d) * t;
             let (p, n) = quadric.settle(p);
             (frame.point_to_world(p), frame.direction_to_world(n))
         }),
-        _ => sweep(bouncer, room, |o, d, t| {
+        Shape::Mesh(_) => {
+            // Each triangle is a plane of its own.
+            let (normals, corners) = (std::mem::take(&mut room.normal), std::mem::take(&mut room.corner));
+            let n = room.t.len();
+            let [nx, ny, nz] = normals.each_ref().map(|v| &v[..n]);
+            let [cx, cy, cz] = corners.each_ref().map(|v| &v[..n]);
+            sweep(bouncer, room, |k, o, d, t| {
+                let normal = frame.direction_to_world(Vec3::new(nx[k], ny[k], nz[k]));
+                let corner = frame.point_to_world(Vec3::new(cx[k], cy[k], cz[k]));
+                let p = o + d * t;
+                (p - normal * (p - corner).dot(normal), normal)
+            });
+            (room.normal, room.corner) = (normals, corners);
+        }
+        _ => sweep(bouncer, room, |_, o, d, t| {
             let p = o + d * t;
             (p - frame.z * (p - frame.origin).dot(frame.z), frame.z)
         }),
@@ -111,7 +148,7 @@ fn off(face: &Face, bouncer: Bouncer, room: &mut Gathered) {
 }
 
 #[inline(always)]
-fn sweep(bouncer: Bouncer, room: &mut Gathered, foot: impl Fn(Vec3, Vec3, f64) -> (Vec3, Vec3)) {
+fn sweep(bouncer: Bouncer, room: &mut Gathered, foot: impl Fn(usize, Vec3, Vec3, f64) -> (Vec3, Vec3)) {
     let n = room.t.len();
     let [ox, oy, oz] = room.o.each_mut().map(|v| &mut v[..n]);
     let [dx, dy, dz] = room.d.each_mut().map(|v| &mut v[..n]);
@@ -120,7 +157,7 @@ fn sweep(bouncer: Bouncer, room: &mut Gathered, foot: impl Fn(Vec3, Vec3, f64) -
     for k in 0..n {
         let o = Vec3::new(ox[k], oy[k], oz[k]);
         let d = Vec3::new(dx[k], dy[k], dz[k]);
-        let (p, normal) = foot(o, d, t[k]);
+        let (p, normal) = foot(k, o, d, t[k]);
         let height_in = d.dot(normal);
         let sign = if height_in < 0.0 { 1.0 } else { -1.0 };
         let side = normal * sign;

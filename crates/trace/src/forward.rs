@@ -271,7 +271,7 @@ impl Walk<'_> {
                         // Its line is set when all rays that meet this face are; until then it moves up as it is.
                         #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
                         self.bounced[face].push(kept as u32);
-                        hits.t[kept] = hits.t[i];
+                        hits.keep(i, kept);
                         for list in &mut self.numbers {
                             list[kept] = list[i];
                         }
@@ -298,7 +298,7 @@ impl Walk<'_> {
             for ((face, bouncer), which) in faces.zip(&self.bounced) {
                 if let (Some(bouncer), false) = (bouncer, which.is_empty()) {
                     let (lines, room) = (&mut self.lines, &mut self.gathered);
-                    bounce(face, *bouncer, which, &hits.t, &self.numbers, lines, room);
+                    bounce(face, *bouncer, which, &hits, &self.numbers, lines, room);
                 }
             }
             self.lines.truncate(kept);

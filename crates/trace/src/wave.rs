@@ -22,7 +22,7 @@ const PURPOSE_SHIFT: u64 = 0x5348_4946;
 const PURPOSE_PATH: u64 = 0x5041_5448;
 
 /// Chains of smooth surfaces are followed on every branch down to this weight; below, one branch is drawn.
-const SPLIT: f64 = 0.02;
+const SPLIT: f64 = 1e-3;
 
 /// Diffuse scatters before a path may be ended by chance.
 const SURE: u32 = 3;

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli import compare, convert, demo, filter_, fit, info, intensity, luminance, patches, sample, trace
+from etendue.cli import compare, convert, demo, draw, filter_, fit, info, intensity, luminance, patches, sample, trace
 from etendue.cli.terminal import INTERRUPTED, complain, spell_out_unknown_letters
 from etendue.errors import EtendueError
 from etendue.quantities.provenance import version
@@ -28,6 +28,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "luminance": luminance.luminance,
     "sample": sample.sample,
     "intensity": intensity.intensity,
+    "draw": draw.draw,
     "trace": trace.trace,
     "patches": patches.patches,
     "filter": filter_.filter_,

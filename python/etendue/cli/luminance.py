@@ -28,7 +28,9 @@ SCENE_EXTENSION = ".toml"
 
 
 def luminance(
-    file: Annotated[Path, typer.Argument(help="A ray file of any format, a light field, or a scene (.toml).")],
+    file: Annotated[
+        Path, typer.Argument(help="A ray file of any format, an index of rays, a light field, or a scene (.toml).")
+    ],
     output: Annotated[
         list[Path],
         typer.Option(
@@ -52,7 +54,11 @@ def luminance(
     pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
     plane: Annotated[str, typer.Option("--plane", help="view or xy.")] = "view",
     method: Annotated[
-        str, typer.Option("--method", help="auto, cone or lightfield; auto: the light field if no acceptance is given.")
+        str,
+        typer.Option(
+            "--method",
+            help="auto, cone or lightfield; auto: the light field, or the cone for an index or an acceptance.",
+        ),
     ] = "auto",
     acceptance: Annotated[
         str | None,
@@ -81,6 +87,12 @@ def luminance(
         typer.Option("--until", help="Of a scene: follow more until this median relative error is reached, e.g. 0.01."),
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Of a scene [1].", min=0, show_default=False)] = None,
+    forward_rays: Annotated[
+        float | None,
+        typer.Option(
+            "--forward-rays", help="Of a scene: rays traced forwards besides, for caustics and beams, e.g. 1e7."
+        ),
+    ] = None,
     flux: Annotated[
         str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")
     ] = None,
@@ -132,11 +144,17 @@ def luminance(
                 rays_per_pixel=rays_per_pixel,
                 until=until,
                 seed=seed,
+                forward_rays=forward_rays,
                 threads=threads,
                 progress=progress,
             )
     else:
-        for_scenes = {"--rays-per-pixel": rays_per_pixel, "--until": until, "--seed": seed}
+        for_scenes = {
+            "--rays-per-pixel": rays_per_pixel,
+            "--until": until,
+            "--seed": seed,
+            "--forward-rays": forward_rays,
+        }
         _refuse(for_scenes, f"for scenes; {file} is none")
         cone = None if acceptance is None else _acceptance(acceptance)
         carrier = "auto" if surface is None else surface_option(surface)

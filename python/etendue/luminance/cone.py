@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.formats.rays.ray_index import RayIndex
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 from etendue.units import MM2_PER_M2
@@ -68,6 +69,8 @@ class ConeEstimate:
         Rays seen.
     etendue : array
         [m² sr]
+    looked : int
+        Rays that had to be looked at: all of them, but of an index.
     """
 
     view: ConeView
@@ -75,12 +78,13 @@ class ConeEstimate:
     variance: FloatArray
     rays: npt.NDArray[np.int64]
     etendue: FloatArray
+    looked: int
 
 
 def cone_estimates(
     rays: RayStream, views: Sequence[ConeView], threads: int | None = None, progress: Progress | None = None
 ) -> tuple[list[ConeEstimate], Tally]:
-    """Eqs. 2.2 to 2.4 of [Audenaert2014]_ for any number of views in one pass over the rays.
+    """Eqs. 2.2 to 2.4 of [Audenaert2014]_ for any number of views in one pass over the rays, or from an index of them.
 
     A ray is carried along its line to the screen; if it crosses pixel p and its direction is within the acceptance of the
     line from p's centre to the observer (eq. 2.2), its flux counts for p. For a Lambertian source the expectation is
@@ -98,14 +102,19 @@ def cone_estimates(
             "Ask for a near-field ray file."
         )
     cones = [_core_cone(view) for view in views]
-    sums, raw_tally = _core.cone_sums(rays.core_source(), cones, checked_threads(threads), progress)
-    tally = Tally.from_core(raw_tally)
-    scale = rays.accept_tally(tally)
+    if isinstance(rays, RayIndex):
+        found, tally, scale = rays.cone_sums(cones, threads, progress), rays.tally, rays.flux_scale
+    else:
+        sums, raw_tally = _core.cone_sums(rays.core_source(), cones, checked_threads(threads), progress)
+        tally = Tally.from_core(raw_tally)
+        scale = rays.accept_tally(tally)
+        found = [(of_cone, tally.rays) for of_cone in sums]
     estimates = []
-    for view, (flux, flux_squared, counts) in zip(views, sums, strict=True):
+    for view, ((flux, flux_squared, counts), looked) in zip(views, found, strict=True):
         etendue = view.etendue()
         factor = scale / etendue
-        estimates.append(ConeEstimate(view, flux * factor, flux_squared * factor**2, counts.astype(np.int64), etendue))
+        variance = flux_squared * factor**2
+        estimates.append(ConeEstimate(view, flux * factor, variance, counts.astype(np.int64), etendue, looked))
     return estimates, tally
 
 

@@ -8,6 +8,7 @@ from typing import Literal, get_args, overload
 import numpy as np
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.formats.rays.ray_index import RayIndex
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Surface
 from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
@@ -67,6 +68,7 @@ def luminance_map(
     rays_per_pixel: int | None = ...,
     until: float | None = ...,
     seed: int | None = ...,
+    forward_rays: float | None = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> LuminanceMap: ...
@@ -79,6 +81,7 @@ def luminance_map(
     rays_per_pixel: int | None = ...,
     until: float | None = ...,
     seed: int | None = ...,
+    forward_rays: float | None = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> list[LuminanceMap]: ...
@@ -94,6 +97,7 @@ def luminance_map(
     rays_per_pixel: int | None = None,
     until: float | None = None,
     seed: int | None = None,
+    forward_rays: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> LuminanceMap | list[LuminanceMap]:
@@ -106,15 +110,16 @@ def luminance_map(
     Parameters
     ----------
     source : RayStream, LightField or Scene
-        A ray set, a source that draws its rays on demand, the light field that was fitted to one, or a scene. Ray sets in
-        a scene are fitted first, since rays have no luminance that a line of sight could meet.
+        A ray set, a source that draws its rays on demand, an index of rays, the light field that was fitted to one, or a
+        scene. Ray sets in a scene are fitted first, since rays have no luminance that a line of sight could meet.
     observer : Observer or sequence of Observer
         Any number is served by one pass over the rays. Of a scene, None: its own observers with their screens.
     screen : Screen or sequence of Screen
         One for all observers, or one each.
     method : {"auto", "cone", "lightfield"}
         ``"lightfield"``: fit a light field to all rays, then look at it. ``"cone"``: only rays that head for the observer,
-        eqs. 2.2 to 2.4 of [Audenaert2014]_. ``"auto"``: the light field, unless an acceptance is given.
+        eqs. 2.2 to 2.4 of [Audenaert2014]_. ``"auto"``: the light field, unless an acceptance is given or the rays are
+        indexed (`RayIndex`), which makes the cone a matter of milliseconds.
     acceptance : float, "auto" or None
         Half-angle α of the cone [°]; None: 1.5; ``"auto"``: the one of least estimated error, and the map's notes say why.
     surface : Surface or "auto"
@@ -129,6 +134,10 @@ def luminance_map(
         times `rays_per_pixel`. What light fields do not know of themselves does not count here, but in the map's errors.
     seed : int, optional
         Of a scene; 1 if None.
+    forward_rays : int, optional
+        Of a scene: so many rays are traced forwards besides, and what they send to the eye from diffuse surfaces is added:
+        light that reaches these through lenses and mirrors (caustics), which lines of sight find by chance only, or not
+        at all if it comes from points, and that of beams. No light is counted twice.
     threads : int, optional
         All cores if None. The result has the same bits for any number.
     progress : callable, optional
@@ -165,7 +174,7 @@ def luminance_map(
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
-    for_scenes = {"rays_per_pixel": rays_per_pixel, "until": until, "seed": seed}
+    for_scenes = {"rays_per_pixel": rays_per_pixel, "until": until, "seed": seed, "forward_rays": forward_rays}
     for_others = {
         "method": None if method == "auto" else method,
         "acceptance": acceptance,
@@ -189,8 +198,8 @@ def luminance_map(
     if len(observers) != len(screens) or not observers:
         raise ArgumentError(f"{len(observers)} observers and {len(screens)} screens; give one screen, or one for each.")
     pairs = list(zip(observers, screens, strict=True))
-    # A stated acceptance asks for the cone.
-    by_cone = method == "cone" or (method == "auto" and acceptance is not None)
+    # A stated acceptance asks for the cone, and so does an index, which was built for nothing else.
+    by_cone = method == "cone" or (method == "auto" and (acceptance is not None or isinstance(source, RayIndex)))
     if isinstance(source, Scene):
         given = {name: value for name, value in for_scenes.items() if value is not None}
         maps = look_at_scene(source, pairs, Looking(**given, threads=threads), progress)  # type: ignore[arg-type]
@@ -246,6 +255,8 @@ def _map(
         f"{counts.sum():,} of {tally.rays:,} rays head for the observer within {angle:.4g}° through the screen",
         f"{int(dead.sum()):,} of {dead.size:,} pixels are dead (no ray): NaN",
     ]
+    if isinstance(rays, RayIndex):
+        notes.append(f"by the index: {estimate.looked:,} rays were looked at, and no other can be seen")
     if not dead.all():
         notes.append(f"median relative standard error {np.median(error[~dead] / values[~dead]):.2%} of the live pixels")
     if tally.unusable:

@@ -42,6 +42,11 @@ MOST_TIMES = 64
 MOST_EVENTS = 10_000
 """Surfaces that a line of sight may meet."""
 
+MOST_FORWARD_RAYS = 1 << 50
+
+ROUND = 16
+"""Batches of rays traced forwards at a time."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Looking:
@@ -50,6 +55,7 @@ class Looking:
     rays_per_pixel: int = DEFAULT_RAYS_PER_PIXEL
     until: float | None = None
     seed: int = 1
+    forward_rays: float | None = None
     threads: int | None = None
 
     def __post_init__(self) -> None:
@@ -60,6 +66,9 @@ class Looking:
             raise ArgumentError(f"until is {self.until!r}; give the relative error to be reached, e.g. 0.01.")
         if not (isinstance(self.seed, int) and 0 <= self.seed <= MOST_SEED):
             raise ArgumentError(f"seed is {self.seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
+        rays = self.forward_rays
+        if rays is not None and not (1 <= rays <= MOST_FORWARD_RAYS and int(rays) == rays):
+            raise ArgumentError(f"forward_rays is {rays!r}; give a whole number from 1 to {MOST_FORWARD_RAYS:,}.")
         checked_threads(self.threads)
 
     @property
@@ -91,16 +100,17 @@ def look_at_scene(
     if not compiled.record["sources"]:
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
     core = _core.Scene(compiled.record)
-    notes = [*compiled.notes, *notes, *_unseen(compiled)]
+    notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=how.forward_rays is not None)]
+    rest = _light_images(compiled, views, how)
     origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
     maps, done = [], 0
-    for (observer, screen), view in zip(pairs, views, strict=True):
+    for (observer, screen), view, image in zip(pairs, views, rest, strict=True):
         passes = _Passes(screen.shape)
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
         while passes.done < wanted:
             first = passes.done
             sum_, _, deviation = _core.look_at_scene(
-                core, view, how.paths, how.seed, MOST_EVENTS, False, first, first + 1, how.threads
+                core, view, how.paths, how.seed, MOST_EVENTS, image is not None, first, first + 1, how.threads
             )
             passes.add(sum_, deviation)
             done += how.paths * screen.columns * screen.rows
@@ -110,10 +120,16 @@ def look_at_scene(
                 wanted = passes.wanted(how.until, most)
         paths = how.paths * passes.done
         told = [f"{paths:,} lines of sight per pixel, in {passes.done} independent passes", *passes.notes(how.until)]
+        values, error = passes.mean, passes.standard_error
+        if image is not None:
+            values, error = values + image[0].reshape(screen.shape), np.hypot(error, image[1].reshape(screen.shape))
+            told.append(
+                f"{int(how.forward_rays or 0):,} rays forwards, for light that smooth surfaces or beams send to diffuse ones"
+            )
         maps.append(
             LuminanceMap(
-                passes.mean * MM2_PER_M2,
-                passes.standard_error * MM2_PER_M2,
+                values * MM2_PER_M2,
+                error * MM2_PER_M2,
                 np.full(screen.shape, paths),
                 observer,
                 screen,
@@ -123,6 +139,27 @@ def look_at_scene(
             )
         )
     return maps
+
+
+def _light_images(compiled: Compiled, views: list[_core._View], how: Looking) -> list[tuple[Array, Array] | None]:
+    """What each observer sees of light that lines of sight do not find: luminance of the pixels and its standard error.
+
+    It reaches a diffuse surface through smooth ones, or comes from a beam; from the surface, or over other diffuse ones,
+    it gets to the eye directly.
+    """
+    if how.forward_rays is None:
+        return [None] * len(views)
+    detectors = [{"kind": "image", "view": view, "complement": True} for view in views]
+    core = _core.Scene({**compiled.record, "detectors": detectors})
+    rays = int(how.forward_rays)
+    batches = -(-rays // _core.batch_size())
+    sums = [np.zeros((2, view["columns"] * view["rows"])) for view in views]
+    for first in range(0, batches, ROUND):
+        last = min(first + ROUND, batches)
+        harvest = _core.trace_batches(core, rays, how.seed, MOST_EVENTS, first, last, how.threads)
+        sums = [total + cells[:2] for total, cells in zip(sums, harvest["cells"], strict=True)]
+    # Rays are independent of each other: the variance of Σ w is Σ w² − (Σ w)²/n.
+    return [(s, np.sqrt(np.maximum(squares - s * s / rays, 0.0))) for s, squares in sums]
 
 
 class _Passes:
@@ -219,7 +256,7 @@ def _fitted(source: Rays, scene: Scene, threads: int | None) -> tuple[Field, str
     return seen, field.surface.spec, 1.0 - field.total_flux / rays.total_flux
 
 
-def _unseen(compiled: Compiled) -> list[str]:
+def _unseen(compiled: Compiled, *, forwards: bool) -> list[str]:
     """What the eye cannot see of the sources, though they shine."""
     names: dict[str, list[str]] = {"point": [], "beam": []}
     for name, source in zip(compiled.source_names, compiled.record["sources"], strict=True):
@@ -228,12 +265,12 @@ def _unseen(compiled: Compiled) -> list[str]:
     notes = []
     if names["point"]:
         notes.append(
-            f"{', '.join(names['point'])}: a point has no finite luminance; it is not seen itself, nor what it lights "
-            "through lenses and mirrors"
+            f"{', '.join(names['point'])}: a point has no finite luminance and is not seen itself"
+            + ("" if forwards else "; what it lights through lenses and mirrors is seen with forward_rays only")
         )
     if names["beam"]:
         notes.append(
-            f"{', '.join(names['beam'])}: parallel light is met by no line of sight; what it lights is not seen here, "
-            "but in a light image of a trace"
+            f"{', '.join(names['beam'])}: parallel light is met by no line of sight and is not seen itself"
+            + ("" if forwards else "; what it lights is seen with forward_rays only")
         )
     return notes

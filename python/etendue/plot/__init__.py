@@ -1,4 +1,4 @@
-"""Pictures of maps, comparisons and intensities; matplotlib is imported when the first one is drawn."""
+"""Pictures of maps, comparisons, intensities and scenes; matplotlib is imported when the first one is drawn."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from etendue.plot.comparison_picture import plot_comparison
 from etendue.plot.cross_section_picture import plot_cross_sections
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
+from etendue.plot.scene_picture import draw_scene
 from etendue.plot.threshold_picture import plot_threshold_sweep
 from etendue.quantities.luminance_map import PLOT_MAP
 
 __all__ = [
+    "draw_scene",
     "plot_characteristic",
     "plot_comparison",
     "plot_cross_sections",

@@ -161,6 +161,11 @@ class RayStream(abc.ABC):
         same._watcher = progress  # noqa: SLF001 - its own kind
         return same
 
+    @property
+    def watcher(self) -> Progress | None:
+        """The function that `watched` was given."""
+        return self._watcher
+
     def batches(self, size: int = BATCH) -> Iterator[RayBatch]:
         """The usable rays in order, `size` records at a time.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import numpy.typing as npt
 
@@ -34,7 +36,6 @@ def chains(count: int, links: npt.NDArray[np.int64]) -> list[list[int]]:
         at[b].append(number)
     ends = links.tolist()
     used = [False] * len(ends)
-    found = []
 
     def follow(start: int, link: int) -> list[int]:
         chain, here = [start], start
@@ -50,11 +51,9 @@ def chains(count: int, links: npt.NDArray[np.int64]) -> list[list[int]]:
         return chain
 
     open_ends = [point for point in range(count) if len(at[point]) not in {0, 2}]
-    for point in [*open_ends, *range(count)]:
-        for link in at[point]:
-            if not used[link]:
-                found.append(follow(point, link))
-    return found
+    # The check comes after the links of the chain before have been used up.
+    starts = ((point, link) for point in [*open_ends, *range(count)] for link in at[point])
+    return [follow(point, link) for point, link in starts if not used[link]]
 
 
 def rings(curves: list[Array], reach: float) -> list[Array]:
@@ -63,6 +62,7 @@ def rings(curves: list[Array], reach: float) -> list[Array]:
     Parameters
     ----------
     curves : list of arrays, each of shape (k, 2)
+        Open and closed ones, in any sense.
     reach : float
         How far apart ends may lie that meet.
 
@@ -96,11 +96,10 @@ def rings(curves: list[Array], reach: float) -> list[Array]:
         if chain[0] != chain[-1]:
             continue
         parts = []
-        for a, b in zip(chain, chain[1:], strict=False):
-            i = by_pair[min(a, b), max(a, b)].pop()
+        for a, b in itertools.pairwise(chain):
+            i = by_pair[min(a, b), max(a, b)].pop(0)
             parts.append(rest[i] if links[i, 0] == a else rest[i][::-1])
-        ring = np.concatenate(parts)
-        ring[-1] = ring[0]
+        ring = np.concatenate([part[:-1] for part in parts] + [parts[0][:1]])
         closed.append(ring)
     return closed
 

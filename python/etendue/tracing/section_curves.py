@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
-LINES = 192
-"""Lines of the grid in either direction."""
+LINES = 384
+"""Lines of the grid in either direction. A gap is found for certain if it is wider than half a cell: two pixels."""
 
 MARGINS = (0.0137, 0.0211)
 """Of the grid beyond the face, as shares of its larger side: more than a cell on both sides, and different, so that no line
@@ -26,17 +26,19 @@ of the grid falls on an axis or an edge of a face that has symmetry."""
 SPLIT = 0.4731
 """Where cells are split: off the middle, for the same reason."""
 
-DEEPEST = 20
-"""Splits of a cell in which more than one curve passes: a thousandth of a cell in either direction."""
+DEEPEST = 18
+"""Splits of a cell in which more than one curve passes: a five hundredth of a cell in either direction."""
 
-FLAT_ENOUGH = 2e-5
-"""Largest distance between a curve and its chords, as a share of the face's size: a tenth of a pixel."""
+FLAT_ENOUGH = 1.5e-5
+"""Largest distance between a curve and the middle of a chord, as a share of the face's size; elsewhere along the chord it is
+not much more. A pixel is some 5e-4."""
 
 FINEST = 12
 """Halvings of a chord."""
 
-HALVINGS = 48
-"""Of the interval in which a curve ends: from a cell to a rounding."""
+STEPS_OF_A_CELL, STEPS, HALVINGS = 8, 12, 48
+"""From its last point a curve is followed in steps of an eighth of a cell, over one and a half cells; the step in which it
+ends is halved down to a rounding."""
 
 WIDE = 0.7
 """How far aside a curve is looked for where it may end, as a share of the way on from its last point."""
@@ -79,16 +81,14 @@ class _Face:
         length = np.hypot(*along.T)
         real = np.flatnonzero(length > 0.0)
         unit = along[real] / length[real, None]
-        lines, _, t = _core.scene_crossings(
-            self.core, self.section.points(starts[real]), self.section.directions(unit)
-        )
+        lines, _, t = _core.scene_crossings(self.core, self.section.points(starts[real]), self.section.directions(unit))
         number = real[lines.astype(np.int64)]
         kept = t <= length[number]
         number, t = number[kept], t[kept]
         return _Hits(number, starts[number] + (t / length[number])[:, None] * along[number])
 
     def nearest(self, middles: Array, normals: Array, low: Array, high: Array) -> tuple[npt.NDArray[np.bool_], Array]:
-        """Whether lines through `middles` along `normals` cross the face between two distances, and where nearest to the middle."""
+        """Whether lines through points cross the face between two distances from these, and where nearest to them."""
         hits = self.cross(middles + low[:, None] * normals, middles + high[:, None] * normals)
         gap = np.hypot(*(hits.points - middles[hits.line]).T)
         order = np.lexsort((gap, hits.line))
@@ -212,17 +212,25 @@ class _Curves:
         away = last - before
         away /= np.hypot(*away.T)[:, None]
         normal = _normals(away)
-        reach = 1.5 * float(np.hypot(self.u[1] - self.u[0], self.v[1] - self.v[0]))
-        low, high, best = np.zeros(len(last)), np.full(len(last), reach), last.copy()
+        cell = float(np.hypot(self.u[1] - self.u[0], self.v[1] - self.v[0]))
+        low, high, best = np.zeros(len(last)), np.zeros(len(last)), last.copy()
+        going = np.ones(len(last), dtype=bool)
+        for step in cell * np.arange(1, STEPS + 1) / STEPS_OF_A_CELL:
+            reach = np.full(len(last), step)
+            found, there = self.face.nearest(last + step * away, normal, -WIDE * reach, WIDE * reach)
+            low, high = np.where(going & found, step, low), np.where(going, step, high)
+            going &= found
+            best[going] = there[going]
         # A curve that is still there a cell farther on has no end here that could be found.
-        lost, _ = self.face.nearest(last + reach * away, normal, -WIDE * high, WIDE * high)
+        best[going] = last[going]
         for _ in range(HALVINGS):
             step = (low + high) / 2.0
             found, there = self.face.nearest(last + step[:, None] * away, normal, -WIDE * step, WIDE * step)
+            found &= ~going
             low, high = np.where(found, step, low), np.where(found, high, step)
             best[found] = there[found]
         for k, (a, _) in enumerate(open_):
-            if not lost[k] and (best[k] != last[k]).any():
+            if (best[k] != last[k]).any():
                 (new,) = self.add(best[k : k + 1])
                 self.links.append(_Link(a, new, NOWHERE))
 
@@ -246,6 +254,7 @@ def crossed_curves(
     shape, frame, trims
         The face as the tracer takes it.
     section : Section
+        The plane.
     region : array, shape (2, 2)
         Left and bottom, right and top of what is looked at [mm].
 
@@ -291,7 +300,8 @@ def _columns(u: Array, v: float) -> Array:
 def _normals(along: Array) -> Array:
     """Unit vectors across."""
     length = np.maximum(np.hypot(*along.T), np.finfo(np.float64).tiny)
-    return np.stack([-along[:, 1], along[:, 0]], axis=1) / length[:, None]
+    normals: Array = np.stack([-along[:, 1], along[:, 0]], axis=1) / length[:, None]
+    return normals
 
 
 def _within(points: Array, directions: Array, cells: Array) -> tuple[Array, Array]:

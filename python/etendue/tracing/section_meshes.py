@@ -18,8 +18,7 @@ Array = npt.NDArray[np.float64]
 def mesh_curves(shape: dict[str, Any], origin: Array, axes: Array, section: Section) -> list[Array]:
     """The curves in which a section cuts a mesh.
 
-    A corner that lies in the section counts as lying below it, everywhere: so the curves of a closed mesh are closed, and
-    triangles that lie in the section have none.
+    A corner that lies in the section counts as lying below it, everywhere: so the curves of a closed mesh are closed.
 
     Parameters
     ----------
@@ -28,6 +27,7 @@ def mesh_curves(shape: dict[str, Any], origin: Array, axes: Array, section: Sect
     origin, axes : arrays, shapes (3,) and (3, 3)
         Where the mesh stands; the rows are the images of its x, y and z.
     section : Section
+        The plane.
 
     Returns
     -------

@@ -24,8 +24,9 @@ AXES = "xyz"
 SHOWN = {"y": (0, 2), "x": (1, 2), "z": (0, 1)}
 """By the axis that stands upright on the section: which coordinates run to the right and up."""
 
-BESIDE = 1e-9
-"""Of a face's size: so far beside it a section is laid that would fall into it. The drawing shows no less than 1e-4."""
+BESIDE = 1e-11
+"""Of the size of what is cut: so far beyond its place a section is laid, so that faces may end in it or lie in it; more than
+roundings, and far less than a drawing shows."""
 
 _CORNERS = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])
 _EDGES = [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
@@ -85,13 +86,18 @@ class Section:
         """The axis that runs up."""
         return AXES[SHOWN[self.axis][1]]
 
+    @property
+    def index(self) -> int:
+        """Number of the axis that it cuts."""
+        return AXES.index(self.axis)
+
     def flat(self, points: Array) -> Array:
         """Points projected onto the section, shape (…, 2) [mm]."""
         return points[..., SHOWN[self.axis]]
 
     def depth(self, points: Array) -> Array:
         """How far points lie from the section along its axis [mm]."""
-        depth: Array = points[..., AXES.index(self.axis)] - self.at
+        depth: Array = points[..., self.index] - self.at
         return depth
 
     def points(self, flat: Array) -> Array:
@@ -118,7 +124,7 @@ def cut_faces(faces: Sequence[Mapping[str, Any]], section: Section, window: Wind
     faces : sequence of mappings
         With ``shape``, ``frame`` and ``trims`` as the tracer takes them.
     section : Section
-        What ends on it or lies in it is cut as if the section were a trifle farther along its axis.
+        It is laid a trifle (10⁻¹¹ of the size of it all) farther along its axis, where nothing ends or lies.
     window : left, right, bottom, top, optional
         What of the section is looked at [mm]. A face without an end, as a plane, has no curve without it.
 
@@ -126,7 +132,7 @@ def cut_faces(faces: Sequence[Mapping[str, Any]], section: Section, window: Wind
     -------
     list of lists of arrays, each of shape (k, 2)
         For each face its curves: points in order along each [mm]; a closed curve ends in its first point. Every point lies
-        on the face, and between two of them the curve is nowhere farther from their chord than 2·10⁻⁵ of the face's size.
+        on the face, and between two of them the curve is nowhere farther from their chord than 3·10⁻⁵ of the face's size.
 
     Examples
     --------
@@ -135,6 +141,7 @@ def cut_faces(faces: Sequence[Mapping[str, Any]], section: Section, window: Wind
     >>> cut_faces([{"shape": rectangle, "frame": here, "trims": []}], Section("y", 0.5))[0][0].tolist()
     [[2.0, 0.0], [-2.0, 0.0]]
     """
+    section = _beyond(section, faces)
     curves: list[list[Array]] = [[] for _ in faces]
     whole = [i for i, face in enumerate(faces) if _is_whole_rectangle(face)]
     for i, segment in zip(whole, _rectangles([faces[i] for i in whole], section), strict=True):
@@ -152,7 +159,7 @@ def _is_whole_rectangle(face: Mapping[str, Any]) -> bool:
 
 
 def _rectangles(faces: Sequence[Mapping[str, Any]], section: Section) -> list[list[Array]]:
-    """All at once: films have a hundred thousand of them. A corner in the section counts as lying below it."""
+    """All at once: films have a hundred thousand of them."""
     if not faces:
         return []
     frames = np.array([face["frame"] for face in faces], dtype=np.float64).reshape(-1, 4, 3)
@@ -163,8 +170,8 @@ def _rectangles(faces: Sequence[Mapping[str, Any]], section: Section) -> list[li
     cut = (depth > 0.0) != (np.roll(depth, -1, axis=1) > 0.0)
     found: list[list[Array]] = [[] for _ in faces]
     for i in np.flatnonzero(cut.any(axis=1)).tolist():
-        (a, b), after = np.flatnonzero(cut[i]), np.roll(np.arange(4), -1)
-        found[i] = [np.array([_between(flat[i], depth[i], k, after[k]) for k in (a, b)])]
+        ends = [_between(flat[i], depth[i], k, (k + 1) % 4) for k in np.flatnonzero(cut[i]).tolist()]
+        found[i] = [np.array(ends)]
     return found
 
 
@@ -185,7 +192,6 @@ def _cut(
         return [part for curve in curves for part in _trimmed(curve, trims, origin, axes, section)]
     if np.isfinite(box).all():
         corners = np.where(_CORNERS, box[1], box[0]) @ axes + origin
-        section = _beside(section, corners)
         crossing = _cut_box(section, corners)
         if crossing is None:
             return []
@@ -197,13 +203,13 @@ def _cut(
     return crossed_curves(shape, [*origin.tolist(), *axes.ravel().tolist()], trims, section, region)
 
 
-def _beside(section: Section, corners: Array) -> Section:
-    """The section, or one just beyond it if what lies in these corners ends on it."""
-    depth = section.depth(corners)
-    slack = BESIDE * float(np.ptp(corners, axis=0).max())
-    if min(abs(float(depth.min())), abs(float(depth.max()))) > slack:
-        return section
-    return dataclasses.replace(section, at=section.at + 2.0 * slack)
+def _beyond(section: Section, faces: Sequence[Mapping[str, Any]]) -> Section:
+    """The section, moved on by a trifle."""
+    sizes = [abs(section.at)]
+    for face in faces:
+        reach = np.abs([face["frame"][:3], *box_of(face["shape"])])
+        sizes.append(float(reach.max(initial=0.0, where=np.isfinite(reach))))
+    return dataclasses.replace(section, at=section.at + BESIDE * max(sizes))
 
 
 def _cut_box(section: Section, corners: Array) -> Array | None:
@@ -222,9 +228,7 @@ def _trimmed(curve: Array, trims: list[Any], origin: Array, axes: Array, section
     return parts
 
 
-def _clipped(
-    curve: Array, normal: Array, offset: float, origin: Array, axes: Array, section: Section
-) -> list[Array]:
+def _clipped(curve: Array, normal: Array, offset: float, origin: Array, axes: Array, section: Section) -> list[Array]:
     height = (section.points(curve) - origin) @ axes.T @ normal - offset
     pieces: list[list[Array]] = [[]]
     for i, point in enumerate(curve):

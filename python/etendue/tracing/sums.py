@@ -43,13 +43,9 @@ class Collected:
     def then(self, rows: Array) -> Collected:
         """With the rays of the next round, shape (m, 8)."""
         records = np.ascontiguousarray(rows).view(RECORD).reshape(-1)
-        if len(self.spool) != self.count:
-            # Another trace went on from here before: what it appended is not ours.
-            own = Spool(RECORD)
-            own.append(self.array())
-            own.append(records)
-            return Collected(own, self.count + len(records))
-        self.spool.append(records)
+        # Else this trace went on from here before, and the same rays follow already.
+        if len(self.spool) == self.count:
+            self.spool.append(records)
         return Collected(self.spool, self.count + len(records))
 
 

@@ -193,6 +193,12 @@ impl Mesh {
         self.normals[i as usize]
     }
 
+    /// Whether it states normals at its vertices, which are interpolated between them.
+    #[must_use]
+    pub const fn is_smooth(&self) -> bool {
+        self.vertex_normals.is_some()
+    }
+
     /// The unit normal of the smooth surface that a triangle stands for, at weights `u` and `v` of its second and third
     /// vertex: between the normals of its vertices. The geometric one if there are none or they cancel out.
     #[must_use]

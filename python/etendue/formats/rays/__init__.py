@@ -10,6 +10,7 @@ from etendue.formats.output import atomic_output
 from etendue.formats.rays import (
     asap,
     ascii_table,
+    etd,
     lighttools,
     lighttools_text,
     refused,
@@ -27,6 +28,7 @@ from etendue.units import FluxUnit
 
 RAY_FORMATS: tuple[RayFormat, ...] = (
     tm25.FORMAT,
+    etd.FORMAT,
     lighttools.FORMAT,
     zemax.FORMAT,
     speos.FORMAT,
@@ -79,7 +81,7 @@ def read_rays(path: str | os.PathLike[str], *, flux: float | None = None, flux_u
     Returns
     -------
     RaySet
-        Its `complaints` tell everything that is wrong with the file.
+        Its `complaints` tell everything that is wrong with the file. Of a ray index it is a `RayIndex`.
 
     Raises
     ------
@@ -105,7 +107,7 @@ def write_rays(path: str | os.PathLike[str], rays: RayStream, format: str | None
     rays : RayStream
         A ray set, or a source that draws its rays on demand.
     format : str, optional
-        ``tm25 | zemax | zemax-text | lighttools | lighttools-text | speos | speos-text | asap | tracepro | csv``;
+        ``tm25 | zemax | zemax-text | lighttools | lighttools-text | speos | speos-text | asap | tracepro | csv | etd``;
         from the extension if None.
 
     Returns

@@ -1,0 +1,340 @@
+"""How fast light is traced, beside Mitsuba (LLVM) and Embree in the same run.
+
+The cavity of thesis chapter 4: a cylinder of radius 21.5 and height 21.4, closed below by a disk, Lambertian with
+reflectance 0.984; four black disks in the base that emit from 1 µm above. A segment is one nearest-hit query; a ray ends
+when it leaves, is absorbed by chance, or meets a black disk. The same loop, and the same exit fraction, in both.
+
+- analytic: the faces as they are;
+- mesh: 24 576 triangles, flat normals; beside Mitsuba also Embree, asked by arrays of rays through `embreex`;
+- map: the reverse map seen from 55°, 250 × 125 pixels of 0.2 mm; efficiency is 1/(variance · time), the variance that of a
+  pixel over independent runs, relative to its mean over all of them;
+- field: maps of a light field, bare and behind a lens, 50 × 50 pixels and 1 000 paths each;
+- cells: time per ray drawn from light fields of 16 to 65 536 cells of place.
+
+Mitsuba's LLVM variants want `libllvm19` (Debian) and `DRJIT_LIBLLVM_PATH=/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1`.
+
+python benchmarks/tracer.py [--jobs analytic,mesh,map,field,cells] [--rays 4000000]
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import etendue as et
+import mitsuba as mi
+import numpy as np
+import trimesh
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
+from etendue import _core
+from etendue.scene import compile_scene
+
+Array = Any
+RADIUS, HEIGHT, REFLECTANCE, HOLE, AWAY = 21.5, 21.4, 0.984, 2.5, 10.0
+HOLES = ((AWAY, 0.0), (-AWAY, 0.0), (0.0, AWAY), (0.0, -AWAY))
+FACETS = 512
+FLUX = 0.96
+LIBRARY = Path("/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1")
+
+
+def row(job: str, value: str, ratio: str = "") -> None:
+    print(f"{job:<52} {value:>28} {ratio:>26}".rstrip(), flush=True)
+
+
+def cavity(walls: list[dict[str, Any]]) -> et.Scene:
+    holes = [
+        {"name": f"hole {i}", "shape": {"kind": "disk", "radius": HOLE}, "at": [x, y, 5e-4], "finish": "absorber"}
+        for i, (x, y) in enumerate(HOLES)
+    ]
+    spot = {"kind": "disk", "radius": HOLE}
+    lamps = [{"kind": "surface", "shape": spot, "flux": FLUX, "at": [x, y, 1e-3]} for x, y in HOLES]
+    white = {"kind": "lambertian", "reflectance": REFLECTANCE}
+    return et.Scene(sources=lamps, finishes={"white": white}, surfaces=[*walls, *holes])
+
+
+def analytic() -> et.Scene:
+    wall = {"name": "wall", "shape": {"kind": "cylinder", "radius": RADIUS, "height": HEIGHT}, "finish": "white"}
+    base = {"name": "base", "shape": {"kind": "disk", "radius": RADIUS}, "finish": "white"}
+    return cavity([wall, base])
+
+
+def mesh() -> tuple[Array, Array]:
+    """The wall in 24 rows, the base in a fan of rings: vertices and 24 576 triangles."""
+    turn = 2 * np.pi * np.arange(FACETS) / FACETS
+    ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    rows, rings = 12, 12
+    levels = [np.column_stack([RADIUS * ring, np.full(FACETS, HEIGHT * k / rows)]) for k in range(rows, -1, -1)]
+    levels += [np.column_stack([RADIUS * k / rings * ring, np.zeros(FACETS)]) for k in range(rings - 1, 0, -1)]
+    vertices = np.concatenate([*levels, np.zeros((1, 3))])
+    a = np.arange(FACETS)
+    b = (a + 1) % FACETS
+    triangles = []
+    for k in range(len(levels) - 1):
+        low, high = k * FACETS, (k + 1) * FACETS
+        triangles += [np.stack([low + a, low + b, high + a], 1), np.stack([high + a, low + b, high + b], 1)]
+    last = (len(levels) - 1) * FACETS
+    triangles.append(np.stack([last + a, last + b, np.full(FACETS, len(vertices) - 1)], 1))
+    return vertices, np.concatenate(triangles).astype(np.uint32)
+
+
+def forward(scene: _core.Scene, rays: int, threads: int | None) -> tuple[float, float]:
+    """Segments per second and exit fraction."""
+    batches = -(-rays // _core.batch_size())
+    start = time.perf_counter()
+    ledger = _core.trace_batches(scene, rays, 1, 1_000_000, 0, batches, threads)["ledger"]
+    seconds = time.perf_counter() - start
+    return ledger["segments"] / seconds, ledger["escaped"][0][0] / (4 * FLUX)
+
+
+@dr.syntax
+def bounce_about(scene: Any, black: list[Any], rays: int, seed: int) -> tuple[Any, Any]:
+    """The loop of the cavity in Mitsuba: segments and rays that left."""
+    rng = mi.PCG32(size=rays, initstate=seed)
+    index = dr.arange(mi.UInt32, rays) % len(HOLES)
+    turn = index * mi.Float(math.pi / 2)
+    spot = HOLE * mi.warp.square_to_uniform_disk_concentric(mi.Point2f(rng.next_float32(), rng.next_float32()))
+    origin = mi.Point3f(AWAY * dr.cos(turn) + spot.x, AWAY * dr.sin(turn) + spot.y, 1e-3)
+    direction = mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32()))
+    ray = mi.Ray3f(origin, direction)
+    active = mi.Mask(True)
+    segments, left = mi.UInt32(0), mi.UInt32(0)
+    while active:
+        si = scene.ray_intersect(ray, active)
+        segments += dr.select(active, 1, 0)
+        hit = active & si.is_valid()
+        left += dr.select(active & ~hit, 1, 0)
+        dark = mi.Mask(False)
+        for shape in black:
+            dark |= si.shape == mi.ShapePtr(shape)
+        active = hit & ~dark & (rng.next_float32() < REFLECTANCE)
+        local = mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32()))
+        local.z = dr.select(si.wi.z < 0, -local.z, local.z)
+        ray = si.spawn_ray(si.to_world(local))
+    return dr.sum(mi.Float(segments)), dr.sum(mi.Float(left))
+
+
+def mitsuba_forward(walls: Callable[[], dict[str, Any]], rays: int) -> tuple[float, float]:
+    """The same loop in Mitsuba: segments per second and exit fraction."""
+    mi.set_variant("llvm_ad_rgb")
+    shift = mi.ScalarTransform4f().translate
+    scale = mi.ScalarTransform4f().scale
+    spots = [shift([x, y, 5e-4]) @ scale(HOLE) for x, y in HOLES]
+    parts = {f"hole{i}": {"type": "disk", "to_world": spot} for i, spot in enumerate(spots)}
+    scene = mi.load_dict({"type": "scene", **walls(), **parts})
+    black = [shape for shape in scene.shapes() if "hole" in shape.id()]
+
+    def timed(seed: int) -> tuple[float, float]:
+        start = time.perf_counter()
+        segments, left = bounce_about(scene, black, rays, seed)
+        dr.eval(segments, left)
+        dr.sync_thread()
+        return segments[0] / (time.perf_counter() - start), left[0] / rays
+
+    timed(1)  # compiles
+    return max(timed(seed) for seed in (2, 3, 4))
+
+
+def embree_rate(vertices: Array, triangles: Array, rays: int) -> float:
+    """Nearest hits per second of independent rays that start on the walls, as the segments of the loop do."""
+    scene = rtcore_scene.EmbreeScene()
+    TriangleMesh(scene, vertices[triangles].astype(np.float32))
+    rng = np.random.default_rng(1)
+    corner = vertices[triangles]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    pick = rng.choice(len(triangles), rays, p=area / area.sum())
+    u, v = rng.random(rays) ** 0.5, rng.random(rays)
+    weights = np.stack([1 - u, u * (1 - v), u * v], axis=1)
+    place = np.einsum("nk,nkx->nx", weights, corner[pick])
+    inward = normal[pick] / area[pick, None]
+    middle = np.array([0.0, 0.0, HEIGHT / 2])
+    inward *= np.sign(((middle - place) * inward).sum(1))[:, None]
+    sphere = rng.normal(size=(rays, 3))
+    direction = inward + sphere / np.linalg.norm(sphere, axis=1)[:, None]
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    origin = (place + 1e-3 * inward).astype(np.float32)
+    direction = direction.astype(np.float32)
+    best = 0.0
+    for _ in range(3):
+        start = time.perf_counter()
+        scene.run(origin, direction)
+        best = max(best, rays / (time.perf_counter() - start))
+    return best
+
+
+def job_forward(name: str, scene: et.Scene, walls: Callable[[], dict[str, Any]], rays: int) -> float:
+    core = _core.Scene(compile_scene(scene).record)
+    forward(core, 1 << 18, None)
+    ours, left = max(forward(core, rays, None) for _ in range(3))
+    one, _ = max(forward(core, rays, 1) for _ in range(2))
+    theirs, their_left = mitsuba_forward(walls, rays)
+    row(f"{name}: all cores", f"{ours / 1e6:.1f} M segments/s", f"{ours / theirs:.2f} × Mitsuba")
+    row(f"{name}: one thread", f"{one / 1e6:.1f} M segments/s")
+    row(f"{name}: Mitsuba, llvm_ad_rgb", f"{theirs / 1e6:.1f} M segments/s")
+    error = math.sqrt(0.955 * 0.045 / rays)
+    row(f"{name}: exit fraction", f"{left:.4f}, {their_left:.4f}", f"± {error:.4f}")
+    return one
+
+
+def job_analytic(rays: int) -> None:
+    def walls() -> dict[str, Any]:
+        scale = mi.ScalarTransform4f().scale
+        wall = {"type": "cylinder", "p0": [0, 0, 0], "p1": [0, 0, HEIGHT], "radius": RADIUS}
+        return {"wall": wall, "base": {"type": "disk", "to_world": scale(RADIUS)}}
+
+    job_forward("analytic cavity", analytic(), walls, rays)
+
+
+def job_mesh(rays: int) -> None:
+    vertices, triangles = mesh()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cavity.ply"
+        trimesh.Trimesh(vertices, triangles, process=False).export(path)
+        scene = cavity([{"name": "walls", "shape": {"kind": "mesh", "file": str(path)}, "finish": "white"}])
+
+        def walls() -> dict[str, Any]:
+            return {"walls": {"type": "ply", "filename": str(path), "face_normals": True}}
+
+        one = job_forward(f"mesh cavity, {len(triangles):,} triangles", scene, walls, rays)
+    embree = embree_rate(vertices, triangles, 1 << 20)
+    row(
+        "mesh cavity: Embree, single rays, one thread",
+        f"{embree / 1e6:.1f} M queries/s",
+        f"{one / embree:.2f} × Embree",
+    )
+
+
+def job_map(_rays: int) -> None:
+    observer, screen = et.Observer(55, 0, 1000), et.Screen(50, 25, 250, 125)
+    scene = analytic()
+    core = _core.Scene(compile_scene(scene).record)
+    view = screen.core_view(observer)
+
+    def ours(seed: int) -> Array:
+        return _core.look_at_scene(core, view, 16, seed, 1_000_000, False, 0, 1)[0]
+
+    mi.set_variant("llvm_ad_rgb")
+    transform = mi.ScalarTransform4f
+    luminance = FLUX / (math.pi * math.pi * HOLE**2)
+    parts = {}
+    for i, (x, y) in enumerate(HOLES):
+        lamp = {"type": "area", "radiance": {"type": "rgb", "value": luminance}}
+        to_world = transform().translate([x, y, 1e-3]) @ transform().scale(HOLE)
+        black = {"type": "diffuse", "reflectance": 0.0}
+        parts[f"lamp{i}"] = {"type": "disk", "to_world": to_world, "emitter": lamp, "bsdf": black}
+    white = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": REFLECTANCE}}}
+    film = {"type": "hdrfilm", "width": 250, "height": 125, "rfilter": {"type": "box"}, "pixel_format": "luminance"}
+    eye, up, across = observer.position, screen.axes(observer)[1], 2 * math.degrees(math.atan(25 / 1000))
+    theirs_scene = mi.load_dict(
+        {
+            "type": "scene",
+            "wall": {"type": "cylinder", "p0": [0, 0, 0], "p1": [0, 0, HEIGHT], "radius": RADIUS, "bsdf": white},
+            "base": {"type": "disk", "to_world": transform().scale(RADIUS), "bsdf": white},
+            **parts,
+            "integrator": {"type": "path", "max_depth": -1, "rr_depth": 5},
+            "sensor": {
+                "type": "perspective",
+                "fov": across,
+                "fov_axis": "x",
+                "to_world": transform().look_at(origin=eye.tolist(), target=[0, 0, 0], up=up.tolist()),
+                "film": film,
+                "sampler": {"type": "independent", "sample_count": 64},
+            },
+        }
+    )
+
+    def theirs(seed: int) -> Array:
+        image = mi.render(theirs_scene, seed=seed, spp=64)
+        return np.array(image)[..., 0]
+
+    def judged(look: Callable[[int], Array], runs: int) -> tuple[float, float, float]:
+        look(0)
+        start = time.perf_counter()
+        maps = np.array([look(seed) for seed in range(1, runs + 1)])
+        seconds = (time.perf_counter() - start) / runs
+        mean = maps.mean(0)
+        lit = mean > 0.2 * np.median(mean[mean > 0])
+        relative = np.median((maps.var(0, ddof=1) / mean**2)[lit])
+        dr.sync_thread()
+        return 1.0 / (relative * seconds), math.sqrt(relative), float(mean[40:85, 80:170].mean())
+
+    mine, noise, level = judged(ours, 16)
+    yours, their_noise, their_level = judged(theirs, 16)
+    row(
+        "map of the cavity: efficiency 1/(variance · time)",
+        f"{mine:.0f} /s",
+        f"{mine / yours:.1f} × Mitsuba's path tracer",
+    )
+    row("map of the cavity: noise of a run", f"{noise:.1%}, {their_noise:.1%}")
+    row("map of the cavity: mean of the middle", f"{level:.5f}, {their_level:.5f} lm/(mm² sr)")
+
+
+def job_field(_rays: int) -> None:
+    field = et.LightField.fit(et.RingSource(rays=1_000_000), et.Disk(radius=30), depths=(5, 5, 5, 5))
+    lens = {
+        "name": "lens",
+        "shape": {
+            "kind": "lens",
+            "radius": 40,
+            "thickness": 20,
+            "front": {"radius_of_curvature": 200},
+            "back": {"radius_of_curvature": -60, "conic": -0.5},
+        },
+        "medium": "PMMA",
+        "at": [0, 0, 10],
+    }
+    source = {"kind": "light-field", "field": field}
+    view = et.Screen(70, 70, 50, 50).core_view(et.Observer(20, 0, 1000))
+    for name, solids in (("bare", []), ("behind a lens", [lens])):
+        core = _core.Scene(compile_scene(et.Scene(sources=[source], solids=solids)).record)
+        _core.look_at_scene(core, view, 4, 1, 1000, False, 0, 1)
+        seconds = []
+        for _ in range(3):
+            start = time.perf_counter()
+            _core.look_at_scene(core, view, 125, 1, 1000, False, 0, 8)
+            seconds.append(time.perf_counter() - start)
+        job = f"light field {name}, 50 × 50 pixels × 1 000 paths"
+        row(job, f"{min(seconds):.2f} s", f"{1.0 / min(seconds):.2f} × bar (1 s)")
+
+
+def job_cells(rays: int) -> None:
+    first = None
+    for depth in (2, 5, 8):
+        field = et.LightField.fit(et.RingSource(rays=400_000), et.Disk(radius=30), depths=(depth, depth, 3, 3))
+        core = _core.Scene(compile_scene(et.Scene(sources=[{"kind": "light-field", "field": field}])).record)
+        batches = -(-rays // _core.batch_size())
+        seconds = []
+        for _ in range(3):
+            start = time.perf_counter()
+            _core.trace_batches(core, rays, 1, 1000, 0, batches)
+            seconds.append(time.perf_counter() - start)
+        first = first or min(seconds)
+        each = f"{min(seconds) / rays * 1e9:.0f} ns a ray"
+        row(f"rays of a field of {4**depth:,} cells of place", each, f"{min(seconds) / first:.2f} × the first")
+
+
+JOBS = {"analytic": job_analytic, "mesh": job_mesh, "map": job_map, "field": job_field, "cells": job_cells}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--jobs", default=",".join(JOBS))
+    parser.add_argument("--rays", type=float, default=4e6)
+    options = parser.parse_args()
+    if LIBRARY.exists():
+        os.environ.setdefault("DRJIT_LIBLLVM_PATH", str(LIBRARY))
+    print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores", flush=True)
+    for job in options.jobs.split(","):
+        JOBS[job](int(options.rays))
+
+
+if __name__ == "__main__":
+    main()
