@@ -109,6 +109,7 @@ def draw_profiles(path: Path, profiles: dict[str, tuple[Any, Any]]) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     made.axes[0].set_ylabel("intensity [cd]")
     made.axes[1].set_yscale("log")
+    made.axes[1].set_ylim(bottom=made.axes[1].get_ylim()[1] * 1e-4)
     made.axes[0].legend(frameon=False, fontsize=8)
     save(made, path)
 
@@ -116,11 +117,11 @@ def draw_profiles(path: Path, profiles: dict[str, tuple[Any, Any]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=int, default=100_000)
-    parser.add_argument("--full", action="store_true", help="two million rays, fine grids, 72 × 72 pixels")
+    parser.add_argument("--full", action="store_true", help="two million rays, fine grids, 60 × 60 pixels")
     parser.add_argument("--output", type=Path, default=Path("narrow-beam"), help="folder for the figures")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    rays, pixels, lines = (2_000_000, 72, 256) if options.full else (options.rays, 24, 16)
+    rays, pixels, lines = (2_000_000, 60, 128) if options.full else (options.rays, 24, 16)
 
     near_field = led.ray_file(rays)
     scenes = luminaires(near_field, full=options.full)
@@ -160,9 +161,12 @@ def main() -> None:
         cells = [cell for name in seen[1:] for cell in (" / ".join(measures(maps[name][i], truth)),)]
         rows.append([f"{observer.theta:g}°", *cells, " / ".join(f"{maps[name][i].intensity:,.0f}" for name in seen)])
     print_table(["θ", *seen[1:], "intensity: " + ", ".join(seen)], rows)
+    drawn = scenes["the LED itself"].replace(name="Figure 3.16", detectors=[])
+    et.draw_scene(drawn, options.output / "figure-3.16.png", section=["y=0"], rays=40, window=(-11, 11, -2, 24))
     draw_profiles(options.output / "figure-3.17.png", profiles)
-    pictures = [(f"θ = {o.theta:g}°", [maps[name][i] for name in seen]) for i, o in enumerate(OBSERVERS)]
-    draw_maps(options.output / "narrow-beam.png", list(seen), pictures, kind="root")
+    shown = [*seen[1:], seen[0]]
+    pictures = [(f"θ = {o.theta:g}°", [maps[name][i] for name in shown]) for i, o in enumerate(OBSERVERS)]
+    draw_maps(options.output / "narrow-beam.png", shown, pictures, kind="root")
     print(f"\nfigures: {options.output}/")
 
 
