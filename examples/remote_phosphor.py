@@ -194,13 +194,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=int, default=50_000)
     parser.add_argument("--lines", type=int, default=4, help="lines of sight per pixel of the maps of the lamp itself")
-    parser.add_argument("--full", action="store_true", help="four million rays, 256 lines, 0.5 mm and 1 mm, fine grids")
+    parser.add_argument("--full", action="store_true", help="four million rays, 128 lines, 0.5 mm and 1 mm, fine grids")
     parser.add_argument("--output", type=Path, default=Path("remote-phosphor"), help="folder for the figures")
     options = parser.parse_args()
     options.pixels = (1.0,)
     options.output.mkdir(parents=True, exist_ok=True)
     if options.full:
-        options.rays, options.lines, options.pixels = 4_000_000, 256, (0.5, 1.0)
+        options.rays, options.lines, options.pixels = 4_000_000, 128, (0.5, 1.0)
     found = {kind: experiment(kind, options) for kind in ("bare", "film")}
     for kind, maps in found.items():
         print_tables(kind, maps)
@@ -209,9 +209,9 @@ def main() -> None:
         print(f"\n{kind}: {truth[kind][i].intensity:.1f} cd on the axis", end="")
     print(f", {truth['film'][0].intensity / truth['bare'][0].intensity:.3f} times as much")
     maps = found["film"][options.pixels[0]]
-    titles = ["the lamp itself", *(name for name in maps if name != "truth")]
+    titles = [*(name for name in maps if name != "truth"), "the lamp itself"]
     rows = [
-        (f"({t.observer.theta:g}°, {t.observer.phi:g}°)", [t, *(seen[i] for n, seen in maps.items() if n != "truth")])
+        (f"({t.observer.theta:g}°, {t.observer.phi:g}°)", [*(seen[i] for n, seen in maps.items() if n != "truth"), t])
         for i, t in enumerate(maps["truth"])
     ]
     draw_maps(options.output / "remote-phosphor.png", titles, rows, size=1.6)

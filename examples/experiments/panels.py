@@ -9,7 +9,7 @@ from typing import Any
 import etendue as et
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import LogNorm, Normalize, PowerNorm
+from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
 
 INK, FAINT = "#1b1b1b", "#6b6b76"
@@ -33,25 +33,17 @@ def save(made: Figure, path: Path) -> None:
     made.savefig(path, bbox_inches="tight", pad_inches=0.1, metadata={"Software": None})
 
 
-def scale(values: Sequence[Any], kind: str = "linear", decades: float = 3.0) -> Normalize:
-    """One scale of colours for several maps: ``"linear"``, ``"root"``, or ``"log"`` over so many decades."""
-    top = max(float(np.nanmax(v)) for v in values)
-    match kind:
-        case "log":
-            return LogNorm(top * 10.0**-decades, top)
-        case "root":
-            return PowerNorm(0.5, 0.0, top)
-        case _:
-            return Normalize(0.0, top)
+def scale(reference: et.LuminanceMap, kind: str) -> Normalize:
+    """Colours from 0 to the reference's brightest pixels, of which a few may be outliers: ``"linear"`` or ``"root"``."""
+    top = float(np.nanquantile(reference.values[reference.values > 0.0], 0.99)) * 1.1
+    return PowerNorm(0.5, 0.0, top) if kind == "root" else Normalize(0.0, top)
 
 
 def show_map(axes: Any, lmap: et.LuminanceMap, norm: Normalize) -> Any:
     """A map in false colour, mm along its sides."""
     w, h = lmap.screen.width / 2, lmap.screen.height / 2
-    values = np.nan_to_num(lmap.values)
-    if isinstance(norm, LogNorm):
-        values = np.maximum(values, norm.vmin)
     axes.tick_params(labelsize=7, color=FAINT, labelcolor=FAINT)
+    values = np.nan_to_num(lmap.values)
     return axes.imshow(values, cmap="inferno", norm=norm, extent=(-w, w, -h, h), interpolation="nearest")
 
 
@@ -62,15 +54,20 @@ def draw_maps(
     kind: str = "linear",
     size: float = 2.1,
 ) -> None:
-    """One row of maps for each observer, one column for each method, one scale for each row."""
+    """One row of maps for each observer, one column for each method; the last map of a row sets its colours.
+
+    What is brighter than the scale has its brightest colour.
+    """
     made = new_figure(size * len(titles) + 1.2, size * len(rows) + 0.4)
     grid = made.subplots(len(rows), len(titles), squeeze=False)
     for panels, (name, maps) in zip(grid, rows, strict=True):
-        norm = scale([lmap.values for lmap in maps], kind)
+        norm = scale(maps[-1], kind)
         for axes, lmap in zip(panels, maps, strict=True):
             image = show_map(axes, lmap, norm)
         panels[0].set_ylabel(name, fontsize=9, color=INK)
-        bar = made.colorbar(image, ax=panels[-1], fraction=0.05)
+        bar = made.colorbar(image, ax=panels[-1], fraction=0.05, extend="max")
+        bar.formatter.set_powerlimits((-2, 4))
+        bar.ax.yaxis.get_offset_text().set(size=7)
         bar.ax.tick_params(labelsize=7)
         bar.set_label(maps[0].unit, fontsize=7)
         for axes in panels[1:]:
