@@ -73,6 +73,8 @@ def test_the_blocks_were_found() -> None:
         assert found.count(language) >= fewest
 
 
+# A page is many commands, each of which has a limit of its own; on a busy machine they add up.
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("page", [p for p in PAGES if any(b.language in RUNNABLE for b in blocks(p))], ids=name_of)
 def test_blocks_run(page: Path, materials: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks of a page run in order, in one namespace and one folder that holds the ray files the pages speak of."""
