@@ -238,6 +238,15 @@ def test_rays_are_chosen_by_their_beginning_alone() -> None:
     assert np.median([abs(t[0, 1]) for t in chosen]) < np.median([abs(t[0, 1]) for t in trails]) / 3
 
 
+def test_rays_of_sources_in_the_section_come_first() -> None:
+    beam = {"kind": "beam", "shape": {"kind": "disk", "radius": 1}, "flux": 1}
+    layout = lay_out_scene(Scene(sources=[{**beam, "at": [0, 40, 0]}, beam]), rays=20)
+    for view, reach in zip(layout.views, (0.2, 41), strict=True):
+        assert len(view.trails) == 20
+        assert max(abs(trail[0, 1]) for trail in view.trails) < reach
+    assert [glow.near for glow in layout.views[0].sources] == [False, True]
+
+
 def test_a_white_sphere_does_not_become_a_tangle() -> None:
     sphere = {"shape": {"kind": "sphere", "radius": 10}, "finish": {"kind": "lambertian", "reflectance": 0.999}}
     figure = et.draw_scene(Scene(sources=[{"kind": "point", "flux": 1}], surfaces=[sphere]), section="y=0", rays=30)
