@@ -96,7 +96,7 @@ def verbs() -> dict[str, Any]:
 def test_help_names_every_verb_with_what_it_does(run: Run) -> None:
     outcome = run("--help")
     assert outcome.status == 0
-    expected = "demo info convert fit luminance sample intensity trace patches filter compare"
+    expected = "demo info convert fit luminance sample intensity trace draw patches filter compare"
     assert set(verbs()) == set(expected.split())
     for name, verb in verbs().items():
         assert f" {name} " in outcome.out
@@ -117,7 +117,7 @@ def test_help_of_a_verb_explains_every_option_and_argument(run: Run, name: str) 
 
 def test_every_verb_that_draws_random_numbers_takes_a_seed() -> None:
     seeded = {name for name, verb in verbs().items() if any("--seed" in p.opts for p in verb.params)}
-    assert seeded == {"demo", "convert", "fit", "luminance", "sample", "trace", "patches"}
+    assert seeded == {"demo", "convert", "draw", "fit", "luminance", "sample", "trace", "patches"}
 
 
 def test_version(run: Run) -> None:

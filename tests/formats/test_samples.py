@@ -190,8 +190,15 @@ def test_samples_convert_to_every_format(samples: Path, tmp_path: Path, name: st
         return
     write_rays(path, rays, ray_format)
     back = read_rays(path)
-    assert np.allclose(back.position, rays.position, atol=2e-6)
-    assert np.allclose(back.direction, rays.direction, atol=2e-7)
+    position, direction, flux = rays.position, rays.direction, rays.flux
+    if ray_format == "etd":
+        # An index puts rays in an order of its own, and keeps their bytes.
+        there, here = (np.lexsort(np.column_stack([r.position, r.direction]).T) for r in (rays, back))
+        order = np.zeros(len(rays), np.intp)
+        order[here] = there
+        position, direction, flux = position[order], direction[order], flux[order]
+    assert np.allclose(back.position, position, atol=2e-6)
+    assert np.allclose(back.direction, direction, atol=2e-7)
     scale = rays.total_flux / back.total_flux if ray_format == "speos-text" else 1.0
-    assert np.allclose(back.flux * scale, rays.flux, rtol=1e-6)
+    assert np.allclose(back.flux * scale, flux, rtol=1e-6)
     assert math.isfinite(back.total_flux)
