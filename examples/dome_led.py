@@ -17,7 +17,7 @@ from pathlib import Path
 import etendue as et
 from etendue.luminance.gridded_map import gridded_luminance_map
 from experiments import led
-from experiments.panels import QUICK, draw_maps, measures, print_table
+from experiments.panels import QUICK, draw_maps, measures, noise, print_table
 
 OBSERVERS = [et.Observer(theta=theta, phi=0, distance=1000) for theta in (0, 30, 60, 90)]
 PIXEL, PARALLELS, THRESHOLD = 0.125, 16, 0.01
@@ -65,8 +65,8 @@ def main() -> None:
     for i, observer in enumerate(OBSERVERS):
         cells = [" / ".join(measures(maps[i], truth[i])) for maps in methods.values()]
         brightest = float(truth[i].values.max())
-        rows.append([f"({observer.theta:g}°, {observer.phi:g}°)", f"{brightest:.2e}", *cells])
-    print_table(["observer", "brightest pixel [cd/m²]", *methods], rows)
+        rows.append([f"({observer.theta:g}°, {observer.phi:g}°)", f"{brightest:.2e}", noise(truth[i]), *cells])
+    print_table(["observer", "brightest pixel [cd/m²]", "its noise", *methods], rows)
     titles = [*(f"field: {name}" if name != "gridded" else name for name in methods), "the LED itself"]
     pictures = [
         (f"θ = {observer.theta:g}°", [*(maps[i] for maps in methods.values()), truth[i]])

@@ -1,4 +1,4 @@
-"""Figures 3.16 and 3.17 of the thesis: a lens that makes a beam of 13° of an LED, lit by four models of that LED.
+"""Figures 3.16 and 3.17 of the thesis: a lens that makes a beam of 13° of an LED, lit by models of that LED.
 
     python examples/narrow_beam.py              # few rays and coarse grids, seconds
     python examples/narrow_beam.py --full       # two million rays: the figures of docs/chapter-3.md
@@ -72,6 +72,9 @@ def luminaires(near_field: et.RaySet, *, full: bool) -> dict[str, et.Scene]:
         name: et.Scene(name=f"{name} and lens", sources=[source], solids=[LENS], detectors=detectors)
         for name, source in models.items()
     }
+    # The ray file again, but light that the lens sends back meets what the LED is made of.
+    body = {**parts, "sources": [models["ray file"]]}
+    found["ray file before the LED's body"] = et.Scene(name="ray file, body and lens", **body, detectors=detectors)
     return found
 
 
@@ -100,7 +103,7 @@ def width(angle: Any, values: Any) -> float:
 def draw_profiles(path: Path, profiles: dict[str, tuple[Any, Any]]) -> None:
     """Figure 3.17."""
     made = new_figure(7.6, 3.4)
-    for axes, reach in zip(made.subplots(1, 2), (15, 60), strict=True):
+    for axes, reach in zip(made.subplots(1, 2), (15, 20), strict=True):
         for (name, (angle, values)), colour in zip(profiles.items(), (INK, *LINES), strict=False):
             dashes = {"the LED itself": "-", "Lambertian square": "-."}.get(name, "--")
             shown = np.abs(angle) <= reach
@@ -163,7 +166,7 @@ def main() -> None:
     print_table(["θ", *seen[1:], "intensity: " + ", ".join(seen)], rows)
     drawn = scenes["the LED itself"].replace(name="Figure 3.16", detectors=[])
     et.draw_scene(drawn, options.output / "figure-3.16.png", section=["y=0"], rays=40, window=(-11, 11, -2, 24))
-    draw_profiles(options.output / "figure-3.17.png", profiles)
+    draw_profiles(options.output / "figure-3.17.png", {name: profiles[name] for name in list(profiles)[:5]})
     shown = [*seen[1:], seen[0]]
     pictures = [(f"θ = {o.theta:g}°", [maps[name][i] for name in shown]) for i, o in enumerate(OBSERVERS)]
     draw_maps(options.output / "narrow-beam.png", shown, pictures, kind="root")

@@ -18,7 +18,7 @@ from typing import Any
 import etendue as et
 import numpy as np
 from etendue.luminance.gridded_map import gridded_luminance_map
-from experiments.panels import LINES, QUICK, draw_maps, measures, new_figure, print_table, save
+from experiments.panels import LINES, QUICK, draw_maps, measures, new_figure, noise, print_table, save
 
 RADIUS, RIM, FLUX = 11.2, 0.7, 800.0
 """Of the plate [mm]; luminance at its rim over that in the middle; flux that it sends out itself [lm]."""
@@ -157,11 +157,12 @@ def print_tables(kind: str, found: dict[float, dict[str, list[et.LuminanceMap]]]
             [
                 f"({t.observer.theta:g}°, {t.observer.phi:g}°)",
                 f"{t.values.max():,.0f}",
+                noise(t),
                 *(" / ".join(measures(seen[i], t)) for seen in methods.values()),
             ]
             for i, t in enumerate(truth)
         ]
-        print_table(["observer", "brightest pixel [cd/m²]", *methods], rows)
+        print_table(["observer", "brightest pixel [cd/m²]", "its noise", *methods], rows)
 
 
 def draw_sections(path: Path, bare: list[et.LuminanceMap], film: list[et.LuminanceMap]) -> None:
@@ -186,7 +187,7 @@ def draw_sections(path: Path, bare: list[et.LuminanceMap], film: list[et.Luminan
         axes.set_xlabel("x on the screen [mm]")
         axes.spines[["top", "right"]].set_visible(False)
     made.axes[0].set_ylabel("luminance [10³ cd/m²]")
-    made.axes[0].legend(title="with film; dotted: bare", frameon=False, fontsize=8, title_fontsize=8)
+    made.axes[1].legend(title="with film; dotted: bare", loc=(0.38, 0.1), frameon=False, fontsize=8, title_fontsize=8)
     save(made, path)
 
 

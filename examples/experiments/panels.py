@@ -91,3 +91,9 @@ def measures(test: et.LuminanceMap, reference: et.LuminanceMap) -> list[str]:
     """NCC (eq. 3.5), NRMSE as printed (eq. 3.6), and true NRMSE, in percent."""
     c = et.compare(test, reference)
     return [f"{100 * value:.2f}" for value in (c.ncc, c.nrmse_thesis, c.nrmse)]
+
+
+def noise(reference: et.LuminanceMap) -> str:
+    """What the standard errors of a reference alone add to a true NRMSE, in percent."""
+    error = float(np.sqrt((reference.standard_error**2).mean()))
+    return f"{100 * error / reference.values.max():.2f}"
