@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any
 
 import etendue as et
 import numpy as np
@@ -49,7 +48,7 @@ def cavity() -> et.Scene:
 
 @functools.cache
 def traced() -> TraceResult:
-    result = et.trace(cavity(), 5e5, 11)
+    result = et.trace(cavity(), 2e6, 11)
     assert result.ledger.closes
     assert result.ledger.lost == ()
     return result

@@ -1,4 +1,4 @@
-"""A cylindrical cavity, open at the top, with a luminous disk in its base: its radiosity equation, solved by Nyström's method.
+"""A cylindrical cavity, open at the top, with a luminous disk in its base: the radiosity equation, by Nyström's method.
 
 Wall and base are Lambertian; by symmetry their exitance depends on the height z and on the distance r from the axis only:
 B = ρ (E₀ + ∫ K B). The kernels are cos θ cos θ'/(π d²), integrated over the azimuth in closed form.
@@ -37,7 +37,7 @@ def wall_to_disk(z: Array, radius: float) -> Array:
     return (x * x + 0.5) / np.sqrt(x * x + 1) - x
 
 
-def _graded(start: float, end: float, levels: int, at_start: bool, at_end: bool) -> Array:  # noqa: FBT001
+def _graded(start: float, end: float, levels: int, at_start: bool, at_end: bool) -> Array:
     """Ends of panels that halve towards ends where the solution is not smooth."""
     steps = 2.0 ** -np.arange(levels, 0, -1)
     rising = np.concatenate([[0.0], steps]) if at_start else np.array([0.0, 0.5])
