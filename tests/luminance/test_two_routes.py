@@ -10,7 +10,7 @@ import etendue as et
 import numpy as np
 import pytest
 from oracles.luminaires import corner, lens_and_mirror, pipe_and_prism, reflector_and_cover
-from oracles.verdicts import assert_agree, assert_differ
+from oracles.verdicts import LARGEST_Z, assert_agree, assert_differ
 
 SCENES: list[Callable[[], dict[str, Any]]] = [corner, lens_and_mirror, reflector_and_cover]
 
@@ -61,5 +61,6 @@ def test_collected_rays_and_lines_of_sight_show_the_same() -> None:
     assert lit.sum() > 20
     assert np.median(both[lit] / mean[lit]) < 0.07
     assert_agree(cone.values[lit], mean[lit], both[lit])
+    assert abs((cone.values - mean)[lit].sum()) < LARGEST_Z * math.sqrt((both[lit] ** 2).sum())
     for other in (mean[::-1], mean[:, ::-1], mean[::-1, ::-1]):
         assert_differ(cone.values[lit], other[lit], both[lit])
