@@ -20,7 +20,9 @@ def assert_drawn_with(share: float, hits: int, rays: int) -> None:
     assert abs(z) < LARGEST_Z, f"{hits / rays} of the rays, {share} expected: z = {z:.2f}"
 
 
-def assert_agree(values: Array, expected: Array, error: Array, degrees: float = np.inf, least: float = 0.9) -> None:
+def assert_agree(
+    values: Array, expected: Array, error: Array, degrees: float | Array = np.inf, least: float = 0.9
+) -> None:
     """χ² over cells with independent errors, two-sided, so that errors too large are found as well.
 
     Errors that come from a spread have `degrees` of freedom, so that deviations are Student's t; each is turned into the
@@ -29,8 +31,8 @@ def assert_agree(values: Array, expected: Array, error: Array, degrees: float = 
     known = np.isfinite(error) & (error > 0.0)
     assert known.sum() >= max(8, least * known.size)
     z = (values[known] - expected[known]) / error[known]
-    if np.isfinite(degrees):
-        z = norm.isf(t.sf(z, degrees))
+    freedom = np.broadcast_to(degrees, known.shape)[known]
+    z = np.where(np.isfinite(freedom), norm.isf(t.sf(z, freedom)), z)
     told = f"mean z² is {(z**2).mean():.2f}, largest |z| {np.abs(z).max():.1f} in {z.size} cells"
     assert chi2.sf((z**2).sum(), z.size) > SIGNIFICANCE, told
     assert chi2.cdf((z**2).sum(), z.size) > SIGNIFICANCE, told
