@@ -357,8 +357,11 @@ impl<'a> Wave<'a> {
             n2,
         };
         let (shares, across) = finish.shares(&here);
-        // Light that is transmitted to the eye arrives from the other side, at the angle of refraction.
-        let through = if shares[1] > 0.0 {
+        // Light that is transmitted to the eye arrives from the other side, at the angle of refraction. An interface transmits
+        // the same share both ways.
+        let through = if matches!(finish, Finish::Interface) {
+            shares[1] * (n1 / n2) * (n1 / n2)
+        } else if shares[1] > 0.0 {
             let there = Incidence {
                 cosine: across,
                 wavelength,
