@@ -49,14 +49,14 @@ def test_what_is_seen_from_everywhere_is_the_flux() -> None:
     far = result.intensity.only
     rng, seed = np.random.default_rng(6), 0
     cells: list[tuple[float, ...]] = []
-    screen = et.Screen(23, 23, 20, 20)
+    screen = et.Screen(23, 23, 16, 16)
     half = 15.0
     cones = [(0.0, half, 0.0, 360.0, 0, 0), (180.0 - half, 180.0, 0.0, 360.0, 0, 6)]
     cones += [(g - half, g + half, c - 30, c + 30, i, j) for i, c in enumerate(far.c) for j, g in enumerate(far.gamma)
               if 0 < g < 180]  # fmt: skip
     for low, high, left, right, i, j in cones:
         solid = math.radians(right - left) * float(np.cos(np.radians(low)) - np.cos(np.radians(high)))
-        count = 6 + int(250 * solid * far.values[i, j] / far.flux)
+        count = 6 + int(150 * solid * far.values[i, j] / far.flux)
         z = rng.uniform(*np.cos(np.radians([high, low])), count)
         seen = []
         for theta, phi in zip(np.degrees(np.arccos(z)), rng.uniform(left, right, count), strict=True):
@@ -72,7 +72,7 @@ def test_what_is_seen_from_everywhere_is_the_flux() -> None:
     escaped = result.ledger.escaped.flux
     assert 50 < escaped < 99
     total = math.sqrt(((error * solid) ** 2).sum())
-    assert total < 0.04 * escaped
+    assert total < 0.05 * escaped
     assert abs(mean @ solid - escaped) < LARGEST_Z * total
 
 
