@@ -37,8 +37,8 @@ from tracer import mesh as cavity_mesh
 
 Array = Any
 CHUNK = 1 << 20
-SINGLE = 2.0**-24
-"""Half the distance from 1 to the next number in single precision."""
+SINGLE, DOUBLE = 2.0**-24, 2.0**-53
+"""Half the distance from 1 to the next number in single and in double precision."""
 ROUNDINGS = 32.0
 """Roundings that a crossing in single precision may add up to: some thirty operations, none of which cancels more than the
 factors that are counted apart."""
@@ -97,15 +97,32 @@ class Ours:
         return found
 
 
-def brute_force(mesh: Mesh, o: Array, d: Array) -> tuple[Array, Array, Array]:
-    """Of one ray with all triangles: distances (infinite: none ahead), barycentric coordinates, cosines."""
+@dataclasses.dataclass
+class Crossings:
+    """Of one ray with all triangles, in double precision."""
+
+    distance: Array
+    """In units of the direction's length; infinite: not met."""
+    within: Array
+    """How far inside of the line of each edge the ray passes, shape (n, 3) [mm]; negative outside."""
+    cosine: Array
+    reach: Array
+    """The lengths that a crossing is computed from [mm]."""
+
+
+def brute_force(mesh: Mesh, o: Array, d: Array) -> Crossings:
+    """Triangle by triangle. Met is also what roundings may have put outside: those of a ray's place beside an edge."""
+    reach = np.linalg.norm(mesh.first - o, axis=1) + mesh.size
+    down = mesh.cross @ d
+    edges = np.roll(mesh.corners, -1, axis=1) - mesh.corners
+    across = np.cross(d, edges)
     with np.errstate(divide="ignore", invalid="ignore"):
-        down = mesh.cross @ d
         t = ((mesh.first - o) * mesh.cross).sum(1) / down
-        weights, _ = places(mesh, np.arange(len(t)), o + t[:, None] * d)
-    weights = np.nan_to_num(weights, nan=-1.0)
-    t = np.where((t > 0) & (weights >= -ON).all(1), t, np.inf)
-    return t, weights, np.abs(down) / (mesh.area * np.linalg.norm(d))
+        within = ((o - mesh.corners) * across).sum(2) / np.linalg.norm(across, axis=2) * np.sign(down)[:, None]
+    within = np.nan_to_num(within, nan=-np.inf)
+    inside = (within >= -ROUNDINGS * DOUBLE * reach[:, None]).all(1)
+    t = np.where(inside & (t > 0), t, np.inf)
+    return Crossings(t, within, np.abs(down) / (mesh.area * np.linalg.norm(d)), reach)
 
 
 @dataclasses.dataclass
@@ -152,48 +169,42 @@ def compare(mesh: Mesh, mine: Array, theirs: dict[str, Array], origin: Array, di
 
 def judge(mesh: Mesh, o: Array, d: Array, mine: float, theirs: int, count: Count) -> None:
     """Why a ray meets another triangle for Embree."""
-    t, weights, cosine = brute_force(mesh, o, d)
-    best, length = int(np.argmin(t)), np.linalg.norm(d)
-    reach = np.linalg.norm(mesh.first - o, axis=1) + mesh.size
+    truth, length = brute_force(mesh, o, d), np.linalg.norm(d)
+    t, reach = truth.distance, truth.reach
+    best = int(np.argmin(t))
     same = np.isfinite(t[best]) == np.isfinite(mine)
     if not (same and (not np.isfinite(mine) or abs(t[best] - mine) <= ON * reach[best] / length)):
         missed = np.flatnonzero(t < mine - ON * reach / length)
-        if len(missed) and all(at_rim(mesh, k, weights[k], d) for k in missed):
+        if len(missed) and all(at_rim(mesh, k, truth, d) for k in missed):
             count.rim += 1
         else:
             count.ours += 1
         return
     near = {k for k in (best, theirs) if k == theirs >= 0 or (k == best and np.isfinite(t[k]))}
-    if any(beside_edge(mesh, k, o, d) <= ROUNDINGS * SINGLE * reach[k] for k in near):
+    if any(np.abs(truth.within[k]).min() <= ROUNDINGS * SINGLE * reach[k] for k in near):
         count.edge += 1
     elif theirs >= 0 and abs(t[theirs] - t[best]) * length <= ROUNDINGS * SINGLE * max(
-        reach[k] * mesh.slim[k] / cosine[k] for k in near
+        reach[k] * mesh.slim[k] / truth.cosine[k] for k in near
     ):
         count.coincident += 1
     else:
         count.unexplained += 1
 
 
-def at_rim(mesh: Mesh, triangle: int, weights: Array, d: Array) -> bool:
+def at_rim(mesh: Mesh, triangle: int, truth: Crossings, d: Array) -> bool:
     """Whether a triangle is met at a corner or an edge beyond which the mesh ends or turns away."""
-    zero = np.abs(weights) <= ON
-    if not zero.any():
+    beside = np.flatnonzero(np.abs(truth.within[triangle]) <= ROUNDINGS * DOUBLE * truth.reach[triangle])
+    if not beside.size:
         return False
-    held = mesh.triangles[triangle][~zero]
+    # On one edge the ends of it hold the place, on two the corner that they share.
+    ends = [{int(v) for v in mesh.triangles[triangle][[j, (j + 1) % 3]]} for j in beside]
+    held = list(set.intersection(*ends[:2]))
     around = np.flatnonzero(np.isin(mesh.triangles, held).sum(axis=1) == len(held))
     turned = np.sign(mesh.cross[around] @ d)
     # About an inner corner every edge has two triangles: as many others as triangles.
     others = len(np.unique(mesh.triangles[around])) - len(held)
     closed = len(around) == (2 if len(held) == 2 else others)
     return not closed or len(np.unique(turned)) > 1
-
-
-def beside_edge(mesh: Mesh, triangle: int, o: Array, d: Array) -> float:
-    """How closely a line passes the lines of a triangle's edges [mm]: as closely as a test of edges must tell."""
-    a = mesh.corners[triangle]
-    across = np.cross(d, np.roll(a, -1, axis=0) - a)
-    square = np.linalg.norm(across, axis=1)
-    return float((np.abs(((a - o) * across).sum(1)) / square).min())
 
 
 # --- meshes and rays -------------------------------------------------------------------------------------------------
