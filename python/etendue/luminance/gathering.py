@@ -35,7 +35,15 @@ def survey_notes(survey: _core.Survey) -> list[str]:
 
 
 def blocks(values: Array) -> Array:
-    """Sums over `BLOCKS` x `BLOCKS` blocks of a map, and over all of it, as one vector."""
+    """Sums over `BLOCKS` x `BLOCKS` blocks of a map, and over all of it, as one vector.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> blocks(np.ones((8, 4)))
+    array([ 2.,  2.,  2.,  2.,  2.,  2.,  2.,  2.,  2.,  2.,  2.,  2.,  2.,
+            2.,  2.,  2., 32.])
+    """
     parts = [part for row in np.array_split(values, BLOCKS) for part in np.array_split(row, BLOCKS, axis=1)]
     return np.array([*(part.sum() for part in parts), values.sum()])
 
@@ -49,6 +57,20 @@ def comparison_note(gathered: list[Array], exact: list[Array]) -> str:
         `blocks` of each pass of the map.
     exact : list of ndarray, shape (rows, columns)
         Two passes of lines of sight that go on.
+
+    Returns
+    -------
+    str
+        A note for the map. It asks to leave gathering out if a block differs by more than chance does in one map of 10 000
+        (normal errors, Šidák's bound over the blocks).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rng = np.random.default_rng(1)
+    >>> exact = [rng.normal(10.0, 1.0, (40, 30)) for _ in range(2)]
+    >>> comparison_note([blocks(rng.normal(10.0, 0.3, (40, 30))) for _ in range(16)], exact)
+    'compared with lines of sight that go on to the sources: +0.10% ± 0.20% of all light'
     """
     passes = np.array(gathered)
     value, variance = passes.mean(axis=0), passes.var(axis=0, ddof=1) / len(passes)
