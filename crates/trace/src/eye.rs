@@ -52,7 +52,7 @@ impl Event {
             wavelength,
             ray,
             face: meeting.face,
-            part: meeting.leaving.part[0],
+            part: meeting.part,
             finish,
             before: meeting.before,
             after: meeting.after,

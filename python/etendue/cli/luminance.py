@@ -93,6 +93,12 @@ def luminance(
             "--forward-rays", help="Of a scene: rays traced forwards besides, for caustics and beams, e.g. 1e7."
         ),
     ] = None,
+    gather: Annotated[
+        bool,
+        typer.Option(
+            "--gather", help="Of a scene: lines of sight end at the second diffuse surface, whose light is found first."
+        ),
+    ] = False,
     flux: Annotated[
         str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")
     ] = None,
@@ -145,6 +151,7 @@ def luminance(
                 until=until,
                 seed=seed,
                 forward_rays=forward_rays,
+                gather=gather,
                 threads=threads,
                 progress=progress,
             )
@@ -154,6 +161,7 @@ def luminance(
             "--until": until,
             "--seed": seed,
             "--forward-rays": forward_rays,
+            "--gather": gather or None,
         }
         _refuse(for_scenes, f"for scenes; {file} is none")
         cone = None if acceptance is None else _acceptance(acceptance)

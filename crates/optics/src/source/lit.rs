@@ -158,6 +158,9 @@ impl Lantern {
         let p = source.frame.point_to_local(x);
         match &source.emitter {
             Emitter::Surface(surface) => {
+                if surface.turns_away_from(p) {
+                    return None;
+                }
                 let (point, normal) = surface.draw_point(numbers);
                 let (distance2, cosine) = towards(point, normal, p)?;
                 Some(Beacon {
