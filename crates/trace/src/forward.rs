@@ -21,6 +21,7 @@ use crate::detector::{Detector, illuminance_cell, intensity_cell};
 use crate::eye::Event;
 use crate::harvest::{Harvest, Record, Yield};
 use crate::inside::Inside;
+use crate::kept::depth;
 use crate::ledger::Fate;
 use crate::meeting::{Fillings, Loss, Meeting, meet};
 use crate::scene::Scene;
@@ -108,6 +109,8 @@ struct Rider {
     scattered: bool,
     /// Whether the reverse tracer does not find it, or leaves it to the light image.
     unseen: bool,
+    /// How often the kept events can be thinned before those of this ray are dropped.
+    depth: u32,
 }
 
 struct Walk<'a> {
@@ -157,7 +160,7 @@ impl<'a> Walk<'a> {
         let watched = scene
             .detectors
             .iter()
-            .any(|d| matches!(d, Detector::Image { .. } | Detector::Events));
+            .any(|d| matches!(d, Detector::Image { .. } | Detector::Events { .. }));
         let clear = scene.media[0].absorption.range() == [0.0, 0.0];
         let bouncers = if clear && !watched { bouncers(scene) } else { Vec::new() };
         Self {
@@ -175,7 +178,7 @@ impl<'a> Walk<'a> {
             numbers: Default::default(),
             trails: None,
             far: 0.0,
-            out: Yield::new(scene),
+            out: Yield::new(scene, run.rays.div_ceil(BATCH)),
         }
     }
 
@@ -184,6 +187,7 @@ impl<'a> Walk<'a> {
         let (scene, run) = (self.scene, self.run);
         let mut births = RayBatch::default();
         let totals = edges(scene, run.rays);
+        let keeps = scene.detectors.iter().any(|d| matches!(d, Detector::Events { .. }));
         let mut mark = 0;
         for (number, range) in deal(scene, run.rays, batch).into_iter().enumerate() {
             let source = &scene.sources[number];
@@ -206,6 +210,7 @@ impl<'a> Walk<'a> {
                             inside: Inside::default(),
                             scattered: false,
                             unseen: !source.is_visible(),
+                            depth: if keeps { depth(run.seed, ray) } else { 0 },
                         };
                         self.start(births.position(i), births.direction(i), rider, &scene.near[number]);
                     } else {
@@ -214,6 +219,9 @@ impl<'a> Walk<'a> {
                     mark += 1;
                 }
                 self.finish();
+                for kept in &mut self.out.events {
+                    kept.settle();
+                }
                 start = stop;
             }
         }
@@ -427,16 +435,22 @@ impl Walk<'_> {
 
     /// Detectors of scattered light take note.
     fn show(&mut self, meeting: &Meeting, finish: u32, d: Vec3, rider: &Rider) {
-        let mut event = Event::new(meeting, finish, d, [rider.flux, rider.wavelength], rider.ray);
-        event.unseen = rider.unseen;
+        let event = Event::new(meeting, finish, d, [rider.flux, rider.wavelength], rider.ray);
         for (number, detector) in self.scene.detectors.iter().enumerate() {
             match detector {
                 Detector::Image { view, complement } if rider.unseen || !complement => {
-                    if let Some((pixel, light)) = event.seen(self.scene, view, meeting.leaving, &mut self.fillings) {
+                    if let Some((pixel, light)) = event.seen(self.scene, view, &mut self.fillings) {
                         self.out.marks[number].push((pixel, rider.ray, light));
                     }
                 }
-                Detector::Events => self.out.events[number].push(event),
+                Detector::Events { faces, .. } => {
+                    if faces
+                        .as_ref()
+                        .is_none_or(|faces| faces.get(meeting.face as usize) == Some(&true))
+                    {
+                        self.out.events[number].push(&event, rider.depth);
+                    }
+                }
                 _ => {}
             }
         }
@@ -463,6 +477,6 @@ fn detect(scene: &Scene, out: &mut Yield, detector: u32, point: Vec3, d: Vec3, r
                 out.marks[number].push((cell, rider.ray, rider.flux));
             }
         }
-        Detector::Intensity { .. } | Detector::Image { .. } | Detector::Events => {}
+        Detector::Intensity { .. } | Detector::Image { .. } | Detector::Events { .. } => {}
     }
 }
