@@ -102,6 +102,10 @@ impl Event {
             return None;
         }
         let t = (view.target - view.eye).dot(view.normal) / k.dot(view.normal);
+        if t >= 0.0 {
+            // It is behind the observer, who looks the other way.
+            return None;
+        }
         let area = view.width * view.height / view.pixels() as f64;
         let weight = bsdf * cosine.abs() / (distance * distance) * (t * t) / (area * k.dot(view.normal).abs());
         Some(Sight {

@@ -50,7 +50,10 @@ def look_at_events(
     for view in views:
         sums = np.zeros((3, view["columns"] * view["rows"]))
         for words in _stretches(events.rows):
-            sums += np.array(_core.look_at_events(core, words, view, how.threads))
+            try:
+                sums += np.array(_core.look_at_events(core, words, view, how.threads))
+            except ValueError as error:
+                raise ArgumentError(f"the scatter events of {events.name!r}: {error}.") from error
             done += len(words)
             if progress is not None and not whole:
                 progress(done)
