@@ -252,8 +252,12 @@ pub fn scene_crossings<'py>(
 type Events<'py> = (Bound<'py, PyArray2<u64>>, u32);
 
 fn event_rows<'py>(py: Python<'py>, kept: &Kept) -> PyResult<Events<'py>> {
-    let words = PyArray1::from_iter(py, kept.rows().flatten().copied());
-    Ok((words.reshape([kept.count(), WORDS])?, kept.level()))
+    let mut words = Vec::with_capacity(kept.count() * WORDS);
+    kept.rows().for_each(|row| words.extend_from_slice(row));
+    Ok((
+        PyArray1::from_vec(py, words).reshape([kept.count(), WORDS])?,
+        kept.level(),
+    ))
 }
 
 /// How often anything is thinned at most.
