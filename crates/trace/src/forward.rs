@@ -443,13 +443,12 @@ impl Walk<'_> {
                         self.out.marks[number].push((pixel, rider.ray, light));
                     }
                 }
-                Detector::Events { faces, .. } => {
+                Detector::Events { faces, .. }
                     if faces
                         .as_ref()
-                        .is_none_or(|faces| faces.get(meeting.face as usize) == Some(&true))
-                    {
-                        self.out.events[number].push(&event, rider.depth);
-                    }
+                        .is_none_or(|faces| faces.get(meeting.face as usize) == Some(&true)) =>
+                {
+                    self.out.events[number].push(&event, rider.depth);
                 }
                 _ => {}
             }

@@ -214,7 +214,8 @@ def _kept(file: Path, detector: str | None) -> ScatterEvents | RaySet | None:
     ArgumentError
         If there is no such detector, or several and none is named.
     """
-    if not is_result_file(file):
+    # A file that is missing is told when it is read.
+    if not (file.is_file() and is_result_file(file)):
         _refuse({"--detector": detector}, f"for results of traces; {file} is none")
         return None
     result = TraceResult.load(file)
