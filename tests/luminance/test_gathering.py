@@ -75,7 +75,7 @@ def test_noise_is_much_smaller(gathered: et.LuminanceMap) -> None:
     lit = exact.values > 0.2 * np.median(exact.values)
     ratio = (exact.standard_error[lit] / gathered.standard_error[lit]) ** 2
     assert np.median(ratio) > 1.5
-    assert "compared with lines of sight that go on" in " ".join(gathered.notes)
+    assert "lines of sight that go on to the sources" in " ".join(gathered.notes)
     assert "leave gather out" not in " ".join(gathered.notes)
 
 

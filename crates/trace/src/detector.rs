@@ -45,8 +45,13 @@ pub enum Detector {
     },
     /// The flux that diffuse surfaces send out, by the cells of patches.
     Exitance(Arc<Patches>),
-    /// Every diffuse scatter, to be looked at later from anywhere.
-    Events,
+    /// Diffuse scatters, to be looked at later from anywhere.
+    Events {
+        /// How many are kept at most: of more, those of every second ray are dropped, as often as it takes.
+        most: usize,
+        /// For each face whether its scatters count; None: those of all.
+        faces: Option<Vec<bool>>,
+    },
 }
 
 impl Detector {
@@ -68,7 +73,7 @@ impl Detector {
                 trims: vec![],
                 flipped: false,
             }),
-            Self::Intensity { .. } | Self::Image { .. } | Self::Exitance(_) | Self::Events => None,
+            Self::Intensity { .. } | Self::Image { .. } | Self::Exitance(_) | Self::Events { .. } => None,
         }
     }
 
@@ -76,7 +81,7 @@ impl Detector {
     #[must_use]
     pub fn cells(&self) -> usize {
         match self {
-            Self::Rays(_) | Self::Events => 0,
+            Self::Rays(_) | Self::Events { .. } => 0,
             Self::Illuminance { columns, rows, .. } => *columns as usize * *rows as usize,
             Self::Intensity { planes, steps } => *planes as usize * (*steps as usize + 1),
             Self::Image { view, .. } => view.pixels(),

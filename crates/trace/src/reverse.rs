@@ -29,6 +29,17 @@ pub struct Lit<'a> {
     pub(crate) lines: Vec<(f64, f64, Vec<f64>)>,
 }
 
+/// What lines of sight do not look for, because something else finds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Left {
+    /// Nothing.
+    Nothing,
+    /// Light that reaches a diffuse surface through smooth ones, and from there the eye directly or over other diffuse ones.
+    Caustics,
+    /// All light that reaches the eye directly from a diffuse surface.
+    Scattered,
+}
+
 /// How a map is computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Method {
@@ -38,9 +49,8 @@ pub struct Method {
     pub seed: u64,
     /// Events that a path may have before it is ended.
     pub most_events: u32,
-    /// Whether light that reaches a diffuse surface through smooth ones, and from there the eye directly or over other
-    /// diffuse ones, is left to the light image.
-    pub without_caustics: bool,
+    /// What is left to the light image, or to scatter events.
+    pub left: Left,
 }
 
 /// Sums over passes: of the mean of each pass, of its square, and of the sources' own deviation.

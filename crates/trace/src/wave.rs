@@ -15,7 +15,7 @@ use etendue_sampling::philox::Stream;
 use crate::exitance::{Exitance, Place};
 use crate::inside::Inside;
 use crate::meeting::{Fillings, Meeting, meet, transmittance};
-use crate::reverse::{Lit, Method, Pixel};
+use crate::reverse::{Left, Lit, Method, Pixel};
 use crate::start::place;
 
 /// The purposes under which shifts of lattices and events of paths are drawn (see [`Stream::new`]).
@@ -318,7 +318,7 @@ impl<'a> Wave<'a> {
     /// Adds the light of sources that the branch meets before `reach`.
     fn gather(&mut self, branch: &Branch, o: Vec3, d: Vec3, reach: f64, absorption: f64) {
         let scene = self.lit.scene;
-        if branch.seen == Seen::Caustic && self.method.without_caustics && branch.direct {
+        if branch.seen == Seen::Caustic && self.method.left == Left::Caustics && branch.direct {
             return;
         }
         // A source that lies on the surface behind it is in front of it.
@@ -448,7 +448,7 @@ impl<'a> Wave<'a> {
             point: meeting.point,
         };
         // What light that came through smooth surfaces does from here on is left to the light image, if there is one.
-        let all = !(self.method.without_caustics && branch.direct);
+        let all = !(self.method.left == Left::Caustics && branch.direct);
         let light = self.known[path.pass].at(self.lit.scene, place, branch.travelled, path.line, all);
         if let Some(light) = light {
             path.sum[0] += branch.weight * light;
@@ -459,6 +459,9 @@ impl<'a> Wave<'a> {
     /// A diffuse scatter: connections to sources, and one direction that is drawn. `boost` makes up for the chance that
     /// it came to this.
     fn scatter(&mut self, branch: &Branch, meeting: &Meeting, finish: &Finish, n: [f64; 2], boost: f64) {
+        if self.method.left == Left::Scattered && branch.direct && branch.scatters == 0 {
+            return;
+        }
         let wavelength = self.wavelength(branch.path);
         let [n1, n2] = n;
         let sides = [(false, n1, n2), (true, n2, n1)].map(|(through, n1, n2)| {

@@ -289,7 +289,7 @@ class _Compiler:
         observers = {observer.name: observer for observer in self.scene.observers if observer.name}
         for i, detector in enumerate(self.scene.detectors):
             with self._at(_place("detectors", i, detector.name)):
-                self.rows["detectors"].append(detector.record(self.files, observers))
+                self.rows["detectors"].append(detector.record(self.files, observers, self.names["faces"]))
                 self.names["detectors"].append(detector.name or f"detectors[{i}]")
 
 

@@ -107,6 +107,12 @@ impl Shape {
 }
 
 impl Shape {
+    /// Number of its parts: triangles of a mesh, 1 for the other shapes.
+    #[must_use]
+    pub fn parts(&self) -> usize {
+        if let Self::Mesh(mesh) = self { mesh.count() } else { 1 }
+    }
+
     /// A box that holds the shape; not finite if the shape has no end.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
