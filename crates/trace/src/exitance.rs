@@ -32,8 +32,8 @@ const SURVEYORS: u64 = 8;
 /// Batches of rays for each pass of a map.
 const EACH: u64 = 2;
 
-/// Rays that a bin has on average in a survey: of as many, one bin in 3000 gets none by chance.
-const FILL: f64 = 8.0;
+/// Rays that a bin has on average in a survey: of as many, hardly one in 10⁶ gets none by chance.
+const FILL: f64 = 16.0;
 
 /// Distance from which a patch counts as smooth, in sides of it.
 const NEAR: f64 = 2.0;

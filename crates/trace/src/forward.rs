@@ -292,7 +292,7 @@ impl Walk<'_> {
                 } else {
                     let next = self.step(&hits, i, &mut rider);
                     if let Some(trails) = &mut self.trails {
-                        let t = hits.t[i].min(self.far);
+                        let t = if hits.t[i].is_finite() { hits.t[i] } else { self.far };
                         trails[slot(&rider)].push(self.lines.origin(i) + self.lines.direction(i) * t);
                     }
                     next
