@@ -165,7 +165,7 @@ def main() -> None:
         rows.append([f"{observer.theta:g}°", *cells, " / ".join(f"{maps[name][i].intensity:,.0f}" for name in seen)])
     print_table(["θ", *seen[1:], "intensity: " + ", ".join(seen)], rows)
     drawn = scenes["the LED itself"].replace(name="Figure 3.16", detectors=[])
-    et.draw_scene(drawn, options.output / "figure-3.16.png", section=["y=0"], rays=40, window=(-11, 11, -2, 24))
+    et.draw_scene(drawn, options.output / "figure-3.16.png", section=["y=0"], rays=24, window=(-9.5, 9.5, -1.5, 20))
     draw_profiles(options.output / "figure-3.17.png", {name: profiles[name] for name in list(profiles)[:5]})
     shown = [*seen[1:], seen[0]]
     pictures = [(f"θ = {o.theta:g}°", [maps[name][i] for name in shown]) for i, o in enumerate(OBSERVERS)]

@@ -1,7 +1,7 @@
 """Section 3.2 of the thesis with a remote phosphor made of parts, bare and under a film of prisms.
 
     python examples/remote_phosphor.py              # few rays and coarse grids, seconds
-    python examples/remote_phosphor.py --full       # six million rays: the tables of docs/chapter-3.md
+    python examples/remote_phosphor.py --full       # four million rays: the tables of docs/chapter-3.md
 
 A luminous plate, darker towards its rim, with and without a film of 240 prisms above it, is traced forwards onto a
 hemisphere far around it, prism by prism, as a goniophotometer would record it. From these rays alone the gridded algorithm
@@ -214,13 +214,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=int, default=50_000)
     parser.add_argument("--lines", type=int, default=4, help="lines of sight per pixel of the maps of the lamp itself")
-    parser.add_argument("--full", action="store_true", help="six million rays, 192 lines, 0.5 mm and 1 mm, fine grids")
+    parser.add_argument("--full", action="store_true", help="four million rays, 128 lines, 0.5 mm and 1 mm, fine grids")
     parser.add_argument("--output", type=Path, default=Path("remote-phosphor"), help="folder for the figures")
     options = parser.parse_args()
     options.pixels = (1.0,)
     options.output.mkdir(parents=True, exist_ok=True)
     if options.full:
-        options.rays, options.lines, options.pixels = 6_000_000, 192, (0.5, 1.0)
+        options.rays, options.lines, options.pixels = 4_000_000, 128, (0.5, 1.0)
     film.print_and_draw(options.output / "film-transmission.png", 2048 if options.full else 64)
     found = {kind: experiment(kind, options) for kind in ("bare", "film")}
     for kind, maps in found.items():
