@@ -219,7 +219,7 @@ def job_map(_rays: int) -> None:
     view = screen.core_view(observer)
 
     def ours(seed: int) -> Array:
-        return _core.look_at_scene(core, view, 16, seed, 1_000_000, False, 0, 1)[0]
+        return _core.look_at_scene(core, view, 16, seed, 1_000_000, "nothing", 0, 1)[0]
 
     mi.set_variant("llvm_ad_rgb")
     transform = mi.ScalarTransform4f
@@ -295,11 +295,11 @@ def job_field(_rays: int) -> None:
     view = et.Screen(70, 70, 50, 50).core_view(et.Observer(20, 0, 1000))
     for name, solids in (("bare", []), ("behind a lens", [lens])):
         core = _core.Scene(compile_scene(et.Scene(sources=[source], solids=solids)).record)
-        _core.look_at_scene(core, view, 4, 1, 1000, False, 0, 1)
+        _core.look_at_scene(core, view, 4, 1, 1000, "nothing", 0, 1)
         seconds = []
         for _ in range(3):
             start = time.perf_counter()
-            _core.look_at_scene(core, view, 125, 1, 1000, False, 0, 8)
+            _core.look_at_scene(core, view, 125, 1, 1000, "nothing", 0, 8)
             seconds.append(time.perf_counter() - start)
         job = f"light field {name}, 50 × 50 pixels × 1 000 paths"
         row(job, f"{min(seconds):.2f} s", f"{1.0 / min(seconds):.2f} × bar (1 s)")

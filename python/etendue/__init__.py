@@ -40,6 +40,7 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
+from etendue.scene.scatter_events import ScatterEvents
 from etendue.sources.ring_source import RingSource
 from etendue.tracing import TraceResult, trace, trace_rounds
 
@@ -64,6 +65,7 @@ __all__ = [
     "RaySet",
     "Region",
     "RingSource",
+    "ScatterEvents",
     "Scene",
     "Screen",
     "Spectrum",

@@ -1,7 +1,7 @@
 """The compiled core. Arrays in, arrays out; lengths in mm, angles in radians, fluxes as stored."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, TypedDict, final
+from typing import Any, Literal, TypeAlias, TypedDict, final
 
 import numpy as np
 import numpy.typing as npt
@@ -85,7 +85,7 @@ class _Harvest(TypedDict):
     ledger: _Ledger
     cells: list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]]
     records: list[_Floats]
-    events: list[npt.NDArray[np.uint64]]
+    events: list[tuple[npt.NDArray[np.uint64], int]]
     rays: int
     imbalance: float
 
@@ -147,6 +147,14 @@ class Scene:
     """A scene, ready to be traced and to be looked at; `record` is what `etendue.scene.compile_scene` makes."""
 
     def __new__(cls, record: dict[str, Any]) -> Scene: ...
+
+@final
+class Survey:
+    """The diffuse surfaces of a scene as patches whose light is known beforehand, for `look_at_scene`."""
+
+    def __new__(cls, scene: Scene, seed: int, most_events: int, threads: int | None = None) -> Survey: ...
+    def patches(self) -> tuple[int, float]:
+        """Number of patches, and the share of them that can be used."""
 
 _Sums: TypeAlias = tuple[_Floats, _Floats, npt.NDArray[np.uint64]]
 _Source: TypeAlias = RayTable | RingSource | FieldRays
@@ -277,7 +285,8 @@ def trace_batches(
     """Traces batches ``first..last`` of a run of `rays` rays.
 
     Of the ledger each entry is (flux, rays), by source, face, medium or reason. Cells of each detector are (Σ w, Σ w², rays
-    that contributed); records are rows of position [mm], direction, flux, wavelength [nm], shape (n, 8).
+    that contributed); records are rows of position [mm], direction, flux, wavelength [nm], shape (n, 8); events are rows of
+    scatter events, shape (n, 15), and how often they were thinned.
     """
 
 def look_at_scene(
@@ -286,24 +295,29 @@ def look_at_scene(
     paths: int,
     seed: int,
     most_events: int,
-    without_caustics: bool,
+    left: Literal["nothing", "caustics", "scattered"],
     first: int,
     last: int,
     threads: int | None = None,
+    survey: Survey | None = None,
 ) -> list[_Floats]:
-    """For each pixel Σ mean, Σ mean² and Σ deviation of the sources over passes ``first..last`` of `paths` paths each."""
+    """For each pixel Σ mean, Σ mean² and Σ deviation of the sources over passes ``first..last`` of `paths` paths each.
+
+    `left`: light that is not looked for, because rays traced forwards find it. Caustics: what reaches a diffuse surface
+    through smooth ones, and from there the eye directly or over other diffuse ones. Scattered: all that reaches the eye
+    directly from a diffuse surface.
+    """
 
 def look_at_events(
     scene: Scene,
     events: npt.NDArray[np.uint64],
     view: _View,
-    complement: bool,
     threads: int | None = None,
 ) -> tuple[_Floats, _Floats, npt.NDArray[np.uint64]]:
-    """The light image of stored scatter events (n, 17), as cells.
+    """The light image of stored scatter events (n, 15), as cells. The rows of a ray follow each other."""
 
-    `complement`: only of light that `look_at_scene` does not find, or leaves out ``without_caustics``.
-    """
+def deepest() -> int:
+    """How often scatter events are thinned at most."""
 
 def trace_trails(scene: Scene, rays: int, seed: int, most_events: int, far: float) -> list[_Floats]:
     """The points (n, 3) that each ray passes; those that leave the scene end after `far`."""

@@ -183,3 +183,95 @@ def test_several_observers_do_not_write_to_one_file(run: Run) -> None:
     status, _, err = run("luminance", "lamp.toml", "-o", "a.npz")
     assert status == 1
     assert "{observer}" in err
+
+
+# --- looking at the result of a trace --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def traced(run: Run, tmp_path: Path) -> et.TraceResult:
+    """The lamp with two recorders of scattered light, traced by the program."""
+    kept = [{"name": "scatter", "kind": "scatter"}, {"name": "few", "kind": "scatter", "most": 500}]
+    et.Scene(**{**SCENE, "detectors": [*SCENE["detectors"], *kept]}).save(tmp_path / "lamp.toml")
+    status, out, _ = run("trace", "lamp.toml", "--rays", "50000", "--seed", "3", "-o", "r.h5")
+    assert status == 0
+    assert "scatter events, of 1 ray in" in out
+    return et.TraceResult.load(tmp_path / "r.h5")
+
+
+VIEW = ["--observer", "60,190", "--distance", "90", "--target", "9,0,5", "--size", "10,8", "--pixels", "5,4"]
+EYE, GRID = et.Observer(60, 190, 90, target=(9, 0, 5)), et.Screen(10, 8, 5, 4)
+
+
+def test_luminance_of_scatter_events(run: Run, traced: et.TraceResult, tmp_path: Path) -> None:
+    status, out, _ = run("luminance", "r.h5", "--detector", "scatter", *VIEW, "-o", "a.npz", "--json")
+    assert status == 0
+    expected = et.luminance_map(traced.events["scatter"], EYE, GRID)
+    assert expected.values.min() > 0
+    np.testing.assert_array_equal(et.read_map(tmp_path / "a.npz").values, expected.values)
+    assert any("scatter events" in note for note in json.loads(out)["maps"][0]["notes"])
+    # From the scene's own observers, with what lines of sight find besides.
+    options = ["--detector", "scatter", "--rays-per-pixel", "16", "--seed", "4"]
+    assert run("luminance", "r.h5", *options, "-o", "{observer}.npz")[0] == 0
+    maps = et.luminance_map(traced.events["scatter"], rays_per_pixel=16, seed=4)
+    for name, lmap in zip(("left-eye", "right"), maps, strict=True):
+        np.testing.assert_array_equal(et.read_map(tmp_path / f"{name}.npz").values, lmap.values)
+
+
+def test_luminance_of_collected_rays(run: Run, traced: et.TraceResult, tmp_path: Path) -> None:
+    options = ["--detector", "rcs", "--acceptance", "5", "--flux", "45"]
+    assert (
+        run("luminance", "r.h5", *options, "--observer", "0,0", "--size", "30,30", "--pixels", "4,4", "-o", "a.npz")[0]
+        == 0
+    )
+    rays = traced.rays["rcs"]
+    expected = et.luminance_map(rays, et.Observer(0, 0, 1000), et.Screen(30, 30, 4, 4), acceptance=5)
+    np.testing.assert_allclose(
+        et.read_map(tmp_path / "a.npz").values, expected.values * 45 / rays.total_flux, rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "text"),
+    [
+        (["r.h5", *VIEW], 1, "3 detectors keep what can be looked at (scatter, few, rcs)"),
+        (["r.h5", *VIEW, "--detector", "sctter"], 1, "Did you mean 'scatter'"),
+        (["r.h5", *VIEW, "--detector", "far"], 1, "unknown detector"),
+        (["r.h5", *VIEW, "--detector", "scatter", "--acceptance", "3"], 2, "--acceptance"),
+        (["r.h5", *VIEW, "--detector", "scatter", "--flux", "3"], 2, "--flux"),
+        (["r.h5", *VIEW, "--detector", "scatter", "--until", "0.1"], 1, "rays_per_pixel"),
+        (["r.h5", *VIEW, "--detector", "scatter", "--forward-rays", "1e5"], 1, "forward_rays"),
+        (["r.h5", *VIEW, "--detector", "rcs", "--rays-per-pixel", "16"], 2, "--rays-per-pixel"),
+        (["lamp.toml", "--detector", "scatter"], 2, "--detector"),
+    ],
+)
+@pytest.mark.usefixtures("traced")
+def test_what_cannot_be_looked_at_is_told(arguments: list[str], status: int, text: str, run: Run) -> None:
+    found, out, err = run("luminance", *arguments, "-o", "{observer}.npz")
+    assert found == status
+    assert text in " ".join((out + err).split())
+
+
+def test_a_result_without_anything_to_look_at(run: Run, tmp_path: Path) -> None:
+    et.trace(et.Scene(sources=SCENE["sources"]), 1000).save(tmp_path / "bare.h5")
+    status, _, err = run("luminance", "bare.h5", *VIEW, "-o", "a.npz")
+    assert status == 1
+    assert "add one of the kind scatter or rays" in err
+
+
+def test_info_on_a_result(run: Run, traced: et.TraceResult) -> None:
+    status, out, _ = run("info", "r.h5")
+    assert status == 0
+    for text in (
+        "result of a trace",
+        "lamp: 50,000 rays",
+        "emitted",
+        f"scatter: {len(traced.events['scatter']):,} scatter",
+    ):
+        assert text in out
+    (facts,) = json.loads(run("info", "r.h5", "--json")[1])
+    assert facts["format"] == "trace result"
+    assert facts["ledger"] == traced.ledger.to_dict()
+    kept = {d["name"]: d for d in facts["detectors"]}
+    assert kept["few"]["events"] == len(traced.events["few"])
+    assert kept["few"]["share_of_rays"] == traced.events["few"].share < 1

@@ -92,6 +92,7 @@ def test_the_core_takes_every_detector() -> None:
             {"kind": "illuminance", "width": 1, "height": 1, "columns": 2, "rows": 3},
             {"kind": "intensity"},
             {"kind": "image", "observer": "me"},
+            {"kind": "scatter"},
         ],
         observers=[{"name": "me", "distance": 100, "screen": screen}],
     )

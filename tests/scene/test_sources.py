@@ -34,7 +34,7 @@ def rays(**keys: Any) -> et.RaySet:
 
 def test_every_source_is_tested() -> None:
     assert set(sources.SOURCES) == {"rays", "light-field", "gridded", "surface", "rings", "point", "beam"}
-    assert set(detectors.DETECTORS) == {"rays", "illuminance", "intensity", "image"}
+    assert set(detectors.DETECTORS) == {"rays", "illuminance", "intensity", "image", "scatter"}
 
 
 # --- rays --------------------------------------------------------------------------------------------------------------

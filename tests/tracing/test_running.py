@@ -40,6 +40,7 @@ def luminaire(**more: Any) -> et.Scene:
             {"name": "desk", "kind": "illuminance", "width": 40, "height": 30, "columns": 3, "rows": 2, "at": [0, 0, 30],
              "toward": [0, 0, -1]},
             {"name": "eye", "kind": "image", "observer": "side"},
+            {"name": "scatter", "kind": "scatter", "most": 150_000},
         ],
         "observers": [{"name": "side", "theta": 80, "phi": 190, "distance": 200, "target": [9, 0, 5], "screen": screen}],
     }  # fmt: skip
@@ -53,6 +54,7 @@ def bits(result: TraceResult) -> list[Any]:
     return [
         sums.batches, sums.rays, sums.segments, sums.imbalance, sums.lost_at,
         *(a.tobytes() for a in arrays), *(held.array().tobytes() for held in sums.collected),
+        *((held.level, held.array().tobytes()) for held in sums.scattered),
     ]  # fmt: skip
 
 
@@ -70,6 +72,8 @@ def test_the_same_bits_for_any_number_of_threads(threads: int, rounds: list[Trac
 
 
 def test_the_same_bits_after_a_stop(rounds: list[TraceResult], tmp_path: Path) -> None:
+    # Events were thinned on the way.
+    assert 0 < rounds[0].sums.scattered[4].level < rounds[-1].sums.scattered[4].level
     rounds[0].save(tmp_path / "part.h5")
     before = bits(rounds[0])
     for start in (rounds[0], TraceResult.load(tmp_path / "part.h5"), tmp_path / "part.h5", str(tmp_path / "part.h5")):

@@ -272,7 +272,7 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
     })
 }
 
-fn detector(dict: &Bound<'_, PyDict>) -> PyResult<Detector> {
+fn detector(dict: &Bound<'_, PyDict>, faces: usize) -> PyResult<Detector> {
     Ok(match get::<String>(dict, "kind")?.as_str() {
         "rays" => Detector::Rays(face(dict)?),
         "illuminance" => Detector::Illuminance {
@@ -290,7 +290,22 @@ fn detector(dict: &Bound<'_, PyDict>) -> PyResult<Detector> {
             view: get::<View>(dict, "view")?.core(),
             complement: optional(dict, "complement")?.unwrap_or(false),
         },
-        "scatter" => Detector::Events,
+        "scatter" => {
+            let listed: Option<Vec<usize>> = optional(dict, "faces")?;
+            let flags = |listed: Vec<usize>| -> PyResult<Vec<bool>> {
+                let mut flags = vec![false; faces];
+                for face in listed {
+                    *flags
+                        .get_mut(face)
+                        .ok_or_else(|| refuse(format!("there is no face {face}")))? = true;
+                }
+                Ok(flags)
+            };
+            Detector::Events {
+                most: get(dict, "most")?,
+                faces: listed.map(flags).transpose()?,
+            }
+        }
         other => return Err(refuse(format!("no detector is called {other}"))),
     })
 }
@@ -326,7 +341,7 @@ impl Scene {
     #[new]
     fn new(record: &Bound<'_, PyDict>) -> PyResult<Self> {
         let each = |key: &str| list(record, key);
-        let parts = each("faces")?.iter().map(part).collect::<PyResult<_>>()?;
+        let parts: Vec<Part> = each("faces")?.iter().map(part).collect::<PyResult<_>>()?;
         let finishes = each("finishes")?.iter().map(finish).collect::<PyResult<_>>()?;
         let media = each("media")?.iter().map(medium).collect::<PyResult<_>>()?;
         let solids = each("solids")?
@@ -338,7 +353,10 @@ impl Scene {
             .iter()
             .map(|s| source(s, &mut sets))
             .collect::<PyResult<_>>()?;
-        let detectors = each("detectors")?.iter().map(detector).collect::<PyResult<_>>()?;
+        let detectors = each("detectors")?
+            .iter()
+            .map(|d| detector(d, parts.len()))
+            .collect::<PyResult<_>>()?;
         let core = CoreScene::new(parts, finishes, media, solids, sources, detectors).map_err(refuse)?;
         Ok(Self {
             core: Arc::new(core),

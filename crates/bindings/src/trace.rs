@@ -6,13 +6,13 @@ use etendue_geometry::RaySource;
 use etendue_geometry::assembly::Leaving;
 use etendue_math::Vec3;
 use etendue_sampling::ordered::{BATCH, within};
-use etendue_trace::eye::{self, Event};
+use etendue_trace::eye;
 use etendue_trace::forward::{Run, trace, trails};
 use etendue_trace::harvest::{Cell, Harvest, Record};
-use etendue_trace::inside::Inside;
+use etendue_trace::kept::{DEEPEST, Kept, WORDS};
 use etendue_trace::ledger::{Entry, Ledger};
 use etendue_trace::meeting::Loss;
-use etendue_trace::reverse::{Lit, Method, Pixel};
+use etendue_trace::reverse::{Left, Lit, Method, Pixel};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -21,6 +21,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::scene::Scene;
 use crate::source::{Opened, Source};
 use crate::surface::vectors;
+use crate::survey::Survey;
 use crate::view::View;
 
 fn entries<'py>(py: Python<'py>, entries: &[Entry]) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u64>>) {
@@ -129,7 +130,7 @@ pub fn trace_batches<'py>(
     dict.set_item("records", records)?;
     let events = PyList::empty(py);
     for detector in &harvest.events {
-        events.append(event_array(py, detector)?)?;
+        events.append(event_rows(py, detector)?)?;
     }
     dict.set_item("events", events)?;
     dict.set_item("rays", harvest.rays)?;
@@ -141,7 +142,7 @@ pub fn trace_batches<'py>(
 /// square, and of the sources' own deviation \[flux unit/(mm² sr)\].
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
-#[pyo3(signature = (scene, view, paths, seed, most_events, without_caustics, first, last, threads=None))]
+#[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None))]
 pub fn look_at_scene<'py>(
     py: Python<'py>,
     scene: &Scene,
@@ -149,21 +150,29 @@ pub fn look_at_scene<'py>(
     paths: u32,
     seed: u64,
     most_events: u32,
-    without_caustics: bool,
+    left: &str,
     first: u32,
     last: u32,
     threads: Option<usize>,
+    survey: Option<&Survey>,
 ) -> PyResult<[Bound<'py, PyArray2<f64>>; 3]> {
     let view = view.core();
+    let left = match left {
+        "nothing" => Left::Nothing,
+        "caustics" => Left::Caustics,
+        "scattered" => Left::Scattered,
+        other => return Err(PyValueError::new_err(format!("nothing is called {other}"))),
+    };
     let method = Method {
         paths,
         seed,
         most_events,
-        without_caustics,
+        left,
     };
     let pixels = py.detach(|| {
         let lit = Lit::new(scene.core(), scene.lanterns());
-        within(threads.unwrap_or(0), |_| lit.look(&view, &method, first..last))
+        let survey = survey.map(Survey::core);
+        within(threads.unwrap_or(0), |_| lit.look(&view, &method, survey, first..last))
     });
     let shape = [view.rows as usize, view.columns as usize];
     let array = |pick: fn(&Pixel) -> f64| PyArray1::from_iter(py, pixels.iter().map(pick)).reshape(shape);
@@ -242,100 +251,41 @@ pub fn scene_crossings<'py>(
     ))
 }
 
-/// Numbers of an event as a table row has them.
-const EVENT: usize = 17;
+/// Rows of scatter events, and how often they were thinned.
+type Events<'py> = (Bound<'py, PyArray2<u64>>, u32);
 
-/// Rows of point, side, direction, flux, wavelength, ray, face, part, finish, and the bits of the solids on both sides: all
-/// 64-bit, whole numbers as their bits.
-fn event_array<'py>(py: Python<'py>, events: &[Event]) -> PyResult<Bound<'py, PyArray2<u64>>> {
-    let rows = events.iter().flat_map(|e| {
-        let reals = [e.point, e.side, e.direction].map(|v| [v.x, v.y, v.z].map(f64::to_bits));
-        let [[a, b, c], [d, f, g], [h, i, j]] = reals;
-        let places = u64::from(e.face) << 32 | u64::from(e.part);
-        let unseen = u64::from(e.unseen);
-        [
-            a,
-            b,
-            c,
-            d,
-            f,
-            g,
-            h,
-            i,
-            j,
-            e.flux.to_bits(),
-            e.wavelength.to_bits(),
-            e.ray,
-            places,
-            u64::from(e.finish),
-            e.before.bits(),
-            e.after.bits(),
-            unseen,
-        ]
-    });
-    PyArray1::from_iter(py, rows).reshape([events.len(), EVENT])
+fn event_rows<'py>(py: Python<'py>, kept: &Kept) -> PyResult<Events<'py>> {
+    let mut words = Vec::with_capacity(kept.count() * WORDS);
+    kept.rows().for_each(|row| words.extend_from_slice(row));
+    Ok((
+        PyArray1::from_vec(py, words).reshape([kept.count(), WORDS])?,
+        kept.level(),
+    ))
 }
 
-fn event(row: &[u64]) -> Event {
-    let at = |k: usize| {
-        Vec3::new(
-            f64::from_bits(row[k]),
-            f64::from_bits(row[k + 1]),
-            f64::from_bits(row[k + 2]),
-        )
-    };
-    #[allow(clippy::cast_possible_truncation, reason = "the halves of a word")]
-    let (face, part) = ((row[12] >> 32) as u32, row[12] as u32);
-    Event {
-        point: at(0),
-        side: at(3),
-        direction: at(6),
-        flux: f64::from_bits(row[9]),
-        wavelength: f64::from_bits(row[10]),
-        ray: row[11],
-        face,
-        part,
-        #[allow(clippy::cast_possible_truncation, reason = "checked by the caller")]
-        finish: row[13] as u32,
-        before: Inside::from_bits(row[14]),
-        after: Inside::from_bits(row[15]),
-        unseen: row[16] != 0,
-    }
+/// How often anything is thinned at most.
+#[pyfunction]
+pub fn deepest() -> u32 {
+    DEEPEST
 }
 
 /// The light image of stored scatter events, as (Σ w, Σ w², rays) of each pixel.
 #[pyfunction]
-#[pyo3(signature = (scene, events, view, complement, threads=None))]
+#[pyo3(signature = (scene, events, view, threads=None))]
 pub fn look_at_events<'py>(
     py: Python<'py>,
     scene: &Scene,
     events: PyReadonlyArray2<'py, u64>,
     view: View,
-    complement: bool,
     threads: Option<usize>,
-) -> PyResult<Bound<'py, PyAny>> {
-    if events.shape()[1] != EVENT {
+) -> PyResult<CellArrays<'py>> {
+    if events.shape()[1] != WORDS {
         return Err(PyValueError::new_err(format!(
-            "events of shape (n, {EVENT}) are needed"
+            "events of shape (n, {WORDS}) are needed"
         )));
     }
-    let (core, view) = (scene.core(), view.core());
-    let events: Vec<Event> = events.as_slice()?.chunks_exact(EVENT).map(event).collect();
-    let solids = core.solids.len();
-    let known = |e: &Event| {
-        (e.face as usize) < core.roles.len()
-            && (e.finish as usize) < core.finishes.len()
-            && [e.before, e.after]
-                .iter()
-                .all(|i| i.solids().iter().all(|s| usize::from(*s) <= solids))
-    };
-    if !events.iter().all(known) {
-        return Err(PyValueError::new_err("the events are of another scene"));
-    }
-    let cells = py.detach(|| {
-        within(threads.unwrap_or(0), |_| {
-            eye::look_at_events(core, &events, &view, complement)
-        })
-    });
-    Ok(cell_arrays(py, &cells).into_pyobject(py)?.into_any())
+    let (core, view, rows) = (scene.core(), view.core(), events.as_slice()?);
+    let cells = py.detach(|| within(threads.unwrap_or(0), |_| eye::look_at_events(core, rows, &view)));
+    let cells = cells.ok_or_else(|| PyValueError::new_err("the events are of another scene"))?;
+    Ok(cell_arrays(py, &cells))
 }

@@ -1,17 +1,21 @@
 //! A diffuse scatter, connected to the eye of an observer: the light image, at once or from stored events.
 
-use etendue_geometry::assembly::Leaving;
+use std::ops::Range;
+
+use etendue_geometry::assembly::{Hits, Leaving, Lines, NONE};
+use etendue_geometry::shape::ROUNDING;
 use etendue_lightfield::View;
 use etendue_math::Vec3;
-use etendue_optics::finish::Incidence;
+use etendue_optics::finish::{Finish, Incidence};
 use rayon::prelude::*;
 
-use crate::harvest::{Cell, gather};
+use crate::harvest::Cell;
 use crate::inside::Inside;
+use crate::kept::{WORDS, from_row, ray_of};
 use crate::meeting::{Fillings, Meeting, transmittance};
-use crate::scene::Scene;
+use crate::scene::{Act, Scene};
 
-/// Light that was scattered diffusely: what is needed to look at it later, from anywhere.
+/// Light that was scattered diffusely: what is needed to look at it, now or later, from anywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
     /// Where \[mm\].
@@ -26,24 +30,41 @@ pub struct Event {
     pub wavelength: f64,
     /// Number of the ray in its run.
     pub ray: u64,
-    /// The surface, its part and its finish.
-    pub face: u32,
-    /// The part of the face.
-    pub part: u32,
-    /// Its finish.
+    /// The finish of the surface.
     pub finish: u32,
+    /// The faces that the light leaves from, the one that scattered it first.
+    pub leaving: Leaving,
     /// The solids on the side of the light.
     pub before: Inside,
     /// The solids on the other side.
     pub after: Inside,
-    /// Whether the reverse tracer does not find the ray, or leaves it to the light image.
-    pub unseen: bool,
+}
+
+/// An event as an observer sees it, if nothing is in between.
+#[derive(Clone, Copy, Debug)]
+struct Sight {
+    pixel: u32,
+    /// What it adds to the luminance of the pixel.
+    light: f64,
+    /// Unit vector to the eye, and how far that is.
+    k: Vec3,
+    distance: f64,
+    /// The solids that the light sets out in.
+    inside: Inside,
 }
 
 impl Event {
     /// The scatter of a ray at a meeting.
     #[must_use]
     pub fn new(meeting: &Meeting, finish: u32, direction: Vec3, [flux, wavelength]: [f64; 2], ray: u64) -> Self {
+        let mut leaving = meeting.leaving;
+        if let Some(slot) = leaving.face.iter().position(|face| *face == meeting.face) {
+            leaving.face.swap(0, slot);
+            leaving.part.swap(0, slot);
+        } else {
+            // More faces coincide than are told apart: in a corner.
+            (leaving.face[0], leaving.part[0]) = (meeting.face, 0);
+        }
         Self {
             point: meeting.point,
             side: meeting.side,
@@ -51,21 +72,19 @@ impl Event {
             flux,
             wavelength,
             ray,
-            face: meeting.face,
-            part: meeting.leaving.part[0],
             finish,
+            leaving,
             before: meeting.before,
             after: meeting.after,
-            unseen: false,
         }
     }
 
-    /// The pixel in which the scatter is seen, and what it adds to the luminance there; None if it is not.
+    /// What an observer would see of it; None if that is nothing.
     ///
     /// Flux Φ on an element gives it the intensity I = Φ f cos θ towards the eye at distance s. Through a pixel of area A at
     /// distance p, whose normal is turned by θₚ, that is the luminance I/s² · p²/(A cos θₚ).
-    #[must_use]
-    pub fn seen(&self, scene: &Scene, view: &View, leaving: Leaving, fillings: &mut Fillings) -> Option<(u32, f64)> {
+    #[inline]
+    fn sight(&self, scene: &Scene, view: &View, fillings: &mut Fillings) -> Option<Sight> {
         let away = view.eye - self.point;
         let distance = away.length();
         let k = away * (1.0 / distance);
@@ -82,41 +101,173 @@ impl Event {
         if bsdf == 0.0 || cosine == 0.0 {
             return None;
         }
-        let inside = if through { self.after } else { self.before };
-        let share = transmittance(scene, self.point, view.eye, leaving, inside, fillings, self.wavelength);
         let t = (view.target - view.eye).dot(view.normal) / k.dot(view.normal);
+        if t >= 0.0 {
+            // It is behind the observer, who looks the other way.
+            return None;
+        }
         let area = view.width * view.height / view.pixels() as f64;
         let weight = bsdf * cosine.abs() / (distance * distance) * (t * t) / (area * k.dot(view.normal).abs());
-        (share > 0.0).then_some((pixel, self.flux * share * weight))
+        Some(Sight {
+            pixel,
+            light: self.flux * weight,
+            k,
+            distance,
+            inside: if through { self.after } else { self.before },
+        })
+    }
+
+    /// The share of its light that gets to the eye.
+    fn passes(&self, scene: &Scene, view: &View, sight: &Sight, fillings: &mut Fillings) -> f64 {
+        let inside = sight.inside;
+        transmittance(
+            scene,
+            self.point,
+            view.eye,
+            self.leaving,
+            inside,
+            fillings,
+            self.wavelength,
+        )
+    }
+
+    /// The pixel in which the scatter is seen, and what it adds to the luminance there; None if it is not.
+    #[must_use]
+    pub fn seen(&self, scene: &Scene, view: &View, fillings: &mut Fillings) -> Option<(u32, f64)> {
+        let sight = self.sight(scene, view, fillings)?;
+        let share = self.passes(scene, view, &sight, fillings);
+        (share > 0.0).then_some((sight.pixel, sight.light * share))
     }
 }
 
-/// Events in one unit of work.
+/// Stored events in one unit of work, or as many more as belong to the last ray.
 const CHUNK: usize = 1 << 14;
 
-/// The light image of stored events, on the threads of the current pool; the same bits for any number of them.
+/// Lines to the eye that are followed together.
+const BLOCK: usize = 1024;
+
+/// The light image of stored events (see [`crate::kept`]), on the threads of the current pool; the same bits for any number
+/// of them. None if they are not of this scene.
 ///
-/// Contributions of one ray to one pixel are taken together if its events lie in the same stretch of 2¹⁴ events.
+/// The rows of a ray follow each other: its contributions to a pixel are taken together.
 #[must_use]
-pub fn look_at_events(scene: &Scene, events: &[Event], view: &View, complement: bool) -> Vec<Cell> {
-    let parts: Vec<Vec<(u32, u64, f64)>> = events
-        .par_chunks(CHUNK)
-        .map(|events| {
-            let mut fillings = Fillings::new(scene);
-            let wanted = events.iter().filter(|e| e.unseen || !complement);
-            wanted
-                .filter_map(|event| {
-                    let mut leaving = Leaving::default();
-                    leaving.add(event.face, event.part);
-                    let (pixel, light) = event.seen(scene, view, leaving, &mut fillings)?;
-                    Some((pixel, event.ray, light))
-                })
-                .collect()
-        })
+pub fn look_at_events(scene: &Scene, rows: &[u64], view: &View) -> Option<Vec<Cell>> {
+    let parts: Vec<Option<Vec<(u32, f64)>>> = stretches(rows)
+        .into_par_iter()
+        .map(|range| Gaze::new(scene, view).look(&rows[range]))
         .collect();
     let mut cells = vec![Cell::default(); view.pixels()];
-    for marks in parts {
-        gather(&mut cells, marks);
+    for part in parts {
+        for (pixel, light) in part? {
+            let cell = &mut cells[pixel as usize];
+            cell.sum += light;
+            cell.squares += light * light;
+            cell.rays += 1;
+        }
     }
-    cells
+    Some(cells)
+}
+
+/// Where the rows can be cut between two rays.
+fn stretches(rows: &[u64]) -> Vec<Range<usize>> {
+    let ray = |at: usize| ray_of(&rows[at * WORDS..]);
+    let (n, mut start) = (rows.len() / WORDS, 0);
+    let mut result = Vec::new();
+    while start < n {
+        let mut end = (start + CHUNK).min(n);
+        while end < n && ray(end) == ray(end - 1) {
+            end += 1;
+        }
+        result.push(start * WORDS..end * WORDS);
+        start = end;
+    }
+    result
+}
+
+/// An observer who looks at one event after the other.
+struct Gaze<'a> {
+    scene: &'a Scene,
+    view: &'a View,
+    fillings: Fillings,
+    /// Events of a block that he would see if nothing were in between, and the lines to his eye.
+    events: Vec<(Event, Sight)>,
+    lines: Lines,
+    hits: Hits,
+    /// What he sees: ray, pixel, luminance.
+    seen: Vec<(u64, u32, f64)>,
+}
+
+impl<'a> Gaze<'a> {
+    fn new(scene: &'a Scene, view: &'a View) -> Self {
+        Self {
+            scene,
+            view,
+            fillings: Fillings::new(scene),
+            events: Vec::with_capacity(BLOCK),
+            lines: Lines::default(),
+            hits: Hits::default(),
+            seen: Vec::new(),
+        }
+    }
+
+    /// Pixels and what each ray adds to them.
+    fn look(mut self, rows: &[u64]) -> Option<Vec<(u32, f64)>> {
+        for row in rows.chunks_exact(WORDS) {
+            let event = from_row(self.scene, row)?;
+            if let Some(sight) = event.sight(self.scene, self.view, &mut self.fillings) {
+                self.lines.push(event.point, sight.k, event.leaving);
+                self.events.push((event, sight));
+                if self.events.len() == BLOCK {
+                    self.follow();
+                }
+            }
+        }
+        self.follow();
+        let mut result = Vec::with_capacity(self.seen.len());
+        for same in self.seen.chunk_by_mut(|a, b| a.0 == b.0) {
+            // What one ray adds to one pixel belongs together: it is not independent.
+            same.sort_by_key(|(_, pixel, _)| *pixel);
+            for here in same.chunk_by(|a, b| a.1 == b.1) {
+                result.push((here[0].1, here.iter().map(|(_, _, light)| light).sum()));
+            }
+        }
+        Some(result)
+    }
+
+    /// Follows the lines of the block to the eye.
+    fn follow(&mut self) {
+        let (scene, view) = (self.scene, self.view);
+        scene.assembly.nearest(&self.lines, &mut self.hits);
+        for (i, (event, sight)) in self.events.iter().enumerate() {
+            let share = match self.at_once(i, event, sight) {
+                Some(share) => share,
+                None => event.passes(scene, view, sight, &mut self.fillings),
+            };
+            if share > 0.0 {
+                self.seen.push((event.ray, sight.pixel, sight.light * share));
+            }
+        }
+        self.events.clear();
+        self.lines.truncate(0);
+    }
+
+    /// The share of the light that gets to the eye, where the first thing in its way, or that there is none, says it all.
+    fn at_once(&self, i: usize, event: &Event, sight: &Sight) -> Option<f64> {
+        let scene = self.scene;
+        let o = event.point;
+        // What lies within rounding of the eye is the surface that it lies on.
+        let reach = sight.distance - 64.0 * ROUNDING * (o.x.abs() + o.y.abs() + o.z.abs() + sight.distance);
+        if self.hits.face[i] == NONE || self.hits.t[i] >= reach {
+            let medium = scene.medium(sight.inside.top());
+            return (scene.media[medium].absorption.range() == [0.0, 0.0]).then_some(1.0);
+        }
+        let role = scene.roles[self.hits.face[i] as usize];
+        match role.act {
+            // A sheet decides before all else that lies there.
+            Act::Optical(finish) if role.solid == 0 => {
+                (!matches!(scene.finishes[finish as usize], Finish::Interface)).then_some(0.0)
+            }
+            _ => None,
+        }
+    }
 }

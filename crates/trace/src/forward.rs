@@ -4,6 +4,7 @@
 //! proportion to their shares, and in a medium it is absorbed at a distance drawn from Beer's law. So the rays that a
 //! detector keeps have equal flux if those of the source have.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use etendue_geometry::assembly::{Hits, Leaving, Lines, NONE};
@@ -18,9 +19,11 @@ use rayon::prelude::*;
 
 use crate::bounce::{Bouncer, Gathered, bounce, bouncers};
 use crate::detector::{Detector, illuminance_cell, intensity_cell};
+use crate::exitance::Place;
 use crate::eye::Event;
 use crate::harvest::{Harvest, Record, Yield};
 use crate::inside::Inside;
+use crate::kept::depth;
 use crate::ledger::Fate;
 use crate::meeting::{Fillings, Loss, Meeting, meet};
 use crate::scene::Scene;
@@ -108,6 +111,8 @@ struct Rider {
     scattered: bool,
     /// Whether the reverse tracer does not find it, or leaves it to the light image.
     unseen: bool,
+    /// How often the kept events can be thinned before those of this ray are dropped.
+    depth: u32,
 }
 
 struct Walk<'a> {
@@ -154,10 +159,12 @@ pub fn trails(scene: &Scene, run: &Run<'_>, far: f64) -> Vec<Vec<Vec3>> {
 impl<'a> Walk<'a> {
     fn new(scene: &'a Scene, run: &'a Run<'a>) -> Self {
         // Detectors of scattered light, absorbing surroundings and trails want to know of every scatter by itself.
-        let watched = scene
-            .detectors
-            .iter()
-            .any(|d| matches!(d, Detector::Image { .. } | Detector::Events));
+        let watched = scene.detectors.iter().any(|d| {
+            matches!(
+                d,
+                Detector::Image { .. } | Detector::Exitance(_) | Detector::Events { .. }
+            )
+        });
         let clear = scene.media[0].absorption.range() == [0.0, 0.0];
         let bouncers = if clear && !watched { bouncers(scene) } else { Vec::new() };
         Self {
@@ -175,7 +182,7 @@ impl<'a> Walk<'a> {
             numbers: Default::default(),
             trails: None,
             far: 0.0,
-            out: Yield::new(scene),
+            out: Yield::new(scene, run.rays.div_ceil(BATCH)),
         }
     }
 
@@ -184,6 +191,7 @@ impl<'a> Walk<'a> {
         let (scene, run) = (self.scene, self.run);
         let mut births = RayBatch::default();
         let totals = edges(scene, run.rays);
+        let keeps = scene.detectors.iter().any(|d| matches!(d, Detector::Events { .. }));
         let mut mark = 0;
         for (number, range) in deal(scene, run.rays, batch).into_iter().enumerate() {
             let source = &scene.sources[number];
@@ -206,6 +214,7 @@ impl<'a> Walk<'a> {
                             inside: Inside::default(),
                             scattered: false,
                             unseen: !source.is_visible(),
+                            depth: if keeps { depth(run.seed, ray) } else { 0 },
                         };
                         self.start(births.position(i), births.direction(i), rider, &scene.near[number]);
                     } else {
@@ -214,6 +223,9 @@ impl<'a> Walk<'a> {
                     mark += 1;
                 }
                 self.finish();
+                for kept in &mut self.out.events {
+                    kept.settle();
+                }
                 start = stop;
             }
         }
@@ -393,7 +405,7 @@ impl Walk<'_> {
             return Err(Fate::Lost(Loss::NoIndex, meeting.face));
         }
         if finish.is_diffuse() && !self.scene.detectors.is_empty() {
-            self.show(meeting, number, d, rider);
+            self.show(meeting, number, &light, d, rider);
         }
         let (shares, across) = finish.shares(&light);
         let Some(lobe) = pick(&shares, numbers[0]) else {
@@ -426,17 +438,37 @@ impl Walk<'_> {
     }
 
     /// Detectors of scattered light take note.
-    fn show(&mut self, meeting: &Meeting, finish: u32, d: Vec3, rider: &Rider) {
-        let mut event = Event::new(meeting, finish, d, [rider.flux, rider.wavelength], rider.ray);
-        event.unseen = rider.unseen;
+    fn show(&mut self, meeting: &Meeting, finish: u32, light: &Incidence, d: Vec3, rider: &Rider) {
+        let event = Event::new(meeting, finish, d, [rider.flux, rider.wavelength], rider.ray);
         for (number, detector) in self.scene.detectors.iter().enumerate() {
             match detector {
                 Detector::Image { view, complement } if rider.unseen || !complement => {
-                    if let Some((pixel, light)) = event.seen(self.scene, view, meeting.leaving, &mut self.fillings) {
+                    if let Some((pixel, light)) = event.seen(self.scene, view, &mut self.fillings) {
                         self.out.marks[number].push((pixel, rider.ray, light));
                     }
                 }
-                Detector::Events => self.out.events[number].push(event),
+                Detector::Exitance(patches) => {
+                    for through in [false, true] {
+                        let share = PI * self.scene.finishes[finish as usize].bsdf(light, through);
+                        let place = Place {
+                            face: meeting.face,
+                            part: meeting.part,
+                            front: meeting.front != through,
+                            point: meeting.point,
+                        };
+                        let cell = || patches.cell(self.scene, place, rider.wavelength, rider.unseen);
+                        if let Some(cell) = (share > 0.0).then(cell).flatten() {
+                            self.out.marks[number].push((cell, rider.ray, rider.flux * share));
+                        }
+                    }
+                }
+                Detector::Events { faces, .. }
+                    if faces
+                        .as_ref()
+                        .is_none_or(|faces| faces.get(meeting.face as usize) == Some(&true)) =>
+                {
+                    self.out.events[number].push(&event, rider.depth);
+                }
                 _ => {}
             }
         }
@@ -463,6 +495,6 @@ fn detect(scene: &Scene, out: &mut Yield, detector: u32, point: Vec3, d: Vec3, r
                 out.marks[number].push((cell, rider.ray, rider.flux));
             }
         }
-        Detector::Intensity { .. } | Detector::Image { .. } | Detector::Events => {}
+        Detector::Intensity { .. } | Detector::Image { .. } | Detector::Exitance(_) | Detector::Events { .. } => {}
     }
 }

@@ -1,7 +1,7 @@
 //! What a trace amounts to: of one batch, and of many in their order.
 
 use crate::detector::Detector;
-use crate::eye::Event;
+use crate::kept::Kept;
 use crate::ledger::Ledger;
 use crate::scene::Scene;
 
@@ -39,7 +39,7 @@ pub struct Harvest {
     /// Rays of each collecting surface.
     pub records: Vec<Vec<Record>>,
     /// Diffuse scatters of each detector of them.
-    pub events: Vec<Vec<Event>>,
+    pub events: Vec<Kept>,
     /// Rays that the sources gave out.
     pub rays: u64,
     /// Largest | emitted − Σ fates | / emitted of a batch.
@@ -55,19 +55,19 @@ pub struct Yield {
     /// Rays of each collecting surface.
     pub records: Vec<Vec<Record>>,
     /// Diffuse scatters of each detector of them.
-    pub events: Vec<Vec<Event>>,
+    pub events: Vec<Kept>,
 }
 
 impl Yield {
-    /// Nothing yet.
+    /// Nothing yet, of one of the batches of a run.
     #[must_use]
-    pub fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene, batches: u64) -> Self {
         let detectors = scene.detectors.len();
         Self {
             ledger: Ledger::new(scene),
             marks: vec![Vec::new(); detectors],
             records: vec![Vec::new(); detectors],
-            events: vec![Vec::new(); detectors],
+            events: scene.detectors.iter().map(|d| Kept::of_batch(d, batches)).collect(),
         }
     }
 }
@@ -82,7 +82,7 @@ impl Harvest {
             ledger: Ledger::new(scene),
             cells: scene.detectors.iter().map(cells).collect(),
             records: vec![Vec::new(); detectors],
-            events: vec![Vec::new(); detectors],
+            events: scene.detectors.iter().map(Kept::of).collect(),
             rays: 0,
             imbalance: 0.0,
         }
@@ -100,7 +100,7 @@ impl Harvest {
             gather(cells, marks);
         }
         for (all, events) in self.events.iter_mut().zip(part.events) {
-            all.extend(events);
+            all.add(events);
         }
         for (all, records) in self.records.iter_mut().zip(part.records) {
             all.extend(records);

@@ -4,16 +4,20 @@
 //! `inside`: which solids it is in; `meeting`: which of the faces that it meets decides what becomes of it.
 //!
 //! `forward`: from the sources to the detectors; `bounce`: many rays at once off a plain wall; `detector`: what takes note of
-//! light; `ledger`: the flux account; `harvest`: what batches amount to. `eye`: diffuse scatters connected to an observer.
+//! light; `ledger`: the flux account; `harvest`: what batches amount to. `eye`: diffuse scatters connected to an observer;
+//! `kept`: those that are kept for later, thinned to a number of them.
 //!
-//! `reverse`: from the eye to the sources; `wave`: a block of its paths.
+//! `reverse`: from the eye to the sources; `wave`: a block of its paths; `exitance`: the light of diffuse surfaces, known
+//! beforehand, at which paths may end.
 
 mod bounce;
 pub mod detector;
+pub mod exitance;
 pub mod eye;
 pub mod forward;
 pub mod harvest;
 pub mod inside;
+pub mod kept;
 pub mod ledger;
 pub mod meeting;
 pub mod reverse;

@@ -13,6 +13,7 @@ use etendue_lightfield::View;
 use etendue_optics::source::Lantern;
 use rayon::prelude::*;
 
+use crate::exitance::{Exitance, Survey};
 use crate::scene::Scene;
 use crate::wave::{BLOCK, Wave};
 
@@ -28,6 +29,17 @@ pub struct Lit<'a> {
     pub(crate) lines: Vec<(f64, f64, Vec<f64>)>,
 }
 
+/// What lines of sight do not look for, because something else finds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Left {
+    /// Nothing.
+    Nothing,
+    /// Light that reaches a diffuse surface through smooth ones, and from there the eye directly or over other diffuse ones.
+    Caustics,
+    /// All light that reaches the eye directly from a diffuse surface.
+    Scattered,
+}
+
 /// How a map is computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Method {
@@ -37,9 +49,8 @@ pub struct Method {
     pub seed: u64,
     /// Events that a path may have before it is ended.
     pub most_events: u32,
-    /// Whether light that reaches a diffuse surface through smooth ones, and from there the eye directly or over other
-    /// diffuse ones, is left to the light image.
-    pub without_caustics: bool,
+    /// What is left to the light image, or to scatter events.
+    pub left: Left,
 }
 
 /// Sums over passes: of the mean of each pass, of its square, and of the sources' own deviation.
@@ -106,16 +117,21 @@ impl<'a> Lit<'a> {
         }
     }
 
-    /// The map of `view`: for each pixel the sums over passes `passes`. Passes are independent of each other.
+    /// The map of `view`: for each pixel the sums over passes `passes`. Passes are independent of each other. With a survey,
+    /// paths end at diffuse surfaces whose light is known.
     ///
     /// Runs on the threads of the current pool; the same bits for any number.
     #[must_use]
-    pub fn look(&self, view: &View, method: &Method, passes: Range<u32>) -> Vec<Pixel> {
+    pub fn look(&self, view: &View, method: &Method, survey: Option<&Survey>, passes: Range<u32>) -> Vec<Pixel> {
+        let known: Vec<Exitance<'_>> = survey
+            .iter()
+            .flat_map(|survey| passes.clone().map(|pass| survey.exitance(self, pass)))
+            .collect();
         let mut pixels = vec![Pixel::default(); view.pixels()];
         let each = (passes.len() * method.paths as usize).max(1);
         let chunk = (4 * BLOCK / each).clamp(1, 1 << 12);
         pixels.par_chunks_mut(chunk).enumerate().for_each(|(number, pixels)| {
-            Wave::new(self, view, method).paint(number * chunk, passes.clone(), pixels);
+            Wave::new(self, view, method, &known).paint(number * chunk, passes.clone(), pixels);
         });
         pixels
     }

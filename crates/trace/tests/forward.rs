@@ -12,8 +12,10 @@ use etendue_optics::source::{Emitter, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_sampling::ordered::within;
 use etendue_trace::detector::Detector;
+use etendue_trace::eye::look_at_events;
 use etendue_trace::forward::{Run, trace};
 use etendue_trace::harvest::Harvest;
+use etendue_trace::kept::{Row, depth, depth_of, ray_of};
 use etendue_trace::meeting::Loss;
 use etendue_trace::scene::{Part, Scene};
 
@@ -102,26 +104,31 @@ fn run(scene: &Scene, rays: u64, threads: usize) -> Harvest {
     within(threads, |_| trace(scene, &run, 0..rays.div_ceil(1 << 16)))
 }
 
+const VIEW: View = View {
+    eye: Vec3::new(3.0, -40.0, 60.0),
+    target: Vec3::new(0.0, 0.0, 0.0),
+    right: Vec3::new(1.0, 0.0, 0.0),
+    up: Vec3::new(0.0, 1.0, 0.0),
+    normal: Vec3::new(0.0, 0.0, 1.0),
+    width: 20.0,
+    height: 20.0,
+    columns: 8,
+    rows: 8,
+};
+
 /// A ball lens, an open mirror, a wall that scatters and transmits, two lamps; nothing symmetric.
 fn mixed(watched: bool) -> Scene {
-    let view = View {
-        eye: Vec3::new(3.0, -40.0, 60.0),
-        target: Vec3::default(),
-        right: Vec3::new(1.0, 0.0, 0.0),
-        up: Vec3::new(0.0, 1.0, 0.0),
-        normal: Vec3::new(0.0, 0.0, 1.0),
-        width: 20.0,
-        height: 20.0,
-        columns: 8,
-        rows: 8,
-    };
     let mut detectors = vec![Detector::Intensity { planes: 8, steps: 9 }];
     if watched {
         detectors.push(Detector::Image {
-            view,
+            view: VIEW,
             complement: false,
         });
     }
+    mixed_with(detectors)
+}
+
+fn mixed_with(detectors: Vec<Detector>) -> Scene {
     Scene::new(
         vec![
             part(sphere(2.0, ALL_Z), turned(Vec3::new(1.0, 0.5, 4.0)), Some(0), 0),
@@ -173,6 +180,74 @@ fn one_two_and_seven_threads_give_the_same_bits() {
     let one = bits(1);
     assert_eq!(one, bits(2));
     assert_eq!(one, bits(7));
+}
+
+/// Events of all faces, a number at most, beside a light image.
+fn kept(most: usize) -> Scene {
+    mixed_with(vec![
+        Detector::Image {
+            view: VIEW,
+            complement: false,
+        },
+        Detector::Events { most, faces: None },
+    ])
+}
+
+fn rows_of(harvest: &Harvest) -> Vec<Row> {
+    harvest.events[1].rows().copied().collect()
+}
+
+#[test]
+fn events_looked_at_later_are_the_light_image() {
+    let scene = kept(1 << 24);
+    let harvest = run(&scene, 200_000, 2);
+    let rows = rows_of(&harvest);
+    assert!(rows.len() > 30_000 && harvest.events[1].level() == 0);
+    assert!(rows.windows(2).all(|two| ray_of(&two[0]) <= ray_of(&two[1])));
+    let flat: Vec<u64> = rows.iter().flatten().copied().collect();
+    let later = look_at_events(&scene, &flat, &VIEW).expect("of this scene");
+    let lit = later.iter().filter(|cell| cell.rays > 0).count();
+    assert!(lit > 20, "{lit}");
+    for (a, b) in later.iter().zip(&harvest.cells[0]) {
+        assert_eq!(a.rays, b.rays);
+        assert!((a.sum - b.sum).abs() <= 1e-12 * b.sum && (a.squares - b.squares).abs() <= 1e-12 * b.squares);
+    }
+    for threads in [1, 7] {
+        assert_eq!(
+            within(threads, |_| look_at_events(&scene, &flat, &VIEW)),
+            Some(later.clone())
+        );
+    }
+    // Of a scene with other faces, or with numbers that stand for nothing.
+    for (word, value) in [(9, 77), (11, 1), (13, 2 << 48), (6, f64::NAN.to_bits())] {
+        let mut other = flat.clone();
+        other[word] = value;
+        assert_eq!(look_at_events(&scene, &other, &VIEW), None);
+    }
+}
+
+#[test]
+fn thinned_events_are_those_of_deep_rays_whatever_the_threads() {
+    let all = rows_of(&run(&kept(1 << 24), 200_000, 2));
+    for most in [1000, 30_000] {
+        let few = run(&kept(most), 200_000, 1);
+        let level = few.events[1].level();
+        let deep: Vec<Row> = all.iter().filter(|row| depth_of(*row) >= level).copied().collect();
+        assert!(level > 1 && few.events[1].count() <= most && few.events[1].count() > most / 8);
+        assert_eq!(rows_of(&few), deep);
+        for threads in [2, 7] {
+            assert_eq!(rows_of(&run(&kept(most), 200_000, threads)), deep);
+        }
+    }
+    // One ray of 2ᵏ has a depth of k or more: binomial, to four standard deviations.
+    for k in [1, 3, 6] {
+        let n = 100_000.0;
+        let share = (0.5_f64).powi(k);
+        let found = (0..100_000)
+            .filter(|ray| i64::from(depth(7, *ray)) >= i64::from(k))
+            .count();
+        assert!((found as f64 - n * share).abs() < 4.0 * (n * share).sqrt());
+    }
 }
 
 #[test]

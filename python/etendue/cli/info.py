@@ -1,4 +1,4 @@
-"""``etendue info``: what is in a ray file, and what is wrong with it; or what a light field is."""
+"""``etendue info``: what is in a ray file, and what is wrong with it; what a light field is, or what a trace found."""
 
 from __future__ import annotations
 
@@ -11,30 +11,32 @@ import typer
 
 from etendue.cli.field import describe_field, print_field
 from etendue.cli.terminal import complain, print_json, progress_bar, say
+from etendue.cli.trace import print_result
 from etendue.errors import EtendueError
 from etendue.formats.rays import detect_format, read_rays
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import is_field_file
 from etendue.quantities.ray_set import RaySet
+from etendue.tracing.result import TraceResult
+from etendue.tracing.storage import is_result_file
 
 
 def info(
-    files: Annotated[list[Path], typer.Argument(help="Ray files of any format, and light fields.")],
+    files: Annotated[list[Path], typer.Argument(help="Ray files of any format, light fields, results of traces.")],
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Format, rays, flux by header and by sum, bounding box, virtual focus, wavelengths, complaints; or a field's fit."""
-    described: list[dict[str, Any] | LightField] = []
+    """Format, rays, flux by header and by sum, bounding box, virtual focus, wavelengths, complaints; a field; a trace."""
+    described: list[dict[str, Any] | LightField | TraceResult] = []
     failed = False
     for file in files:
         try:
-            described.append(LightField.load(file) if is_field_file(file) else describe(file))
+            described.append(_opened(file))
         except (EtendueError, OSError) as error:
             failed = True
             reason = error.strerror if isinstance(error, OSError) else error
             described.append({"file": str(file), "error": str(reason)})
     if json:
-        both = zip(files, described, strict=True)
-        print_json([_field_facts(file, d) if isinstance(d, LightField) else d for file, d in both])
+        print_json([_facts(file, d) for file, d in zip(files, described, strict=True)])
     else:
         for number, (file, facts) in enumerate(zip(files, described, strict=True)):
             if number:
@@ -42,14 +44,27 @@ def info(
             if isinstance(facts, LightField):
                 say(f"{file}: light field, {file.stat().st_size / 1000:,.1f} kB")
                 print_field(facts)
+            elif isinstance(facts, TraceResult):
+                say(f"{file}: result of a trace, {file.stat().st_size / 1000:,.1f} kB")
+                print_result(facts)
             else:
                 _print(facts)
     if failed:
         raise typer.Exit(1)
 
 
-def _field_facts(path: Path, field: LightField) -> dict[str, Any]:
-    return {"file": path, "format": "light field", "bytes": path.stat().st_size} | describe_field(field)
+def _opened(path: Path) -> dict[str, Any] | LightField | TraceResult:
+    if is_field_file(path):
+        return LightField.load(path)
+    return TraceResult.load(path) if is_result_file(path) else describe(path)
+
+
+def _facts(path: Path, found: dict[str, Any] | LightField | TraceResult) -> dict[str, Any]:
+    if isinstance(found, LightField):
+        return {"file": path, "format": "light field", "bytes": path.stat().st_size} | describe_field(found)
+    if isinstance(found, TraceResult):
+        return {"file": path, "format": "trace result", "bytes": path.stat().st_size} | found.to_dict()
+    return found
 
 
 def describe(path: Path) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.field import complaints_of, read_source, surface_option
 from etendue.cli.terminal import check_outputs, complain, numbers, one_of, print_json, progress_bar, say, whole_numbers
 from etendue.errors import ArgumentError, UnknownNameError
@@ -23,13 +24,19 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import PLANES, Observer, Screen
 from etendue.quantities.ray_set import RaySet
 from etendue.scene import Scene
+from etendue.scene.scatter_events import ScatterEvents
+from etendue.tracing.result import TraceResult
+from etendue.tracing.storage import is_result_file
 
 SCENE_EXTENSION = ".toml"
 
 
 def luminance(
     file: Annotated[
-        Path, typer.Argument(help="A ray file of any format, an index of rays, a light field, or a scene (.toml).")
+        Path,
+        typer.Argument(
+            help="A ray file of any format, an index of rays, a light field, a scene (.toml), or the result of a trace."
+        ),
     ],
     output: Annotated[
         list[Path],
@@ -80,7 +87,12 @@ def luminance(
     ] = None,
     rays_per_pixel: Annotated[
         int | None,
-        typer.Option("--rays-per-pixel", help="Lines of sight per pixel of a scene [256].", min=1, show_default=False),
+        typer.Option(
+            "--rays-per-pixel",
+            help="Lines of sight per pixel of a scene [256]; of scatter events, for what they leave out [none].",
+            min=1,
+            show_default=False,
+        ),
     ] = None,
     until: Annotated[
         float | None,
@@ -93,6 +105,18 @@ def luminance(
             "--forward-rays", help="Of a scene: rays traced forwards besides, for caustics and beams, e.g. 1e7."
         ),
     ] = None,
+    gather: Annotated[
+        bool,
+        typer.Option(
+            "--gather", help="Of a scene: lines of sight end at the second diffuse surface, whose light is found first."
+        ),
+    ] = False,
+    detector: Annotated[
+        str | None,
+        typer.Option(
+            "--detector", help="Of the result of a trace: the detector whose scatter events or rays are shown."
+        ),
+    ] = None,
     flux: Annotated[
         str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")
     ] = None,
@@ -101,31 +125,36 @@ def luminance(
     threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Luminance maps with a standard error per pixel, from rays, a light field or a scene, for any number of observers."""
+    """Luminance maps with a standard error per pixel, from rays, a light field, a scene or a trace, for many observers."""
     one_of(method, METHODS, "--method")
     one_of(plane, PLANES, "--plane")
     one_of(scale, SCALES, "--scale")
     x, y, z = numbers(target, 3, "--target", "0,0,0")
     scene = Scene.load(file) if file.suffix.lower() == SCENE_EXTENSION else None
-    if scene is not None and observer is None and size is None:
-        seen = [(keys.name, keys.observer(), keys.screen.screen()) for keys in scene.observers]
+    kept = _kept(file, detector)
+    looked = kept if isinstance(kept, ScatterEvents) else scene
+    own = looked.scene if isinstance(looked, ScatterEvents) else scene
+    if own is not None and observer is None and size is None:
+        seen = [(keys.name, keys.observer(), keys.screen.screen()) for keys in own.observers]
         if not seen:
             raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
     else:
         screen = _screen(size, pixels, plane)
         seen = [("", Observer(theta, phi, distance, (x, y, z)), screen) for theta, phi in _angles(observer)]
-    targets = [[_named(path, o, name) for path in output] for name, o, _ in seen]
-    everything = [path for paths in targets for path in paths]
-    if len(set(everything)) < len(everything):
-        raise ArgumentError(
-            "several observers would write to the same file; put {theta} and {phi}, or {observer}, into its name."
-        )
+    targets, everything = _targets(output, seen)
     check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
 
     for_rays = {"--method": "cone" if method == "cone" else None, "--acceptance": acceptance, "--surface": surface}
     observers, screens = [o for _, o, _ in seen], [s for _, _, s in seen]
     source: RaySet | LightField | None = None
-    if scene is not None:
+    for_scenes = {
+        "--rays-per-pixel": rays_per_pixel,
+        "--until": until,
+        "--seed": seed,
+        "--forward-rays": forward_rays,
+        "--gather": gather or None,
+    }
+    if looked is not None:
         for_others = {
             "--method": None if method == "auto" else method,
             "--acceptance": acceptance,
@@ -134,31 +163,29 @@ def luminance(
             "--flux": flux,
             "--unit": unit,
         }
-        _refuse(for_others, f"for rays and light fields; {file} is a scene")
-        paths_asked = (rays_per_pixel or DEFAULT_RAYS_PER_PIXEL) * sum(s.columns * s.rows for s in screens)
-        with progress_bar("lines of sight", paths_asked) as progress:
+        what = "is a scene" if kept is None else "holds scatter events"
+        _refuse(for_others, f"for rays and light fields; {file} {what}")
+        with progress_bar(*_work(looked, screens, rays_per_pixel)) as progress:
             maps = luminance_map(
-                scene,
+                looked,
                 observers,
                 screens,
                 rays_per_pixel=rays_per_pixel,
                 until=until,
                 seed=seed,
                 forward_rays=forward_rays,
+                gather=gather,
                 threads=threads,
                 progress=progress,
             )
     else:
-        for_scenes = {
-            "--rays-per-pixel": rays_per_pixel,
-            "--until": until,
-            "--seed": seed,
-            "--forward-rays": forward_rays,
-        }
         _refuse(for_scenes, f"for scenes; {file} is none")
         cone = None if acceptance is None else _acceptance(acceptance)
         carrier = "auto" if surface is None else surface_option(surface)
-        source = read_source(file, flux, unit, for_rays)
+        if isinstance(kept, RaySet):
+            source = in_unit(with_flux(kept, flux), unit)
+        else:
+            source = read_source(file, flux, unit, for_rays)
         with progress_bar("rays", len(source)) if isinstance(source, RaySet) else nullcontext() as progress:
             maps = luminance_map(
                 source,
@@ -185,6 +212,56 @@ def luminance(
         print_map(lmap)
         for path in paths:
             say(f"  {path}")
+
+
+def _kept(file: Path, detector: str | None) -> ScatterEvents | RaySet | None:
+    """What a detector of a trace kept that can be looked at; None if the file is no result of a trace.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such detector, or several and none is named.
+    """
+    # A file that is missing is told when it is read.
+    if not (file.is_file() and is_result_file(file)):
+        _refuse({"--detector": detector}, f"for results of traces; {file} is none")
+        return None
+    result = TraceResult.load(file)
+    found: dict[str, ScatterEvents | RaySet] = {**result.events, **result.rays}
+    if detector is not None and detector not in found:
+        raise UnknownNameError("detector of scatter events or rays", detector, found)
+    if detector is None and len(found) != 1:
+        have = (
+            f"{len(found)} detectors keep what can be looked at ({', '.join(found)})" if found else "no detector keeps"
+        )
+        wish = "name one by --detector" if found else "scatter events or rays: add one of the kind scatter or rays"
+        raise ArgumentError(f"{file}: {have}{'; ' if found else ' '}{wish}.")
+    return found[detector] if detector is not None else next(iter(found.values()))
+
+
+def _work(looked: Scene | ScatterEvents, screens: list[Screen], rays_per_pixel: int | None) -> tuple[str, int]:
+    """What there is to do for maps, and how much of it."""
+    if isinstance(looked, ScatterEvents) and rays_per_pixel is None:
+        return "scatter events", len(looked) * len(screens)
+    each = DEFAULT_RAYS_PER_PIXEL if rays_per_pixel is None else rays_per_pixel
+    return "lines of sight", each * sum(screen.columns * screen.rows for screen in screens)
+
+
+def _targets(output: list[Path], seen: list[tuple[str, Observer, Screen]]) -> tuple[list[list[Path]], list[Path]]:
+    """The files of each map, and all of them.
+
+    Raises
+    ------
+    ArgumentError
+        If maps of several observers would be written to the same file.
+    """
+    targets = [[_named(path, observer, name) for path in output] for name, observer, _ in seen]
+    everything = [path for paths in targets for path in paths]
+    if len(set(everything)) < len(everything):
+        raise ArgumentError(
+            "several observers would write to the same file; put {theta} and {phi}, or {observer}, into its name."
+        )
+    return targets, everything
 
 
 def _angles(observer: list[str] | None) -> list[tuple[float, ...]]:

@@ -203,6 +203,10 @@ def print_result(result: TraceResult) -> None:
             case "illuminance":
                 seen = result.illuminance[detection.name]
                 say(f"  {detection.name}: mean {seen.mean:.6g} {seen.unit}, least/mean {seen.uniformity:.3f}")
+            case "scatter":
+                events = result.events[detection.name]
+                share = "" if events.share == 1.0 else f", of 1 ray in {round(1.0 / events.share):,}"
+                say(f"  {detection.name}: {len(events):,} scatter events{share}")
             case _:
                 image = result.images[detection.name]
                 say(f"  {detection.name}: maximum {image.values.max():.6g} {image.unit}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal, get_args, overload
 
 import numpy as np
@@ -14,11 +14,13 @@ from etendue.lightfield.surfaces import Surface
 from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
 from etendue.luminance.cone import ConeEstimate, ConeView, check_acceptance, cone_estimates
 from etendue.luminance.looking import look_at_field
+from etendue.luminance.scatter_map import look_at_events
 from etendue.luminance.scene_map import Looking, look_at_scene
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally
 from etendue.scene import Scene
+from etendue.scene.scatter_events import ScatterEvents
 
 Method = Literal["auto", "cone", "lightfield"]
 METHODS: tuple[str, ...] = get_args(Method)
@@ -61,7 +63,7 @@ def luminance_map(
 ) -> list[LuminanceMap]: ...
 @overload
 def luminance_map(
-    source: Scene,
+    source: Scene | ScatterEvents,
     observer: Observer,
     screen: Screen,
     *,
@@ -69,12 +71,13 @@ def luminance_map(
     until: float | None = ...,
     seed: int | None = ...,
     forward_rays: float | None = ...,
+    gather: bool = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> LuminanceMap: ...
 @overload
 def luminance_map(
-    source: Scene,
+    source: Scene | ScatterEvents,
     observer: Sequence[Observer] | None = ...,
     screen: Screen | Sequence[Screen] | None = ...,
     *,
@@ -82,11 +85,12 @@ def luminance_map(
     until: float | None = ...,
     seed: int | None = ...,
     forward_rays: float | None = ...,
+    gather: bool = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> list[LuminanceMap]: ...
 def luminance_map(
-    source: RayStream | LightField | Scene,
+    source: RayStream | LightField | Scene | ScatterEvents,
     observer: Observer | Sequence[Observer] | None = None,
     screen: Screen | Sequence[Screen] | None = None,
     *,
@@ -98,6 +102,7 @@ def luminance_map(
     until: float | None = None,
     seed: int | None = None,
     forward_rays: float | None = None,
+    gather: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> LuminanceMap | list[LuminanceMap]:
@@ -105,13 +110,15 @@ def luminance_map(
 
     Rays travel in free space, forwards and backwards along their lines: where on its line a ray starts has no influence.
     In a scene, lines of sight are followed from the eye through the optics to the sources; those that meet smooth surfaces
-    only have no noise but that of the places within a pixel.
+    only have no noise but that of the places within a pixel. Scatter events are connected to the eye past what stands in
+    their scene: light that comes from diffuse surfaces directly.
 
     Parameters
     ----------
-    source : RayStream, LightField or Scene
-        A ray set, a source that draws its rays on demand, an index of rays, the light field that was fitted to one, or a
-        scene. Ray sets in a scene are fitted first, since rays have no luminance that a line of sight could meet.
+    source : RayStream, LightField, Scene or ScatterEvents
+        A ray set, a source that draws its rays on demand, an index of rays, the light field that was fitted to one, a
+        scene, or the scatter events of a trace. Ray sets in a scene are fitted first, since rays have no luminance that a
+        line of sight could meet.
     observer : Observer or sequence of Observer
         Any number is served by one pass over the rays. Of a scene, None: its own observers with their screens.
     screen : Screen or sequence of Screen
@@ -128,7 +135,8 @@ def luminance_map(
         Points per pixel at which a light field is read; 16 if None.
     rays_per_pixel : int, optional
         Of a scene: lines of sight per pixel, in 16 independent passes (at least 4) whose spread gives the standard error;
-        256 if None.
+        256 if None. Of scatter events: so many are followed for what the events leave out, sources that are seen directly,
+        in mirrors or through lenses, and diffuse surfaces seen so; none if None.
     until : float, optional
         Of a scene: more passes are made until the median relative error of the pixels with light is below it, up to 64
         times `rays_per_pixel`. What light fields do not know of themselves does not count here, but in the map's errors.
@@ -138,6 +146,10 @@ def luminance_map(
         Of a scene: so many rays are traced forwards besides, and what they send to the eye from diffuse surfaces is added:
         light that reaches these through lenses and mirrors (caustics), which lines of sight find by chance only, or not
         at all if it comes from points, and that of beams. No light is counted twice.
+    gather : bool, optional
+        Of a scene: lines of sight end at the second diffuse surface, whose light is then known from rays traced forwards,
+        as a mean over small patches. Many times as fast where light goes to and fro between diffuse surfaces. Patches
+        that light does not reach evenly are not used; the map's notes tell how it compares with lines that go on.
     threads : int, optional
         All cores if None. The result has the same bits for any number.
     progress : callable, optional
@@ -174,23 +186,30 @@ def luminance_map(
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
-    for_scenes = {"rays_per_pixel": rays_per_pixel, "until": until, "seed": seed, "forward_rays": forward_rays}
+    for_scenes = {
+        "rays_per_pixel": rays_per_pixel,
+        "until": until,
+        "seed": seed,
+        "forward_rays": forward_rays,
+        "gather": gather or None,
+    }
     for_others = {
         "method": None if method == "auto" else method,
         "acceptance": acceptance,
         "surface": None if surface == "auto" else surface,
         "samples": samples,
     }
-    is_scene = isinstance(source, Scene)
+    is_scene = isinstance(source, Scene | ScatterEvents)
     needless = [name for name, value in (for_others if is_scene else for_scenes).items() if value is not None]
     if needless:
         owner, here = ("rays and light fields", "scene") if is_scene else ("scenes", "ray set or light field")
         raise ArgumentError(f"{', '.join(needless)}: for {owner}, and the source is a {here}; leave it out.")
-    if isinstance(source, Scene) and observer is None and screen is None:
-        if not source.observers:
+    if is_scene and observer is None and screen is None:
+        scene = source.scene if isinstance(source, ScatterEvents) else source
+        if not (isinstance(scene, Scene) and scene.observers):
             raise ArgumentError("the scene has no observers; give an observer and a screen.")
-        observer = [keys.observer() for keys in source.observers]
-        screen = [keys.screen.screen() for keys in source.observers]
+        observer = [keys.observer() for keys in scene.observers]
+        screen = [keys.screen.screen() for keys in scene.observers]
     if observer is None or screen is None:
         raise ArgumentError("give an observer and a screen.")
     observers = [observer] if isinstance(observer, Observer) else list(observer)
@@ -200,9 +219,14 @@ def luminance_map(
     pairs = list(zip(observers, screens, strict=True))
     # A stated acceptance asks for the cone, and so does an index, which was built for nothing else.
     by_cone = method == "cone" or (method == "auto" and (acceptance is not None or isinstance(source, RayIndex)))
-    if isinstance(source, Scene):
+    if isinstance(source, Scene | ScatterEvents):
         given = {name: value for name, value in for_scenes.items() if value is not None}
-        maps = look_at_scene(source, pairs, Looking(**given, threads=threads), progress)  # type: ignore[arg-type]
+        how = Looking(**given, threads=threads)  # type: ignore[arg-type]
+        if isinstance(source, Scene):
+            maps = look_at_scene(source, pairs, how, progress)
+        else:
+            _check_events(given)
+            maps = look_at_events(source, pairs, how, progress, whole=rays_per_pixel is not None)
         return maps[0] if isinstance(observer, Observer) else maps
     samples = DEFAULT_SAMPLES if samples is None else samples
     if isinstance(source, LightField):
@@ -225,6 +249,15 @@ def luminance_map(
         estimates, tally = cone_estimates(source, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
         maps = [_map(source, estimate, 0, tally, None) for estimate in estimates]
     return maps[0] if isinstance(observer, Observer) else maps
+
+
+def _check_events(given: Mapping[str, object]) -> None:
+    """Refuse options that mean nothing for scatter events."""
+    if "forward_rays" in given:
+        raise ArgumentError("forward_rays: scatter events are rays traced forwards already; leave it out.")
+    needless = [name for name in given if name != "rays_per_pixel"]
+    if needless and "rays_per_pixel" not in given:
+        raise ArgumentError(f"{', '.join(needless)}: for lines of sight; give rays_per_pixel too, or leave it out.")
 
 
 def _automatic(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.formats.rays import read_rays
 from etendue.lightfield.light_field import LightField
+from etendue.luminance.gathering import CHECKS, FIRST_CHECK, blocks, comparison_note, survey_notes
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
@@ -26,6 +27,8 @@ from etendue.scene.sources.from_files import Field, Rays
 from etendue.units import MM2_PER_M2
 
 Array = npt.NDArray[np.float64]
+Left = Literal["nothing", "caustics", "scattered"]
+"""Light that lines of sight leave to rays traced forwards."""
 
 DEFAULT_RAYS_PER_PIXEL = 256
 MOST_RAYS_PER_PIXEL = 1 << 24
@@ -56,6 +59,7 @@ class Looking:
     until: float | None = None
     seed: int = 1
     forward_rays: float | None = None
+    gather: bool = False
     threads: int | None = None
 
     def __post_init__(self) -> None:
@@ -82,10 +86,47 @@ class Looking:
         return -(-self.rays_per_pixel // self.passes)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Forward:
+    """What rays traced forwards send to the eye of an observer.
+
+    Parameters
+    ----------
+    values, error : array, shape (rows, columns)
+        Luminance and its standard error [flux unit/(mm² sr)].
+    rays : array of int64, shape (rows, columns)
+        Rays that each pixel rests on.
+    note : str
+        What it is.
+    """
+
+    values: Array
+    error: Array
+    rays: npt.NDArray[np.int64]
+    note: str
+
+    @classmethod
+    def of(cls, sums: Array, shape: tuple[int, ...], rays: int, scale: float, note: str) -> Forward:
+        """From Σ w, Σ w² and the rays that contributed, shape (3, pixels), over `rays` rays; each w stands for `scale` w.
+
+        Rays are independent of each other: the variance of Σ w is Σ w² − (Σ w)²/n.
+        """
+        sum_, squares, count = (row.reshape(shape) for row in sums)
+        error = np.sqrt(np.maximum(squares - sum_ * sum_ / rays, 0.0))
+        return cls(sum_ * scale, error * scale, count.astype(np.int64), note)
+
+
 def look_at_scene(
-    scene: Scene, pairs: Sequence[tuple[Observer, Screen]], how: Looking, progress: Progress | None = None
+    scene: Scene,
+    pairs: Sequence[tuple[Observer, Screen]],
+    how: Looking,
+    progress: Progress | None = None,
+    scattered: Sequence[Forward] | None = None,
 ) -> list[LuminanceMap]:
     """The maps of a scene for observers with their screens; see `luminance_map`.
+
+    `scattered`, if given, has all light that reaches each observer directly from diffuse surfaces; only the rest is looked
+    for.
 
     Raises
     ------
@@ -99,20 +140,27 @@ def look_at_scene(
     compiled = compile_scene(seeable)
     if not compiled.record["sources"]:
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
-    core = _core.Scene(compiled.record)
-    notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=how.forward_rays is not None)]
-    rest = _light_images(compiled, views, how)
+    core = _core.Scene({**compiled.record, "detectors": []})
+    survey = _core.Survey(core, how.seed, MOST_EVENTS, how.threads) if how.gather else None
+    forwards = scattered is not None or how.forward_rays is not None
+    notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=forwards)]
+    notes += [] if survey is None else survey_notes(survey)
+    rest = _light_images(compiled, views, how) if scattered is None else scattered
+    left: Left = "scattered" if scattered is not None else "caustics" if forwards else "nothing"
     origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
     maps, done = [], 0
     for (observer, screen), view, image in zip(pairs, views, rest, strict=True):
-        passes = _Passes(screen.shape)
+        passes, gathered = _Passes(screen.shape), []
+
+        def look(number: int, known: _core.Survey | None, view: _core._View = view) -> list[Array]:
+            passes = number, number + 1
+            return _core.look_at_scene(core, view, how.paths, how.seed, MOST_EVENTS, left, *passes, how.threads, known)
+
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
         while passes.done < wanted:
-            first = passes.done
-            sum_, _, deviation = _core.look_at_scene(
-                core, view, how.paths, how.seed, MOST_EVENTS, image is not None, first, first + 1, how.threads
-            )
+            sum_, _, deviation = look(passes.done, survey)
             passes.add(sum_, deviation)
+            gathered.append(blocks(sum_))
             done += how.paths * screen.columns * screen.rows
             if progress is not None:
                 progress(done)
@@ -120,12 +168,14 @@ def look_at_scene(
                 wanted = passes.wanted(how.until, most)
         paths = how.paths * passes.done
         told = [f"{paths:,} lines of sight per pixel, in {passes.done} independent passes", *passes.notes(how.until)]
+        if survey is not None and survey.patches()[0]:
+            told.append(comparison_note(gathered, [look(FIRST_CHECK + i, None)[0] for i in range(CHECKS)]))
+        if image is None and not passes.lit:
+            told.append("the map is dark")
         values, error = passes.mean, passes.standard_error
         if image is not None:
-            values, error = values + image[0].reshape(screen.shape), np.hypot(error, image[1].reshape(screen.shape))
-            told.append(
-                f"{int(how.forward_rays or 0):,} rays forwards, for light that smooth surfaces or beams send to diffuse ones"
-            )
+            values, error = values + image.values, np.hypot(error, image.error)
+            told.append(image.note)
         maps.append(
             LuminanceMap(
                 values * MM2_PER_M2,
@@ -141,7 +191,7 @@ def look_at_scene(
     return maps
 
 
-def _light_images(compiled: Compiled, views: list[_core._View], how: Looking) -> list[tuple[Array, Array] | None]:
+def _light_images(compiled: Compiled, views: list[_core._View], how: Looking) -> Sequence[Forward | None]:
     """What each observer sees of light that lines of sight do not find: luminance of the pixels and its standard error.
 
     It reaches a diffuse surface through smooth ones, or comes from a beam; from the surface, or over other diffuse ones,
@@ -153,13 +203,13 @@ def _light_images(compiled: Compiled, views: list[_core._View], how: Looking) ->
     core = _core.Scene({**compiled.record, "detectors": detectors})
     rays = int(how.forward_rays)
     batches = -(-rays // _core.batch_size())
-    sums = [np.zeros((2, view["columns"] * view["rows"])) for view in views]
+    sums = [np.zeros((3, view["columns"] * view["rows"])) for view in views]
     for first in range(0, batches, ROUND):
         last = min(first + ROUND, batches)
         harvest = _core.trace_batches(core, rays, how.seed, MOST_EVENTS, first, last, how.threads)
-        sums = [total + cells[:2] for total, cells in zip(sums, harvest["cells"], strict=True)]
-    # Rays are independent of each other: the variance of Σ w is Σ w² − (Σ w)²/n.
-    return [(s, np.sqrt(np.maximum(squares - s * s / rays, 0.0))) for s, squares in sums]
+        sums = [total + np.array(cells) for total, cells in zip(sums, harvest["cells"], strict=True)]
+    note = f"{rays:,} rays forwards, for light that smooth surfaces or beams send to diffuse ones"
+    return [Forward.of(s, (v["rows"], v["columns"]), rays, 1.0, note) for s, v in zip(sums, views, strict=True)]
 
 
 class _Passes:
@@ -202,11 +252,16 @@ class _Passes:
             return self.done
         return min(most, 2 * self.done, max(self.done + 1, math.ceil(1.1 * self.done * (error / until) ** 2)))
 
+    @property
+    def lit(self) -> bool:
+        """Whether any line of sight met light."""
+        return bool((self.mean > 0.0).any())
+
     def notes(self, until: float | None) -> list[str]:
         """How sure the map is."""
         lit = self.mean > 0.0
         if not lit.any():
-            return ["no line of sight met light: the map is dark"]
+            return ["no line of sight met light"]
         total = float(np.median(self.standard_error[lit] / self.mean[lit]))
         notes = [f"median relative standard error {total:.2%} of the pixels with light"]
         if until is not None and self.relative_error() >= until:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import abc
 import math
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
-from annotated_types import Gt, Le
+from annotated_types import Ge, Gt, Le
 from pydantic import model_validator
 
 from etendue.errors import UnknownNameError
@@ -17,11 +18,14 @@ from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.shape import WHOLE, Shape, Trim
-from etendue.scene.values import AsNumber, Finite, Length, Pixels
+from etendue.scene.values import AsCount, AsNumber, AsRow, Finite, Length, Pixels
 
 Record = dict[str, Any]
 MOST_STEPS = 18_000
 """Steps of γ over 180°: a hundredth of a degree."""
+
+MOST_SCATTERS = 1 << 36
+"""Scatters that can be asked for: eight terabytes of them."""
 
 
 class Detector(Description, abc.ABC):
@@ -36,8 +40,8 @@ class Detector(Description, abc.ABC):
     name: str = ""
 
     @abc.abstractmethod
-    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:
-        """The detector as the core takes it; `observers` are those of the scene by name.
+    def record(self, files: Files, observers: dict[str, ObserverKeys], faces: Sequence[str] = ()) -> Record:
+        """The detector as the core takes it; `observers` are those of the scene by name, `faces` the names of its faces.
 
         Raises
         ------
@@ -67,7 +71,7 @@ class RayCollector(Detector, Placement):
     shape: Annotated[Shape, Family(SHAPES)]
     trim: Trim = WHOLE
 
-    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:  # noqa: ARG002
+    def record(self, files: Files, observers: dict[str, ObserverKeys], faces: Sequence[str] = ()) -> Record:  # noqa: ARG002
         """The trimmed shape and its place."""
         sheet = self.shape.sheet(self.trim, files)
         return {"kind": "rays", "shape": sheet.shape, "frame": self.frame().record(), "trims": sheet.trims}
@@ -98,7 +102,7 @@ class Illuminance(Detector, Placement):
     columns: Pixels
     rows: Pixels
 
-    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:  # noqa: ARG002
+    def record(self, files: Files, observers: dict[str, ObserverKeys], faces: Sequence[str] = ()) -> Record:  # noqa: ARG002
         """The grid and its place."""
         return {
             "kind": "illuminance",
@@ -139,7 +143,7 @@ class FarField(Detector):
             )
         return self
 
-    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:  # noqa: ARG002
+    def record(self, files: Files, observers: dict[str, ObserverKeys], faces: Sequence[str] = ()) -> Record:  # noqa: ARG002
         """The numbers of planes and of angles, 0° and 180° among them."""
         return {"kind": "intensity", "planes": self.c_planes, "gammas": round(180.0 / self.gamma_step) + 1}
 
@@ -161,7 +165,7 @@ class LightImage(Detector):
     kind: Literal["image"] = "image"
     observer: str
 
-    def record(self, files: Files, observers: dict[str, ObserverKeys]) -> Record:  # noqa: ARG002
+    def record(self, files: Files, observers: dict[str, ObserverKeys], faces: Sequence[str] = ()) -> Record:  # noqa: ARG002
         """The observer's view of its screen."""
         if self.observer not in observers:
             raise UnknownNameError("observer", self.observer, observers)
@@ -169,8 +173,42 @@ class LightImage(Detector):
         return {"kind": "image", "view": keys.screen.screen().core_view(keys.observer())}
 
 
+class ScatterRecorder(Detector):
+    """Where light is scattered diffusely: kept, so that it can be looked at later from anywhere.
+
+    Parameters
+    ----------
+    surfaces : sequence of str
+        Names of surfaces and solids whose scatters are kept; those of all if empty. ``"lens.front"`` is one face of a solid.
+    most : int
+        How many are kept at most, 120 bytes each. Of more, those of every second ray are dropped, again if needed, and
+        the others stand for all: what is estimated from them keeps its mean.
+
+    Examples
+    --------
+    >>> ScatterRecorder(surfaces=["wall"], most=1000).record(Files(), {}, ["lens.front", "wall"])
+    {'kind': 'scatter', 'most': 1000, 'faces': [1]}
+    """
+
+    kind: Literal["scatter"] = "scatter"
+    surfaces: Annotated[tuple[str, ...], AsRow] = ()
+    most: Annotated[int, Ge(1), Le(MOST_SCATTERS), AsCount] = 10**7
+
+    def record(self, files: Files, observers: dict[str, ObserverKeys], faces: Sequence[str] = ()) -> Record:  # noqa: ARG002
+        """The numbers of the faces, if they are not all."""
+        if not self.surfaces:
+            return {"kind": "scatter", "most": self.most}
+        chosen: set[int] = set()
+        for name in self.surfaces:
+            found = [i for i, face in enumerate(faces) if face == name or face.startswith(f"{name}.")]
+            if not found:
+                raise UnknownNameError("surface", name, {*faces, *(face.rpartition(".")[0] or face for face in faces)})
+            chosen.update(found)
+        return {"kind": "scatter", "most": self.most, "faces": sorted(chosen)}
+
+
 DETECTORS: dict[str, type[Detector]] = {
-    cls.model_fields["kind"].default: cls for cls in (RayCollector, Illuminance, FarField, LightImage)
+    cls.model_fields["kind"].default: cls for cls in (RayCollector, Illuminance, FarField, LightImage, ScatterRecorder)
 }
 """Every detector by its kind."""
 

@@ -164,8 +164,13 @@ class Scene(Description):
             raise SceneError(path, [("", f"no TOML: {error}")]) from None
         return cls.from_dict(data, folder=path.parent, source=path)
 
-    def to_toml(self) -> str:
-        """The scene as the text of a TOML file in the folder from which its relative paths count.
+    def to_toml(self, folder: str | os.PathLike[str] | None = None) -> str:
+        """The scene as the text of a TOML file in a folder: that from which its relative paths count, if none is given.
+
+        Raises
+        ------
+        SceneError
+            If something lives in memory only.
 
         Examples
         --------
@@ -173,7 +178,8 @@ class Scene(Description):
         name = "empty"
         wavelength = 450
         """
-        return to_toml(self.to_dict())
+        data = self.to_dict()
+        return to_toml(data if folder is None else _moved(data, self._folder, Path(folder)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a TOML file, whole or not at all; relative paths are written as seen from its folder.
@@ -185,9 +191,9 @@ class Scene(Description):
         ArgumentError
             If the folder does not exist.
         """
-        data = _moved(self.to_dict(), self._folder, Path(path).parent)
+        text = self.to_toml(Path(path).parent)
         with atomic_output(path) as temporary:
-            temporary.write_text(to_toml(data), encoding="utf-8")
+            temporary.write_text(text, encoding="utf-8")
 
     @classmethod
     def json_schema(cls) -> dict[str, Any]:

@@ -18,6 +18,9 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.scene.scatter_events import ScatterEvents
+from etendue.scene.scene import Scene
+from etendue.tracing.scattered import Scattered
 from etendue.tracing.sums import RECORD, Collected, Counts
 from etendue.units import MM2_PER_M2, FluxUnit
 
@@ -90,6 +93,11 @@ class Detection(abc.ABC):
     @property
     def cells(self) -> int:
         """Number of cells that flux is summed in."""
+        return 0
+
+    @property
+    def most_events(self) -> int:
+        """Number of scatter events that are kept at most."""
         return 0
 
     def to_dict(self) -> dict[str, Any]:
@@ -262,8 +270,60 @@ class LightImage(Detection):
         )
 
 
+@dataclasses.dataclass(frozen=True)
+class ScatteredLight(Detection):
+    """Where light was scattered diffusely.
+
+    Parameters
+    ----------
+    most : int
+        How many scatters are kept at most.
+    surfaces : tuple of str
+        Whose; empty: of all.
+    geometry : str
+        Fingerprint of what stands in the scene.
+    """
+
+    KIND = "scatter"
+    most: int
+    surfaces: tuple[str, ...]
+    geometry: str
+
+    @property
+    def most_events(self) -> int:
+        """Number of scatter events that are kept at most."""
+        return self.most
+
+    def read(
+        self, scattered: Scattered, rays: int, scale: float, faces: tuple[str, ...], scene: Scene | None, origin: Origin
+    ) -> ScatterEvents:
+        """The events of `rays` rays, of which a trace has `scale` times as many."""
+        share = 0.5**scattered.level
+        notes = (
+            []
+            if share == 1.0
+            else [f"the scatters of 1 ray in {2**scattered.level:,} were kept, {self.most:,} at most"]
+        )
+        if self.surfaces:
+            notes.append(f"scatters on {', '.join(self.surfaces)} only")
+        return ScatterEvents(
+            self.name,
+            scattered.array(),
+            scale / share,
+            share,
+            rays,
+            faces,
+            self.surfaces,
+            self.geometry,
+            scene,
+            origin.flux_unit,
+            origin.provenance.then(f"scatter events of {self.name!r}"),
+            (*notes, *origin.notes),
+        )
+
+
 DETECTIONS: dict[str, type[Detection]] = {
-    cls.KIND: cls for cls in (IncidentRays, FarFieldIntensity, GridIlluminance, LightImage)
+    cls.KIND: cls for cls in (IncidentRays, FarFieldIntensity, GridIlluminance, LightImage, ScatteredLight)
 }
 """Every kind of detection."""
 

@@ -10,12 +10,14 @@ from etendue.errors import ArgumentError, SceneError
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.provenance import Provenance
 from etendue.scene import Compiled, Scene
+from etendue.scene.scatter_events import geometry_of
 from etendue.tracing.detections import (
     Detection,
     FarFieldIntensity,
     GridIlluminance,
     IncidentRays,
     LightImage,
+    ScatteredLight,
     check_cells,
 )
 from etendue.units import FluxUnit
@@ -44,6 +46,8 @@ class Plan:
     detections : tuple of Detection
     notes : tuple of str
         What the user should know.
+    scene : Scene or None
+        What is traced; None if it is known by its text only.
     """
 
     scene_name: str
@@ -59,6 +63,7 @@ class Plan:
     loss_names: tuple[str, ...]
     detections: tuple[Detection, ...]
     notes: tuple[str, ...] = ()
+    scene: Scene | None = dataclasses.field(default=None, compare=False, repr=False)
 
     @property
     def provenance(self) -> Provenance:
@@ -118,6 +123,7 @@ def make_plan(scene: Scene, compiled: Compiled, rays: float | None, seed: int, m
         tuple(_core.losses()),
         detections,
         (*compiled.notes, *notes),
+        scene,
     )
 
 
@@ -171,6 +177,8 @@ def _detections(scene: Scene, compiled: Compiled) -> Iterable[Detection]:
                 width, height = record["width"], record["height"]
                 axes = (ox, oy, oz), (xx, xy, xz), (yx, yy, yz)
                 yield GridIlluminance(name, width, height, record["columns"], record["rows"], *axes)
+            case "scatter":
+                yield ScatteredLight(name, record["most"], described.surfaces, geometry_of(compiled))  # type: ignore[attr-defined]
             case _:
                 seen = observers[described.observer]  # type: ignore[attr-defined]
                 yield LightImage(name, seen.observer(), seen.screen.screen())

@@ -13,6 +13,7 @@ from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
+from etendue.scene.scatter_events import ScatterEvents
 from etendue.tracing.detections import (
     Counted,
     Detection,
@@ -21,6 +22,7 @@ from etendue.tracing.detections import (
     IncidentRays,
     LightImage,
     Origin,
+    ScatteredLight,
 )
 from etendue.tracing.ledger import Entry, Ledger, Loss
 from etendue.tracing.named import ByName
@@ -162,6 +164,20 @@ class TraceResult:
         return ByName("light image", {d.name: d.read(c, self._origin) for d, c in found})
 
     @cached_property
+    def events(self) -> ByName[ScatterEvents]:
+        """Where light was scattered diffusely; `luminance_map` shows it to any observer."""
+        plan, done, scale = self.plan, self.rays_done, self.scale
+        found = ((d, held) for d, held in zip(plan.detections, self.sums.scattered, strict=True))
+        return ByName(
+            "scatter recorder",
+            {
+                d.name: d.read(held, done, scale, plan.face_names, plan.scene, self._origin)
+                for d, held in found
+                if isinstance(d, ScatteredLight)
+            },
+        )
+
+    @cached_property
     def relative_error(self) -> float:
         """The largest, over the detectors with cells, of the flux-weighted median relative standard error of its cells.
 
@@ -232,11 +248,15 @@ class TraceResult:
             "surfaces_met": self.sums.segments,
             "relative_error": self.relative_error,
             "ledger": self.ledger.to_dict(),
-            "detectors": [
-                {"name": d.name, "kind": d.KIND, "rays": len(self.rays[d.name])}
-                if isinstance(d, IncidentRays)
-                else {"name": d.name, "kind": d.KIND}
-                for d in self.plan.detections
-            ],
+            "detectors": [{"name": d.name, "kind": d.KIND} | self._counts(d) for d in self.plan.detections],
             "notes": list(self.notes),
         }
+
+    def _counts(self, detection: Detection) -> dict[str, float]:
+        """How much a detector kept, of those that keep rays or events."""
+        if isinstance(detection, IncidentRays):
+            return {"rays": len(self.rays[detection.name])}
+        if isinstance(detection, ScatteredLight):
+            events = self.events[detection.name]
+            return {"events": len(events), "share_of_rays": events.share}
+        return {}

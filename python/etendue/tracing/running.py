@@ -188,6 +188,7 @@ class Rounds(Iterator[TraceResult]):
         first = 0 if sums is None else sums.batches
         end = min(first + ROUND, -(-plan.rays // _core.batch_size()))
         harvest = _core.trace_batches(self._core, plan.rays, plan.seed, plan.most_events, first, end, self._threads)
-        result = TraceResult(plan, Sums.first(harvest, end) if sums is None else sums.then(harvest, end))
+        most = tuple(detection.most_events for detection in plan.detections)
+        result = TraceResult(plan, Sums.first(harvest, end, most) if sums is None else sums.then(harvest, end))
         self._last = result
         return result

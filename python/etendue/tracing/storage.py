@@ -9,6 +9,7 @@ import errno
 import io
 import json
 import shutil
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,13 +17,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue import _core
 from etendue.errors import FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
 from etendue.formats.output import atomic_output
 from etendue.quantities.spool import Spool
+from etendue.scene.scatter_events import EVENT
+from etendue.scene.scene import Scene
 from etendue.tracing.detections import check_cells, detection_from_dict
 from etendue.tracing.plan import Plan
 from etendue.tracing.result import TraceResult
+from etendue.tracing.scattered import STRETCH, Scattered
 from etendue.tracing.sums import ENTRIES, RECORD, Collected, Sums
 from etendue.units import FLUX_UNITS
 
@@ -66,21 +71,22 @@ def save_result(result: TraceResult, path: Path) -> None:
     """See `TraceResult.save`."""
     import h5py  # noqa: PLC0415
 
-    # Rows of 64 bytes, three numbers per cell, and room for the rest.
+    # Rows of 64 bytes, events of 120, three numbers per cell, and room for the rest.
     size = 64 * sum(held.count for held in result.sums.collected) + 24 * sum(len(c[0]) for c in result.sums.cells)
+    size += EVENT.itemsize * sum(held.count for held in result.sums.scattered)
     size += len(result.plan.scene_text.encode()) + (1 << 20)
     with atomic_output(path) as temporary:
         if size <= IMAGE_LIMIT:
             # In one go, because an HDF5 library whose disk is full cannot even close its file.
             image = io.BytesIO()
             with h5py.File(image, "w", libver=LIBRARY) as file:
-                _write(file, result)
+                _write(file, result, path.parent)
             temporary.write_bytes(image.getbuffer())
         else:
             if shutil.disk_usage(temporary.parent).free < size:
                 raise OSError(errno.ENOSPC, f"no room for {size / 1e9:.1f} GB", str(path))
             with h5py.File(temporary, "w", libver=LIBRARY) as file:
-                _write(file, result)
+                _write(file, result, path.parent)
 
 
 def load_result(path: Path) -> TraceResult:
@@ -96,20 +102,21 @@ def load_result(path: Path) -> TraceResult:
         if node.integer("version") != VERSION:
             found = f"version {node.integer('version')}"
             raise node.error("attribute 'version'", found, f"This étendue reads {VERSION}; update it.")
-        plan = _plan(node.group("plan"))
+        plan = _plan(node.group("plan"), path)
         return TraceResult(plan, _sums(node.group("sums"), plan))
 
 
 # --- writing ---------------------------------------------------------------------------------------------------------
 
 
-def _write(file: Any, result: TraceResult) -> None:
+def _write(file: Any, result: TraceResult, folder: Path) -> None:
     plan, sums = result.plan, result.sums
     put(file, format=FORMAT, version=VERSION, length_unit="mm", wavelength_unit="nm", flux_unit=plan.flux_unit)
     group = file.create_group("plan")
     put(group, scene_name=plan.scene_name, fingerprint=plan.fingerprint, flux_unit=plan.flux_unit)
     put(group, **{name: np.uint64(getattr(plan, name)) for name in NUMBERS})
-    _put_text(group, "scene", plan.scene_text)
+    # Files that the scene names are found from where the result is.
+    _put_text(group, "scene", plan.scene.to_toml(folder) if plan.scene_text and plan.scene else plan.scene_text)
     for name in NAMES:
         _put_text(group, name, json.dumps(getattr(plan, name)))
     _put_text(group, "detectors", json.dumps([detection.to_dict() for detection in plan.detections]))
@@ -121,11 +128,13 @@ def _write(file: Any, result: TraceResult) -> None:
         flux, rays = sums.ledger[name]
         _put_array(entry, "flux", flux)
         _put_array(entry, "rays", rays)
-    for i, (cells, held) in enumerate(zip(sums.cells, sums.collected, strict=True)):
+    for i, (cells, held, events) in enumerate(zip(sums.cells, sums.collected, sums.scattered, strict=True)):
         detector = group.create_group(f"detector_{i}")
         for name, array in zip(("sum", "squares", "rays"), cells, strict=True):
             _put_array(detector, name, array)
         _put_array(detector, "records", held.array().view("<f8").reshape(-1, 8))
+        if plan.detections[i].most_events:
+            _put_events(detector, events)
 
 
 def _put_array(group: Any, name: str, values: npt.NDArray[Any]) -> None:
@@ -138,6 +147,19 @@ def _put_array(group: Any, name: str, values: npt.NDArray[Any]) -> None:
     group.create_dataset(name, data=values, chunks=chunks, fletcher32=True, **packed)
 
 
+def _put_events(group: Any, events: Scattered) -> None:
+    """Scatter events, a column after the other; all but places and directions say the same over and over."""
+    put(group, level=np.uint64(events.level))
+    for name in EVENT.names or ():
+        dtype, shape = EVENT[name].base, (events.count, *EVENT[name].shape)
+        packed = {} if name in {"position", "direction"} else {"shuffle": True, "compression": "gzip"}
+        chunks = {"chunks": (min(events.count, CHUNK), *shape[1:]), "fletcher32": True} | packed
+        column = group.create_dataset(name, shape, dtype, **(chunks if events.count else {}))
+        for number, rows in enumerate(events.stretches()):
+            start = number * STRETCH
+            column[start : start + len(rows)] = rows[name]
+
+
 def _put_text(group: Any, name: str, text: str) -> None:
     """A text of any length, as its bytes in UTF-8: an attribute holds 64 kB at most."""
     _put_array(group, name, np.frombuffer(text.encode("utf-8"), dtype=np.uint8))
@@ -146,15 +168,16 @@ def _put_text(group: Any, name: str, text: str) -> None:
 # --- reading ---------------------------------------------------------------------------------------------------------
 
 
-def _plan(group: Node) -> Plan:
+def _plan(group: Node, path: Path) -> Plan:
     unit = group.text("flux_unit")
     if unit not in FLUX_UNITS:
         raise group.error("attribute 'flux_unit'", f"{unit!r} is none of {', '.join(FLUX_UNITS)}")
     detections = tuple(detection_from_dict(data) for data in json.loads(_text(group, "detectors")))
     check_cells(detections)
+    text = _text(group, "scene")
     return Plan(
         scene_name=group.text("scene_name"),
-        scene_text=_text(group, "scene"),
+        scene_text=text,
         fingerprint=group.text("fingerprint"),
         flux_unit="W" if unit == "W" else "lm",
         detections=detections,
@@ -166,7 +189,13 @@ def _plan(group: Node) -> Plan:
         medium_names=_texts(group, "medium_names"),
         loss_names=_texts(group, "loss_names"),
         notes=_texts(group, "notes"),
+        scene=_scene(text, path) if any(detection.most_events for detection in detections) else None,
     )
+
+
+def _scene(text: str, path: Path) -> Scene | None:
+    """The scene that scatter events are looked at in."""
+    return Scene.from_dict(tomllib.loads(text), folder=path.parent, source=path) if text else None
 
 
 def _sums(group: Node, plan: Plan) -> Sums:
@@ -186,7 +215,7 @@ def _sums(group: Node, plan: Plan) -> Sums:
     if not 0 < numbers["rays"] <= plan.rays:
         raise group.error("attribute 'rays'", f"{numbers['rays']} of {plan.rays} rays are done")
     lost_at = group.numbers("lost_at", (lengths["lost"],)).astype(np.int64).tolist()
-    cells, collected = [], []
+    cells, collected, scattered = [], [], []
     for i, detection in enumerate(plan.detections):
         detector = group.group(f"detector_{i}")
         sum_, squares = (_row(detector, name, "<f8", detection.cells) for name in ("sum", "squares"))
@@ -196,6 +225,7 @@ def _sums(group: Node, plan: Plan) -> Sums:
             spool.append(part)
             count += len(part)
         collected.append(Collected(spool, count))
+        scattered.append(_events(detector, detection.most_events))
     return Sums(
         **numbers,
         imbalance=group.number("imbalance"),
@@ -203,6 +233,7 @@ def _sums(group: Node, plan: Plan) -> Sums:
         lost_at=tuple(None if at < 0 else at for at in lost_at),
         cells=tuple(cells),
         collected=tuple(collected),
+        scattered=tuple(scattered),
     )
 
 
@@ -221,6 +252,27 @@ def _records(group: Node) -> Iterator[npt.NDArray[Any]]:
         raise group.error("dataset 'records'", f"shape {data.shape}, expected 8 columns")
     for start in range(0, len(data), 16 * CHUNK):
         yield np.ascontiguousarray(data[start : start + 16 * CHUNK]).view(RECORD).reshape(-1)
+
+
+def _events(group: Node, most: int) -> Scattered:
+    """The scatter events of a detector, if it keeps any."""
+    events = Scattered.nothing(most)
+    if not most:
+        return events
+    level = group.integer("level")
+    if not 0 <= level <= _core.deepest():
+        raise group.error("attribute 'level'", f"{level} is not from 0 to {_core.deepest()}")
+    columns = {name: group.dataset(name, EVENT[name].base, 1 + len(EVENT[name].shape)) for name in EVENT.names or ()}
+    count = len(columns["ray"])
+    for name, column in columns.items():
+        if column.shape != (count, *EVENT[name].shape):
+            raise group.error(f"dataset {name!r}", f"shape {column.shape}, expected {(count, *EVENT[name].shape)}")
+    for start in range(0, count, STRETCH):
+        rows = np.zeros(min(STRETCH, count - start), EVENT)
+        for name, column in columns.items():
+            rows[name] = column[start : start + len(rows)]
+        events.spool.append(rows)
+    return Scattered(events.spool, count, level, most)
 
 
 def _text(group: Node, name: str) -> str:

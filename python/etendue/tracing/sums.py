@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.quantities.spool import Spool
+from etendue.tracing.scattered import Scattered
 
 Array = npt.NDArray[np.float64]
 Counts = npt.NDArray[np.uint64]
@@ -67,6 +68,8 @@ class Sums:
         Of each detector; empty for those that have none.
     collected : tuple of Collected
         Of each detector; empty for those that collect no rays.
+    scattered : tuple of Scattered
+        Of each detector; empty for those that keep no scatter events.
     """
 
     batches: int
@@ -77,10 +80,11 @@ class Sums:
     lost_at: tuple[int | None, ...]
     cells: tuple[tuple[Array, Array, Counts], ...]
     collected: tuple[Collected, ...]
+    scattered: tuple[Scattered, ...]
 
     @classmethod
-    def first(cls, harvest: _core._Harvest, batches: int) -> Sums:
-        """Those of the first round."""
+    def first(cls, harvest: _core._Harvest, batches: int, most: tuple[int, ...]) -> Sums:
+        """Those of the first round; each detector keeps so many scatter events at most."""
         return cls(
             batches,
             harvest["rays"],
@@ -90,6 +94,7 @@ class Sums:
             tuple(harvest["ledger"]["lost_at"]),
             tuple(harvest["cells"]),
             tuple(Collected(Spool(RECORD), 0).then(rows) for rows in harvest["records"]),
+            tuple(Scattered.nothing(n).then(*events) for n, events in zip(most, harvest["events"], strict=True)),
         )
 
     def then(self, harvest: _core._Harvest, batches: int) -> Sums:
@@ -104,6 +109,7 @@ class Sums:
             tuple(a if a is not None else b for a, b in zip(self.lost_at, harvest["ledger"]["lost_at"], strict=True)),
             tuple((a[0] + b[0], a[1] + b[1], a[2] + b[2]) for a, b in zip(self.cells, harvest["cells"], strict=True)),
             tuple(held.then(rows) for held, rows in zip(self.collected, harvest["records"], strict=True)),
+            tuple(held.then(*events) for held, events in zip(self.scattered, harvest["events"], strict=True)),
         )
 
 

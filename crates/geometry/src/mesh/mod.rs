@@ -186,6 +186,12 @@ impl Mesh {
         self.triangles[i as usize].map(|v| self.vertices[v as usize])
     }
 
+    /// Number of triangles.
+    #[must_use]
+    pub const fn count(&self) -> usize {
+        self.triangles.len()
+    }
+
     /// The geometric unit normal of a triangle; its vertices run counter-clockwise about it.
     #[inline]
     #[must_use]

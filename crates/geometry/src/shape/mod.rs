@@ -6,6 +6,7 @@
 //! counts as inside if it may be, by the rounding errors of its computation: neighbours that share an edge leave no gap.
 
 pub mod asphere;
+pub mod chart;
 pub mod flat;
 pub mod quadric;
 pub mod roots;
@@ -106,6 +107,12 @@ impl Shape {
 }
 
 impl Shape {
+    /// Number of its parts: triangles of a mesh, 1 for the other shapes.
+    #[must_use]
+    pub fn parts(&self) -> usize {
+        if let Self::Mesh(mesh) = self { mesh.count() } else { 1 }
+    }
+
     /// A box that holds the shape; not finite if the shape has no end.
     #[must_use]
     pub fn bounds(&self) -> Bounds {

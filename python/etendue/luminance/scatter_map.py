@@ -1,0 +1,100 @@
+"""Maps of stored scatter events: each is connected to the eye, past what stands in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.luminance.scene_map import Forward, Looking, look_at_scene
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.ray_stream import Progress
+from etendue.scene.scatter_events import EVENT, ScatterEvents
+from etendue.units import MM2_PER_M2
+
+STRETCH = 1 << 21
+"""Events that are looked at in one go: a quarter of a gigabyte."""
+
+
+def look_at_events(
+    events: ScatterEvents,
+    pairs: Sequence[tuple[Observer, Screen]],
+    how: Looking,
+    progress: Progress | None = None,
+    *,
+    whole: bool = False,
+) -> list[LuminanceMap]:
+    """The maps of scatter events for observers with their screens; see `luminance_map`.
+
+    `whole`: with what lines of sight find besides, as `how` says.
+
+    Raises
+    ------
+    ArgumentError
+        If the events have no scene or another one, a screen has no apparent area, or all light is wanted of the scatters
+        of some surfaces only.
+    SceneError
+        If files that the scene names are missing.
+    """
+    views = [screen.core_view(observer) for observer, screen in pairs]
+    if whole and events.surfaces:
+        raise ArgumentError(
+            f"the scatter events of {events.name!r} are those of {', '.join(events.surfaces)} only, and lines of sight "
+            "would pass over all scattered light: keep those of all surfaces, or leave rays_per_pixel out."
+        )
+    core, seen, done = events.core, [], 0
+    for view in views:
+        sums = np.zeros((3, view["columns"] * view["rows"]))
+        for words in _stretches(events.rows):
+            try:
+                sums += np.array(_core.look_at_events(core, words, view, how.threads))
+            except ValueError as error:
+                raise ArgumentError(f"the scatter events of {events.name!r}: {error}.") from error
+            done += len(words)
+            if progress is not None and not whole:
+                progress(done)
+        shape = (view["rows"], view["columns"])
+        note = f"{len(events):,} scatter events of {events.rays:,} rays, for light that comes from diffuse surfaces directly"
+        seen.append(Forward.of(sums, shape, events.rays, events.scale, note))
+    if whole and events.scene is not None:
+        maps = look_at_scene(events.scene, pairs, how, progress, seen)
+        return [lmap.replace(notes=(*lmap.notes, *events.notes)) for lmap in maps]
+    return [_map(events, image, *pair) for image, pair in zip(seen, pairs, strict=True)]
+
+
+def _map(events: ScatterEvents, image: Forward, observer: Observer, screen: Screen) -> LuminanceMap:
+    notes = [
+        image.note,
+        "sources, and what is seen in mirrors and through lenses, are left out; rays_per_pixel adds them",
+    ]
+    lit = image.rays > 0
+    if lit.any():
+        notes.append(f"median relative standard error {np.median(image.error[lit] / image.values[lit]):.2%} where lit")
+    if not lit.all():
+        dark = int((~lit).sum())
+        notes.append(f"{dark:,} of {lit.size:,} pixels saw no scatter: their luminance is 0, its error unknown")
+    return LuminanceMap(
+        image.values * MM2_PER_M2,
+        np.where(lit, image.error, np.nan) * MM2_PER_M2,
+        image.rays,
+        observer,
+        screen,
+        events.flux_unit,
+        events.provenance.then("luminance by scatter events"),
+        (*notes, *events.notes),
+    )
+
+
+def _stretches(rows: npt.NDArray[np.void]) -> Iterator[npt.NDArray[np.uint64]]:
+    """The events as words, some at a time; those of a ray stay together."""
+    ray, start = rows["ray"], 0
+    while start < len(rows):
+        end = min(start + STRETCH, len(rows))
+        while end < len(rows) and ray[end] == ray[end - 1]:
+            end += 1
+        yield rows[start:end].view("<u8").reshape(-1, EVENT.itemsize // 8)
+        start = end

@@ -1,0 +1,455 @@
+"""Scatter events show what a light image of the same rays shows, lines of sight, and closed forms; verdicts at 1e-4."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from etendue import _core
+from etendue.errors import ArgumentError, FormatError, SceneError, UnknownNameError
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.scene.scatter_events import EVENT
+from etendue.tracing.running import ROUND
+from scipy.stats import chi2, norm
+
+Array = npt.NDArray[np.float64]
+SIGNIFICANCE = 1e-4
+LARGEST_Z = float(norm.isf(SIGNIFICANCE / 2))
+ONE_ROUND = ROUND * _core.batch_size()
+
+
+def assert_agree(values: Array, expected: Array, error: Array, fewest: int = 8) -> None:
+    """χ² over cells with independent errors; two-sided, so that errors too large are found as well."""
+    lit = error > 0.0
+    assert lit.sum() >= fewest
+    z = (values[lit] - expected[lit]) / error[lit]
+    assert chi2.sf((z**2).sum(), z.size) > SIGNIFICANCE, f"mean z² is {(z**2).mean():.2f}"
+    assert chi2.cdf((z**2).sum(), z.size) > SIGNIFICANCE, f"mean z² is {(z**2).mean():.2f}"
+
+
+def view(name: str, theta: float, phi: float, **more: Any) -> dict[str, Any]:
+    screen = {"width": 26, "height": 20, "columns": 6, "rows": 5}
+    return {"name": name, "theta": theta, "phi": phi, "distance": 300, "target": [3, 2, 2], "screen": screen, **more}
+
+
+def corner(**more: Any) -> dict[str, Any]:
+    """Two leaves at a slant and a black ball before them, lit by a small lamp that nobody sees: no symmetry."""
+    return {
+        "sources": [{"name": "led", "kind": "surface", "shape": {"kind": "rectangle", "width": 2, "height": 1}, "flux": 100,
+                     "at": [4, 3, 40], "toward": [-0.1, -0.05, -1], "exponent": 20}],
+        "surfaces": [
+            {"name": "floor", "shape": {"kind": "rectangle", "width": 60, "height": 54}, "finish": {"kind": "lambertian",
+             "reflectance": 0.7}},
+            {"name": "side", "shape": {"kind": "rectangle", "width": 24, "height": 40}, "at": [-9, 0, 8],
+             "toward": [1, 0.2, 0.1], "finish": {"kind": "lambertian", "reflectance": 0.4}},
+            {"name": "ball", "shape": {"kind": "sphere", "radius": 4}, "at": [6, -1, 9], "finish": "absorber"},
+        ],
+        "observers": [view("eye", 40, 15), view("above", 5, 200)],
+        "detectors": [{"name": "scatter", "kind": "scatter"}],
+        **more,
+    }  # fmt: skip
+
+
+def everything(folder: Path) -> dict[str, Any]:
+    """What events have to remember: solids around them and behind, absorption, colours, meshes, sheets on faces of solids,
+    bodies that touch, finishes that transmit and depend on angle and colour; and a cavity with many scatters of each ray."""
+    (folder / "tile.obj").write_text("v 0 0 0\nv 9 0 1\nv 9 8 2\nv 0 8 0\nf 1 2 3\nf 1 3 4\n", encoding="utf-8")
+    (folder / "veil.csv").write_text("450, 0.2\n600, 0.5\n", encoding="utf-8")
+    veil = {"kind": "lambertian", "reflectance": {"file": "veil.csv", "by": "wavelength"}, "transmittance": 0.3}
+    white = {"kind": "lambertian", "reflectance": 0.95}
+    return {
+        "media": {"tinted": {"index": 1.5, "absorption": 0.02}, "haze": {"index": 1.0, "absorption": 0.001}},
+        "surroundings": "haze",
+        "sources": [
+            {"name": "led", "kind": "surface", "shape": {"kind": "rectangle", "width": 2, "height": 1}, "flux": 90,
+             "at": [1, 0, 1], "toward": [0.2, 0.1, 1], "spectrum": [[450, 1], [600, 2]]},
+            {"name": "pilot", "kind": "point", "flux": 30, "at": [3, 4, 12]},
+        ],
+        "solids": [
+            {"name": "block", "medium": "tinted", "shape": {"kind": "block", "width": 14, "height": 12, "depth": 3},
+             "at": [2, 1, 15]},
+            {"name": "cap", "medium": "tinted", "shape": {"kind": "block", "width": 14, "height": 12, "depth": 2},
+             "at": [2, 1, 18], "finishes": {"left": white}},
+            {"name": "dome", "medium": "silicone", "shape": {"kind": "dome", "radius": 4}, "at": [9, -6, 0],
+             "finishes": {"dome": {"kind": "lambertian", "reflectance": 0.4, "transmittance": 0.4}}},
+        ],
+        "surfaces": [
+            {"name": "label", "shape": {"kind": "disk", "radius": 3}, "at": [2, 1, 20], "finish": veil},
+            {"name": "inlay", "shape": {"kind": "disk", "radius": 2}, "at": [5, 1, 18], "finish": veil},
+            {"name": "tile", "shape": {"kind": "mesh", "file": "tile.obj", "unit": "mm"}, "at": [-9, -4, 8], "finish": veil},
+            {"name": "cup", "shape": {"kind": "cylinder", "radius": 6, "height": 9}, "finish": white},
+            {"name": "floor", "shape": {"kind": "disk", "radius": 30}, "at": [0, 0, -2], "finish": veil},
+        ],
+        "observers": [view("eye", 40, 15), view("below", 125, 300, target=[2, 0, 8]), view("near", 60, 110, distance=30)],
+        "detectors": [
+            {"name": "scatter", "kind": "scatter"},
+            {"name": "rays", "kind": "rays", "shape": {"kind": "disk", "radius": 3}, "at": [2, 1, 20]},
+            *({"name": name, "kind": "image", "observer": name} for name in ("eye", "below", "near")),
+        ],
+    }  # fmt: skip
+
+
+@pytest.fixture
+def traced(tmp_path: Path) -> et.TraceResult:
+    scene = et.Scene.from_dict(everything(tmp_path), folder=tmp_path)
+    return et.trace(scene, 150_000, seed=5)
+
+
+def test_the_same_picture_as_a_light_image_of_the_same_rays(traced: et.TraceResult) -> None:
+    """Each scatter is connected to the eye at once, or later: the same sums, but for the order in which they are made."""
+    events = traced.events["scatter"]
+    assert len(np.unique(events.surface)) >= 7
+    assert len(events) > 1.5 * 150_000
+    names = ("eye", "below", "near")
+    for name, lmap in zip(names, et.luminance_map(events), strict=True):
+        image = traced.images[name]
+        assert (image.rays > 0).mean() > 0.7
+        np.testing.assert_array_equal(lmap.rays, image.rays)
+        np.testing.assert_allclose(lmap.values, image.values, rtol=1e-11)
+        np.testing.assert_allclose(lmap.standard_error, image.standard_error, rtol=1e-9)
+        assert lmap.observer == image.observer
+        assert lmap.flux_unit == "lm"
+
+
+def test_what_events_say(traced: et.TraceResult) -> None:
+    """Light that arrives at a Lambertian surface and does not stay there was reflected or let through."""
+    events, ledger = traced.events.only, traced.ledger
+    assert (np.diff(events.ray) >= 0).all()
+    assert events.ray.max() < 150_000
+    assert set(np.unique(events.wavelength)) <= {450.0, 555.0, 600.0}
+    np.testing.assert_allclose(np.linalg.norm(events.direction, axis=1), 1.0, rtol=1e-12)
+    on_floor = events.surface == events.surface_names.index("floor")
+    assert np.allclose(events.position[on_floor, 2], -2.0)
+    arrived = events.flux_by_surface()
+    n = np.count_nonzero(events.surface == events.surface_names.index("cup"))
+    absorbed = ledger.by_surface["cup"].flux / arrived["cup"]
+    assert abs(absorbed - 0.05) < LARGEST_Z * math.sqrt(0.05 * 0.95 / n)
+
+
+def test_the_same_picture_as_lines_of_sight() -> None:
+    """Diffuse surfaces and what stands before them, from two sides: no line of code in common but geometry and finishes."""
+    scene = et.Scene(**corner())
+    maps = et.luminance_map(et.trace(scene, 2e6, 3).events["scatter"])
+    for lmap, reverse in zip(maps, et.luminance_map(scene, rays_per_pixel=1024, seed=5), strict=True):
+        assert reverse.observer == lmap.observer
+        error = np.hypot(lmap.standard_error, reverse.standard_error)
+        dark = reverse.values == 0
+        assert (lmap.values[dark] == 0).all()
+        assert np.median(error[~dark] / reverse.values[~dark]) < 0.02
+        assert_agree(lmap.values, reverse.values, error)
+        for other in (reverse.values[::-1], reverse.values[:, ::-1]):
+            assert chi2.sf(np.nansum(((lmap.values - other) / error) ** 2), error.size) < SIGNIFICANCE
+
+
+def test_with_what_lines_of_sight_find_besides() -> None:
+    """A lamp in view, a mirror, a disk that mirrors and scatters: the whole is what lines of sight find, to which rays
+    forwards add only what the mirrors throw on the walls, which is found by chance else."""
+    more = [
+        {"name": "mirror", "shape": {"kind": "rectangle", "width": 9, "height": 12}, "at": [-6, 5, 6],
+         "toward": [1, -0.4, 0.8], "finish": {"kind": "mirror", "reflectance": 0.9}},
+        {"name": "half", "shape": {"kind": "disk", "radius": 5}, "at": [8, 8, 3], "toward": [-0.3, 0, 1],
+         "finish": {"kind": "diffuse-specular", "total_reflectance": 0.8, "specular_reflectance": 0.3}},
+    ]  # fmt: skip
+    lamp = {"name": "lamp", "kind": "surface", "shape": {"kind": "sphere", "radius": 1}, "flux": 60, "at": [9, 2, 14]}
+    keys = corner()
+    keys["sources"] = [*keys["sources"], lamp]
+    keys["surfaces"] = [*keys["surfaces"], *more]
+    scene = et.Scene(**keys)
+    events = et.trace(scene, 1e6, 4).events.only
+    wholes = et.luminance_map(events, rays_per_pixel=256, seed=2)
+    parts = et.luminance_map(events)
+    other = et.luminance_map(scene, rays_per_pixel=1024, seed=9, forward_rays=1e6)
+    for whole, part, reverse in zip(wholes, parts, other, strict=True):
+        assert_agree(whole.values, reverse.values, np.hypot(whole.standard_error, reverse.standard_error))
+        rest = whole.values - part.values
+        assert (rest >= -1e-9 * whole.values.max()).all()
+        assert (rest > 0.05 * whole.values).sum() > 3
+        assert any("scatter events" in note for note in whole.notes)
+        assert any("left out" in note for note in part.notes)
+
+
+def test_rays_as_a_source_are_counted_once() -> None:
+    """Where nothing but diffuse surfaces is seen, lines of sight add nothing to events, whatever the source is."""
+    lamp = et.Scene(**corner(surfaces=[], detectors=[{"name": "all", "kind": "rays", "shape": {"kind": "disk", "radius": 9},
+                    "at": [4, 3, 39]}]))  # fmt: skip
+    rays = et.trace(lamp, 4000, 2).rays.only
+    scene = et.Scene(**corner(sources=[{"name": "file", "kind": "rays", "rays": rays}]))
+    events = et.trace(scene, None, 3).events.only
+    for whole, part in zip(et.luminance_map(events, rays_per_pixel=16), et.luminance_map(events), strict=True):
+        np.testing.assert_allclose(whole.values, part.values, rtol=1e-12)
+
+
+def test_integrating_sphere() -> None:
+    """V6: a small Lambertian disk on the wall lights the sphere evenly, E₀ = Φ/A; L = ρ (E₀ + E_r)/π everywhere, from any
+    observer; and the wall receives (E₀ + E_r) A (1 − f)."""
+    radius, reflectance, flux, top = 10.0, 0.8, 3.0, 8.0
+    area = 4 * math.pi * radius**2
+    port = (radius - top) / (2 * radius)
+    inside = np.array([0.6, 0.64, -0.48])
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 0.01}, "flux": flux, "at": 9.99 * inside,
+            "toward": -inside}  # fmt: skip
+    wall = {"name": "wall", "shape": {"kind": "sphere", "radius": radius}, "trim": {"z": [-11, top]},
+            "finish": {"kind": "lambertian", "reflectance": reflectance}}  # fmt: skip
+    scene = et.Scene(sources=[lamp], surfaces=[wall], detectors=[{"name": "scatter", "kind": "scatter"}])
+    events = et.trace(scene, 1e6, 6).events.only
+    arrives = flux / area + reflectance * flux * (1 - port) / (area * (1 - reflectance * (1 - port)))
+    assert events.flux_by_surface()["wall"] == pytest.approx(arrives * area * (1 - port), rel=4e-3)
+    expected = reflectance / math.pi * arrives * 1e6
+    observers = [et.Observer(theta, 200, 60, target=(0, 0, 8)) for theta in (8, 25)]
+    for lmap in et.luminance_map(events, observers, et.Screen(5, 4, 5, 4)):
+        assert_agree(lmap.values, np.full(lmap.values.shape, expected), lmap.standard_error)
+        assert abs(lmap.values.mean() / expected - 1) < 0.02
+
+
+# --- thinning --------------------------------------------------------------------------------------------------------
+
+
+def test_thinning_keeps_whole_rays() -> None:
+    """Of the rays of half, a quarter …, all events are kept, and they are those of the unthinned trace."""
+    all_, few = (
+        et.trace(et.Scene(**corner(detectors=[{"kind": "scatter", "most": most}])), 3e5, 8).events.only
+        for most in (10**7, 100_000)
+    )
+    assert all_.share == 1.0
+    assert few.share in (0.5, 0.25, 0.125, 0.0625)
+    assert 100_000 / 5 < len(few) <= 100_000
+    depth = all_.rows["ray"] >> np.uint64(56)
+    kept = all_.rows[depth >= round(-math.log2(few.share))]
+    assert kept.tobytes() == np.asarray(few.rows).tobytes()
+    assert few.scale == all_.scale / few.share
+    assert any("1 ray in" in note for note in few.notes)
+    assert all_.notes == ()
+
+
+def test_thinning_keeps_the_mean_and_tells_its_error() -> None:
+    """A closed ball that reflects half receives 2 Φ; the stop at a number of events, which rays with many scatters reach
+    first, does not bias it. Over 400 traces of a few rays, thinned hard."""
+    ball = {
+        "name": "ball",
+        "shape": {"kind": "sphere", "radius": 5},
+        "finish": {"kind": "lambertian", "reflectance": 0.5},
+    }
+    lamp = {"kind": "point", "flux": 1, "at": [1, 2, 0]}
+    scene = et.Scene(sources=[lamp], surfaces=[ball], detectors=[{"kind": "scatter", "most": 150}])
+    # The eye is in the ball, and sees nothing of what is behind it.
+    found, shares, eye, screen = [], [], et.Observer(0, 0, 3), et.Screen(9, 9, 1, 1)
+    maps: list[LuminanceMap] = []
+    for seed in range(400):
+        events = et.trace(scene, 600, seed).events.only
+        assert len(events) <= 150
+        found.append(events.flux_by_surface()["ball"])
+        shares.append(events.share)
+        maps.append(et.luminance_map(events, eye, screen))
+    assert len(set(shares)) > 1
+    arrived = np.array(found)
+    assert abs(arrived.mean() - 2.0) < LARGEST_Z * arrived.std(ddof=1) / math.sqrt(400)
+    # L = ρ E/π with E = 2 Φ/A.
+    truth = 2.0 / (4 * math.pi * 25) * 0.5 / math.pi * 1e6
+    values = np.array([m.values[0, 0] for m in maps])
+    stated = np.array([m.standard_error[0, 0] for m in maps])
+    assert abs(values.mean() - truth) < LARGEST_Z * values.std(ddof=1) / 20
+    assert math.sqrt((stated**2).mean()) == pytest.approx(values.std(ddof=1), rel=0.2)
+
+
+def test_thinned_maps_have_the_errors_that_they_state() -> None:
+    scene = et.Scene(**corner(detectors=[{"kind": "scatter", "most": 60_000}]))
+    events = et.trace(scene, 2.5 * ONE_ROUND, 3).events.only
+    assert events.share < 0.1
+    for lmap, reverse in zip(et.luminance_map(events), et.luminance_map(scene, rays_per_pixel=1024), strict=True):
+        assert_agree(lmap.values, reverse.values, np.hypot(lmap.standard_error, reverse.standard_error))
+
+
+def test_nothing_is_left_of_one_event() -> None:
+    """The least that can be asked for: events of a ray are kept together, or not at all."""
+    events = et.trace(et.Scene(**corner(detectors=[{"kind": "scatter", "most": 1}])), 5000, 3).events.only
+    assert len(events) <= 1
+    assert (et.luminance_map(events)[0].values >= 0).all()
+
+
+# --- surfaces --------------------------------------------------------------------------------------------------------
+
+
+def test_some_surfaces_only() -> None:
+    chosen = et.Scene(
+        **corner(detectors=[{"name": "few", "kind": "scatter", "surfaces": ["side"]}, {"kind": "scatter"}])
+    )
+    result = et.trace(chosen, 200_000, 3)
+    few, all_ = result.events["few"], result.events["detectors[1]"]
+    names = np.array(all_.surface_names)
+    assert np.asarray(few.rows).tobytes() == all_.rows[names[all_.surface] == "side"].tobytes()
+    assert any("side only" in note for note in few.notes)
+    with pytest.raises(ArgumentError, match="side only"):
+        et.luminance_map(few, rays_per_pixel=16)
+
+
+def test_a_solid_stands_for_its_faces() -> None:
+    dome = {"name": "dome", "shape": {"kind": "dome", "radius": 3}, "medium": "silicone", "at": [0, 0, 2],
+            "finish": {"kind": "lambertian", "reflectance": 0.5, "transmittance": 0.5}}  # fmt: skip
+    found = {}
+    for names in (["dome"], ["dome.dome"], ["dome.base"]):
+        scene = et.Scene(**corner(solids=[dome], detectors=[{"name": "few", "kind": "scatter", "surfaces": names}]))
+        found[names[0]] = et.trace(scene, 20_000, 3).events.only.flux_by_surface()
+    assert set(found["dome"]) == {"dome.dome", "dome.base"}
+    assert found["dome"]["dome.dome"] == found["dome.dome"]["dome.dome"]
+    with pytest.raises(SceneError, match=r"unknown surface 'flor'\. Did you mean 'floor'"):
+        et.trace(et.Scene(**corner(detectors=[{"kind": "scatter", "surfaces": ["flor"]}])), 1000)
+
+
+@pytest.mark.parametrize("wrong", [{"most": 0}, {"most": 2**60}, {"most": 1.5}, {"surfaces": "floor"}, {"mots": 3}])
+def test_nonsense_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(SceneError, match=next(iter(wrong))):
+        et.Scene(**corner(detectors=[{"kind": "scatter", **wrong}]))
+
+
+# --- files -----------------------------------------------------------------------------------------------------------
+
+
+def test_looked_at_from_a_file_in_another_place(tmp_path: Path, traced: et.TraceResult) -> None:
+    """A result names the files of its scene as seen from where it is; a file that has changed is noticed."""
+    (tmp_path / "results").mkdir()
+    path = tmp_path / "results" / "result.h5"
+    traced.save(path)
+    again = et.TraceResult.load(path)
+    assert again.events["scatter"].rows.tobytes() == traced.events["scatter"].rows.tobytes()
+    for lmap, expected in zip(et.luminance_map(again.events.only), et.luminance_map(traced.events.only), strict=True):
+        np.testing.assert_array_equal(lmap.values, expected.values)
+        assert lmap.header() == expected.header()
+    again.save(tmp_path / "copy.h5")
+    assert len(et.luminance_map(et.TraceResult.load(tmp_path / "copy.h5").events.only)) == 3
+    (tmp_path / "tile.obj").write_text("v 0 0 0\nv 9 0 1\nv 9 8 2\nf 1 2 3\n", encoding="utf-8")
+    with pytest.raises(ArgumentError, match="another scene, or a file that it names has changed"):
+        et.luminance_map(et.TraceResult.load(path).events.only)
+    (tmp_path / "tile.obj").unlink()
+    with pytest.raises(SceneError, match=r"tile\.obj"):
+        et.luminance_map(et.TraceResult.load(path).events.only)
+
+
+def test_a_scene_that_lives_in_memory_can_be_given(tmp_path: Path) -> None:
+    rays = et.RaySet(np.zeros((9, 3)), np.tile([0.1, 0, 1.0], (9, 1)), np.ones(9))
+    scene = et.Scene(**corner(sources=[{"kind": "rays", "rays": rays, "at": [4, 3, 40], "toward": [0, 0, -1]}]))
+    result = et.trace(scene, None)
+    expected = et.luminance_map(result.events.only)
+    result.save(tmp_path / "r.h5")
+    lonely = et.TraceResult.load(tmp_path / "r.h5").events.only
+    eye, screen = et.Observer(40, 15, 300), et.Screen(26, 20, 6, 5)
+    with pytest.raises(ArgumentError, match="come without their scene"):
+        et.luminance_map(lonely, eye, screen)
+    with pytest.raises(ArgumentError, match="no observers"):
+        et.luminance_map(lonely)
+    with pytest.raises(ArgumentError, match="another scene"):
+        et.luminance_map(lonely.replace(scene=et.Scene(**corner(surfaces=[]))), eye, screen)
+    for lmap, same in zip(et.luminance_map(lonely.replace(scene=scene)), expected, strict=True):
+        np.testing.assert_array_equal(lmap.values, same.values)
+
+
+def test_a_file_cut_short_anywhere_is_found(tmp_path: Path) -> None:
+    path = tmp_path / "result.h5"
+    et.trace(et.Scene(**corner()), 30_000, 3).save(path)
+    whole = path.read_bytes()
+    for length in np.linspace(0, len(whole) - 1, 60).astype(int):
+        path.write_bytes(whole[:length])
+        with pytest.raises(FormatError, match=r"result\.h5"):
+            et.TraceResult.load(path)
+
+
+def test_damage_is_found(tmp_path: Path) -> None:
+    path = tmp_path / "result.h5"
+    small = et.trace(et.Scene(**corner()), 30_000, 3)
+    small.save(path)
+    whole, rows, found = path.read_bytes(), small.events.only.rows.tobytes(), 0
+    for at in np.random.default_rng(5).integers(0, len(whole), 80):
+        damaged = bytearray(whole)
+        damaged[at] ^= 0x5A
+        path.write_bytes(damaged)
+        try:
+            again = et.TraceResult.load(path)
+        except FormatError as error:
+            found += str(path) in str(error)
+        else:
+            assert again.events.only.rows.tobytes() == rows  # room that nothing uses
+    assert found > 60
+
+
+def test_columns_must_fit_each_other(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "result.h5"
+    result = et.trace(et.Scene(**corner()), 3000, 3)
+    for name, values, match in (
+        ("flux", np.ones(5), "shape"), ("part", np.ones((5, 4), "u4"), "shape"), ("ray", np.ones(5), "expected uint64"),
+    ):  # fmt: skip
+        result.save(path)
+        with h5py.File(path, "r+") as file:
+            del file["sums/detector_0"][name]
+            file["sums/detector_0"][name] = values
+        with pytest.raises(FormatError, match=match):
+            et.TraceResult.load(path)
+    result.save(path)
+    with h5py.File(path, "r+") as file:
+        file["sums/detector_0"].attrs["level"] = np.uint64(64)
+    with pytest.raises(FormatError, match="level"):
+        et.TraceResult.load(path)
+
+
+# --- how it is asked for ---------------------------------------------------------------------------------------------
+
+
+def test_the_same_bits_for_any_number_of_threads() -> None:
+    events = et.trace(et.Scene(**corner()), 200_000, 3).events.only
+    one, two, seven = (et.luminance_map(events, threads=n) for n in (1, 2, 7))
+    for other in (two, seven):
+        for lmap, same in zip(one, other, strict=True):
+            assert lmap.values.tobytes() == same.values.tobytes()
+            assert lmap.standard_error.tobytes() == same.standard_error.tobytes()
+
+
+def test_events_of_a_ray_stay_together_in_any_stretch(monkeypatch: pytest.MonkeyPatch, traced: et.TraceResult) -> None:
+    from etendue.luminance import scatter_map
+
+    expected = et.luminance_map(traced.events.only)
+    told: list[int] = []
+    monkeypatch.setattr(scatter_map, "STRETCH", 1000)
+    for lmap, same in zip(et.luminance_map(traced.events.only, progress=told.append), expected, strict=True):
+        np.testing.assert_array_equal(lmap.rays, same.rays)
+        np.testing.assert_allclose(lmap.values, same.values, rtol=1e-12)
+        np.testing.assert_allclose(lmap.standard_error, same.standard_error, rtol=1e-12)
+    assert told == sorted(told)
+    assert told[-1] == 3 * len(traced.events.only)
+
+
+def test_options_that_mean_nothing_are_refused() -> None:
+    events = et.trace(et.Scene(**corner()), 2000, 3).events.only
+    for wrong, match in (
+        ({"forward_rays": 1e5}, "forward_rays"), ({"until": 0.1}, "rays_per_pixel"), ({"seed": 2}, "rays_per_pixel"),
+        ({"method": "cone"}, "method"), ({"threads": 0}, "threads"), ({"rays_per_pixel": 0}, "rays_per_pixel"),
+    ):  # fmt: skip
+        with pytest.raises(ArgumentError, match=match):
+            et.luminance_map(events, **wrong)  # type: ignore[call-overload]
+    with pytest.raises(UnknownNameError, match="Did you mean 'scatter'"):
+        et.trace(et.Scene(**corner()), 2000, 3).events["scater"]
+    with pytest.raises(ArgumentError, match="no detector with cells"):
+        et.trace(et.Scene(**corner()), 2000, until=0.1)
+
+
+def test_rows_of_something_else_are_refused() -> None:
+    events = et.trace(et.Scene(**corner()), 2000, 3).events.only
+    for field, value in (("face", 99), ("part", 1), ("before", 1 << 48), ("after", 7), ("flux", np.nan),
+                         ("position", np.inf)):  # fmt: skip
+        rows = np.array(events.rows)
+        rows[field][3] = value
+        with pytest.raises(ArgumentError, match="another scene"):
+            et.luminance_map(events.replace(rows=rows))
+    assert EVENT.itemsize == 120
+
+
+def test_a_surface_without_light_is_dark() -> None:
+    lamp = {"kind": "point", "flux": 1, "at": [0, 0, 500]}
+    scene = et.Scene(**corner(sources=[lamp], surfaces=[]))
+    lmap = et.luminance_map(et.trace(scene, 1000, 3).events.only)[0]
+    assert (lmap.values == 0).all()
+    assert np.isnan(lmap.standard_error).all()
+    assert any("saw no scatter" in note for note in lmap.notes)
