@@ -1,7 +1,7 @@
 """Figures 3.16 and 3.17 of the thesis: a lens that makes a beam of 13° of an LED, lit by models of that LED.
 
     python examples/narrow_beam.py              # few rays and coarse grids, seconds
-    python examples/narrow_beam.py --full       # two million rays: the figures of docs/chapter-3.md
+    python examples/narrow_beam.py --full       # four million rays: the figures of docs/chapter-3.md
 
 The lens stands before the LED of `dome_led.py`. Truth is the LED itself, die, dome and base, together with the lens. The
 models are what one gets from a vendor or makes of it: the ray file, the light field fitted to it, the patches of section
@@ -56,8 +56,7 @@ def square(flux: float) -> dict[str, Any]:
 
 def luminaires(near_field: et.RaySet, *, full: bool) -> dict[str, et.Scene]:
     """The lens before the LED itself, and before each model of it."""
-    surface = et.Dome(radius=led.CARRIER) if full else et.Disk(radius=led.CARRIER, z=led.DIE_TOP)
-    field = et.LightField.fit(near_field, surface, depths=None if full else QUICK)
+    field = et.LightField.fit(near_field, led.LOW_BOX, depths=None if full else QUICK)
     grid = et.GriddedSource.fit(near_field, et.Dome(radius=led.CARRIER), 0.125, 0.01, 16)
     models: dict[str, dict[str, Any]] = {
         "ray file": {"kind": "rays", "rays": near_field},
@@ -102,7 +101,7 @@ def width(angle: Any, values: Any) -> float:
 
 def draw_profiles(path: Path, profiles: dict[str, tuple[Any, Any]]) -> None:
     """Figure 3.17."""
-    made = new_figure(7.6, 3.4)
+    made = new_figure(8.4, 3.8)
     for axes, reach in zip(made.subplots(1, 2), (15, 20), strict=True):
         for (name, (angle, values)), colour in zip(profiles.items(), (INK, *LINES), strict=False):
             dashes = {"the LED itself": "-", "Lambertian square": "-."}.get(name, "--")
@@ -113,18 +112,19 @@ def draw_profiles(path: Path, profiles: dict[str, tuple[Any, Any]]) -> None:
     made.axes[0].set_ylabel("intensity [cd]")
     made.axes[1].set_yscale("log")
     made.axes[1].set_ylim(bottom=made.axes[1].get_ylim()[1] * 1e-4)
-    made.axes[0].legend(frameon=False, fontsize=8)
+    handles, labels = made.axes[0].get_legend_handles_labels()
+    made.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=8)
     save(made, path)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=int, default=100_000)
-    parser.add_argument("--full", action="store_true", help="two million rays, fine grids, 60 × 60 pixels")
+    parser.add_argument("--full", action="store_true", help="four million rays, fine grids, 60 × 60 pixels")
     parser.add_argument("--output", type=Path, default=Path("narrow-beam"), help="folder for the figures")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    rays, pixels, lines = (2_000_000, 60, 128) if options.full else (options.rays, 24, 16)
+    rays, pixels, lines = (4_000_000, 60, 512) if options.full else (options.rays, 24, 16)
 
     near_field = led.ray_file(rays)
     scenes = luminaires(near_field, full=options.full)
@@ -165,7 +165,7 @@ def main() -> None:
         rows.append([f"{observer.theta:g}°", *cells, " / ".join(f"{maps[name][i].intensity:,.0f}" for name in seen)])
     print_table(["θ", *seen[1:], "intensity: " + ", ".join(seen)], rows)
     drawn = scenes["the LED itself"].replace(name="Figure 3.16", detectors=[])
-    et.draw_scene(drawn, options.output / "figure-3.16.png", section=["y=0"], rays=40, window=(-11, 11, -2, 24))
+    et.draw_scene(drawn, options.output / "figure-3.16.png", section=["y=0"], rays=24, window=(-9.5, 9.5, -1.5, 20))
     draw_profiles(options.output / "figure-3.17.png", {name: profiles[name] for name in list(profiles)[:5]})
     shown = [*seen[1:], seen[0]]
     pictures = [(f"θ = {o.theta:g}°", [maps[name][i] for name in shown]) for i, o in enumerate(OBSERVERS)]

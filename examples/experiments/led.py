@@ -16,6 +16,10 @@ CARRIER = 1.264
 DIE_TOP = 0.05
 """Height of the luminous plane over the base [mm]."""
 
+LOW_BOX = et.Box(1.8, 1.8, 0.12, centre=(0, 0, 0.06))
+"""A carrier just larger than the die as one sees it through the dome: 1.4 mm wide from above, 1.75 mm from the side, where
+it is 0.1 mm high."""
+
 DIE = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.3), (0.3, 0.3), (0.3, 0.5), (-0.5, 0.5)]
 """A square of 1 mm without the corner that the bond wire takes, so that left and right cannot be mixed up."""
 

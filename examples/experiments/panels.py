@@ -88,9 +88,9 @@ def print_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def measures(test: et.LuminanceMap, reference: et.LuminanceMap) -> list[str]:
-    """NCC (eq. 3.5), NRMSE as printed (eq. 3.6), and true NRMSE, in percent."""
+    """NCC (eq. 3.5; an even map has none), NRMSE as printed (eq. 3.6), and true NRMSE, in percent."""
     c = et.compare(test, reference)
-    return [f"{100 * value:.2f}" for value in (c.ncc, c.nrmse_thesis, c.nrmse)]
+    return ["–" if np.isnan(value) else f"{100 * value:.2f}" for value in (c.ncc, c.nrmse_thesis, c.nrmse)]
 
 
 def noise(reference: et.LuminanceMap) -> str:

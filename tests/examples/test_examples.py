@@ -11,10 +11,10 @@ import pytest
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RUNS = {
     "chapter_2.py": (["--rays", "200000", "--seeds", "4"], 4),
-    "dome_led.py": (["--rays", "100000"], 1),
+    "dome_led.py": (["--rays", "100000"], 2),
     "first_picture.py": (["--rays", "500000", "--output", "picture.png"], 1),
     "narrow_beam.py": (["--rays", "50000"], 3),
-    "remote_phosphor.py": (["--rays", "20000"], 2),
+    "remote_phosphor.py": (["--rays", "20000"], 3),
     "rings_traced.py": (["--rays", "1000000"], 1),
     "threshold_sweep.py": (["--rays", "100000"], 1),
 }
