@@ -148,6 +148,14 @@ class Scene:
 
     def __new__(cls, record: dict[str, Any]) -> Scene: ...
 
+@final
+class Survey:
+    """The diffuse surfaces of a scene as patches whose light is known beforehand, for `look_at_scene`."""
+
+    def __new__(cls, scene: Scene, seed: int, most_events: int, threads: int | None = None) -> Survey: ...
+    def patches(self) -> tuple[int, float]:
+        """Number of patches, and the share of them that can be used."""
+
 _Sums: TypeAlias = tuple[_Floats, _Floats, npt.NDArray[np.uint64]]
 _Source: TypeAlias = RayTable | RingSource | FieldRays
 
@@ -291,6 +299,7 @@ def look_at_scene(
     first: int,
     last: int,
     threads: int | None = None,
+    survey: Survey | None = None,
 ) -> list[_Floats]:
     """For each pixel Σ mean, Σ mean² and Σ deviation of the sources over passes ``first..last`` of `paths` paths each.
 

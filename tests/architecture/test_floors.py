@@ -208,6 +208,7 @@ WITHOUT_EXAMPLE = {
     "etendue.scene.shapes.round.Quadric": "likewise",
     "etendue.scene.shapes.shape.Shape": "likewise",
     "etendue.scene.sources.source.Source": "likewise",
+    "etendue.luminance.gathering.survey_notes": "words about what the core found",
     "etendue.quantities.observer.observer_from_dict": "for readers of files",
     "etendue.quantities.provenance.version": "the version, whatever it is",
     "etendue.quantities.ray_merge.merged": "RaySet.merge is the door",

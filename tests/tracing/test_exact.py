@@ -11,11 +11,10 @@ import numpy.typing as npt
 import pytest
 from etendue.tracing.result import TraceResult
 from numpy.polynomial.legendre import leggauss
-from scipy.stats import chi2, norm
+from oracles.verdicts import SIGNIFICANCE, assert_agree, assert_drawn_with
+from scipy.stats import chi2
 
 Array = npt.NDArray[np.float64]
-SIGNIFICANCE = 1e-4
-LARGEST_Z = float(norm.isf(SIGNIFICANCE / 2))
 NODES, WEIGHTS = leggauss(8)
 
 
@@ -24,21 +23,6 @@ def traced(rays: float, seed: int = 1, **scene: Any) -> TraceResult:
     assert result.ledger.closes
     assert result.ledger.lost_share == 0.0
     return result
-
-
-def assert_drawn_with(share: float, hits: int, rays: int) -> None:
-    """`hits` of `rays` independent rays, each with probability `share`: the normal limit of the binomial."""
-    z = (hits - rays * share) / math.sqrt(rays * share * (1.0 - share))
-    assert abs(z) < LARGEST_Z, f"{hits / rays} of the rays, {share} expected: z = {z:.2f}"
-
-
-def assert_chi_squared(values: Array, error: Array, expected: Array) -> None:
-    """Independent cells with known standard errors."""
-    lit = np.isfinite(error) & (error > 0.0)
-    assert lit.sum() > 0.9 * lit.size
-    z = (values[lit] - expected[lit]) / error[lit]
-    assert chi2.sf((z**2).sum(), lit.sum()) > SIGNIFICANCE
-    assert chi2.cdf((z**2).sum(), lit.sum()) > SIGNIFICANCE
 
 
 # --- free space ------------------------------------------------------------------------------------------------------
@@ -65,7 +49,7 @@ def test_illuminance_falls_with_the_square_of_the_distance(exponent: float) -> N
             assert (alpha > 0).all()
             assert (beta > 0).all()
             expected += wu * wv / 4 * flux * (exponent + 1) / (2 * np.pi) * alpha**exponent * beta / distance**2
-    assert_chi_squared(seen.values, seen.standard_error, expected * 1e6)
+    assert_agree(seen.values, seen.standard_error, expected * 1e6)
     # No turn, no mirror image: the picture is lopsided enough to tell.
     for other in (expected[::-1], expected[:, ::-1], expected[::-1, ::-1]):
         z = (seen.values - other * 1e6) / seen.standard_error
@@ -104,7 +88,7 @@ def test_far_field_of_a_cosine_emitter(exponent: float) -> None:
     lit = inner > 0
     assert (expected[~lit] < 1e-3 * expected.max()).all()
     # Quadrature is off by 1e-3 in cells that the terminator crosses: they have fewer rays than that could show.
-    assert_chi_squared(inner[lit], error[lit], expected[lit])
+    assert_agree(inner[lit], error[lit], expected[lit])
 
 
 def test_flux_from_disc_to_disc() -> None:
@@ -227,7 +211,7 @@ def test_furnace() -> None:
     grid = {"name": "grid", "kind": "illuminance", "width": 6, "height": 5, "columns": 4, "rows": 3, "at": [0, 0.4, 5],
             "toward": [0.1, 0, -1]}  # fmt: skip
     seen = traced(3e6, 9, sources=[source], solids=[lens], detectors=[grid]).illuminance["grid"]
-    assert_chi_squared(seen.values, seen.standard_error, np.full((3, 4), math.pi * 1e6))
+    assert_agree(seen.values, seen.standard_error, np.full((3, 4), math.pi * 1e6))
 
 
 def test_luminance_out_of_a_dome() -> None:
@@ -253,4 +237,4 @@ def test_luminance_out_of_a_dome() -> None:
     half = np.radians(5)
     mean = (np.sin(gamma + half) ** 2 - np.sin(gamma - half) ** 2) / 2 / (np.cos(gamma - half) - np.cos(gamma + half))
     expected = np.tile(transmittance * flux / math.pi * mean, (4, 1))
-    assert_chi_squared(far.values[:, 1:9], far.standard_error[:, 1:9], expected)
+    assert_agree(far.values[:, 1:9], far.standard_error[:, 1:9], expected)

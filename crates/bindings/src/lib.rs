@@ -14,6 +14,7 @@ mod scene;
 mod source;
 mod subset;
 mod surface;
+mod survey;
 mod trace;
 mod view;
 
@@ -27,6 +28,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<field::LightField>()?;
     module.add_class::<field::FieldRays>()?;
     module.add_class::<scene::Scene>()?;
+    module.add_class::<survey::Survey>()?;
     module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;
     module.add_function(wrap_pyfunction!(scan::scan, module)?)?;
     module.add_function(wrap_pyfunction!(cone::cone_sums, module)?)?;

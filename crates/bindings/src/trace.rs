@@ -21,6 +21,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::scene::Scene;
 use crate::source::{Opened, Source};
 use crate::surface::vectors;
+use crate::survey::Survey;
 use crate::view::View;
 
 fn entries<'py>(py: Python<'py>, entries: &[Entry]) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u64>>) {
@@ -141,7 +142,7 @@ pub fn trace_batches<'py>(
 /// square, and of the sources' own deviation \[flux unit/(mm² sr)\].
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
-#[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None))]
+#[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None))]
 pub fn look_at_scene<'py>(
     py: Python<'py>,
     scene: &Scene,
@@ -153,6 +154,7 @@ pub fn look_at_scene<'py>(
     first: u32,
     last: u32,
     threads: Option<usize>,
+    survey: Option<&Survey>,
 ) -> PyResult<[Bound<'py, PyArray2<f64>>; 3]> {
     let view = view.core();
     let left = match left {
@@ -169,7 +171,8 @@ pub fn look_at_scene<'py>(
     };
     let pixels = py.detach(|| {
         let lit = Lit::new(scene.core(), scene.lanterns());
-        within(threads.unwrap_or(0), |_| lit.look(&view, &method, first..last))
+        let survey = survey.map(Survey::core);
+        within(threads.unwrap_or(0), |_| lit.look(&view, &method, survey, first..last))
     });
     let shape = [view.rows as usize, view.columns as usize];
     let array = |pick: fn(&Pixel) -> f64| PyArray1::from_iter(py, pixels.iter().map(pick)).reshape(shape);

@@ -191,6 +191,44 @@ impl Part {
         }
     }
 
+    /// How far from `position` the line along `direction` leaves the part, and the cosine of its angle with the normal there;
+    /// None if it does not. Without chart coordinates: for lines that mostly miss, or leave it too far away.
+    #[inline]
+    #[must_use]
+    pub fn leaves(&self, position: Vec3, direction: Vec3) -> Option<(f64, f64)> {
+        let (o, d) = self.localise(position, direction);
+        match self.shape {
+            Shape::Rectangle { width, height } => {
+                let t = -o.z / d.z;
+                let inside = |x: f64, size: f64| (0.0..=1.0).contains(&(x / size + 0.5));
+                let met = d.z > 0.0 && inside(o.x + t * d.x, width) && inside(o.y + t * d.y, height);
+                met.then_some((t, d.z))
+            }
+            Shape::Disk { radius } => {
+                let t = -o.z / d.z;
+                let (x, y) = ((o.x + t * d.x) / radius, (o.y + t * d.y) / radius);
+                (d.z > 0.0 && x * x + y * y <= 1.0).then_some((t, d.z))
+            }
+            Shape::Hemisphere { radius } => {
+                let middle = -o.dot(d);
+                let near = o + d * middle;
+                let half_chord = radius * radius - near.dot(near);
+                let half = half_chord.max(0.0).sqrt();
+                (half_chord > 0.0 && near.z + d.z * half >= 0.0).then_some((middle + half, half / radius))
+            }
+            Shape::Tube { radius, height } => {
+                let across = d.x * d.x + d.y * d.y;
+                let middle = -(o.x * d.x + o.y * d.y) / across;
+                let (x, y) = (o.x + middle * d.x, o.y + middle * d.y);
+                let half_chord = (radius * radius - (x * x + y * y)) / across;
+                let half = half_chord.max(0.0).sqrt();
+                let t = middle + half;
+                let met = across > 0.0 && half_chord > 0.0 && (0.0..=1.0).contains(&((o.z + t * d.z) / height + 0.5));
+                met.then_some((t, half * across / radius))
+            }
+        }
+    }
+
     #[inline(always)]
     fn localise(&self, position: Vec3, direction: Vec3) -> (Vec3, Vec3) {
         (
@@ -372,6 +410,29 @@ pub(crate) mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_line_leaves_where_it_crosses() {
+        for part in zoo() {
+            let mut missed = 0;
+            for [s1, s2, a, b] in lattice(5000) {
+                let (x, k) = part.ray([s1, s2], [a, b]);
+                let normal = part.ray([s1, s2], [0.5, 0.5]).1;
+                for along in [0.0, 3.0, -700.0] {
+                    let (t, cosine) = part.leaves(x + k * along, k).expect("it was made to");
+                    // The same square root as above.
+                    let error = 1e-12 * (1.0 + along.abs()) / cosine.max(1e-6);
+                    assert!((t + along).abs() < error, "{part:?} {t} {along}");
+                    assert!((cosine - normal.dot(k)).abs() < error, "{part:?} {cosine}");
+                }
+                // Lines beside it: the two agree on which are met.
+                let aside = x + Vec3::new(s1 - 0.4, b - 0.5, a - 0.3) * 60.0;
+                assert_eq!(part.leaves(aside, k).is_some(), part.cross(aside, k).met);
+                missed += usize::from(!part.cross(aside, k).met);
+            }
+            assert!(missed > 500, "{part:?} {missed}");
         }
     }
 

@@ -10,7 +10,7 @@ const GENERATOR: [u32; 12] = [
 /// Dimensions of a point.
 pub const DIMENSIONS: usize = GENERATOR.len();
 
-/// Point `index` of the sequence, moved by `shift` (modulo 1) in each dimension: uniform if the shift is, and unbiased.
+/// Point `index` of the sequence, moved by `shift`, each from 0 to 1, modulo 1 in each dimension: uniform if the shift is, and unbiased.
 #[inline]
 #[must_use]
 pub fn lattice_point(index: u32, shift: &[f64; DIMENSIONS]) -> [f64; DIMENSIONS] {
@@ -18,7 +18,8 @@ pub fn lattice_point(index: u32, shift: &[f64; DIMENSIONS]) -> [f64; DIMENSIONS]
     let phase = index.reverse_bits();
     std::array::from_fn(|k| {
         let turn = f64::from(phase.wrapping_mul(GENERATOR[k])) * (1.0 / 4_294_967_296.0) + shift[k];
-        let inside = turn - turn.floor();
+        // Both are below 1.
+        let inside = if turn >= 1.0 { turn - 1.0 } else { turn };
         // A number that rounds to 1 or is 0 is none that others draw.
         inside.clamp(f64::EPSILON / 2.0, 1.0 - f64::EPSILON / 2.0)
     })

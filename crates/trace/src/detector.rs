@@ -1,11 +1,14 @@
 //! Detectors: what takes note of light and does not change it.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use etendue_geometry::Face;
 use etendue_geometry::shape::{Flat, Outline, Shape};
 use etendue_lightfield::View;
 use etendue_math::{Frame, Vec3};
+
+use crate::exitance::Patches;
 
 /// A detector.
 #[derive(Clone, Debug)]
@@ -40,6 +43,8 @@ pub enum Detector {
         /// cannot be seen backwards, and of all sources through smooth surfaces onto the first diffuse one.
         complement: bool,
     },
+    /// The flux that diffuse surfaces send out, by the cells of patches.
+    Exitance(Arc<Patches>),
     /// Diffuse scatters, to be looked at later from anywhere.
     Events {
         /// How many are kept at most: of more, those of every second ray are dropped, as often as it takes.
@@ -68,7 +73,7 @@ impl Detector {
                 trims: vec![],
                 flipped: false,
             }),
-            Self::Intensity { .. } | Self::Image { .. } | Self::Events { .. } => None,
+            Self::Intensity { .. } | Self::Image { .. } | Self::Exitance(_) | Self::Events { .. } => None,
         }
     }
 
@@ -80,6 +85,7 @@ impl Detector {
             Self::Illuminance { columns, rows, .. } => *columns as usize * *rows as usize,
             Self::Intensity { planes, steps } => *planes as usize * (*steps as usize + 1),
             Self::Image { view, .. } => view.pixels(),
+            Self::Exitance(patches) => patches.cells(),
         }
     }
 }

@@ -4,6 +4,7 @@
 //! proportion to their shares, and in a medium it is absorbed at a distance drawn from Beer's law. So the rays that a
 //! detector keeps have equal flux if those of the source have.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use etendue_geometry::assembly::{Hits, Leaving, Lines, NONE};
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 
 use crate::bounce::{Bouncer, Gathered, bounce, bouncers};
 use crate::detector::{Detector, illuminance_cell, intensity_cell};
+use crate::exitance::Place;
 use crate::eye::Event;
 use crate::harvest::{Harvest, Record, Yield};
 use crate::inside::Inside;
@@ -157,10 +159,12 @@ pub fn trails(scene: &Scene, run: &Run<'_>, far: f64) -> Vec<Vec<Vec3>> {
 impl<'a> Walk<'a> {
     fn new(scene: &'a Scene, run: &'a Run<'a>) -> Self {
         // Detectors of scattered light, absorbing surroundings and trails want to know of every scatter by itself.
-        let watched = scene
-            .detectors
-            .iter()
-            .any(|d| matches!(d, Detector::Image { .. } | Detector::Events { .. }));
+        let watched = scene.detectors.iter().any(|d| {
+            matches!(
+                d,
+                Detector::Image { .. } | Detector::Exitance(_) | Detector::Events { .. }
+            )
+        });
         let clear = scene.media[0].absorption.range() == [0.0, 0.0];
         let bouncers = if clear && !watched { bouncers(scene) } else { Vec::new() };
         Self {
@@ -401,7 +405,7 @@ impl Walk<'_> {
             return Err(Fate::Lost(Loss::NoIndex, meeting.face));
         }
         if finish.is_diffuse() && !self.scene.detectors.is_empty() {
-            self.show(meeting, number, d, rider);
+            self.show(meeting, number, &light, d, rider);
         }
         let (shares, across) = finish.shares(&light);
         let Some(lobe) = pick(&shares, numbers[0]) else {
@@ -434,13 +438,28 @@ impl Walk<'_> {
     }
 
     /// Detectors of scattered light take note.
-    fn show(&mut self, meeting: &Meeting, finish: u32, d: Vec3, rider: &Rider) {
+    fn show(&mut self, meeting: &Meeting, finish: u32, light: &Incidence, d: Vec3, rider: &Rider) {
         let event = Event::new(meeting, finish, d, [rider.flux, rider.wavelength], rider.ray);
         for (number, detector) in self.scene.detectors.iter().enumerate() {
             match detector {
                 Detector::Image { view, complement } if rider.unseen || !complement => {
                     if let Some((pixel, light)) = event.seen(self.scene, view, &mut self.fillings) {
                         self.out.marks[number].push((pixel, rider.ray, light));
+                    }
+                }
+                Detector::Exitance(patches) => {
+                    for through in [false, true] {
+                        let share = PI * self.scene.finishes[finish as usize].bsdf(light, through);
+                        let place = Place {
+                            face: meeting.face,
+                            part: meeting.part,
+                            front: meeting.front != through,
+                            point: meeting.point,
+                        };
+                        let cell = || patches.cell(self.scene, place, rider.wavelength, rider.unseen);
+                        if let Some(cell) = (share > 0.0).then(cell).flatten() {
+                            self.out.marks[number].push((cell, rider.ray, rider.flux * share));
+                        }
                     }
                 }
                 Detector::Events { faces, .. }
@@ -476,6 +495,6 @@ fn detect(scene: &Scene, out: &mut Yield, detector: u32, point: Vec3, d: Vec3, r
                 out.marks[number].push((cell, rider.ray, rider.flux));
             }
         }
-        Detector::Intensity { .. } | Detector::Image { .. } | Detector::Events { .. } => {}
+        Detector::Intensity { .. } | Detector::Image { .. } | Detector::Exitance(_) | Detector::Events { .. } => {}
     }
 }

@@ -7,10 +7,12 @@
 //! light; `ledger`: the flux account; `harvest`: what batches amount to. `eye`: diffuse scatters connected to an observer;
 //! `kept`: those that are kept for later, thinned to a number of them.
 //!
-//! `reverse`: from the eye to the sources; `wave`: a block of its paths.
+//! `reverse`: from the eye to the sources; `wave`: a block of its paths; `exitance`: the light of diffuse surfaces, known
+//! beforehand, at which paths may end.
 
 mod bounce;
 pub mod detector;
+pub mod exitance;
 pub mod eye;
 pub mod forward;
 pub mod harvest;

@@ -29,6 +29,8 @@ pub struct Meeting {
     pub side: Vec3,
     /// The deciding face; the first one met, if none decides.
     pub face: u32,
+    /// Its part that is met (a triangle of a mesh).
+    pub part: u32,
     /// Whether the ray meets the front of the deciding face.
     pub front: bool,
     /// The finish of the deciding face; None: the ray goes on as if nothing were there.
@@ -169,6 +171,7 @@ fn alone(
         normal,
         side,
         face: index,
+        part: crossing.part,
         front,
         finish,
         before: inside,
@@ -378,6 +381,7 @@ fn resolve(
         normal,
         side,
         face,
+        part: group[at].1.part,
         front,
         finish: verdict.map(|(_, _, finish)| finish),
         before: inside,

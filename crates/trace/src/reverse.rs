@@ -13,6 +13,7 @@ use etendue_lightfield::View;
 use etendue_optics::source::Lantern;
 use rayon::prelude::*;
 
+use crate::exitance::{Exitance, Survey};
 use crate::scene::Scene;
 use crate::wave::{BLOCK, Wave};
 
@@ -116,16 +117,21 @@ impl<'a> Lit<'a> {
         }
     }
 
-    /// The map of `view`: for each pixel the sums over passes `passes`. Passes are independent of each other.
+    /// The map of `view`: for each pixel the sums over passes `passes`. Passes are independent of each other. With a survey,
+    /// paths end at diffuse surfaces whose light is known.
     ///
     /// Runs on the threads of the current pool; the same bits for any number.
     #[must_use]
-    pub fn look(&self, view: &View, method: &Method, passes: Range<u32>) -> Vec<Pixel> {
+    pub fn look(&self, view: &View, method: &Method, survey: Option<&Survey>, passes: Range<u32>) -> Vec<Pixel> {
+        let known: Vec<Exitance<'_>> = survey
+            .iter()
+            .flat_map(|survey| passes.clone().map(|pass| survey.exitance(self, pass)))
+            .collect();
         let mut pixels = vec![Pixel::default(); view.pixels()];
         let each = (passes.len() * method.paths as usize).max(1);
         let chunk = (4 * BLOCK / each).clamp(1, 1 << 12);
         pixels.par_chunks_mut(chunk).enumerate().for_each(|(number, pixels)| {
-            Wave::new(self, view, method).paint(number * chunk, passes.clone(), pixels);
+            Wave::new(self, view, method, &known).paint(number * chunk, passes.clone(), pixels);
         });
         pixels
     }

@@ -12,6 +12,7 @@ use etendue_optics::source::surface::about;
 use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
 use etendue_sampling::philox::Stream;
 
+use crate::exitance::{Exitance, Place};
 use crate::inside::Inside;
 use crate::meeting::{Fillings, Meeting, meet, transmittance};
 use crate::reverse::{Left, Lit, Method, Pixel};
@@ -35,8 +36,8 @@ const FEW: usize = 8;
 enum Seen {
     /// Smooth surfaces, or nothing yet.
     Smooth,
-    /// A diffuse surface, and nothing since: the density of its direction there, and the distance from there.
-    Diffuse { density: f64, travelled: f64, all: bool },
+    /// A diffuse surface, and nothing since: the density of its direction there, and whether all sources were connected to.
+    Diffuse { density: f64, all: bool },
     /// A diffuse surface, and smooth ones since.
     Caustic,
 }
@@ -49,6 +50,8 @@ struct Branch {
     inside: Inside,
     weight: f64,
     seen: Seen,
+    /// Distance since the last diffuse scatter.
+    travelled: f64,
     events: u32,
     scatters: u32,
     /// Whether the eye sees the first diffuse surface directly.
@@ -59,6 +62,8 @@ struct Branch {
 struct Path {
     numbers: Numbers,
     line: usize,
+    /// Its pass, counted from the first of those that are made.
+    pass: usize,
     sum: [f64; 2],
 }
 
@@ -78,6 +83,8 @@ pub struct Wave<'a> {
     lit: &'a Lit<'a>,
     view: &'a View,
     method: &'a Method,
+    /// The light of diffuse surfaces, for each pass, if it is known.
+    known: &'a [Exitance<'a>],
     fillings: Fillings,
     hits: Hits,
     paths: Vec<Path>,
@@ -95,11 +102,12 @@ pub struct Wave<'a> {
 
 impl<'a> Wave<'a> {
     /// An empty block.
-    pub fn new(lit: &'a Lit<'a>, view: &'a View, method: &'a Method) -> Self {
+    pub fn new(lit: &'a Lit<'a>, view: &'a View, method: &'a Method, known: &'a [Exitance<'a>]) -> Self {
         Self {
             lit,
             view,
             method,
+            known,
             fillings: Fillings::new(lit.scene),
             hits: Hits::default(),
             paths: Vec::with_capacity(BLOCK),
@@ -128,9 +136,10 @@ impl<'a> Wave<'a> {
                 let (cell, index) = (flat / paths, flat % paths);
                 let pixel = (first + cell / passes.len()) as u64;
                 #[allow(clippy::cast_possible_truncation, reason = "a number of passes")]
-                let pass = passes.start + (cell % passes.len()) as u32;
+                let pass = (cell % passes.len()) as u32;
+                let pass = [passes.start + pass, pass];
                 if shift.0 != cell {
-                    shift = (cell, self.shift(pixel, pass));
+                    shift = (cell, self.shift(pixel, pass[0]));
                 }
                 #[allow(clippy::cast_possible_truncation, reason = "a number of paths")]
                 self.aim(pixel, pass, index as u32, &shift.1);
@@ -162,7 +171,7 @@ impl<'a> Wave<'a> {
     }
 
     /// A path from the eye through a point of a pixel.
-    fn aim(&mut self, pixel: u64, pass: u32, index: u32, shift: &[f64; DIMENSIONS]) {
+    fn aim(&mut self, pixel: u64, [pass, made]: [u32; 2], index: u32, shift: &[f64; DIMENSIONS]) {
         let view = self.view;
         let stream = Stream::new(self.method.seed, PURPOSE_PATH);
         let address = ((pixel << 24 | u64::from(pass)) << 20).wrapping_add(u64::from(index));
@@ -186,6 +195,7 @@ impl<'a> Wave<'a> {
         self.paths.push(Path {
             numbers,
             line,
+            pass: made as usize,
             sum: [0.0; 2],
         });
         if let Some((inside, leaving)) = self.eye {
@@ -195,6 +205,7 @@ impl<'a> Wave<'a> {
                 inside,
                 weight: 1.0,
                 seen: Seen::Smooth,
+                travelled: 0.0,
                 events: 0,
                 scatters: 0,
                 direct: true,
@@ -243,6 +254,7 @@ impl<'a> Wave<'a> {
             return;
         };
         branch.events += 1;
+        branch.travelled += meeting.t;
         if absorption > 0.0 {
             branch.weight *= (-absorption * meeting.t).exp();
         }
@@ -257,9 +269,6 @@ impl<'a> Wave<'a> {
                 self.meet(&branch, d, &meeting, finish, [n1, n2]);
             }
             _ => {
-                if let Seen::Diffuse { travelled, .. } = &mut branch.seen {
-                    *travelled += meeting.t;
-                }
                 branch.inside = meeting.after;
                 self.push(&meeting, d, branch);
             }
@@ -329,13 +338,8 @@ impl<'a> Wave<'a> {
                 if absorption > 0.0 {
                     weight *= (-absorption * lit.t).exp();
                 }
-                if let Seen::Diffuse {
-                    density,
-                    travelled,
-                    all,
-                } = branch.seen
-                {
-                    let distance = travelled + lit.t;
+                if let Seen::Diffuse { density, all } = branch.seen {
+                    let distance = branch.travelled + lit.t;
                     let picked = if all { 1.0 } else { share };
                     let other = picked * lit.density * distance * distance / lit.cosine;
                     weight *= density / (density + other);
@@ -357,8 +361,11 @@ impl<'a> Wave<'a> {
             n2,
         };
         let (shares, across) = finish.shares(&here);
-        // Light that is transmitted to the eye arrives from the other side, at the angle of refraction.
-        let through = if shares[1] > 0.0 {
+        // Light that is transmitted to the eye arrives from the other side, at the angle of refraction. An interface transmits
+        // the same share both ways.
+        let through = if matches!(finish, Finish::Interface) {
+            shares[1] * (n1 / n2) * (n1 / n2)
+        } else if shares[1] > 0.0 {
             let there = Incidence {
                 cosine: across,
                 wavelength,
@@ -390,7 +397,7 @@ impl<'a> Wave<'a> {
             };
             wave.push(meeting, d, branch);
         };
-        let diffuse = finish.is_diffuse();
+        let diffuse = finish.is_diffuse() && !self.end(branch, meeting, finish);
         // Chains of smooth surfaces branch; everything else is drawn.
         if branch.seen == Seen::Smooth && branch.weight > SPLIT {
             for (transmitted, share) in [(false, smooth[0]), (true, smooth[1])] {
@@ -428,6 +435,27 @@ impl<'a> Wave<'a> {
         }
     }
 
+    /// Takes what a diffuse surface is known to send back along the branch; false if that is not known.
+    fn end(&mut self, branch: &Branch, meeting: &Meeting, finish: &Finish) -> bool {
+        if branch.scatters == 0 || self.known.is_empty() || !finish.is_diffuse() {
+            return false;
+        }
+        let path = &mut self.paths[branch.path as usize];
+        let place = Place {
+            face: meeting.face,
+            part: meeting.part,
+            front: meeting.front,
+            point: meeting.point,
+        };
+        // What light that came through smooth surfaces does from here on is left to the light image, if there is one.
+        let all = !(self.method.left == Left::Caustics && branch.direct);
+        let light = self.known[path.pass].at(self.lit.scene, place, branch.travelled, path.line, all);
+        if let Some(light) = light {
+            path.sum[0] += branch.weight * light;
+        }
+        light.is_some()
+    }
+
     /// A diffuse scatter: connections to sources, and one direction that is drawn. `boost` makes up for the chance that
     /// it came to this.
     fn scatter(&mut self, branch: &Branch, meeting: &Meeting, finish: &Finish, n: [f64; 2], boost: f64) {
@@ -459,11 +487,12 @@ impl<'a> Wave<'a> {
             weight: branch.weight * boost,
             ..*branch
         };
+        // The direction has the first numbers, which are the most evenly spread; a side is drawn only where there are two.
+        let numbers = &mut self.paths[branch.path as usize].numbers;
+        let (turn, height) = (numbers.draw(), numbers.draw());
+        let through = chances[1] > 0.0 && numbers.draw() >= chances[0];
         self.reach_out(&branch, meeting, finish, n, chances, all);
 
-        let numbers = &mut self.paths[branch.path as usize].numbers;
-        let (side, turn, height) = (numbers.draw(), numbers.draw(), numbers.draw());
-        let through = side >= chances[0];
         let chance = chances[usize::from(through)];
         let normal = if through { -meeting.side } else { meeting.side };
         let cosine = (1.0 - height).sqrt();
@@ -480,9 +509,9 @@ impl<'a> Wave<'a> {
                 weight: branch.weight * share / chance,
                 seen: Seen::Diffuse {
                     density: chance * cosine * FRAC_1_PI,
-                    travelled: 0.0,
                     all,
                 },
+                travelled: 0.0,
                 scatters: branch.scatters + 1,
                 ..branch
             };

@@ -11,7 +11,7 @@ import typer
 
 from etendue.cli import compare, convert, demo, draw, filter_, fit, info, intensity, luminance, patches, sample, trace
 from etendue.cli.terminal import INTERRUPTED, complain, spell_out_unknown_letters
-from etendue.errors import EtendueError
+from etendue.errors import EtendueError, SceneWarning
 from etendue.quantities.provenance import version
 
 app = typer.Typer(
@@ -53,10 +53,17 @@ def _common(
     pass
 
 
+def _show_warning(message: Warning | str, *_where: object, **_more: object) -> None:
+    complain(f"warning: {message}")
+
+
 def main() -> None:
     """Run the program; the exit status is 0, 1 for an error of the data, 2 for one of usage, 130 after Ctrl-C."""
     # Complaints about files are printed by the verbs, once and in full.
     warnings.simplefilter("ignore")
+    # What is wrong with a scene is worth knowing before hours of tracing.
+    warnings.simplefilter("default", SceneWarning)
+    warnings.showwarning = _show_warning
     spell_out_unknown_letters()
     try:
         status = app(standalone_mode=False)

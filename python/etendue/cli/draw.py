@@ -52,7 +52,8 @@ def draw(
         print_json({"file": file, **layout.to_dict(), "outputs": outputs})
         return
     for note in layout.compiled.notes:
-        complain(f"note: {note}")
+        if note not in layout.compiled.doubts:  # these were warnings
+            complain(f"note: {note}")
     print_layout(layout)
     for path in outputs:
         say(f"  {path}")

@@ -105,6 +105,12 @@ def luminance(
             "--forward-rays", help="Of a scene: rays traced forwards besides, for caustics and beams, e.g. 1e7."
         ),
     ] = None,
+    gather: Annotated[
+        bool,
+        typer.Option(
+            "--gather", help="Of a scene: lines of sight end at the second diffuse surface, whose light is found first."
+        ),
+    ] = False,
     detector: Annotated[
         str | None,
         typer.Option(
@@ -146,6 +152,7 @@ def luminance(
         "--until": until,
         "--seed": seed,
         "--forward-rays": forward_rays,
+        "--gather": gather or None,
     }
     if looked is not None:
         for_others = {
@@ -167,6 +174,7 @@ def luminance(
                 until=until,
                 seed=seed,
                 forward_rays=forward_rays,
+                gather=gather,
                 threads=threads,
                 progress=progress,
             )

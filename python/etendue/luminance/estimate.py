@@ -71,6 +71,7 @@ def luminance_map(
     until: float | None = ...,
     seed: int | None = ...,
     forward_rays: float | None = ...,
+    gather: bool = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> LuminanceMap: ...
@@ -84,6 +85,7 @@ def luminance_map(
     until: float | None = ...,
     seed: int | None = ...,
     forward_rays: float | None = ...,
+    gather: bool = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> list[LuminanceMap]: ...
@@ -100,6 +102,7 @@ def luminance_map(
     until: float | None = None,
     seed: int | None = None,
     forward_rays: float | None = None,
+    gather: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> LuminanceMap | list[LuminanceMap]:
@@ -143,6 +146,10 @@ def luminance_map(
         Of a scene: so many rays are traced forwards besides, and what they send to the eye from diffuse surfaces is added:
         light that reaches these through lenses and mirrors (caustics), which lines of sight find by chance only, or not
         at all if it comes from points, and that of beams. No light is counted twice.
+    gather : bool, optional
+        Of a scene: lines of sight end at the second diffuse surface, whose light is then known from rays traced forwards,
+        as a mean over small patches. Many times as fast where light goes to and fro between diffuse surfaces. Patches
+        that light does not reach evenly are not used; the map's notes tell how it compares with lines that go on.
     threads : int, optional
         All cores if None. The result has the same bits for any number.
     progress : callable, optional
@@ -179,7 +186,13 @@ def luminance_map(
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
-    for_scenes = {"rays_per_pixel": rays_per_pixel, "until": until, "seed": seed, "forward_rays": forward_rays}
+    for_scenes = {
+        "rays_per_pixel": rays_per_pixel,
+        "until": until,
+        "seed": seed,
+        "forward_rays": forward_rays,
+        "gather": gather or None,
+    }
     for_others = {
         "method": None if method == "auto" else method,
         "acceptance": acceptance,

@@ -14,6 +14,7 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.formats.rays import read_rays
 from etendue.lightfield.light_field import LightField
+from etendue.luminance.gathering import CHECKS, FIRST_CHECK, blocks, comparison_note, survey_notes
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
@@ -58,6 +59,7 @@ class Looking:
     until: float | None = None
     seed: int = 1
     forward_rays: float | None = None
+    gather: bool = False
     threads: int | None = None
 
     def __post_init__(self) -> None:
@@ -138,22 +140,27 @@ def look_at_scene(
     compiled = compile_scene(seeable)
     if not compiled.record["sources"]:
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
-    core = _core.Scene(compiled.record)
+    core = _core.Scene({**compiled.record, "detectors": []})
+    survey = _core.Survey(core, how.seed, MOST_EVENTS, how.threads) if how.gather else None
     forwards = scattered is not None or how.forward_rays is not None
     notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=forwards)]
+    notes += [] if survey is None else survey_notes(survey)
     rest = _light_images(compiled, views, how) if scattered is None else scattered
     left: Left = "scattered" if scattered is not None else "caustics" if forwards else "nothing"
     origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
     maps, done = [], 0
     for (observer, screen), view, image in zip(pairs, views, rest, strict=True):
-        passes = _Passes(screen.shape)
+        passes, gathered = _Passes(screen.shape), []
+
+        def look(number: int, known: _core.Survey | None, view: _core._View = view) -> list[Array]:
+            passes = number, number + 1
+            return _core.look_at_scene(core, view, how.paths, how.seed, MOST_EVENTS, left, *passes, how.threads, known)
+
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
         while passes.done < wanted:
-            first = passes.done
-            sum_, _, deviation = _core.look_at_scene(
-                core, view, how.paths, how.seed, MOST_EVENTS, left, first, first + 1, how.threads
-            )
+            sum_, _, deviation = look(passes.done, survey)
             passes.add(sum_, deviation)
+            gathered.append(blocks(sum_))
             done += how.paths * screen.columns * screen.rows
             if progress is not None:
                 progress(done)
@@ -161,6 +168,8 @@ def look_at_scene(
                 wanted = passes.wanted(how.until, most)
         paths = how.paths * passes.done
         told = [f"{paths:,} lines of sight per pixel, in {passes.done} independent passes", *passes.notes(how.until)]
+        if survey is not None and survey.patches()[0]:
+            told.append(comparison_note(gathered, [look(FIRST_CHECK + i, None)[0] for i in range(CHECKS)]))
         if image is None and not passes.lit:
             told.append("the map is dark")
         values, error = passes.mean, passes.standard_error

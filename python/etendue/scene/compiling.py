@@ -15,6 +15,7 @@ from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
 from etendue.scene.media_library import MEDIA
 from etendue.scene.mistakes import join
+from etendue.scene.overlaps import Kind, doubts_about
 from etendue.scene.scene import Scene
 from etendue.scene.things import Solid, Surface
 from etendue.units import FluxUnit
@@ -37,6 +38,8 @@ class Compiled:
         Of all sources.
     notes : tuple of str
         What the user should know.
+    doubts : tuple of str
+        Those of the notes that make one doubt that the scene is what was meant; each was a `SceneWarning`.
 
     Examples
     --------
@@ -54,6 +57,7 @@ class Compiled:
     detector_names: tuple[str, ...]
     flux_unit: FluxUnit
     notes: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
 
 def compile_scene(scene: Scene) -> Compiled:
@@ -69,6 +73,12 @@ def compile_scene(scene: Scene) -> Compiled:
     SceneError
         With every mistake: a name that stands for nothing, a solid without a medium, a file that is missing or damaged,
         units of flux that do not agree, a medium without an index at a wavelength of the sources.
+
+    Warns
+    -----
+    SceneWarning
+        Of what is probably not meant, which is in the notes as well: solids that are open, overlap or lie in later ones,
+        sources that start partly in a solid, or in one that no light leaves.
 
     Examples
     --------
@@ -88,12 +98,14 @@ class _Compiler:
         self.files = scene.files
         self.mistakes: list[tuple[str, str]] = []
         self.notes: list[str] = []
+        self.doubts: list[str] = []
         self.rows: dict[str, list[Record]] = {
             key: [] for key in ("media", "finishes", "solids", "faces", "sources", "detectors")
         }
         self.names: dict[str, list[str]] = {key: [] for key in self.rows}
         self.media: list[tuple[str, str, Medium]] = []
         self.numbers: dict[tuple[str, str], int] = {}
+        self.kinds: list[Kind] = []
 
     def compiled(self) -> Compiled:
         """Everything, or all mistakes."""
@@ -107,6 +119,8 @@ class _Compiler:
         self._check_indices()
         if self.mistakes:
             raise SceneError(self.scene.name or "scene", self.mistakes)
+        for doubt in doubts_about(self.rows, self.kinds, self.names["sources"]):
+            self._doubt(doubt, 4)
         names = {key: tuple(held) for key, held in self.names.items()}
         return Compiled(
             dict(self.rows),
@@ -118,7 +132,14 @@ class _Compiler:
             names["detectors"],
             unit,
             tuple(dict.fromkeys(self.notes)),
+            tuple(dict.fromkeys(self.doubts)),
         )
+
+    def _doubt(self, text: str, stacklevel: int) -> None:
+        """Tell what is probably not meant."""
+        warnings.warn(text, SceneWarning, stacklevel=stacklevel)
+        self.notes.append(text)
+        self.doubts.append(text)
 
     @contextlib.contextmanager
     def _at(self, place: str) -> Iterator[None]:
@@ -198,12 +219,13 @@ class _Compiler:
     def _solid(self, place: str, name: str, solid: Solid) -> None:
         number = len(self.rows["solids"])
         frame = solid.frame()
-        entered = False
+        entered = closed = False
         with self._at(join(place, "shape")):
             faces = solid.shape.faces(self.files)
-            for doubt in (doubt for face in faces for doubt in face.doubts):
-                warnings.warn(f"{place}: {doubt}", SceneWarning, stacklevel=5)
-                self.notes.append(f"{place}: {doubt}")
+            doubts = [doubt for face in faces for doubt in face.doubts]
+            closed = not doubts
+            for doubt in doubts:
+                self._doubt(f"{place}: {doubt}", 5)
             self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(faces)]
             for face in faces:
                 key, given = solid.finish_of(face)
@@ -218,6 +240,7 @@ class _Compiler:
             self.mistakes.append((join(place, "medium"), text))
         medium = 0 if solid.medium is None else self._medium(join(place, "medium"), name, solid.medium)
         self.rows["solids"].append({"medium": medium})
+        self.kinds.append(Kind(name, not entered, closed))
         self.names["solids"].append(name)
 
     def _surface(self, place: str, name: str, surface: Surface) -> None:

@@ -6,6 +6,7 @@
 //! counts as inside if it may be, by the rounding errors of its computation: neighbours that share an edge leave no gap.
 
 pub mod asphere;
+pub mod chart;
 pub mod flat;
 pub mod quadric;
 pub mod roots;

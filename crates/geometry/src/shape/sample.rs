@@ -36,7 +36,7 @@ enum Kind {
 
 /// What is turned about the z axis: the parameter s runs along its outline.
 #[derive(Clone, Debug)]
-enum Outlined {
+pub(super) enum Outlined {
     /// s = z.
     Quadric(Quadric),
     /// s = r².
@@ -64,7 +64,7 @@ const GAUSS: [[f64; 2]; 5] = [
 
 impl Outlined {
     /// dA/ds.
-    fn density(&self, s: f64) -> f64 {
+    pub(super) fn density(&self, s: f64) -> f64 {
         match self {
             // With r² = g(z), dA = 2π r √(1 + r'²) dz = 2π √(g + g'²/4) dz, which is smooth at an apex too.
             Self::Quadric(q) => {
@@ -111,7 +111,7 @@ impl Outlined {
     }
 
     /// The point at s, `turn` turns about the axis.
-    fn point(&self, s: f64, turn: f64) -> Vec3 {
+    pub(super) fn point(&self, s: f64, turn: f64) -> Vec3 {
         let (r, z) = match self {
             Self::Quadric(q) => (squared_radius(q, s).max(0.0).sqrt(), s),
             Self::Asphere(a) => (s.sqrt(), a.sag_at(s)[0]),
@@ -122,7 +122,7 @@ impl Outlined {
     }
 
     /// The ranges of s that belong to the surface.
-    fn ranges(&self) -> Option<Vec<[f64; 2]>> {
+    pub(super) fn ranges(&self) -> Option<Vec<[f64; 2]>> {
         match self {
             Self::Quadric(q) => quadric_ranges(q),
             Self::Asphere(a) => {
@@ -278,11 +278,7 @@ fn rotation(outlined: Outlined) -> Option<AreaSampler> {
             let at = |i: usize| from + (to - from) * (i as f64 / STRETCHES as f64);
             let (from, to) = (at(i), at(i + 1));
             let most = outlined.bound(from, to);
-            area += (to - from)
-                * GAUSS
-                    .iter()
-                    .map(|[x, w]| w * outlined.density(from + x * (to - from)))
-                    .sum::<f64>();
+            area += integral(|s| outlined.density(s), from, to);
             // Picked by the area under the bound: rejection leaves the area under the density.
             areas.push((to - from) * most);
             stretches.push(Stretch { from, to, most });
@@ -295,12 +291,18 @@ fn rotation(outlined: Outlined) -> Option<AreaSampler> {
     })
 }
 
-fn twice_area([a, b, c]: [[f64; 2]; 3]) -> f64 {
+/// ∫ f(s) ds by Gauss's rule.
+pub(super) fn integral(f: impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
+    let sum: f64 = GAUSS.iter().map(|[x, w]| w * f(from + x * (to - from))).sum();
+    (to - from) * sum
+}
+
+pub(super) fn twice_area([a, b, c]: [[f64; 2]; 3]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
 /// A simple polygon as triangles, by cutting off ears.
-fn triangulate(vertices: &[[f64; 2]]) -> Vec<[[f64; 2]; 3]> {
+pub(super) fn triangulate(vertices: &[[f64; 2]]) -> Vec<[[f64; 2]; 3]> {
     let mut rest: Vec<[f64; 2]> = vertices.to_vec();
     let turn = |p: &[[f64; 2]]| -> f64 {
         (0..p.len())

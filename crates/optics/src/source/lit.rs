@@ -129,19 +129,20 @@ impl Lantern {
             }
             Emitter::Field(sampler) => {
                 for (part, table) in sampler.field().parts.iter().zip(&self.parts) {
-                    let crossing = part.part.cross(p, -k);
-                    if !crossing.met {
+                    let Some((back, cosine)) = part.part.leaves(p, -k) else {
+                        continue;
+                    };
+                    if !(-reach..0.0).contains(&back) {
                         continue;
                     }
-                    let (point, normal) = part.part.ray(crossing.place, [0.5, 0.5]);
-                    let t = (point - p).dot(k);
-                    if t > 0.0 && t <= reach {
+                    let crossing = part.part.cross(p, -k);
+                    if crossing.met {
                         let reading = part.at(crossing.place, crossing.direction);
                         visit(Lit {
-                            t,
+                            t: -back,
                             luminance: reading.value * self.scale,
                             deviation: reading.deviation * self.scale,
-                            cosine: -k.dot(normal),
+                            cosine,
                             density: table.density(crossing.place) / part.part.area(),
                         });
                     }
@@ -157,6 +158,9 @@ impl Lantern {
         let p = source.frame.point_to_local(x);
         match &source.emitter {
             Emitter::Surface(surface) => {
+                if surface.turns_away_from(p) {
+                    return None;
+                }
                 let (point, normal) = surface.draw_point(numbers);
                 let (distance2, cosine) = towards(point, normal, p)?;
                 Some(Beacon {

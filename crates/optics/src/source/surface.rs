@@ -55,6 +55,13 @@ impl SurfaceSource {
         }
     }
 
+    /// Whether no point of the surface can send light to `p`, as far as that is easy to tell.
+    #[inline]
+    #[must_use]
+    pub fn turns_away_from(&self, p: Vec3) -> bool {
+        matches!(self.shape, Shape::Flat(_)) && (if self.flipped { -p.z } else { p.z }) <= 0.0
+    }
+
     /// A point spread evenly over the area, and the normal on the emitting side.
     #[must_use]
     pub fn draw_point(&self, numbers: &mut Numbers) -> (Vec3, Vec3) {

@@ -1,0 +1,321 @@
+"""Solids that bite into each other, and light that starts in them: looked for with lines, before anything is traced."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.scene.extents import box_of
+
+Array = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
+Record = dict[str, Any]
+
+MOST_LINES, FEWEST_LINES, ALL_LINES = 1024, 64, 1 << 13
+"""Lines through the box that two solids share, and as many through the boxes of the smaller one's faces: within limits, what
+`ALL_LINES` leave for each pair."""
+
+STARTS = 256
+"""Rays of a source whose starts are looked at."""
+
+SHARE = 0.01
+"""Of these, fewer say nothing: measured ray files have strays."""
+
+BESIDE = 1e-6
+"""Of the size of a solid: what overlaps by less was meant to touch. It is far more than the roundings of a placement, and
+of coordinates in single precision, and less than anything that is made."""
+
+MOST_PAIRS = 512
+"""Pairs of solids with boxes that meet; a scene with more is looked at in part."""
+
+DEEPEST = 4
+"""Solids that a ray may be in at once."""
+
+_CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
+
+
+@dataclasses.dataclass(frozen=True)
+class Kind:
+    """What is known of a solid besides its faces.
+
+    Parameters
+    ----------
+    name : str
+    opaque : bool
+        Whether no face of it lets light pass.
+    closed : bool
+        What is open has no inside.
+
+    Examples
+    --------
+    >>> Kind("wall", opaque=True, closed=True).name
+    'wall'
+    """
+
+    name: str
+    opaque: bool
+    closed: bool
+
+
+def doubts_about(record: Record, kinds: Sequence[Kind], source_names: Sequence[str]) -> tuple[str, ...]:
+    """What is probably not meant: each with the names of both bodies and a point.
+
+    Solids may lie in one another and touch. These are told: two of which each has space of its own and both share some;
+    one that lies in a later one, which fills its space; more than four in one place; sources of which a part starts in a
+    solid and a part does not, or which start in a solid that no light leaves.
+
+    The lines are the same every time. What takes less than some thousandth of the box that two solids share may be missed.
+
+    Parameters
+    ----------
+    record : mapping
+        Of the tracer; see `etendue.scene.compile_scene`.
+    kinds : sequence of Kind
+        One for each of its solids.
+    source_names : sequence of str
+        Of its sources.
+
+    Examples
+    --------
+    >>> from etendue.scene import Scene, compile_scene
+    >>> wall = {"shape": {"kind": "ball", "radius": 2}, "finish": "absorber"}
+    >>> record = compile_scene(Scene(solids=[wall])).record
+    >>> led = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 1}
+    >>> sources = compile_scene(Scene(sources=[led])).record["sources"]
+    >>> doubts_about({**record, "sources": sources}, [Kind("wall", opaque=True, closed=True)], ["led"])[0][:45]
+    '100% of the light of "led" starts in "wall", '
+    """
+    solids = _Solids(record, kinds)
+    if not solids.owner.size:
+        return ()
+    sources = zip(source_names, record["sources"], strict=True)
+    return (*_overlaps(solids), *(doubt for name, source in sources for doubt in _starts(solids, name, source)))
+
+
+def _place(point: Array) -> str:
+    x, y, z = (point + 0.0).tolist()
+    return f"({x:.4g}, {y:.4g}, {z:.4g}) mm"
+
+
+# --- solids ----------------------------------------------------------------------------------------------------------
+
+
+class _Solids:
+    """The closed solids of a scene, and the boxes around them."""
+
+    def __init__(self, record: Record, kinds: Sequence[Kind]) -> None:
+        self.record = record
+        self.names = [f'"{kind.name}"' for kind in kinds]
+        self.opaque = [kind.opaque for kind in kinds]
+        closed = [face for face in record["faces"] if face["solid"] is not None and kinds[face["solid"]].closed]
+        boxes = [box_of(face["shape"]) for face in closed]
+        # A face of absurd numbers may have no place.
+        known = [bool(np.isfinite(box).all()) for box in boxes]
+        self.faces = list(itertools.compress(closed, known))
+        self.boxes = np.array(list(itertools.compress(boxes, known))).reshape(-1, 2, 3)
+        self.owner = np.array([face["solid"] for face in self.faces], dtype=np.int64)
+        self.low, self.high = np.full((len(kinds), 3), np.inf), np.full((len(kinds), 3), -np.inf)
+        self.frames = np.array([face["frame"] for face in self.faces], dtype=np.float64).reshape(-1, 4, 3)
+        corners = self.placed(np.arange(len(self.faces))[:, None], _CORNERS)
+        np.minimum.at(self.low, self.owner, corners.min(axis=1))
+        np.maximum.at(self.high, self.owner, corners.max(axis=1))
+        self.sizes = (self.high - self.low).max(axis=1)
+
+    def placed(self, faces: Numbers, at: Array) -> Array:
+        """Points in the boxes of faces, which lie along their own axes; from coordinates 0 to 1, in the world [mm]."""
+        low, high = self.boxes[faces, 0], self.boxes[faces, 1]
+        local = low + at * (high - low)
+        placed: Array = np.einsum("...k,...kx->...x", local, self.frames[faces, 1:]) + self.frames[faces, 0]
+        return placed
+
+    def in_faces(self, solid: int, n: int) -> Array:
+        """Points in the boxes of a solid's faces, shape (n, 3) [mm]: even where it is thin and aslant."""
+        faces = np.flatnonzero(self.owner == solid)
+        return self.placed(faces[np.arange(n) * max(1, len(faces) // n) % len(faces)], _spread(n, 3))
+
+    @functools.cached_property
+    def _core(self) -> _core.Scene:
+        return _bare(self.record, [{**face, "solid": None, "finish": 0} for face in self.faces], [])
+
+    def crossings(self, starts: Array, directions: Array) -> tuple[Numbers, Numbers, Array]:
+        """Where lines cross solids ahead: number of the line, of the solid, distance [mm]; in order along each line."""
+        lines, faces, distances = _core.scene_crossings(self._core, starts, directions)
+        order = np.lexsort((distances, lines))
+        return lines[order].astype(np.int64), self.owner[faces[order].astype(np.int64)], distances[order]
+
+    def sides(self, points: Array) -> tuple[Flags, Flags]:
+        """Whether points lie in each solid, and whether they lie outside of it, shape (points, solids).
+
+        A point on a face, or from which a line meets an edge, does neither.
+        """
+        directions = _directions(len(points))
+        shape = (len(points), len(self.names))
+        inside, outside = np.ones((2, *shape), dtype=bool)
+        for sign in (1.0, -1.0):
+            line, solid, t = self.crossings(points, sign * directions)
+            counts = np.zeros(shape, dtype=np.int64)
+            np.add.at(counts, (line, solid), 1)
+            inside &= counts % 2 == 1
+            outside &= counts % 2 == 0
+            on = t <= BESIDE * self.sizes[solid]
+            inside[line[on], solid[on]] = outside[line[on], solid[on]] = False
+        return inside, outside
+
+
+def _bare(record: Record, faces: list[Record], sources: list[Record]) -> _core.Scene:
+    """Faces and sources in the scene's surroundings, and nothing else."""
+    return _core.Scene(
+        {
+            "media": record["media"][:1],
+            "finishes": [{"kind": "fresnel"}],
+            "solids": [],
+            "faces": faces,
+            "sources": sources,
+            "detectors": [],
+        }
+    )
+
+
+@functools.cache
+def _spread(n: int, dimensions: int) -> Array:
+    """Points of the unit cube, evenly spread: multiples of powers of 1/g, g^(d+1) = g + 1 [Roberts2018]_."""
+    g = 2.0
+    for _ in range(64):
+        g = (1.0 + g) ** (1.0 / (dimensions + 1))
+    return (0.5 + np.outer(np.arange(1, n + 1), g ** -np.arange(1.0, dimensions + 1))) % 1.0
+
+
+def _directions(n: int) -> Array:
+    """Unit vectors, evenly spread, shape (n, 3)."""
+    u, v = _spread(n, 2).T
+    z, turn = 2.0 * u - 1.0, 2.0 * np.pi * v
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
+
+
+# --- solids in solids ------------------------------------------------------------------------------------------------
+
+
+def _overlaps(solids: _Solids) -> Iterator[str]:
+    pairs = list(itertools.islice(_near(solids), MOST_PAIRS + 1))
+    lines = min(MOST_LINES, max(FEWEST_LINES, ALL_LINES // max(1, 2 * len(pairs))))
+    names = solids.names
+    shared: list[tuple[int, int]] = []
+    hidden: set[int] = set()
+    for a, b in pairs[:MOST_PAIRS]:
+        point, first, second = _compare(solids, a, b, lines)
+        if point is None:
+            continue
+        shared.append((a, b))
+        if first and second:
+            yield (
+                f"{names[a]} and {names[b]} overlap: both hold {_place(point)}, and neither lies in the other; {names[b]}, "
+                "which is listed later, fills the space that they share"
+            )
+        elif not first and a not in hidden:
+            hidden.add(a)
+            yield (
+                f"{names[a]} lies in {names[b]}, which is listed later and fills its space, as at {_place(point)}; light "
+                f"never meets {names[a]}: list it after {names[b]}"
+            )
+    yield from _crowds(solids, shared)
+    if len(pairs) > MOST_PAIRS:
+        yield f"more than {MOST_PAIRS} pairs of solids are near each other; {MOST_PAIRS} were looked at for overlaps"
+
+
+def _near(solids: _Solids) -> Iterator[tuple[int, int]]:
+    """Pairs of solids whose boxes have a space in common, the first listed first."""
+    order = np.argsort(solids.low[:, 0], kind="stable")
+    low, high, sizes = solids.low[order], solids.high[order], solids.sizes[order]
+    ends = np.searchsorted(low[:, 0], high[:, 0])
+    for i, end in enumerate(ends):
+        common = np.minimum(high[i], high[i + 1 : end]) - np.maximum(low[i], low[i + 1 : end])
+        thick = BESIDE * np.minimum(sizes[i], sizes[i + 1 : end])
+        for j in np.flatnonzero((common > thick[:, None]).all(axis=1)):
+            a, b = int(order[i]), int(order[i + 1 + j])
+            yield min(a, b), max(a, b)
+
+
+def _compare(solids: _Solids, a: int, b: int, lines: int) -> tuple[Array | None, bool, bool]:
+    """A point in the midst of what two solids share, if they do; and whether each has space of its own."""
+    low, high = solids.low[[a, b]], solids.high[[a, b]]
+    reach = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
+    small = min((a, b), key=lambda solid: solids.sizes[solid])
+    common = low.max(axis=0) + _spread(lines, 3) * (high.min(axis=0) - low.max(axis=0))
+    directions = _directions(2 * lines)
+    starts = np.concatenate([common, solids.in_faces(small, lines)]) - reach * directions
+    line, solid, t = solids.crossings(starts, directions)
+    kept = (solid == a) | (solid == b)
+    line, solid, t = line[kept], solid[kept], t[kept]
+    # Stretches from each crossing to the next of the same line.
+    length = np.where(line[1:] == line[:-1], np.diff(t), 0.0)
+    thick = length > BESIDE * solids.sizes[[a, b]].min()
+    first, second = (_held(line, solid == which)[:-1] & thick for which in (a, b))
+    if not (first & second).any():
+        return None, True, True
+    best = int(np.argmax(np.where(first & second, length, 0.0)))
+    point = starts[line[best]] + (t[best] + length[best] / 2.0) * directions[line[best]]
+    return point, bool((first & ~second).any()), bool((second & ~first).any())
+
+
+def _held(line: Numbers, crossed: Flags) -> Flags:
+    """Whether what follows each crossing of a line lies in a solid, given which of the crossings are those of the solid.
+
+    A line that crosses it an odd number of times has met an edge: nothing of it counts.
+    """
+    count: Numbers = np.cumsum(crossed, dtype=np.int64)
+    begin, end = np.searchsorted(line, line), np.searchsorted(line, line, side="right")
+    before = count[begin] - crossed[begin].astype(np.int64)
+    held: Flags = ((count - before) % 2 == 1) & ((count[end - 1] - before) % 2 == 0)
+    return held
+
+
+def _crowds(solids: _Solids, shared: Sequence[tuple[int, int]]) -> Iterator[str]:
+    """More solids in one place than a ray may be in at once."""
+    for a, pairs in itertools.groupby(sorted(shared), key=lambda pair: pair[0]):
+        if len(list(pairs)) < DEEPEST:
+            continue
+        points = solids.low[a] + _spread(MOST_LINES, 3) * (solids.high[a] - solids.low[a])
+        inside, _ = solids.sides(points)
+        inside &= inside[:, a : a + 1]
+        most = int(np.argmax(inside.sum(axis=1)))
+        if inside[most].sum() > DEEPEST:
+            names = [name for name, held in zip(solids.names, inside[most], strict=True) if held]
+            yield f"{', '.join(names)} all hold {_place(points[most])}; a ray can be in {DEEPEST} solids at once: use fewer"
+            return
+
+
+# --- sources in solids -----------------------------------------------------------------------------------------------
+
+
+def _starts(solids: _Solids, name: str, source: Record) -> Iterator[str]:
+    trails = _core.trace_trails(_bare(solids.record, [], [source]), STARTS, 1, 1, 1.0)
+    points = np.array([trail[0] for trail in trails if len(trail)]).reshape(-1, 3)
+    near = (points[:, None] >= solids.low) & (points[:, None] <= solids.high)
+    if not near.all(axis=2).any():
+        return
+    inside, outside = solids.sides(points)
+    for solid in np.flatnonzero(inside.mean(axis=0) >= SHARE):
+        # The space belongs to the last solid that holds it.
+        owned = inside[:, solid] & ~inside[:, solid + 1 :].any(axis=1)
+        here, without = inside[:, solid], outside[:, solid]
+        if solids.opaque[solid]:
+            if owned.mean() >= SHARE:
+                yield (
+                    f'{owned.mean():.0%} of the light of "{name}" starts in {solids.names[solid]}, as at '
+                    f"{_place(points[np.argmax(owned)])}, and no face of it lets light pass; move one of them"
+                )
+        elif without.mean() >= SHARE:
+            yield (
+                f'{here.mean():.0%} of the light of "{name}" starts in {solids.names[solid]}, as at '
+                f"{_place(points[np.argmax(here)])}, and {without.mean():.0%} outside of it, as at "
+                f"{_place(points[np.argmax(without)])}; put all of it inside, or none"
+            )

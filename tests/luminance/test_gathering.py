@@ -1,0 +1,177 @@
+"""Lines of sight that end at surfaces whose light is known: the same map, with less noise. Verdicts at 1e-4, fixed seeds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from etendue.luminance.gathering import BLOCKS, blocks, comparison_note
+from scipy.stats import chi2, norm
+
+Array = npt.NDArray[np.float64]
+SIGNIFICANCE = 1e-4
+WHITE = {"kind": "lambertian", "reflectance": 0.85}
+
+
+def assert_agree(values: Array, expected: Array, error: Array) -> None:
+    """χ² and the largest of the z; of 16 passes the spread has 15 degrees of freedom, which widens both a little."""
+    z = (values - expected) / error
+    widened = (z**2).sum() * 13 / 15
+    assert chi2.sf(widened, z.size) > SIGNIFICANCE
+    assert np.abs(z).max() < 1.35 * norm.isf(SIGNIFICANCE / 2 / z.size)
+
+
+def tray(**more: Any) -> dict[str, Any]:
+    """A white tray with slanted sides, lit by a lamp in a corner that faces one side; a black plate lies close to the floor,
+    a slanted diffuse sheet lets light through. No symmetry; light goes to and fro."""
+    side = {"shape": {"kind": "rectangle", "width": 40, "height": 16}, "finish": WHITE}
+    surfaces = [
+        {"name": "floor", "shape": {"kind": "rectangle", "width": 40, "height": 30}, "finish": WHITE},
+        {"name": "left", **side, "at": [-20, 0, 6], "toward": [1, 0, 0.2], "spin": 90},
+        {"name": "right", **side, "at": [21, 0, 7], "toward": [-1, 0.1, 0.4], "spin": 90},
+        {"name": "back", "shape": {"kind": "cylinder", "radius": 34, "height": 18}, "at": [0, -16, 0], "finish": WHITE},
+        {"name": "plate", "shape": {"kind": "disk", "radius": 5}, "at": [4, 3, 1e-3], "finish": "absorber"},
+        {"name": "sheet", "shape": {"kind": "rectangle", "width": 9, "height": 7}, "at": [-8, -4, 8],
+         "toward": [0.5, 0.3, 1], "finish": {"kind": "lambertian", "reflectance": 0.3, "transmittance": 0.5}},
+    ]  # fmt: skip
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 1.5}, "flux": 50, "at": [-12, 8, 5],
+            "toward": [1, -0.6, 0.3]}  # fmt: skip
+    eye = {"name": "eye", "theta": 35, "phi": 250, "distance": 300, "target": [0, 0, 4],
+           "screen": {"width": 44, "height": 34, "columns": 11, "rows": 9}}  # fmt: skip
+    detectors = [{"name": "image", "kind": "image", "observer": "eye"}]
+    return {"sources": [lamp], "surfaces": surfaces, "observers": [eye], "detectors": detectors, **more}
+
+
+def seen(scene: et.Scene, **how: Any) -> et.LuminanceMap:
+    (lmap,) = et.luminance_map(scene, **how)
+    return lmap
+
+
+@pytest.fixture(scope="module")
+def gathered() -> et.LuminanceMap:
+    return seen(et.Scene(**tray()), rays_per_pixel=1024, seed=3, gather=True)
+
+
+def test_the_map_is_that_of_the_light_image(gathered: et.LuminanceMap) -> None:
+    """Rays forwards, each scatter connected to the eye, know nothing of patches."""
+    image = et.trace(et.Scene(**tray()), 2e6, 9).images["image"]
+    # The lamp itself is no scattered light.
+    eye, screen = gathered.observer, gathered.screen
+    dark = {**tray(), "surfaces": [dict(s, finish="absorber") for s in tray()["surfaces"]]}
+    bare = et.luminance_map(et.Scene(**dark), eye, screen, rays_per_pixel=256)
+    clear = (bare.values == 0) & (image.values > 0)
+    assert clear.sum() > 60
+    error = np.hypot(gathered.standard_error, image.standard_error)
+    assert np.median(error[clear] / image.values[clear]) < 0.02
+    assert_agree(gathered.values[clear], image.values[clear], error[clear])
+
+
+def test_noise_is_much_smaller(gathered: et.LuminanceMap) -> None:
+    exact = seen(et.Scene(**tray()), rays_per_pixel=1024, seed=4)
+    lit = exact.values > 0.2 * np.median(exact.values)
+    ratio = (exact.standard_error[lit] / gathered.standard_error[lit]) ** 2
+    assert np.median(ratio) > 1.5
+    assert "lines of sight that go on to the sources" in " ".join(gathered.notes)
+    assert "leave gather out" not in " ".join(gathered.notes)
+
+
+def test_integrating_sphere() -> None:
+    """V6: L = ρ (E₀ + E_r)/π, as in test_scene_map, to a fraction of its error."""
+    radius, reflectance, flux, top = 10.0, 0.9, 3.0, 8.0
+    area = 4 * math.pi * radius**2
+    port = (radius - top) / (2 * radius)
+    inside = np.array([0.6, 0.64, -0.48])
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 0.01}, "flux": flux, "at": 9.99 * inside,
+            "toward": -inside}  # fmt: skip
+    wall = {"shape": {"kind": "sphere", "radius": radius}, "trim": {"z": [-11, top]},
+            "finish": {"kind": "lambertian", "reflectance": reflectance}}  # fmt: skip
+    reflected = reflectance * flux * (1 - port) / (area * (1 - reflectance * (1 - port)))
+    expected = reflectance / math.pi * (flux / area + reflected) * 1e6
+    lmap = et.luminance_map(
+        et.Scene(sources=[lamp], surfaces=[wall]),
+        et.Observer(8, 200, 60, target=(0, 0, 8)),
+        et.Screen(5, 4, 5, 4),
+        rays_per_pixel=1024,
+        gather=True,
+    )
+    assert_agree(lmap.values, np.full(lmap.values.shape, expected), lmap.standard_error)
+    assert abs(lmap.values.mean() / expected - 1) < 3e-3
+
+
+def test_no_light_is_counted_twice() -> None:
+    """A lens throws a caustic on the floor, which lights the walls; a beam falls on a side: what the light image adds and
+    what the patches send are shared out."""
+    lens = {"name": "lens", "shape": {"kind": "ball", "radius": 3}, "medium": "BK7", "at": [-6, 4, 6]}
+    beam = {"kind": "beam", "shape": {"kind": "disk", "radius": 2}, "flux": 20, "at": [0, -3, 30],
+            "toward": [0.5, 0.1, -1]}  # fmt: skip
+    scene = et.Scene(**{**tray(solids=[lens]), "sources": [*tray()["sources"], beam]})
+    both = seen(scene, rays_per_pixel=1024, seed=4, forward_rays=2e6, gather=True)
+    image = et.trace(scene, 4e6, 3).images["image"]
+    # Pixels in which the lens or the lamp is seen show what a light image cannot.
+    right, up, _ = image.screen.axes(image.observer)
+    points = np.array(image.observer.target) + image.screen.x[:, None] * right + image.screen.y[:, None, None] * up
+    sight = points - image.observer.position
+    sight /= np.linalg.norm(sight, axis=-1, keepdims=True)
+    clear = image.values > 0
+    for centre, radius in ((np.array([-6.0, 4.0, 6.0]), 3.0), (np.array([-12.0, 8.0, 5.0]), 1.5)):
+        off = np.linalg.norm(np.cross(image.observer.position - centre, sight), axis=-1)
+        clear &= off > radius + math.hypot(4, 4) / 2
+    assert clear.sum() > 50
+    error = np.hypot(image.standard_error, both.standard_error)
+    assert_agree(both.values[clear], image.values[clear], error[clear])
+
+
+def test_triangles_of_a_mesh_are_patches(tmp_path: Any) -> None:
+    """A dented bowl of small triangles and one of large ones, beside lines of sight that go on."""
+    import trimesh
+
+    bowl = trimesh.creation.icosphere(subdivisions=4, radius=12)
+    bowl.update_faces(bowl.triangles_center @ [0.1, 0.05, -1.0] > -3.1)
+    bowl.apply_scale([1.0, 0.8, 0.9])
+    bowl.export(tmp_path / "bowl.stl")
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 5, "at": [3, 1, -4],
+            "toward": [-1, 0, -0.5]}  # fmt: skip
+    scene = et.Scene(
+        sources=[lamp],
+        surfaces=[{"name": "bowl", "shape": {"kind": "mesh", "file": str(tmp_path / "bowl.stl")}, "finish": WHITE}],
+    )
+    eye, screen = et.Observer(20, 40, 200, target=(0, 0, -4)), et.Screen(18, 14, 6, 5)
+    known = et.luminance_map(scene, eye, screen, rays_per_pixel=512, gather=True)
+    exact = et.luminance_map(scene, eye, screen, rays_per_pixel=2048, seed=7)
+    lit = exact.values > 0
+    error = np.hypot(known.standard_error, exact.standard_error)[lit]
+    assert_agree(known.values[lit], exact.values[lit], error)
+    # Per line of sight, the variance is smaller; the rest is that of the light that comes straight from the lamp.
+    assert np.median((exact.standard_error[lit] / known.standard_error[lit]) ** 2) * 4 > 1.2
+
+
+def test_the_same_bits_for_any_number_of_threads() -> None:
+    maps = [seen(et.Scene(**tray()), rays_per_pixel=64, seed=3, gather=True, threads=n) for n in (1, 2, 7)]
+    for other in maps[1:]:
+        assert np.array_equal(maps[0].values, other.values)
+        assert np.array_equal(maps[0].standard_error, other.standard_error)
+
+
+def test_nothing_diffuse_is_told() -> None:
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 5}
+    lmap = et.luminance_map(
+        et.Scene(sources=[lamp]), et.Observer(0, 0, 100), et.Screen(2, 2, 2, 2), rays_per_pixel=4, gather=True
+    )
+    assert any("no diffuse surface" in note for note in lmap.notes)
+    assert lmap.values.max() > 0
+
+
+def test_a_difference_is_told() -> None:
+    """The comparison is judged by the errors of both: passes of one mean, lines of another."""
+    rng = np.random.default_rng(3)
+    exact = [rng.normal(10.0, 1.0, (40, 30)) for _ in range(2)]
+    for shift, told in ((0.0, False), (0.5, True)):
+        passes = [blocks(rng.normal(10.0 + shift, 0.3, (40, 30))) for _ in range(16)]
+        note = comparison_note(passes, exact)
+        assert ("leave gather out" in note) is told
+    assert len(passes[0]) == BLOCKS**2 + 1
+    assert "too few" in comparison_note(passes, [np.diag([1.0, 0, 0, 0, 0]) * k for k in (1.0, 2.0)])
