@@ -20,6 +20,7 @@ from scipy.stats import chi2, norm
 Array = npt.NDArray[np.float64]
 SIGNIFICANCE = 1e-4
 LARGEST_Z = float(norm.isf(SIGNIFICANCE / 2))
+NO_FACE = (1 << 32) - 1
 ONE_ROUND = ROUND * _core.batch_size()
 
 
@@ -60,6 +61,13 @@ def everything(folder: Path) -> dict[str, Any]:
     bodies that touch, finishes that transmit and depend on angle and colour; and a cavity with many scatters of each ray."""
     (folder / "tile.obj").write_text("v 0 0 0\nv 9 0 1\nv 9 8 2\nv 0 8 0\nf 1 2 3\nf 1 3 4\n", encoding="utf-8")
     (folder / "veil.csv").write_text("450, 0.2\n600, 0.5\n", encoding="utf-8")
+    # Tilted, so that rounding sets faces that coincide apart.
+    up = np.array([0.36, -0.48, 0.8])
+    block, across = np.array([2, 1, 15.0]), np.array([0.8, 0.6, 0])
+
+    def on(height: float, aside: float = 0.0) -> dict[str, Any]:
+        return {"at": list(block + height * up + aside * across), "toward": list(up)}
+
     veil = {"kind": "lambertian", "reflectance": {"file": "veil.csv", "by": "wavelength"}, "transmittance": 0.3}
     white = {"kind": "lambertian", "reflectance": 0.95}
     return {
@@ -71,16 +79,16 @@ def everything(folder: Path) -> dict[str, Any]:
             {"name": "pilot", "kind": "point", "flux": 30, "at": [3, 4, 12]},
         ],
         "solids": [
-            {"name": "block", "medium": "tinted", "shape": {"kind": "block", "width": 14, "height": 12, "depth": 3},
-             "at": [2, 1, 15]},
-            {"name": "cap", "medium": "tinted", "shape": {"kind": "block", "width": 14, "height": 12, "depth": 2},
-             "at": [2, 1, 18], "finishes": {"left": white}},
+            {"name": "block", "medium": "tinted", **on(0),
+             "shape": {"kind": "block", "width": 14, "height": 12, "depth": 3}},
+            {"name": "cap", "medium": "tinted", "shape": {"kind": "block", "width": 14, "height": 12, "depth": 2}, **on(3),
+             "finishes": {"left": white}},
             {"name": "dome", "medium": "silicone", "shape": {"kind": "dome", "radius": 4}, "at": [9, -6, 0],
              "finishes": {"dome": {"kind": "lambertian", "reflectance": 0.4, "transmittance": 0.4}}},
         ],
         "surfaces": [
-            {"name": "label", "shape": {"kind": "disk", "radius": 3}, "at": [2, 1, 20], "finish": veil},
-            {"name": "inlay", "shape": {"kind": "disk", "radius": 2}, "at": [5, 1, 18], "finish": veil},
+            {"name": "label", "shape": {"kind": "disk", "radius": 3}, **on(5), "finish": veil},
+            {"name": "inlay", "shape": {"kind": "disk", "radius": 2}, **on(3, 2), "finish": veil},
             {"name": "tile", "shape": {"kind": "mesh", "file": "tile.obj", "unit": "mm"}, "at": [-9, -4, 8], "finish": veil},
             {"name": "cup", "shape": {"kind": "cylinder", "radius": 6, "height": 9}, "finish": white},
             {"name": "floor", "shape": {"kind": "disk", "radius": 30}, "at": [0, 0, -2], "finish": veil},
@@ -88,7 +96,7 @@ def everything(folder: Path) -> dict[str, Any]:
         "observers": [view("eye", 40, 15), view("below", 125, 300, target=[2, 0, 8]), view("near", 60, 110, distance=30)],
         "detectors": [
             {"name": "scatter", "kind": "scatter"},
-            {"name": "rays", "kind": "rays", "shape": {"kind": "disk", "radius": 3}, "at": [2, 1, 20]},
+            {"name": "rays", "kind": "rays", "shape": {"kind": "disk", "radius": 3}, **on(5)},
             *({"name": name, "kind": "image", "observer": name} for name in ("eye", "below", "near")),
         ],
     }  # fmt: skip
@@ -114,6 +122,17 @@ def test_the_same_picture_as_a_light_image_of_the_same_rays(traced: et.TraceResu
         np.testing.assert_allclose(lmap.standard_error, image.standard_error, rtol=1e-9)
         assert lmap.observer == image.observer
         assert lmap.flux_unit == "lm"
+
+
+def test_light_leaves_all_faces_that_coincide(tmp_path: Path) -> None:
+    """Where a label lies on a block, light is sent off from both: of one alone it would meet the other at once."""
+    scene = et.Scene.from_dict(everything(tmp_path), folder=tmp_path)
+    events = et.trace(scene, 5000, seed=5).events["scatter"]
+    rows = np.array(events.rows)
+    shared = rows["face"][:, 1] != NO_FACE
+    assert 20 < shared.sum() < 0.5 * len(rows)
+    rows["face"][:, 1:] = NO_FACE
+    assert et.luminance_map(events.replace(rows=rows))[0].rays.sum() < et.luminance_map(events)[0].rays.sum()
 
 
 def test_what_events_say(traced: et.TraceResult) -> None:

@@ -58,12 +58,13 @@ impl Event {
     #[must_use]
     pub fn new(meeting: &Meeting, finish: u32, direction: Vec3, [flux, wavelength]: [f64; 2], ray: u64) -> Self {
         let mut leaving = meeting.leaving;
-        if let Some(slot) = leaving.face.iter().position(|face| *face == meeting.face) {
+        let mut found = leaving.face.iter().zip(leaving.part);
+        if let Some(slot) = found.position(|(face, part)| (*face, part) == (meeting.face, meeting.part)) {
             leaving.face.swap(0, slot);
             leaving.part.swap(0, slot);
         } else {
             // More faces coincide than are told apart: in a corner.
-            (leaving.face[0], leaving.part[0]) = (meeting.face, 0);
+            (leaving.face[0], leaving.part[0]) = (meeting.face, meeting.part);
         }
         Self {
             point: meeting.point,

@@ -206,6 +206,9 @@ pub fn meet_one(
     }
 }
 
+/// Surfaces that change nothing, which light may pass between two points: more are a start that is not where it should be.
+const MOST_PASSED: u32 = 1000;
+
 /// The share of light that gets from a point to another without being scattered, reflected or refracted: what media do not
 /// absorb, 0 if there is a surface in between.
 #[must_use]
@@ -220,7 +223,7 @@ pub fn transmittance(
 ) -> f64 {
     let (mut o, mut leaving, mut inside, mut depth) = (from, leaving, inside, 0.0);
     let d = (to - from).normalized();
-    loop {
+    for _ in 0..MOST_PASSED {
         let distance = (to - o).dot(d);
         // What lies within rounding of the end is the surface that the end lies on.
         let reach = distance - 64.0 * ROUNDING * (o.x.abs() + o.y.abs() + o.z.abs() + distance);
@@ -247,6 +250,7 @@ pub fn transmittance(
             }
         }
     }
+    0.0
 }
 
 /// The media of a scene at the wavelength that was last asked for, since one ray follows another of the same.

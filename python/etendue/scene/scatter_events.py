@@ -88,7 +88,7 @@ class ScatterEvents:
     >>> events.position.shape == (len(events), 3), bool((events.position[:, 2] == 30).all())
     (True, True)
     >>> observers = [et.Observer(theta, 20, 500, target=(0, 0, 30)) for theta in (150, 120)]
-    >>> one, other = et.luminance_map(events, observers, et.Screen(20, 20, 4, 4))
+    >>> one, other = et.luminance_map(events, observers, et.Screen(20, 20, 4, 4, "xy"))
     >>> bool(abs(one.values.mean() / other.values.mean() - 1) < 0.02)      # paper is as bright from everywhere
     True
     """
