@@ -7,7 +7,7 @@ when it leaves, is absorbed by chance, or meets a black disk. The same loop, and
 - analytic: the faces as they are;
 - mesh: 24 576 triangles, flat normals; beside Mitsuba also Embree, asked by arrays of rays through `embreex`;
 - map: the reverse map seen from 55°, 250 × 125 pixels of 0.2 mm; efficiency is 1/(variance · time), the variance that of a
-  pixel over independent runs, relative to its mean over all of them; gathered maps have 256 paths a pixel, their survey included,
+  pixel over independent runs, relative to its mean over all of them; gathered maps have 256 paths a pixel and their survey,
   lines that go on 16, Mitsuba 64;
 - field: maps of a light field, bare and behind a lens, 50 × 50 pixels and 1 000 paths each;
 - cells: time per ray drawn from light fields of 16 to 65 536 cells of place.

@@ -99,7 +99,8 @@ def test_integrating_sphere() -> None:
         gather=True,
     )
     assert_agree(lmap.values, np.full(lmap.values.shape, expected), lmap.standard_error)
-    assert abs(lmap.values.mean() / expected - 1) < 3e-3
+    # The mean of such maps scatters by 0.25 % (eight seeds); without patches by 0.8 %, of half as many lines.
+    assert abs(lmap.values.mean() / expected - 1) < 3.9 * 2.5e-3
 
 
 def test_no_light_is_counted_twice() -> None:
