@@ -7,7 +7,7 @@ when it leaves, is absorbed by chance, or meets a black disk. The same loop, and
 - analytic: the faces as they are;
 - mesh: 24 576 triangles, flat normals; beside Mitsuba also Embree, asked by arrays of rays through `embreex`;
 - map: the reverse map seen from 55°, 250 × 125 pixels of 0.2 mm; efficiency is 1/(variance · time), the variance that of a
-  pixel over independent runs, relative to its mean over all of them; gathered maps have 256 paths a pixel and their survey,
+  pixel over independent runs, relative to its mean over all of them; gathered maps have 1024 paths a pixel and their survey,
   lines that go on 16, Mitsuba 64;
 - field: maps of a light field, bare and behind a lens, 50 × 50 pixels and 1 000 paths each;
 - cells: time per ray drawn from light fields of 16 to 65 536 cells of place.
@@ -223,9 +223,9 @@ def job_map(_rays: int) -> None:
         return _core.look_at_scene(core, view, 16, seed, 1_000_000, "nothing", 0, 1)[0]
 
     def gathered(seed: int) -> Array:
-        """A map of the default 256 paths a pixel, with its survey."""
+        """A map of 16 passes of 64 paths a pixel, with its survey."""
         survey = _core.Survey(core, seed, 1_000_000)
-        how = (core, view, 16, seed, 1_000_000, "nothing")
+        how = (core, view, 64, seed, 1_000_000, "nothing")
         passes = [_core.look_at_scene(*how, i, i + 1, None, survey)[0] for i in range(16)]
         return sum(passes) / len(passes)
 
@@ -278,7 +278,7 @@ def job_map(_rays: int) -> None:
         return 1.0 / (relative * seconds), math.sqrt(relative), float(np.median(mean[inside]))
 
     mine, noise, level = judged(ours, 16)
-    known, little_noise, known_level = judged(gathered, 8)
+    known, little_noise, known_level = judged(gathered, 6)
     yours, their_noise, their_level = judged(theirs, 16)
     for way, efficiency in (("gathered", known), ("lines that go on", mine)):
         row(
