@@ -23,7 +23,8 @@ from etendue.plot.map_picture import SCALES, plot_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import PLANES, Observer, Screen
 from etendue.quantities.ray_set import RaySet
-from etendue.scene import Scene
+from etendue.scene import Scene, compile_scene
+from etendue.scene.framing import framed_screen
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.tracing.result import TraceResult
 from etendue.tracing.storage import is_result_file
@@ -54,7 +55,7 @@ def luminance(
     ] = None,
     size: Annotated[
         str | None,
-        typer.Option("--size", help="Width and height of the screen in mm; needed with --observer.", metavar="W,H"),
+        typer.Option("--size", help="Width and height of the screen in mm; a scene is framed without.", metavar="W,H"),
     ] = None,
     distance: Annotated[float, typer.Option("--distance", help="From target to observer in mm.")] = 1000.0,
     target: Annotated[str, typer.Option("--target", help="Point looked at, in mm.", metavar="X,Y,Z")] = "0,0,0",
@@ -139,8 +140,13 @@ def luminance(
         if not seen:
             raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
     else:
-        screen = _screen(size, pixels, plane)
-        seen = [("", Observer(theta, phi, distance, (x, y, z)), screen) for theta, phi in _angles(observer)]
+        looking = [Observer(theta, phi, distance, (x, y, z)) for theta, phi in _angles(observer)]
+        if own is not None and size is None and plane == "view":
+            columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
+            compiled = compile_scene(own)
+            seen = [("", o, framed_screen(compiled, o, columns, rows)) for o in looking]
+        else:
+            seen = [("", o, _screen(size, pixels, plane)) for o in looking]
     targets, everything = _targets(output, seen)
     check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
 
