@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from etendue.cli import app as program
 from etendue.cli import trace as trace_verb
+from etendue.scene import compile_scene
+from etendue.scene.framing import framed_screen
 from etendue.tracing.running import Rounds
 
 SCENE: dict[str, Any] = {
@@ -167,7 +169,7 @@ def test_luminance_of_a_scene_for_another_observer(run: Run, tmp_path: Path) -> 
         (["lamp.toml", "--samples", "3", "-o", "{observer}.npz"], "--samples"),
         (["lamp.toml", "--method", "cone", "-o", "{observer}.npz"], "--method"),
         (["lamp.toml", "--unit", "W", "-o", "{observer}.npz"], "--unit"),
-        (["lamp.toml", "--observer", "3,4", "-o", "a.npz"], "--size"),
+        (["lamp.toml", "--observer", "3,4", "--plane", "xy", "-o", "a.npz"], "--size"),
         (["lamp.toml", "--size", "3,4", "-o", "a.npz"], "--observer"),
         (["other.ray", "--observer", "0,0", "--size", "3,4", "--until", "0.1", "-o", "a.npz"], "--until"),
         (["other.ray", "--size", "3,4", "-o", "a.npz"], "--observer"),
@@ -177,6 +179,14 @@ def test_options_that_do_not_apply_are_refused(arguments: list[str], text: str, 
     status, out, err = run("luminance", *arguments)
     assert status == 2
     assert text in out + err
+
+
+def test_a_scene_is_framed_without_a_size(run: Run, tmp_path: Path) -> None:
+    options = ["--observer", "3,4", "--pixels", "9,5", "--rays-per-pixel", "4"]
+    status, _, err = run("luminance", "lamp.toml", *options, "-o", str(tmp_path / "a.npz"))
+    assert status == 0, err
+    lmap = et.read_map(tmp_path / "a.npz")
+    assert lmap.screen == framed_screen(compile_scene(et.Scene.load("lamp.toml")), et.Observer(3, 4, 1000), 9, 5)
 
 
 def test_several_observers_do_not_write_to_one_file(run: Run) -> None:

@@ -16,10 +16,17 @@ PLANE = {"shape": {"kind": "plane"}, "finish": "absorber", "at": [0, 0, -9]}
 
 @pytest.mark.parametrize("pixels", [(64, 32), (16, 90)])
 @pytest.mark.parametrize("view", [(0, 0, 50), (35, 200, 40), (90, 70, 900), (150, -20, 33)])
-def test_all_of_the_scene_is_seen_and_it_fills_the_screen(view: tuple[float, float, float], pixels: tuple[int, int]) -> None:
+def test_all_of_the_scene_is_seen_and_it_fills_the_screen(
+    view: tuple[float, float, float], pixels: tuple[int, int]
+) -> None:
     """The corners of a rectangle of triangles, turned and moved, through the pinhole of the eye by similar triangles."""
     at = np.array([3.0, -2.0, 1.0])
-    sheet = {"shape": {"kind": "rectangle", "width": 7, "height": 4}, "finish": "absorber", "at": at, "toward": [1, 0, 0]}
+    sheet = {
+        "shape": {"kind": "rectangle", "width": 7, "height": 4},
+        "finish": "absorber",
+        "at": at,
+        "toward": [1, 0, 0],
+    }
     observer = et.Observer(*view, target=(1, 1, 0))
     compiled = compile_scene(et.Scene(surfaces=[sheet, PLANE]))
     screen = framed_screen(compiled, observer, *pixels)
