@@ -141,12 +141,7 @@ def luminance(
             raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
     else:
         looking = [Observer(theta, phi, distance, (x, y, z)) for theta, phi in _angles(observer)]
-        if own is not None and size is None and plane == "view":
-            columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
-            compiled = compile_scene(own)
-            seen = [("", o, framed_screen(compiled, o, columns, rows)) for o in looking]
-        else:
-            seen = [("", o, _screen(size, pixels, plane)) for o in looking]
+        seen = [("", o, s) for o, s in zip(looking, _screens(own, looking, size, pixels, plane), strict=True)]
     targets, everything = _targets(output, seen)
     check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
 
@@ -276,12 +271,16 @@ def _angles(observer: list[str] | None) -> list[tuple[float, ...]]:
     return [numbers(text, 2, "--observer", "30,0") for text in observer]
 
 
-def _screen(size: str | None, pixels: str, plane: str) -> Screen:
+def _screens(scene: Scene | None, observers: list[Observer], size: str | None, pixels: str, plane: str) -> list[Screen]:
+    """One screen for each observer: of the stated size, or one on which all of the scene is seen."""
+    columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
+    if size is None and scene is not None and plane == "view":
+        compiled = compile_scene(scene)
+        return [framed_screen(compiled, observer, columns, rows) for observer in observers]
     if size is None:
         raise typer.BadParameter("give the screen's width and height in mm, e.g. --size 25,25", param_hint="--size")
     width, height = numbers(size, 2, "--size", "25,25")
-    columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
-    return Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")
+    return [Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")] * len(observers)
 
 
 def _refuse(options: Mapping[str, object], why: str) -> None:
