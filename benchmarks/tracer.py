@@ -5,7 +5,8 @@ reflectance 0.984; four black disks in the base that emit from 1 µm above. A se
 when it leaves, is absorbed by chance, or meets a black disk. The same loop, and the same exit fraction, in both.
 
 - analytic: the faces as they are;
-- mesh: 24 064 triangles (23 bands of 1 024 and a fan of 512), flat normals; beside Mitsuba also Embree, asked by arrays of rays through `embreex`;
+- mesh: 24 064 triangles (23 bands of 1 024 and a fan of 512), flat normals; beside Mitsuba also Embree, asked by arrays of
+  rays through `embreex`;
 - map: the reverse map seen from 55°, 250 × 125 pixels of 0.2 mm; efficiency is 1/(variance · time), the variance that of a
   pixel over independent runs, relative to its mean over all of them; gathered maps have 1024 paths a pixel and their survey,
   lines that go on 16, Mitsuba 64;
