@@ -1,6 +1,6 @@
 //! The light of diffuse surfaces, known beforehand.
 
-use etendue_sampling::ordered::within;
+use etendue_sampling::ordered::inside;
 use etendue_trace::exitance;
 use etendue_trace::reverse::Lit;
 use pyo3::exceptions::PyValueError;
@@ -32,7 +32,7 @@ impl Survey {
         }
         let core = py.detach(|| {
             let lit = Lit::new(scene.core(), scene.lanterns());
-            within(threads.unwrap_or(0), |_| exitance::Survey::new(&lit, seed, most_events))
+            inside(threads.unwrap_or(0), || exitance::Survey::new(&lit, seed, most_events))
         });
         Ok(Self { core })
     }

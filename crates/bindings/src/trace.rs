@@ -5,7 +5,7 @@ use std::ops::Range;
 use etendue_geometry::RaySource;
 use etendue_geometry::assembly::Leaving;
 use etendue_math::Vec3;
-use etendue_sampling::ordered::{BATCH, within};
+use etendue_sampling::ordered::{BATCH, inside};
 use etendue_trace::eye;
 use etendue_trace::forward::{Run, trace, trails};
 use etendue_trace::harvest::{Cell, Harvest, Record};
@@ -115,7 +115,7 @@ pub fn trace_batches<'py>(
     };
     let core = scene.core();
     let batches: Range<u64> = first..last;
-    let harvest: Harvest = py.detach(|| within(threads.unwrap_or(0), |_| trace(core, &run, batches.clone())));
+    let harvest: Harvest = py.detach(|| inside(threads.unwrap_or(0), || trace(core, &run, batches.clone())));
     let dict = PyDict::new(py);
     dict.set_item("ledger", ledger_dict(py, &harvest.ledger)?)?;
     let cells = PyList::empty(py);
@@ -172,7 +172,7 @@ pub fn look_at_scene<'py>(
     let pixels = py.detach(|| {
         let lit = Lit::new(scene.core(), scene.lanterns());
         let survey = survey.map(Survey::core);
-        within(threads.unwrap_or(0), |_| lit.look(&view, &method, survey, first..last))
+        inside(threads.unwrap_or(0), || lit.look(&view, &method, survey, first..last))
     });
     let shape = [view.rows as usize, view.columns as usize];
     let array = |pick: fn(&Pixel) -> f64| PyArray1::from_iter(py, pixels.iter().map(pick)).reshape(shape);
@@ -285,7 +285,7 @@ pub fn look_at_events<'py>(
         )));
     }
     let (core, view, rows) = (scene.core(), view.core(), events.as_slice()?);
-    let cells = py.detach(|| within(threads.unwrap_or(0), |_| eye::look_at_events(core, rows, &view)));
+    let cells = py.detach(|| inside(threads.unwrap_or(0), || eye::look_at_events(core, rows, &view)));
     let cells = cells.ok_or_else(|| PyValueError::new_err("the events are of another scene"))?;
     Ok(cell_arrays(py, &cells))
 }

@@ -76,6 +76,14 @@ pub fn within<T: Send>(threads: usize, work: impl Fn(bool) -> T + Sync) -> T {
     })
 }
 
+/// Calls `work` inside a pool of `threads` threads (0: one per core), also if that is one: for work whose parallel loops do not
+/// ask whether there is a pool. Where a system refuses threads, rayon's own pool serves.
+pub fn inside<T: Send>(threads: usize, work: impl Fn() -> T + Sync) -> T {
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    let done = builder.build_scoped(rayon::ThreadBuilder::run, |pool| pool.install(&work));
+    done.unwrap_or_else(|_| work())
+}
+
 /// Calls `work` on the calling thread, beside a pool of `threads` threads (0: one per core), if there is one.
 ///
 /// For work that allocates much between its parallel loops: what the calling thread frees, it is given again, while the
@@ -92,6 +100,13 @@ pub fn beside<T>(threads: usize, work: impl Fn(Option<&rayon::ThreadPool>) -> T)
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pool_has_as_many_threads_as_asked_for() {
+        for threads in [1, 2, 3] {
+            assert_eq!(inside(threads, rayon::current_num_threads), threads);
+        }
+    }
 
     #[test]
     fn merges_in_order_for_any_number_of_threads() {

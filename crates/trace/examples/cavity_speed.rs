@@ -14,7 +14,7 @@ use etendue_optics::finish::Finish;
 use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
-use etendue_sampling::ordered::{BATCH, within};
+use etendue_sampling::ordered::{BATCH, inside};
 use etendue_trace::forward::{Run, trace};
 use etendue_trace::scene::{Part, Scene};
 
@@ -95,7 +95,7 @@ fn main() -> Result<(), String> {
     };
     for threads in [1, 2] {
         let begin = Instant::now();
-        let harvest = within(threads, |_| trace(&scene, &run, 0..rays.div_ceil(BATCH)));
+        let harvest = inside(threads, || trace(&scene, &run, 0..rays.div_ceil(BATCH)));
         let seconds = begin.elapsed().as_secs_f64();
         let [emitted, _] = harvest.ledger.balance();
         println!(

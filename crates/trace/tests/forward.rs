@@ -10,7 +10,7 @@ use etendue_optics::finish::Finish;
 use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
-use etendue_sampling::ordered::within;
+use etendue_sampling::ordered::inside;
 use etendue_trace::detector::Detector;
 use etendue_trace::eye::look_at_events;
 use etendue_trace::forward::{Run, trace};
@@ -101,7 +101,7 @@ fn run(scene: &Scene, rays: u64, threads: usize) -> Harvest {
         most_events: 10_000,
         sets: &[],
     };
-    within(threads, |_| trace(scene, &run, 0..rays.div_ceil(1 << 16)))
+    inside(threads, || trace(scene, &run, 0..rays.div_ceil(1 << 16)))
 }
 
 const VIEW: View = View {
@@ -214,7 +214,7 @@ fn events_looked_at_later_are_the_light_image() {
     }
     for threads in [1, 7] {
         assert_eq!(
-            within(threads, |_| look_at_events(&scene, &flat, &VIEW)),
+            inside(threads, || look_at_events(&scene, &flat, &VIEW)),
             Some(later.clone())
         );
     }
