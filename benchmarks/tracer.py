@@ -11,11 +11,11 @@ when it leaves, is absorbed by chance, or meets a black disk. The same loop, and
   pixel over independent runs, relative to its mean over all of them; gathered maps have 1024 paths a pixel and their survey,
   lines that go on 16, Mitsuba 64;
 - field: maps of a light field, bare and behind a lens, 50 × 50 pixels and 1 000 paths each;
-- cells: time per ray drawn from light fields of 16 to 65 536 cells of place.
+- patches: time per ray of a gridded source of 16 to 100 000 patches, through a lens.
 
 Mitsuba's LLVM variants want `libllvm19` (Debian) and `DRJIT_LIBLLVM_PATH=/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1`.
 
-python benchmarks/tracer.py [--jobs analytic,mesh,map,field,cells] [--rays 4000000]
+python benchmarks/tracer.py [--jobs analytic,mesh,map,field,patches] [--rays 4000000]
 """
 
 from __future__ import annotations
@@ -319,23 +319,35 @@ def job_field(_rays: int) -> None:
         row(job, f"{min(seconds):.2f} s", f"{1.0 / min(seconds):.2f} × bar (1 s)")
 
 
-def job_cells(rays: int) -> None:
+def job_patches(rays: int) -> None:
+    lens = {
+        "shape": {
+            "kind": "lens",
+            "radius": 40,
+            "thickness": 20,
+            "front": {"radius_of_curvature": 200},
+            "back": {"radius_of_curvature": -60, "conic": -0.5},
+        },
+        "medium": "PMMA",
+        "at": [0, 0, 10],
+    }
     first = None
-    for depth in (2, 5, 8):
-        field = et.LightField.fit(et.RingSource(rays=400_000), et.Disk(radius=30), depths=(depth, depth, 3, 3))
-        core = _core.Scene(compile_scene(et.Scene(sources=[{"kind": "light-field", "field": field}])).record)
+    for pixel in (20.0, 1.7, 0.165):
+        gridded = et.GriddedSource.fit(et.RingSource(rays=2_000_000), et.Disk(radius=30), pixel=pixel, threshold=5.0)
+        source = {"kind": "gridded", "gridded": gridded, "draws": rays}
+        core = _core.Scene(compile_scene(et.Scene(sources=[source], solids=[lens])).record)
         batches = -(-rays // _core.batch_size())
         seconds = []
-        for _ in range(3):
+        for _ in range(5):
             start = time.perf_counter()
             _core.trace_batches(core, rays, 1, 1000, 0, batches)
             seconds.append(time.perf_counter() - start)
         first = first or min(seconds)
         each = f"{min(seconds) / rays * 1e9:.0f} ns a ray"
-        row(f"rays of a field of {4**depth:,} cells of place", each, f"{min(seconds) / first:.2f} × the first")
+        row(f"rays of {len(gridded.patches):,} patches through a lens", each, f"{min(seconds) / first:.2f} × the first")
 
 
-JOBS = {"analytic": job_analytic, "mesh": job_mesh, "map": job_map, "field": job_field, "cells": job_cells}
+JOBS = {"analytic": job_analytic, "mesh": job_mesh, "map": job_map, "field": job_field, "patches": job_patches}
 
 
 def main() -> None:
