@@ -24,6 +24,7 @@ from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Compiled, Scene, compile_scene
 from etendue.scene.placement import Placement
 from etendue.scene.sources.from_files import Field, Rays
+from etendue.scene.sources.gridded import Gridded
 from etendue.units import MM2_PER_M2
 
 Array = npt.NDArray[np.float64]
@@ -279,11 +280,12 @@ def with_fields(scene: Scene, threads: int | None = None) -> tuple[Scene, list[s
     """
     sources, notes = [], []
     for i, source in enumerate(scene.sources):
-        if not isinstance(source, Rays):
+        if not isinstance(source, Rays | Gridded):
             sources.append(source)
             continue
         name = source.name or f"sources[{i}]"
-        field, surface, share = _fitted(source, scene, threads)
+        rays = source.as_rays(scene.files) if isinstance(source, Gridded) else source
+        field, surface, share = _fitted(rays, scene, threads)
         sources.append(field)
         lost = f"; {share:.2%} of the flux does not come from it" if share > 1e-4 else ""
         notes.append(f"{name}: a light field on {surface} was fitted to its rays{lost}")

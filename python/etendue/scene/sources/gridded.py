@@ -13,6 +13,8 @@ from etendue.formats.rays import read_rays
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.surfaces import parse_surface
 from etendue.scene.files import Files
+from etendue.scene.placement import Placement
+from etendue.scene.sources.from_files import Rays
 from etendue.scene.sources.source import Emitter, Source
 from etendue.scene.values import AsCount, Index, Length, Positive
 
@@ -69,15 +71,25 @@ class Gridded(Source):
             parse_surface(self.surface)
         return self
 
+    def as_rays(self, files: Files) -> Rays:
+        """The source as one of the rays that are drawn, in its place: what can be fitted and then seen."""
+        gridded = self._gridded(files)
+        place = {key: getattr(self, key) for key in (*Source.model_fields, *Placement.model_fields)}
+        return Rays(**place, rays=gridded.sample(self.draws, self.seed), flux=self.flux, flux_unit=gridded.flux_unit)
+
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The rays that were drawn."""
-        gridded = self.gridded
-        if self.file is not None and self.surface is not None:
-            rays = read_rays(files.find(self.file))
-            gridded = GriddedSource.fit(rays, parse_surface(self.surface), self.pixel, self.threshold)
-        assert gridded is not None  # noqa: S101 - one of the two is given
+        gridded = self._gridded(files)
         drawn = gridded.sample(self.draws, self.seed)
         flux = drawn.total_flux if self.flux is None else self.flux
         scale = drawn.flux_scale * flux / drawn.total_flux
         record = {"kind": "rays", "rays": drawn.core_source(), "scale": scale, "flux": flux}
         return (Emitter(record, gridded.flux_unit),)
+
+    def _gridded(self, files: Files) -> GriddedSource:
+        gridded = self.gridded
+        if self.file is not None and self.surface is not None:
+            rays = read_rays(files.find(self.file))
+            gridded = GriddedSource.fit(rays, parse_surface(self.surface), self.pixel, self.threshold)
+        assert gridded is not None  # noqa: S101 - one of the two is given
+        return gridded
