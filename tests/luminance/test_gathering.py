@@ -176,3 +176,28 @@ def test_a_difference_is_told() -> None:
         assert ("leave gather out" in note) is told
     assert len(passes[0]) == BLOCKS**2 + 1
     assert "too few" in comparison_note(passes, [np.diag([1.0, 0, 0, 0, 0]) * k for k in (1.0, 2.0)])
+
+
+def test_colours_and_light_fields_are_gathered_too() -> None:
+    """Two wavelengths of unequal shares, walls that reflect them unequally, a light field beside the lamp: the light image
+    of rays forwards, which knows of no patches, has the same values."""
+    field = et.LightField.fit(et.RingSource(rays=100_000), et.Disk(radius=30), depths=(3, 3, 2, 2))
+    scene = tray()
+    tint = {"kind": "lambertian", "reflectance": {"wavelength": [450, 650], "values": [0.9, 0.4]}}
+    scene["surfaces"] = [dict(s, finish=tint if s["finish"] == WHITE else s["finish"]) for s in scene["surfaces"]]
+    lamp = {**scene["sources"][0], "spectrum": [[450, 0.7], [650, 0.3]]}
+    panel = {"kind": "light-field", "field": field, "flux": 20, "at": [0, 5, 60], "toward": [0, 0, -1],
+             "spectrum": [[450, 0.1], [650, 0.9]]}  # fmt: skip
+    coloured = et.Scene(**{**scene, "sources": [lamp, panel]})
+    known = seen(coloured, rays_per_pixel=1024, seed=2, gather=True)
+    image = et.trace(coloured, 2e6, 5).images["image"]
+    right, up, _ = image.screen.axes(image.observer)
+    points = np.array(image.observer.target) + image.screen.x[:, None] * right + image.screen.y[:, None, None] * up
+    sight = points - image.observer.position
+    sight /= np.linalg.norm(sight, axis=-1, keepdims=True)
+    off = np.linalg.norm(np.cross(image.observer.position - np.array([-12.0, 8.0, 5.0]), sight), axis=-1)
+    clear = (image.values > 0) & (off > 1.5 + math.hypot(4, 4) / 2)
+    assert clear.sum() > 60
+    error = np.hypot(known.standard_error, image.standard_error)
+    assert np.median(error[clear] / image.values[clear]) < 0.03
+    assert_agree(known.values[clear], image.values[clear], error[clear])

@@ -37,7 +37,7 @@ impl Survey {
         Ok(Self { core })
     }
 
-    /// Number of patches, and the share of their sides that can be used.
+    /// Number of patches, and the share of them that can be used.
     fn patches(&self) -> (usize, f64) {
         (self.core.patches(), self.core.usable())
     }

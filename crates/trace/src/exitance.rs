@@ -13,6 +13,7 @@ use std::f64::consts::FRAC_1_PI;
 use std::ops::Range;
 use std::sync::Arc;
 
+use etendue_geometry::Face;
 use etendue_geometry::shape::chart::{BINS, Chart};
 use etendue_geometry::shape::sample::AreaSampler;
 use etendue_math::Vec3;
@@ -21,7 +22,7 @@ use etendue_sampling::ordered::BATCH;
 use crate::detector::Detector;
 use crate::forward::{Run, trace};
 use crate::reverse::Lit;
-use crate::scene::{Act, Scene};
+use crate::scene::{Act, Role, Scene};
 
 /// Batches of rays from which the sizes of patches are chosen.
 const SCOUTS: u64 = 1;
@@ -37,6 +38,9 @@ const FILL: f64 = 16.0;
 
 /// Distance from which a patch counts as smooth, in sides of it.
 const NEAR: f64 = 2.0;
+
+/// What the seed is mixed with, so that no ray of a survey is one of a light image or a trace of the same seed.
+const SURVEY: u64 = 0x5355_5256;
 
 /// More rays than any map takes: the run whose batches are dealt to the passes.
 const RUN: u64 = 1 << 44;
@@ -55,7 +59,7 @@ impl Patches {
     #[allow(clippy::cast_possible_truncation, reason = "limited by the number of rays")]
     fn cut(scene: &Scene, wavelengths: Vec<f64>, areas: &[Option<f64>]) -> Self {
         let mut bins = 0;
-        let cut = |(face, area): (&etendue_geometry::Face, &Option<f64>)| {
+        let cut = |(face, area): (&Face, &Option<f64>)| {
             let chart = Chart::new(&face.shape, (*area)?)?;
             let first = bins;
             bins += chart.areas().len() as u32 * BINS;
@@ -139,15 +143,19 @@ impl Survey {
     /// for any number.
     #[must_use]
     pub fn new(lit: &Lit<'_>, seed: u64, most_events: u32) -> Self {
-        let scene = lit.scene;
+        let (scene, seed) = (lit.scene, seed ^ SURVEY);
         let wavelengths: Vec<f64> = lit.lines.iter().map(|line| line.1).collect();
-        let own = |(face, role): (&etendue_geometry::Face, &crate::scene::Role)| {
+        let own = |(face, role): (&Face, &Role)| {
             let Act::Optical(finish) = role.act else { return None };
             let cut = scene.finishes[finish as usize].is_diffuse() && face.trims.is_empty();
             cut.then(|| AreaSampler::new(&face.shape).map(|sampler| sampler.area()))?
         };
         let areas: Vec<Option<f64>> = scene.assembly.faces().iter().zip(&scene.roles).map(own).collect();
         let count = |patches: &Arc<Patches>, batches: Range<u64>| -> Vec<u64> {
+            // Where nothing is cut there is nothing to look for.
+            if patches.bins == 0 {
+                return Vec::new();
+            }
             let scene = with(scene, patches);
             let run = Run {
                 rays: RUN,

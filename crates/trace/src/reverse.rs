@@ -125,6 +125,7 @@ impl<'a> Lit<'a> {
     pub fn look(&self, view: &View, method: &Method, survey: Option<&Survey>, passes: Range<u32>) -> Vec<Pixel> {
         let known: Vec<Exitance<'_>> = survey
             .iter()
+            .filter(|survey| survey.patches() > 0)
             .flat_map(|survey| passes.clone().map(|pass| survey.exitance(self, pass)))
             .collect();
         let mut pixels = vec![Pixel::default(); view.pixels()];
