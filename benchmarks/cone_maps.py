@@ -8,28 +8,18 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import etendue as et
 import numpy as np
+from timing import best
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from oracles.cone import plain_statement
 
 ACCEPTANCE = 1.5
 SCREEN = et.Screen(70, 70, 128, 128)
-
-
-def best(job: Callable[[], object], repeats: int) -> float:
-    """Least wall time of some repeats [s]: what the job takes when nothing else disturbs it."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        job()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def main() -> None:

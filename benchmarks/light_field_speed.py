@@ -11,13 +11,11 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
 import etendue as et
 import numpy as np
-from cone_maps import best
 from etendue.lightfield.candidate import grow_candidate, product_bases, uniform_bases
 from etendue.lightfield.counting import EtendueCounts, count_rays
 from etendue.lightfield.fitting import fine_depths
@@ -25,6 +23,7 @@ from etendue.lightfield.light_field import LightField, PartField
 from etendue.lightfield.trees import grow, log_evidence
 from etendue.units import MM2_PER_M2
 from light_field import Family, families
+from timing import best, timed
 
 Array = Any
 DEPTHS = (5, 5, 5, 5)
@@ -166,12 +165,11 @@ def looking(field: LightField, extent: float, target: tuple[float, float, float]
         peer = best(lambda: map_in_numpy(field, observer, screen), 3)
         row("numpy: map of 128² pixels, 16 points each", f"{peer * 1e3:.2f} ms", MAP_BAR / peer)
     for threads, cores in CORES:
-        times = []
-        for _ in range(repeats):
-            start = time.perf_counter()
-            et.luminance_map(field, observer, screen, samples=SAMPLES, threads=threads)
-            times.append(time.perf_counter() - start)
-        median = float(np.median(times))
+
+        def look(threads: int | None = threads) -> et.LuminanceMap:
+            return et.luminance_map(field, observer, screen, samples=SAMPLES, threads=threads)
+
+        median = float(np.median([timed(look)[0] for _ in range(repeats)]))
         row(
             f"map of 128² pixels, 16 points each, {cores}, median of {repeats}",
             f"{median * 1e3:.2f} ms",
@@ -203,9 +201,9 @@ def fitting(family: Family, rays: et.RaySet) -> LightField:
     """The whole fit, from rays to field."""
     fields = []
     for title, surface in (("stated", family.surface), ("auto", "auto")):
-        start = time.perf_counter()
-        fields.append(LightField.fit(rays, surface))
-        row(f"LightField.fit, {len(rays):,} rays, {title} surface", f"{time.perf_counter() - start:.2f} s")
+        seconds, fitted = timed(lambda surface=surface: LightField.fit(rays, surface))
+        fields.append(fitted)
+        row(f"LightField.fit, {len(rays):,} rays, {title} surface", f"{seconds:.2f} s")
     field = fields[0]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "field.h5"

@@ -8,16 +8,14 @@ Without a file, rays of the ring source are indexed: 56 bytes each, or 28 if the
 from __future__ import annotations
 
 import argparse
-import os
 import resource
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import etendue as et
 import numpy as np
 from etendue.quantities.ray_stream import RayStream
+from timing import best, load, timed
 
 SCREEN = et.Screen(70, 70, 128, 128)
 VIEWS = (
@@ -31,21 +29,6 @@ VIEWS = (
     ("θ = 10°, 1000 mm, 0.25°", et.Observer(10, 45, 1000), 0.25),
     ("θ = 10°, 1000 mm, 5°", et.Observer(10, 45, 1000), 5.0),
 )
-
-
-def best(job: Callable[[], object], repeats: int) -> float:
-    """Least wall time of some repeats [s]: what the job takes when nothing else disturbs it."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        job()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
-
-def load() -> str:
-    """How busy the machine was: runnable processes per core over the last minute."""
-    return f"{os.getloadavg()[0] / (os.cpu_count() or 1):.1f}"
 
 
 def main() -> None:
@@ -63,14 +46,10 @@ def main() -> None:
         if options.file is not None:
             source = et.read_rays(options.file)
         path = Path(folder) / "rings.etd"
-        start = time.perf_counter()
-        et.RayIndex.build(source, path)
-        built = time.perf_counter() - start
+        built, _ = timed(lambda: et.RayIndex.build(source, path))
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         bytes_each = path.stat().st_size / len(source)
-        print(
-            f"{len(source):,} rays, load per core {load()}: indexed in {built:.1f} s, {path.stat().st_size / 1e6:,.0f} MB"
-        )
+        print(f"{len(source):,} rays, {load()}: indexed in {built:.1f} s, {path.stat().st_size / 1e6:,.0f} MB")
         print(f"  {bytes_each:.1f} bytes a ray; resident at most {peak:,.0f} MiB, mapped pages of the files among them")
         opening = best(lambda: et.RayIndex.open(path), 3)
         index = et.RayIndex.open(path)

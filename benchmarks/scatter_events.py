@@ -9,28 +9,19 @@ python benchmarks/scatter_events.py [--events 1e7]
 from __future__ import annotations
 
 import argparse
-import os
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import etendue as et
 import numpy as np
+from timing import best, load, timed
 
-T = TypeVar("T")
 RADIUS, HEIGHT, REFLECTANCE, HOLE, AWAY = 21.5, 21.4, 0.984, 2.5, 10.0
 
 
 def row(job: str, value: str, ratio: str = "") -> None:
     print(f"{job:<52} {value:>28} {ratio:>30}".rstrip(), flush=True)
-
-
-def timed(work: Callable[[], T]) -> tuple[float, T]:
-    start = time.perf_counter()
-    result = work()
-    return time.perf_counter() - start, result
 
 
 def cavity(detector: dict[str, Any], *more: dict[str, Any]) -> et.Scene:
@@ -71,14 +62,14 @@ def job(name: str, wanted: int, folder: Path, *more: dict[str, Any]) -> None:
     anew, other = timed(lambda: et.trace(cavity(image, *more), rays))
     events = result.events.only
     looks = [timed(lambda: et.luminance_map(events)[0]) for _ in range(4)]
-    best, lmap = min(look[0] for look in looks), looks[0][1]
+    quick, lmap = min(look[0] for look in looks), looks[0][1]
     np.testing.assert_allclose(lmap.values, other.images["image"].values, rtol=1e-10)
     row(f"{name}: trace with one light image", f"{anew:.2f} s", f"{rays / 1e6:.1f} M rays")
     row(f"{name}: trace with scatter events", f"{once:.2f} s", f"{once / anew:.2f} × with one light image")
-    row(f"{name}: map of {len(events) / 1e6:.1f} M events", f"{best:.2f} s", f"{anew / best:.1f} × a trace anew")
+    row(f"{name}: map of {len(events) / 1e6:.1f} M events", f"{quick:.2f} s", f"{anew / quick:.1f} × a trace anew")
     row(f"{name}: the first map", f"{looks[0][0]:.2f} s")
-    one = min(timed(lambda: et.luminance_map(events, threads=1))[0] for _ in range(2))
-    row(f"{name}: events looked at, all cores", f"{len(events) / best / 1e6:.1f} M events/s")
+    one = best(lambda: et.luminance_map(events, threads=1), 2)
+    row(f"{name}: events looked at, all cores", f"{len(events) / quick / 1e6:.1f} M events/s")
     row(f"{name}: events looked at, one thread", f"{len(events) / one / 1e6:.1f} M events/s")
     saved, _ = timed(lambda: result.save(folder / "result.h5"))
     loaded, _ = timed(lambda: et.TraceResult.load(folder / "result.h5").events.only)
@@ -90,7 +81,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--events", type=float, default=1e7)
     options = parser.parse_args()
-    print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores", flush=True)
+    print(load(), flush=True)
     with tempfile.TemporaryDirectory() as folder:
         job("cavity", int(options.events), Path(folder))
         job("cavity behind a grille", int(options.events), Path(folder), grille(Path(folder)))

@@ -38,12 +38,26 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 from etendue import _core
 from etendue.scene import compile_scene
+from timing import best, load
 
 Array = Any
 RADIUS, HEIGHT, REFLECTANCE, HOLE, AWAY = 21.5, 21.4, 0.984, 2.5, 10.0
 HOLES = ((AWAY, 0.0), (-AWAY, 0.0), (0.0, AWAY), (0.0, -AWAY))
 FACETS = 512
 FLUX = 0.96
+LENS = {
+    "name": "lens",
+    "shape": {
+        "kind": "lens",
+        "radius": 40,
+        "thickness": 20,
+        "front": {"radius_of_curvature": 200},
+        "back": {"radius_of_curvature": -60, "conic": -0.5},
+    },
+    "medium": "PMMA",
+    "at": [0, 0, 10],
+}
+"""What stands before a light field and before patches."""
 LIBRARY = Path("/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1")
 
 
@@ -164,12 +178,7 @@ def embree_rate(vertices: Array, triangles: Array, rays: int) -> float:
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     origin = (place + 1e-3 * inward).astype(np.float32)
     direction = direction.astype(np.float32)
-    best = 0.0
-    for _ in range(3):
-        start = time.perf_counter()
-        scene.run(origin, direction)
-        best = max(best, rays / (time.perf_counter() - start))
-    return best
+    return rays / best(lambda: scene.run(origin, direction), 3)
 
 
 def job_forward(name: str, scene: et.Scene, walls: Callable[[], dict[str, Any]], rays: int) -> float:
@@ -293,58 +302,26 @@ def job_map(_rays: int) -> None:
 
 def job_field(_rays: int) -> None:
     field = et.LightField.fit(et.RingSource(rays=1_000_000), et.Disk(radius=30), depths=(5, 5, 5, 5))
-    lens = {
-        "name": "lens",
-        "shape": {
-            "kind": "lens",
-            "radius": 40,
-            "thickness": 20,
-            "front": {"radius_of_curvature": 200},
-            "back": {"radius_of_curvature": -60, "conic": -0.5},
-        },
-        "medium": "PMMA",
-        "at": [0, 0, 10],
-    }
     source = {"kind": "light-field", "field": field}
     view = et.Screen(70, 70, 50, 50).core_view(et.Observer(20, 0, 1000))
-    for name, solids in (("bare", []), ("behind a lens", [lens])):
+    for name, solids in (("bare", []), ("behind a lens", [LENS])):
         core = _core.Scene(compile_scene(et.Scene(sources=[source], solids=solids)).record)
         _core.look_at_scene(core, view, 4, 1, 1000, "nothing", 0, 1)
-        seconds = []
-        for _ in range(3):
-            start = time.perf_counter()
-            _core.look_at_scene(core, view, 125, 1, 1000, "nothing", 0, 8)
-            seconds.append(time.perf_counter() - start)
+        seconds = best(lambda core=core: _core.look_at_scene(core, view, 125, 1, 1000, "nothing", 0, 8), 3)
         job = f"light field {name}, 50 × 50 pixels × 1 000 paths"
-        row(job, f"{min(seconds):.2f} s", f"{1.0 / min(seconds):.2f} × bar (1 s)")
+        row(job, f"{seconds:.2f} s", f"{1.0 / seconds:.2f} × bar (1 s)")
 
 
 def job_patches(rays: int) -> None:
-    lens = {
-        "shape": {
-            "kind": "lens",
-            "radius": 40,
-            "thickness": 20,
-            "front": {"radius_of_curvature": 200},
-            "back": {"radius_of_curvature": -60, "conic": -0.5},
-        },
-        "medium": "PMMA",
-        "at": [0, 0, 10],
-    }
-    first = None
+    first, batches = None, -(-rays // _core.batch_size())
     for pixel in (20.0, 1.7, 0.165):
         gridded = et.GriddedSource.fit(et.RingSource(rays=2_000_000), et.Disk(radius=30), pixel=pixel, threshold=5.0)
         source = {"kind": "gridded", "gridded": gridded, "draws": rays}
-        core = _core.Scene(compile_scene(et.Scene(sources=[source], solids=[lens])).record)
-        batches = -(-rays // _core.batch_size())
-        seconds = []
-        for _ in range(5):
-            start = time.perf_counter()
-            _core.trace_batches(core, rays, 1, 1000, 0, batches)
-            seconds.append(time.perf_counter() - start)
-        first = first or min(seconds)
-        each = f"{min(seconds) / rays * 1e9:.0f} ns a ray"
-        row(f"rays of {len(gridded.patches):,} patches through a lens", each, f"{min(seconds) / first:.2f} × the first")
+        core = _core.Scene(compile_scene(et.Scene(sources=[source], solids=[LENS])).record)
+        seconds = best(lambda core=core: _core.trace_batches(core, rays, 1, 1000, 0, batches), 5)
+        first = first or seconds
+        each = f"{seconds / rays * 1e9:.0f} ns a ray"
+        row(f"rays of {len(gridded.patches):,} patches through a lens", each, f"{seconds / first:.2f} × the first")
 
 
 JOBS = {"analytic": job_analytic, "mesh": job_mesh, "map": job_map, "field": job_field, "patches": job_patches}
@@ -357,7 +334,7 @@ def main() -> None:
     options = parser.parse_args()
     if LIBRARY.exists():
         os.environ.setdefault("DRJIT_LIBLLVM_PATH", str(LIBRARY))
-    print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores", flush=True)
+    print(load(), flush=True)
     for job in options.jobs.split(","):
         JOBS[job](int(options.rays))
 

@@ -11,7 +11,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,39 +27,7 @@ from etendue.formats.rays import RAY_FORMATS
 from etendue.quantities.provenance import version
 from etendue.quantities.report import RayFileWarning
 
-
-@dataclasses.dataclass(frozen=True)
-class Outcome:
-    """What a run of the program left: exit status, standard output, standard error."""
-
-    status: int
-    out: str
-    err: str
-
-    @property
-    def json(self) -> Any:
-        """Standard output as JSON; it must hold nothing else, and no NaN or Infinity."""
-        return json.loads(self.out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
-
-
-Run = Callable[..., Outcome]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Run the program in an empty folder, in this process."""
-    monkeypatch.setenv("COLUMNS", "300")
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: object) -> Outcome:
-        capsys.readouterr()
-        monkeypatch.setattr(sys, "argv", ["etendue", *map(str, arguments)])
-        with pytest.raises(SystemExit) as leaving:
-            program.main()
-        out, err = capsys.readouterr()
-        return Outcome(int(leaving.value.code or 0), out, err)
-
-    return call
+from cli.outcome import Outcome, Run, files
 
 
 @pytest.fixture(scope="module")
@@ -80,10 +47,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     np.savetxt(place / "bad.csv", rows, delimiter=",", fmt="%.9g")
     (place / "nonsense.ray").write_bytes(b"\x00\x01" * 500)
     return place
-
-
-def files(place: Path) -> list[str]:
-    return sorted(str(p.relative_to(place)) for p in place.rglob("*"))
 
 
 # --- the program -----------------------------------------------------------------------------------------------------

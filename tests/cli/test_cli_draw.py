@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import etendue as et
 import pytest
-from etendue.cli import app as program
 from etendue.plot.scene_layout import lay_out_scene
+
+from cli.outcome import Run
 
 SCENE: dict[str, Any] = {
     "name": "lamp",
@@ -23,25 +22,11 @@ SCENE: dict[str, Any] = {
                    "at": [0, 0, 900]}],
 }  # fmt: skip
 
-Run = Callable[..., tuple[int, str, str]]
 
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Run the program in a folder with the scene, in this process."""
-    monkeypatch.setenv("COLUMNS", "300")
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(autouse=True)
+def lamp(tmp_path: Path) -> None:
+    """The scene, in the folder that the program works in."""
     et.Scene(**SCENE).save(tmp_path / "lamp.toml")
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        monkeypatch.setattr(sys, "argv", ["etendue", *map(str, arguments)])
-        with pytest.raises(SystemExit) as leaving:
-            program.main()
-        out, err = capsys.readouterr()
-        return int(leaving.value.code or 0), out, err
-
-    return call
 
 
 def test_the_picture_is_that_of_the_api(run: Run, tmp_path: Path) -> None:

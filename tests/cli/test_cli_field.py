@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,47 +12,15 @@ import numpy.typing as npt
 import pytest
 from etendue.cli import field as field_verbs
 from etendue.cli import fit as fit_verb
-from etendue.cli import main
 from etendue.cli import sample as sample_verb
 from etendue.lightfield.diagnostics import diagnose
 from etendue.lightfield.surfaces import Disk, Plane
 from oracles.light_fields import SURFACES, make_field
 from oracles.sources import LimbDarkenedDisk
 
+from cli.outcome import Run, files
+
 Array = npt.NDArray[np.float64]
-
-
-@dataclasses.dataclass(frozen=True)
-class Outcome:
-    """What a run of the program left."""
-
-    status: int
-    out: str
-    err: str
-
-    @property
-    def json(self) -> Any:
-        """Standard output as JSON, without NaN or Infinity."""
-        return json.loads(self.out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
-
-
-Run = Callable[..., Outcome]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Run the program in an empty folder, in this process."""
-    monkeypatch.setenv("COLUMNS", "300")
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: object) -> Outcome:
-        capsys.readouterr()
-        monkeypatch.setattr(sys, "argv", ["etendue", *map(str, arguments)])
-        with pytest.raises(SystemExit) as leaving:
-            main()
-        return Outcome(int(leaving.value.code or 0), *capsys.readouterr())
-
-    return call
 
 
 @pytest.fixture(scope="module")
@@ -72,10 +37,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "short.h5").write_bytes((place / "dome.h5").read_bytes()[:-500])
     (place / "nonsense.h5").write_bytes(b"\x00\x01" * 500)
     return place
-
-
-def files(place: Path) -> list[str]:
-    return sorted(str(p.relative_to(place)) for p in place.rglob("*"))
 
 
 def same_field(a: et.LightField, b: et.LightField) -> None:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import itertools
 import json
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import etendue as et
 import numpy as np
 import pytest
-from etendue.cli import app as program
 from etendue.cli import trace as trace_verb
 from etendue.scene import compile_scene
 from etendue.scene.framing import framed_screen
 from etendue.tracing.running import Rounds
+
+from cli.outcome import Run
 
 SCENE: dict[str, Any] = {
     "name": "lamp",
@@ -37,25 +37,11 @@ SCENE: dict[str, Any] = {
     ],
 }  # fmt: skip
 
-Run = Callable[..., tuple[int, str, str]]
 
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Run the program in a folder with the scene, in this process."""
-    monkeypatch.setenv("COLUMNS", "300")
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(autouse=True)
+def lamp(tmp_path: Path) -> None:
+    """The scene, in the folder that the program works in."""
     et.Scene(**SCENE).save(tmp_path / "lamp.toml")
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        monkeypatch.setattr(sys, "argv", ["etendue", *map(str, arguments)])
-        with pytest.raises(SystemExit) as leaving:
-            program.main()
-        out, err = capsys.readouterr()
-        return int(leaving.value.code or 0), out, err
-
-    return call
 
 
 def test_trace_is_the_trace_of_the_api(run: Run, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import math
 from typing import Any, Literal, Self
 
@@ -56,12 +57,12 @@ def trimmed_quadric(record: Record, trim: Trim) -> Sheet:
     return Sheet({**record, "z": z, "r": r}, trim.planes())
 
 
-class Quadric(Shape):
+class Quadric(Shape, abc.ABC):
     """What shapes with one quadric equation share."""
 
+    @abc.abstractmethod
     def quadric(self) -> Record:
         """The equation and its own ranges."""
-        raise NotImplementedError
 
     def sheet(self, trim: Trim, files: Files) -> Sheet:  # noqa: ARG002 - other shapes come from files
         """The quadric; ranges of the trim narrow its own."""
