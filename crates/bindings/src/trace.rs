@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use etendue_geometry::RaySource;
-use etendue_geometry::assembly::Leaving;
+use etendue_geometry::lines::Leaving;
 use etendue_math::Vec3;
 use etendue_sampling::ordered::{BATCH, inside};
 use etendue_trace::eye;

@@ -2,149 +2,16 @@
 
 use std::sync::Arc;
 
-use etendue_math::{Frame, Vec3};
+use etendue_math::Vec3;
 use multiversion::multiversion;
 
 use crate::bounds::Bounds;
 use crate::bvh::Bvh;
 use crate::face::Face;
+use crate::lines::{Leaving, Lines, MOST_LEFT, NONE};
 use crate::mesh::{Found, Rays};
-use crate::shape::flat::{meet_annulus, meet_rectangle};
 use crate::shape::{Crossing, Outline, Shape};
-
-/// No face.
-pub const NONE: u32 = u32::MAX;
-
-/// Faces that a ray can start on at once: more surfaces than that never coincide in one point but in corners.
-pub const MOST_LEFT: usize = 4;
-
-/// What a ray starts on: faces, and the parts of them, filled up with [`NONE`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Leaving {
-    /// Faces.
-    pub face: [u32; MOST_LEFT],
-    /// Part of each face.
-    pub part: [u32; MOST_LEFT],
-}
-
-impl Default for Leaving {
-    fn default() -> Self {
-        Self {
-            face: [NONE; MOST_LEFT],
-            part: [NONE; MOST_LEFT],
-        }
-    }
-}
-
-impl Leaving {
-    /// One face more; a ray that starts on more than [`MOST_LEFT`] forgets the rest.
-    pub fn add(&mut self, face: u32, part: u32) {
-        if let Some(slot) = self.face.iter().position(|f| *f == NONE) {
-            (self.face[slot], self.part[slot]) = (face, part);
-        }
-    }
-
-    /// The parts of `face` that are left, in `room`.
-    #[inline]
-    pub fn parts<'a>(&self, face: u32, room: &'a mut [u32; MOST_LEFT]) -> &'a [u32] {
-        let mut n = 0;
-        for slot in 0..MOST_LEFT {
-            if self.face[slot] == face {
-                room[n] = self.part[slot];
-                n += 1;
-            }
-        }
-        &room[..n]
-    }
-}
-
-/// A block of rays: where they start, where they go, what they start on. Structure of arrays.
-#[derive(Clone, Debug, Default)]
-pub struct Lines {
-    /// Start points, one array per axis \[mm\].
-    pub origin: [Vec<f64>; 3],
-    /// Unit directions, one array per axis.
-    pub direction: [Vec<f64>; 3],
-    /// Faces that each ray starts on.
-    left: [Vec<u32>; MOST_LEFT],
-    /// The parts of them.
-    parts: Vec<[u32; MOST_LEFT]>,
-}
-
-impl Lines {
-    /// Number of rays.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.parts.len()
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.parts.is_empty()
-    }
-
-    /// Start point of ray `i`.
-    #[inline(always)]
-    #[must_use]
-    pub fn origin(&self, i: usize) -> Vec3 {
-        Vec3::new(self.origin[0][i], self.origin[1][i], self.origin[2][i])
-    }
-
-    /// Direction of ray `i`.
-    #[inline(always)]
-    #[must_use]
-    pub fn direction(&self, i: usize) -> Vec3 {
-        Vec3::new(self.direction[0][i], self.direction[1][i], self.direction[2][i])
-    }
-
-    /// What ray `i` starts on.
-    #[inline(always)]
-    #[must_use]
-    pub fn leaving(&self, i: usize) -> Leaving {
-        Leaving {
-            face: std::array::from_fn(|slot| self.left[slot][i]),
-            part: self.parts[i],
-        }
-    }
-
-    /// One ray more.
-    #[inline(always)]
-    pub fn push(&mut self, o: Vec3, d: Vec3, leaving: Leaving) {
-        for (axis, (o, d)) in [(o.x, d.x), (o.y, d.y), (o.z, d.z)].into_iter().enumerate() {
-            self.origin[axis].push(o);
-            self.direction[axis].push(d);
-        }
-        for (slot, face) in self.left.iter_mut().zip(leaving.face) {
-            slot.push(face);
-        }
-        self.parts.push(leaving.part);
-    }
-
-    /// Puts a ray in the place of ray `i`.
-    #[inline(always)]
-    pub fn set(&mut self, i: usize, o: Vec3, d: Vec3, leaving: Leaving) {
-        for (axis, (o, d)) in [(o.x, d.x), (o.y, d.y), (o.z, d.z)].into_iter().enumerate() {
-            self.origin[axis][i] = o;
-            self.direction[axis][i] = d;
-        }
-        for (slot, face) in self.left.iter_mut().zip(leaving.face) {
-            slot[i] = face;
-        }
-        self.parts[i] = leaving.part;
-    }
-
-    /// Keeps the first `n` rays.
-    pub fn truncate(&mut self, n: usize) {
-        for axis in self.origin.iter_mut().chain(&mut self.direction) {
-            axis.truncate(n);
-        }
-        for slot in &mut self.left {
-            slot.truncate(n);
-        }
-        self.parts.truncate(n);
-    }
-}
+use crate::sweep::try_simple;
 
 /// What the rays of a block meet first. Structure of arrays.
 #[derive(Clone, Debug, Default)]
@@ -157,6 +24,8 @@ pub struct Hits {
     pub face: Vec<u32>,
     /// Its part and coordinates, for faces that have them.
     pub part: Vec<(u32, [f64; 2])>,
+    /// Whether parts were written since all of them were reset.
+    parted: bool,
     scratch: Scratch,
 }
 
@@ -192,24 +61,18 @@ impl Scratch {
 pub const TIE: f64 = 1e-9;
 
 impl Hits {
-    fn reset(&mut self, n: usize) {
+    fn reset(&mut self, n: usize, parted: bool) {
         self.t.clear();
         self.t.resize(n, f64::INFINITY);
         self.second.clear();
         self.second.resize(n, f64::INFINITY);
         self.face.clear();
         self.face.resize(n, NONE);
-        self.part.clear();
+        if self.parted || parted {
+            self.part.clear();
+        }
         self.part.resize(n, (0, [0.0; 2]));
-    }
-
-    /// Puts what is known of ray `from` in the place of ray `to`.
-    #[inline(always)]
-    pub fn keep(&mut self, from: usize, to: usize) {
-        self.t[to] = self.t[from];
-        self.second[to] = self.second[from];
-        self.face[to] = self.face[from];
-        self.part[to] = self.part[from];
+        self.parted = parted;
     }
 
     /// The nearest crossing of ray `i`.
@@ -220,11 +83,28 @@ impl Hits {
         Crossing { t: self.t[i], part, uv }
     }
 
+    /// For each ray whether another crossing may be part of the same event, as [`Hits::tied`] says.
+    pub fn ties(&self, lines: &Lines, out: &mut Vec<bool>) {
+        find_ties(self, lines, out);
+    }
+
     /// Whether another crossing of ray `i` may be part of the same event.
     #[inline(always)]
     #[must_use]
     pub fn tied(&self, i: usize, o: Vec3) -> bool {
         self.second[i] - self.t[i] <= TIE * (o.x.abs() + o.y.abs() + o.z.abs() + self.t[i])
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn find_ties(hits: &Hits, lines: &Lines, out: &mut Vec<bool>) {
+    let n = lines.len();
+    out.resize(n, false);
+    let out = &mut out[..n];
+    let [x, y, z] = lines.origin.each_ref().map(|v| &v[..n]);
+    let (first, second) = (&hits.t[..n], &hits.second[..n]);
+    for i in 0..n {
+        out[i] = second[i] - first[i] <= TIE * (x[i].abs() + y[i].abs() + z[i].abs() + first[i]);
     }
 }
 
@@ -291,12 +171,13 @@ impl Assembly {
 
     /// The first crossing of each ray of the block, at t > 0.
     pub fn nearest(&self, lines: &Lines, hits: &mut Hits) {
-        hits.reset(lines.len());
+        let one_by_one = !self.others.is_empty() || self.tree.is_some();
+        hits.reset(lines.len(), one_by_one || !self.meshes.is_empty());
         try_simple(&self.faces, &self.simple, lines, hits);
         for &index in &self.meshes {
             self.try_mesh(index, lines, hits);
         }
-        if self.others.is_empty() && self.tree.is_none() {
+        if !one_by_one {
             return;
         }
         for i in 0..lines.len() {
@@ -467,60 +348,5 @@ impl One {
     #[inline(always)]
     fn reach(&self, o: Vec3) -> f64 {
         self.t + TIE * (o.x.abs() + o.y.abs() + o.z.abs() + self.t)
-    }
-}
-
-/// Tries a block of rays on the faces `which`, one face after the other, several rays at a time.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn try_simple(faces: &[Face], which: &[u32], lines: &Lines, hits: &mut Hits) {
-    for &index in which {
-        let face = &faces[index as usize];
-        match &face.shape {
-            Shape::Flat(flat) => match flat.outline {
-                Outline::Annulus { inner, outer } => sweep(&face.frame, index, lines, hits, |o, d, leaving| {
-                    [meet_annulus(inner, outer, o, d, leaving), f64::INFINITY]
-                }),
-                Outline::Rectangle { width, height } => sweep(&face.frame, index, lines, hits, |o, d, leaving| {
-                    [
-                        meet_rectangle([0.5 * width, 0.5 * height], o, d, leaving),
-                        f64::INFINITY,
-                    ]
-                }),
-                Outline::Whole | Outline::Polygon { .. } => sweep(&face.frame, index, lines, hits, |o, d, leaving| {
-                    [meet_annulus(0.0, f64::INFINITY, o, d, leaving), f64::INFINITY]
-                }),
-            },
-            Shape::Quadric(quadric) => sweep(&face.frame, index, lines, hits, |o, d, leaving| {
-                quadric.crossings(o, d, leaving)
-            }),
-            Shape::Asphere(_) | Shape::Torus(_) | Shape::Mesh(_) => {}
-        }
-    }
-}
-
-#[inline(always)]
-fn sweep(frame: &Frame, index: u32, lines: &Lines, hits: &mut Hits, meet: impl Fn(Vec3, Vec3, bool) -> [f64; 2]) {
-    let n = lines.len();
-    let [ox, oy, oz] = lines.origin.each_ref().map(|v| &v[..n]);
-    let [dx, dy, dz] = lines.direction.each_ref().map(|v| &v[..n]);
-    let [l0, l1, l2, l3] = lines.left.each_ref().map(|v| &v[..n]);
-    let (best, second, owner) = (&mut hits.t[..n], &mut hits.second[..n], &mut hits.face[..n]);
-    for i in 0..n {
-        let o = frame.point_to_local(Vec3::new(ox[i], oy[i], oz[i]));
-        let d = frame.direction_to_local(Vec3::new(dx[i], dy[i], dz[i]));
-        let left = (l0[i] == index) | (l1[i] == index) | (l2[i] == index) | (l3[i] == index);
-        for t in meet(o, d, left) {
-            let nearer = (t > 0.0) & (t < best[i]);
-            let next = (t > 0.0) & (t < second[i]);
-            second[i] = if nearer {
-                best[i]
-            } else if next {
-                t
-            } else {
-                second[i]
-            };
-            owner[i] = if nearer { index } else { owner[i] };
-            best[i] = if nearer { t } else { best[i] };
-        }
     }
 }

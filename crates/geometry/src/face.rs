@@ -1,6 +1,6 @@
 //! A shape in its place: moved, turned and trimmed.
 
-use etendue_math::{Frame, Vec3};
+use etendue_math::{Frame, Interval, Vec3};
 
 use crate::bounds::Bounds;
 use crate::shape::{Crossing, ROUNDING, Shape, size};
@@ -106,6 +106,32 @@ impl Face {
         }
     }
 
+    /// Whether a point of a box may lie on the face, by a look at its equation; often true where none does.
+    #[must_use]
+    pub fn may_touch(&self, around: Bounds) -> bool {
+        if !around.touches(self.bounds()) {
+            return false;
+        }
+        let (lo, hi, frame) = (around.lo, around.hi, &self.frame);
+        let along = |axis: Vec3| {
+            let term = |from: f64, to: f64, origin: f64, axis: f64| {
+                (Interval::new(from, to) - Interval::point(origin)) * Interval::point(axis)
+            };
+            term(lo.x, hi.x, frame.origin.x, axis.x)
+                + term(lo.y, hi.y, frame.origin.y, axis.y)
+                + term(lo.z, hi.z, frame.origin.z, axis.z)
+        };
+        match &self.shape {
+            Shape::Flat(_) => along(frame.z).has_zero(),
+            Shape::Quadric(quadric) => {
+                let [r2, z2, z1, z0] = [quadric.r2, quadric.z2, quadric.z1, quadric.z0].map(Interval::point);
+                let (x, y, z) = (along(frame.x), along(frame.y), along(frame.z));
+                (r2 * (x.squared() + y.squared()) + z2 * z.squared() + z1 * z + z0).has_zero()
+            }
+            Shape::Asphere(_) | Shape::Torus(_) | Shape::Mesh(_) => true,
+        }
+    }
+
     /// The first crossing of the line o + t d at 0 < t < `reach`.
     #[inline]
     #[must_use]
@@ -145,6 +171,44 @@ impl Face {
         Foot {
             point: self.frame.point_to_world(p),
             normal: if self.flipped { -n } else { n },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::Quadric;
+
+    #[test]
+    fn a_box_beside_a_turned_cylinder_does_not_touch_it_and_one_on_it_does() {
+        let frame = Frame {
+            origin: Vec3::new(1.0, -2.0, 0.5),
+            x: Vec3::new(0.6, 0.8, 0.0),
+            y: Vec3::new(0.0, 0.0, 1.0),
+            z: Vec3::new(0.8, -0.6, 0.0),
+        };
+        let (r2, z2, z1, z0) = (1.0, 0.0, 0.0, -25.0);
+        let shape = Shape::Quadric(Quadric {
+            r2,
+            z2,
+            z1,
+            z0,
+            z: [0.0, 9.0],
+            r: [0.0, f64::INFINITY],
+        });
+        let face = Face {
+            shape,
+            frame,
+            trims: vec![],
+            flipped: false,
+        };
+        let around = |x: f64, y: f64, z: f64| Bounds::of([frame.point_to_world(Vec3::new(x, y, z))]).widened(1e-3);
+        assert!(!face.may_touch(around(4.9, 0.0, 4.0)) && !face.may_touch(around(0.1, 0.2, 3.0)));
+        assert!(!face.may_touch(around(5.0, 0.0, 40.0)));
+        for turn in 0..40_u32 {
+            let (sine, cosine) = f64::from(turn).sin_cos();
+            assert!(face.may_touch(around(5.0 * cosine, 5.0 * sine, 0.2 * f64::from(turn))));
         }
     }
 }

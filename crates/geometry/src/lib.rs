@@ -3,18 +3,21 @@
 //! Rays: `batch` is a structure of arrays that the inner loops run over, `source` anything that yields rays by index, `table`
 //! records in memory or in a mapped file, `tally` the flux account of a pass, `scan` the statistics of a ray set in one pass.
 //!
-//! Surfaces: `shape` holds the kinds of surface, `mesh` triangles, `face` a shape in its place, `assembly` many faces
-//! together, `bounds` and `bvh` what spares the tests that cannot succeed.
+//! Surfaces: `shape` holds the kinds of surface, `mesh` triangles, `face` a shape in its place, `lines` a block of rays that
+//! look for surfaces, `assembly` many faces
+//! together, `sweep` many rays on simple ones of them, `bounds` and `bvh` what spares the tests that cannot succeed.
 
 pub mod assembly;
 pub mod batch;
 pub mod bounds;
 pub mod bvh;
 pub mod face;
+pub mod lines;
 pub mod mesh;
 pub mod scan;
 pub mod shape;
 pub mod source;
+mod sweep;
 pub mod table;
 pub mod tally;
 

@@ -16,6 +16,14 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// Whether its axes are those of the world.
+    #[inline]
+    #[must_use]
+    pub fn is_straight(&self) -> bool {
+        let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|[x, y, z]| Vec3::new(x, y, z));
+        [self.x, self.y, self.z] == [x, y, z]
+    }
+
     /// The components of a world direction along the frame's axes.
     #[inline(always)]
     #[must_use]

@@ -169,22 +169,33 @@ impl Finish {
     }
 }
 
-/// The lobe that a number from 0 to 1 picks by the shares; None: absorbed.
+/// The lobe that a number from 0 to 1 picks by the shares; None: absorbed. What is left of the number when that is known is
+/// again spread evenly from 0 to 1.
 #[inline]
 #[must_use]
-pub fn pick(shares: &Shares, number: f64) -> Option<Lobe> {
+pub fn pick(shares: &Shares, number: f64) -> Option<(Lobe, f64)> {
     let mut sum = 0.0;
     for (share, lobe) in shares.iter().zip(Lobe::ALL) {
-        sum += share;
-        if number < sum {
-            return Some(lobe);
+        if number < sum + share {
+            return Some((lobe, part_of(number - sum, *share)));
         }
+        sum += share;
     }
     // Shares that should add up to 1 may fall short of it by rounding.
     (sum >= 1.0 - 1e-12).then(|| {
         let last = shares.iter().rposition(|share| *share > 0.0).unwrap_or(0);
-        Lobe::ALL[last]
+        (Lobe::ALL[last], 0.5)
     })
+}
+
+/// The greatest number below 1.
+const LAST: f64 = 1.0 - f64::EPSILON / 2.0;
+
+/// Where a number lies between 0 and `share`, as a number from 0 to 1 that is less than 1.
+#[inline(always)]
+#[must_use]
+pub fn part_of(number: f64, share: f64) -> f64 {
+    (number / share).min(LAST)
 }
 
 #[cfg(test)]
@@ -219,12 +230,19 @@ mod tests {
     fn lobes_are_picked_by_their_shares_and_the_rest_is_absorbed() {
         let shares = [0.1, 0.2, 0.3, 0.15];
         let n = 100_000;
-        let mut counts = [0; 5];
+        let (mut counts, mut rests) = ([0; 5], [0.0; 5]);
         for k in 0..n {
             let lobe = pick(&shares, (f64::from(k) + 0.5) / f64::from(n));
-            counts[lobe.map_or(4, |l| Lobe::ALL.iter().position(|m| *m == l).expect("known"))] += 1;
+            let place = lobe.map_or(4, |(l, _)| Lobe::ALL.iter().position(|m| *m == l).expect("known"));
+            rests[place] += lobe.map_or(0.0, |(_, rest)| rest);
+            assert!(lobe.is_none_or(|(_, rest)| (0.0..1.0).contains(&rest)));
+            counts[place] += 1;
         }
         assert_eq!(counts, [10_000, 20_000, 30_000, 15_000, 25_000]);
+        // What is left of the number is even in each lobe.
+        for (rest, count) in rests.iter().zip(counts).take(4) {
+            assert!((rest / f64::from(count) - 0.5).abs() < 1e-4, "{rest}");
+        }
     }
 
     #[test]

@@ -77,6 +77,18 @@ impl Detector {
         }
     }
 
+    /// Whether it wants to know of light at diffuse surfaces.
+    #[must_use]
+    pub const fn watches_scatter(&self) -> bool {
+        matches!(self, Self::Image { .. } | Self::Exitance(_) | Self::Events { .. })
+    }
+
+    /// Whether it wants to know of light that leaves the scene.
+    #[must_use]
+    pub const fn watches_escape(&self) -> bool {
+        matches!(self, Self::Intensity { .. })
+    }
+
     /// Number of cells that flux is summed in.
     #[must_use]
     pub fn cells(&self) -> usize {

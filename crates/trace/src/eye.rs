@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use etendue_geometry::assembly::{Hits, Leaving, Lines, NONE};
+use etendue_geometry::assembly::Hits;
+use etendue_geometry::lines::{Leaving, Lines, NONE};
 use etendue_geometry::shape::ROUNDING;
 use etendue_lightfield::View;
 use etendue_math::Vec3;
@@ -249,7 +250,7 @@ impl<'a> Gaze<'a> {
             }
         }
         self.events.clear();
-        self.lines.truncate(0);
+        self.lines.clear();
     }
 
     /// The share of the light that gets to the eye, where the first thing in its way, or that there is none, says it all.

@@ -5,7 +5,7 @@
 //! 2ᵏ Σ over what is left after k times is a martingale: its mean is the sum over all rays, whenever one stops.
 
 use etendue_geometry::Face;
-use etendue_geometry::assembly::{Leaving, MOST_LEFT};
+use etendue_geometry::lines::{Leaving, MOST_LEFT};
 use etendue_geometry::shape::Crossing;
 use etendue_math::Vec3;
 use etendue_sampling::philox::Stream;

@@ -10,7 +10,6 @@
 //! `reverse`: from the eye to the sources; `wave`: a block of its paths; `exitance`: the light of diffuse surfaces, known
 //! beforehand, at which paths may end.
 
-mod bounce;
 pub mod detector;
 pub mod exitance;
 pub mod eye;

@@ -5,7 +5,8 @@
 //! listed last before the others; else the face of the last listed solid among those crossed decides, unless the space on
 //! both sides belongs to the same, later listed solid: then the face is hidden.
 
-use etendue_geometry::assembly::{Hits, Leaving, Lines, TIE};
+use etendue_geometry::assembly::{Hits, TIE};
+use etendue_geometry::lines::{Leaving, Lines};
 use etendue_geometry::shape::{Crossing, ROUNDING};
 use etendue_math::Vec3;
 use etendue_optics::finish::Finish;

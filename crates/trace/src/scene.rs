@@ -10,6 +10,7 @@ use etendue_optics::medium::Medium;
 use etendue_optics::source::Source;
 
 use crate::detector::Detector;
+use crate::start::START;
 
 /// What a face does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,16 +66,26 @@ pub struct Part {
 #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
 fn near(source: &Source, assembly: &Assembly, roles: &[Role]) -> Vec<u32> {
     let around = source.bounds();
+    // A ray starts on a sheet if it starts no farther from it than rounding may have moved it (see `start`).
+    let reach = 4.0
+        * START
+        * [around.lo, around.hi]
+            .map(|p| p.x.abs() + p.y.abs() + p.z.abs())
+            .iter()
+            .sum::<f64>();
     // A box around each solid.
     let mut solids: HashMap<u16, Bounds> = HashMap::new();
     for (role, bounds) in roles.iter().zip(assembly.bounds()) {
         let all = solids.entry(role.solid).or_insert(Bounds::EMPTY);
         *all = all.union(*bounds);
     }
-    let each = roles.iter().zip(assembly.bounds()).zip(0..);
-    each.filter(|((role, bounds), _)| {
-        let reach = if role.solid == 0 { **bounds } else { solids[&role.solid] };
-        around.touches(reach)
+    let each = roles.iter().zip(assembly.faces()).zip(0..);
+    each.filter(|((role, face), _)| {
+        if role.solid == 0 {
+            !around.is_finite() || face.may_touch(around.widened(reach))
+        } else {
+            around.touches(solids[&role.solid])
+        }
     })
     .map(|(_, index)| index)
     .collect()

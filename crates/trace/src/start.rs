@@ -1,6 +1,6 @@
 //! Where a ray starts: in which solids, on which faces.
 
-use etendue_geometry::assembly::{Leaving, MOST_LEFT, NONE};
+use etendue_geometry::lines::{Leaving, MOST_LEFT, NONE};
 use etendue_geometry::shape::{Crossing, ROUNDING};
 use etendue_math::Vec3;
 
@@ -51,6 +51,10 @@ pub fn place_near(scene: &Scene, o: Vec3, d: Vec3, near: &[u32]) -> Result<(Insi
     start.settled(scene)
 }
 
+/// A ray starts on a face if it starts no farther from it than this, in units of |x| + |y| + |z|: what rounding does to points
+/// that come through several frames.
+pub const START: f64 = 64.0 * ROUNDING;
+
 /// What is known of a start point.
 struct Start {
     o: Vec3,
@@ -67,7 +71,7 @@ impl Start {
         Self {
             o,
             d,
-            reach: 64.0 * ROUNDING * (o.x.abs() + o.y.abs() + o.z.abs()),
+            reach: START * (o.x.abs() + o.y.abs() + o.z.abs()),
             leaving: Leaving {
                 face: [NONE; MOST_LEFT],
                 part: [NONE; MOST_LEFT],

@@ -1,7 +1,7 @@
 //! Étendue is conserved: the Jacobian determinant of (x, y, p, q) through lenses is 1, p and q being direction cosines in air.
 
 use etendue_geometry::Face;
-use etendue_geometry::assembly::Leaving;
+use etendue_geometry::lines::Leaving;
 use etendue_geometry::shape::{Asphere, Quadric, Shape};
 use etendue_math::{Frame, Vec3};
 use etendue_optics::finish::Finish;

@@ -45,29 +45,55 @@ fn on_plane(o: Vec3, d: Vec3, leaving: bool) -> (f64, f64, f64, f64) {
     (t, o.x + t * d.x, o.y + t * d.y, ROUNDING * (size(o) + t.abs()))
 }
 
-/// Distance to the piece between two circles, +∞ if it is missed. The bounds are NaN-safe: a comparison with NaN fails.
-#[inline(always)]
-#[must_use]
-pub fn meet_annulus(inner: f64, outer: f64, o: Vec3, d: Vec3, leaving: bool) -> f64 {
-    let (t, x, y, error) = on_plane(o, d, leaving);
-    let r2 = x * x + y * y;
-    let (least, most) = (inner - error, outer + error);
-    if (r2 <= most * most) & ((least <= 0.0) | (r2 >= least * least)) {
-        t
-    } else {
-        f64::INFINITY
+/// The piece between two circles \[mm\].
+#[derive(Clone, Copy, Debug)]
+pub struct Annulus {
+    /// Inner radius.
+    pub inner: f64,
+    /// Outer radius.
+    pub outer: f64,
+}
+
+impl Annulus {
+    /// All of the plane.
+    pub const ALL: Self = Self {
+        inner: 0.0,
+        outer: f64::INFINITY,
+    };
+
+    /// Distance to it, +∞ if it is missed. The bounds are NaN-safe: a comparison with NaN fails.
+    #[inline(always)]
+    #[must_use]
+    pub fn crossing(&self, o: Vec3, d: Vec3, leaving: bool) -> f64 {
+        let (t, x, y, error) = on_plane(o, d, leaving);
+        let r2 = x * x + y * y;
+        let (least, most) = (self.inner - error, self.outer + error);
+        if (r2 <= most * most) & ((least <= 0.0) | (r2 >= least * least)) {
+            t
+        } else {
+            f64::INFINITY
+        }
     }
 }
 
-/// Distance to a centred rectangle given by its half sides, +∞ if it is missed.
-#[inline(always)]
-#[must_use]
-pub fn meet_rectangle(half: [f64; 2], o: Vec3, d: Vec3, leaving: bool) -> f64 {
-    let (t, x, y, error) = on_plane(o, d, leaving);
-    if (x.abs() <= half[0] + error) & (y.abs() <= half[1] + error) {
-        t
-    } else {
-        f64::INFINITY
+/// A centred rectangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Rectangle {
+    /// Half of its sides \[mm\].
+    pub half: [f64; 2],
+}
+
+impl Rectangle {
+    /// Distance to it, +∞ if it is missed.
+    #[inline(always)]
+    #[must_use]
+    pub fn crossing(&self, o: Vec3, d: Vec3, leaving: bool) -> f64 {
+        let (t, x, y, error) = on_plane(o, d, leaving);
+        if (x.abs() <= self.half[0] + error) & (y.abs() <= self.half[1] + error) {
+            t
+        } else {
+            f64::INFINITY
+        }
     }
 }
 
@@ -78,8 +104,14 @@ impl Flat {
     pub fn crossing(&self, o: Vec3, d: Vec3, leaving: bool) -> f64 {
         match &self.outline {
             Outline::Whole => on_plane(o, d, leaving).0,
-            Outline::Rectangle { width, height } => meet_rectangle([0.5 * width, 0.5 * height], o, d, leaving),
-            Outline::Annulus { inner, outer } => meet_annulus(*inner, *outer, o, d, leaving),
+            Outline::Rectangle { width, height } => {
+                let half = [0.5 * width, 0.5 * height];
+                Rectangle { half }.crossing(o, d, leaving)
+            }
+            Outline::Annulus { inner, outer } => {
+                let (inner, outer) = (*inner, *outer);
+                Annulus { inner, outer }.crossing(o, d, leaving)
+            }
             Outline::Polygon { vertices } => {
                 let (t, x, y, error) = on_plane(o, d, leaving);
                 if t.is_finite() && within(vertices, x, y, error) {
@@ -158,6 +190,7 @@ mod tests {
     fn neighbours_that_share_an_edge_leave_no_gap() {
         // Lines aimed at points computed on the common edge x = 1/3 meet at least one of two rectangles.
         let half = 0.5 / 3.0;
+        let piece = Rectangle { half: [half, 1.0] };
         for i in 0..10_000 {
             let f = |g: f64| (0.5 + f64::from(i) * g).fract();
             let target = Vec3::new(1.0 / 3.0, 0.3 * f(0.754_877) - 0.15, 0.0);
@@ -168,8 +201,8 @@ mod tests {
             );
             let d = (target - o).normalized();
             let shift = |c: f64| o - Vec3::new(c, 0.0, 0.0);
-            let left = meet_rectangle([half, 1.0], shift(1.0 / 3.0 - half), d, false);
-            let right = meet_rectangle([half, 1.0], shift(1.0 / 3.0 + half), d, false);
+            let left = piece.crossing(shift(1.0 / 3.0 - half), d, false);
+            let right = piece.crossing(shift(1.0 / 3.0 + half), d, false);
             assert!(left.is_finite() || right.is_finite());
         }
     }

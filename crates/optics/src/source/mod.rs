@@ -16,7 +16,7 @@ use etendue_geometry::shape::sample::AreaSampler;
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_lightfield::field::draw::{FieldRays, Sampler};
 use etendue_math::{Frame, Vec3};
-use etendue_sampling::philox::{Stream, fill_uniforms};
+use etendue_sampling::philox::{Pairs, Stream, fill_fours};
 
 pub use lit::{Beacon, Lantern, Lit};
 pub use numbers::Numbers;
@@ -24,7 +24,11 @@ pub use point::PointSource;
 pub use rings::{Ring, RingSource};
 pub use surface::SurfaceSource;
 
-/// The purpose under which the rays of traced sources are drawn (see [`Stream::new`]); each source has one of its own.
+/// The purpose under which the first four numbers of each ray of a traced source are drawn (see [`Pairs::new`]); each source
+/// has one of its own.
+const PURPOSE_BIRTH: u32 = 0x4000_0000;
+
+/// The purpose under which more of them are drawn (see [`Stream::new`]).
 const PURPOSE_EMIT: u64 = 0x454D_4954 << 32;
 
 /// The purpose under which their wavelengths are drawn.
@@ -169,7 +173,10 @@ impl Source {
         }
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "a range of at most a block")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "a range of at most a block; fewer than 2^28 sources"
+    )]
     fn draw(
         &self,
         source: u64,
@@ -186,7 +193,7 @@ impl Source {
         batch.flux[..batch.len].fill(self.flux / count as f64);
         let indices: Vec<u64> = range.collect();
         let mut four: [Vec<f64>; 4] = Default::default();
-        fill_uniforms(stream, &indices, &vec![0; indices.len()], &mut four);
+        fill_fours(Pairs::new(seed, PURPOSE_BIRTH + source as u32), &indices, &mut four);
         if let Emitter::Surface(surface) = &self.emitter {
             if surface.draw_block(&four, &mut batch.position, &mut batch.direction) {
                 return;

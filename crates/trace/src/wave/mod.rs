@@ -4,7 +4,8 @@ mod scatter;
 
 use std::ops::Range;
 
-use etendue_geometry::assembly::{Hits, Leaving, Lines, NONE, TIE};
+use etendue_geometry::assembly::{Hits, TIE};
+use etendue_geometry::lines::{Leaving, Lines, NONE};
 use etendue_lightfield::View;
 use etendue_math::Vec3;
 use etendue_optics::finish::{Finish, Incidence};
@@ -222,10 +223,10 @@ impl<'a> Wave<'a> {
             self.hits = hits;
             std::mem::swap(&mut self.lines, &mut self.next_lines);
             std::mem::swap(&mut self.branches, &mut self.next);
-            self.next_lines.truncate(0);
+            self.next_lines.clear();
             self.next.clear();
         }
-        self.lines.truncate(0);
+        self.lines.clear();
     }
 
     fn wavelength(&self, path: u32) -> f64 {

@@ -197,6 +197,6 @@ impl Wave<'_> {
             *sum = [sum[0] + free * connection.light[0], sum[1] + free * connection.light[1]];
         }
         self.connections.clear();
-        self.shadows.truncate(0);
+        self.shadows.clear();
     }
 }
