@@ -193,14 +193,18 @@ def test_with_what_lines_of_sight_find_besides() -> None:
 
 
 def test_rays_as_a_source_are_counted_once() -> None:
-    """Where nothing but diffuse surfaces is seen, lines of sight add nothing to events, whatever the source is."""
+    """Among diffuse surfaces, lines of sight add to events only what they see where all is black: the field that was fitted
+    to the rays of the source."""
     lamp = et.Scene(**corner(surfaces=[], detectors=[{"name": "all", "kind": "rays", "shape": {"kind": "disk", "radius": 9},
                     "at": [4, 3, 39]}]))  # fmt: skip
     rays = et.trace(lamp, 4000, 2).rays.only
-    scene = et.Scene(**corner(sources=[{"name": "file", "kind": "rays", "rays": rays}]))
-    events = et.trace(scene, None, 3).events.only
-    for whole, part in zip(et.luminance_map(events, rays_per_pixel=16), et.luminance_map(events), strict=True):
-        np.testing.assert_allclose(whole.values, part.values, rtol=1e-12)
+    source = {"name": "file", "kind": "rays", "rays": rays}
+    events = et.trace(et.Scene(**corner(sources=[source])), None, 3).events.only
+    black = [{**surface, "finish": "absorber"} for surface in corner()["surfaces"]]
+    direct = et.luminance_map(et.Scene(**corner(sources=[source], surfaces=black)), rays_per_pixel=16)
+    wholes, parts = et.luminance_map(events, rays_per_pixel=16), et.luminance_map(events)
+    for whole, part, alone in zip(wholes, parts, direct, strict=True):
+        np.testing.assert_allclose(whole.values, part.values + alone.values, rtol=1e-12)
 
 
 def test_integrating_sphere() -> None:
