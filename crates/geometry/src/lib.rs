@@ -17,7 +17,7 @@ pub mod mesh;
 pub mod scan;
 pub mod shape;
 pub mod source;
-mod sweep;
+pub mod sweep;
 pub mod table;
 pub mod tally;
 

@@ -1,4 +1,4 @@
-//! Many rays on simple faces, several at a time.
+//! Many rays on one face, several at a time.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::assembly::Hits;
 use crate::face::Face;
 use crate::lines::Lines;
 use crate::shape::flat::{Annulus, Rectangle};
-use crate::shape::{Outline, Quadric, Shape};
+use crate::shape::{Crossing, Outline, Quadric, Shape};
 
 /// Rays that are tried on all simple faces before the next ones are: what they need stays in the cache of first level.
 const CHUNK: usize = 256;
@@ -119,4 +119,88 @@ fn sweep_turned<const TURNED: bool>(
 #[inline(always)]
 fn least(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
+}
+
+/// A vector for each of many rays, one array per axis.
+pub type Vectors = [Vec<f64>; 3];
+
+/// Puts values into a list in place of what it held.
+pub fn fill<T>(list: &mut Vec<T>, values: impl Iterator<Item = T>) {
+    list.clear();
+    list.extend(values);
+}
+
+/// Puts some vectors of many into lists in place of what those held.
+pub fn gather(into: &mut Vectors, from: &Vectors, which: &[u32]) {
+    for (list, values) in into.iter_mut().zip(from) {
+        fill(list, which.iter().map(|i| values[*i as usize]));
+    }
+}
+
+/// The points at which lines meet a face, settled on it, and the normals there: for each line what [`Face::foot`] says.
+/// `points` holds the start points on entry, `parts` the triangles of a mesh that are met.
+pub fn feet(face: &Face, points: &mut Vectors, directions: &Vectors, t: &[f64], parts: &[u32], normals: &mut Vectors) {
+    for list in normals.iter_mut() {
+        list.resize(t.len(), 0.0);
+    }
+    match &face.shape {
+        Shape::Flat(_) => feet_on(face, &Plane, points, directions, t, normals),
+        Shape::Quadric(quadric) => feet_on(face, quadric, points, directions, t, normals),
+        Shape::Asphere(_) | Shape::Torus(_) | Shape::Mesh(_) => {
+            for (i, (t, part)) in t.iter().zip(parts).enumerate() {
+                let [o, d] = [&*points, directions].map(|v| Vec3::new(v[0][i], v[1][i], v[2][i]));
+                let (t, part, uv) = (*t, *part, [0.0; 2]);
+                let foot = face.foot(o, d, &Crossing { t, part, uv });
+                (points[0][i], points[1][i], points[2][i]) = (foot.point.x, foot.point.y, foot.point.z);
+                (normals[0][i], normals[1][i], normals[2][i]) = (foot.normal.x, foot.normal.y, foot.normal.z);
+            }
+        }
+    }
+}
+
+/// A surface whose points are settled by its equation.
+trait Settled {
+    /// The point of the surface next to o + t d, and the normal there; everything in the world.
+    fn foot(&self, frame: &Frame, o: Vec3, d: Vec3, t: f64) -> (Vec3, Vec3);
+}
+
+/// The plane z = 0 of a frame.
+struct Plane;
+
+impl Settled for Plane {
+    #[inline(always)]
+    fn foot(&self, frame: &Frame, o: Vec3, d: Vec3, t: f64) -> (Vec3, Vec3) {
+        let p = o + d * t;
+        (p - frame.z * (p - frame.origin).dot(frame.z), frame.z)
+    }
+}
+
+impl Settled for Quadric {
+    #[inline(always)]
+    fn foot(&self, frame: &Frame, o: Vec3, d: Vec3, t: f64) -> (Vec3, Vec3) {
+        let (p, n) = self.settle(frame.point_to_local(o) + frame.direction_to_local(d) * t);
+        (frame.point_to_world(p), frame.direction_to_world(n))
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn feet_on<S: Settled>(
+    face: &Face,
+    shape: &S,
+    points: &mut Vectors,
+    directions: &Vectors,
+    t: &[f64],
+    normals: &mut Vectors,
+) {
+    let n = t.len();
+    let [px, py, pz] = points.each_mut().map(|v| &mut v[..n]);
+    let [dx, dy, dz] = directions.each_ref().map(|v| &v[..n]);
+    let [nx, ny, nz] = normals.each_mut().map(|v| &mut v[..n]);
+    let sign = if face.flipped { -1.0 } else { 1.0 };
+    for i in 0..n {
+        let (o, d) = (Vec3::new(px[i], py[i], pz[i]), Vec3::new(dx[i], dy[i], dz[i]));
+        let (p, normal) = shape.foot(&face.frame, o, d, t[i]);
+        (px[i], py[i], pz[i]) = (p.x, p.y, p.z);
+        (nx[i], ny[i], nz[i]) = (sign * normal.x, sign * normal.y, sign * normal.z);
+    }
 }

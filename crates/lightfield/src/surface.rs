@@ -191,46 +191,9 @@ impl Part {
         }
     }
 
-    /// How far from `position` the line along `direction` leaves the part, and the cosine of its angle with the normal there;
-    /// None if it does not. Without chart coordinates: for lines that mostly miss, or leave it too far away.
-    #[inline]
-    #[must_use]
-    pub fn leaves(&self, position: Vec3, direction: Vec3) -> Option<(f64, f64)> {
-        let (o, d) = self.localise(position, direction);
-        match self.shape {
-            Shape::Rectangle { width, height } => {
-                let t = -o.z / d.z;
-                let inside = |x: f64, size: f64| (0.0..=1.0).contains(&(x / size + 0.5));
-                let met = d.z > 0.0 && inside(o.x + t * d.x, width) && inside(o.y + t * d.y, height);
-                met.then_some((t, d.z))
-            }
-            Shape::Disk { radius } => {
-                let t = -o.z / d.z;
-                let (x, y) = ((o.x + t * d.x) / radius, (o.y + t * d.y) / radius);
-                (d.z > 0.0 && x * x + y * y <= 1.0).then_some((t, d.z))
-            }
-            Shape::Hemisphere { radius } => {
-                let middle = -o.dot(d);
-                let near = o + d * middle;
-                let half_chord = radius * radius - near.dot(near);
-                let half = half_chord.max(0.0).sqrt();
-                (half_chord > 0.0 && near.z + d.z * half >= 0.0).then_some((middle + half, half / radius))
-            }
-            Shape::Tube { radius, height } => {
-                let across = d.x * d.x + d.y * d.y;
-                let middle = -(o.x * d.x + o.y * d.y) / across;
-                let (x, y) = (o.x + middle * d.x, o.y + middle * d.y);
-                let half_chord = (radius * radius - (x * x + y * y)) / across;
-                let half = half_chord.max(0.0).sqrt();
-                let t = middle + half;
-                let met = across > 0.0 && half_chord > 0.0 && (0.0..=1.0).contains(&((o.z + t * d.z) / height + 0.5));
-                met.then_some((t, half * across / radius))
-            }
-        }
-    }
-
+    /// A line in the coordinates of the part.
     #[inline(always)]
-    fn localise(&self, position: Vec3, direction: Vec3) -> (Vec3, Vec3) {
+    pub(crate) fn localise(&self, position: Vec3, direction: Vec3) -> (Vec3, Vec3) {
         (
             self.frame.point_to_local(position),
             self.frame.direction_to_local(direction),

@@ -13,22 +13,18 @@ pub struct Fresnel {
 
 /// Fresnel's equations for unpolarised light that arrives in a medium of index `n1` at an angle with this `cosine` on the
 /// interface to a medium of index `n2`. `[BornWolf1999]`, section 1.5.2.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn fresnel(cosine: f64, n1: f64, n2: f64) -> Fresnel {
     let ratio = n1 / n2;
     let square = 1.0 - ratio * ratio * (1.0 - cosine * cosine);
-    if square <= 0.0 {
-        return Fresnel {
-            reflectance: 1.0,
-            cosine: 0.0,
-        };
-    }
-    let across = square.sqrt();
+    let across = (if square > 0.0 { square } else { 0.0 }).sqrt();
     let s = (n1 * cosine - n2 * across) / (n1 * cosine + n2 * across);
     let p = (n1 * across - n2 * cosine) / (n1 * across + n2 * cosine);
+    // Beyond the critical angle the quotients are ±1, but for 0/0 at grazing incidence.
+    let total = square <= 0.0;
     Fresnel {
-        reflectance: 0.5 * (s * s + p * p),
+        reflectance: if total { 1.0 } else { 0.5 * (s * s + p * p) },
         cosine: across,
     }
 }
@@ -41,7 +37,7 @@ pub fn reflect(d: Vec3, normal: Vec3, cosine: f64) -> Vec3 {
 }
 
 /// The direction after refraction by Snell's law, `across` being the cosine of the angle of refraction.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn refract(d: Vec3, normal: Vec3, cosine: f64, ratio: f64, across: f64) -> Vec3 {
     renormalized(d * ratio + normal * (ratio * cosine - across))

@@ -113,6 +113,12 @@ impl Shape {
         if let Self::Mesh(mesh) = self { mesh.count() } else { 1 }
     }
 
+    /// Whether it looks smooth where it is not: a mesh that states normals at its vertices.
+    #[must_use]
+    pub fn is_smooth(&self) -> bool {
+        matches!(self, Self::Mesh(mesh) if mesh.is_smooth())
+    }
+
     /// A box that holds the shape; not finite if the shape has no end.
     #[must_use]
     pub fn bounds(&self) -> Bounds {

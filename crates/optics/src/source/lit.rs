@@ -1,6 +1,7 @@
 //! Sources as they are seen: their luminance along a line, and points on them to connect to.
 
 use etendue_lightfield::field::LightField;
+use etendue_lightfield::leave::Sights;
 use etendue_math::Vec3;
 use etendue_sampling::alias::Alias;
 
@@ -105,6 +106,19 @@ impl Lantern {
             scale: source.flux / total,
             parts: parts.collect::<Option<Vec<_>>>()?,
         })
+    }
+
+    /// Marks the lines of sight on which light of the source may arrive; others keep their marks.
+    pub fn mark(&self, source: &Source, sights: Sights<'_>, marks: &mut [bool]) {
+        match &source.emitter {
+            Emitter::Field(sampler) => {
+                for part in &sampler.field().parts {
+                    part.part.mark(&source.frame, sights, marks);
+                }
+            }
+            Emitter::Surface(_) => marks.fill(true),
+            Emitter::Rays { .. } | Emitter::Point(_) | Emitter::Beam(_) => {}
+        }
     }
 
     /// Calls `visit` for the light that travels along −`d` to `o` from points of the source at 0 < t ≤ `reach`.

@@ -1,12 +1,15 @@
 //! A block of paths from the eye, all branches of which take their next steps together.
 
 mod scatter;
+mod smooth;
 
 use std::ops::Range;
 
 use etendue_geometry::assembly::{Hits, TIE};
-use etendue_geometry::lines::{Leaving, Lines, NONE};
+use etendue_geometry::lines::{Leaving, Lines};
+use etendue_geometry::sweep::fill;
 use etendue_lightfield::View;
+use etendue_lightfield::leave::Sights;
 use etendue_math::Vec3;
 use etendue_optics::finish::{Finish, Incidence};
 use etendue_optics::source::Numbers;
@@ -18,6 +21,7 @@ use crate::inside::Inside;
 use crate::meeting::{Fillings, Meeting, meet};
 use crate::reverse::{Left, Lit, Method, Pixel};
 use crate::start::place;
+use smooth::{Room, Sorter};
 
 /// The purposes under which shifts of lattices and events of paths are drawn (see [`Stream::new`]).
 const PURPOSE_SHIFT: u64 = 0x5348_4946;
@@ -91,6 +95,11 @@ pub struct Wave<'a> {
     branches: Vec<Branch>,
     next_lines: Lines,
     next: Vec<Branch>,
+    sorter: Sorter,
+    room: Room,
+    /// How far each branch goes, and whether it may meet a source.
+    reach: Vec<f64>,
+    marks: Vec<bool>,
     /// Connections that have to be looked at.
     shadows: Lines,
     connections: Vec<Connection>,
@@ -113,6 +122,10 @@ impl<'a> Wave<'a> {
             branches: Vec::new(),
             next_lines: Lines::default(),
             next: Vec::new(),
+            sorter: Sorter::new(lit.scene),
+            room: Room::default(),
+            reach: Vec::new(),
+            marks: Vec::new(),
             shadows: Lines::default(),
             connections: Vec::new(),
             eye: place(lit.scene, view.eye, (view.target - view.eye).normalized()).ok(),
@@ -173,7 +186,16 @@ impl<'a> Wave<'a> {
         let view = self.view;
         let stream = Stream::new(self.method.seed, PURPOSE_PATH);
         let address = ((pixel << 24 | u64::from(pass)) << 20).wrapping_add(u64::from(index));
-        let mut numbers = Numbers::after(lattice_point(index, shift), stream, address);
+        #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+        let path = self.paths.len() as u32;
+        // Made where it stays: it is large.
+        self.paths.push(Path {
+            numbers: Numbers::after(lattice_point(index, shift), stream, address),
+            line: 0,
+            pass: made as usize,
+            sum: [0.0; 2],
+        });
+        let Path { numbers, line, .. } = &mut self.paths[path as usize];
         let columns = u64::from(view.columns);
         let (row, column) = ((pixel / columns) as f64, (pixel % columns) as f64);
         let (du, dv) = (numbers.draw(), numbers.draw());
@@ -182,20 +204,10 @@ impl<'a> Wave<'a> {
         let through = view.target + view.right * u + view.up * v;
         let d = (through - view.eye).normalized();
         let lines = &self.lit.lines;
-        let line = if lines.len() == 1 {
-            0
-        } else {
+        if lines.len() > 1 {
             let number = numbers.draw();
-            lines.partition_point(|l| l.0 < number).min(lines.len() - 1)
-        };
-        #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
-        let path = self.paths.len() as u32;
-        self.paths.push(Path {
-            numbers,
-            line,
-            pass: made as usize,
-            sum: [0.0; 2],
-        });
+            *line = lines.partition_point(|l| l.0 < number).min(lines.len() - 1);
+        }
         if let Some((inside, leaving)) = self.eye {
             self.lines.push(view.eye, d, leaving);
             self.branches.push(Branch {
@@ -216,9 +228,8 @@ impl<'a> Wave<'a> {
         while !self.branches.is_empty() {
             let mut hits = std::mem::take(&mut self.hits);
             self.lit.scene.assembly.nearest(&self.lines, &mut hits);
-            for i in 0..self.branches.len() {
-                self.step(&hits, i);
-            }
+            self.gather(&hits);
+            self.advance(&hits);
             self.connect(&mut hits);
             self.hits = hits;
             std::mem::swap(&mut self.lines, &mut self.next_lines);
@@ -240,14 +251,10 @@ impl<'a> Wave<'a> {
 
     fn step(&mut self, hits: &Hits, i: usize) {
         let scene = self.lit.scene;
-        let (o, d) = (self.lines.origin(i), self.lines.direction(i));
+        let d = self.lines.direction(i);
         let mut branch = self.branches[i];
         let wavelength = self.wavelength(branch.path);
         let absorption = self.fillings.at(scene, branch.inside.top(), wavelength).absorption;
-        self.gather(&branch, o, d, hits.t[i], absorption);
-        if hits.face[i] == NONE {
-            return;
-        }
         let Ok(meeting) = meet(scene, &self.lines, hits, i, branch.inside, |_, _, _| {}) else {
             return;
         };
@@ -273,17 +280,11 @@ impl<'a> Wave<'a> {
         }
     }
 
-    /// Adds the light of sources that the branch meets before `reach`.
-    fn gather(&mut self, branch: &Branch, o: Vec3, d: Vec3, reach: f64, absorption: f64) {
+    /// Adds the light of sources that branches meet before anything else.
+    fn gather(&mut self, hits: &Hits) {
         let scene = self.lit.scene;
-        if branch.seen == Seen::Caustic && self.method.left == Left::Caustics && branch.direct {
-            return;
-        }
         // A source that lies on the surface behind it is in front of it.
-        let reach = reach * (1.0 + TIE);
-        let path = &mut self.paths[branch.path as usize];
-        let colour = &self.lit.lines[path.line].2;
-        let sum = &mut path.sum;
+        fill(&mut self.reach, hits.t.iter().map(|t| t * (1.0 + TIE)));
         let mut before = 0.0;
         for (number, source) in scene.sources.iter().enumerate() {
             let share = self.lit.shares[number] - before;
@@ -291,20 +292,38 @@ impl<'a> Wave<'a> {
             let Some(lantern) = &self.lit.lanterns[number] else {
                 continue;
             };
-            lantern.along(source, o, d, reach, |lit| {
-                let mut weight = branch.weight * colour[number];
-                if absorption > 0.0 {
-                    weight *= (-absorption * lit.t).exp();
+            self.marks.clear();
+            self.marks.resize(self.branches.len(), false);
+            let sights = Sights {
+                origin: self.lines.origin.each_ref().map(Vec::as_slice),
+                direction: self.lines.direction.each_ref().map(Vec::as_slice),
+                reach: &self.reach,
+            };
+            lantern.mark(source, sights, &mut self.marks);
+            for (i, branch) in self.branches.iter().enumerate().filter(|(i, _)| self.marks[*i]) {
+                if branch.seen == Seen::Caustic && self.method.left == Left::Caustics && branch.direct {
+                    continue;
                 }
-                if let Seen::Diffuse { density, all } = branch.seen {
-                    let distance = branch.travelled + lit.t;
-                    let picked = if all { 1.0 } else { share };
-                    let other = picked * lit.density * distance * distance / lit.cosine;
-                    weight *= density / (density + other);
-                }
-                sum[0] += weight * lit.luminance;
-                sum[1] += weight * lit.deviation;
-            });
+                let (o, d) = (self.lines.origin(i), self.lines.direction(i));
+                let path = &mut self.paths[branch.path as usize];
+                let (_, wavelength, colour) = &self.lit.lines[path.line];
+                let (sum, fillings) = (&mut path.sum, &mut self.fillings);
+                lantern.along(source, o, d, self.reach[i], |lit| {
+                    let mut weight = branch.weight * colour[number];
+                    let absorption = fillings.at(scene, branch.inside.top(), *wavelength).absorption;
+                    if absorption > 0.0 {
+                        weight *= (-absorption * lit.t).exp();
+                    }
+                    if let Seen::Diffuse { density, all } = branch.seen {
+                        let distance = branch.travelled + lit.t;
+                        let picked = if all { 1.0 } else { share };
+                        let other = picked * lit.density * distance * distance / lit.cosine;
+                        weight *= density / (density + other);
+                    }
+                    sum[0] += weight * lit.luminance;
+                    sum[1] += weight * lit.deviation;
+                });
+            }
         }
     }
 

@@ -1,0 +1,190 @@
+//! How far away a line leaves a part of a carrier surface, without chart coordinates: for lines that mostly miss it.
+
+use etendue_math::{Frame, Vec3};
+use multiversion::multiversion;
+
+use crate::surface::{Part, Shape};
+
+/// Distance along a line at which it leaves a part, and the cosine of its angle with the normal there; the distance is NaN if
+/// it does not.
+type Left = (f64, f64);
+
+/// A part as lines leave it, in its own coordinates.
+trait Leave {
+    fn leave(&self, o: Vec3, d: Vec3) -> Left;
+}
+
+#[inline(always)]
+fn left(met: bool, t: f64, cosine: f64) -> Left {
+    (if met { t } else { f64::NAN }, cosine)
+}
+
+struct Rectangle {
+    width: f64,
+    height: f64,
+}
+
+impl Leave for Rectangle {
+    #[inline(always)]
+    fn leave(&self, o: Vec3, d: Vec3) -> Left {
+        let t = -o.z / d.z;
+        let (x, y) = ((o.x + t * d.x) / self.width + 0.5, (o.y + t * d.y) / self.height + 0.5);
+        let inside = (0.0..=1.0).contains(&x) & (0.0..=1.0).contains(&y);
+        left((d.z > 0.0) & inside, t, d.z)
+    }
+}
+
+struct Disk {
+    radius: f64,
+}
+
+impl Leave for Disk {
+    #[inline(always)]
+    fn leave(&self, o: Vec3, d: Vec3) -> Left {
+        let t = -o.z / d.z;
+        let (x, y) = ((o.x + t * d.x) / self.radius, (o.y + t * d.y) / self.radius);
+        left((d.z > 0.0) & (x * x + y * y <= 1.0), t, d.z)
+    }
+}
+
+struct Hemisphere {
+    radius: f64,
+}
+
+impl Leave for Hemisphere {
+    #[inline(always)]
+    fn leave(&self, o: Vec3, d: Vec3) -> Left {
+        let middle = -o.dot(d);
+        let near = o + d * middle;
+        let half_chord = self.radius * self.radius - near.dot(near);
+        let half = half_chord.max(0.0).sqrt();
+        let met = (half_chord > 0.0) & (near.z + d.z * half >= 0.0);
+        left(met, middle + half, half / self.radius)
+    }
+}
+
+struct Tube {
+    radius: f64,
+    height: f64,
+}
+
+impl Leave for Tube {
+    #[inline(always)]
+    fn leave(&self, o: Vec3, d: Vec3) -> Left {
+        let across = d.x * d.x + d.y * d.y;
+        let middle = -(o.x * d.x + o.y * d.y) / across;
+        let (x, y) = (o.x + middle * d.x, o.y + middle * d.y);
+        let half_chord = (self.radius * self.radius - (x * x + y * y)) / across;
+        let half = half_chord.max(0.0).sqrt();
+        let t = middle + half;
+        let z = (o.z + t * d.z) / self.height + 0.5;
+        let met = (across > 0.0) & (half_chord > 0.0) & (0.0..=1.0).contains(&z);
+        left(met, t, half * across / self.radius)
+    }
+}
+
+/// Start points and unit directions of lines in the world, one array per axis, and how far each of them goes.
+#[derive(Clone, Copy, Debug)]
+pub struct Sights<'a> {
+    /// \[mm\].
+    pub origin: [&'a [f64]; 3],
+    /// Away from the start point, against the light.
+    pub direction: [&'a [f64]; 3],
+    /// \[mm\].
+    pub reach: &'a [f64],
+}
+
+impl Part {
+    /// How far from `position` the line along `direction` leaves the part, and the cosine of its angle with the normal there;
+    /// None if it does not.
+    #[inline]
+    #[must_use]
+    pub fn leaves(&self, position: Vec3, direction: Vec3) -> Option<(f64, f64)> {
+        let (o, d) = self.localise(position, direction);
+        let (t, cosine) = match self.shape {
+            Shape::Rectangle { width, height } => Rectangle { width, height }.leave(o, d),
+            Shape::Disk { radius } => Disk { radius }.leave(o, d),
+            Shape::Hemisphere { radius } => Hemisphere { radius }.leave(o, d),
+            Shape::Tube { radius, height } => Tube { radius, height }.leave(o, d),
+        };
+        (!t.is_nan()).then_some((t, cosine))
+    }
+
+    /// Marks the lines of sight that meet the part's emitting side at 0 < t ≤ `reach`, the part standing in `frame`; others
+    /// keep their marks. Rounding may decide otherwise than [`Part::leaves`] at the very rim.
+    pub fn mark(&self, frame: &Frame, sights: Sights<'_>, marks: &mut [bool]) {
+        let own = &self.frame;
+        let placed = Frame {
+            origin: frame.point_to_world(own.origin),
+            x: frame.direction_to_world(own.x),
+            y: frame.direction_to_world(own.y),
+            z: frame.direction_to_world(own.z),
+        };
+        match self.shape {
+            Shape::Rectangle { width, height } => mark(&Rectangle { width, height }, &placed, sights, marks),
+            Shape::Disk { radius } => mark(&Disk { radius }, &placed, sights, marks),
+            Shape::Hemisphere { radius } => mark(&Hemisphere { radius }, &placed, sights, marks),
+            Shape::Tube { radius, height } => mark(&Tube { radius, height }, &placed, sights, marks),
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn mark<L: Leave>(part: &L, frame: &Frame, sights: Sights<'_>, marks: &mut [bool]) {
+    let n = marks.len();
+    let [ox, oy, oz] = sights.origin.map(|v| &v[..n]);
+    let [dx, dy, dz] = sights.direction.map(|v| &v[..n]);
+    let reach = &sights.reach[..n];
+    for i in 0..n {
+        let o = frame.point_to_local(Vec3::new(ox[i], oy[i], oz[i]));
+        let d = frame.direction_to_local(Vec3::new(dx[i], dy[i], dz[i]));
+        // Light goes the other way.
+        let (back, _) = part.leave(o, -d);
+        marks[i] |= (back < 0.0) & (-back <= reach[i]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::tests::{lattice, zoo};
+
+    #[test]
+    fn lines_of_sight_are_marked_where_they_are_left() {
+        let frame = Frame {
+            origin: Vec3::new(-3.0, 2.0, 1.0),
+            x: Vec3::new(0.0, 0.6, 0.8),
+            y: Vec3::new(1.0, 0.0, 0.0),
+            z: Vec3::new(0.0, 0.8, -0.6),
+        };
+        for part in zoo() {
+            let (mut origin, mut direction): ([Vec<f64>; 3], [Vec<f64>; 3]) = Default::default();
+            let (mut reach, mut expected) = (Vec::new(), Vec::new());
+            for (i, [s1, s2, a, b]) in lattice(4000).enumerate() {
+                let (x, k) = part.ray([s1, s2], [a, b]);
+                // From before the part, from behind it, and past it, with a reach that is enough or not.
+                let (aside, away) = ([0.0, 0.0, 4.0][i % 3], [5.0, 5.0, -5.0][i % 3]);
+                let o = x + k * away + Vec3::new(aside, 0.0, 0.0);
+                let most = if i % 2 == 0 { 5.5 } else { 4.5 };
+                let found = part.leaves(o, k).is_some_and(|(back, _)| back < 0.0 && -back <= most);
+                expected.push(found);
+                let (o, d) = (frame.point_to_world(o), -frame.direction_to_world(k));
+                for (axis, (o, d)) in [(o.x, d.x), (o.y, d.y), (o.z, d.z)].into_iter().enumerate() {
+                    origin[axis].push(o);
+                    direction[axis].push(d);
+                }
+                reach.push(most);
+            }
+            let sights = Sights {
+                origin: origin.each_ref().map(Vec::as_slice),
+                direction: direction.each_ref().map(Vec::as_slice),
+                reach: &reach,
+            };
+            let mut marks = vec![false; reach.len()];
+            part.mark(&frame, sights, &mut marks);
+            assert_eq!(marks, expected);
+            let met = marks.iter().filter(|m| **m).count();
+            assert!(met > 500 && met < 2500, "{part:?}: {met}");
+        }
+    }
+}

@@ -1,0 +1,259 @@
+//! Interfaces of solids that many branches meet at once: each of them goes on mirrored and refracted.
+//!
+//! What `meeting` and [`Wave::meet`] come to there, without branches and several lines at a time.
+
+use etendue_geometry::assembly::Hits;
+use etendue_geometry::lines::{Lines, NONE};
+use etendue_geometry::sweep::{Vectors, feet, fill, gather};
+use etendue_math::Vec3;
+use etendue_optics::finish::Finish;
+use etendue_optics::fresnel::{fresnel, reflect, refract};
+use multiversion::multiversion;
+
+use super::{Branch, SPLIT, Seen, Wave};
+use crate::inside::Inside;
+use crate::meeting::Fillings;
+use crate::scene::{Act, Scene};
+
+/// Sorts branches by the faces that they meet.
+#[derive(Default)]
+pub struct Sorter {
+    /// For each face whether it is an interface of a solid that branches are split at many at a time.
+    splits: Vec<bool>,
+    lists: Vec<Vec<u32>>,
+    /// The faces whose lists are not empty, in the order of their first branches.
+    used: Vec<u32>,
+    /// Places of the branches that are worked on one by one.
+    single: Vec<u32>,
+    tied: Vec<bool>,
+}
+
+impl Sorter {
+    pub fn new(scene: &Scene) -> Self {
+        let roles = scene.roles.iter().zip(scene.assembly.faces());
+        let splits = roles.map(|(role, face)| {
+            let interface = |f: u32| matches!(scene.finishes[f as usize], Finish::Interface);
+            role.solid != 0 && !face.shape.is_smooth() && matches!(role.act, Act::Optical(f) if interface(f))
+        });
+        Self {
+            splits: splits.collect(),
+            lists: vec![Vec::new(); scene.roles.len()],
+            ..Self::default()
+        }
+    }
+
+    /// Sorts branches; those that meet nothing are left out.
+    #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+    fn sort(&mut self, branches: &[Branch], lines: &Lines, hits: &Hits, most_events: u32) {
+        for face in self.used.drain(..) {
+            self.lists[face as usize].clear();
+        }
+        self.single.clear();
+        hits.ties(lines, &mut self.tied);
+        for (i, branch) in branches.iter().enumerate() {
+            let face = hits.face[i];
+            if face == NONE {
+                continue;
+            }
+            let smooth = branch.seen == Seen::Smooth && branch.weight > SPLIT && branch.events < most_events;
+            if smooth && self.splits[face as usize] && !self.tied[i] {
+                let list = &mut self.lists[face as usize];
+                if list.is_empty() {
+                    self.used.push(face);
+                }
+                list.push(i as u32);
+            } else {
+                self.single.push(i as u32);
+            }
+        }
+    }
+}
+
+/// What lies on both sides of an interface, for a line that crosses it.
+#[derive(Clone, Copy)]
+struct Sides {
+    before: Inside,
+    after: Inside,
+    n: [f64; 2],
+    /// 1 if the line enters the solid, −1 if it leaves it.
+    sign: f64,
+    /// Absorption coefficient of the medium that it comes through \[1/mm\].
+    absorption: f64,
+}
+
+impl Sides {
+    /// None if the face is hidden there, or the line goes on as if nothing were there, or cannot.
+    fn new(scene: &Scene, solid: u16, before: Inside, wavelength: f64, fillings: &mut Fillings) -> Option<Self> {
+        let after = before.crossed(solid)?;
+        let [here, there] = [before, after].map(|inside| fillings.at(scene, inside.top(), wavelength));
+        let meets = solid >= before.top().min(after.top()) && here.n > 0.0 && there.n > 0.0 && here.n != there.n;
+        meets.then_some(Self {
+            before,
+            after,
+            n: [here.n, there.n],
+            sign: if before.contains(solid) { -1.0 } else { 1.0 },
+            absorption: here.absorption,
+        })
+    }
+}
+
+/// Branches that meet one face, gathered, and what becomes of them. Structure of arrays.
+#[derive(Default)]
+pub struct Room {
+    which: Vec<u32>,
+    sides: Vec<Sides>,
+    sign: Vec<f64>,
+    n: [Vec<f64>; 2],
+    t: Vec<f64>,
+    part: Vec<u32>,
+    points: Vectors,
+    normals: Vectors,
+    /// Where they come along and where they are mirrored to.
+    mirrored: Vectors,
+    refracted: Vectors,
+    /// Shares of the radiance that go on mirrored and refracted; NaN where the normal contradicts what the line is in.
+    shares: [Vec<f64>; 2],
+    /// Those of them that go on.
+    going: Vec<u32>,
+    sorted: [Vectors; 2],
+}
+
+impl Wave<'_> {
+    /// Takes all branches to their next events.
+    pub(super) fn advance(&mut self, hits: &Hits) {
+        let (mut sorter, mut room) = (std::mem::take(&mut self.sorter), std::mem::take(&mut self.room));
+        sorter.sort(&self.branches, &self.lines, hits, self.method.most_events);
+        for face in &sorter.used {
+            self.split(*face, &sorter.lists[*face as usize], hits, &mut room);
+        }
+        for i in &sorter.single {
+            self.step(hits, *i as usize);
+        }
+        (self.sorter, self.room) = (sorter, room);
+    }
+
+    /// Splits branches at an interface of a solid.
+    fn split(&mut self, face: u32, which: &[u32], hits: &Hits, room: &mut Room) {
+        self.look_around(face, which, hits, room);
+        let indices = || room.which.iter().map(|i| *i as usize);
+        fill(&mut room.t, indices().map(|i| hits.t[i]));
+        fill(&mut room.part, indices().map(|i| hits.part[i].0));
+        fill(&mut room.sign, room.sides.iter().map(|sides| sides.sign));
+        for (side, list) in room.n.iter_mut().enumerate() {
+            fill(list, room.sides.iter().map(|sides| sides.n[side]));
+        }
+        gather(&mut room.points, &self.lines.origin, &room.which);
+        gather(&mut room.mirrored, &self.lines.direction, &room.which);
+        let surface = &self.lit.scene.assembly.faces()[face as usize];
+        feet(
+            surface,
+            &mut room.points,
+            &room.mirrored,
+            &room.t,
+            &room.part,
+            &mut room.normals,
+        );
+        refract_all(room);
+        for (k, i) in room.which.iter().enumerate() {
+            let (branch, t) = (&mut self.branches[*i as usize], room.t[k]);
+            if room.shares[0][k].is_nan() {
+                self.step(hits, *i as usize);
+                continue;
+            }
+            branch.events += 1;
+            branch.travelled += t;
+            branch.direct &= branch.scatters > 0;
+            let absorption = room.sides[k].absorption;
+            if absorption > 0.0 {
+                branch.weight *= (-absorption * t).exp();
+            }
+        }
+        for (transmitted, directions) in [(false, &room.mirrored), (true, &room.refracted)] {
+            let shares = &room.shares[usize::from(transmitted)];
+            room.going.clear();
+            for (k, i) in room.which.iter().enumerate() {
+                let mut branch = self.branches[*i as usize];
+                branch.weight *= shares[k];
+                branch.inside = if transmitted {
+                    room.sides[k].after
+                } else {
+                    room.sides[k].before
+                };
+                if branch.weight > 0.0 {
+                    #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+                    room.going.push(k as u32);
+                    self.next.push(branch);
+                }
+            }
+            let [points, ways] = &mut room.sorted;
+            gather(points, &room.points, &room.going);
+            gather(ways, directions, &room.going);
+            let [o, d] = [points, ways].map(|lists| lists.each_ref().map(|list| &list[..]));
+            self.next_lines
+                .extend(o, d, face, room.going.iter().map(|k| room.part[*k as usize]));
+        }
+    }
+
+    /// Finds what lies on both sides of a face for each of some branches; those for which the face is none are worked on by
+    /// themselves.
+    fn look_around(&mut self, face: u32, which: &[u32], hits: &Hits, room: &mut Room) {
+        let scene = self.lit.scene;
+        let solid = scene.roles[face as usize].solid;
+        room.which.clear();
+        room.sides.clear();
+        // Nearly all come from one or two sides.
+        let mut seen: Vec<(Inside, f64, Option<Sides>)> = Vec::new();
+        for i in which {
+            let branch = &self.branches[*i as usize];
+            let (inside, wavelength) = (branch.inside, self.wavelength(branch.path));
+            let known = seen.iter().find(|known| known.0 == inside && known.1 == wavelength);
+            let sides = if let Some((.., sides)) = known {
+                *sides
+            } else {
+                let sides = Sides::new(scene, solid, inside, wavelength, &mut self.fillings);
+                seen.push((inside, wavelength, sides));
+                sides
+            };
+            if let Some(sides) = sides {
+                room.which.push(*i);
+                room.sides.push(sides);
+            } else {
+                self.step(hits, *i as usize);
+            }
+        }
+    }
+}
+
+/// Directions and shares of what is mirrored and refracted.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn refract_all(room: &mut Room) {
+    let n = room.t.len();
+    for list in room.refracted.iter_mut().chain(&mut room.shares) {
+        list.resize(n, 0.0);
+    }
+    let [dx, dy, dz] = room.mirrored.each_mut().map(|v| &mut v[..n]);
+    let [rx, ry, rz] = room.refracted.each_mut().map(|v| &mut v[..n]);
+    let [back, through] = room.shares.each_mut().map(|v| &mut v[..n]);
+    let [nx, ny, nz] = room.normals.each_ref().map(|v| &v[..n]);
+    let [n1, n2] = room.n.each_ref().map(|v| &v[..n]);
+    let sign = &room.sign[..n];
+    for k in 0..n {
+        let d = Vec3::new(dx[k], dy[k], dz[k]);
+        let side = Vec3::new(nx[k], ny[k], nz[k]) * sign[k];
+        let height = -d.dot(side);
+        let cosine = if height < 1.0 { height } else { 1.0 };
+        let ratio = n1[k] / n2[k];
+        let f = fresnel(cosine, n1[k], n2[k]);
+        let mirrored = reflect(d, side, cosine);
+        let refracted = refract(d, side, cosine, ratio, f.cosine);
+        (dx[k], dy[k], dz[k]) = (mirrored.x, mirrored.y, mirrored.z);
+        (rx[k], ry[k], rz[k]) = (refracted.x, refracted.y, refracted.z);
+        let agrees = (height > 0.0) | ((height == 0.0) & (sign[k] < 0.0));
+        back[k] = if agrees { f.reflectance } else { f64::NAN };
+        through[k] = if agrees {
+            (1.0 - f.reflectance) * (ratio * ratio)
+        } else {
+            f64::NAN
+        };
+    }
+}
