@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use etendue_math::Vec3;
+use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
 use crate::bounds::Bounds;
@@ -51,6 +51,7 @@ impl Scratch {
         {
             list.resize(n, 0.0);
         }
+        self.leaving.clear();
         self.leaving.resize(n, [NONE; MOST_LEFT]);
         self.triangle.resize(n, NONE);
     }
@@ -93,6 +94,25 @@ impl Hits {
     #[must_use]
     pub fn tied(&self, i: usize, o: Vec3) -> bool {
         self.second[i] - self.t[i] <= TIE * (o.x.abs() + o.y.abs() + o.z.abs() + self.t[i])
+    }
+}
+
+/// Lines in the coordinates of a mesh, and how far each of them is of interest: crossings that are tied with what it met so
+/// far are.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn to_local(frame: &Frame, lines: &Lines, met: &[f64], scratch: &mut Scratch) {
+    let n = lines.len();
+    let [ox, oy, oz] = lines.origin.each_ref().map(|v| &v[..n]);
+    let [dx, dy, dz] = lines.direction.each_ref().map(|v| &v[..n]);
+    let [px, py, pz] = scratch.origin.each_mut().map(|v| &mut v[..n]);
+    let [kx, ky, kz] = scratch.direction.each_mut().map(|v| &mut v[..n]);
+    let (met, reach) = (&met[..n], &mut scratch.t[..n]);
+    for i in 0..n {
+        let (o, d) = (Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]));
+        let (p, k) = (frame.point_to_local(o), frame.direction_to_local(d));
+        (px[i], py[i], pz[i]) = (p.x, p.y, p.z);
+        (kx[i], ky[i], kz[i]) = (k.x, k.y, k.z);
+        reach[i] = met[i] + TIE * (o.x.abs() + o.y.abs() + o.z.abs() + met[i]);
     }
 }
 
@@ -207,17 +227,9 @@ impl Assembly {
         let n = lines.len();
         let scratch = &mut hits.scratch;
         scratch.resize(n);
+        to_local(&face.frame, lines, &hits.t, scratch);
         for i in 0..n {
-            let (o, d) = (lines.origin(i), lines.direction(i));
-            let (p, k) = (face.frame.point_to_local(o), face.frame.direction_to_local(d));
-            for (axis, (p, k)) in [(p.x, k.x), (p.y, k.y), (p.z, k.z)].into_iter().enumerate() {
-                scratch.origin[axis][i] = p;
-                scratch.direction[axis][i] = k;
-            }
-            scratch.t[i] = hits.t[i] + TIE * (o.x.abs() + o.y.abs() + o.z.abs() + hits.t[i]);
-            let mut room = [NONE; MOST_LEFT];
-            lines.leaving(i).parts(index, &mut room);
-            scratch.leaving[i] = room;
+            lines.leaving(i).parts(index, &mut scratch.leaving[i]);
         }
         mesh.nearest_block(
             Rays {

@@ -128,7 +128,16 @@ impl Face {
                 let (x, y, z) = (along(frame.x), along(frame.y), along(frame.z));
                 (r2 * (x.squared() + y.squared()) + z2 * z.squared() + z1 * z + z0).has_zero()
             }
-            Shape::Asphere(_) | Shape::Torus(_) | Shape::Mesh(_) => true,
+            Shape::Mesh(mesh) => {
+                // A box around the box, in the coordinates of the mesh.
+                let corner = |i: u32| {
+                    let pick = |bit: u32, lo: f64, hi: f64| if i >> bit & 1 == 0 { lo } else { hi };
+                    frame.point_to_local(Vec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z)))
+                };
+                let local = Bounds::of((0..8).map(corner));
+                mesh.touches(local.widened(2.0 * ROUNDING * (size(frame.origin) + size(lo) + size(hi))))
+            }
+            Shape::Asphere(_) | Shape::Torus(_) => true,
         }
     }
 
@@ -177,8 +186,44 @@ impl Face {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::mesh::Mesh;
     use crate::shape::Quadric;
+
+    #[test]
+    fn a_box_touches_a_mesh_where_it_touches_a_triangle() {
+        // Stairs of squares up along x, turned.
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for i in 0..50_u32 {
+            let (x, z) = (f64::from(i), f64::from(i * i) * 0.1);
+            let corner = |dx: f64, dy: f64| Vec3::new(x + dx, dy, z);
+            vertices.extend([corner(0.0, 0.0), corner(0.9, 0.0), corner(0.9, 1.0), corner(0.0, 1.0)]);
+            triangles.extend([[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]);
+        }
+        let mesh = Mesh::new(vertices, triangles, None).expect("sound");
+        let face = Face {
+            shape: Shape::Mesh(Arc::new(mesh)),
+            frame: Frame {
+                origin: Vec3::new(1.0, -2.0, 0.5),
+                x: Vec3::new(0.0, 0.0, 1.0),
+                y: Vec3::new(1.0, 0.0, 0.0),
+                z: Vec3::new(0.0, 1.0, 0.0),
+            },
+            trims: vec![],
+            flipped: false,
+        };
+        for i in 0..50 {
+            let (x, z) = (f64::from(i), f64::from(i * i) * 0.1);
+            let touched = |x: f64, y: f64, z: f64| {
+                let at = face.frame.point_to_world(Vec3::new(x, y, z));
+                face.may_touch(Bounds::of([at]).widened(1e-3))
+            };
+            assert!(touched(x + 0.5, 0.5, z) && touched(x + 0.5, 1.0, z + 5e-4));
+            assert!(!touched(x + 0.95, 0.5, z) && !touched(x + 0.5, 0.5, z + 0.05) && !touched(x + 0.5, 1.01, z));
+        }
+    }
 
     #[test]
     fn a_box_beside_a_turned_cylinder_does_not_touch_it_and_one_on_it_does() {

@@ -146,15 +146,54 @@ pub fn feet(face: &Face, points: &mut Vectors, directions: &Vectors, t: &[f64], 
     match &face.shape {
         Shape::Flat(_) => feet_on(face, &Plane, points, directions, t, normals),
         Shape::Quadric(quadric) => feet_on(face, quadric, points, directions, t, normals),
-        Shape::Asphere(_) | Shape::Torus(_) | Shape::Mesh(_) => {
-            for (i, (t, part)) in t.iter().zip(parts).enumerate() {
+        Shape::Mesh(mesh) => {
+            let mut heights = vec![0.0; t.len()];
+            for (i, part) in parts.iter().enumerate() {
+                let (n, height) = mesh.plane(*part);
+                (normals[0][i], normals[1][i], normals[2][i]) = (n.x, n.y, n.z);
+                heights[i] = height;
+            }
+            feet_in_planes(face, points, directions, t, normals, &heights);
+        }
+        Shape::Asphere(_) | Shape::Torus(_) => {
+            for (i, t) in t.iter().enumerate() {
                 let [o, d] = [&*points, directions].map(|v| Vec3::new(v[0][i], v[1][i], v[2][i]));
-                let (t, part, uv) = (*t, *part, [0.0; 2]);
-                let foot = face.foot(o, d, &Crossing { t, part, uv });
+                let crossing = Crossing {
+                    t: *t,
+                    ..Crossing::default()
+                };
+                let foot = face.foot(o, d, &crossing);
                 (points[0][i], points[1][i], points[2][i]) = (foot.point.x, foot.point.y, foot.point.z);
                 (normals[0][i], normals[1][i], normals[2][i]) = (foot.normal.x, foot.normal.y, foot.normal.z);
             }
         }
+    }
+}
+
+/// Each line meets a plane of its own, n·p = `heights`, given with its normal in the coordinates of the face.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn feet_in_planes(
+    face: &Face,
+    points: &mut Vectors,
+    directions: &Vectors,
+    t: &[f64],
+    normals: &mut Vectors,
+    heights: &[f64],
+) {
+    let n = t.len();
+    let [px, py, pz] = points.each_mut().map(|v| &mut v[..n]);
+    let [dx, dy, dz] = directions.each_ref().map(|v| &v[..n]);
+    let [nx, ny, nz] = normals.each_mut().map(|v| &mut v[..n]);
+    let (heights, frame) = (&heights[..n], &face.frame);
+    let sign = if face.flipped { -1.0 } else { 1.0 };
+    for i in 0..n {
+        let (o, d) = (Vec3::new(px[i], py[i], pz[i]), Vec3::new(dx[i], dy[i], dz[i]));
+        let normal = Vec3::new(nx[i], ny[i], nz[i]);
+        let p = frame.point_to_local(o) + frame.direction_to_local(d) * t[i];
+        let p = frame.point_to_world(p - normal * (p.dot(normal) - heights[i]));
+        let normal = frame.direction_to_world(normal);
+        (px[i], py[i], pz[i]) = (p.x, p.y, p.z);
+        (nx[i], ny[i], nz[i]) = (sign * normal.x, sign * normal.y, sign * normal.z);
     }
 }
 

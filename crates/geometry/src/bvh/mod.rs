@@ -89,6 +89,32 @@ impl Bvh {
             .map(|ends| &self.order[ends[0] as usize..ends[1] as usize])
     }
 
+    /// Whether `visit` says so of any primitive whose bounds have a point in common with a box.
+    pub fn any_in(&self, around: Bounds, mut visit: impl FnMut(u32) -> bool) -> bool {
+        let (lo, hi) = (around.lo, around.hi);
+        let axes = [(lo.x, hi.x), (lo.y, hi.y), (lo.z, hi.z)];
+        let mut open = vec![0_u32];
+        while let Some(child) = open.pop() {
+            if child & LEAF == 0 {
+                let node = &self.nodes[child as usize];
+                // Boxes of lanes that are not in use are NaN: nothing touches them.
+                let touches = |lane: usize| {
+                    axes.iter().enumerate().all(|(axis, (lo, hi))| {
+                        f64::from(node.planes[axis][lane]) <= *hi && *lo <= f64::from(node.planes[axis + 3][lane])
+                    })
+                };
+                open.extend((0..WIDTH).filter(|lane| touches(*lane)).map(|lane| node.child[lane]));
+            } else {
+                let leaf = (child & !LEAF) as usize;
+                let primitives = &self.order[self.leaves[leaf] as usize..self.leaves[leaf + 1] as usize];
+                if primitives.iter().any(|primitive| visit(*primitive)) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
     /// Visits all primitives whose bounds the ray o + t d meets for a t in \[`t_lo`, `t_max`\], and few others: boxes in
     /// the order in which the ray enters them, those behind `t_max` left out. `visit` may lower `t_max` as it finds hits.
     ///

@@ -29,14 +29,22 @@ pub struct Mesh {
     vertices: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     vertex_normals: Option<Vec<Vec3>>,
-    /// Geometric unit normals, 0 for a triangle without area.
-    normals: Vec<Vec3>,
+    /// The plane of each triangle: its geometric unit normal and n·p of its points; 0 for a triangle without area.
+    planes: Vec<Plane>,
     degenerate: usize,
     area: f64,
     by_area: Alias,
     tree: Bvh,
     /// The triangles of each leaf of the tree.
     blocks: Vec<Block>,
+}
+
+/// The points p with n·p = h: what is asked of a triangle after every hit, in half a cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+struct Plane {
+    normal: Vec3,
+    height: f64,
 }
 
 /// Why vertices and triangles are no mesh.
@@ -119,7 +127,13 @@ impl Mesh {
     pub fn new(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>, normals: Option<Vec<Vec3>>) -> Result<Self, MeshError> {
         check(&vertices, &triangles, normals.as_deref())?;
         let corners = |i: usize| triangles[i].map(|v| vertices[v as usize]);
-        let (areas, unit): (Vec<f64>, Vec<Vec3>) = (0..triangles.len()).map(|i| area_and_normal(corners(i))).unzip();
+        let (areas, planes): (Vec<f64>, Vec<Plane>) = (0..triangles.len())
+            .map(|i| {
+                let (area, normal) = area_and_normal(corners(i));
+                let height = normal.dot(corners(i)[0]);
+                (area, Plane { normal, height })
+            })
+            .unzip();
         #[allow(clippy::cast_possible_truncation, reason = "fewer than 2³¹ triangles")]
         let real: Vec<u32> = (0..triangles.len() as u32)
             .filter(|i| areas[*i as usize] > 0.0)
@@ -150,7 +164,7 @@ impl Mesh {
             by_area,
             tree,
             blocks,
-            normals: unit,
+            planes,
             vertex_normals: normals,
             vertices,
             triangles,
@@ -176,6 +190,15 @@ impl Mesh {
         Bounds::of(self.real().flat_map(|i| self.triangle(i)))
     }
 
+    /// Whether the box around any triangle has a point in common with a box.
+    #[must_use]
+    pub fn touches(&self, around: Bounds) -> bool {
+        // The tree numbers the triangles that have an area.
+        let real: Vec<u32> = self.real().collect();
+        self.tree
+            .any_in(around, |i| Bounds::of(self.triangle(real[i as usize])).touches(around))
+    }
+
     /// The vertices of a triangle \[mm\].
     ///
     /// # Panics
@@ -196,7 +219,15 @@ impl Mesh {
     #[inline]
     #[must_use]
     pub fn normal(&self, i: u32) -> Vec3 {
-        self.normals[i as usize]
+        self.planes[i as usize].normal
+    }
+
+    /// The plane of a triangle: its geometric unit normal n, and n·p of its points \[mm\].
+    #[inline]
+    #[must_use]
+    pub fn plane(&self, i: u32) -> (Vec3, f64) {
+        let Plane { normal, height } = self.planes[i as usize];
+        (normal, height)
     }
 
     /// Whether it states normals at its vertices, which are interpolated between them.
@@ -255,7 +286,7 @@ impl Mesh {
     /// The triangles that have an area.
     #[allow(clippy::cast_possible_truncation, reason = "fewer than 2³¹ triangles")]
     fn real(&self) -> impl Iterator<Item = u32> {
-        (0..self.len() as u32).filter(|i| self.normals[*i as usize] != Vec3::default())
+        (0..self.len() as u32).filter(|i| self.planes[*i as usize].normal != Vec3::default())
     }
 }
 

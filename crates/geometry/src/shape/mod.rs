@@ -95,8 +95,8 @@ impl Shape {
     pub fn settle(&self, p: Vec3, part: u32) -> (Vec3, Vec3) {
         match self {
             Self::Mesh(mesh) => {
-                let (n, [corner, ..]) = (mesh.normal(part), mesh.triangle(part));
-                (p - n * (p - corner).dot(n), n)
+                let (n, height) = mesh.plane(part);
+                (p - n * (p.dot(n) - height), n)
             }
             Self::Flat(_) => (Vec3::new(p.x, p.y, 0.0), Vec3::new(0.0, 0.0, 1.0)),
             Self::Quadric(quadric) => quadric.settle(p),
