@@ -51,7 +51,6 @@ impl Scratch {
         {
             list.resize(n, 0.0);
         }
-        self.leaving.clear();
         self.leaving.resize(n, [NONE; MOST_LEFT]);
         self.triangle.resize(n, NONE);
     }
@@ -228,8 +227,8 @@ impl Assembly {
         let scratch = &mut hits.scratch;
         scratch.resize(n);
         to_local(&face.frame, lines, &hits.t, scratch);
-        for i in 0..n {
-            lines.leaving(i).parts(index, &mut scratch.leaving[i]);
+        for (i, left) in scratch.leaving.iter_mut().enumerate() {
+            *left = lines.leaving(i).parts_of(index);
         }
         mesh.nearest_block(
             Rays {

@@ -34,6 +34,13 @@ impl Leaving {
         }
     }
 
+    /// The parts of `face` that are left, each in its slot; [`NONE`] in the others.
+    #[inline(always)]
+    #[must_use]
+    pub fn parts_of(&self, face: u32) -> [u32; MOST_LEFT] {
+        std::array::from_fn(|slot| if self.face[slot] == face { self.part[slot] } else { NONE })
+    }
+
     /// The parts of `face` that are left, in `room`.
     #[inline]
     pub fn parts<'a>(&self, face: u32, room: &'a mut [u32; MOST_LEFT]) -> &'a [u32] {

@@ -168,11 +168,14 @@ impl Bvh {
                     continue;
                 }
             } else {
+                let before = *t_max;
                 visit((child & !LEAF) as usize, t_max);
-                let Some(lower) = probe.limit(*t_max) else {
-                    return;
-                };
-                limit = lower;
+                if *t_max < before {
+                    let Some(lower) = probe.limit(*t_max) else {
+                        return;
+                    };
+                    limit = lower;
+                }
             }
             loop {
                 if top == 0 {

@@ -161,7 +161,6 @@ impl Wave<'_> {
                 continue;
             }
             branch.events += 1;
-            branch.travelled += t;
             branch.direct &= branch.scatters > 0;
             let absorption = room.sides[k].absorption;
             if absorption > 0.0 {
