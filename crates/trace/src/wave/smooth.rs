@@ -1,4 +1,4 @@
-//! Interfaces of solids that many branches meet at once: each of them goes on mirrored and refracted.
+//! Interfaces of solids that many branches meet at once: each of them goes on mirrored and refracted, or on one of both ways.
 //!
 //! What `meeting` and [`Wave::meet`] come to there, without branches and several lines at a time.
 
@@ -55,8 +55,7 @@ impl Sorter {
             if face == NONE {
                 continue;
             }
-            let smooth = branch.seen == Seen::Smooth && branch.weight > SPLIT && branch.events < most_events;
-            if smooth && self.splits[face as usize] && !self.tied[i] {
+            if self.splits[face as usize] && !self.tied[i] && branch.events < most_events {
                 let list = &mut self.lists[face as usize];
                 if list.is_empty() {
                     self.used.push(face);
@@ -155,16 +154,28 @@ impl Wave<'_> {
         );
         refract_all(room);
         for (k, i) in room.which.iter().enumerate() {
-            let (branch, t) = (&mut self.branches[*i as usize], room.t[k]);
             if room.shares[0][k].is_nan() {
                 self.step(hits, *i as usize);
                 continue;
             }
+            let branch = &mut self.branches[*i as usize];
             branch.events += 1;
+            branch.travelled += room.t[k];
             branch.direct &= branch.scatters > 0;
-            let absorption = room.sides[k].absorption;
+            let Sides { n, absorption, .. } = room.sides[k];
             if absorption > 0.0 {
-                branch.weight *= (-absorption * t).exp();
+                branch.weight *= (-absorption * room.t[k]).exp();
+            }
+            if branch.seen != Seen::Smooth {
+                branch.seen = Seen::Caustic;
+            }
+            if branch.seen != Seen::Smooth || branch.weight <= SPLIT {
+                // One of both ways is drawn by its share of the flux; radiance carries its factor (n₁/n₂)² besides.
+                let number = self.paths[branch.path as usize].numbers.draw();
+                let mirrored = number < room.shares[0][k];
+                let ratio = n[0] / n[1];
+                room.shares[0][k] = if mirrored { 1.0 } else { 0.0 };
+                room.shares[1][k] = if mirrored { 0.0 } else { ratio * ratio };
             }
         }
         for (transmitted, directions) in [(false, &room.mirrored), (true, &room.refracted)] {
