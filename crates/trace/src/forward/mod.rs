@@ -3,6 +3,9 @@
 //! Every ray keeps its flux and has one fate: at a surface it goes into one of the lobes, or is absorbed, by chance in
 //! proportion to their shares, and in a medium it is absorbed at a distance drawn from Beer's law. So the rays that a
 //! detector keeps have equal flux if those of the source have.
+//!
+//! `flock`: rays on their way, sorted by what comes next; `bounce`: many at once off a plain wall; `step`: one by one; `note`:
+//! detectors take note.
 
 mod bounce;
 mod flock;

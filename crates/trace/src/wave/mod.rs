@@ -1,4 +1,6 @@
 //! A block of paths from the eye, all branches of which take their next steps together.
+//!
+//! `smooth`: interfaces that many of them meet at once; `scatter`: diffuse surfaces.
 
 mod scatter;
 mod smooth;
