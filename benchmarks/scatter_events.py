@@ -17,6 +17,8 @@ import etendue as et
 import numpy as np
 from timing import best, load, timed
 
+# Rays from which the number of scatters of each is learnt.
+TRIAL = 1 << 18
 RADIUS, HEIGHT, REFLECTANCE, HOLE, AWAY = 21.5, 21.4, 0.984, 2.5, 10.0
 
 
@@ -54,10 +56,11 @@ def grille(folder: Path) -> dict[str, Any]:
 
 
 def job(name: str, wanted: int, folder: Path, *more: dict[str, Any]) -> None:
-    kept = {"name": "scatter", "kind": "scatter", "most": 2 * wanted}
+    # None of those of the trial is dropped, either.
+    kept = {"name": "scatter", "kind": "scatter", "most": 2 * max(wanted, TRIAL)}
     image = {"name": "image", "kind": "image", "observer": "eye"}
-    trial = et.trace(cavity(kept, *more), rays=1 << 18)
-    rays = round(wanted / len(trial.events.only) * (1 << 18))
+    trial = et.trace(cavity(kept, *more), rays=TRIAL)
+    rays = round(wanted / len(trial.events.only) * TRIAL)
     once, result = timed(lambda: et.trace(cavity(kept, *more), rays))
     anew, other = timed(lambda: et.trace(cavity(image, *more), rays))
     events = result.events.only

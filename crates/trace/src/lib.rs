@@ -8,7 +8,7 @@
 //! thinned to a number of them.
 //!
 //! `reverse`: from the eye to the sources; `wave`: a block of its paths; `exitance`: the light of diffuse surfaces, known
-//! beforehand, at which paths may end.
+//! beforehand, at which paths may end. `lists`: what rays of a block are sorted into.
 
 pub mod detector;
 pub mod exitance;
@@ -18,6 +18,7 @@ pub mod harvest;
 pub mod inside;
 pub mod kept;
 pub mod ledger;
+mod lists;
 pub mod meeting;
 pub mod reverse;
 pub mod scene;

@@ -5,6 +5,7 @@ use etendue_geometry::lines::{Leaving, Lines};
 use etendue_math::Vec3;
 
 use crate::inside::Inside;
+use crate::lists::Lists;
 use crate::scene::Scene;
 
 use super::bounce::Bouncer;
@@ -76,11 +77,9 @@ impl Flock {
 pub struct Sorter {
     /// For each face, and for none, the number of the list of most rays that meet it: [`GONE`], [`SINGLE`], or from [`FIRST`] on
     /// for faces off which many are bounced at once.
-    list_of: Vec<u32>,
+    list_of: Vec<usize>,
     bouncers: Vec<Bouncer>,
-    lists: Vec<Vec<u32>>,
-    /// The lists that are not empty, in the order of their first rays.
-    used: Vec<u32>,
+    lists: Lists,
     /// For each ray whether it may be at more than one face.
     tied: Vec<bool>,
     /// Whether rays that leave each solid's medium cannot be absorbed on their way; the surroundings first.
@@ -98,69 +97,60 @@ const FIRST: usize = 2;
 
 impl Sorter {
     /// Of a scene, and those of its faces off which many rays are bounced at once.
-    #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
+    #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^16 solids")]
     pub fn new(scene: &Scene, bouncers: Vec<Bouncer>) -> Self {
         let solids = 0..=scene.solids.len();
         let clear = |solid: usize| scene.media[scene.medium(solid as u16)].absorption.range() == [0.0, 0.0];
         let clear: Vec<bool> = solids.map(clear).collect();
-        let mut list_of = vec![SINGLE as u32; scene.roles.len() + 1];
-        list_of[scene.roles.len()] = if clear[0] { GONE } else { SINGLE } as u32;
-        for (list, bouncer) in (FIRST as u32..).zip(&bouncers) {
+        let mut list_of = vec![SINGLE; scene.roles.len() + 1];
+        list_of[scene.roles.len()] = if clear[0] { GONE } else { SINGLE };
+        for (list, bouncer) in (FIRST..).zip(&bouncers) {
             list_of[bouncer.face as usize] = list;
         }
         Self {
             list_of,
-            lists: vec![Vec::new(); FIRST + bouncers.len()],
+            lists: Lists::new(FIRST + bouncers.len()),
             bouncers,
-            used: Vec::new(),
             tied: Vec::new(),
             clear,
         }
     }
 
-    /// Sorts the rays of a flock. Rays that have had all the events that they may have (`ended`) are not bounced, nor those in a solid or at more than
-    /// one face.
-    #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+    /// Sorts the rays of a flock. Rays that have had all the events that they may have (`ended`) are not bounced, nor those in
+    /// a solid or at more than one face.
     pub fn sort(&mut self, flock: &Flock, hits: &Hits, ended: bool) {
-        for list in &self.used {
-            self.lists[*list as usize].clear();
-        }
-        self.used.clear();
+        self.lists.clear();
         hits.ties(&flock.lines, &mut self.tied);
         let faces = self.list_of.len() - 1;
         for i in 0..flock.len() {
             let face = (hits.face[i] as usize).min(faces);
-            let mut list = self.list_of[face] as usize;
+            let mut list = self.list_of[face];
             // Few rays are special: their branch costs nothing, and none is on the way of the others.
             let nested = flock.inside[i] != Inside::default();
             if nested | ended | self.tied[i] {
                 let leaves = face == faces && self.clear[usize::from(flock.inside[i].top())];
                 list = if leaves { GONE } else { SINGLE };
             }
-            if self.lists[list].is_empty() {
-                self.used.push(list as u32);
-            }
-            self.lists[list].push(i as u32);
+            self.lists.push(list, i);
         }
+        self.lists.join_short(FIRST, SINGLE);
     }
 
     /// Places of the rays that meet nothing and cannot be absorbed on their way.
     pub fn gone(&self) -> &[u32] {
-        &self.lists[GONE]
+        self.lists.get(GONE)
     }
 
     /// Places of the rays that are worked on one by one.
     pub fn single(&self) -> &[u32] {
-        &self.lists[SINGLE]
+        self.lists.get(SINGLE)
     }
 
     /// Places of the rays that are bounced, face by face.
     pub fn bounced(&self) -> impl Iterator<Item = (Bouncer, &[u32])> {
-        let bounced = |list: &u32| {
-            let list = *list as usize;
-            let bouncer = self.bouncers.get(list.checked_sub(FIRST)?)?;
-            Some((*bouncer, &self.lists[list][..]))
-        };
-        self.used.iter().filter_map(bounced)
+        let bouncer = |list: usize| self.bouncers.get(list.checked_sub(FIRST)?);
+        self.lists
+            .used()
+            .filter_map(move |(list, places)| Some((*bouncer(list)?, places)))
     }
 }

@@ -12,6 +12,7 @@ use multiversion::multiversion;
 
 use super::{Branch, SPLIT, Seen, Wave};
 use crate::inside::Inside;
+use crate::lists::Lists;
 use crate::meeting::Fillings;
 use crate::scene::{Act, Scene};
 
@@ -20,13 +21,13 @@ use crate::scene::{Act, Scene};
 pub struct Sorter {
     /// For each face whether it is an interface of a solid that branches are split at many at a time.
     splits: Vec<bool>,
-    lists: Vec<Vec<u32>>,
-    /// The faces whose lists are not empty, in the order of their first branches.
-    used: Vec<u32>,
-    /// Places of the branches that are worked on one by one.
-    single: Vec<u32>,
+    /// Places of the branches that are, by the number of their face and 1.
+    lists: Lists,
     tied: Vec<bool>,
 }
+
+/// The list of branches that are worked on one by one.
+const SINGLE: usize = 0;
 
 impl Sorter {
     pub fn new(scene: &Scene) -> Self {
@@ -37,34 +38,24 @@ impl Sorter {
         });
         Self {
             splits: splits.collect(),
-            lists: vec![Vec::new(); scene.roles.len()],
-            ..Self::default()
+            lists: Lists::new(scene.roles.len() + 1),
+            tied: Vec::new(),
         }
     }
 
     /// Sorts branches; those that meet nothing are left out.
-    #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
     fn sort(&mut self, branches: &[Branch], lines: &Lines, hits: &Hits, most_events: u32) {
-        for face in self.used.drain(..) {
-            self.lists[face as usize].clear();
-        }
-        self.single.clear();
+        self.lists.clear();
         hits.ties(lines, &mut self.tied);
         for (i, branch) in branches.iter().enumerate() {
             let face = hits.face[i];
             if face == NONE {
                 continue;
             }
-            if self.splits[face as usize] && !self.tied[i] && branch.events < most_events {
-                let list = &mut self.lists[face as usize];
-                if list.is_empty() {
-                    self.used.push(face);
-                }
-                list.push(i as u32);
-            } else {
-                self.single.push(i as u32);
-            }
+            let split = self.splits[face as usize] && !self.tied[i] && branch.events < most_events;
+            self.lists.push(if split { face as usize + 1 } else { SINGLE }, i);
         }
+        self.lists.join_short(SINGLE + 1, SINGLE);
     }
 }
 
@@ -122,18 +113,18 @@ impl Wave<'_> {
     pub(super) fn advance(&mut self, hits: &Hits) {
         let (mut sorter, mut room) = (std::mem::take(&mut self.sorter), std::mem::take(&mut self.room));
         sorter.sort(&self.branches, &self.lines, hits, self.method.most_events);
-        for face in &sorter.used {
-            self.split(*face, &sorter.lists[*face as usize], hits, &mut room);
+        for (list, which) in sorter.lists.used().filter(|(list, _)| *list != SINGLE) {
+            self.split(list - 1, which, hits, &mut room);
         }
-        for i in &sorter.single {
+        for i in sorter.lists.get(SINGLE) {
             self.step(hits, *i as usize);
         }
         (self.sorter, self.room) = (sorter, room);
     }
 
     /// Splits branches at an interface of a solid.
-    fn split(&mut self, face: u32, which: &[u32], hits: &Hits, room: &mut Room) {
-        self.look_around(face, which, hits, room);
+    fn split(&mut self, number: usize, which: &[u32], hits: &Hits, room: &mut Room) {
+        self.look_around(self.lit.scene.roles[number].solid, which, hits, room);
         let indices = || room.which.iter().map(|i| *i as usize);
         fill(&mut room.t, indices().map(|i| hits.t[i]));
         fill(&mut room.part, indices().map(|i| hits.part[i].0));
@@ -143,7 +134,7 @@ impl Wave<'_> {
         }
         gather(&mut room.points, &self.lines.origin, &room.which);
         gather(&mut room.mirrored, &self.lines.direction, &room.which);
-        let surface = &self.lit.scene.assembly.faces()[face as usize];
+        let surface = &self.lit.scene.assembly.faces()[number];
         feet(
             surface,
             &mut room.points,
@@ -199,16 +190,17 @@ impl Wave<'_> {
             gather(points, &room.points, &room.going);
             gather(ways, directions, &room.going);
             let [o, d] = [points, ways].map(|lists| lists.each_ref().map(|list| &list[..]));
+            #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
+            let face = number as u32;
             self.next_lines
                 .extend(o, d, face, room.going.iter().map(|k| room.part[*k as usize]));
         }
     }
 
-    /// Finds what lies on both sides of a face for each of some branches; those for which the face is none are worked on by
-    /// themselves.
-    fn look_around(&mut self, face: u32, which: &[u32], hits: &Hits, room: &mut Room) {
+    /// Finds what lies on both sides of a face of a solid for each of some branches; those for which it is no interface are
+    /// worked on by themselves.
+    fn look_around(&mut self, solid: u16, which: &[u32], hits: &Hits, room: &mut Room) {
         let scene = self.lit.scene;
-        let solid = scene.roles[face as usize].solid;
         room.which.clear();
         room.sides.clear();
         // Nearly all come from one or two sides.
