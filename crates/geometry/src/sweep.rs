@@ -138,7 +138,8 @@ pub fn gather(into: &mut Vectors, from: &Vectors, which: &[u32]) {
 }
 
 /// The points at which lines meet a face, settled on it, and the normals there: for each line what [`Face::foot`] says.
-/// `points` holds the start points on entry, `parts` the triangles of a mesh that are met.
+/// `points` holds the start points on entry \[mm\], `t` the distances \[mm\], `parts` the triangles of a mesh that are met;
+/// the lists are of one length.
 pub fn feet(face: &Face, points: &mut Vectors, directions: &Vectors, t: &[f64], parts: &[u32], normals: &mut Vectors) {
     for list in normals.iter_mut() {
         list.resize(t.len(), 0.0);

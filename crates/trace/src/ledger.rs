@@ -39,7 +39,7 @@ impl Entry {
         self.rays += 1;
     }
 
-    /// Many rays more, in eight sums side by side.
+    /// Many rays more, by their fluxes \[flux unit\], in eight sums side by side.
     pub fn add_all(&mut self, fluxes: &[f64]) {
         let eights = fluxes.chunks_exact(8);
         let rest = eights.remainder();

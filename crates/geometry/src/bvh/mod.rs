@@ -168,14 +168,11 @@ impl Bvh {
                     continue;
                 }
             } else {
-                let before = *t_max;
                 visit((child & !LEAF) as usize, t_max);
-                if *t_max < before {
-                    let Some(lower) = probe.limit(*t_max) else {
-                        return;
-                    };
-                    limit = lower;
-                }
+                let Some(lower) = probe.limit(*t_max) else {
+                    return;
+                };
+                limit = lower;
             }
             loop {
                 if top == 0 {

@@ -13,7 +13,9 @@ use super::bounce::Bouncer;
 /// What a ray carries.
 #[derive(Clone, Copy, Debug)]
 pub struct Rider {
+    /// \[flux unit\].
     pub flux: f64,
+    /// \[nm\].
     pub wavelength: f64,
     /// Its number in the run.
     pub ray: u64,

@@ -86,9 +86,6 @@ fn edges(scene: &Scene, done: u64) -> Vec<u64> {
 }
 
 /// Traces batches `batches` of a run on the threads of the current pool, and merges them in order.
-///
-/// `stop` is looked at before each batch; batches from the first one that was not begun on are left out, and the number of
-/// batches done is returned.
 #[must_use]
 pub fn trace(scene: &Scene, run: &Run<'_>, batches: Range<u64>) -> Harvest {
     let parts: Vec<Yield> = batches

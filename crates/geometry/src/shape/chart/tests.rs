@@ -53,6 +53,18 @@ fn zoo() -> Vec<Shape> {
     ]
 }
 
+/// Point `i` of those that are spread evenly over a surface, and its triangle.
+fn drawn(sampler: &AreaSampler, stream: Stream, i: u64) -> (Vec3, u32) {
+    let (mut block, mut k, mut numbers) = (0, 4, [0.0; 4]);
+    sampler.draw(&mut || {
+        if k == 4 {
+            (numbers, k, block) = (stream.uniforms(i, block), 0, block + 1);
+        }
+        k += 1;
+        numbers[k - 1]
+    })
+}
+
 #[test]
 fn evenly_spread_points_fall_into_patches_by_their_areas() {
     for (number, shape) in (0..).zip(zoo()) {
@@ -64,14 +76,7 @@ fn evenly_spread_points_fall_into_patches_by_their_areas() {
         let (mut counts, n) = (vec![0_u32; areas.len()], 2000 * areas.len() as u64);
         let stream = Stream::new(8, number);
         for i in 0..n {
-            let (mut block, mut k, mut numbers) = (0, 4, [0.0; 4]);
-            let (p, triangle) = sampler.draw(&mut || {
-                if k == 4 {
-                    (numbers, k, block) = (stream.uniforms(i, block), 0, block + 1);
-                }
-                k += 1;
-                numbers[k - 1]
-            });
+            let (p, triangle) = drawn(&sampler, stream, i);
             counts[(chart.bin(p, triangle) / BINS) as usize] += 1;
         }
         // χ² of known shares: its mean is the number of patches but one, its variance twice that.
@@ -100,14 +105,7 @@ fn patches_are_small_and_every_bin_is_used() {
         let mut bins = vec![0_u32; seen.len() * BINS as usize];
         let stream = Stream::new(9, 0);
         for i in 0..400 * seen.len() as u64 {
-            let (mut block, mut k, mut numbers) = (0, 4, [0.0; 4]);
-            let (p, triangle) = sampler.draw(&mut || {
-                if k == 4 {
-                    (numbers, k, block) = (stream.uniforms(i, block), 0, block + 1);
-                }
-                k += 1;
-                numbers[k - 1]
-            });
+            let (p, triangle) = drawn(&sampler, stream, i);
             let bin = chart.bin(p, triangle);
             bins[bin as usize] += 1;
             seen[(bin / BINS) as usize].push(p);
