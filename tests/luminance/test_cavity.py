@@ -89,7 +89,7 @@ def test_where_the_light_ends() -> None:
         (wall, ledger.by_surface["wall"].rays), (base, ledger.by_surface["base"].rays), (top, ledger.escaped.rays),
         (back, ledger.by_surface["disk"].rays),
     ):  # fmt: skip
-        assert_drawn_with(flux / FLUX, rays, n)
+        assert_drawn_with(share=flux / FLUX, hits=rays, rays=n)
 
 
 def test_illuminance_of_the_base() -> None:
@@ -102,7 +102,7 @@ def test_illuminance_of_the_base() -> None:
         for v, wv in zip(x, w, strict=True):
             at = seen.points + u * half[0] * np.array(seen.right) + v * half[1] * np.array(seen.up)
             expected += wu * wv / 4 * CAVITY.on_base(np.hypot(at[..., 0], at[..., 1]))
-    assert_agree(seen.values, expected * 1e6, seen.standard_error)
+    assert_agree(values=seen.values, expected=expected * 1e6, standard_error=seen.standard_error)
 
 
 # --- what is seen ----------------------------------------------------------------------------------------------------
@@ -143,7 +143,11 @@ def expected_map(observer: Observer, screen: Screen) -> Array:
 
 def test_light_image() -> None:
     image = traced().images["image"]
-    assert_agree(image.values, expected_map(image.observer, image.screen) * 1e6, image.standard_error)
+    assert_agree(
+        values=image.values,
+        expected=expected_map(image.observer, image.screen) * 1e6,
+        standard_error=image.standard_error,
+    )
 
 
 def test_reverse_map() -> None:
@@ -151,6 +155,6 @@ def test_reverse_map() -> None:
     (seen,) = et.luminance_map(cavity(), rays_per_pixel=16384, seed=2)
     expected = expected_map(seen.observer, seen.screen) * 1e6
     assert np.median(seen.standard_error / seen.values) < 0.01
-    assert_agree(seen.values, expected, seen.standard_error, REVERSE)
-    assert_differ(seen.values, expected[::-1], seen.standard_error)
-    assert_differ(seen.values, expected[:, ::-1], seen.standard_error)
+    assert_agree(values=seen.values, expected=expected, standard_error=seen.standard_error, degrees=REVERSE)
+    assert_differ(values=seen.values, other=expected[::-1], standard_error=seen.standard_error)
+    assert_differ(values=seen.values, other=expected[:, ::-1], standard_error=seen.standard_error)

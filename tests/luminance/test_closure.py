@@ -68,7 +68,7 @@ def test_what_is_seen_from_everywhere_is_the_flux() -> None:
                       float(np.mean(seen)), count - 1.0))  # fmt: skip
     off, error, solid, mean, degrees = np.array(cells).T
     assert solid.sum() == pytest.approx(4 * math.pi)
-    assert_agree(off, np.zeros_like(off), error, degrees)
+    assert_agree(values=off, expected=np.zeros_like(off), standard_error=error, degrees=degrees)
     escaped = result.ledger.escaped.flux
     assert 50 < escaped < 99
     total = math.sqrt(((error * solid) ** 2).sum())

@@ -218,7 +218,7 @@ def test_flux_between_tilted_rectangles() -> None:
             expected += wu * wv / 4 * irradiance(at, np.array(forward.normal), flux / 15)
     share = expected.mean() * 24 / flux
     assert 0.05 < share < 0.2
-    assert_agree(forward.values, expected * 1e6, forward.standard_error)
+    assert_agree(values=forward.values, expected=expected * 1e6, standard_error=forward.standard_error)
     # The card as it is seen along its normal: its corners are at those of the screen, turned by its spin.
     card = {"shape": CARD, **CARD_AT, "finish": {"kind": "lambertian", "reflectance": 1.0}}
     scene = et.Scene(sources=[lamp], surfaces=[card])
@@ -240,8 +240,8 @@ def test_flux_between_tilted_rectangles() -> None:
             inside &= (np.abs(at @ np.array(forward.right)) < 3) & (np.abs(at @ np.array(forward.up)) < 2)
     assert inside.sum() > 60
     error = seen.standard_error[inside]
-    assert_agree(seen.values[inside], expected_map[inside] * 1e6, error, REVERSE)
-    assert_differ(seen.values[inside], expected_map[::-1][inside] * 1e6, error)
+    assert_agree(values=seen.values[inside], expected=expected_map[inside] * 1e6, standard_error=error, degrees=REVERSE)
+    assert_differ(values=seen.values[inside], other=expected_map[::-1][inside] * 1e6, standard_error=error)
     total = math.sqrt((seen.standard_error**2).sum()) * seen.screen.pixel_area / 1e6
     assert abs(seen.intensity - share * flux / math.pi) < LARGEST_Z * total
     assert total < 0.01 * seen.intensity

@@ -10,19 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.luminance.gathering import BLOCKS, blocks, comparison_note
-from scipy.stats import chi2, norm
+from oracles.verdicts import REVERSE, assert_agree
 
 Array = npt.NDArray[np.float64]
-SIGNIFICANCE = 1e-4
 WHITE = {"kind": "lambertian", "reflectance": 0.85}
-
-
-def assert_agree(values: Array, expected: Array, error: Array) -> None:
-    """χ² and the largest of the z; of 16 passes the spread has 15 degrees of freedom, which widens both a little."""
-    z = (values - expected) / error
-    widened = (z**2).sum() * 13 / 15
-    assert chi2.sf(widened, z.size) > SIGNIFICANCE
-    assert np.abs(z).max() < 1.35 * norm.isf(SIGNIFICANCE / 2 / z.size)
 
 
 def tray(**more: Any) -> dict[str, Any]:
@@ -67,7 +58,9 @@ def test_the_map_is_that_of_the_light_image(gathered: et.LuminanceMap) -> None:
     assert clear.sum() > 60
     error = np.hypot(gathered.standard_error, image.standard_error)
     assert np.median(error[clear] / image.values[clear]) < 0.02
-    assert_agree(gathered.values[clear], image.values[clear], error[clear])
+    assert_agree(
+        values=gathered.values[clear], expected=image.values[clear], standard_error=error[clear], degrees=REVERSE
+    )
 
 
 def test_noise_is_much_smaller(gathered: et.LuminanceMap) -> None:
@@ -98,7 +91,12 @@ def test_integrating_sphere() -> None:
         rays_per_pixel=1024,
         gather=True,
     )
-    assert_agree(lmap.values, np.full(lmap.values.shape, expected), lmap.standard_error)
+    assert_agree(
+        values=lmap.values,
+        expected=np.full(lmap.values.shape, expected),
+        standard_error=lmap.standard_error,
+        degrees=REVERSE,
+    )
     # The mean of such maps scatters by 0.25 % (eight seeds); without patches by 0.8 %, of half as many lines.
     assert abs(lmap.values.mean() / expected - 1) < 3.9 * 2.5e-3
 
@@ -123,7 +121,7 @@ def test_no_light_is_counted_twice() -> None:
         clear &= off > radius + math.hypot(4, 4) / 2
     assert clear.sum() > 50
     error = np.hypot(image.standard_error, both.standard_error)
-    assert_agree(both.values[clear], image.values[clear], error[clear])
+    assert_agree(values=both.values[clear], expected=image.values[clear], standard_error=error[clear], degrees=REVERSE)
 
 
 def test_triangles_of_a_mesh_are_patches(tmp_path: Any) -> None:
@@ -145,7 +143,7 @@ def test_triangles_of_a_mesh_are_patches(tmp_path: Any) -> None:
     exact = et.luminance_map(scene, eye, screen, rays_per_pixel=2048, seed=7)
     lit = exact.values > 0
     error = np.hypot(known.standard_error, exact.standard_error)[lit]
-    assert_agree(known.values[lit], exact.values[lit], error)
+    assert_agree(values=known.values[lit], expected=exact.values[lit], standard_error=error, degrees=REVERSE)
     # Per line of sight, the variance is smaller; the rest is that of the light that comes straight from the lamp.
     assert np.median((exact.standard_error[lit] / known.standard_error[lit]) ** 2) * 4 > 1.2
 
@@ -200,4 +198,4 @@ def test_colours_and_light_fields_are_gathered_too() -> None:
     assert clear.sum() > 60
     error = np.hypot(known.standard_error, image.standard_error)
     assert np.median(error[clear] / image.values[clear]) < 0.03
-    assert_agree(known.values[clear], image.values[clear], error[clear])
+    assert_agree(values=known.values[clear], expected=image.values[clear], standard_error=error[clear], degrees=REVERSE)

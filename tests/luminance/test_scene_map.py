@@ -218,7 +218,7 @@ def test_integrating_sphere() -> None:
         sources=[lamp],
         surfaces=[wall],
     )
-    assert_agree(lmap.values, np.full(lmap.values.shape, expected), lmap.standard_error)
+    assert_agree(values=lmap.values, expected=np.full(lmap.values.shape, expected), standard_error=lmap.standard_error)
     assert abs(lmap.values.mean() / expected - 1) < 0.02
 
 
@@ -265,7 +265,11 @@ def test_rings_through_a_collecting_surface() -> None:
     cone = et.luminance_map(incident, observer, screen, method="cone", acceptance=4.0)
     lit = cone.rays > 50
     assert lit.sum() > 60
-    assert_agree(cone.values[lit], reverse.values[lit], np.hypot(cone.standard_error, reverse.standard_error)[lit])
+    assert_agree(
+        values=cone.values[lit],
+        expected=reverse.values[lit],
+        standard_error=np.hypot(cone.standard_error, reverse.standard_error)[lit],
+    )
 
 
 def test_a_beam_on_paper() -> None:
@@ -282,7 +286,7 @@ def test_a_beam_on_paper() -> None:
     assert (et.luminance_map(scene, eye, screen, rays_per_pixel=16).values == 0).all()
     lmap = et.luminance_map(scene, eye, screen, rays_per_pixel=16, forward_rays=1e6)
     expected = 0.8 / math.pi * flux * math.cos(tilt) / (math.pi * radius**2) * 1e6
-    assert_agree(lmap.values, np.full(lmap.values.shape, expected), lmap.standard_error)
+    assert_agree(values=lmap.values, expected=np.full(lmap.values.shape, expected), standard_error=lmap.standard_error)
 
 
 def test_no_light_is_counted_twice() -> None:
@@ -305,7 +309,7 @@ def test_no_light_is_counted_twice() -> None:
     clear = off > radius + math.hypot(26 / 9, 20 / 7) / 2
     assert 30 < clear.sum() < clear.size
     error = np.hypot(image.standard_error, both.standard_error)
-    assert_agree(both.values[clear], image.values[clear], error[clear], least=0.5)
+    assert_agree(values=both.values[clear], expected=image.values[clear], standard_error=error[clear], least=0.5)
 
 
 # --- solids that touch -----------------------------------------------------------------------------------------------

@@ -24,9 +24,9 @@ def test_light_image_and_lines_of_sight_show_the_same(scene_of: Callable[[], dic
     assert reverse.observer == forward.observer
     error = np.hypot(forward.standard_error, reverse.standard_error)
     assert np.median(error / reverse.values) < 0.04
-    assert_agree(forward.values, reverse.values, error)
+    assert_agree(values=forward.values, expected=reverse.values, standard_error=error)
     for other in (reverse.values[::-1], reverse.values[:, ::-1], reverse.values[::-1, ::-1]):
-        assert_differ(forward.values, other, error)
+        assert_differ(values=forward.values, other=other, standard_error=error)
 
 
 def test_collected_rays_and_lines_of_sight_show_the_same() -> None:
@@ -60,7 +60,7 @@ def test_collected_rays_and_lines_of_sight_show_the_same() -> None:
     lit = cone.rays > 100
     assert lit.sum() > 20
     assert np.median(both[lit] / mean[lit]) < 0.07
-    assert_agree(cone.values[lit], mean[lit], both[lit])
+    assert_agree(values=cone.values[lit], expected=mean[lit], standard_error=both[lit])
     assert abs((cone.values - mean)[lit].sum()) < LARGEST_Z * math.sqrt((both[lit] ** 2).sum())
     for other in (mean[::-1], mean[:, ::-1], mean[::-1, ::-1]):
-        assert_differ(cone.values[lit], other[lit], both[lit])
+        assert_differ(values=cone.values[lit], other=other[lit], standard_error=both[lit])

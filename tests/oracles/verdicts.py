@@ -14,23 +14,28 @@ REVERSE = 15.0
 """Degrees of freedom of the errors of a map of a scene: of the spread of 16 passes."""
 
 
-def assert_drawn_with(share: float, hits: int, rays: int) -> None:
+def assert_drawn_with(*, share: float, hits: int, rays: int) -> None:
     """`hits` of `rays` independent rays, each with probability `share`: the normal limit of the binomial."""
     z = (hits - rays * share) / np.sqrt(rays * share * (1.0 - share))
     assert abs(z) < LARGEST_Z, f"{hits / rays} of the rays, {share} expected: z = {z:.2f}"
 
 
 def assert_agree(
-    values: Array, expected: Array, error: Array, degrees: float | Array = np.inf, least: float = 0.9
+    *,
+    values: Array,
+    expected: Array | float,
+    standard_error: Array,
+    degrees: float | Array = np.inf,
+    least: float = 0.9,
 ) -> None:
     """χ² over cells with independent errors, two-sided, so that errors too large are found as well.
 
     Errors that come from a spread have `degrees` of freedom, so that deviations are Student's t; each is turned into the
     normal deviate of the same probability. `least` is the share of the cells that must have an error.
     """
-    known = np.isfinite(error) & (error > 0.0)
+    known = np.isfinite(standard_error) & (standard_error > 0.0)
     assert known.sum() >= max(8, least * known.size)
-    z = (values[known] - expected[known]) / error[known]
+    z = (values[known] - np.broadcast_to(expected, values.shape)[known]) / standard_error[known]
     freedom = np.broadcast_to(degrees, known.shape)[known]
     z = np.where(np.isfinite(freedom), norm.isf(t.sf(z, freedom)), z)
     told = f"mean z² is {(z**2).mean():.2f}, largest |z| {np.abs(z).max():.1f} in {z.size} cells"
@@ -38,8 +43,8 @@ def assert_agree(
     assert chi2.cdf((z**2).sum(), z.size) > SIGNIFICANCE, told
 
 
-def assert_differ(values: Array, other: Array, error: Array) -> None:
+def assert_differ(*, values: Array, other: Array, standard_error: Array) -> None:
     """The other does not agree: what is compared is lopsided enough to tell a mirror image."""
-    known = np.isfinite(error) & (error > 0.0)
-    z = (values[known] - other[known]) / error[known]
+    known = np.isfinite(standard_error) & (standard_error > 0.0)
+    z = (values[known] - other[known]) / standard_error[known]
     assert chi2.sf((z**2).sum(), z.size) < SIGNIFICANCE

@@ -49,7 +49,7 @@ def test_illuminance_falls_with_the_square_of_the_distance(exponent: float) -> N
             assert (alpha > 0).all()
             assert (beta > 0).all()
             expected += wu * wv / 4 * flux * (exponent + 1) / (2 * np.pi) * alpha**exponent * beta / distance**2
-    assert_agree(seen.values, seen.standard_error, expected * 1e6)
+    assert_agree(values=seen.values, standard_error=seen.standard_error, expected=expected * 1e6)
     # No turn, no mirror image: the picture is lopsided enough to tell.
     for other in (expected[::-1], expected[:, ::-1], expected[::-1, ::-1]):
         z = (seen.values - other * 1e6) / seen.standard_error
@@ -88,7 +88,7 @@ def test_far_field_of_a_cosine_emitter(exponent: float) -> None:
     lit = inner > 0
     assert (expected[~lit] < 1e-3 * expected.max()).all()
     # Quadrature is off by 1e-3 in cells that the terminator crosses: they have fewer rays than that could show.
-    assert_agree(inner[lit], error[lit], expected[lit])
+    assert_agree(values=inner[lit], standard_error=error[lit], expected=expected[lit])
 
 
 def test_flux_from_disc_to_disc() -> None:
@@ -102,7 +102,7 @@ def test_flux_from_disc_to_disc() -> None:
     target = {"name": "target", "shape": {"kind": "disk", "radius": r2}, "at": np.array([1, 2, 3]) + d * axis,
               "toward": axis, "finish": "absorber"}  # fmt: skip
     ledger = traced(1e6, 2, sources=[source], surfaces=[target]).ledger
-    assert_drawn_with(share, ledger.by_surface["target"].rays, 10**6)
+    assert_drawn_with(share=share, hits=ledger.by_surface["target"].rays, rays=10**6)
     assert ledger.by_surface["target"].flux == pytest.approx(7 * ledger.by_surface["target"].rays / 10**6, rel=1e-12)
 
 
@@ -120,7 +120,7 @@ def test_integrating_sphere(reflectance: float, top: float) -> None:
             "finish": {"kind": "lambertian", "reflectance": reflectance}}  # fmt: skip
     ledger = traced(1e6, 4, sources=[beam], surfaces=[wall]).ledger
     share = reflectance * port / (1 - reflectance * (1 - port))
-    assert_drawn_with(share, ledger.escaped.rays, 10**6)
+    assert_drawn_with(share=share, hits=ledger.escaped.rays, rays=10**6)
 
 
 def fresnel(cosine: float, n: float) -> float:
@@ -194,7 +194,7 @@ def test_mirrored_pipe(angle: float, length: float) -> None:
     )  # fmt: skip
     entered = len(result.rays["in"])
     assert entered > 150_000
-    assert_drawn_with(share, len(result.rays["out"]), entered)
+    assert_drawn_with(share=share, hits=len(result.rays["out"]), rays=entered)
 
 
 # --- lossless optics -------------------------------------------------------------------------------------------------
@@ -211,7 +211,7 @@ def test_furnace() -> None:
     grid = {"name": "grid", "kind": "illuminance", "width": 6, "height": 5, "columns": 4, "rows": 3, "at": [0, 0.4, 5],
             "toward": [0.1, 0, -1]}  # fmt: skip
     seen = traced(3e6, 9, sources=[source], solids=[lens], detectors=[grid]).illuminance["grid"]
-    assert_agree(seen.values, seen.standard_error, np.full((3, 4), math.pi * 1e6))
+    assert_agree(values=seen.values, standard_error=seen.standard_error, expected=np.full((3, 4), math.pi * 1e6))
 
 
 def test_luminance_out_of_a_dome() -> None:
@@ -237,4 +237,4 @@ def test_luminance_out_of_a_dome() -> None:
     half = np.radians(5)
     mean = (np.sin(gamma + half) ** 2 - np.sin(gamma - half) ** 2) / 2 / (np.cos(gamma - half) - np.cos(gamma + half))
     expected = np.tile(transmittance * flux / math.pi * mean, (4, 1))
-    assert_agree(far.values[:, 1:9], far.standard_error[:, 1:9], expected)
+    assert_agree(values=far.values[:, 1:9], standard_error=far.standard_error[:, 1:9], expected=expected)

@@ -15,22 +15,12 @@ from etendue.errors import ArgumentError, FormatError, SceneError, UnknownNameEr
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.scene.scatter_events import EVENT
 from etendue.tracing.running import ROUND
-from scipy.stats import chi2, norm
+from oracles.verdicts import LARGEST_Z, SIGNIFICANCE, assert_agree
+from scipy.stats import chi2
 
 Array = npt.NDArray[np.float64]
-SIGNIFICANCE = 1e-4
-LARGEST_Z = float(norm.isf(SIGNIFICANCE / 2))
 NO_FACE = (1 << 32) - 1
 ONE_ROUND = ROUND * _core.batch_size()
-
-
-def assert_agree(values: Array, expected: Array, error: Array, fewest: int = 8) -> None:
-    """χ² over cells with independent errors; two-sided, so that errors too large are found as well."""
-    lit = error > 0.0
-    assert lit.sum() >= fewest
-    z = (values[lit] - expected[lit]) / error[lit]
-    assert chi2.sf((z**2).sum(), z.size) > SIGNIFICANCE, f"mean z² is {(z**2).mean():.2f}"
-    assert chi2.cdf((z**2).sum(), z.size) > SIGNIFICANCE, f"mean z² is {(z**2).mean():.2f}"
 
 
 def view(name: str, theta: float, phi: float, **more: Any) -> dict[str, Any]:
@@ -160,7 +150,7 @@ def test_the_same_picture_as_lines_of_sight() -> None:
         dark = reverse.values == 0
         assert (lmap.values[dark] == 0).all()
         assert np.median(error[~dark] / reverse.values[~dark]) < 0.02
-        assert_agree(lmap.values, reverse.values, error)
+        assert_agree(values=lmap.values, expected=reverse.values, standard_error=error)
         for other in (reverse.values[::-1], reverse.values[:, ::-1]):
             assert chi2.sf(np.nansum(((lmap.values - other) / error) ** 2), error.size) < SIGNIFICANCE
 
@@ -184,7 +174,11 @@ def test_with_what_lines_of_sight_find_besides() -> None:
     parts = et.luminance_map(events)
     other = et.luminance_map(scene, rays_per_pixel=1024, seed=9, forward_rays=1e6)
     for whole, part, reverse in zip(wholes, parts, other, strict=True):
-        assert_agree(whole.values, reverse.values, np.hypot(whole.standard_error, reverse.standard_error))
+        assert_agree(
+            values=whole.values,
+            expected=reverse.values,
+            standard_error=np.hypot(whole.standard_error, reverse.standard_error),
+        )
         rest = whole.values - part.values
         assert (rest >= -1e-9 * whole.values.max()).all()
         assert (rest > 0.05 * whole.values).sum() > 3
@@ -225,7 +219,9 @@ def test_integrating_sphere() -> None:
     expected = reflectance / math.pi * arrives * 1e6
     observers = [et.Observer(theta, 200, 60, target=(0, 0, 8)) for theta in (8, 25)]
     for lmap in et.luminance_map(events, observers, et.Screen(5, 4, 5, 4)):
-        assert_agree(lmap.values, np.full(lmap.values.shape, expected), lmap.standard_error)
+        assert_agree(
+            values=lmap.values, expected=np.full(lmap.values.shape, expected), standard_error=lmap.standard_error
+        )
         assert abs(lmap.values.mean() / expected - 1) < 0.02
 
 
@@ -284,7 +280,11 @@ def test_thinned_maps_have_the_errors_that_they_state() -> None:
     events = et.trace(scene, 2.5 * ONE_ROUND, 3).events.only
     assert events.share < 0.1
     for lmap, reverse in zip(et.luminance_map(events), et.luminance_map(scene, rays_per_pixel=1024), strict=True):
-        assert_agree(lmap.values, reverse.values, np.hypot(lmap.standard_error, reverse.standard_error))
+        assert_agree(
+            values=lmap.values,
+            expected=reverse.values,
+            standard_error=np.hypot(lmap.standard_error, reverse.standard_error),
+        )
 
 
 def test_nothing_is_left_of_one_event() -> None:
