@@ -323,3 +323,19 @@ def test_notes_name_all_that_was_compared() -> None:
     for row in choice.table:
         assert row.surface.NAME in choice.notes[0]
     assert json.dumps(choice.notes)
+
+
+def test_the_choice_is_told_in_the_words_of_the_trade() -> None:
+    """What was chosen and why; every other surface with its distance, and a reason if it predicts better."""
+    choice = choose_surface(et.RingSource(rays=60_000))
+    told = choice.notes[0]
+    assert told.startswith(f"carrier surface {choice.surface.spec}: ")
+    assert "better than others" not in told
+    for row in choice.table:
+        if row.surface == choice.surface:
+            continue
+        figure = f"{row.surface.NAME} {-row.lag:+.4f} ± {row.lag_error:.4f}".replace("-", "−")
+        assert figure in told
+        reason = told.split(figure)[1].split(f" {choice.table[0].surface.NAME} ")[0]
+        if row.lag <= 0.0:
+            assert "not for sure better" in reason or "does not meet it" in reason

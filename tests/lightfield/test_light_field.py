@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import etendue as et
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.light_field import LightField
 from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm
+from oracles.verdicts import LARGEST_Z
 
 DEPTHS = (4, 4, 4, 4)
 
@@ -205,3 +208,34 @@ def test_what_makes_no_sense_is_refused(film: tuple[PrismaticFilm, et.RaySet, Li
         field.luminance([[0, 0, 0]], [[0, 0, 0]])
     with pytest.raises(ArgumentError, match="whole part"):
         field.intensity(24, 7.0)
+
+
+def test_scores_of_surfaces_compare_the_same_rays() -> None:
+    """A Lambertian rectangle of area A on a carrier that half of its rays miss.
+
+    On the whole each ray has the density 1/(π A). On half of it the rays that meet it have (1 - u) 2/(π A) + u e, and the
+    others u e: u their share, e = 1/(4 π² R²) even over all lines through the ball of radius R.
+    """
+    rng = np.random.default_rng(8)
+    n, width, height = 100_000, 4.0, 1.5
+    cosine, turn = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    sine = np.sqrt(1 - cosine**2)
+    k = np.stack([sine * np.cos(turn), sine * np.sin(turn), cosine], axis=1)
+    x = np.stack([width * (rng.random(n) - 0.5), height * (rng.random(n) - 0.5), np.zeros(n)], axis=1)
+    rays = et.RaySet(x, k, np.full(n, 1 / n))
+    fields = [
+        et.LightField.fit(rays, et.Plane(0.0, w, height, (c, 0.0)), depths=(2, 2, 2, 2)).report
+        for w, c in ((width, 0.0), (width / 2, -width / 4))
+    ]
+    whole, half = (report.score for report in fields)
+    share = fields[1].unmet_flux
+    assert abs(share - 0.5) < LARGEST_Z * 0.5 / math.sqrt(n)
+    # 4⁴ free cells lose 4⁴/(2 n) nat at most; held-out rays are a tenth of all.
+    loss = 4**4 / (2 * 0.9 * n)
+    assert whole == pytest.approx(-math.log(math.pi * width * height), abs=2 * loss)
+    away = x - np.array(rays.virtual_focus.point)
+    radius = np.linalg.norm(np.cross(away, k), axis=1).max()
+    flat, even = 1 / (math.pi * width * height), 1 / (4 * math.pi**2 * radius**2)
+    met = (1 - share) * math.log((1 - share) * 2 * flat + share * even)
+    expected = met + share * math.log(share * even) - math.log(flat)
+    assert half - whole == pytest.approx(expected, abs=4 * loss + LARGEST_Z * fields[1].score_error)

@@ -146,7 +146,7 @@ def test_the_words_say_geometry_rays_and_errors() -> None:
     assert "My lamp" in text
     assert "θ = 30°, φ = 45°, from 12\u2009345 mm of (1, 2, 3) mm" in text
     assert "median 400 rays per lit pixel" in text
-    assert "median standard error 5 %" in text
+    assert "standard error 5 %, weighted by flux" in text
     assert f"{lmap.dead_pixels} dead pixels (grey, 1" in text
     assert "led.tm25ray" in text
     assert figure.axes[1].get_ylabel() == "luminance [cd/m²]"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping
 from contextlib import nullcontext
@@ -333,6 +334,7 @@ def summary(lmap: LuminanceMap) -> dict[str, Any]:
     """A map in figures, as plain data [unit of the map]."""
     live = ~np.isnan(lmap.values)
     values = lmap.values[live]
+    error = lmap.relative_error
     return {
         "quantity": lmap.quantity,
         "unit": lmap.unit,
@@ -341,6 +343,7 @@ def summary(lmap: LuminanceMap) -> dict[str, Any]:
         "mean_of_live_pixels": float(values.mean()) if live.any() else None,
         "maximum": float(values.max()) if live.any() else None,
         "intensity": lmap.intensity,
+        "relative_error": None if error is None else dataclasses.asdict(error),
         "rays": int(lmap.rays[lmap.rays > 0].sum()) if (lmap.rays >= 0).any() else None,
         "dead_pixels": lmap.dead_pixels,
         "pixels": lmap.values.size,
@@ -354,7 +357,13 @@ def print_map(lmap: LuminanceMap) -> None:
     where = lmap.observer
     say(f"{facts['quantity']} from θ = {where.theta:g}°, φ = {where.phi:g}°, {where.distance:g} mm")
     if facts["maximum"] is not None:
-        say(f"  mean of live pixels {facts['mean_of_live_pixels']:.5g} {lmap.unit}, maximum {facts['maximum']:.5g}")
+        error = lmap.standard_error.flat[np.nanargmax(lmap.values)]
+        known = f" ± {error:.2g}" if np.isfinite(error) else ""
+        say(
+            f"  mean of live pixels {facts['mean_of_live_pixels']:.5g} {lmap.unit}, maximum {facts['maximum']:.5g}{known}"
+        )
         say(f"  intensity towards the observer {facts['intensity']:.5g} {'cd' if lmap.flux_unit == 'lm' else 'W/sr'}")
+    if lmap.relative_error is not None:
+        say(f"  {lmap.relative_error.sentence(facts['quantity'])}")
     for note in lmap.notes:
         say(f"  {note}")

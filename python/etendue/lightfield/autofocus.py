@@ -13,7 +13,7 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.enclosures import ball_centre, cylinder_of_lines, near_rays, start_centre
 from etendue.lightfield.jury import Grid, Jury, Verdict
-from etendue.lightfield.probe import probe_rays
+from etendue.lightfield.probe import FEWEST, even_density, probe_rays
 from etendue.lightfield.surfaces import SLACK, Box, Cylinder, Disk, Dome, Hemisphere, Part, Plane, Sphere, Surface
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, checked_threads
@@ -29,9 +29,6 @@ ENOUGH = 1 << 12
 
 MANY = 1 << 16
 """Rays from which on fine grids say more than coarse ones."""
-
-FEWEST = 25
-"""Rays below which no comparison means anything."""
 
 LEAD = 3.0
 """Standard errors of the difference by which a less simple surface must lead."""
@@ -198,8 +195,7 @@ class _Search:
         self.start_centre = start_centre(self.position)
         self.least = TINY * float(np.abs(self.position).max())
         self.radius = self.sphere(self.centre).closed("radius")
-        everything = Sphere(centre=_triple(self.centre)).sized_for(rays).closed("radius")
-        even = 1.0 / (4.0 * np.pi**2 * max(everything, self.least) ** 2)
+        even = even_density(rays)
         self.jury = Jury.of(rays, even, seed, threads)
         self.scouts = Jury.of(probe_rays(rays, SCOUTS), even, seed, threads, ENOUGH)
         self.less = 0 if len(rays) >= MANY else 1
@@ -376,16 +372,22 @@ class _Search:
 
     # --- in words --------------------------------------------------------------------------------------------------------
 
+    def judged(self, row: SurfaceScore) -> str:
+        """A surface that was not chosen: how well it predicts against the chosen one, and why it was not if it is better."""
+        told = f"{row.surface.NAME} {-row.lag:+.4f} ± {row.lag_error:.4f}".replace("-", "−")
+        if row.unmet > self.most_unmet:
+            return f"{told}, but {row.unmet:.2%} of the flux does not meet it"
+        return told if row.lag > 0.0 else f"{told}, not for sure better and less simple"
+
     def notes(
         self, winner: _Tried, table: tuple[SurfaceScore, ...], depths: tuple[float, float] | None
     ) -> Iterator[str]:
         """What the user should know of the choice."""
-        others = ", ".join(
-            f"{row.surface.NAME} {row.lag:+.3f} ± {row.lag_error:.3f}" for row in table if row.surface != winner.surface
-        )
+        others = ", ".join(self.judged(row) for row in table if row.surface != winner.surface)
         yield (
-            f"the surface {winner.surface.spec} was chosen on {len(self.jury.flux):,} rays; it foretells held-out rays "
-            f"better than others by so many nat per ray: {others}"
+            f"carrier surface {winner.surface.spec}: of those that take up the light, the simplest that none surpasses "
+            f"for sure in predicting rays held out of the fit ({len(self.jury.flux):,} rays, the same for all; ln "
+            f"likelihood per ray against it: {others})"
         )
         if depths is not None and isinstance(winner.surface, Plane | Disk | Dome):
             yield f"depths between {depths[0]:.6g} and {depths[1]:.6g} mm cannot be told from that of {winner.surface.spec}"

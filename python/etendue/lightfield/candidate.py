@@ -22,7 +22,7 @@ FLOOR = 1e-3
 """Share of a uniform density in the factors of a product base: where they are wrongly dark, the data can still say so."""
 
 MIXED_IN = 1e-4
-"""Share of a uniform field in every score, so that one cell that is wrongly dark cannot decide it."""
+"""Least share of the even density in every score, so that one cell that is wrongly dark cannot decide it."""
 
 FINE_POSITIONS = tuple((k * LATTICE[0] % 1.0, k * LATTICE[1] % 1.0) for k in range(16))
 """Positions of the fine grids over which the factors of a product base are averaged: evenly spread."""
@@ -103,7 +103,7 @@ class Candidate:
         return tuple(fields)
 
     def score(self, counts: EtendueCounts) -> Score:
-        """Ln of the density in étendue [1/(mm² sr)] at each of the held-out rays that were kept."""
+        """Ln of the density in étendue [1/(mm² sr)] at the held-out rays; see `score_densities`."""
         charts = counts.surface.parts()
         core = _core.LightField(
             [core_part(chart.core(), part) for chart, part in zip(charts, self.fields(counts), strict=True)]
@@ -119,11 +119,22 @@ class Candidate:
 
 
 def score_densities(counts: EtendueCounts, luminance: FloatArray) -> Score:
-    """The score of a field that has these luminances at the rays that were kept [flux unit/(mm² sr)]."""
-    flux = sum(counts.part_flux)
-    even = flux / sum(chart.etendue for chart in counts.surface.parts())
-    mixed = (1.0 - MIXED_IN) * luminance + MIXED_IN * even
-    return Score(np.log(mixed / flux), counts.kept.weight)
+    """The score of a field that has these luminances at the rays that were kept [flux unit/(mm² sr)].
+
+    The density of a ray is (1 - u) L/Φ + u e, with u the share of the flux that does not meet the surface and e the even
+    density over all lines through the source (`even_density`). It adds up to one over all lines whatever the surface is.
+    Held-out rays that do not meet the surface count with u e: so many as there are among as many rays as were kept.
+    """
+    met = sum(counts.part_flux)
+    unmet = max(counts.unmet_flux / (met + counts.unmet_flux), MIXED_IN)
+    values = np.log((1.0 - unmet) * luminance / met + unmet * counts.even)
+    weights = counts.kept.weight
+    if counts.unmet_rays and len(values):
+        outside = max(round(len(values) * counts.unmet_rays / (counts.rays - counts.unmet_rays)), 1)
+        share = float(weights.sum()) * counts.unmet_flux / met
+        values = np.concatenate([values, np.full(outside, np.log(unmet * counts.even))])
+        weights = np.concatenate([weights, np.full(outside, share / outside)])
+    return Score(values, weights)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.lightfield.probe import LOOKED_AT, even_density, probe_rays
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 
@@ -98,6 +99,8 @@ class EtendueCounts:
         Flux of the latter [flux unit].
     tally : Tally
         The flux account of all rays.
+    even : float
+        The even density over all lines through the source [1/(mm² sr)]; see `even_density`.
     symmetry : str
         What the counts are folded by, so that each ray is counted once for each of its images; ``"none"``: they are not.
     """
@@ -111,6 +114,7 @@ class EtendueCounts:
     unmet_rays: int
     unmet_flux: float
     tally: Tally
+    even: float
     symmetry: str = "none"
 
     def __getitem__(self, fold: Fold) -> tuple[PartCounts, ...]:
@@ -208,6 +212,7 @@ def count_rays(
         unmet_rays=raw["unmet_rays"],
         unmet_flux=raw["unmet_flux"] * scale,
         tally=tally,
+        even=even_density(probe_rays(rays, LOOKED_AT)),
     )
 
 

@@ -23,7 +23,7 @@ from etendue.lightfield.candidate import (
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, count_rays
 from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.light_field import FitReport, LightField
-from etendue.lightfield.probe import probe_rays
+from etendue.lightfield.probe import check_near_field, probe_rays
 from etendue.lightfield.surfaces import Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry
 from etendue.lightfield.trees import POSITIONS, Base, Tree
@@ -64,6 +64,7 @@ def fit_light_field(
 ) -> LightField:
     """See `LightField.fit`."""
     threads = checked_threads(threads)
+    check_near_field(rays)
     notes: tuple[str, ...] = ()
     if isinstance(surface, str):
         if surface != "auto":

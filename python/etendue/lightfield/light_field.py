@@ -69,12 +69,14 @@ class FitReport:
     log_evidence : float
         ln of the evidence of the trees against their base measures, summed over the parts.
     score : float
-        Mean ln L/Φ of held-out rays, L in 1/(mm² sr): the larger the better, comparable between surfaces. It is that of
-        one tree on nine tenths of the rays; the field, an average of trees on all rays, is somewhat better.
+        Mean ln of the density in étendue [1/(mm² sr)] that the field gives to held-out rays: the larger the better. Rays
+        that do not meet the surface count with an even density over all lines through the source, so that fields of the
+        same rays on different surfaces can be compared. It is that of one tree on nine tenths of the rays; the field, an
+        average of trees on all rays, is somewhat better.
     score_error : float
         Standard error of the score.
     histogram_score : float
-        That of the equal-étendue histogram of the fitted rays, mixed with 1e-4 of a uniform field, on the same rays.
+        That of the equal-étendue histogram of the fitted rays, on the same rays.
     effective_cells : float
         Effective degrees of freedom: how many free cells would be as uncertain as the field is.
     symmetry : str

@@ -12,6 +12,22 @@ from etendue.quantities.ray_stream import RayStream
 STRETCH = 4096
 """Rays that are read in one piece."""
 
+LOOKED_AT = 1 << 14
+"""Rays whose lines tell how large the source is."""
+
+FEWEST = 25
+"""Rays below which no comparison means anything."""
+
+SINGLE = 4e-7
+"""Distance between lines, against that of their start points and coordinates, which single precision can make of nothing:
+some roundings of 6e-8."""
+
+SMALLEST = 1e-6
+"""Radius [mm] below which no source is that emits light: a thousandth of a wavelength or so."""
+
+ALMOST_ALL = 0.999
+"""Share of the lines that must pass the point; the others are strays."""
+
 
 def probe_rays(rays: RayStream, at_most: int) -> RaySet:
     """Up to `at_most` rays that carry flux, from stretches spread evenly over the set, in its own scale of flux.
@@ -41,3 +57,48 @@ def probe_rays(rays: RayStream, at_most: int) -> RaySet:
         if lit.any():
             return RaySet(position[lit], direction[lit], flux[lit], flux_unit=rays.flux_unit)
     raise ArgumentError("these rays carry no flux, so no light field can be fitted to them.")
+
+
+def check_near_field(rays: RayStream) -> None:
+    """Refuse rays whose lines all pass one point: they tell an intensity distribution, and no luminance.
+
+    Such are files of a point source, and far-field data written as rays that start at one point or on a sphere about it.
+
+    Raises
+    ------
+    ArgumentError
+        If so, or if the rays have no position or carry no flux.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> check_near_field(et.RingSource(rays=1000))
+    """
+    some = probe_rays(rays, LOOKED_AT)
+    focus = some.virtual_focus
+    if len(some) < FEWEST or not focus.determined:
+        return
+    point = np.array(focus.point)
+    away = some.position - point
+    off = float(np.quantile(np.linalg.norm(np.cross(away, some.direction), axis=1), ALMOST_ALL))
+    reach = float(np.abs(away).max() + np.abs(some.position).max())
+    if off > max(SINGLE * reach, SMALLEST):
+        return
+    place = ", ".join(f"{x:.4g}" for x in point + 0.0)
+    raise ArgumentError(
+        f"{rays.provenance.source}: the lines of its rays pass one point, ({place}) mm, to within {off:.1g} mm: the set "
+        "has no near field, and a point has no finite luminance. Its intensity distribution is what it tells (etendue "
+        "intensity); in a scene that can be the intensity of a source. For luminance ask for a ray file with positions."
+    )
+
+
+def even_density(rays: RaySet) -> float:
+    """The density in étendue that is the same on all lines through a ball which all rays pass [1/(mm² sr)]: 1/(4 π² R²).
+
+    The ball is the smallest about the virtual focus of the rays. The density depends on the rays alone, so that fields on
+    different surfaces can be compared by what they say of rays that do not meet one of them.
+    """
+    away = rays.position - np.array(rays.virtual_focus.point)
+    radius = float(np.linalg.norm(np.cross(away, rays.direction), axis=1).max())
+    least = SINGLE * float(np.abs(rays.position).max()) + SMALLEST
+    return 1.0 / (4.0 * np.pi**2 * max(radius, least) ** 2)

@@ -10,6 +10,7 @@ import numpy as np
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.rays.ray_index import RayIndex
 from etendue.lightfield.light_field import LightField
+from etendue.lightfield.probe import check_near_field
 from etendue.lightfield.surfaces import Surface
 from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
 from etendue.luminance.cone import ConeEstimate, ConeView, check_acceptance, cone_estimates
@@ -242,12 +243,9 @@ def luminance_map(
             s.axes(o)  # a view without area is refused before the work
         field = LightField.fit(source, surface, threads=threads, progress=progress)
         maps = [look_at_field(field, o, s, samples, threads) for o, s in pairs]
-    elif acceptance == "auto":
-        maps = _automatic(source, pairs, threads, progress)
     else:
-        angle = check_acceptance(DEFAULT_ACCEPTANCE if acceptance is None else acceptance)
-        estimates, tally = cone_estimates(source, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
-        maps = [_map(source, estimate, 0, tally, None) for estimate in estimates]
+        check_near_field(source)
+        maps = _by_cone(source, pairs, acceptance, threads, progress)
     return maps[0] if isinstance(observer, Observer) else maps
 
 
@@ -258,6 +256,21 @@ def _check_events(given: Mapping[str, object]) -> None:
     needless = [name for name in given if name != "rays_per_pixel"]
     if needless and "rays_per_pixel" not in given:
         raise ArgumentError(f"{', '.join(needless)}: for lines of sight; give rays_per_pixel too, or leave it out.")
+
+
+def _by_cone(
+    rays: RayStream,
+    pairs: list[tuple[Observer, Screen]],
+    acceptance: Acceptance,
+    threads: int | None,
+    progress: Progress | None,
+) -> list[LuminanceMap]:
+    """The maps of rays that head for the observers."""
+    if acceptance == "auto":
+        return _automatic(rays, pairs, threads, progress)
+    angle = check_acceptance(DEFAULT_ACCEPTANCE if acceptance is None else acceptance)
+    estimates, tally = cone_estimates(rays, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
+    return [_map(rays, estimate, 0, tally, None) for estimate in estimates]
 
 
 def _automatic(
@@ -290,8 +303,10 @@ def _map(
     ]
     if isinstance(rays, RayIndex):
         notes.append(f"by the index: {estimate.looked:,} rays were looked at, and no other can be seen")
-    if not dead.all():
-        notes.append(f"median relative standard error {np.median(error[~dead] / values[~dead]):.2%} of the live pixels")
+    notes.append(
+        "standard errors hold the noise of the rays alone; what the cone blurs, over the angle and by parallax at the edges "
+        "of the source, is not in them"
+    )
     if tally.unusable:
         notes.append(f"{tally.unusable:,} rays cannot be used and were left out; see the ray set's complaints")
     if choice is not None:

@@ -72,8 +72,6 @@ def _map(events: ScatterEvents, image: Forward, observer: Observer, screen: Scre
         "sources, and what is seen in mirrors and through lenses, are left out; rays_per_pixel adds them",
     ]
     lit = image.rays > 0
-    if lit.any():
-        notes.append(f"median relative standard error {np.median(image.error[lit] / image.values[lit]):.2%} where lit")
     if not lit.all():
         dark = int((~lit).sum())
         notes.append(f"{dark:,} of {lit.size:,} pixels saw no scatter: their luminance is 0, its error unknown")

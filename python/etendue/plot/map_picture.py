@@ -211,15 +211,15 @@ def _relative_error(lmap: LuminanceMap | IlluminanceMap) -> Array:
 
 
 def _facts(lmap: LuminanceMap | IlluminanceMap, data: Array, show: str) -> Iterator[str]:
-    """What the picture rests on, fact by fact. Black pixels would only pull the medians to 0."""
+    """What the picture rests on, fact by fact."""
     lit = (lmap.values > 0.0) & np.isfinite(lmap.values)
     if lit.any():
         rays = lmap.rays[lit & (lmap.rays >= 0)]
         count = style.grouped(f"{np.median(rays):.0f}") if rays.size else ""
         yield f"median {count} rays per lit pixel" if rays.size else "number of rays unknown"
-        error = _relative_error(lmap)
-        error = error[~np.isnan(error)]
-        yield f"median standard error {style.percent(np.median(error))}" if error.size else "standard errors unknown"
+        error = lmap.relative_error
+        known = "" if error is None else style.percent(100.0 * error.flux_weighted)
+        yield f"standard error {known}, weighted by flux" if known else "standard errors unknown"
     missing = int(np.isnan(data).sum())
     if missing:
         what = "dead pixels" if show == "value" else "pixels without a relative error"

@@ -14,6 +14,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.luminance_map import PLOT_MAP, SAVE_MAP
 from etendue.quantities.observer import Screen
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.relative_error import RelativeError
 from etendue.units import FLUX_UNITS, ILLUMINANCE_NAME, ILLUMINANCE_UNIT, MM2_PER_M2, FluxUnit
 
 Array = npt.NDArray[np.float64]
@@ -122,6 +123,11 @@ class IlluminanceMap:
     def flux(self) -> float:
         """Flux on the front of the rectangle [`flux_unit`]."""
         return float(self.values.sum()) * self.screen.pixel_area / MM2_PER_M2
+
+    @property
+    def relative_error(self) -> RelativeError | None:
+        """Standard error over value, for the map as a whole; None if no cell with light has a known error."""
+        return RelativeError.of(self.values, self.standard_error)
 
     @property
     def mean(self) -> float:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.relative_error import RelativeError
 from etendue.units import FLUX_UNITS, LUMINANCE_NAME, LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
 
 MapValues = npt.NDArray[np.float64]
@@ -100,6 +101,11 @@ class LuminanceMap:
     def dead_pixels(self) -> int:
         """Number of pixels that no ray reached (NaN in `values`)."""
         return int(np.isnan(self.values).sum())
+
+    @property
+    def relative_error(self) -> RelativeError | None:
+        """Standard error over value, for the map as a whole; None if no pixel with light has a known error."""
+        return RelativeError.of(self.values, self.standard_error, self.screen.cosine(self.observer))
 
     @property
     def intensity(self) -> float:

@@ -20,6 +20,7 @@ from etendue.lightfield.gridded.pixelated import PixelatedSurface
 from etendue.lightfield.gridded.pixels import Array
 from etendue.lightfield.gridded.sampling import RECORD, sampled_records
 from etendue.lightfield.gridded.summing import summed_intensity
+from etendue.lightfield.probe import check_near_field
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.patches import Patches
@@ -106,10 +107,11 @@ class GriddedSource:
         Raises
         ------
         ArgumentError
-            If a number is out of its domain, the rays have no positions, none of them leaves the surface, or there are
-            too many pixels or bins.
+            If a number is out of its domain, the rays have no positions or no near field, none of them leaves the surface,
+            or there are too many pixels or bins.
         """
         check_threshold(threshold)
+        check_near_field(rays)
         batches = all_batches(rays, 2, progress)
         lit = lit_pixels(batches, PixelatedSurface.cut(surface.sized_for(rays), pixel, parallels))
         steps = angular.first_within(angular.quadrature_errors(lit.rings), threshold)
