@@ -97,6 +97,13 @@ def even_density(rays: RaySet) -> float:
 
     The ball is the smallest about the virtual focus of the rays. The density depends on the rays alone, so that fields on
     different surfaces can be compared by what they say of rays that do not meet one of them.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> cross = et.RaySet([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], [[0, 0, 1]] * 2 + [[0.6, 0, 0.8]] * 2, [1] * 4)
+    >>> round(even_density(cross) * 4 * np.pi**2, 3)
+    1.0
     """
     away = rays.position - np.array(rays.virtual_focus.point)
     radius = float(np.linalg.norm(np.cross(away, rays.direction), axis=1).max())

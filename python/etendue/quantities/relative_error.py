@@ -27,6 +27,12 @@ class RelativeError:
         with its share of the flux.
     bright : float
         Median of σ/L over the pixels above `BRIGHT` of the maximum.
+
+    Examples
+    --------
+    >>> found = RelativeError.of(np.array([[100.0, 50.0, 0.1, 0.0]]), np.array([[2.0, 2.0, 0.1, 0.0]]))
+    >>> found.sentence("luminance")
+    'standard error 2.732 % of the luminance, weighted by flux; median 3 % of the pixels above 10 % of the maximum'
     """
 
     flux_weighted: float
@@ -42,12 +48,6 @@ class RelativeError:
             In one unit; NaN where dead or unknown.
         area : array_like
             Apparent area of each pixel, up to a factor.
-
-        Examples
-        --------
-        >>> found = RelativeError.of(np.array([[100.0, 50.0, 0.1, 0.0]]), np.array([[2.0, 2.0, 0.1, 0.0]]))
-        >>> found.sentence("luminance")
-        'standard error 2.732 % of the luminance, weighted by flux; median 3 % of the pixels above 10 % of the maximum'
         """
         with np.errstate(invalid="ignore"):
             known = np.isfinite(values) & np.isfinite(standard_error) & (values > 0.0)
