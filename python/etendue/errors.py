@@ -61,11 +61,10 @@ class SceneError(EtendueError, ValueError):
     def __init__(self, source: object, mistakes: Iterable[tuple[str, str]]) -> None:
         self.source = source
         self.mistakes = tuple(mistakes)
-        lines = [f"{place}: {text}" if place else text for place, text in self.mistakes]
-        if len(lines) == 1:
-            super().__init__(f"{source}: {lines[0]}")
-        else:
-            super().__init__("\n  ".join([f"{source}: {len(lines)} mistakes", *lines]))
+        told = [f"{place}: {text}" if place else text for place, text in self.mistakes]
+        self.lines = (f"{source}: {told[0]}",) if len(told) == 1 else (f"{source}: {len(told)} mistakes", *told)
+        """The message, line by line."""
+        super().__init__("\n  ".join(self.lines))
 
 
 class SceneWarning(UserWarning):

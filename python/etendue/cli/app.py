@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 
 from etendue.cli import compare, convert, demo, draw, filter_, fit, info, intensity, luminance, patches, sample, trace
-from etendue.cli.terminal import INTERRUPTED, complain, spell_out_unknown_letters
+from etendue.cli.terminal import INTERRUPTED, complain, complain_of, complain_of_usage, spell_out_unknown_letters
 from etendue.errors import EtendueError, SceneWarning
 from etendue.quantities.provenance import version
 
@@ -67,20 +67,16 @@ def main() -> None:
     spell_out_unknown_letters()
     try:
         status = app(standalone_mode=False)
-    except EtendueError as error:
-        complain(f"error: {error}")
-        sys.exit(1)
-    except OSError as error:
-        complain(f"error: {error.filename}: {error.strerror}" if error.filename else f"error: {error}")
+    except (EtendueError, OSError) as error:
+        complain_of(error)
         sys.exit(1)
     except (KeyboardInterrupt, typer.Abort):
         status = INTERRUPTED
     except Exception as error:
         # The parser's own errors know how to show themselves, with the nearest name.
-        show = getattr(error, "show", None)
-        if show is None:
+        if not hasattr(error, "show"):
             raise
-        show()
+        complain_of_usage(cast(typer.BadParameter, error))
         sys.exit(getattr(error, "exit_code", 2))
     # The parser returns this status for Ctrl-C as well; a trace has said what it kept.
     if status == INTERRUPTED:

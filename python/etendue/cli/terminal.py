@@ -15,14 +15,17 @@ import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError, SceneError, UnknownNameError
+from etendue.quantities.printable import printable
 from etendue.quantities.ray_stream import Progress as ProgressFunction
 
-output = Console(soft_wrap=True, highlight=False)
+# Brackets and colons in the texts of files are brackets and colons, neither markup nor emoji.
+output = Console(soft_wrap=True, highlight=False, markup=False, emoji=False)
 """Results, on standard output."""
 
-errors = Console(stderr=True, soft_wrap=True, highlight=False)
+errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False, emoji=False)
 """Complaints and progress, on standard error."""
 
 
@@ -31,13 +34,32 @@ INTERRUPTED = 130
 
 
 def complain(message: str) -> None:
-    """Print one line to standard error."""
-    errors.print(message, markup=False)
+    """Print one line to standard error, whatever the message holds."""
+    errors.print(Text(printable(message)))
 
 
 def say(message: str = "") -> None:
-    """Print one line to standard output."""
-    output.print(message, markup=False)
+    """Print one line to standard output, whatever the message holds."""
+    output.print(Text(printable(message)))
+
+
+def complain_of(error: Exception) -> None:
+    """Print an error to standard error: one line, or one for every mistake of a scene."""
+    if isinstance(error, OSError) and error.filename:
+        complain(f"error: {error.filename}: {error.strerror}")
+        return
+    first, *more = error.lines if isinstance(error, SceneError) else (str(error),)
+    complain(f"error: {first}")
+    for line in more:
+        complain(f"  {line}")
+
+
+def complain_of_usage(error: typer.BadParameter) -> None:
+    """Print what the parser has to say about arguments, with the usage of the verb, to standard error."""
+    told, message = io.StringIO(), error.format_message()
+    error.show(told)
+    for line in told.getvalue().replace(message, printable(message)).splitlines():
+        complain(line)
 
 
 def spell_out_unknown_letters() -> None:
@@ -49,9 +71,18 @@ def spell_out_unknown_letters() -> None:
 
 def print_json(data: Any) -> None:
     """Print one JSON document; NaN, which JSON does not have, becomes null."""
-    # JSON has an escape of its own for letters that the output does not have.
+    # JSON has an escape of its own for letters that the output does not have, and for those that a terminal would obey.
     narrow = not (sys.stdout.encoding or "").lower().startswith("utf")
-    sys.stdout.write(json.dumps(_plain(data), ensure_ascii=narrow, indent=2, allow_nan=False) + "\n")
+    text = json.dumps(_plain(data), ensure_ascii=narrow, indent=2, allow_nan=False)
+    sys.stdout.write("".join(_for_json(letter) for letter in text) + "\n")
+
+
+def _for_json(letter: str) -> str:
+    """A letter of a JSON document as it may be shown; JSON's escapes count in units of UTF-16."""
+    if letter == "\n" or printable(letter) == letter:
+        return letter
+    units = letter.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2))
 
 
 def _plain(data: Any) -> Any:
@@ -74,9 +105,9 @@ def progress_bar(title: str, total: int) -> Iterator[ProgressFunction | None]:
     if not errors.is_terminal:
         yield None
         return
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=errors, transient=True) as bar:
-        task = bar.add_task(title, total=total)
+        task = bar.add_task(printable(title), total=total)
         yield lambda done: bar.update(task, completed=done)
 
 

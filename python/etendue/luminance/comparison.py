@@ -13,6 +13,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
+from etendue.quantities.printable import printable
 from etendue.units import MM2_PER_M2
 
 Array = npt.NDArray[np.float64]
@@ -186,7 +187,7 @@ class Comparison:
         )
         maps = (("test", self.test_statistics), ("reference", self.reference_statistics))
         figures = (f"{name}: {statistics.summary(self.reference.unit)}" for name, statistics in maps)
-        return "\n".join((agreement, significance, *figures, *(f"note: {note}" for note in self.notes)))
+        return "\n".join((agreement, significance, *figures, *(f"note: {printable(note)}" for note in self.notes)))
 
     def to_dict(self) -> dict[str, Any]:
         """Every number as plain data for JSON (undefined numbers are None): all but the maps and the image."""

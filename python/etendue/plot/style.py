@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from etendue.errors import UnknownNameError
 from etendue.formats.output import atomic_output
 from etendue.quantities.observer import Observer
+from etendue.quantities.printable import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,7 +77,11 @@ def dress(axes: Axes) -> None:
 
 
 def finish(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
-    """Write the figure, if a path is given, whole or not at all, and return it."""
+    """Write the figure, if a path is given, whole or not at all, and return it.
+
+    Names and titles stand in it as they are: a dollar sign begins no formula.
+    """
+    _take_texts_as_they_are(figure)
     if path is not None:
         suffix = Path(path).suffix.lower()
         if suffix not in FILE_TYPES:
@@ -84,6 +89,18 @@ def finish(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
         with atomic_output(path) as temporary:
             figure.savefig(temporary, format=suffix[1:], metadata=FILE_TYPES[suffix])
     return figure
+
+
+def _take_texts_as_they_are(figure: Figure) -> None:
+    from matplotlib.axis import Axis
+    from matplotlib.text import Text
+
+    # Numbers at axes are ours, and their powers of ten are formulas.
+    ours = {text for axis in figure.findobj(Axis) for text in axis.findobj(Text) if text is not axis.label}
+    for text in figure.findobj(Text):
+        if text not in ours:
+            text.set_parse_math(False)
+            text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
 
 
 def locator_for(inches: float) -> MaxNLocator:

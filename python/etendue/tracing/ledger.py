@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from etendue.quantities.printable import printable
 from etendue.units import FluxUnit
 
 CLOSED = 1e-12
@@ -144,9 +145,9 @@ class Ledger:
             yield from ((1, str(loss), Entry(loss.flux, loss.rays)) for loss in self.lost)
 
     def table(self) -> str:
-        """The account for people."""
+        """The account for people, one line for each row."""
         total = self.total.flux or 1.0
-        rows = [("  " * depth + name, entry) for depth, name, entry in self.rows()]
+        rows = [("  " * depth + printable(name), entry) for depth, name, entry in self.rows()]
         width = max(len(name) for name, _ in rows)
         return "\n".join(
             f"{name:<{width}}  {entry.flux:>8.6g} {self.flux_unit}  {entry.flux / total:>9.4%}  {entry.rays:>8,} rays"

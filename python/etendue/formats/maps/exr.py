@@ -20,6 +20,7 @@ from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
 from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, check_room, parsing
 from etendue.formats.maps.narrow import narrowed, rays_from_uint32, rays_to_uint32
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.printable import printable
 
 MAGIC = b"\x76\x2f\x31\x01"
 
@@ -80,14 +81,10 @@ def _plain_attributes(lmap: AnyMap) -> dict[str, Any]:
         "screenHeight": float(screen.height),
         "screenPlane": screen.plane,
         "pixelAspectRatio": float((screen.width / screen.columns) / (screen.height / screen.rows)),
-        "software": _encodable(lmap.provenance.software),
-        "comments": _encodable("\n".join(("angles in degrees, lengths in millimetres", *lmap.notes))),
+        # The JSON header keeps what cannot be shown, such as bytes of file names that are no text.
+        "software": printable(lmap.provenance.software),
+        "comments": "\n".join(("angles in degrees, lengths in millimetres", *map(printable, lmap.notes))),
     }
-
-
-def _encodable(text: str) -> str:
-    """Names of files may hold bytes that are no text; the JSON header keeps them, the library refuses them."""
-    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def read(path: Path) -> AnyMap:

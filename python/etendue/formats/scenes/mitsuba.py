@@ -14,6 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from etendue.quantities.patches import Patches
+from etendue.quantities.printable import printable
 from etendue.units import LUMINANCE_UNIT, MM2_PER_M2
 
 BLACK = '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>'
@@ -45,7 +46,7 @@ def write(patches: Patches, folder: Path) -> None:
 
 def _scene(patches: Patches) -> Iterator[str]:
     surface = CLEAR if len(patches.parts) > 1 else BLACK
-    source = f"{patches.provenance.source}, by {patches.provenance.software}"
+    source = printable(f"{patches.provenance.source}, by {patches.provenance.software}")
     yield '<scene version="3.0.0">'
     # A comment must not hold two hyphens, which a file name may.
     yield f"  <!-- {len(patches)} patches of {source.replace('--', '- -').rstrip('-')}; lengths in mm, rendered in "
