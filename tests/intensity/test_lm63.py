@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.errors import FormatError
 from etendue.formats.intensity import read_intensity, write_intensity
 from etendue.quantities.intensity import Intensity
 from oracles.intensity import lid
@@ -125,12 +125,6 @@ def test_what_follows_the_table_is_complained_about(read) -> None:
 def test_what_is_refused(read, content: bytes, message: str) -> None:
     with pytest.raises(FormatError, match=message):
         read(content)
-
-
-@pytest.mark.parametrize(("number", "letter"), [(2, "B"), (3, "A")])
-def test_types_a_and_b_are_refused_with_advice(read, number: int, letter: str) -> None:
-    with pytest.raises(UnsupportedFormatError, match=f"type {letter}.*Convert the file to type C"):
-        read(ies(head=f"1 -1 1 3 1 {number} 2 0 0 0", gamma="-90 0 90"))
 
 
 def test_values_below_zero_and_ranges_that_end_early(read) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.errors import ArgumentError, FormatError
+from etendue.formats.intensity.goniometer import Kind, in_c_gamma
 from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_lines
 from etendue.formats.intensity.lm63_writer import write
 from etendue.formats.intensity.opening import opening_facts
@@ -17,8 +18,9 @@ from etendue.formats.intensity.symmetry import Array, unfolded
 from etendue.formats.rays.ray_format import Head, file_provenance
 from etendue.quantities.intensity import Intensity, Symmetry
 from etendue.quantities.report import Complaint, Severity
-from etendue.units import WATTS_PER_FILE_UNIT, FluxUnit
+from etendue.units import INTENSITY_UNIT, WATTS_PER_FILE_UNIT, FluxUnit
 
+PHOTOMETRIC_TYPES: dict[int, Literal["A", "B", "C"]] = {1: "C", 2: "B", 3: "A"}
 EDITIONS = (1986, 1991, 1995, 2002, 2019)
 ORIENTATION = (
     "C planes are the file's own: in IES files C0 lies along the luminaire's length; nothing was turned or mirrored"
@@ -91,7 +93,7 @@ class _Words:
 
 
 def read(path: Path) -> Intensity:
-    """Read a file of photometric type C; types A and B are refused with advice."""
+    """Read a file of any photometric type; A becomes C-γ exactly, B by resampling with the error of it in the notes."""
     return _Reader(path).intensity()
 
 
@@ -183,7 +185,7 @@ class _Reader:
         lamps, lumens = whole("number of lamps", -1000, 1_000_000), take("lumens per lamp")
         multiplier = take("candela multiplier")
         n_gamma, n_c = whole("number of vertical angles", 2, 100_000), whole("number of horizontal angles", 1, 100_000)
-        self._check_type(whole("photometric type", 1, 3))
+        kind = PHOTOMETRIC_TYPES[whole("photometric type", 1, 3)]
         units = whole("units type", 1, 2)
         width, length, height = (take(name) for name in ("width", "length", "height"))
         ballast, second, watts = take("ballast factor"), take("ballast-lamp factor or future use"), take("input watts")
@@ -193,21 +195,21 @@ class _Reader:
         for what, angles in (("vertical", gamma), ("horizontal", c)):
             if not (np.diff(angles) > 0.0).all():
                 raise FormatError(self.path, f"{what} angles", "they do not rise", DAMAGED)
-        if gamma[0] < 0.0 or gamma[-1] > 180.0:
-            found = f"{gamma[0]:g}° to {gamma[-1]:g}°, beyond 0° to 180°"
-            raise FormatError(self.path, "vertical angles", found, DAMAGED)
-        if gamma[0] not in (0.0, 90.0) or gamma[-1] not in (90.0, 180.0):
-            found = f"they run from {gamma[0]:g}° to {gamma[-1]:g}°; beyond them the intensity is taken as 0"
-            self.complain("warning", "vertical angles", found, "LM-63 5.13")
+        if kind == "C":
+            self._check_vertical(gamma)
         values = self.words.numbers(n_c * n_gamma, "candela values").reshape(n_c, n_gamma)
         self._check_end()
-        c, values = self._whole_circle(c, values)
         unit, per_unit = self._unit()
         values = values * factor * per_unit
         if not np.isfinite(values).all():
             raise FormatError(self.path, "candela values", "multiplied by their factors they are no numbers", DAMAGED)
         if (values < 0.0).any():
             self.complain("warning", "candela values", f"{int((values < 0.0).sum())} are below 0", "LM-63 5.15")
+        notes: tuple[str, ...] = (ORIENTATION,)
+        if kind == "C":
+            c, values = self._whole_circle(c, values)
+        else:
+            c, gamma, values, notes = self._from_type(kind, c, gamma, values, INTENSITY_UNIT[unit])
         facts |= {new: text for key, text in reversed(self.keywords) if (new := FACT_BY_KEYWORD.get(key)) and text}
         facts |= {"keywords": tuple(self.keywords), "lamps": abs(lamps), "input_power": watts}
         facts |= self._stated_flux(per_unit)
@@ -221,18 +223,18 @@ class _Reader:
             flux_unit=unit,
             luminaire=facts,
             provenance=file_provenance(self.path, "lm63"),
-            notes=(ORIENTATION,),
+            notes=notes,
         )
         self._check_flux(result)
         return result.replace(complaints=tuple(self.complaints))
 
-    def _check_type(self, kind: int) -> None:
-        if kind != 1:
-            name = {2: "B", 3: "A"}[kind]
-            raise UnsupportedFormatError(
-                self.path, "photometric type", f"type {name}: planes about a horizontal axis, or in other directions",
-                "Convert the file to type C with the maker's software; type A and B tables cannot become C-γ without loss.",
-            )  # fmt: skip
+    def _check_vertical(self, gamma: Array) -> None:
+        if gamma[0] < 0.0 or gamma[-1] > 180.0:
+            found = f"{gamma[0]:g}° to {gamma[-1]:g}°, beyond 0° to 180°"
+            raise FormatError(self.path, "vertical angles", found, DAMAGED)
+        if gamma[0] not in (0.0, 90.0) or gamma[-1] not in (90.0, 180.0):
+            found = f"they run from {gamma[0]:g}° to {gamma[-1]:g}°; beyond them the intensity is taken as 0"
+            self.complain("warning", "vertical angles", found, "LM-63 5.13")
 
     def _factor(self, multiplier: float, ballast: float, second: float) -> float:
         """From the numbers of the file to candela (or its other unit)."""
@@ -290,6 +292,18 @@ class _Reader:
             self.path, "horizontal angles", f"{first:g}° to {last:g}° is no sector that symmetry completes",
             "Known are 0 to 0, 90, 180 or 360, and 90 to 270; ask for a complete file.",
         )  # fmt: skip
+
+    def _from_type(
+        self, kind: Kind, horizontal: Array, vertical: Array, values: Array, unit: str
+    ) -> tuple[Array, Array, Array, tuple[str, ...]]:
+        """C, γ, values and notes, from a table of type A or B."""
+        try:
+            converted = in_c_gamma(kind, horizontal, vertical, values, unit)
+        except ArgumentError as error:
+            raise FormatError(self.path, f"angles of type {kind}", str(error), DAMAGED) from None
+        for what in converted.assumed:
+            self.complain("note", f"angles of type {kind}", what, "LM-63 5.13, 5.14")
+        return converted.c, converted.gamma, converted.values, converted.notes
 
     # --- flux ----------------------------------------------------------------------------------------------------------
 
