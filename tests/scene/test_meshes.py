@@ -19,6 +19,7 @@ from etendue.scene.files import Files
 from etendue.scene.mesh_files import MESH_FORMATS, read_mesh
 from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
 from oracles import step
+from oracles.meshes import divided_sphere
 from oracles.scenes import OCTAHEDRON, OCTANTS
 
 CORNERS = np.array(OCTAHEDRON)
@@ -243,13 +244,7 @@ def test_normals_of_a_tube_are_radial_and_its_lids_stay_flat() -> None:
 
 def test_normals_of_a_sphere() -> None:
     """An octahedron divided four times, on the unit sphere: normals differ from the radius by less than a facet does."""
-    vertices, triangles = CORNERS / 2, np.array(OCTANTS)
-    for _ in range(4):
-        a, b, c = (vertices[triangles[:, k]] for k in range(3))
-        middles = [(p + q) / np.linalg.norm(p + q, axis=1, keepdims=True) for p, q in ((a, b), (b, c), (c, a))]
-        parts = [(a, middles[0], middles[2]), (b, middles[1], middles[0]), (c, middles[2], middles[1]), tuple(middles)]
-        corners = np.concatenate([np.stack(part, axis=1) for part in parts]).reshape(-1, 3)
-        vertices, triangles = welded(corners, np.arange(len(corners)).reshape(-1, 3))
+    vertices, triangles = divided_sphere(4)
     split, _, normals = smooth_normals(vertices, triangles, 45.0)
     assert len(split) == len(vertices) == 1026
     cosine = np.einsum("ij,ij->i", split, normals)

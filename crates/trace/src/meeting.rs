@@ -19,6 +19,15 @@ use crate::scene::{Act, Scene};
 /// Crossings in one event.
 type Group = Vec<(u32, Crossing)>;
 
+/// Surfaces that light may meet as meshes with interpolated normals; whatever it meets after them has its own normal.
+///
+/// Mirrored at an interpolated normal, a bundle of étendue dA cos θ dω leaves with dA cos θ' dω: θ and θ' are angles on the
+/// triangle and differ by up to twice that between both normals. What shrinks in one place grows in another, but a long chain
+/// of total reflections may settle on a closed way where each round shrinks it: light that came in through the surface then
+/// never leaves, which no surface does to it. At the triangles' own normals étendue is kept, so such a way holds nothing that
+/// came in from outside.
+const INTERPOLATED: u32 = 1000;
+
 /// What a ray is at when it meets faces.
 #[derive(Clone, Copy, Debug)]
 pub struct Meeting {
@@ -47,6 +56,14 @@ pub struct Meeting {
 }
 
 impl Meeting {
+    /// As it is for light that has met `events` surfaces before, forwards and backwards alike: see [`INTERPOLATED`].
+    #[inline(always)]
+    pub fn limit_interpolation(&mut self, events: u32) {
+        if events >= INTERPOLATED {
+            self.normal = self.side;
+        }
+    }
+
     /// The direction of light that arrived along `d` and was mirrored.
     #[inline]
     #[must_use]

@@ -269,7 +269,7 @@ impl<'a> Walk<'a> {
             self.draw(&now, sorter.single(), event);
             for (k, i) in sorter.single().iter().enumerate() {
                 let numbers = self.numbers.each_ref().map(|list| list[k]);
-                self.step(&now, &hits, *i as usize, numbers, last, &mut next);
+                self.step(&now, &hits, *i as usize, numbers, event, &mut next);
             }
             std::mem::swap(&mut now, &mut next);
             event += 1;

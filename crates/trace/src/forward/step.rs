@@ -23,10 +23,10 @@ impl Walk<'_> {
     /// there, into which lobe it goes, and at which height, since what is left of a number that has decided is again spread
     /// evenly.
     #[inline]
-    pub(super) fn step(&mut self, now: &Flock, hits: &Hits, i: usize, numbers: [f64; 2], last: bool, next: &mut Flock) {
+    pub(super) fn step(&mut self, now: &Flock, hits: &Hits, i: usize, numbers: [f64; 2], event: u32, next: &mut Flock) {
         let who = now.who[i];
         let mut rider = self.riders[who as usize];
-        let went = self.event(now, hits, i, numbers, last, &mut rider);
+        let went = self.event(now, hits, i, numbers, event, &mut rider);
         let t = if hits.t[i].is_finite() { hits.t[i] } else { self.far };
         self.mark(rider.ray, now.lines.origin(i) + now.lines.direction(i) * t);
         match went {
@@ -39,7 +39,7 @@ impl Walk<'_> {
     }
 
     #[inline]
-    fn event(&mut self, now: &Flock, hits: &Hits, i: usize, numbers: [f64; 2], last: bool, rider: &mut Rider) -> Next {
+    fn event(&mut self, now: &Flock, hits: &Hits, i: usize, numbers: [f64; 2], event: u32, rider: &mut Rider) -> Next {
         let scene = self.scene;
         let (d, inside) = (now.lines.direction(i), now.inside[i]);
         let [mut number, turn] = numbers;
@@ -56,13 +56,14 @@ impl Walk<'_> {
             return Err(Fate::Escaped);
         }
         let out = &mut self.out;
-        let meeting = meet(scene, &now.lines, hits, i, inside, |detector, point, _| {
+        let mut meeting = meet(scene, &now.lines, hits, i, inside, |detector, point, _| {
             detect(scene, out, detector, point, d, rider);
         })
         .map_err(|(loss, face)| Fate::Lost(loss, face))?;
-        if last {
+        if event + 1 >= self.run.most_events {
             return Err(Fate::Terminated);
         }
+        meeting.limit_interpolation(event);
         match meeting.finish {
             None => Ok(((meeting.point, d, meeting.leaving), meeting.after)),
             Some(finish) => self.scatter(&meeting, finish, d, [number, turn], rider),

@@ -257,9 +257,10 @@ impl<'a> Wave<'a> {
         let mut branch = self.branches[i];
         let wavelength = self.wavelength(branch.path);
         let absorption = self.fillings.at(scene, branch.inside.top(), wavelength).absorption;
-        let Ok(meeting) = meet(scene, &self.lines, hits, i, branch.inside, |_, _, _| {}) else {
+        let Ok(mut meeting) = meet(scene, &self.lines, hits, i, branch.inside, |_, _, _| {}) else {
             return;
         };
+        meeting.limit_interpolation(branch.events);
         branch.events += 1;
         branch.travelled += meeting.t;
         if absorption > 0.0 {
