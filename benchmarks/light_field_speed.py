@@ -81,7 +81,7 @@ def count_in_numpy(rays: et.RaySet, fine: tuple[int, int], equal: bool) -> list[
 
 
 def counting(radii: tuple[float, ...], flux: tuple[float, ...], rays: int, repeats: int) -> None:
-    """Rays of concentric rings into 2²⁰ cells, from a mapped file and from memory."""
+    """Rays of concentric rings into 2²⁰ cells, from a file and from memory."""
     equal = len(radii) == 1
     kind, fine = "equal" if equal else "unequal", fine_depths(rays, DEPTHS)
     some = et.RingSource(radii, flux, rays=min(rays, 2_000_000)).ray_set()
@@ -96,7 +96,7 @@ def counting(radii: tuple[float, ...], flux: tuple[float, ...], rays: int, repea
         path = Path(folder) / "rings.tm25ray"
         et.write_rays(path, et.RingSource(radii, flux, rays=rays))
         held = et.RingSource(radii, flux, rays=rays).ray_set()
-        for place, source in (("a mapped TM-25 file", et.read_rays(path)), ("memory (f64)", held)):
+        for place, source in (("a TM-25 file", et.read_rays(path)), ("memory (f64)", held)):
             for threads, cores in CORES:
                 rate = rays / best(lambda s=source, t=threads: count_rays(s, RINGS, DEPTHS, fine, threads=t), repeats)
                 title = f"{kind} rays from {place}, {cores}"

@@ -1,5 +1,6 @@
 """The compiled core. Arrays in, arrays out; lengths in mm, angles in radians, fluxes as stored."""
 
+import os
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias, TypedDict, final
 
@@ -90,12 +91,34 @@ class _Harvest(TypedDict):
     imbalance: float
 
 @final
+class StoredBytes:
+    """Bytes of a file, read where they are asked for: never mapped, so that a file that shrinks is an error and no crash.
+
+    Whatever reads them raises `FormatError` if the file did not give them, and warns once, with `ChangedFileWarning`, if its
+    size or time of change is not what it was when it was opened.
+    """
+
+    def __new__(cls, path: str | os.PathLike[str], start: int, len: int) -> StoredBytes: ...
+    def __len__(self) -> int: ...
+    def size(self) -> int:
+        """Size of the whole file when it was opened."""
+
+    def named(self, name: str) -> StoredBytes:
+        """The same bytes, of what messages call by this name."""
+
+    def read(self, start: int, stop: int) -> npt.NDArray[np.uint8]:
+        """Bytes ``start..stop``, counted from the first."""
+
+    def check(self) -> None:
+        """Raise or warn as after a pass."""
+
+@final
 class RayTable:
-    """Ray records over the bytes of an array: in memory, or mapped from a file."""
+    """Ray records over the bytes of an array, or of a file."""
 
     def __new__(
         cls,
-        bytes: npt.NDArray[np.uint8],
+        records: npt.NDArray[np.uint8] | StoredBytes,
         stride: int,
         position: int | None,
         direction: int,

@@ -43,6 +43,18 @@ class UnsupportedFormatError(FormatError):
     """A format recognised by name that étendue refuses, with what to ask for instead."""
 
 
+class OutputError(EtendueError, OSError):
+    """A file that the system does not let be written: names it, what was needed and what there is."""
+
+    def __str__(self) -> str:
+        """File and reason."""
+        return f"{self.filename}: {self.strerror}."
+
+
+class MemoryLimitError(EtendueError, MemoryError):
+    """More memory is asked for than there is: names what for, how much, and how much there is."""
+
+
 class UnitError(EtendueError, ValueError):
     """A conversion between units that the data does not support (watts to lumens without a spectrum)."""
 

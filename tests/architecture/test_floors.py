@@ -218,6 +218,8 @@ WITHOUT_EXAMPLE = {
     "etendue.quantities.ray_set.RaySetMeaning": "for readers of files",
     "etendue.quantities.ray_stream": "what ray sets and sources share; RaySet and RingSource show it",
     "etendue.quantities.report.RayFileWarning": "a category of warnings",
+    "etendue.quantities.report.ChangedFileWarning": "a category of warnings",
+    "etendue.formats.input": "about files that change and pipes that wait; its tests show it",
 }
 """Public things whose docstring may do without an example, with the reason."""
 
@@ -316,7 +318,16 @@ def test_no_crate_is_unsafe_prints_or_opens_files() -> None:
     assert len(sources) > 10
     for path in sources:
         code = without_comments(path.read_text())
-        for word in (r"\bunsafe\b", r"\bunsafe_code\b", r"\be?println!", r"\bdbg!", r"\bstd::fs\b", r"\bstatic mut\b"):
+        words = [r"\bunsafe\b", r"\bunsafe_code\b", r"\be?println!", r"\bdbg!", r"\bstatic mut\b"]
+        if path.name == "stored.rs":  # one of them opens files of rays, the other reads what is open
+            assert re.search(r"\bstd::fs\b", code), path
+        else:
+            words.append(r"\bstd::fs\b")
+        if path.parent.parent.name != "bindings":
+            assert not re.search(r"\bFile::\w", code.partition("#[cfg(test)]")[0]), (
+                f"{path.relative_to(ROOT)}: opens a file"
+            )
+        for word in words:
             assert not re.search(word, code), f"{path.relative_to(ROOT)}: {word}"
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.rays import read_rays, write_rays
+from etendue.quantities.file_records import FileRecords
 from etendue.quantities.report import RayFileWarning
 
 ROWS = (
@@ -56,7 +57,7 @@ def places(rays: et.RaySet, severity: str) -> list[str]:
 def test_seven_columns(tmp_path: Path) -> None:
     assert asap_bytes()[:4].hex() == "f71c0000"
     rays = read(tmp_path)
-    assert isinstance(rays.records, np.memmap)
+    assert isinstance(rays.records, FileRecords)
     assert rays.position.tolist() == [list(row[:3]) for row in ROWS]
     assert np.allclose(rays.direction, [row[3:6] for row in ROWS], atol=1e-7)
     assert rays.flux.tolist() == [1.0, 2.5, 4.5]

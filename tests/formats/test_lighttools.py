@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.rays import read_rays, write_rays
+from etendue.quantities.file_records import FileRecords
 from etendue.quantities.ray_set import RaySetMeaning
 from etendue.quantities.report import RayFileWarning
 
@@ -53,7 +54,7 @@ def places(rays: et.RaySet, severity: str) -> list[str]:
 @pytest.mark.parametrize(("data_type", "flux_unit"), [(0, "W"), (1, "lm")])
 def test_flux_only(tmp_path: Path, data_type: int, flux_unit: str) -> None:
     rays = read(tmp_path, data_type=data_type)
-    assert isinstance(rays.records, np.memmap)
+    assert isinstance(rays.records, FileRecords)
     assert rays.position.tolist() == [list(row[:3]) for row in ROWS]
     assert np.allclose(rays.direction, [row[3:6] for row in ROWS], atol=1e-7)
     assert rays.flux.tolist() == [1.0, 2.5, 4.5]

@@ -17,6 +17,7 @@ from etendue.errors import ArgumentError, FormatError
 from etendue.formats import rays as package
 from etendue.formats.rays import RAY_FORMATS, detect_format, read_rays, write_rays
 from etendue.formats.rays.ray_format import Head, RayFormat
+from etendue.quantities.file_records import FileRecords
 from etendue.quantities.ray_set import RaySetMeaning
 from etendue.quantities.ray_stream import BATCH
 from etendue.quantities.report import RayFileWarning
@@ -283,11 +284,13 @@ def test_cut_at_every_byte(ray_format: RayFormat, tmp_path: Path) -> None:
     write_rays(path, asymmetric(), ray_format.name)
     data, whole = path.read_bytes(), read_rays(path)
     readable = 0
+    cut = tmp_path / "cut"
+    cut.write_bytes(data)
     # A new file for each cut would be slow: the same one shrinks.
     for size in range(len(data) - 1, -1, -1):
-        with path.open("rb+") as file:
+        with cut.open("rb+") as file:
             file.truncate(size)
-        rays = read_or_refuse(path)
+        rays = read_or_refuse(cut)
         if isinstance(rays, FormatError):
             continue
         readable += 1
@@ -382,7 +385,7 @@ def test_opening_a_large_file_costs_no_memory(name: str, tmp_path: Path) -> None
     rays = read_rays(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert (len(rays), isinstance(rays.records, np.memmap)) == (MANY, True)
+    assert (len(rays), isinstance(rays.records, FileRecords)) == (MANY, True)
     assert peak < 16e6
 
 

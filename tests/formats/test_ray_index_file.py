@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import FormatError
+from etendue.quantities.file_records import FileRecords
 from etendue.quantities.ray_set import RaySetMeaning
 from etendue.quantities.report import Complaint
 
@@ -137,7 +138,7 @@ def test_everything_that_a_set_knows_comes_back(tmp_path: Path) -> None:
     built = et.RayIndex.build(rays, tmp_path / "a.etd")
     opened = et.read_rays(tmp_path / "a.etd")
     assert isinstance(opened, et.RayIndex)
-    assert isinstance(opened.records, np.memmap)
+    assert isinstance(opened.records, FileRecords)
     for back in (built, opened):
         assert back.records.dtype == rays.records.dtype
         assert back.header == rays.header

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError, UnitError, UnsupportedFormatError
 from etendue.formats.rays import read_rays, write_rays
+from etendue.quantities.file_records import FileRecords
 from etendue.quantities.ray_set import RaySetMeaning
 
 ROWS = (
@@ -38,7 +39,7 @@ def places(rays: et.RaySet, severity: str) -> list[str]:
 
 def test_columns(tmp_path: Path) -> None:
     rays = read(tmp_path, speos_bytes())
-    assert isinstance(rays.records, np.memmap)
+    assert isinstance(rays.records, FileRecords)
     assert rays.position.tolist() == [list(row[:3]) for row in ROWS]
     assert np.allclose(rays.direction, [row[3:6] for row in ROWS], atol=1e-7)
     assert rays.wavelength is not None

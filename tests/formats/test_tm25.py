@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from etendue.errors import FormatError
 from etendue.formats.rays import detect_format, read_rays, write_rays
+from etendue.quantities.file_records import FileRecords
 from etendue.quantities.ray_set import RaySetMeaning
 from etendue.quantities.report import RayFileWarning
 from hypothesis import HealthCheck, given, settings
@@ -100,7 +101,7 @@ def places(rays: et.RaySet, severity: str) -> list[str]:
 def test_luminous_rays(made: Callable[..., et.RaySet]) -> None:
     names = {0: "LED blå", 3: "RiGO", 7: "at 350 mA"}
     rays = made(start=5, descriptions={i: text.encode("utf-32-le") for i, text in names.items()})
-    assert isinstance(rays.records, np.memmap)
+    assert isinstance(rays.records, FileRecords)
     assert rays.position.tolist() == [list(g[:3]) for g in GEOMETRY]
     assert np.allclose(rays.direction, [g[3:] for g in GEOMETRY], atol=1e-7)
     assert rays.flux.tolist() == list(FLUX)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.rays import detect_format, read_rays, write_rays, zemax
+from etendue.quantities.file_records import FileRecords
 from etendue.quantities.ray_set import RaySetMeaning
 from etendue.quantities.report import RayFileWarning
 
@@ -60,7 +61,7 @@ def places(rays: et.RaySet, severity: str) -> list[str]:
 @pytest.mark.parametrize(("flux_type", "flux_unit"), [(0, "W"), (1, "lm")])
 def test_flux_only(tmp_path: Path, identifier: int, flux_type: int, flux_unit: str) -> None:
     rays = read(tmp_path, identifier=identifier, flux_type=flux_type)
-    assert isinstance(rays.records, np.memmap)
+    assert isinstance(rays.records, FileRecords)
     assert rays.position.tolist() == [list(row[:3]) for row in ROWS]
     assert np.allclose(rays.direction, [row[3:6] for row in ROWS], atol=1e-7)
     assert rays.flux.tolist() == [1.0, 2.5, 4.5]

@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from etendue.errors import ArgumentError
+from etendue.errors import ArgumentError, OutputError
 from etendue.formats.output import atomic_output
 
 
@@ -46,7 +46,7 @@ def _write_and_fail(target: Path, failure: type[BaseException]) -> None:
 def test_failure_of_the_replacement_itself_leaves_no_litter(tmp_path: Path) -> None:
     target = tmp_path / "map.csv"
     target.write_text("old")
-    with pytest.raises(FileNotFoundError), atomic_output(target) as temporary:
+    with pytest.raises(OutputError, match=r"map\.csv"), atomic_output(target) as temporary:
         temporary.unlink()
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]

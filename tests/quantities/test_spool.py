@@ -118,4 +118,4 @@ for n in (100_001, 100_700, 104_000, 300_000):
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["OSError"] * 4
+    assert done.stdout.split() == ["OutputError"] * 4

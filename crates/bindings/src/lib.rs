@@ -12,6 +12,7 @@ mod run;
 mod scan;
 mod scene;
 mod source;
+mod stored;
 mod subset;
 mod surface;
 mod survey;
@@ -24,6 +25,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<source::RayTable>()?;
+    module.add_class::<stored::StoredBytes>()?;
     module.add_class::<source::RingSource>()?;
     module.add_class::<field::LightField>()?;
     module.add_class::<field::FieldRays>()?;

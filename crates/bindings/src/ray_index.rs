@@ -1,6 +1,5 @@
 //! The index of rays by direction and position.
 
-use etendue_geometry::table::RayTable as CoreTable;
 use etendue_lightfield::ray_index::{
     Cells, LEAF, RayIndex, arrange as core_arrange, count as core_count, index_sums as core_sums, place as core_place,
 };
@@ -13,7 +12,7 @@ use pyo3::types::PyDict;
 use crate::cone::{Cone, SumArrays};
 use crate::run::interruptible;
 use crate::scan::tally_dict;
-use crate::source::{RayTable, Source, with_source};
+use crate::source::{Opened, RayTable, Records, Source, with_source};
 
 fn grid(side: u32) -> PyResult<Cells> {
     Cells::new(side).ok_or_else(|| PyValueError::new_err(format!("{side} cells along a side")))
@@ -23,10 +22,6 @@ fn grid(side: u32) -> PyResult<Cells> {
 #[pyfunction]
 pub fn index_leaf() -> usize {
     LEAF
-}
-
-fn table<'a>(bytes: &'a [u8], table: &RayTable) -> PyResult<CoreTable<'a>> {
-    CoreTable::new(bytes, table.layout).ok_or_else(|| PyValueError::new_err("the ray table changed its size"))
 }
 
 /// First pass: (usable rays of each cell, tally).
@@ -87,7 +82,12 @@ pub fn index_arrange<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (cells, starts, layout) = (grid(side)?, starts.as_slice()?, records.get().layout);
     let [x, y, z] = centre;
-    let mut bytes = records.get().bytes.bind(py).try_readwrite()?;
+    let Records::Array(bytes) = &records.get().records else {
+        return Err(PyValueError::new_err(
+            "records are put in order in memory or in a map, not in a file",
+        ));
+    };
+    let mut bytes = bytes.bind(py).try_readwrite()?;
     let bytes = bytes.as_slice_mut()?;
     let bounds = interruptible(py, threads, progress, |threads, tick| {
         core_arrange(bytes, &layout, cells, starts, Vec3::new(x, y, z), threads, tick)
@@ -113,8 +113,10 @@ pub fn index_sums<'py>(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<(SumArrays<'py>, u64)>> {
-    let bytes = records.get().bytes.bind(py).readonly();
-    let rays = table(bytes.as_slice()?, records.get())?;
+    let opened = Opened::table(py, records.get())?;
+    let Source::Table(rays) = opened.core()? else {
+        return Err(PyValueError::new_err("an index is one over records"));
+    };
     let [x, y, z] = centre;
     let index = RayIndex::new(
         rays,
@@ -127,7 +129,9 @@ pub fn index_sums<'py>(
     let core: Vec<_> = cones.iter().map(Cone::core).collect();
     let sums = interruptible(py, threads, progress, |threads, tick| {
         core_sums(&index, &core, threads, tick)
-    })?;
+    });
+    opened.check()?;
+    let sums = sums?;
     let arrays = sums.into_iter().zip(&cones);
     arrays
         .map(|((sum, looked), cone)| Ok((cone.arrays(py, sum)?, looked)))

@@ -11,20 +11,32 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::field::FieldRays;
+use crate::stored::StoredBytes;
 
-/// Ray records over the bytes of an array: in memory, or mapped from a file.
+/// Where the records of a table are.
+#[derive(FromPyObject)]
+pub enum Records {
+    /// In memory.
+    Array(Py<PyArray1<u8>>),
+    /// In a file.
+    File(Py<StoredBytes>),
+}
+
+/// Ray records over the bytes of an array, or of a file.
 #[pyclass(frozen, module = "etendue._core")]
 pub struct RayTable {
-    pub bytes: Py<PyArray1<u8>>,
+    pub records: Records,
     pub layout: Layout,
 }
 
 #[pymethods]
 impl RayTable {
     #[new]
-    #[pyo3(signature = (bytes, stride, position, direction, flux, double, length_scale))]
+    #[pyo3(signature = (records, stride, position, direction, flux, double, length_scale))]
+    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
     fn new(
-        bytes: &Bound<'_, PyArray1<u8>>,
+        py: Python<'_>,
+        records: Records,
         stride: usize,
         position: Option<usize>,
         direction: usize,
@@ -41,18 +53,13 @@ impl RayTable {
             float,
             length_scale,
         };
-        let readonly = bytes.readonly();
-        let slice = readonly.as_slice()?;
-        CoreTable::new(slice, layout)
-            .ok_or_else(|| PyValueError::new_err(format!("{} bytes are not a table of {layout:?}", slice.len())))?;
-        Ok(Self {
-            bytes: bytes.clone().unbind(),
-            layout,
-        })
+        let table = Self { records, layout };
+        Opened::table(py, &table)?.core()?;
+        Ok(table)
     }
 
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
-        Ok(self.bytes.bind(py).len()? / self.layout.stride)
+        Ok(usize::try_from(Opened::table(py, self)?.core()?.len())?)
     }
 }
 
@@ -111,6 +118,7 @@ impl RaySource for Source<'_> {
 /// A Python source, held open for the time of a call.
 pub enum Opened<'py> {
     Table(PyReadonlyArray1<'py, u8>, Layout),
+    File(Bound<'py, StoredBytes>, Layout),
     Rings(Bound<'py, RingSource>),
     Field(Bound<'py, FieldRays>),
 }
@@ -119,8 +127,7 @@ impl<'py> Opened<'py> {
     /// The source behind a Python object.
     pub fn new(source: &Bound<'py, PyAny>) -> PyResult<Self> {
         if let Ok(table) = source.cast::<RayTable>() {
-            let table = table.get();
-            Ok(Self::Table(table.bytes.bind(source.py()).readonly(), table.layout))
+            Self::table(source.py(), table.get())
         } else if let Ok(rays) = source.cast::<FieldRays>() {
             Ok(Self::Field(rays.clone()))
         } else {
@@ -128,23 +135,49 @@ impl<'py> Opened<'py> {
         }
     }
 
+    /// The records of a table.
+    pub fn table(py: Python<'py>, table: &RayTable) -> PyResult<Self> {
+        Ok(match &table.records {
+            Records::Array(bytes) => Self::Table(bytes.bind(py).try_readonly()?, table.layout),
+            Records::File(bytes) => Self::File(bytes.bind(py).clone(), table.layout),
+        })
+    }
+
     /// The core's view of it.
     pub fn core(&self) -> PyResult<Source<'_>> {
+        let no_table =
+            |bytes: u64, layout: &Layout| PyValueError::new_err(format!("{bytes} bytes are not a table of {layout:?}"));
         Ok(match self {
-            Self::Table(bytes, layout) => Source::Table(
-                CoreTable::new(bytes.as_slice()?, *layout)
-                    .ok_or_else(|| PyValueError::new_err("the ray table changed its size"))?,
-            ),
+            Self::Table(bytes, layout) => {
+                let bytes = bytes.as_slice()?;
+                let table = CoreTable::new(bytes, *layout);
+                Source::Table(table.ok_or_else(|| no_table(bytes.len() as u64, layout))?)
+            }
+            Self::File(bytes, layout) => {
+                let bytes = bytes.get().core();
+                let table = CoreTable::stored(bytes, *layout);
+                Source::Table(table.ok_or_else(|| no_table(bytes.len(), layout))?)
+            }
             Self::Rings(rings) => Source::Rings(&rings.get().0),
             Self::Field(rays) => Source::Field(rays.get().core()),
         })
     }
+
+    /// What is to be said of the source after a pass: whether its file gave all that it was asked for.
+    pub fn check(&self) -> PyResult<()> {
+        match self {
+            Self::File(bytes, _) => bytes.get().check(bytes.py()),
+            Self::Table(..) | Self::Rings(_) | Self::Field(_) => Ok(()),
+        }
+    }
 }
 
-/// Calls `body` with the core's view of a Python source.
+/// Calls `body` with the core's view of a Python source; what it found counts only if the source gave all its rays.
 pub fn with_source<R>(source: &Bound<'_, PyAny>, body: impl FnOnce(&Source<'_>) -> PyResult<R>) -> PyResult<R> {
     let opened = Opened::new(source)?;
-    body(&opened.core()?)
+    let found = body(&opened.core()?);
+    opened.check()?;
+    found
 }
 
 type RayArrays<'py> = (

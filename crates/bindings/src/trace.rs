@@ -104,8 +104,8 @@ pub fn trace_batches<'py>(
     if first > last || last > rays.div_ceil(BATCH) {
         return Err(PyValueError::new_err(format!("batches {first}..{last} of {rays} rays")));
     }
-    let sets = open(py, scene)?;
-    let sets: Vec<Source<'_>> = sets.iter().map(Opened::core).collect::<PyResult<_>>()?;
+    let opened = open(py, scene)?;
+    let sets: Vec<Source<'_>> = opened.iter().map(Opened::core).collect::<PyResult<_>>()?;
     let sets: Vec<&dyn RaySource> = sets.iter().map(|s| s as &dyn RaySource).collect();
     let run = Run {
         rays,
@@ -116,6 +116,7 @@ pub fn trace_batches<'py>(
     let core = scene.core();
     let batches: Range<u64> = first..last;
     let harvest: Harvest = py.detach(|| inside(threads.unwrap_or(0), || trace(core, &run, batches.clone())));
+    opened.iter().try_for_each(Opened::check)?;
     let dict = PyDict::new(py);
     dict.set_item("ledger", ledger_dict(py, &harvest.ledger)?)?;
     let cells = PyList::empty(py);
@@ -191,8 +192,8 @@ pub fn trace_trails<'py>(
     most_events: u32,
     far: f64,
 ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
-    let sets = open(py, scene)?;
-    let sets: Vec<Source<'_>> = sets.iter().map(Opened::core).collect::<PyResult<_>>()?;
+    let opened = open(py, scene)?;
+    let sets: Vec<Source<'_>> = opened.iter().map(Opened::core).collect::<PyResult<_>>()?;
     let sets: Vec<&dyn RaySource> = sets.iter().map(|s| s as &dyn RaySource).collect();
     let run = Run {
         rays,
@@ -202,6 +203,7 @@ pub fn trace_trails<'py>(
     };
     let core = scene.core();
     let found = py.detach(|| trails(core, &run, far));
+    opened.iter().try_for_each(Opened::check)?;
     found
         .into_iter()
         .map(|trail| {

@@ -22,6 +22,8 @@ pub struct RayBatch {
     pub defects: [u64; Defect::COUNT],
     /// Largest | |k| − 1 | of the directions as they were stored.
     pub norm_error: f64,
+    /// Room for the records of a file on their way here, kept from block to block.
+    pub room: Vec<u8>,
 }
 
 /// Why a ray cannot be used.
@@ -50,6 +52,7 @@ impl Default for RayBatch {
             flux: zeros(),
             defects: [0; Defect::COUNT],
             norm_error: 0.0,
+            room: Vec::new(),
         }
     }
 }

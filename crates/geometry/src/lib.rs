@@ -1,7 +1,8 @@
 //! Rays and the surfaces they meet.
 //!
 //! Rays: `batch` is a structure of arrays that the inner loops run over, `source` anything that yields rays by index, `table`
-//! records in memory or in a mapped file, `tally` the flux account of a pass, `scan` the statistics of a ray set in one pass.
+//! records in memory or in a file, `stored` a stretch of a file, `tally` the flux account of a pass, `scan` the statistics of a
+//! ray set in one pass.
 //!
 //! Surfaces: `shape` holds the kinds of surface, `mesh` triangles, `face` a shape in its place, `lines` a block of rays that
 //! look for surfaces, `assembly` many faces
@@ -17,6 +18,7 @@ pub mod mesh;
 pub mod scan;
 pub mod shape;
 pub mod source;
+pub mod stored;
 pub mod sweep;
 pub mod table;
 pub mod tally;

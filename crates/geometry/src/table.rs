@@ -1,9 +1,10 @@
-//! Ray records in memory, or in a mapped file: fixed stride, little-endian columns of one float type.
+//! Ray records in memory, or in a file: fixed stride, little-endian columns of one float type.
 
 use std::ops::Range;
 
 use crate::batch::RayBatch;
 use crate::source::RaySource;
+use crate::stored::StoredBytes;
 
 /// The float type of a table's columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,10 +41,20 @@ pub struct Layout {
     pub length_scale: f64,
 }
 
-/// Records over borrowed bytes.
+/// Where the records are.
+#[derive(Clone, Copy, Debug)]
+enum Store<'a> {
+    Memory(&'a [u8]),
+    File(&'a StoredBytes),
+}
+
+/// Records over borrowed bytes, or in a file.
+///
+/// Rays that a file does not give have no direction; [`StoredBytes::failure`] tells of them after a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct RayTable<'a> {
-    bytes: &'a [u8],
+    store: Store<'a>,
+    len: u64,
     layout: Layout,
 }
 
@@ -51,6 +62,16 @@ impl<'a> RayTable<'a> {
     /// A table over `bytes`; None if a column would reach past the record or the bytes are no whole number of records.
     #[must_use]
     pub fn new(bytes: &'a [u8], layout: Layout) -> Option<Self> {
+        Self::over(Store::Memory(bytes), bytes.len() as u64, layout)
+    }
+
+    /// A table over a stretch of a file; None as with [`Self::new`].
+    #[must_use]
+    pub fn stored(bytes: &'a StoredBytes, layout: Layout) -> Option<Self> {
+        Self::over(Store::File(bytes), bytes.len(), layout)
+    }
+
+    fn over(store: Store<'a>, bytes: u64, layout: Layout) -> Option<Self> {
         let width = layout.float.size();
         let fits = |offset: usize, columns: usize| {
             offset
@@ -58,11 +79,15 @@ impl<'a> RayTable<'a> {
                 .is_some_and(|end| end <= layout.stride)
         };
         let valid = layout.stride > 0
-            && bytes.len().is_multiple_of(layout.stride)
+            && bytes.is_multiple_of(layout.stride as u64)
             && layout.position.is_none_or(|offset| fits(offset, 3))
             && fits(layout.direction, 3)
             && fits(layout.flux, 1);
-        valid.then_some(Self { bytes, layout })
+        valid.then(|| Self {
+            store,
+            len: bytes / layout.stride as u64,
+            layout,
+        })
     }
 
     /// Where the columns lie.
@@ -71,28 +96,44 @@ impl<'a> RayTable<'a> {
         &self.layout
     }
 
-    /// The bytes of some records, as they are stored.
+    /// The bytes of some records, as they are stored; those of a file are read into `room`.
+    ///
+    /// # Panics
+    /// If the table has fewer.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "indices lie inside a slice that is in memory"
+        reason = "indices lie inside a slice that is in memory, or will be"
     )]
-    pub fn records(&self, range: Range<u64>) -> &'a [u8] {
-        let (start, stop) = (range.start as usize, range.end as usize);
-        &self.bytes[start * self.layout.stride..stop * self.layout.stride]
+    pub fn records<'s>(&self, range: Range<u64>, room: &'s mut Vec<u8>) -> &'s [u8]
+    where
+        'a: 's,
+    {
+        let stride = self.layout.stride;
+        match self.store {
+            Store::Memory(bytes) => &bytes[range.start as usize * stride..range.end as usize * stride],
+            Store::File(file) => {
+                assert!(range.end <= self.len, "records {range:?} of {}", self.len);
+                room.resize((range.end - range.start) as usize * stride, 0);
+                file.read(range.start * stride as u64, room);
+                room
+            }
+        }
     }
 
     /// Puts rays of several ranges, together at most [`BLOCK`](crate::batch::BLOCK), one after another into `batch`,
     /// settled.
     pub fn gather(&self, ranges: impl Iterator<Item = Range<u64>>, batch: &mut RayBatch) {
         batch.len = 0;
+        let mut room = std::mem::take(&mut batch.room);
         for range in ranges {
-            let records = self.records(range);
+            let records = self.records(range, &mut room);
             match self.layout.float {
                 Float::F32 => decode(records, &self.layout, batch, 4, read_f32),
                 Float::F64 => decode(records, &self.layout, batch, 8, read_f64),
             }
         }
+        batch.room = room;
         batch.settle();
     }
 }
@@ -135,7 +176,7 @@ fn decode(records: &[u8], layout: &Layout, batch: &mut RayBatch, width: usize, r
 
 impl RaySource for RayTable<'_> {
     fn len(&self) -> u64 {
-        (self.bytes.len() / self.layout.stride) as u64
+        self.len
     }
 
     fn fill(&self, range: Range<u64>, batch: &mut RayBatch) {

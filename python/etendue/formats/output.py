@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
-import secrets
+import re
+import shutil
 import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from etendue.errors import ArgumentError
+from etendue.errors import ArgumentError, OutputError
+from etendue.formats.temporary import PATTERN, temporary_beside
 
 
 @contextlib.contextmanager
-def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_output(path: str | os.PathLike[str], size: int | None = None) -> Iterator[Path]:
     r"""Write a file so that `path` holds either what it held before or the whole new content.
 
     Parameters
     ----------
     path : path
         Where the file shall appear. Its directory must exist.
+    size : int, optional
+        Bytes that the file will have at least: refused at once if there is no room for them.
 
     Yields
     ------
@@ -31,7 +36,9 @@ def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     ArgumentError
-        If the directory does not exist or cannot be written, or if `path` is a directory or a device.
+        If the directory does not exist, or if `path` is a directory, a device or a pipe.
+    OutputError
+        If the system does not let it be written: full disk, quota, permissions, a limit of size. Names `path`.
 
     Examples
     --------
@@ -44,16 +51,92 @@ def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
     ('row,column\n', 1)
     """
     target = _destination(Path(path))
-    temporary = _temporary_beside(target)
-    try:
+    with naming(target), temporary_beside(target) as temporary:
+        if size is not None:
+            require_room(target, size)
         yield temporary
         _flush(temporary)
         _keep_permissions(target, temporary)
         temporary.replace(target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
     _flush_directory(target.parent)
+
+
+def require_room(target: Path, size: int) -> None:
+    """Refuse, before it is begun, what the disk has no room for.
+
+    Parameters
+    ----------
+    target : Path
+        A file, which need not be there, or a folder.
+    size : int
+        [bytes]
+
+    Raises
+    ------
+    OutputError
+        If so.
+    """
+    free = _free(target)
+    if free is not None and size > free:
+        raise OutputError(
+            errno.ENOSPC, f"cannot write: {size:,} bytes are needed, and {free:,} are free. "
+            "Make room, or write to another disk", str(target),
+        )  # fmt: skip
+    limit = _largest_file()
+    if limit is not None and size > limit:
+        raise OutputError(
+            errno.EFBIG,
+            f"cannot write: {size:,} bytes are needed, and files may have {limit:,} (ulimit -f)",
+            str(target),
+        )
+
+
+@contextlib.contextmanager
+def naming(target: Path) -> Iterator[None]:
+    """Errors of the system over what is written name what was to be written, and how far it came.
+
+    Raises
+    ------
+    OutputError
+        In place of an `OSError` that names no file, or a temporary one.
+    """
+    try:
+        yield
+    except OutputError:
+        raise
+    except OSError as error:
+        number = error.errno or _number_in(str(error))
+        if number is None or (error.filename is not None and not PATTERN.fullmatch(Path(error.filename).name)):
+            raise
+        free = _free(target)
+        room = "" if free is None else f"; {free:,} bytes are free in {target.parent}"
+        raise OutputError(
+            number,
+            f"cannot write: {os.strerror(number)}{room}. Check the permissions, the disk and its quota",
+            str(target),
+        ) from error
+
+
+def _number_in(text: str) -> int | None:
+    """The number of an error that a library has only told in words."""
+    match = re.search(r"errno = (\d+)", text)
+    return int(match[1]) if match else None
+
+
+def _free(target: Path) -> int | None:
+    """Bytes free where a file shall be, if the system tells."""
+    with contextlib.suppress(OSError):
+        return shutil.disk_usage(target if target.is_dir() else target.parent).free
+    return None
+
+
+def _largest_file() -> int | None:
+    try:
+        import resource
+    except ImportError:
+        return None
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    return None if limit == resource.RLIM_INFINITY else limit
 
 
 def _destination(path: Path) -> Path:
@@ -69,18 +152,6 @@ def _destination(path: Path) -> Path:
             f"{path}: cannot write: the directory {target.parent} does not exist. Create it first or give another path."
         )
     return target
-
-
-def _temporary_beside(target: Path) -> Path:
-    temporary = target.with_name(f".writing-{secrets.token_hex(8)}{target.suffix}")
-    try:
-        # 0o666 less the umask: what a file written in place would get.
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-    except OSError as error:
-        raise ArgumentError(
-            f"{target}: cannot write: {error.strerror or error}. Check the permissions of {target.parent} and the disk."
-        ) from error
-    return temporary
 
 
 def _keep_permissions(target: Path, temporary: Path) -> None:

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from etendue.errors import ArgumentError
+from etendue.formats.output import naming
+from etendue.formats.temporary import temporary_beside
 
 
 def check_output_folder(path: str | os.PathLike[str], replaceable: Callable[[Path], bool]) -> None:
@@ -56,7 +58,9 @@ def atomic_folder(path: str | os.PathLike[str], replaceable: Callable[[Path], bo
     Raises
     ------
     ArgumentError
-        As of `check_output_folder`, or if a folder cannot be made there.
+        As of `check_output_folder`.
+    OutputError
+        If the system does not let it be written.
 
     Examples
     --------
@@ -69,19 +73,9 @@ def atomic_folder(path: str | os.PathLike[str], replaceable: Callable[[Path], bo
     """
     check_output_folder(path, replaceable)
     target = Path(path).absolute()
-    temporary = target.with_name(f".writing-{secrets.token_hex(8)}")
-    try:
-        temporary.mkdir()
-    except OSError as error:
-        raise ArgumentError(
-            f"{target}: cannot write: {error.strerror or error}. Check the permissions of {target.parent} and the disk."
-        ) from error
-    try:
+    with naming(target), temporary_beside(target, folder=True) as temporary:
         yield temporary
         _take_the_place_of(temporary, target)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
 
 
 def _take_the_place_of(temporary: Path, target: Path) -> None:
@@ -96,4 +90,7 @@ def _take_the_place_of(temporary: Path, target: Path) -> None:
     except BaseException:
         old.rename(target)
         raise
-    shutil.rmtree(old, ignore_errors=True)
+    # Under the name of what nobody needs: should the program end here, another one removes it.
+    useless = target.with_name(f".writing-{secrets.token_hex(8)}")
+    old.rename(useless)
+    shutil.rmtree(useless, ignore_errors=True)

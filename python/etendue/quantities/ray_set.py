@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import math
 import warnings
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.file_records import AnyRecords, FileRecords
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_operations import FLUX_COLUMNS, RayOperations
 from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally, checked_threads
@@ -99,7 +101,7 @@ class RaySetMeaning:
 class RaySet(RayOperations, RayUnits, RayStream):
     """A sample of a source's light: rays with position, direction and flux.
 
-    The rays stay where they are, in memory or in a mapped file; properties copy what is asked for, `batches` streams.
+    The rays stay where they are, in memory or in their file; properties copy what is asked for, `batches` streams.
 
     Parameters
     ----------
@@ -154,14 +156,14 @@ class RaySet(RayOperations, RayUnits, RayStream):
         self._adopt(records, meaning)
 
     @classmethod
-    def from_records(cls, records: npt.NDArray[Any], meaning: RaySetMeaning) -> RaySet:
+    def from_records(cls, records: AnyRecords, meaning: RaySetMeaning) -> RaySet:
         """A ray set over structured records, without copying.
 
         Parameters
         ----------
-        records : structured array, shape (n,), contiguous
+        records : structured array, shape (n,), contiguous, or FileRecords
             Little-endian fields ``direction`` (3,), ``flux`` and, but for far-field sets, ``position`` (3,), all f4 or
-            all f8, and any of `EXTRA_COLUMNS`. It may be a memory map.
+            all f8, and any of `EXTRA_COLUMNS`.
         meaning : RaySetMeaning
             What the fields mean.
 
@@ -176,7 +178,7 @@ class RaySet(RayOperations, RayUnits, RayStream):
         rays._adopt(records, meaning)  # noqa: SLF001 - an alternative constructor
         return rays
 
-    def _adopt(self, records: npt.NDArray[Any], meaning: RaySetMeaning) -> None:
+    def _adopt(self, records: AnyRecords, meaning: RaySetMeaning) -> None:
         fields: Mapping[str, Any] = records.dtype.fields or {}
         if meaning.flux_unit not in FLUX_UNITS:
             raise UnknownNameError("flux unit", meaning.flux_unit, FLUX_UNITS)
@@ -185,7 +187,7 @@ class RaySet(RayOperations, RayUnits, RayStream):
                 raise UnknownNameError("ray column", name, (*GEOMETRY_COLUMNS, *EXTRA_COLUMNS))
         if "direction" not in fields or "flux" not in fields:
             raise ArgumentError("RaySet: records need the fields 'direction' and 'flux'.")
-        if records.ndim != 1 or not records.flags.c_contiguous:
+        if isinstance(records, np.ndarray) and (records.ndim != 1 or not records.flags.c_contiguous):
             raise ArgumentError(
                 f"RaySet: records of shape {records.shape} and strides {records.strides} are not one contiguous row; "
                 "copy them with numpy.ascontiguousarray, flat."
@@ -210,6 +212,13 @@ class RaySet(RayOperations, RayUnits, RayStream):
         changed._tally = self._tally  # noqa: SLF001 - its own kind
         return changed
 
+    def named(self, name: str) -> Self:
+        """The same set, whose file messages call by this name."""
+        same = copy.copy(self)
+        if isinstance(self._records, FileRecords):
+            same._records = self._records.named(name)  # noqa: SLF001 - its own kind
+        return same
+
     def __len__(self) -> int:
         """Number of rays, usable or not."""
         return int(self._records.shape[0])
@@ -221,8 +230,8 @@ class RaySet(RayOperations, RayUnits, RayStream):
     # --- what the rays are -------------------------------------------------------------------------------------------
 
     @property
-    def records(self) -> npt.NDArray[Any]:
-        """The structured records as stored, shape (n,)."""
+    def records(self) -> AnyRecords:
+        """The structured records as stored, shape (n,); of a binary file, `FileRecords`."""
         return self._records
 
     @property
@@ -303,7 +312,7 @@ class RaySet(RayOperations, RayUnits, RayStream):
         if name not in self.columns:
             raise UnknownNameError("ray column", name, self.columns)
         if name == "spectrum_index":
-            return self._records[name][rows].astype(np.int64)
+            return self._field(name, rows).astype(np.int64)
         if name == "wavelength":
             return self._stored(name, rows) * self._meaning.wavelength_scale
         return self._stored(name, rows) * (self.flux_scale if name in FLUX_COLUMNS else 1.0)
@@ -311,7 +320,12 @@ class RaySet(RayOperations, RayUnits, RayStream):
     def _stored(self, name: str, rows: slice = slice(None)) -> FloatArray:
         """A field of the records as f8, unscaled; the signalling NaN of damaged files pass in silence."""
         with np.errstate(invalid="ignore"):
-            return self._records[name][rows].astype(np.float64)
+            return self._field(name, rows).astype(np.float64)
+
+    def _field(self, name: str, rows: slice) -> npt.NDArray[Any]:
+        """A field of some records; all of a file's are never in memory at once."""
+        values: npt.NDArray[Any] = self._records[name] if rows == slice(None) else self._records[rows][name]
+        return values
 
     # --- passes over all rays ------------------------------------------------------------------------------------------
 
@@ -319,8 +333,9 @@ class RaySet(RayOperations, RayUnits, RayStream):
         """The records as the compiled core takes them."""
         fields = self._records.dtype.fields
         assert fields is not None  # noqa: S101 - checked on adoption
+        records = self._records
         return _core.RayTable(
-            self._records.view(np.uint8).reshape(-1),
+            records.stored if isinstance(records, FileRecords) else records.view(np.uint8).reshape(-1),
             self._records.dtype.itemsize,
             fields["position"][1] if "position" in fields else None,
             fields["direction"][1],

@@ -12,6 +12,10 @@ class RayFileWarning(UserWarning):
     """A ray file contradicts itself; reading went on because the meaning is certain."""
 
 
+class ChangedFileWarning(RayFileWarning):
+    """Somebody wrote to a file while it was in use."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Complaint:
     """One thing that is not as it should be.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 import weakref
 from collections.abc import Iterable
@@ -9,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from etendue.errors import OutputError
 
 MEMORY_LIMIT = 64 << 20
 """Bytes that stay in memory; beyond, the records go to a nameless temporary file, which is then mapped."""
@@ -50,7 +53,7 @@ class Spool:
 
         Raises
         ------
-        OSError
+        OutputError
             If the temporary folder is full.
         """
         written, held = self._state
@@ -81,17 +84,29 @@ class Spool:
         if self._file is None:
             self._file = tempfile.TemporaryFile(prefix="etendue-")  # noqa: SIM115 - it lives as long as the spool
             weakref.finalize(self, self._file.close)
-        self._file.seek(written)
-        for part in held:
-            # Not ndarray.tofile, which closes its own buffer without looking whether the last bytes found room.
-            self._file.write(part.view(np.uint8).data)
-            written += part.nbytes
+        asked = written + sum(part.nbytes for part in held)
+        try:
+            self._file.seek(written)
+            for part in held:
+                # Not ndarray.tofile, which closes its own buffer without looking whether the last bytes found room.
+                self._file.write(part.view(np.uint8).data)
+                written += part.nbytes
+            self._file.flush()
+        except OSError as error:
+            raise OutputError(
+                error.errno,
+                f"cannot write {asked:,} bytes of temporary records: {error.strerror}. "
+                "Make room, or set TMPDIR to a folder that has some",
+                tempfile.gettempdir(),
+            ) from error
         self._state = (written, ())
 
     def close(self) -> None:
         """Give the file back; arrays that were handed out stay."""
         if self._file is not None:
-            self._file.close()
+            # What found no room has been told; the file's buffer would tell it again in its place.
+            with contextlib.suppress(OSError):
+                self._file.close()
 
 
 def spool(
@@ -110,7 +125,7 @@ def spool(
 
     Raises
     ------
-    OSError
+    OutputError
         If the temporary folder is full.
 
     Examples

@@ -136,7 +136,11 @@ fn sorted(source: &impl RaySource, table: Option<&RayTable<'_>>, cells: Cells, r
             }
         }
     });
-    let stored = table.map_or(drawn.as_slice(), |table| table.records(range));
+    let mut room = Vec::new();
+    let stored = match table {
+        Some(table) => table.records(range, &mut room),
+        None => drawn.as_slice(),
+    };
     let mut runs = Vec::new();
     let mut total = 0;
     // From counts to the first place of each cell.

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.formats.input import at_rest, is_stream, require_readable, stream_in_file
 from etendue.formats.output import atomic_output
 from etendue.formats.rays import (
     asap,
@@ -66,8 +68,8 @@ def detect_format(path: str | os.PathLike[str]) -> RayFormat:
 def read_rays(path: str | os.PathLike[str], *, flux: float | None = None, flux_unit: FluxUnit | None = None) -> RaySet:
     """Read a ray file. Its format is found from the content, never from the extension.
 
-    Binary files are mapped, not read: opening 28 GB takes no memory. Files whose per-ray values are relative (TM-25,
-    LightTools, Speos) are scaled to the header's total flux.
+    The rays of binary files stay where they are: opening 28 GB takes no memory. Files whose per-ray values are relative
+    (TM-25, LightTools, Speos) are scaled to the header's total flux.
 
     Parameters
     ----------
@@ -87,14 +89,41 @@ def read_rays(path: str | os.PathLike[str], *, flux: float | None = None, flux_u
     ------
     FormatError
         With file, place, what was found and what to do.
+    ArgumentError
+        If it is a directory, a device or a socket.
     OSError
         If the file cannot be opened.
+
+    Warns
+    -----
+    ChangedFileWarning
+        If somebody wrote to the file, at any time as long as the set is in use; what it was when it was opened counts. That
+        it became shorter, or is another file, is a FormatError.
+    WaitingWarning
+        If it is a pipe, and nothing comes. A pipe is read to its end into a temporary file.
     """
     path = Path(path)
-    rays = detect_format(path).read(path)
+    require_readable(path)
+    rays = _from_stream(path) if is_stream(path) else _from_file(path)
     if flux is None and flux_unit is not None:
         raise ArgumentError("read_rays: flux_unit is the unit of `flux`, which is missing; RaySet.in_unit converts.")
     return rays if flux is None else rays.with_total_flux(flux, flux_unit)
+
+
+def _from_file(path: Path) -> RaySet:
+    with at_rest(path):
+        return detect_format(path).read(path)
+
+
+def _from_stream(path: Path) -> RaySet:
+    """The rays that come out of a pipe, under its name."""
+    with stream_in_file(path) as file:
+        try:
+            rays = _from_file(file)
+        except FormatError as error:
+            raise type(error)(path, error.place, error.found, error.advice) from None
+        origin = dataclasses.replace(rays.provenance, source=path.name)
+        return rays.replace(provenance=origin).named(str(path))
 
 
 def write_rays(path: str | os.PathLike[str], rays: RayStream, format: str | None = None) -> tuple[str, ...]:

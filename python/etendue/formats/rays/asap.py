@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, stored_records
 from etendue.formats.rays.shared import (
     RayColour,
     losses,
@@ -154,7 +154,7 @@ def read(path: Path) -> RaySet:
         complaints=(*complaints, *tail),
         provenance=file_provenance(path, "asap"),
     )
-    return RaySet.from_records(map_records(path, dtype, header.start, rays), meaning)
+    return RaySet.from_records(stored_records(path, dtype, header.start, rays), meaning)
 
 
 def _header(path: Path, columns: int) -> _Header:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import mmap
 import os
 import re
 import struct
@@ -19,8 +18,9 @@ import numpy as np
 from etendue import _core
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.rays.index_building import SIDES, Counted, IndexTables, Records, leaf_count
-from etendue.formats.rays.ray_format import file_provenance, map_records
+from etendue.formats.rays.ray_format import file_provenance, stored_records
 from etendue.formats.rays.shared import read_bytes
+from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySetMeaning
 from etendue.quantities.ray_stream import Tally
@@ -109,9 +109,9 @@ def write_tables(path: Path, counted: Counted, tables: IndexTables, text: bytes)
             len(text), place.records, 0, 0,
         )  # fmt: skip
         file.write(header)
-        file.flush()
+        check = _checksum(file, place.records)
         file.seek(CHECKSUM_AT)
-        file.write(struct.pack("<I", _checksum(file, place.records)))
+        file.write(struct.pack("<I", check))
 
 
 def _place(counted: Counted, text: bytes) -> Place:
@@ -119,10 +119,19 @@ def _place(counted: Counted, text: bytes) -> Place:
 
 
 def _checksum(file: BinaryIO, size: int) -> int:
-    """CRC-32 of the first `size` bytes, those of the checksum itself taken as 0."""
-    with mmap.mmap(file.fileno(), size, access=mmap.ACCESS_READ) as data, memoryview(data) as view:
-        check = zlib.crc32(bytes(4), zlib.crc32(view[:CHECKSUM_AT]))
-        return zlib.crc32(view[CHECKSUM_AT + 4 :], check)
+    """CRC-32 of the first `size` bytes of a file, those of the checksum itself taken as 0."""
+    file.seek(0)
+    check = zlib.crc32(_head(file.read(HEADER.size)))
+    done = HEADER.size
+    while data := file.read(min(len(ZEROS), size - done)):
+        check = zlib.crc32(data, check)
+        done += len(data)
+    return check
+
+
+def _head(data: bytes) -> bytes:
+    """The header with the checksum taken as 0."""
+    return data[:CHECKSUM_AT] + bytes(4) + data[CHECKSUM_AT + 4 :]
 
 
 def text_of(meaning: RaySetMeaning, dtype: np.dtype[Any], tally: Tally, centre: tuple[float, float, float]) -> bytes:
@@ -157,8 +166,8 @@ def _plain(data: Any) -> Any:
 # --- reading ---------------------------------------------------------------------------------------------------------
 
 
-def read_index(path: Path) -> tuple[Records, RaySetMeaning, IndexTables, Tally]:
-    """Map an index: records, what they mean, tables, and the flux account.
+def read_index(path: Path) -> tuple[AnyRecords, RaySetMeaning, IndexTables, Tally]:
+    """Open an index: records, which stay in the file, what they mean, tables, and the flux account.
 
     Raises
     ------
@@ -180,13 +189,13 @@ def read_index(path: Path) -> tuple[Records, RaySetMeaning, IndexTables, Tally]:
     if (place.records, place.end) != (start, size):
         found = f"the header describes {place.end:,} bytes with the records from byte {place.records:,}"
         raise FormatError(path, f"byte {size}", f"{found}; the file has {size:,}, from {start:,}", DAMAGED)
-    with path.open("rb") as file:
-        found_checksum = _checksum(file, start)
+    tables = read_bytes(path, 0, start, "tables")
+    found_checksum = zlib.crc32(tables[HEADER.size :], zlib.crc32(_head(tables[: HEADER.size])))
     if found_checksum != checksum:
         found = f"the checksum is {checksum:08x}, but that of header and tables {found_checksum:08x}"
         raise FormatError(path, f"byte {CHECKSUM_AT}", found, DAMAGED)
     try:
-        content = json.loads(read_bytes(path, place.json, text_bytes, "JSON text"))
+        content = json.loads(tables[place.json : place.json + text_bytes])
         dtype = _dtype(content["columns"], width)
         tally = Tally(**content["tally"])
         meaning = _meaning(content["meaning"], path)
@@ -195,13 +204,13 @@ def read_index(path: Path) -> tuple[Records, RaySetMeaning, IndexTables, Tally]:
     except (ArgumentError, AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError) as error:
         found = f"the JSON text is not that of an index: {type(error).__name__}: {error}"
         raise FormatError(path, f"byte {place.json}", found, DAMAGED) from error
-    starts = map_records(path, np.dtype("<u8"), place.starts, cells + 1)
+    starts = np.frombuffer(tables, np.dtype("<u8"), cells + 1, place.starts)
     counts = np.diff(starts.astype(np.int64))
     if starts[0] != 0 or int(starts[-1]) != rays or (counts < 0).any() or leaf_count(starts) != leaves:
         found = f"the cells' first rays do not rise from 0 to {rays:,} with {leaves:,} leaves"
         raise FormatError(path, f"byte {place.starts}", found, DAMAGED)
-    bounds = map_records(path, np.dtype("<f4"), place.bounds, 8 * leaves).reshape(leaves, 8)
-    records = map_records(path, dtype, place.records, rays)
+    bounds = np.frombuffer(tables, np.dtype("<f4"), 8 * leaves, place.bounds).reshape(leaves, 8)
+    records = stored_records(path, dtype, place.records, rays)
     return records, meaning, IndexTables(side, (x, y, z), starts, bounds), tally
 
 

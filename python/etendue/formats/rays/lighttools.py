@@ -21,7 +21,7 @@ from etendue.formats.rays.lighttools_colour import (
     colour_losses,
     held_colour,
 )
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, stored_records
 from etendue.formats.rays.shared import (
     RayColour,
     Records,
@@ -106,7 +106,7 @@ def read(path: Path) -> RaySet:
             raise FormatError(path, f"byte {offset}", f"{name} {value} does not exist", f"Known: {listed}. [{CLAUSE}]")
     dtype = _Layout(bool(far_field), COLOUR_INFO[colour]).dtype()
     rays, tail = _count(path, dtype.itemsize)
-    records = map_records(path, dtype, HEADER.size, rays)
+    records = stored_records(path, dtype, HEADER.size, rays)
     total = stated_total(data[40:44])
     complaints = []
     if minor != 0:
@@ -193,7 +193,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
             records["wavelength"] = colour.wavelength(batch)
         elif held == TRISTIMULUS and isinstance(rays, RaySet):
             for name in TRISTIMULUS_COLUMNS:
-                records[name] = own_rows(batch, rays.records[name]) * rays.flux_scale
+                records[name] = own_rows(batch, rays, name) * rays.flux_scale
 
     data_type, far_field = FLUX_UNIT.index(rays.flux_unit), not rays.has_position
     fields = (VERSION, 0, data_type, far_field, COLOUR_INFO.index(held), 1, 0.0, 0.0, 0.0)

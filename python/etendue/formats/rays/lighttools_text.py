@@ -254,7 +254,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         if held == WAVELENGTH:
             return [*before, batch.flux, colour.wavelength(batch)]
         if held == TRISTIMULUS and isinstance(rays, RaySet):
-            x, z = (own_rows(batch, rays.records[name]) * rays.flux_scale for name in TRISTIMULUS_COLUMNS)
+            x, z = (own_rows(batch, rays, name) * rays.flux_scale for name in TRISTIMULUS_COLUMNS)
             return [*before, x, batch.flux, z]
         return [*before, batch.flux]
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.quantities.file_records import AnyRecords, FileRecords
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
@@ -87,8 +87,8 @@ class RayFormat:
     far_field: bool = False
 
 
-def map_records(path: Path, dtype: np.dtype[Any], offset: int, count: int) -> npt.NDArray[Any]:
-    """Map `count` records from byte `offset` of a file, read-only, without reading them.
+def stored_records(path: Path, dtype: np.dtype[Any], offset: int, count: int) -> AnyRecords:
+    """`count` records from byte `offset` of a file, which is held open; none is read.
 
     Raises
     ------
@@ -98,13 +98,14 @@ def map_records(path: Path, dtype: np.dtype[Any], offset: int, count: int) -> np
     if count == 0:
         return np.zeros(0, dtype)
     end = offset + count * dtype.itemsize
-    size = path.stat().st_size
+    records = FileRecords.of(path, dtype, offset, count)
+    size = records.stored.size()
     if end > size:
         raise FormatError(
             path, f"byte {size}", f"the file ends, but {count:,} records of {dtype.itemsize} bytes end at byte {end:,}",
             "The file is truncated; ask for it again.",
         )  # fmt: skip
-    return np.memmap(path, dtype=dtype, mode="r", offset=offset, shape=(count,))
+    return records
 
 
 def file_provenance(path: Path, format_name: str) -> Provenance:

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.output import atomic_output
 from etendue.formats.rays.index_building import Counted, IndexTables, Records, count_rays, fill_index
 from etendue.formats.rays.index_file import DAMAGED, HEADER, map_new, read_index, text_of, write_tables
+from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 from etendue.quantities.report import Complaint
@@ -42,7 +42,7 @@ class RayIndex(RaySet):
     True
     """
 
-    def __init__(self, records: Records, meaning: RaySetMeaning, tables: IndexTables, tally: Tally) -> None:
+    def __init__(self, records: AnyRecords, meaning: RaySetMeaning, tables: IndexTables, tally: Tally) -> None:
         self._adopt(records, meaning)
         self._tables = tables
         self._tally = tally
@@ -98,7 +98,7 @@ class RayIndex(RaySet):
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> RayIndex:
-        """The index in a file. It is mapped and not read: 10⁸ rays open in some milliseconds.
+        """The index in a file. Its rays are not read: 10⁸ of them open in some milliseconds.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class RayIndex(RaySet):
             raise FormatError(path, place, found, DAMAGED) from error
 
     @classmethod
-    def from_records(cls, records: npt.NDArray[Any], meaning: RaySetMeaning) -> RaySet:
+    def from_records(cls, records: AnyRecords, meaning: RaySetMeaning) -> RaySet:
         """A plain ray set: records that were made of an index's rays stand in no order that its tables know."""
         return RaySet.from_records(records, meaning)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 import math
+import os
 import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, FormatError
+from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.report import Complaint
@@ -53,15 +55,18 @@ def read_bytes(path: Path, offset: int, count: int, what: str) -> bytes:
     FormatError
         If the file ends before; found before anything is allocated.
     """
-    size = path.stat().st_size
-    if offset + count > size:
+    with path.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        data = b""
+        if offset + count <= size:
+            file.seek(offset)
+            data = file.read(count)
+    if len(data) < count:
         raise FormatError(
             path, f"byte {size}", f"the file ends inside its {what}, which reaches to byte {offset + count:,}",
             "The file is truncated; ask for it again.",
         )  # fmt: skip
-    with path.open("rb") as file:
-        file.seek(offset)
-        return file.read(count)
+    return data
 
 
 def stated_total(data: bytes) -> float | None:
@@ -142,11 +147,11 @@ def whole_records(path: Path, start: int, width: int, stated: int, clause: str) 
     return count, (Complaint("error", f"byte {size}", found, clause),)
 
 
-def wavelength_complaints(records: Records, clause: str) -> tuple[Complaint, ...]:
+def wavelength_complaints(records: AnyRecords, clause: str) -> tuple[Complaint, ...]:
     """A complaint if among the first `CHECKED_RAYS` rays there are wavelengths that are none."""
     if "wavelength" not in (records.dtype.names or ()):
         return ()
-    head = records["wavelength"][:CHECKED_RAYS]
+    head = records[:CHECKED_RAYS]["wavelength"]
     bad = int((~(np.isfinite(head) & (head > 0))).sum())
     if not bad:
         return ()
@@ -260,9 +265,9 @@ def batch_rows(batch: RayBatch) -> slice:
     return slice(batch.start, batch.start + len(batch.usable))
 
 
-def own_rows(batch: RayBatch, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """The values of a whole column that belong to a batch's usable rays, as f64 if they are floats."""
-    values = column[batch_rows(batch)][batch.usable]
+def own_rows(batch: RayBatch, rays: RaySet, name: str) -> npt.NDArray[Any]:
+    """The stored values of a column that belong to a batch's usable rays, as f64 if they are floats."""
+    values: npt.NDArray[Any] = rays.records[batch_rows(batch)][name][batch.usable]
     with np.errstate(invalid="ignore"):  # a signalling NaN is as good as a quiet one
         return values.astype(np.float64) if values.dtype.kind == "f" else values
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError, UnsupportedFormatError
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, stored_records
 from etendue.formats.rays.shared import (
     LARGEST_FLOAT,
     RayColour,
@@ -68,7 +68,7 @@ def read(path: Path) -> RaySet:
     count, stray = divmod(size - HEADER.size, RECORD.itemsize)
     if count < 1:
         raise FormatError(path, f"byte {size}", "there is not one whole ray", "The file is empty or truncated.")
-    records = map_records(path, RECORD, HEADER.size, count)
+    records = stored_records(path, RECORD, HEADER.size, count)
     watts, lumens = stated_total(data[0:4]), stated_total(data[24:28])
     complaints = []
     if stray:

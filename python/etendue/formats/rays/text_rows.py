@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import io
+import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -19,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.formats.input import shortened
 from etendue.formats.rays.ray_format import Head
 from etendue.quantities.report import Complaint, Severity
 from etendue.quantities.spool import spool
@@ -130,7 +132,7 @@ class Rows:
     Parameters
     ----------
     records : structured array
-        As `RowLayout.dtype` says, in memory or in a mapped temporary file.
+        As `RowLayout.dtype` says, in memory or in a temporary file.
     complaints : tuple of Complaint
     """
 
@@ -246,9 +248,14 @@ class _RowReader:
 
     def parts(self) -> Iterator[npt.NDArray[Any]]:
         with self.path.open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
             file.seek(self.offset)
             rest = b""
-            while data := file.read(BLOCK):
+            # The size at the beginning counts, whatever is appended meanwhile.
+            while (left := size - file.tell()) > 0:
+                data = file.read(min(BLOCK, left))
+                if not data:
+                    raise shortened(self.path, file.tell(), size)
                 cut = data.rfind(self.end_of_line) + 1
                 block, rest = (rest + data[:cut], data[cut:]) if cut else (b"", rest + data)
                 if block:

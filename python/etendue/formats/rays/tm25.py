@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, stored_records
 from etendue.formats.rays.shared import (
     CHECKED_RAYS,
     STRETCH,
@@ -45,6 +45,7 @@ from etendue.formats.rays.tm25_layout import (
     padded,
 )
 from etendue.formats.rays.tm25_writer import write
+from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.report import Complaint
 from etendue.quantities.spectrum import Spectrum
@@ -135,7 +136,7 @@ def read(path: Path) -> RaySet:
     text_bytes = min(header.text_bytes, MAX_TEXT_BYTES)
     extra_text = decode(read_bytes(path, place.labels + len(labels), text_bytes, "additional text"))
     spectra, table_complaints = _spectra(header, tables)
-    records: Records = map_records(path, columns.record, start, rays)
+    records: AnyRecords = stored_records(path, columns.record, start, rays)
     if tail and not _directions_are_unit(records):
         found = "the file has not the size that its header describes, and no directions stand where they should"
         raise FormatError(path, f"byte {start}", found, "The file is damaged; ask for it again.")
@@ -244,22 +245,22 @@ def _find_rays(path: Path, header: _Header, tables_end: int, size: int) -> tuple
     return place, count, tuple(complaints)
 
 
-def _directions_are_unit(records: Records) -> bool:
+def _directions_are_unit(records: AnyRecords) -> bool:
     """Whether most of the first directions are unit vectors; they are not if the columns are shifted."""
     with np.errstate(all="ignore"):
-        k = records["direction"][:1024].astype(np.float64)
+        k = records[:1024]["direction"].astype(np.float64)
         norm = np.sqrt(np.einsum("ij,ij->i", k, k))
     return bool(np.mean(np.abs(norm - 1) < 1e-3) > 0.5)
 
 
-def _with_integer_index(records: Records, tables: int) -> tuple[Records, tuple[Complaint, ...]]:
+def _with_integer_index(records: AnyRecords, tables: int) -> tuple[AnyRecords, tuple[Complaint, ...]]:
     """Records whose spectrum index is an integer; some software stores it as a float (the standard: 4.8.1.18, i32).
 
     An integer from 1 to 2²³ is a denormal float, so the two cannot be confused.
     """
     if "spectrum_index" not in (records.dtype.names or ()):
         return records, ()
-    stored = records["spectrum_index"][:CHECKED_RAYS]
+    stored = records[:CHECKED_RAYS]["spectrum_index"]
     if ((stored >= 1) & (stored <= tables)).all():
         return records, ()
     floats = np.ascontiguousarray(stored).view("<f4")
@@ -273,7 +274,7 @@ def _with_integer_index(records: Records, tables: int) -> tuple[Records, tuple[C
     return records, (Complaint("warning", "rays", found, "TM-25 4.8.1.18"),)
 
 
-def _converted(records: Records) -> Iterator[Records]:
+def _converted(records: AnyRecords) -> Iterator[Records]:
     for at in range(0, len(records), STRETCH):
         part = np.array(records[at : at + STRETCH])
         floats = np.ascontiguousarray(part["spectrum_index"]).view("<f4")

@@ -171,9 +171,9 @@ def _fill(rays: RayStream, colour: RayColour, batch: RayBatch, records: Records)
         if name == "wavelength":
             records[name] = colour.wavelength(batch)
         elif name in FLUX_COLUMNS:
-            records[name] = own_rows(batch, rays.records[name]) * rays.flux_scale
+            records[name] = own_rows(batch, rays, name) * rays.flux_scale
         elif name in rays.columns:
-            records[name] = own_rows(batch, rays.records[name]).reshape(records[name].shape)
+            records[name] = own_rows(batch, rays, name).reshape(records[name].shape)
 
 
 def _in_other_unit(rays: RayStream, colour: RayColour, batch: RayBatch) -> float:

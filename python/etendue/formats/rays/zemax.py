@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, map_records
+from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, stored_records
 from etendue.formats.rays.shared import (
     Colour,
     RayColour,
@@ -26,6 +26,7 @@ from etendue.formats.rays.shared import (
     whole_records,
     write_records,
 )
+from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.provenance import version
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import RayBatch, RayStream
@@ -86,7 +87,7 @@ def read(path: Path) -> RaySet:
     single, wavelength_complaint = _single_wavelength(kind, wavelength)
     complaints = [*_header_complaints(kind, flux_type, placement), *wavelength_complaint]
     rays, tail = whole_records(path, HEADER.size, RECORD_BYTES[kind], count, CLAUSE)
-    records = map_records(path, _record(kind), HEADER.size, rays)
+    records = stored_records(path, _record(kind), HEADER.size, rays)
     total = stated_total(data[112:116])
     header = {
         "identifier": identifier,
@@ -123,9 +124,9 @@ def _single_wavelength(kind: int, stored: float) -> tuple[float | None, list[Com
     return float(stored) * NM_PER_UM, []
 
 
-def _unit_of_wavelength(records: Records) -> Iterator[Complaint]:
-    if "wavelength" in (records.dtype.names or ()) and records["wavelength"][0] > LONGEST_WAVELENGTH:
-        found = f"a wavelength of {records['wavelength'][0]:g} µm, in which the column is by definition; is it in nm?"
+def _unit_of_wavelength(records: AnyRecords) -> Iterator[Complaint]:
+    if "wavelength" in (records.dtype.names or ()) and records[0]["wavelength"] > LONGEST_WAVELENGTH:
+        found = f"a wavelength of {records[0]['wavelength']:g} µm, in which the column is by definition; is it in nm?"
         yield Complaint("warning", f"byte {HEADER.size + 28}", found, CLAUSE)
 
 
