@@ -470,7 +470,7 @@ def test_watts_become_lumens_ray_by_ray_through_v_of_lambda() -> None:
     back = lumens.in_unit("W")
     np.testing.assert_allclose(back.flux, watts.flux, rtol=1e-13)
     assert lumens.in_unit("lm") is lumens
-    assert lumens.provenance.steps == ("W to lm through its spectrum",)
+    assert lumens.provenance.steps == ("W to lm through the wavelength of each ray",)
 
 
 def test_one_spectrum_or_wavelength_converts_all_rays_alike() -> None:
@@ -517,7 +517,7 @@ def test_the_ray_whose_wavelength_is_missing_is_named(wavelength: float) -> None
     watts = radiometric(ray_operations.CHUNK + 10)
     watts.records["wavelength"][ray_operations.CHUNK + 3] = wavelength
     with pytest.raises(
-        UnitError, match=rf"led\.ray: ray 262,148 has the wavelength {wavelength:g} nm.*with_total_flux"
+        UnitError, match=rf"led\.ray: ray 262,148 has the wavelength {wavelength:g} nm.*--flux 54.6lm"
     ):
         watts.in_unit("lm")
 
@@ -549,9 +549,9 @@ def test_rays_that_cannot_be_used_need_neither_wavelength_nor_spectrum(unit: str
         (
             lambda: without_wavelength(radiometric()),
             "lm",
-            r"led.ray: W cannot become lumens.*with_total_flux\(value, 'lm'",
+            r"led.ray: W cannot become lumens.*--flux 54.6lm",
         ),
-        (lambda: without_wavelength(radiometric(), flux_unit="lm"), "W", r"lm cannot become watts.*'W'"),
+        (lambda: without_wavelength(radiometric(), flux_unit="lm"), "W", r"lm cannot become watts.*--flux 0.7W"),
         (lambda: radiometric(flux_unit="lm", wavelength_scale=10.0), "W", r"V\(λ\) is 0"),
         (lambda: without_wavelength(radiometric(), spectra=(Spectrum([500.0], [1.0]),) * 2), "lm", "no spectrum"),
     ],
@@ -675,7 +675,7 @@ def test_complaints_of_a_merged_set_name_the_file() -> None:
     ("sets", "flux", "message"),
     [
         (list, None, "no ray sets"),
-        (lambda: [uneven(2), radiometric(2)], None, "one set is in lm, another in W"),
+        (lambda: [uneven(2), radiometric(2)], None, "the sets differ in unit"),
         (lambda: [uneven(2), uneven(2)], [1.0], "1 fluxes for 2 sets"),
         (lambda: [uneven(2)], [0.0], "finite flux > 0"),
         (

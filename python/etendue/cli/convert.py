@@ -27,7 +27,12 @@ def convert(
         typer.Option("--flux", help="Total flux that overrides the file's, e.g. 337 or 337lm; once per input."),
     ] = None,
     unit: Annotated[
-        str | None, typer.Option("--unit", help="lm or W: convert the flux through the file's spectrum.")
+        str | None,
+        typer.Option(
+            "--unit",
+            help="lm or W: the unit of OUTPUT; inputs are converted through their spectra or the totals they state. "
+            "Without it: that of --flux, or of the inputs; lm if these differ.",
+        ),
     ] = None,
     subset: Annotated[int | None, typer.Option("--subset", help="Write this many rays, drawn at random.")] = None,
     seed: Annotated[int, typer.Option("--seed", help="Seed of --subset.")] = 1,
@@ -40,13 +45,16 @@ def convert(
     if flux and len(flux) != len(inputs):
         raise typer.BadParameter(f"--flux was given {len(flux)} times for {len(inputs)} input files")
     fluxes: list[str | None] = [*flux] if flux else [None] * len(inputs)
-    sets = [with_flux(read_rays(path), text) for path, text in zip(inputs, fluxes, strict=True)]
+    read = [read_rays(path) for path in inputs]
+    wanted = _unit(unit, fluxes, read)
+    sets = [in_unit(with_flux(rays, text), wanted) for rays, text in zip(read, fluxes, strict=True)]
+    assumed = [note for old, new in zip(read, sets, strict=True) for note in _changes(old, new)]
     rays = RaySet.merge(sets) if len(sets) > 1 else sets[0]
-    rays = in_unit(rays, unit)
     if subset is not None:
         rays = rays.subset(subset, seed)
     with progress_bar("rays", len(rays)) as progress:
-        notes = write_rays(output, rays.watched(progress) if progress else rays, format)
+        losses = write_rays(output, rays.watched(progress) if progress else rays, format, flux_unit=wanted)
+    notes = (*assumed, *losses)
     complaints = [str(c) for c in rays.complaints]
     if json:
         facts = {"output": output, "rays": len(rays), "total_flux": rays.total_flux, "flux_unit": rays.flux_unit}
@@ -55,6 +63,28 @@ def convert(
     for line in (*complaints, *(f"note: {note}" for note in notes)):
         complain(line)
     say(f"{output}: {len(rays):,} rays, {rays.total_flux:.7g} {rays.flux_unit}")
+
+
+def _unit(stated: str | None, fluxes: list[str | None], sets: list[RaySet]) -> FluxUnit | None:
+    """The unit of the output: the stated one, else that of the fluxes, else lm if the files differ; None: the file's own."""
+    if stated is not None:
+        one_of(stated, FLUX_UNITS, "--unit")
+        return "W" if stated == "W" else "lm"
+    ends = {
+        next((unit for unit in FLUX_UNITS if text.strip().endswith(unit)), None) for text in fluxes if text is not None
+    }
+    if None not in fluxes and len(ends) == 1 and None not in ends:
+        return "W" if "W" in ends else "lm"
+    return "lm" if len({rays.flux_unit for rays in sets}) > 1 else None
+
+
+def _changes(old: RaySet, new: RaySet) -> list[str]:
+    """What was done to the flux of an input, and by which assumption."""
+    steps = new.provenance.steps[len(old.provenance.steps) :]
+    if not steps:
+        return []
+    told = f"{old.total_flux:.6g} {old.flux_unit} became {new.total_flux:.6g} {new.flux_unit}"
+    return [f"{old.provenance.source}: {told}: {'; '.join(steps)}"]
 
 
 def with_flux(rays: RaySet, text: str | None) -> RaySet:

@@ -14,23 +14,29 @@ from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import BATCH, RayBatch
 from etendue.quantities.report import Complaint
 from etendue.quantities.spool import spool
+from etendue.units import FluxUnit
 
 if TYPE_CHECKING:
     from etendue.quantities.ray_set import RaySet
 
 
-def merged(sets: Sequence[RaySet], flux: Sequence[float] | None) -> RaySet:
+def merged(sets: Sequence[RaySet], flux: Sequence[float] | None, unit: FluxUnit | None) -> RaySet:
     """One set of all usable rays; see `etendue.RaySet.merge`."""
     if not sets:
         raise ArgumentError("merge: no ray sets.")
-    if len({rays.flux_unit for rays in sets}) > 1:
-        raise ArgumentError("merge: one set is in lm, another in W; convert with in_unit first.")
+    if unit is None and len({rays.flux_unit for rays in sets}) > 1:
+        units = ", ".join(f"{rays.provenance.source} in {rays.flux_unit}" for rays in sets)
+        raise ArgumentError(
+            f"merge: the sets differ in unit ({units}); say which the whole is to have: unit='lm' or 'W'."
+        )
     if not all(rays.has_position for rays in sets):
         raise ArgumentError("merge: a far-field set has no positions.")
     if flux is not None:
         if len(flux) != len(sets):
             raise ArgumentError(f"merge: {len(flux)} fluxes for {len(sets)} sets.")
-        sets = [rays.with_total_flux(value) for rays, value in zip(sets, flux, strict=True)]
+        sets = [rays.with_total_flux(value, unit) for rays, value in zip(sets, flux, strict=True)]
+    if unit is not None:
+        sets = [rays.in_unit(unit) for rays in sets]
 
     single, by_ray = _wavelengths(sets)
     indexed = all(_knows_spectra(rays) for rays in sets)

@@ -171,7 +171,14 @@ class RayOperations:
             "declared_flux": float(flux),
             "flux_unit": unit,
             "header": header,
-            "provenance": self.provenance.then(f"total flux set to {flux:.9g} {unit}"),
+            "provenance": self.provenance.then(
+                f"total flux set to {flux:.9g} {unit}"
+                + (
+                    ""
+                    if unit == self.flux_unit
+                    else f", shared by the rays as their {self.flux_unit}: one spectrum for all"
+                )
+            ),
         }
         if unit == self.flux_unit:
             return self.replace(**changes)
@@ -364,15 +371,18 @@ class RayOperations:
         )
 
     @classmethod
-    def merge(cls, sets: Sequence[RaySet], flux: Sequence[float] | None = None) -> RaySet:
+    def merge(cls, sets: Sequence[RaySet], flux: Sequence[float] | None = None, unit: FluxUnit | None = None) -> RaySet:
         """One set of all rays: a white LED from its blue and its yellow file.
 
         Parameters
         ----------
         sets : sequence of RaySet
-            With the same flux unit, in the same coordinates.
+            In the same coordinates.
         flux : sequence of float, optional
-            Total flux of each set [their unit]; their own if None.
+            Total flux of each set [`unit`]; their own if None.
+        unit : {"lm", "W"}, optional
+            Of the merged set, and of `flux`; sets in the other unit are converted (`with_total_flux`, else `in_unit`). That
+            of the sets if None.
 
         Returns
         -------
@@ -383,7 +393,9 @@ class RayOperations:
         Raises
         ------
         ArgumentError
-            If units differ, a set is a far-field set, or the numbers of sets and fluxes differ.
+            If units differ and none is stated, a set is a far-field set, or the numbers of sets and fluxes differ.
+        UnitError
+            If a set cannot be converted.
 
         Examples
         --------
@@ -393,7 +405,7 @@ class RayOperations:
         >>> et.RaySet.merge([blue, yellow], flux=[23.0, 314.0]).flux.tolist()
         [23.0, 314.0]
         """
-        return merged(sets, flux)
+        return merged(sets, flux, unit)
 
 
 def _double(dtype: np.dtype[Any]) -> np.dtype[Any]:

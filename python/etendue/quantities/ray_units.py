@@ -32,10 +32,13 @@ class RayUnits:
     def in_unit(self: RaySet, unit: FluxUnit) -> RaySet:  # type: ignore[misc]
         """The set with its flux in lumens or watts, through its spectrum: Φ_v = K_m ∫ Φ_e,λ V(λ) dλ.
 
+        If no spectrum is known, but the header of the rays' file states the total in both units, their ratio is taken for
+        all rays. The last step of the provenance says how it was done.
+
         Raises
         ------
         UnitError
-            If the set does not know the spectrum of its rays; the message says what would help.
+            If the set knows neither the spectrum of its rays nor both totals; the message says what would help.
 
         Examples
         --------
@@ -53,16 +56,16 @@ class RayUnits:
             return self._with_flux(
                 lambda batch: self._column_of(batch, "radiant_flux"), unit, "the file's radiant flux column"
             )
-        efficacy = self._efficacy()
+        how, efficacy = self._efficacy()
         if unit == "lm":
-            return self._with_flux(lambda batch: batch.flux * efficacy(batch), unit, "its spectrum")
+            return self._with_flux(lambda batch: batch.flux * efficacy(batch), unit, how)
         dark = any(not (efficacy(batch) > 0).all() for batch in self.batches())
         if dark:
             raise UnitError(
                 f"{self.provenance.source}: lumens cannot become watts: some rays have a wavelength at which V(λ) is 0, "
-                "so their radiant flux is not determined. State it: with_total_flux(value, 'W')."
+                "so their radiant flux is not determined. State the total in W (flux=, --flux 0.7W)."
             )
-        return self._with_flux(lambda batch: batch.flux / efficacy(batch), unit, "its spectrum")
+        return self._with_flux(lambda batch: batch.flux / efficacy(batch), unit, how)
 
     @property
     def knows_spectrum(self: RaySet) -> bool:  # type: ignore[misc]
@@ -75,8 +78,8 @@ class RayUnits:
             or len(self.spectra) == 1
         )
 
-    def _efficacy(self: RaySet) -> Callable[[RayBatch], FloatArray]:  # type: ignore[misc]
-        """Luminous efficacy of radiation [lm/W] of the rays of a batch."""
+    def _efficacy(self: RaySet) -> tuple[str, Callable[[RayBatch], FloatArray]]:  # type: ignore[misc]
+        """Where the luminous efficacy of radiation is known from, and that of the rays of a batch [lm/W]."""
         if "wavelength" in self.columns:
 
             def monochromatic(batch: RayBatch) -> FloatArray:
@@ -88,15 +91,15 @@ class RayUnits:
                     raise UnitError(
                         f"{self.provenance.source}: ray {at + 1:,} has the wavelength {wavelength[first]:g} nm, "
                         "so its lumens are not determined. Ask for a file with a wavelength for every ray, or state the "
-                        "total: with_total_flux(value, unit)."
+                        "total in lm (flux=, --flux 54.6lm)."
                     )
                 return LUMINOUS_EFFICACY_MAX * photopic_efficiency(wavelength)
 
-            return monochromatic
+            return "the wavelength of each ray", monochromatic
         single = self.meaning.single_wavelength
         if single is not None:
             constant = LUMINOUS_EFFICACY_MAX * float(photopic_efficiency([single])[0])
-            return lambda batch: np.full(len(batch.flux), constant)
+            return f"its wavelength of {single:g} nm", lambda batch: np.full(len(batch.flux), constant)
         if "spectrum_index" in self.columns and self.spectra:
             table = np.array([spectrum.luminous_efficacy for spectrum in self.spectra])
 
@@ -110,15 +113,36 @@ class RayUnits:
                 chosen: FloatArray = table[index - 1]
                 return chosen
 
-            return indexed
+            return "the spectrum of each ray", indexed
         if len(self.spectra) == 1:
             k = self.spectra[0].luminous_efficacy
-            return lambda batch: np.full(len(batch.flux), k)
+            return "its spectrum", lambda batch: np.full(len(batch.flux), k)
+        lumens, watts = (self.header.get(name) for name in ("luminous_flux", "radiant_flux"))
+        # Only as long as the rays are those of the file.
+        of_file = bool({"total_flux", "overruled_total_flux"} & set(self.header))
+        if of_file and isinstance(lumens, float) and isinstance(watts, float) and lumens > 0 and watts > 0:
+            ratio = lumens / watts
+            how = f"the totals of its header, {lumens:.6g} lm and {watts:.6g} W, as if all rays had one spectrum"
+            return how, lambda batch: np.full(len(batch.flux), ratio)
         other = "lumens" if self.flux_unit == "W" else "watts"
         raise UnitError(
             f"{self.provenance.source}: {self.flux_unit} cannot become {other}: the rays carry no wavelength and the file "
-            "no spectrum. Ask for a set with wavelengths, give the spectrum (RaySet.with_spectrum), or state the total "
-            f"(with_total_flux(value, {'lm' if self.flux_unit == 'W' else 'W'!r})) if all rays share one spectrum."
+            "no spectrum, nor does it state both totals. Ask for a file with wavelengths, or, if all rays share one "
+            f"spectrum, state the total (flux=, --flux {'54.6lm' if self.flux_unit == 'W' else '0.7W'}) or the spectrum "
+            "(RaySet.with_spectrum)."
+        )
+
+    def without_spectrum(self: RaySet) -> RaySet:  # type: ignore[misc]
+        """The same rays with nothing known of their spectra, wavelengths and polarisation.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0], wavelength=[450.0]).without_spectrum().knows_spectrum
+        False
+        """
+        return self._without("wavelength", "spectrum_index", "stokes", "polarisation_axis").replace(
+            spectra=(), single_wavelength=None, provenance=self.provenance.then("wavelengths and spectra left out")
         )
 
     def with_spectrum(self: RaySet, spectrum: Spectrum) -> RaySet:  # type: ignore[misc]

@@ -126,7 +126,9 @@ def _from_stream(path: Path) -> RaySet:
         return rays.replace(provenance=origin).named(str(path))
 
 
-def write_rays(path: str | os.PathLike[str], rays: RayStream, format: str | None = None) -> tuple[str, ...]:
+def write_rays(
+    path: str | os.PathLike[str], rays: RayStream, format: str | None = None, *, flux_unit: FluxUnit | None = None
+) -> tuple[str, ...]:
     """Write a ray file: completely, or not at all.
 
     Parameters
@@ -138,6 +140,9 @@ def write_rays(path: str | os.PathLike[str], rays: RayStream, format: str | None
     format : str, optional
         ``tm25 | zemax | zemax-text | lighttools | lighttools-text | speos | speos-text | asap | tracepro | csv | etd``;
         from the extension if None.
+    flux_unit : {"lm", "W"}, optional
+        Unit of the flux in the file, whatever of the rays' spectra it then cannot hold. None: that of the rays, but watts in
+        formats that hold wavelengths beside watts only (TM-25).
 
     Returns
     -------
@@ -162,8 +167,14 @@ def write_rays(path: str | os.PathLike[str], rays: RayStream, format: str | None
             f"{path}: {chosen.title} holds a position for every ray, and far-field rays have none; "
             f"at the origin they would look like a point source. Formats for far-field rays: {able}."
         )
+    notes: tuple[str, ...] = ()
+    if flux_unit is not None and isinstance(rays, RaySet):
+        rays = rays.in_unit(flux_unit)
+        if chosen.wants_watts(rays):
+            rays = rays.without_spectrum()
+            notes = (f"{chosen.title} holds wavelengths and spectra of rays beside W only: they are left out, for lm.",)
     with atomic_output(path) as temporary:
-        return chosen.write(rays, temporary)
+        return (*notes, *chosen.write(rays, temporary))
 
 
 def _format_named(name: str) -> RayFormat:

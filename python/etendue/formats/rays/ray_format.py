@@ -76,6 +76,8 @@ class RayFormat:
         express, one sentence each.
     far_field : bool
         Whether it can hold rays without positions.
+    wants_watts : callable
+        Whether it would write this set in watts because in lumens it cannot hold all that is known of the rays.
     """
 
     name: str
@@ -85,6 +87,7 @@ class RayFormat:
     read: Callable[[Path], RaySet]
     write: Callable[[RayStream, Path], tuple[str, ...]]
     far_field: bool = False
+    wants_watts: Callable[[RayStream], bool] = lambda _rays: False
 
 
 def stored_records(path: Path, dtype: np.dtype[Any], offset: int, count: int) -> AnyRecords:

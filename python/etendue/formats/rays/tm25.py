@@ -44,7 +44,7 @@ from etendue.formats.rays.tm25_layout import (
     decode,
     padded,
 )
-from etendue.formats.rays.tm25_writer import write
+from etendue.formats.rays.tm25_writer import wants_watts, write
 from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.report import Complaint
@@ -397,5 +397,5 @@ def _spectral_complaints(header: _Header, columns: Columns) -> Iterator[Complain
             yield Complaint("warning", "byte 256", found, "TM-25 4.7.2")
 
 
-FORMAT = RayFormat("tm25", "IES TM-25 ray file", (".tm25ray", ".tm25"), recognise, read, write)
+FORMAT = RayFormat("tm25", "IES TM-25 ray file", (".tm25ray", ".tm25"), recognise, read, write, wants_watts=wants_watts)
 """TM-25 ray files."""

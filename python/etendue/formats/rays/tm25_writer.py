@@ -117,10 +117,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
 def _in_writable_unit(rays: RayStream) -> tuple[RayStream, RayColour, list[str]]:
     """The rays in watts if only so all that is known of them can be written, and if that is possible."""
     colour = RayColour.of(rays)
-    if not isinstance(rays, RaySet) or rays.flux_unit == "W" or _has_tristimulus(rays):
-        return rays, colour, []
-    lone_stokes = "stokes" in rays.columns and "radiant_flux" not in rays.columns
-    if not (colour.kind in NEEDS_WATTS or lone_stokes):
+    if not isinstance(rays, RaySet) or not wants_watts(rays):
         return rays, colour, []
     try:
         in_watts = rays.in_unit("W")
@@ -134,6 +131,14 @@ def _in_writable_unit(rays: RayStream) -> tuple[RayStream, RayColour, list[str]]
         "Lumens were turned into watts: beside lumens, TM-25 has no place for wavelengths, spectra per ray and Stokes."
     )
     return in_watts, RayColour.of(in_watts), [note]
+
+
+def wants_watts(rays: RayStream) -> bool:
+    """Whether only in watts all that a set in lumens knows could be written."""
+    if not isinstance(rays, RaySet) or rays.flux_unit == "W" or _has_tristimulus(rays):
+        return False
+    lone_stokes = "stokes" in rays.columns and "radiant_flux" not in rays.columns
+    return RayColour.of(rays).kind in NEEDS_WATTS or lone_stokes
 
 
 def _has_tristimulus(rays: RaySet) -> bool:
