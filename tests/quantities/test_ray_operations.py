@@ -516,9 +516,7 @@ def test_a_column_of_watts_is_better_than_a_spectrum() -> None:
 def test_the_ray_whose_wavelength_is_missing_is_named(wavelength: float) -> None:
     watts = radiometric(ray_operations.CHUNK + 10)
     watts.records["wavelength"][ray_operations.CHUNK + 3] = wavelength
-    with pytest.raises(
-        UnitError, match=rf"led\.ray: ray 262,148 has the wavelength {wavelength:g} nm.*--flux 54.6lm"
-    ):
+    with pytest.raises(UnitError, match=rf"led\.ray: ray 262,148 has the wavelength {wavelength:g} nm.*--flux 54.6lm"):
         watts.in_unit("lm")
 
 
