@@ -11,13 +11,15 @@ import etendue.formats.intensity
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
-from etendue.formats.intensity import INTENSITY_FORMATS, read_intensity, write_intensity
+from etendue.formats.intensity import INTENSITY_FORMATS, detect_intensity_format, read_intensity, write_intensity
 from etendue.quantities.intensity import Intensity
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from oracles.intensity import TERMS, lid
+from oracles.luminaire_files import write_any
 
 ALL = pytest.mark.parametrize("name", INTENSITY_FORMATS)
+WRITTEN = pytest.mark.parametrize("name", [name for name, f in INTENSITY_FORMATS.items() if f.write])
 DIGITS = 1e-5
 """Six significant digits are stored."""
 
@@ -36,13 +38,14 @@ def assert_same_function(found: Intensity, expected: Intensity, tolerance: float
 def test_the_registry_holds_every_module_that_has_a_format() -> None:
     package = etendue.formats.intensity
     modules = [importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__)]
-    assert {m.FORMAT.name for m in modules if hasattr(m, "FORMAT")} == set(INTENSITY_FORMATS) == {"lm63", "eulumdat"}
+    assert {m.FORMAT.name for m in modules if hasattr(m, "FORMAT")} == set(INTENSITY_FORMATS)
+    assert set(INTENSITY_FORMATS) == {"lm63", "eulumdat", "tm33", "gldf"}
 
 
 # --- round trips -----------------------------------------------------------------------------------------------------
 
 
-@ALL
+@WRITTEN
 @pytest.mark.parametrize("symmetry", TERMS)
 @pytest.mark.parametrize(
     "c",
@@ -65,7 +68,7 @@ def test_round_trip(name: str, symmetry: str, c: tuple[float, ...], gamma: tuple
     assert list(tmp_path.iterdir()) == [path_of(name, tmp_path)]
 
 
-@ALL
+@WRITTEN
 def test_what_was_read_is_written_without_further_loss(name: str, tmp_path: Path) -> None:
     write_intensity(path_of(name, tmp_path), lid("C0-C180"))
     once = read_intensity(path_of(name, tmp_path))
@@ -75,7 +78,7 @@ def test_what_was_read_is_written_without_further_loss(name: str, tmp_path: Path
     assert twice.luminaire.keys() == once.luminaire.keys()
 
 
-@ALL
+@WRITTEN
 def test_symmetry_makes_files_smaller(name: str, tmp_path: Path) -> None:
     size = {}
     for symmetry in TERMS:
@@ -84,7 +87,7 @@ def test_symmetry_makes_files_smaller(name: str, tmp_path: Path) -> None:
     assert size["rotational"] < 0.6 * size["both"] < 0.4 * size["C0-C180"] < 0.3 * size["none"]
 
 
-@ALL
+@WRITTEN
 def test_rays_to_file_and_back(name: str, tmp_path: Path) -> None:
     led = et.intensity_distribution(et.RingSource(rays=50_000, seed=1), 8, 15)
     lost = write_intensity(path_of(name, tmp_path), led)
@@ -92,7 +95,7 @@ def test_rays_to_file_and_back(name: str, tmp_path: Path) -> None:
     assert_same_function(read_intensity(path_of(name, tmp_path)), led)
 
 
-@ALL
+@WRITTEN
 def test_a_table_that_ends_early_goes_on_with_zero(name: str, tmp_path: Path) -> None:
     led = lid("none", gamma=[10, 30, 60])
     (note, other) = write_intensity(path_of(name, tmp_path), led)
@@ -106,7 +109,7 @@ def test_a_table_that_ends_early_goes_on_with_zero(name: str, tmp_path: Path) ->
     assert again.flux == pytest.approx(led.flux, rel=1e-3)
 
 
-@ALL
+@WRITTEN
 def test_text_and_facts(name: str, tmp_path: Path) -> None:
     facts = {
         "manufacturer": "Łampa & Söhne\r\n[X] injected", "luminaire": "x" * 500, "catalogue_number": "№ 7", "lamps": 3,
@@ -126,7 +129,7 @@ def test_text_and_facts(name: str, tmp_path: Path) -> None:
     assert max(map(len, data.split(b"\r\n"))) <= 132
 
 
-@ALL
+@WRITTEN
 def test_turned_and_mirrored_on_the_way_out(name: str, tmp_path: Path) -> None:
     led = lid("none")
     write_intensity(path_of(name, tmp_path), led, rotate=90, mirror=True)
@@ -151,13 +154,18 @@ def test_from_one_format_to_the_other_nothing_is_turned_and_that_is_said(tmp_pat
 
 @ALL
 def test_the_content_decides_not_the_extension(name: str, tmp_path: Path) -> None:
-    write_intensity(tmp_path / "led.xyz", lid("none"), format=name)
-    assert read_intensity(tmp_path / "led.xyz").provenance.format == name
-    (tmp_path / "LED").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "led.xyz").read_bytes())
-    assert_same_function(read_intensity(tmp_path / "LED"), lid("none"))
+    write_any(name, tmp_path / "led.xyz", lid("none"))
+    found = detect_intensity_format(tmp_path / "led.xyz")
+    assert found is not None
+    assert found.name == name
+    assert_same_function(read_intensity(tmp_path / "led.xyz"), lid("none"))
+    data = (tmp_path / "led.xyz").read_bytes()
+    if not data.startswith(b"PK"):
+        (tmp_path / "LED").write_bytes(b"\xef\xbb\xbf" + data)
+        assert_same_function(read_intensity(tmp_path / "LED"), lid("none"))
 
 
-@ALL
+@WRITTEN
 @pytest.mark.parametrize("end", [b"\n", b"\r"])
 def test_line_ends_of_any_system(name: str, end: bytes, tmp_path: Path) -> None:
     path = path_of(name, tmp_path)
@@ -174,7 +182,6 @@ def test_other_files_are_refused(content: bytes, tmp_path: Path) -> None:
 
 
 def test_ray_files_are_no_intensity_files(samples: Path) -> None:
-    from etendue.formats.intensity import detect_intensity_format
     from etendue.formats.rays import detect_format
 
     for path in (samples / "rays").iterdir():
@@ -182,6 +189,13 @@ def test_ray_files_are_no_intensity_files(samples: Path) -> None:
     for path in (samples / "intensity").iterdir():
         with pytest.raises(FormatError):
             detect_format(path)
+
+
+@pytest.mark.parametrize("name", ["lm63", "eulumdat"])
+def test_files_that_hold_one_distribution_have_none_to_name(name: str, tmp_path: Path) -> None:
+    write_intensity(path_of(name, tmp_path), lid("none"))
+    with pytest.raises(ArgumentError, match="hold one distribution"):
+        read_intensity(path_of(name, tmp_path), "1")
 
 
 def test_wrong_names_and_places(tmp_path: Path) -> None:
@@ -199,7 +213,7 @@ def test_wrong_names_and_places(tmp_path: Path) -> None:
 # --- damage ----------------------------------------------------------------------------------------------------------
 
 
-@ALL
+@WRITTEN
 @pytest.mark.parametrize("symmetry", ["none", "rotational", "C90-C270"])
 def test_cut_at_every_byte(name: str, symmetry: str, tmp_path: Path) -> None:
     """A cut is an error, or makes no difference, or is complained about: inside the very last number."""
@@ -226,13 +240,29 @@ def test_cut_at_every_byte(name: str, symmetry: str, tmp_path: Path) -> None:
     assert set(outcomes[len(data.rstrip()) + 1 :]) == {"right"}
 
 
+@pytest.mark.parametrize("name", [name for name, f in INTENSITY_FORMATS.items() if f.write is None])
+def test_cut_at_every_byte_where_an_end_is_marked(name: str, tmp_path: Path) -> None:
+    """XML ends with a tag and ZIP with a record: whatever is cut short is an error."""
+    path = path_of(name, tmp_path)
+    led = lid("none", (0, 180), (0, 90))
+    write_any(name, path, led)
+    data = path.read_bytes()
+    whole = len(data.rstrip()) if name != "gldf" else len(data)
+    for length in range(whole):
+        path.write_bytes(data[:length])
+        with pytest.raises(FormatError):
+            read_intensity(path)
+    path.write_bytes(data[:whole])
+    assert_same_function(read_intensity(path), led)
+
+
 @ALL
 @settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_damage_gives_a_format_error_or_a_distribution(name: str, data: st.DataObject, tmp_path: Path) -> None:
     """Bytes overwritten, removed and inserted; the formats have no checksum, so a digit may have become another."""
     path = path_of(name, tmp_path)
-    write_intensity(path, lid("both", (0, 90, 180, 270), (0, 45, 90)))
+    write_any(name, path, lid("both", (0, 90, 180, 270), (0, 45, 90)))
     content = bytearray(path.read_bytes())
     for _ in range(data.draw(st.integers(1, 4))):
         place = data.draw(st.integers(0, len(content) - 1))
@@ -253,7 +283,7 @@ def test_damage_gives_a_format_error_or_a_distribution(name: str, data: st.DataO
     assert np.isfinite(found.flux)
 
 
-@ALL
+@WRITTEN
 def test_absurd_counts_take_no_memory(name: str, tmp_path: Path) -> None:
     path = path_of(name, tmp_path)
     write_intensity(path, lid("none"))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from etendue.cli import main
 from oracles.intensity import lid
+from oracles.luminaire_files import archive, ies_of, product, tm33_of
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -80,11 +81,38 @@ def test_files_are_turned_and_converted(run: Run) -> None:
     assert "rotate=90 turns" in err
 
 
+def test_one_of_several_photometries(run: Run) -> None:
+    files = {"f": ("ldc/ies", "localFileName", "a.ies"), "g": ("ldc/ies", "localFileName", "b.ies")}
+    two = {"ldc/a.ies": ies_of(lid("none"), Path()), "ldc/b.ies": ies_of(lid("both"), Path())}
+    Path("two.gldf").write_bytes(archive({"product.xml": product(files, {"p": "f", "q": "g"}), **two}))
+    status, _, err = run("two.gldf")
+    assert status == 1
+    assert "p (a.ies); q (b.ies)" in err
+    status, out, err = run("two.gldf", "--photometry", "q", "-o", "q.ies")
+    assert (status, err) == (0, "")
+    assert "symmetry both" in out
+    assert "photometry q of the container" in out
+    assert et.read_intensity("q.ies").symmetry() == "both"
+    status, _, err = run("two.gldf", "--photometry", "r")
+    assert status == 1
+    assert "Known: p, q" in err
+
+
+def test_a_file_of_tm33(run: Run) -> None:
+    Path("a.xml").write_bytes(tm33_of(lid("C0-C180")))
+    status, out, err = run("a.xml", "-o", "a.ldt", "--rotate", 90)
+    assert (status, err) == (0, "")
+    assert "manufacturer: Łampa & Söhne" in out
+    assert et.read_intensity("a.ldt").symmetry(1e-4) == "C90-C270"
+
+
 @pytest.mark.usefixtures("led")
 @pytest.mark.parametrize(
     ("arguments", "status", "hint"),
     [
         (["a.ies", "--c-planes", "12"], 2, "--c-planes: for ray files"),
+        (["led.tm25ray", "--photometry", "1"], 2, "--photometry: for intensity files"),
+        (["a.ies", "--photometry", "1"], 1, "hold one distribution"),
         (["a.ies", "--kind", "ploar"], 2, "'polar'"),
         (["a.ies", "-o", "b.tiff"], 1, ".tiff"),
         (["a.ies", "-o", "none/b.ies"], 1, "does not exist"),

@@ -1,4 +1,4 @@
-"""``etendue info``: what is in a ray file, and what is wrong with it; what a light field is, or what a trace found."""
+"""``etendue info``: what is in a ray or intensity file, and what is wrong with it; a light field; what a trace found."""
 
 from __future__ import annotations
 
@@ -10,23 +10,28 @@ import numpy as np
 import typer
 
 from etendue.cli.field import describe_field, print_field
+from etendue.cli.intensity import print_intensity, summary
 from etendue.cli.terminal import complain, print_json, progress_bar, say
 from etendue.cli.trace import print_result
 from etendue.errors import EtendueError
+from etendue.formats.intensity import detect_intensity_format, read_intensity
 from etendue.formats.rays import detect_format, read_rays
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import is_field_file
+from etendue.quantities.intensity import Intensity
 from etendue.quantities.ray_set import RaySet
 from etendue.tracing.result import TraceResult
 from etendue.tracing.storage import is_result_file
 
 
 def info(
-    files: Annotated[list[Path], typer.Argument(help="Ray files of any format, light fields, results of traces.")],
+    files: Annotated[
+        list[Path], typer.Argument(help="Ray files and intensity files of any format, light fields, results of traces.")
+    ],
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Format, rays, flux by header and by sum, bounding box, virtual focus, wavelengths, complaints; a field; a trace."""
-    described: list[dict[str, Any] | LightField | TraceResult] = []
+    described: list[dict[str, Any] | LightField | TraceResult | Intensity] = []
     failed = False
     for file in files:
         try:
@@ -44,6 +49,11 @@ def info(
             if isinstance(facts, LightField):
                 say(f"{file}: light field, {file.stat().st_size / 1000:,.1f} kB")
                 print_field(facts)
+            elif isinstance(facts, Intensity):
+                say(f"{file}: intensity, {file.stat().st_size / 1000:,.1f} kB")
+                print_intensity(facts)
+                for complaint in facts.complaints:
+                    say(f"  {complaint}")
             elif isinstance(facts, TraceResult):
                 say(f"{file}: result of a trace, {file.stat().st_size / 1000:,.1f} kB")
                 print_result(facts)
@@ -53,15 +63,20 @@ def info(
         raise typer.Exit(1)
 
 
-def _opened(path: Path) -> dict[str, Any] | LightField | TraceResult:
+def _opened(path: Path) -> dict[str, Any] | LightField | TraceResult | Intensity:
     if is_field_file(path):
         return LightField.load(path)
+    if detect_intensity_format(path) is not None:
+        return read_intensity(path)
     return TraceResult.load(path) if is_result_file(path) else describe(path)
 
 
-def _facts(path: Path, found: dict[str, Any] | LightField | TraceResult) -> dict[str, Any]:
+def _facts(path: Path, found: dict[str, Any] | LightField | TraceResult | Intensity) -> dict[str, Any]:
     if isinstance(found, LightField):
         return {"file": path, "format": "light field", "bytes": path.stat().st_size} | describe_field(found)
+    if isinstance(found, Intensity):
+        told = {"complaints": [complaint.to_dict() for complaint in found.complaints]}
+        return {"file": path, "bytes": path.stat().st_size} | summary(found) | told
     if isinstance(found, TraceResult):
         return {"file": path, "format": "trace result", "bytes": path.stat().st_size} | found.to_dict()
     return found

@@ -22,10 +22,13 @@ from etendue.lightfield.light_field import LightField
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
 from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
 from etendue.quantities.intensity_cells import Cells
+from etendue.quantities.spectrum import Spectrum
 
 
 def intensity(
-    file: Annotated[Path, typer.Argument(help="A ray file of any format, a light field, or an IES or EULUMDAT file.")],
+    file: Annotated[
+        Path, typer.Argument(help="A ray file of any format, a light field, or an IES, EULUMDAT, TM-33 or GLDF file.")
+    ],
     output: Annotated[
         list[Path] | None,
         typer.Option("-o", "--output", help="Distribution (.ies, .ldt) or picture (.png, .pdf); several are allowed."),
@@ -46,6 +49,10 @@ def intensity(
     unit: Annotated[
         str | None, typer.Option("--unit", help="lm or W: convert through the ray file's spectrum.")
     ] = None,
+    photometry: Annotated[
+        str | None,
+        typer.Option("--photometry", help="Which one of an intensity file that holds several (TM-33, GLDF)."),
+    ] = None,
     rotate: Annotated[
         float, typer.Option("--rotate", help="Turn about the axis: C becomes C + this, in degrees.")
     ] = 0.0,
@@ -58,6 +65,8 @@ def intensity(
     one_of(kind, INTENSITY_KINDS, "--kind")
     check_outputs(outputs, (*INTENSITY_EXTENSIONS, *PICTURE_EXTENSIONS))
     if detect_intensity_format(file) is None:
+        if photometry is not None:
+            raise typer.BadParameter(f"--photometry: for intensity files, and {file} is none")
         cells = Cells(36 if c_planes is None else c_planes, 2.5 if gamma_step is None else gamma_step)
         source = read_source(file, flux, unit)
         if isinstance(source, LightField):
@@ -71,7 +80,7 @@ def intensity(
         needless = [option for option, value in given.items() if value is not None]
         if needless:
             raise typer.BadParameter(f"{', '.join(needless)}: for ray files and light fields, and {file} is neither")
-        result = read_intensity(file)
+        result = read_intensity(file, photometry)
         complaints = [str(c) for c in result.complaints]
     shown = result.mirrored() if mirror else result
     shown = shown.rotated_about_axis(rotate) if rotate else shown
@@ -106,9 +115,15 @@ def summary(distribution: Intensity) -> dict[str, Any]:
         "planes": distribution.c.size,
         "gammas": distribution.gamma.size,
         "gamma_range": [float(distribution.gamma[0]), float(distribution.gamma[-1])],
-        "luminaire": distribution.luminaire,
+        "luminaire": {name: _plain(fact) for name, fact in distribution.luminaire.items()},
         "notes": list(distribution.notes),
     }
+
+
+def _plain(fact: Any) -> Any:
+    return (
+        {"wavelength": fact.wavelength.tolist(), "weight": fact.weight.tolist()} if isinstance(fact, Spectrum) else fact
+    )
 
 
 def print_intensity(distribution: Intensity) -> None:
@@ -120,7 +135,11 @@ def print_intensity(distribution: Intensity) -> None:
     where = facts["maximum_at"]
     say(f"  maximum {distribution.maximum:.6g} {distribution.unit} at C = {where['c']:g}°, γ = {where['gamma']:g}°")
     for name, value in distribution.luminaire.items():
-        if name not in {"keywords", "lamp_sets", "tilt"}:
+        if isinstance(value, Spectrum):
+            say(
+                f"  spectrum: {value.wavelength[0]:g} to {value.wavelength[-1]:g} nm, {value.wavelength.size} wavelengths"
+            )
+        elif name not in {"keywords", "lamp_sets", "tilt"}:
             text = f"{value:.7g}" if isinstance(value, float) else str(value)
             unit = re.search(r"\[(\w+)\]", LUMINAIRE_FACTS[name])
             say(f"  {name.replace('_', ' ')}: {text[:100]}{f' {unit[1]}' if unit else ''}")

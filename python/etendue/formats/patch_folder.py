@@ -89,6 +89,7 @@ def write_patch_folder(
     with atomic_folder(folder, is_patch_folder) as temporary:
         (temporary / "lids").mkdir()
         writer = INTENSITY_FORMATS[PATCH_FORMATS[format]].write
+        assert writer is not None  # noqa: S101 - both are formats that are written
         for i, row in enumerate(rows):
             writer(patches.intensity(i), temporary / row["file"])
         for scene in scenes:

@@ -43,6 +43,7 @@ LUMINAIRE_FACTS: dict[str, str] = {
     "housing_z": "extent of the luminaire along the axis [mm]",
     "lamp_sets": "every lamp set of an EULUMDAT file, one mapping each",
     "tilt": "lamp factors over the tilt of the luminaire, of an IES file; not applied",
+    "spectrum": "`Spectrum` of all its light, if a file tells it",
     "keywords": "every keyword line of an IES file, as pairs",
 }
 """What may be known of the luminaire beside its intensity, with its meaning."""

@@ -5,18 +5,23 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from etendue.errors import FormatError, UnknownNameError
-from etendue.formats.intensity import eulumdat, lm63
+from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.formats.intensity import eulumdat, gldf, lm63, tm33
 from etendue.formats.intensity.intensity_format import IntensityFormat
 from etendue.formats.output import atomic_output
 from etendue.formats.rays.ray_format import Head
 from etendue.quantities.intensity import Intensity
 
-INTENSITY_FORMATS: dict[str, IntensityFormat] = {module.FORMAT.name: module.FORMAT for module in (lm63, eulumdat)}
+INTENSITY_FORMATS: dict[str, IntensityFormat] = {
+    module.FORMAT.name: module.FORMAT for module in (lm63, eulumdat, tm33, gldf)
+}
 """Every format by name, in the order in which a file is tested."""
 
-INTENSITY_EXTENSIONS: tuple[str, ...] = tuple(f.extension for f in INTENSITY_FORMATS.values())
+INTENSITY_EXTENSIONS: tuple[str, ...] = tuple(f.extension for f in INTENSITY_FORMATS.values() if f.write)
 """Extensions that choose a format for writing."""
+
+PLANES_COUNTED_AS = {"lm63": "lm63", "tm33": "lm63", "eulumdat": "eulumdat"}
+"""Which of the formats that can be written counts its planes C from the same side of a luminaire."""
 
 
 def detect_intensity_format(path: str | os.PathLike[str]) -> IntensityFormat | None:
@@ -31,10 +36,10 @@ def detect_intensity_format(path: str | os.PathLike[str]) -> IntensityFormat | N
     return next((f for f in INTENSITY_FORMATS.values() if f.recognise(head)), None)
 
 
-def read_intensity(path: str | os.PathLike[str]) -> Intensity:
-    """Read an IES LM-63 or EULUMDAT file; the format is found from the content.
+def read_intensity(path: str | os.PathLike[str], photometry: str | None = None) -> Intensity:
+    """Read an intensity file of any format: IES LM-63, EULUMDAT, TM-33, GLDF; the format is found from the content.
 
-    The planes C are the file's own. The two formats count them from different sides of a luminaire (C of EULUMDAT is C of
+    The planes C are the file's own. IES and EULUMDAT count them from different sides of a luminaire (C of EULUMDAT is C of
     IES + 90°), and both count them from above, against the axis; `Intensity.rotated_about_axis` and `Intensity.mirrored`
     lead from one to the other, and nothing does so unasked.
 
@@ -42,6 +47,9 @@ def read_intensity(path: str | os.PathLike[str]) -> Intensity:
     ----------
     path : path
         Of the file.
+    photometry : str, optional
+        Which one, of a file that holds several: the number of an emitter of TM-33, the name of a photometry, an emitter
+        or a variant of GLDF. Without it TM-33 gives the sum of its emitters, and GLDF the only one that it has.
 
     Returns
     -------
@@ -52,7 +60,11 @@ def read_intensity(path: str | os.PathLike[str]) -> Intensity:
     Raises
     ------
     FormatError
-        With file, place, what was found and what to do.
+        With file, place, what was found and what to do; of a file that holds several, with the names of all.
+    UnknownNameError
+        If there is no such photometry in the file.
+    ArgumentError
+        If a photometry is named, and the format holds one only.
     OSError
         If the file cannot be opened.
 
@@ -69,7 +81,11 @@ def read_intensity(path: str | os.PathLike[str]) -> Intensity:
     if found is None:
         known = ", ".join(f"{f.title} ({f.extension})" for f in INTENSITY_FORMATS.values())
         raise FormatError(path, "first lines", "this is no intensity distribution", f"Known formats: {known}.")
-    return found.read(Path(path))
+    if photometry is None:
+        return found.read(Path(path))
+    if found.pick is None:
+        raise ArgumentError(f"{path}: photometry: {found.title} files hold one distribution; leave it out.")
+    return found.pick(Path(path), photometry)
 
 
 def write_intensity(
@@ -109,18 +125,19 @@ def write_intensity(
         If the format cannot hold the distribution at all.
     """
     path = Path(path)
-    by_extension = {f.extension: f for f in INTENSITY_FORMATS.values()}
+    writable = {name: f for name, f in INTENSITY_FORMATS.items() if f.write}
+    by_extension = {f.extension: f for f in writable.values()}
     if format is not None:
-        if format not in INTENSITY_FORMATS:
-            raise UnknownNameError("intensity format", format, INTENSITY_FORMATS)
-        chosen = INTENSITY_FORMATS[format]
+        if format not in writable:
+            raise UnknownNameError("intensity format that can be written", format, writable)
+        chosen = writable[format]
     elif path.suffix.lower() in by_extension:
         chosen = by_extension[path.suffix.lower()]
     else:
         raise UnknownNameError("extension of an intensity file", path.suffix.lower(), by_extension)
-    other = intensity.provenance.format in INTENSITY_FORMATS and intensity.provenance.format != chosen.name
+    counted = PLANES_COUNTED_AS.get(intensity.provenance.format, chosen.name)
     kept: tuple[str, ...] = ()
-    if other and rotate == 0.0:
+    if counted != chosen.name and rotate == 0.0:
         turn = 90 if chosen.name == "eulumdat" else -90
         origin = INTENSITY_FORMATS[intensity.provenance.format].title
         kept = (f"C planes were kept as {origin} counts them; rotate={turn} turns them to those of {chosen.title}",)
@@ -129,4 +146,5 @@ def write_intensity(
     if rotate != 0.0:
         intensity = intensity.rotated_about_axis(rotate)
     with atomic_output(path) as temporary:
-        return (*chosen.write(intensity, temporary), *kept)
+        losses = chosen.write(intensity, temporary) if chosen.write else ()
+    return (*losses, *kept)

@@ -37,8 +37,11 @@ class IntensityFormat:
         Whether a file that begins with this `Head` is of this format.
     read : callable
         From a path to the distribution. Raises `FormatError` for whatever is wrong with the file.
-    write : callable
-        Writes a distribution to a path and returns what the format could not express, one sentence each.
+    write : callable, optional
+        Writes a distribution to a path and returns what the format could not express, one sentence each. None for
+        formats that are read only.
+    pick : callable, optional
+        From a path and a name to one of the distributions of a file. None for formats that hold one.
     """
 
     name: str
@@ -46,7 +49,22 @@ class IntensityFormat:
     extension: str
     recognise: Callable[[Head], bool]
     read: Callable[[Path], Intensity]
-    write: Callable[[Intensity, Path], tuple[str, ...]]
+    write: Callable[[Intensity, Path], tuple[str, ...]] | None = None
+    pick: Callable[[Path, str], Intensity] | None = None
+
+
+def read_bytes(path: Path) -> bytes:
+    """The whole file.
+
+    Raises
+    ------
+    FormatError
+        If it is larger than any distribution.
+    """
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise FormatError(path, "size", f"{size:,} bytes, far more than a distribution", "Give an intensity file.")
+    return path.read_bytes()
 
 
 def read_lines(path: Path) -> list[str]:
@@ -59,10 +77,7 @@ def read_lines(path: Path) -> list[str]:
     FormatError
         If the file is larger than any distribution, or no text.
     """
-    size = path.stat().st_size
-    if size > MOST_BYTES:
-        raise FormatError(path, "size", f"{size:,} bytes, far more than a distribution", "Give an intensity file.")
-    data = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+    data = read_bytes(path).removeprefix(b"\xef\xbb\xbf")
     if b"\0" in data:
         raise FormatError(path, f"byte {data.index(0)}", "a zero byte in a text", DAMAGED)
     try:
@@ -96,5 +111,7 @@ def general_losses(intensity: Intensity) -> Iterator[str]:
     """What files of intensity have no place for, one sentence each."""
     if np.isfinite(intensity.standard_error).any():
         yield "standard errors are not kept"
+    if "spectrum" in intensity.luminaire:
+        yield "the spectrum is not kept"
     if "tilt" in intensity.luminaire:
         yield "the lamp factors over tilt are not kept"

@@ -14,9 +14,9 @@ from etendue.formats.intensity.goniometer import Kind, in_c_gamma
 from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_lines
 from etendue.formats.intensity.lm63_writer import write
 from etendue.formats.intensity.opening import opening_facts
-from etendue.formats.intensity.symmetry import Array, unfolded
+from etendue.formats.intensity.symmetry import Array, from_sector
 from etendue.formats.rays.ray_format import Head, file_provenance
-from etendue.quantities.intensity import Intensity, Symmetry
+from etendue.quantities.intensity import Intensity
 from etendue.quantities.report import Complaint, Severity
 from etendue.units import INTENSITY_UNIT, WATTS_PER_FILE_UNIT, FluxUnit
 
@@ -264,23 +264,15 @@ class _Reader:
     def _whole_circle(self, c: Array, values: Array) -> tuple[Array, Array]:
         """All planes, from the sector that the file explores."""
         first, last = float(c[0]), float(c[-1])
-        if c.size == 1:
-            if first != 0.0:
-                self.complain("note", "horizontal angles", f"the only one is {first:g}°; taken as rotational symmetry")
-            return unfolded(c, values, "rotational")
-        sectors: dict[tuple[float, float], Symmetry] = {
-            (0.0, 90.0): "both",
-            (0.0, 180.0): "C0-C180",
-            (90.0, 270.0): "C90-C270",
-        }
-        if (first, last) in sectors:
-            return unfolded(c, values, sectors[first, last])
-        if first == 0.0 and last == 360.0:
+        if c.size == 1 and first != 0.0:
+            self.complain("note", "horizontal angles", f"the only one is {first:g}°; taken as rotational symmetry")
+        known = from_sector(c, values)
+        if known is not None:
             difference = float(np.abs(values[0] - values[-1]).max())
-            if difference > 1e-6 * float(np.abs(values).max()):
+            if last == 360.0 and difference > 1e-6 * float(np.abs(values).max()):
                 found = f"the planes 0° and 360° are one and differ by up to {difference:.6g}; that of 0° was taken"
                 self.complain("warning", "candela values", found, "LM-63 5.14")
-            return c[:-1], values[:-1]
+            return known[:2]
         if first == 0.0 and 180.0 < last < 360.0:
             if self.version != 1995:
                 self.complain("note", "horizontal angles", f"they end at {last:g}°; 360° is 0° again", "LM-63 5.14")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -40,6 +42,50 @@ def unfolded(c: Array, values: Array, symmetry: Symmetry) -> tuple[Array, Array]
     angles = np.mod(np.concatenate(images), 360.0)
     whole, first = np.unique(angles, return_index=True)
     return whole, np.concatenate([values] * len(images))[first]
+
+
+def from_sector(c: Array, values: Array) -> tuple[Array, Array, Symmetry] | None:
+    """The planes of the whole circle, from a sector whose ends tell the symmetry.
+
+    Parameters
+    ----------
+    c : array, shape (k,)
+        [°] rising.
+    values : array, shape (k, n_gamma)
+        Of these planes.
+
+    Returns
+    -------
+    c, values : array
+        As `unfolded`; of two planes 0° and 360° the first.
+    symmetry : str
+        What the sector stands for; None instead of all three if it is none of 0 to 0, 90, 180 or 360, and 90 to 270.
+    """
+    first, last = float(c[0]), float(c[-1])
+    sectors: dict[tuple[float, float], Symmetry] = {
+        (0.0, 90.0): "both",
+        (0.0, 180.0): "C0-C180",
+        (90.0, 270.0): "C90-C270",
+    }
+    if c.size == 1:
+        return *unfolded(c, values, "rotational"), "rotational"
+    if (first, last) in sectors:
+        return *unfolded(c, values, sectors[first, last]), sectors[first, last]
+    return (c[:-1], values[:-1], "none") if (first, last) == (0.0, 360.0) else None
+
+
+def sum_of(parts: Sequence[Intensity]) -> Intensity:
+    """The sum of several distributions in the same frame and unit: a table over the nodes of all of them.
+
+    Where one of them ends and another goes on, its step to 0 becomes a ramp of `RAMP`.
+    """
+    ends = [g for part in parts for g in (part.gamma[0] - RAMP, part.gamma[-1] + RAMP)]
+    gamma = np.unique(np.concatenate([part.gamma for part in parts] + [ends]))
+    low, high = min(part.gamma[0] for part in parts), max(part.gamma[-1] for part in parts)
+    gamma = gamma[(gamma >= low) & (gamma <= high)]
+    c = np.unique(np.concatenate([part.c for part in parts]))
+    values = np.sum([part.at(c[:, None], gamma) for part in parts], axis=0)
+    return parts[0].replace(c=c, gamma=gamma, values=values, standard_error=np.full(values.shape, np.nan))
 
 
 def folded(intensity: Intensity, symmetry: Symmetry) -> tuple[Array, Array]:

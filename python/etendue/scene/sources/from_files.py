@@ -143,7 +143,9 @@ class Point(Source):
     Parameters
     ----------
     file : path, optional
-        An IES or EULUMDAT file; isotropic without it.
+        Any intensity file that `etendue.read_intensity` reads; isotropic without it.
+    photometry : str, optional
+        Which one, of a file that holds several.
     intensity : Intensity
         In Python, instead of a file.
     flux : number, optional
@@ -161,6 +163,7 @@ class Point(Source):
 
     kind: Literal["point"] = "point"
     file: Path | None = None
+    photometry: str | None = None
     intensity: SkipJsonSchema[InstanceOf[Intensity] | None] = None
     flux: Positive | None = None
     flux_unit: FluxUnit | None = None
@@ -170,6 +173,8 @@ class Point(Source):
         given = self.file is not None or self.intensity is not None
         if self.file is not None and self.intensity is not None:
             raise ValueError("'file' and 'intensity' are both given; use one")
+        if self.photometry is not None and self.file is None:
+            raise ValueError("'photometry' names one of the distributions of a file; give 'file'")
         if not given and self.flux is None:
             raise ValueError("'flux' is missing; only a file could tell it")
         if given and self.flux_unit is not None:
@@ -178,7 +183,9 @@ class Point(Source):
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The table and its flux."""
-        table = read_intensity(files.find(self.file)) if self.file is not None else self.intensity
+        table = self.intensity
+        if self.file is not None:
+            table = read_intensity(files.find(self.file), self.photometry)
         if table is None:
             table = Intensity(np.zeros(1), np.array([0.0, 180.0]), np.ones((1, 2)), flux_unit=self.flux_unit or "lm")
         if (table.values < 0.0).any() or not table.flux > 0.0:
@@ -190,4 +197,4 @@ class Point(Source):
             "values": np.array(table.values),
             "flux": table.flux if self.flux is None else self.flux,
         }
-        return (Emitter(record, table.flux_unit),)
+        return (Emitter(record, table.flux_unit, table.luminaire.get("spectrum")),)
