@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 from pathlib import Path
 
@@ -196,6 +197,13 @@ def test_files_that_hold_one_distribution_have_none_to_name(name: str, tmp_path:
     write_intensity(path_of(name, tmp_path), lid("none"))
     with pytest.raises(ArgumentError, match="hold one distribution"):
         read_intensity(path_of(name, tmp_path), "1")
+
+
+def test_a_pipe_is_left_to_those_who_read_pipes(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    assert detect_intensity_format(tmp_path / "pipe") is None
+    with pytest.raises(ArgumentError, match="this is a pipe"):
+        read_intensity(tmp_path / "pipe")
 
 
 def test_wrong_names_and_places(tmp_path: Path) -> None:

@@ -31,6 +31,8 @@ _FAULTS = (
     NotImplementedError,
     RuntimeError,
     ValueError,
+    LookupError,
+    ArithmeticError,
     OSError,
 )
 """What `zipfile` raises for archives that are damaged; OSError when it is led to a place before the file's beginning."""
@@ -59,8 +61,10 @@ class Archive:
                 members = archive.infolist()
         except _FAULTS as error:
             raise FormatError(path, "directory of the archive", str(error)[:200], ADVICE) from None
-        self.members = {member.filename: member for member in members if not member.is_dir()}
-        if len(self.members) + sum(member.is_dir() for member in members) != len(members):
+        # `ZipInfo.is_dir` cannot stand a name without letters.
+        files = [member for member in members if not member.filename.endswith("/")]
+        self.members = {member.filename: member for member in files}
+        if len(self.members) != len(files):
             raise FormatError(path, "directory of the archive", "two members have the same name", ADVICE)
 
     def read(self, name: str, most: int) -> bytes:

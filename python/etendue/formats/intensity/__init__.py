@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.formats.input import is_stream, require_file
 from etendue.formats.intensity import eulumdat, gldf, lm63, tm33
 from etendue.formats.intensity.intensity_format import IntensityFormat
 from etendue.formats.output import atomic_output
@@ -27,11 +28,15 @@ PLANES_COUNTED_AS = {"lm63": "lm63", "tm33": "lm63", "eulumdat": "eulumdat"}
 def detect_intensity_format(path: str | os.PathLike[str]) -> IntensityFormat | None:
     """The format of an intensity file, from its content; None if it is none of them.
 
+    A pipe is none: looking at its beginning would take that away from whoever reads it.
+
     Raises
     ------
     OSError
         If the file cannot be opened.
     """
+    if is_stream(Path(path)):
+        return None
     head = Head.of(Path(path))
     return next((f for f in INTENSITY_FORMATS.values() if f.recognise(head)), None)
 
@@ -64,7 +69,7 @@ def read_intensity(path: str | os.PathLike[str], photometry: str | None = None) 
     UnknownNameError
         If there is no such photometry in the file.
     ArgumentError
-        If a photometry is named, and the format holds one only.
+        If a photometry is named, and the format holds one only; or if the path leads to a pipe, a device or a folder.
     OSError
         If the file cannot be opened.
 
@@ -77,6 +82,7 @@ def read_intensity(path: str | os.PathLike[str], photometry: str | None = None) 
     ...     read_intensity(Path(folder) / "spot.ies").values.tolist(), lost
     ([[1000.0, 10.0, 0.0]], ())
     """
+    require_file(Path(path), "intensity files are looked at before they are read")
     found = detect_intensity_format(path)
     if found is None:
         known = ", ".join(f"{f.title} ({f.extension})" for f in INTENSITY_FORMATS.values())
