@@ -82,9 +82,13 @@ class _Ledger(TypedDict):
     lost_at: list[int | None]
     segments: int
 
+_Open: TypeAlias = tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint64], _Floats]
+
 class _Harvest(TypedDict):
     ledger: _Ledger
     cells: list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]]
+    births: tuple[_Floats, _Floats, npt.NDArray[np.uint64]]
+    open_units: list[_Open]
     records: list[_Floats]
     events: list[tuple[npt.NDArray[np.uint64], int]]
     rays: int
@@ -290,6 +294,24 @@ def select_subset(start: int, stop: int, n: int, k: int, taken: int, seed: int) 
 def deal_parts(start: int, stop: int, parts: int, seed: int) -> npt.NDArray[np.uint32]:
     """The part of each ray in ``start..stop``."""
 
+@final
+class Dealing:
+    """The rays of a run, dealt to sources: their fluxes, and number and length of the set that each gives out, if any."""
+
+    def __new__(cls, fluxes: Sequence[float], sets: Sequence[tuple[int, int] | None], rays: int) -> Dealing: ...
+    @property
+    def strata(self) -> int:
+        """Number of strata: the rays of their own, and each set of which copies are given out."""
+
+    def sources(self) -> list[tuple[int, int]]:
+        """Stratum of each source, and its rays in the whole run."""
+
+    def done(self, done: int) -> list[int]:
+        """Units of each stratum among the first `done` rays."""
+
+    def units(self, rays: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint64]]:
+        """The unit of each ray and its stratum, by the rays' numbers in the run."""
+
 def losses() -> list[str]:
     """Why rays are lost, in the order of a ledger."""
 
@@ -304,11 +326,14 @@ def trace_batches(
     first: int,
     last: int,
     threads: int | None = None,
+    open_units: Sequence[_Open] | None = None,
 ) -> _Harvest:
-    """Traces batches ``first..last`` of a run of `rays` rays.
+    """Traces batches ``first..last`` of a run of `rays` rays, the earlier ones of which left units open.
 
-    Of the ledger each entry is (flux, rays), by source, face, medium or reason. Cells of each detector are (Σ w, Σ w², rays
-    that contributed); records are rows of position [mm], direction, flux, wavelength [nm], shape (n, 8); events are rows of
+    Of the ledger each entry is (flux, rays), by source, face, medium or reason. Cells of each detector are (Σ w, Σ w², units
+    that contributed), shape (strata, cells); births are the same of the flux of each source, and of all of them at the end.
+    Open units are cell, unit and Σ w of each detector and, at the end, of the sources, where more copies of a ray may come;
+    records are rows of position [mm], direction, flux, wavelength [nm], shape (n, 8); events are rows of
     scatter events, shape (n, 15), and how often they were thinned.
     """
 

@@ -70,6 +70,18 @@ def test_trace_says_what_became_of_the_light(run: Run) -> None:
         assert text in out
 
 
+def test_copies_of_rays_are_told(run: Run, tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    lamp = et.RaySet(rng.random((200, 3)), rng.normal(size=(200, 3)) * 0.2 + [0, 0, 1], np.ones(200))
+    et.write_rays(tmp_path / "led.ray", lamp, format="zemax")
+    (tmp_path / "few.toml").write_text('[[sources]]\nname = "led"\nkind = "rays"\nfile = "led.ray"\n', encoding="utf-8")
+    _, traced, _ = run("trace", "few.toml", "--rays", "20000", "-o", "few.h5")
+    _, told, _ = run("info", "few.h5")
+    for out in (traced, told):
+        assert "led: 20,000 rays are copies of 200 rays of the set, as good as 200 equal rays" in out
+    assert run("info", "few.h5", "--json").json[0]["effective_rays"] == pytest.approx(200)
+
+
 def test_an_interruption_leaves_a_valid_result(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*arguments: Any, **options: Any) -> Any:
         rounds = et.trace_rounds(*arguments, **options)

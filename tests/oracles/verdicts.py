@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2, norm, t
+from scipy.stats import binomtest, chi2, norm, t
 
 Array = npt.NDArray[np.float64]
 SIGNIFICANCE = 1e-4
@@ -48,3 +48,14 @@ def assert_differ(*, values: Array, other: Array, standard_error: Array) -> None
     known = np.isfinite(standard_error) & (standard_error > 0.0)
     z = (values[known] - other[known]) / standard_error[known]
     assert chi2.sf((z**2).sum(), z.size) < SIGNIFICANCE
+
+
+def assert_covers(*, deviations: Array) -> None:
+    """Deviations from the truth, each independent and over its own error, lie within the 68 % and the 95 % of the normal as
+    often as that: binomial, two-sided, so that errors too large are found as well.
+    """
+    assert np.isfinite(deviations).all()
+    for level in (0.68, 0.95):
+        within = int((np.abs(deviations) < norm.isf((1.0 - level) / 2.0)).sum())
+        told = f"{within} of {deviations.size} within {level:.0%}; deviations spread by {deviations.std():.2f}"
+        assert binomtest(within, deviations.size, level).pvalue > SIGNIFICANCE, told

@@ -51,6 +51,7 @@ def bits(result: TraceResult) -> list[Any]:
     """Everything that a result holds, as bytes."""
     sums = result.sums
     arrays = [a for entry in sums.ledger.values() for a in entry] + [a for cells in sums.cells for a in cells]
+    arrays += [*sums.births, *(a for opened in sums.open_units for a in opened)]
     return [
         sums.batches, sums.rays, sums.segments, sums.imbalance, sums.lost_at,
         *(a.tobytes() for a in arrays), *(held.array().tobytes() for held in sums.collected),

@@ -5,6 +5,7 @@
 
 mod cone;
 mod counts;
+mod dealing;
 mod field;
 mod polya;
 mod ray_index;
@@ -31,6 +32,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<field::FieldRays>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<survey::Survey>()?;
+    module.add_class::<dealing::Dealing>()?;
     module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;
     module.add_function(wrap_pyfunction!(scan::scan, module)?)?;
     module.add_function(wrap_pyfunction!(cone::cone_sums, module)?)?;

@@ -213,14 +213,19 @@ fn finish(dict: &Bound<'_, PyDict>) -> PyResult<Finish> {
     }
 }
 
-/// A source; ray sets are gathered in `sets`.
+/// A source; ray sets are gathered in `sets`, those of several sources once.
 fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult<Source> {
     let py = dict.py();
     let emitter = match get::<String>(dict, "kind")?.as_str() {
         "rays" => {
-            sets.push(get::<Bound<'py, PyAny>>(dict, "rays")?.unbind());
+            let rays = get::<Bound<'py, PyAny>>(dict, "rays")?;
+            let known = sets.iter().position(|set| set.bind(py).is(&rays));
+            let set = known.unwrap_or_else(|| {
+                sets.push(rays.unbind());
+                sets.len() - 1
+            });
             Emitter::Rays {
-                set: sets.len() - 1,
+                set,
                 scale: get(dict, "scale")?,
             }
         }

@@ -6,14 +6,15 @@ use etendue_geometry::RaySource;
 use etendue_geometry::lines::Leaving;
 use etendue_math::Vec3;
 use etendue_sampling::ordered::{BATCH, inside};
+use etendue_trace::dealing::Dealing as CoreDealing;
 use etendue_trace::eye;
-use etendue_trace::forward::{Run, trace, trails};
-use etendue_trace::harvest::{Cell, Harvest, Record};
+use etendue_trace::forward::{Run, trace_on, trails};
+use etendue_trace::harvest::{Cell, Harvest, Mark, Open, Record, Tally};
 use etendue_trace::kept::{DEEPEST, Kept, WORDS};
 use etendue_trace::ledger::{Entry, Ledger};
 use etendue_trace::meeting::Loss;
 use etendue_trace::reverse::{Left, Lit, Method, Pixel};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -60,6 +61,50 @@ fn cell_arrays<'py>(py: Python<'py>, cells: &[Cell]) -> CellArrays<'py> {
     )
 }
 
+/// As [`CellArrays`], shape (strata, cells).
+type TallyArrays<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<u64>>,
+);
+
+fn tally_arrays<'py>(py: Python<'py>, tally: &Tally, strata: usize) -> PyResult<TallyArrays<'py>> {
+    let shape = [strata, tally.cells.len() / strata];
+    let (sum, squares, rays) = cell_arrays(py, &tally.cells);
+    Ok((sum.reshape(shape)?, squares.reshape(shape)?, rays.reshape(shape)?))
+}
+
+/// Cell, unit and sum of each open unit of a tally.
+type OpenArrays<'py> = (
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+fn open_arrays<'py>(py: Python<'py>, tally: &Tally) -> OpenArrays<'py> {
+    (
+        PyArray1::from_iter(py, tally.open.iter().map(|mark| mark.0)),
+        PyArray1::from_iter(py, tally.open.iter().map(|mark| mark.1)),
+        PyArray1::from_iter(py, tally.open.iter().map(|mark| mark.2)),
+    )
+}
+
+/// Open units as Python hands them over, in the order of their cells and units.
+type OpenRows<'py> = (
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, u64>,
+    PyReadonlyArray1<'py, f64>,
+);
+
+fn begun(tallies: &[OpenRows<'_>]) -> PyResult<Open> {
+    let each = |(cells, units, sums): &OpenRows<'_>| -> PyResult<Vec<Mark>> {
+        let (cells, units, sums) = (cells.as_slice()?, units.as_slice()?, sums.as_slice()?);
+        let marks = cells.iter().zip(units).zip(sums).map(|((c, u), s)| (*c, *u, *s));
+        Ok(marks.collect())
+    };
+    tallies.iter().map(each).collect()
+}
+
 /// Rows of position, direction, flux, wavelength.
 fn record_array<'py>(py: Python<'py>, records: &[Record]) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let rows = records.iter().flat_map(|r| {
@@ -87,10 +132,10 @@ fn open<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Vec<Opened<'py>>> {
     scene.sets().iter().map(|s| Opened::new(s.bind(py))).collect()
 }
 
-/// Traces batches `first..last` of a run of `rays` rays.
+/// Traces batches `first..last` of a run of `rays` rays, the earlier ones of which left units `open`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
-#[pyo3(signature = (scene, rays, seed, most_events, first, last, threads=None))]
+#[pyo3(signature = (scene, rays, seed, most_events, first, last, threads=None, open_units=None))]
 pub fn trace_batches<'py>(
     py: Python<'py>,
     scene: &Scene,
@@ -100,6 +145,7 @@ pub fn trace_batches<'py>(
     first: u64,
     last: u64,
     threads: Option<usize>,
+    open_units: Option<Vec<OpenRows<'py>>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     if first > last || last > rays.div_ceil(BATCH) {
         return Err(PyValueError::new_err(format!("batches {first}..{last} of {rays} rays")));
@@ -115,15 +161,22 @@ pub fn trace_batches<'py>(
     };
     let core = scene.core();
     let batches: Range<u64> = first..last;
-    let harvest: Harvest = py.detach(|| inside(threads.unwrap_or(0), || trace(core, &run, batches.clone())));
+    let begun = begun(open_units.as_deref().unwrap_or_default())?;
+    let work = || trace_on(core, &run, batches.clone(), begun.clone());
+    let harvest: Harvest = py.detach(|| inside(threads.unwrap_or(0), work));
     opened.iter().try_for_each(Opened::check)?;
+    let strata = CoreDealing::of(core, rays, run.sets).strata();
     let dict = PyDict::new(py);
     dict.set_item("ledger", ledger_dict(py, &harvest.ledger)?)?;
     let cells = PyList::empty(py);
-    for detector in &harvest.cells {
-        cells.append(cell_arrays(py, detector))?;
+    for detector in &harvest.tallies {
+        cells.append(tally_arrays(py, detector, strata)?)?;
     }
     dict.set_item("cells", cells)?;
+    dict.set_item("births", tally_arrays(py, &harvest.births, strata)?)?;
+    let tallies = harvest.tallies.iter().chain([&harvest.births]);
+    let open: Vec<OpenArrays<'_>> = tallies.map(|tally| open_arrays(py, tally)).collect();
+    dict.set_item("open_units", open)?;
     let records = PyList::empty(py);
     for detector in &harvest.records {
         records.append(record_array(py, detector)?)?;

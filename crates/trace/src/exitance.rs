@@ -164,7 +164,7 @@ impl Survey {
                 sets: &[],
             };
             let harvest = trace(&scene, &run, batches);
-            let cells = &harvest.cells[scene.detectors.len() - 1];
+            let cells = &harvest.tallies[scene.detectors.len() - 1].cells;
             let sides = cells.chunks(2 * wavelengths.len());
             sides.map(|lines| lines.iter().map(|cell| cell.rays).sum()).collect()
         };
@@ -240,7 +240,7 @@ impl Survey {
         };
         let first = SCOUTS + SURVEYORS + u64::from(pass) * EACH;
         let harvest = trace(&scene, &run, first..first + EACH);
-        let cells = &harvest.cells[scene.detectors.len() - 1];
+        let cells = &harvest.tallies[scene.detectors.len() - 1].cells;
         // The rays stand for the whole run.
         let scale = RUN as f64 / (EACH * BATCH) as f64;
         let lines = lit.lines.len();

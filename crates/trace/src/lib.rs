@@ -3,13 +3,15 @@
 //! `scene`: faces with their optical properties, solids with their media, sources, detectors. `start`: where a ray starts;
 //! `inside`: which solids it is in; `meeting`: which of the faces that it meets decides what becomes of it.
 //!
-//! `forward`: from the sources to the detectors; `detector`: what takes note of light; `ledger`: the flux account;
+//! `forward`: from the sources to the detectors; `dealing`: which source gives out which ray, and which rays are copies of
+//! one; `detector`: what takes note of light; `ledger`: the flux account;
 //! `harvest`: what batches amount to. `eye`: diffuse scatters connected to an observer; `kept`: those that are kept for later,
 //! thinned to a number of them.
 //!
 //! `reverse`: from the eye to the sources; `wave`: a block of its paths; `exitance`: the light of diffuse surfaces, known
 //! beforehand, at which paths may end. `lists`: what rays of a block are sorted into.
 
+pub mod dealing;
 pub mod detector;
 pub mod exitance;
 pub mod eye;

@@ -162,7 +162,7 @@ fn every_ray_has_one_fate_and_the_ledger_closes() {
     let in_glass = harvest.ledger.in_medium[1].flux();
     assert!(in_glass > 0.05 && harvest.ledger.on_face[2].flux() > 0.05);
     // What escapes is what the far field holds.
-    let far: f64 = harvest.cells[0].iter().map(|cell| cell.sum).sum();
+    let far: f64 = harvest.tallies[0].cells.iter().map(|cell| cell.sum).sum();
     assert!((far / harvest.ledger.escaped.flux() - 1.0).abs() < 1e-12);
 }
 
@@ -171,9 +171,9 @@ fn one_two_and_seven_threads_give_the_same_bits() {
     let bits = |threads| {
         let harvest = run(&mixed(true), 200_000, threads);
         let cells = harvest
-            .cells
+            .tallies
             .iter()
-            .flatten()
+            .flat_map(|tally| &tally.cells)
             .flat_map(|c| [c.sum.to_bits(), c.squares.to_bits(), c.rays]);
         (harvest.ledger, cells.collect::<Vec<u64>>())
     };
@@ -208,7 +208,7 @@ fn events_looked_at_later_are_the_light_image() {
     let later = look_at_events(&scene, &flat, &VIEW).expect("of this scene");
     let lit = later.iter().filter(|cell| cell.rays > 0).count();
     assert!(lit > 20, "{lit}");
-    for (a, b) in later.iter().zip(&harvest.cells[0]) {
+    for (a, b) in later.iter().zip(&harvest.tallies[0].cells) {
         assert_eq!(a.rays, b.rays);
         assert!((a.sum - b.sum).abs() <= 1e-12 * b.sum && (a.squares - b.squares).abs() <= 1e-12 * b.squares);
     }
@@ -351,9 +351,10 @@ fn a_lens_cemented_on_a_dome_of_the_same_glass_is_one_body() {
     let (one, two) = (run(&build(false), rays, 2), run(&build(true), rays, 2));
     assert!(two.ledger.lost.iter().all(|entry| entry.rays == 0));
     // χ² of two counts of the same cells; 1e-4 point of 22 degrees of freedom: 55.
-    let chi2: f64 = one.cells[0]
+    let chi2: f64 = one.tallies[0]
+        .cells
         .iter()
-        .zip(&two.cells[0])
+        .zip(&two.tallies[0].cells)
         .map(|(a, b)| (a.rays as f64, b.rays as f64))
         .filter(|(a, b)| a + b > 0.0)
         .map(|(a, b)| (a - b) * (a - b) / (a + b))
@@ -388,7 +389,7 @@ fn illuminance_falls_with_the_square_of_the_distance_and_the_cosines() {
     let harvest = run(&scene, 3_000_000, 2);
     let (cw, ch) = (2.0, 2.0);
     let mut chi2 = 0.0;
-    for (index, cell) in (0_u32..).zip(&harvest.cells[0]) {
+    for (index, cell) in (0_u32..).zip(&harvest.tallies[0].cells) {
         let (row, column) = (f64::from(index / 4), f64::from(index % 4));
         // The midpoint rule on 10 × 10 points of the cell.
         let mut expected = 0.0;

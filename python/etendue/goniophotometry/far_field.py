@@ -74,7 +74,7 @@ def intensity_distribution(
         flux_unit=rays.flux_unit,
         provenance=rays.provenance.then(f"far-field intensity in {shape[0]} planes, γ in steps of {gamma_step:.9g}°"),
     )
-    return result.replace(notes=tuple(_notes(result, total, len(rays), usable)))
+    return result.replace(notes=(*_notes(result, total, len(rays), usable), *rays.notes))
 
 
 def _notes(result: Intensity, total: float, rays: int, usable: int) -> list[str]:

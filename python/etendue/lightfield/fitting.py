@@ -82,7 +82,7 @@ def fit_light_field(
     if symmetry != "none":
         counts = fold(counts, symmetry)
     field = fit_counts(rays, counts, plan, seed, threads)
-    return field.replace(notes=(*notes, *field.notes))
+    return field.replace(notes=(*notes, *field.notes, *rays.notes))
 
 
 def default_bits(rays: int) -> int:

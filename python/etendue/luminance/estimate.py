@@ -311,6 +311,7 @@ def _map(
         notes.append(f"{tally.unusable:,} rays cannot be used and were left out; see the ray set's complaints")
     if choice is not None:
         notes.append(choice.reason)
+    notes += rays.notes
     method = "cone" if choice is None else "cone, automatic acceptance"
     return LuminanceMap(
         values=values,

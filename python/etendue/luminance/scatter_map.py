@@ -13,7 +13,7 @@ from etendue.luminance.scene_map import Forward, Looking, look_at_scene
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress
-from etendue.scene.scatter_events import EVENT, ScatterEvents
+from etendue.scene.scatter_events import EVENT, RAY, ScatterEvents
 from etendue.units import MM2_PER_M2
 
 STRETCH = 1 << 21
@@ -48,18 +48,21 @@ def look_at_events(
         )
     core, seen, done = events.core, [], 0
     for view in views:
-        sums = np.zeros((3, view["columns"] * view["rows"]))
-        for words in _stretches(events.rows):
+        width = events.dealing.strata, view["columns"] * view["rows"]
+        sums = np.zeros(width), np.zeros(width), np.zeros(width, np.uint64)
+        for stratum, words in _stretches(events):
             try:
-                sums += np.array(_core.look_at_events(core, words, view, how.threads))
+                found = _core.look_at_events(core, words, view, how.threads)
             except ValueError as error:
                 raise ArgumentError(f"the scatter events of {events.name!r}: {error}.") from error
+            for total, part in zip(sums, found, strict=True):
+                total[stratum] += part
             done += len(words)
             if progress is not None and not whole:
                 progress(done)
         shape = (view["rows"], view["columns"])
         note = f"{len(events):,} scatter events of {events.rays:,} rays, for light that comes from diffuse surfaces directly"
-        seen.append(Forward.of(sums, shape, events.rays, events.scale, note))
+        seen.append(Forward.of(sums, shape, events.dealing, events.rays, events.scale, note))
     if whole and events.scene is not None:
         maps = look_at_scene(events.scene, pairs, how, progress, seen)
         return [lmap.replace(notes=(*lmap.notes, *events.notes)) for lmap in maps]
@@ -87,12 +90,33 @@ def _map(events: ScatterEvents, image: Forward, observer: Observer, screen: Scre
     )
 
 
-def _stretches(rows: npt.NDArray[np.void]) -> Iterator[npt.NDArray[np.uint64]]:
-    """The events as words, some at a time; those of a ray stay together."""
-    ray, start = rows["ray"], 0
-    while start < len(rows):
-        end = min(start + STRETCH, len(rows))
-        while end < len(rows) and ray[end] == ray[end - 1]:
-            end += 1
-        yield rows[start:end].view("<u8").reshape(-1, EVENT.itemsize // 8)
+def _stretches(events: ScatterEvents) -> Iterator[tuple[int, npt.NDArray[np.uint64]]]:
+    """The events as words, some at a time, with their stratum; those of a ray and of all its copies stay together."""
+    rows, dealing = events.rows, events.dealing
+    ray = rows["ray"] & RAY
+    if dealing.strata == 1:
+        yield from ((0, _words(rows[part])) for part in _cuts(ray))
+        return
+    unit, stratum = dealing.core.units(ray)
+    order = np.argsort(unit, kind="stable")
+    for number in range(dealing.strata):
+        own = order[stratum[order] == number]
+        for part in _cuts(unit[own]):
+            chosen = rows[own[part]]
+            # To the core, copies of a ray are that ray.
+            chosen["ray"] = unit[own[part]]
+            yield number, _words(chosen)
+
+
+def _cuts(keys: npt.NDArray[np.uint64]) -> Iterator[slice]:
+    """Some ascending keys at a time; equal ones stay together."""
+    start = 0
+    while start < len(keys):
+        last = min(start + STRETCH, len(keys)) - 1
+        end = int(np.searchsorted(keys, keys[last], side="right"))
+        yield slice(start, end)
         start = end
+
+
+def _words(rows: npt.NDArray[np.void]) -> npt.NDArray[np.uint64]:
+    return rows.view("<u8").reshape(-1, EVENT.itemsize // 8)

@@ -22,6 +22,7 @@ from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Compiled, Scene, compile_scene
+from etendue.scene.dealing import CellSums, Dealing, added
 from etendue.scene.placement import Placement
 from etendue.scene.sources.from_files import Field, Rays
 from etendue.scene.sources.gridded import Gridded
@@ -107,13 +108,12 @@ class Forward:
     note: str
 
     @classmethod
-    def of(cls, sums: Array, shape: tuple[int, ...], rays: int, scale: float, note: str) -> Forward:
-        """From Σ w, Σ w² and the rays that contributed, shape (3, pixels), over `rays` rays; each w stands for `scale` w.
-
-        Rays are independent of each other: the variance of Σ w is Σ w² − (Σ w)²/n.
-        """
-        sum_, squares, count = (row.reshape(shape) for row in sums)
-        error = np.sqrt(np.maximum(squares - sum_ * sum_ / rays, 0.0))
+    def of(
+        cls, sums: CellSums, shape: tuple[int, ...], dealing: Dealing, rays: int, scale: float, note: str
+    ) -> Forward:
+        """From the sums of each pixel over the first `rays` rays of a run; each w stands for `scale` w."""
+        error = np.sqrt(dealing.variance(sums, rays)).reshape(shape)
+        sum_, count = (row.sum(axis=0).reshape(shape) for row in (sums[0], sums[2]))
         return cls(sum_ * scale, error * scale, count.astype(np.int64), note)
 
 
@@ -204,13 +204,17 @@ def _light_images(compiled: Compiled, views: list[_core._View], how: Looking) ->
     core = _core.Scene({**compiled.record, "detectors": detectors})
     rays = int(how.forward_rays)
     batches = -(-rays // _core.batch_size())
-    sums = [np.zeros((3, view["columns"] * view["rows"])) for view in views]
+    dealing = Dealing.of(compiled.record["sources"], rays)
+    sums: list[CellSums] = []
+    begun = None
     for first in range(0, batches, ROUND):
         last = min(first + ROUND, batches)
-        harvest = _core.trace_batches(core, rays, how.seed, MOST_EVENTS, first, last, how.threads)
-        sums = [total + np.array(cells) for total, cells in zip(sums, harvest["cells"], strict=True)]
+        harvest = _core.trace_batches(core, rays, how.seed, MOST_EVENTS, first, last, how.threads, begun)
+        cells, begun = harvest["cells"], harvest["open_units"]
+        sums = [added(*pair) for pair in zip(sums, cells, strict=True)] if sums else cells
     note = f"{rays:,} rays forwards, for light that smooth surfaces or beams send to diffuse ones"
-    return [Forward.of(s, (v["rows"], v["columns"]), rays, 1.0, note) for s, v in zip(sums, views, strict=True)]
+    found = zip(sums, views, strict=True)
+    return [Forward.of(s, (v["rows"], v["columns"]), dealing, rays, 1.0, note) for s, v in found]
 
 
 class _Passes:

@@ -79,6 +79,7 @@ def merged(sets: Sequence[RaySet], flux: Sequence[float] | None, unit: FluxUnit 
         spectra=tuple(s for rays in sets for s in rays.spectra) if indexed else (),
         single_wavelength=single,
         header={},
+        copies=max(rays.meaning.copies for rays in sets),
         complaints=tuple(
             _placed(complaint, rays) for rays in sets for complaint in (*rays.complaints, *_losses(rays, dtype, single))
         ),

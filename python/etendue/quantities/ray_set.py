@@ -83,6 +83,9 @@ class RaySetMeaning:
     complaints : tuple of Complaint
         What the reader had to say.
     provenance : Provenance
+    copies : float
+        How many copies of a ray there are on average where they are most, of rays traced from a set with more rays than it
+        holds: only rays that are no copies are independent of each other.
     """
 
     flux_unit: FluxUnit = "lm"
@@ -96,6 +99,7 @@ class RaySetMeaning:
     header: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     complaints: tuple[Complaint, ...] = ()
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
+    copies: float = 1.0
 
 
 class RaySet(RayOperations, RayUnits, RayStream):
@@ -387,9 +391,21 @@ class RaySet(RayOperations, RayUnits, RayStream):
         return self.tally.flux * self.flux_scale
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What all that is made of the rays should tell."""
+        copies = self._meaning.copies
+        if copies <= 1.0:
+            return ()
+        return (
+            f"up to {copies:,.4g} of the rays are copies of one ray of a set: standard errors made as if all were "
+            f"independent of each other are too small, up to {math.sqrt(copies):,.3g} times",
+        )
+
+    @property
     def complaints(self) -> tuple[Complaint, ...]:
         """All that is to be said of the set: by its reader, and by a pass over its rays."""
-        return (*self._meaning.complaints, *self._tally_complaints(self.tally))
+        copied = (Complaint("note", "rays", note) for note in self.notes)
+        return (*self._meaning.complaints, *copied, *self._tally_complaints(self.tally))
 
     def _tally_complaints(self, tally: Tally) -> list[Complaint]:
         return [*self._ray_complaints(tally), *self._total_complaints(tally)]

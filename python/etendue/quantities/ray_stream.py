@@ -125,6 +125,11 @@ class RayStream(abc.ABC):
     def core_source(self) -> Any:
         """The source as the compiled core takes it."""
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What all that is made of the rays should tell."""
+        return ()
+
     @abc.abstractmethod
     def accept_tally(self, tally: Tally) -> float:
         """Take note of a pass over all rays, and return the factor from stored flux to `flux_unit`."""

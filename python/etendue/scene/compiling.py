@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
+from etendue.quantities.fingerprint import fingerprint
 from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
 from etendue.scene.media_library import MEDIA
@@ -106,6 +107,7 @@ class _Compiler:
         self.media: list[tuple[str, str, Medium]] = []
         self.numbers: dict[tuple[str, str], int] = {}
         self.kinds: list[Kind] = []
+        self.sets: list[Any] = []
 
     def compiled(self) -> Compiled:
         """Everything, or all mistakes."""
@@ -269,6 +271,8 @@ class _Compiler:
                 for emitter in source.emitters(self.files):
                     wavelengths, shares = source.colours(emitter, self.scene.wavelength)
                     units.setdefault(emitter.flux_unit, name)
+                    if "rays" in emitter.record:
+                        emitter.record["rays"] = self._one_set(emitter.record["rays"])
                     self.rows["sources"].append(
                         {
                             **emitter.record,
@@ -284,6 +288,14 @@ class _Compiler:
             text = " and ".join(f"{name!r} is in {unit}" for unit, name in units.items())
             self.mistakes.append(("sources", f"{text}; give all of them in one unit, by flux and flux_unit"))
         return next(iter(units), "lm")
+
+    def _one_set(self, rays: Any) -> Any:
+        """The same set for the same rays, however often their file is read: light drawn from it is not independent."""
+        for known in self.sets:
+            if known is rays or (len(known) == len(rays) and fingerprint({"": known}) == fingerprint({"": rays})):
+                return known
+        self.sets.append(rays)
+        return rays
 
     def _detectors(self) -> None:
         observers = {observer.name: observer for observer in self.scene.observers if observer.name}

@@ -15,6 +15,7 @@ from etendue.errors import ArgumentError, SceneWarning
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.provenance import Provenance
 from etendue.scene.compiling import Compiled, compile_scene
+from etendue.scene.dealing import Dealing
 from etendue.scene.scene import Scene
 from etendue.units import FluxUnit
 
@@ -64,6 +65,8 @@ class ScatterEvents:
         Share of the rays whose events were kept, 1 or ½ or ¼ …
     rays : int
         Rays that were traced.
+    dealing : Dealing
+        Which source gave out which of them, and which are copies of one ray of a set.
     surface_names : tuple of str
         Of all faces of the scene.
     surfaces : tuple of str
@@ -98,6 +101,7 @@ class ScatterEvents:
     scale: float
     share: float
     rays: int
+    dealing: Dealing
     surface_names: tuple[str, ...]
     surfaces: tuple[str, ...]
     geometry: str

@@ -18,13 +18,12 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.scene.dealing import Array, CellSums, Dealing
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.scene.scene import Scene
 from etendue.tracing.scattered import Scattered
-from etendue.tracing.sums import RECORD, Collected, Counts
+from etendue.tracing.sums import RECORD, Collected
 from etendue.units import MM2_PER_M2, FluxUnit
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -38,6 +37,7 @@ class Counted:
     error : array
         Its standard error; NaN for cells that no ray reached.
     rays : array of int64
+        That contributed, copies of one counted once.
     """
 
     flux: Array
@@ -45,16 +45,11 @@ class Counted:
     rays: npt.NDArray[np.int64]
 
     @classmethod
-    def of(cls, cells: tuple[Array, Array, Counts], rays: int, scale: float) -> Counted:
-        """Of sums over `rays` rays, of which a trace has `scale` times as many.
-
-        A ray adds w to a cell, mostly 0; rays are independent of each other. So the variance of Σ w is n times that of w:
-        Σ w² − (Σ w)²/n.
-        """
-        sum_, squares, count = cells
-        variance = np.maximum(squares - sum_ * sum_ / max(rays, 1), 0.0)
-        error = np.where(count > 0, np.sqrt(variance) * scale, np.nan)
-        return cls(sum_ * scale, error, count.astype(np.int64))
+    def of(cls, cells: CellSums, dealing: Dealing, rays: int) -> Counted:
+        """Of sums over the first `rays` rays of a run, scaled to all of them; errors as of `Dealing.variance`."""
+        scale, count = dealing.rays / rays, cells[2].sum(axis=0)
+        error = np.where(count > 0, np.sqrt(dealing.variance(cells, rays)) * scale, np.nan)
+        return cls(cells[0].sum(axis=0) * scale, error, count.astype(np.int64))
 
     @property
     def relative_error(self) -> float:
@@ -116,13 +111,14 @@ class IncidentRays(Detection):
 
     KIND = "rays"
 
-    def read(self, collected: Collected, scale: float, origin: Origin) -> RaySet:
+    def read(self, collected: Collected, dealing: Dealing, scale: float, origin: Origin) -> RaySet:
         """The rays, with a wavelength each unless all have the same."""
         records = collected.array()
         meaning = RaySetMeaning(
             flux_unit=origin.flux_unit,
             stored_flux_scale=scale,
             provenance=origin.provenance.then(f"rays incident on {self.name!r}"),
+            copies=dealing.most_copies(),
         )
         wavelength = records["wavelength"]
         if len(records) and (wavelength == wavelength[0]).all():
@@ -295,9 +291,15 @@ class ScatteredLight(Detection):
         return self.most
 
     def read(
-        self, scattered: Scattered, rays: int, scale: float, faces: tuple[str, ...], scene: Scene | None, origin: Origin
+        self,
+        scattered: Scattered,
+        dealing: Dealing,
+        rays: int,
+        faces: tuple[str, ...],
+        scene: Scene | None,
+        origin: Origin,
     ) -> ScatterEvents:
-        """The events of `rays` rays, of which a trace has `scale` times as many."""
+        """The events of the first `rays` rays of a run, which stand for all of them."""
         share = 0.5**scattered.level
         notes = (
             []
@@ -309,9 +311,10 @@ class ScatteredLight(Detection):
         return ScatterEvents(
             self.name,
             scattered.array(),
-            scale / share,
+            dealing.rays / rays / share,
             share,
             rays,
+            dealing,
             faces,
             self.surfaces,
             self.geometry,

@@ -10,6 +10,7 @@ from etendue.errors import ArgumentError, SceneError
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.provenance import Provenance
 from etendue.scene import Compiled, Scene
+from etendue.scene.dealing import Dealing
 from etendue.scene.scatter_events import geometry_of
 from etendue.tracing.detections import (
     Detection,
@@ -41,6 +42,8 @@ class Plan:
         SHA-256 of the scene as the tracer takes it, files included (of ray sets, the rays at both ends).
     rays, seed, most_events : int
     flux_unit : {"lm", "W"}
+    dealing : Dealing
+        Which source gives out which ray.
     source_names, face_names, medium_names, loss_names : tuple of str
         Of the rows of the ledger.
     detections : tuple of Detection
@@ -57,6 +60,7 @@ class Plan:
     seed: int
     most_events: int
     flux_unit: FluxUnit
+    dealing: Dealing
     source_names: tuple[str, ...]
     face_names: tuple[str, ...]
     medium_names: tuple[str, ...]
@@ -117,6 +121,7 @@ def make_plan(scene: Scene, compiled: Compiled, rays: float | None, seed: int, m
         seed,
         most_events,
         compiled.flux_unit,
+        Dealing.of(compiled.record["sources"], count),
         _unique(compiled.source_names),
         _unique([*compiled.face_names, *detector_faces]),
         _unique(compiled.medium_names),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
+from etendue.scene.dealing import Array, Counts
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.tracing.detections import (
     Counted,
@@ -27,7 +29,7 @@ from etendue.tracing.detections import (
 from etendue.tracing.ledger import Entry, Ledger, Loss
 from etendue.tracing.named import ByName
 from etendue.tracing.plan import Plan
-from etendue.tracing.sums import Array, Counts, Sums
+from etendue.tracing.sums import Sums
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -98,7 +100,7 @@ class TraceResult:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What the user should know."""
-        notes = [*self.plan.notes, *self.ledger.notes()]
+        notes = [*self.plan.notes, *self._copies_told(), *self.ledger.notes()]
         if not self.complete:
             notes.append(
                 f"{self.rays_done:,} of {self.rays_asked:,} rays were traced; every flux is scaled by {self.scale:.6g}"
@@ -127,6 +129,35 @@ class TraceResult:
             self.sums.imbalance,
         )
 
+    @cached_property
+    def effective_rays(self) -> float:
+        """(Σw)²/Σw² over the rays of all sources, copies of a ray taken together: as many equal ones have the same error."""
+        return self._effective[-1]
+
+    @cached_property
+    def effective_rays_by_source(self) -> dict[str, float]:
+        """The same of each source."""
+        return dict(zip(self.plan.source_names, self._effective[:-1], strict=True))
+
+    @cached_property
+    def _effective(self) -> list[float]:
+        sum_, squares, _ = (row.sum(axis=0) for row in self.sums.births)
+        return [float(s * s / q) if q > 0.0 else 0.0 for s, q in zip(sum_, squares, strict=True)]
+
+    def _copies_told(self) -> Iterator[str]:
+        """What is to be said of sets whose rays were given out several times."""
+        dealing, done = self.plan.dealing, self.rays_done
+        given = self.sums.ledger["emitted"][1].tolist()
+        units = dealing.done(done).tolist()
+        for stratum, sources in dealing.copied():
+            names = ", ".join(self.plan.source_names[i] for i in sources)
+            rays = sum(given[i] for i in sources)
+            worth = min(self._effective[i] for i in sources)
+            told = f"{names}: {rays:,} rays are copies of {units[stratum]:,} rays of the set"
+            yield f"{told}, as good as {worth:,.0f} equal rays; errors are those of these, more copies do not lessen them"
+        if dealing.strata > 1 and len(given) > 1:
+            yield f"the rays of all sources are as good as {self.effective_rays:,.0f} equal rays"
+
     def _entries(self, row: tuple[Array, Counts]) -> list[Entry]:
         flux, rays = row
         return [Entry(f * self.scale, n) for f, n in zip(flux.tolist(), rays.tolist(), strict=True)]
@@ -139,7 +170,7 @@ class TraceResult:
         return ByName(
             "ray collecting surface",
             {
-                detection.name: detection.read(self.sums.collected[i], self.scale, self._origin)
+                detection.name: detection.read(self.sums.collected[i], self.plan.dealing, self.scale, self._origin)
                 for i, detection in enumerate(self.plan.detections)
                 if isinstance(detection, IncidentRays)
             },
@@ -166,12 +197,12 @@ class TraceResult:
     @cached_property
     def events(self) -> ByName[ScatterEvents]:
         """Where light was scattered diffusely; `luminance_map` shows it to any observer."""
-        plan, done, scale = self.plan, self.rays_done, self.scale
+        plan, done = self.plan, self.rays_done
         found = ((d, held) for d, held in zip(plan.detections, self.sums.scattered, strict=True))
         return ByName(
             "scatter recorder",
             {
-                d.name: d.read(held, done, scale, plan.face_names, plan.scene, self._origin)
+                d.name: d.read(held, plan.dealing, done, plan.face_names, plan.scene, self._origin)
                 for d, held in found
                 if isinstance(d, ScatteredLight)
             },
@@ -189,7 +220,7 @@ class TraceResult:
     @cached_property
     def _counted(self) -> list[tuple[Detection, Counted]]:
         pairs = zip(self.plan.detections, self.sums.cells, strict=True)
-        return [(d, Counted.of(cells, self.rays_done, self.scale)) for d, cells in pairs if d.cells]
+        return [(d, Counted.of(cells, self.plan.dealing, self.rays_done)) for d, cells in pairs if d.cells]
 
     @property
     def _origin(self) -> Origin:
@@ -245,6 +276,8 @@ class TraceResult:
             "seed": self.seed,
             "rays_asked": self.rays_asked,
             "rays_done": self.rays_done,
+            "effective_rays": self.effective_rays,
+            "effective_rays_by_source": self.effective_rays_by_source,
             "surfaces_met": self.sums.segments,
             "relative_error": self.relative_error,
             "ledger": self.ledger.to_dict(),

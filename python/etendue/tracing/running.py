@@ -187,7 +187,9 @@ class Rounds(Iterator[TraceResult]):
         plan, sums = self.plan, None if last is None else last.sums
         first = 0 if sums is None else sums.batches
         end = min(first + ROUND, -(-plan.rays // _core.batch_size()))
-        harvest = _core.trace_batches(self._core, plan.rays, plan.seed, plan.most_events, first, end, self._threads)
+        begun = None if sums is None else sums.open_units
+        how = (plan.rays, plan.seed, plan.most_events, first, end, self._threads)
+        harvest = _core.trace_batches(self._core, *how, begun)
         most = tuple(detection.most_events for detection in plan.detections)
         result = TraceResult(plan, Sums.first(harvest, end, most) if sums is None else sums.then(harvest, end))
         self._last = result

@@ -22,17 +22,18 @@ from etendue.errors import FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
 from etendue.formats.output import atomic_output
 from etendue.quantities.spool import Spool
+from etendue.scene.dealing import CellSums, Dealing
 from etendue.scene.scatter_events import EVENT
 from etendue.scene.scene import Scene
 from etendue.tracing.detections import check_cells, detection_from_dict
 from etendue.tracing.plan import Plan
 from etendue.tracing.result import TraceResult
 from etendue.tracing.scattered import STRETCH, Scattered
-from etendue.tracing.sums import ENTRIES, RECORD, Collected, Sums
+from etendue.tracing.sums import ENTRIES, RECORD, Collected, Open, Sums
 from etendue.units import FLUX_UNITS
 
 FORMAT = "etendue trace result"
-VERSION = 1
+VERSION = 2
 
 CHUNK = 1 << 13
 """Rows of a chunk of rays: half a megabyte."""
@@ -43,6 +44,8 @@ IMAGE_LIMIT = 1 << 28
 NAMES = ("source_names", "face_names", "medium_names", "loss_names", "notes")
 NUMBERS = ("rays", "seed", "most_events")
 SUMS = ("batches", "rays", "segments")
+OPEN = {"open_cell": "<u4", "open_unit": "<u8", "open_sum": "<f8"}
+"""What is kept of units of which more rays may come."""
 
 DAMAGED = "The file is damaged or cut short: copy it again, or trace the scene again."
 FOREIGN = "Give an HDF5 file that TraceResult.save wrote."
@@ -72,7 +75,7 @@ def save_result(result: TraceResult, path: Path) -> None:
     import h5py  # noqa: PLC0415
 
     # Rows of 64 bytes, events of 120, three numbers per cell, and room for the rest.
-    size = 64 * sum(held.count for held in result.sums.collected) + 24 * sum(len(c[0]) for c in result.sums.cells)
+    size = 64 * sum(held.count for held in result.sums.collected) + 24 * sum(c[0].size for c in result.sums.cells)
     size += EVENT.itemsize * sum(held.count for held in result.sums.scattered)
     size += len(result.plan.scene_text.encode()) + (1 << 20)
     with atomic_output(path) as temporary:
@@ -101,7 +104,9 @@ def load_result(path: Path) -> TraceResult:
             raise node.error("attribute 'format'", f"it is not {FORMAT!r}", FOREIGN)
         if node.integer("version") != VERSION:
             found = f"version {node.integer('version')}"
-            raise node.error("attribute 'version'", found, f"This étendue reads {VERSION}; update it.")
+            older = node.integer("version") < VERSION
+            advice = "of an earlier étendue; trace the scene again" if older else "update étendue"
+            raise node.error("attribute 'version'", found, f"This étendue reads {VERSION}: {advice}.")
         plan = _plan(node.group("plan"), path)
         return TraceResult(plan, _sums(node.group("sums"), plan))
 
@@ -117,6 +122,10 @@ def _write(file: Any, result: TraceResult, folder: Path) -> None:
     put(group, **{name: np.uint64(getattr(plan, name)) for name in NUMBERS})
     # Files that the scene names are found from where the result is.
     _put_text(group, "scene", plan.scene.to_toml(folder) if plan.scene_text and plan.scene else plan.scene_text)
+    sets = [(-1, 0) if held is None else held for held in plan.dealing.sets]
+    _put_array(group, "source_flux", np.array(plan.dealing.flux, dtype=np.float64))
+    _put_array(group, "source_set", np.array([number for number, _ in sets], dtype=np.int64))
+    _put_array(group, "source_set_rays", np.array([length for _, length in sets], dtype=np.uint64))
     for name in NAMES:
         _put_text(group, name, json.dumps(getattr(plan, name)))
     _put_text(group, "detectors", json.dumps([detection.to_dict() for detection in plan.detections]))
@@ -130,20 +139,29 @@ def _write(file: Any, result: TraceResult, folder: Path) -> None:
         _put_array(entry, "rays", rays)
     for i, (cells, held, events) in enumerate(zip(sums.cells, sums.collected, sums.scattered, strict=True)):
         detector = group.create_group(f"detector_{i}")
-        for name, array in zip(("sum", "squares", "rays"), cells, strict=True):
-            _put_array(detector, name, array)
+        _put_cells(detector, cells, sums.open_units[i])
         _put_array(detector, "records", held.array().view("<f8").reshape(-1, 8))
         if plan.detections[i].most_events:
             _put_events(detector, events)
+    _put_cells(group.create_group("births"), sums.births, sums.open_units[-1])
+
+
+def _put_cells(group: Any, cells: CellSums, begun: Open) -> None:
+    """Sums of cells, and what they have of rays of which more copies may come."""
+    arrays: dict[str, npt.NDArray[Any]] = dict(zip(("sum", "squares", "rays", *OPEN), (*cells, *begun), strict=True))
+    for name, array in arrays.items():
+        _put_array(group, name, array)
 
 
 def _put_array(group: Any, name: str, values: npt.NDArray[Any]) -> None:
     if not values.size:
         group.create_dataset(name, data=values)
         return
-    chunks = (min(len(values), CHUNK), *values.shape[1:])
+    # Records are read row by row, sums of cells stratum by stratum.
+    records = name == "records"
+    chunks = (min(len(values), CHUNK), 8) if records else (*(1,) * (values.ndim - 1), min(values.shape[-1], CHUNK))
     # The digits of rays are as good as random: packing them takes long and saves little.
-    packed = {} if values.ndim > 1 else {"shuffle": True, "compression": "gzip"}
+    packed = {} if records else {"shuffle": True, "compression": "gzip"}
     group.create_dataset(name, data=values, chunks=chunks, fletcher32=True, **packed)
 
 
@@ -180,6 +198,7 @@ def _plan(group: Node, path: Path) -> Plan:
         scene_text=text,
         fingerprint=group.text("fingerprint"),
         flux_unit="W" if unit == "W" else "lm",
+        dealing=_dealing(group),
         detections=detections,
         rays=group.integer("rays"),
         seed=group.integer("seed"),
@@ -215,32 +234,61 @@ def _sums(group: Node, plan: Plan) -> Sums:
     if not 0 < numbers["rays"] <= plan.rays:
         raise group.error("attribute 'rays'", f"{numbers['rays']} of {plan.rays} rays are done")
     lost_at = group.numbers("lost_at", (lengths["lost"],)).astype(np.int64).tolist()
-    cells, collected, scattered = [], [], []
+    cells, begun, collected, scattered = [], [], [], []
     for i, detection in enumerate(plan.detections):
         detector = group.group(f"detector_{i}")
-        sum_, squares = (_row(detector, name, "<f8", detection.cells) for name in ("sum", "squares"))
-        cells.append((sum_, squares, _row(detector, "rays", "<u8", detection.cells)))
+        cells.append(_cells(detector, plan.dealing.strata, detection.cells))
+        begun.append(_open(detector))
         spool, count = Spool(RECORD), 0
         for part in _records(detector):
             spool.append(part)
             count += len(part)
         collected.append(Collected(spool, count))
         scattered.append(_events(detector, detection.most_events))
+    births = group.group("births")
+    begun.append(_open(births))
     return Sums(
         **numbers,
         imbalance=group.number("imbalance"),
         ledger=entries,
         lost_at=tuple(None if at < 0 else at for at in lost_at),
         cells=tuple(cells),
+        births=_cells(births, plan.dealing.strata, len(plan.source_names) + 1),
+        open_units=tuple(begun),
         collected=tuple(collected),
         scattered=tuple(scattered),
     )
 
 
-def _row(group: Node, name: str, dtype: str, length: int) -> npt.NDArray[Any]:
-    data = group.dataset(name, np.dtype(dtype), 1)
-    if data.shape != (length,):
-        raise group.error(f"dataset {name!r}", f"shape {data.shape}, expected ({length},)")
+def _cells(group: Node, strata: int, cells: int) -> CellSums:
+    sum_, squares = (_row(group, name, "<f8", strata, cells) for name in ("sum", "squares"))
+    return sum_, squares, _row(group, "rays", "<u8", strata, cells)
+
+
+def _open(group: Node) -> Open:
+    length = group.dataset("open_cell", np.dtype(OPEN["open_cell"]), 1).shape[0]
+    cell, unit, sum_ = (_row(group, name, dtype, length) for name, dtype in OPEN.items())
+    return cell, unit, sum_
+
+
+def _dealing(group: Node) -> Dealing:
+    """Which source gives out which ray."""
+    n = len(_texts(group, "source_names"))
+    flux, rays = _row(group, "source_flux", "<f8", n), group.integer("rays")
+    pairs = zip(
+        *(_row(group, name, dtype, n) for name, dtype in (("source_set", "<i8"), ("source_set_rays", "<u8"))),
+        strict=True,
+    )
+    if not (n and np.isfinite(flux).all() and (flux > 0.0).all() and rays > 0):
+        raise group.error("dataset 'source_flux'", "it is not a positive flux of each source")
+    sets = tuple(None if number < 0 else (int(number), int(length)) for number, length in pairs)
+    return Dealing(tuple(flux.tolist()), sets, rays)
+
+
+def _row(group: Node, name: str, dtype: str, *shape: int) -> npt.NDArray[Any]:
+    data = group.dataset(name, np.dtype(dtype), len(shape))
+    if data.shape != shape:
+        raise group.error(f"dataset {name!r}", f"shape {data.shape}, expected {shape}")
     values: npt.NDArray[Any] = data[()]
     return values
 

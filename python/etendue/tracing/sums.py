@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.quantities.spool import Spool
+from etendue.scene.dealing import Array, CellSums, Counts, added
 from etendue.tracing.scattered import Scattered
 
-Array = npt.NDArray[np.float64]
-Counts = npt.NDArray[np.uint64]
+Open = tuple[npt.NDArray[np.uint32], Counts, Array]
 
 RECORD = np.dtype([("position", "<f8", 3), ("direction", "<f8", 3), ("flux", "<f8"), ("wavelength", "<f8")])
 """A ray as a ray collecting surface keeps it."""
@@ -64,8 +64,12 @@ class Sums:
         (flux, rays) of each of `ENTRIES`.
     lost_at : tuple of int or None
         The face at which the first ray of each reason was lost.
-    cells : tuple of (Σ w, Σ w², rays)
-        Of each detector; empty for those that have none.
+    cells : tuple of (Σ w, Σ w², units)
+        Of each detector, shape (strata, cells) (`Dealing`); empty for those that have none.
+    births : (Σ w, Σ w², units)
+        Of the flux of each source, and of all of them at the end, shape (strata, sources + 1).
+    open_units : tuple of (cell, unit, Σ w)
+        Of units of which more copies may come, by detector and, at the end, by source.
     collected : tuple of Collected
         Of each detector; empty for those that collect no rays.
     scattered : tuple of Scattered
@@ -78,7 +82,9 @@ class Sums:
     imbalance: float
     ledger: Mapping[str, tuple[Array, Counts]]
     lost_at: tuple[int | None, ...]
-    cells: tuple[tuple[Array, Array, Counts], ...]
+    cells: tuple[CellSums, ...]
+    births: CellSums
+    open_units: tuple[Open, ...]
     collected: tuple[Collected, ...]
     scattered: tuple[Scattered, ...]
 
@@ -93,6 +99,8 @@ class Sums:
             _entries(harvest),
             tuple(harvest["ledger"]["lost_at"]),
             tuple(harvest["cells"]),
+            harvest["births"],
+            tuple(harvest["open_units"]),
             tuple(Collected(Spool(RECORD), 0).then(rows) for rows in harvest["records"]),
             tuple(Scattered.nothing(n).then(*events) for n, events in zip(most, harvest["events"], strict=True)),
         )
@@ -107,7 +115,9 @@ class Sums:
             max(self.imbalance, harvest["imbalance"]),
             {name: (flux + entries[name][0], rays + entries[name][1]) for name, (flux, rays) in self.ledger.items()},
             tuple(a if a is not None else b for a, b in zip(self.lost_at, harvest["ledger"]["lost_at"], strict=True)),
-            tuple((a[0] + b[0], a[1] + b[1], a[2] + b[2]) for a, b in zip(self.cells, harvest["cells"], strict=True)),
+            tuple(added(a, b) for a, b in zip(self.cells, harvest["cells"], strict=True)),
+            added(self.births, harvest["births"]),
+            tuple(harvest["open_units"]),
             tuple(held.then(rows) for held, rows in zip(self.collected, harvest["records"], strict=True)),
             tuple(held.then(*events) for held, events in zip(self.scattered, harvest["events"], strict=True)),
         )

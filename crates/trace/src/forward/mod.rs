@@ -23,8 +23,9 @@ use etendue_sampling::ordered::BATCH;
 use etendue_sampling::philox::{Pairs, fill_pairs};
 use rayon::prelude::*;
 
+use crate::dealing::Dealing;
 use crate::detector::Detector;
-use crate::harvest::{Harvest, Yield};
+use crate::harvest::{Harvest, Open, Yield};
 use crate::kept::depth;
 use crate::ledger::Fate;
 use crate::meeting::{Fillings, Loss};
@@ -50,52 +51,24 @@ pub struct Run<'a> {
     pub sets: &'a [&'a dyn RaySource],
 }
 
-/// The rays of each source in batch `batch`: the first one's number among those of the source, and how many.
-///
-/// After b batches, source s has had ⌊b B `Q_s`⌋ − ⌊b B Q_{s−1}⌋ rays, Q being the sums of the shares of the flux: every
-/// beginning of a run serves all sources in proportion, and each number is known without counting.
-#[must_use]
-pub fn deal(scene: &Scene, rays: u64, batch: u64) -> Vec<Range<u64>> {
-    let bounds = |done: u64| edges(scene, done);
-    let (from, to) = (
-        bounds((batch * BATCH).min(rays)),
-        bounds(((batch + 1) * BATCH).min(rays)),
-    );
-    (0..scene.sources.len())
-        .map(|s| (from[s + 1] - from[s])..(to[s + 1] - to[s]))
-        .collect()
-}
-
-/// Rays of the first s sources among the first `done` rays.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a share of `done`"
-)]
-fn edges(scene: &Scene, done: u64) -> Vec<u64> {
-    let total: f64 = scene.sources.iter().map(|s| s.flux).sum();
-    let mut sum = 0.0;
-    let mut result = vec![0];
-    for source in &scene.sources {
-        sum += source.flux;
-        result.push(((sum / total) * done as f64).floor() as u64);
-    }
-    let last = result.len() - 1;
-    result[last] = done;
-    result
-}
-
 /// Traces batches `batches` of a run on the threads of the current pool, and merges them in order.
 #[must_use]
 pub fn trace(scene: &Scene, run: &Run<'_>, batches: Range<u64>) -> Harvest {
+    trace_on(scene, run, batches, Open::new())
+}
+
+/// As [`trace`], of a run whose earlier batches left these sums of open units.
+#[must_use]
+pub fn trace_on(scene: &Scene, run: &Run<'_>, batches: Range<u64>, open: Open) -> Harvest {
+    let dealing = Dealing::of(scene, run.rays, run.sets);
     let parts: Vec<Yield> = batches
         .clone()
         .into_par_iter()
-        .map(|b| trace_batch(scene, run, b))
+        .map(|b| trace_batch(scene, run, &dealing, b))
         .collect();
-    let mut harvest = Harvest::new(scene);
-    for part in parts {
-        harvest.add(part);
+    let mut harvest = Harvest::new(scene, &dealing, open);
+    for (part, batch) in parts.into_iter().zip(batches) {
+        harvest.add(part, &dealing, batch);
     }
     harvest
 }
@@ -104,6 +77,7 @@ pub fn trace(scene: &Scene, run: &Run<'_>, batches: Range<u64>) -> Harvest {
 struct Walk<'a> {
     scene: &'a Scene,
     run: &'a Run<'a>,
+    dealing: &'a Dealing,
     pairs: Pairs,
     fillings: Fillings,
     /// The rays of the block as they were born: the first one's number in the run, and what they carry.
@@ -129,9 +103,20 @@ struct Walk<'a> {
     out: Yield,
 }
 
-fn trace_batch(scene: &Scene, run: &Run<'_>, batch: u64) -> Yield {
-    let mut walk = Walk::new(scene, run);
+fn trace_batch(scene: &Scene, run: &Run<'_>, dealing: &Dealing, batch: u64) -> Yield {
+    let mut walk = Walk::new(scene, run, dealing);
     walk.batch(batch);
+    let copied = walk.out.marks.iter_mut().flatten();
+    dealing.units(batch, copied.map(|(_, ray, _)| ray));
+    dealing.units(batch, walk.out.copies.iter_mut().map(|(_, ray, _)| ray));
+    // Copies follow each other: one mark for all of them.
+    walk.out.copies.dedup_by(|next, first| {
+        let same = (next.0, next.1) == (first.0, first.1);
+        if same {
+            first.2 += next.2;
+        }
+        same
+    });
     walk.out
 }
 
@@ -139,7 +124,8 @@ fn trace_batch(scene: &Scene, run: &Run<'_>, batch: u64) -> Yield {
 /// `far` from its last turn.
 #[must_use]
 pub fn trails(scene: &Scene, run: &Run<'_>, far: f64) -> Vec<Vec<Vec3>> {
-    let mut walk = Walk::new(scene, run);
+    let dealing = Dealing::of(scene, run.rays, run.sets);
+    let mut walk = Walk::new(scene, run, &dealing);
     walk.trails = Some(Vec::new());
     walk.sorter = Sorter::new(scene, Vec::new());
     walk.far = far;
@@ -148,10 +134,11 @@ pub fn trails(scene: &Scene, run: &Run<'_>, far: f64) -> Vec<Vec<Vec3>> {
 }
 
 impl<'a> Walk<'a> {
-    fn new(scene: &'a Scene, run: &'a Run<'a>) -> Self {
+    fn new(scene: &'a Scene, run: &'a Run<'a>, dealing: &'a Dealing) -> Self {
         Self {
             scene,
             run,
+            dealing,
             pairs: Pairs::new(run.seed, PURPOSE_TRACE),
             fillings: Fillings::new(scene),
             first: 0,
@@ -175,15 +162,15 @@ impl<'a> Walk<'a> {
     fn batch(&mut self, batch: u64) {
         let (scene, run) = (self.scene, self.run);
         let mut births = RayBatch::default();
-        let totals = edges(scene, run.rays);
         self.first = batch * BATCH;
-        for (number, range) in deal(scene, run.rays, batch).into_iter().enumerate() {
+        for (number, range) in self.dealing.batch(batch).into_iter().enumerate() {
             let source = &scene.sources[number];
-            let count = totals[number + 1] - totals[number];
+            let count = self.dealing.count(number);
             let mut start = range.start;
             while start < range.end {
                 let stop = (start + BLOCK as u64).min(range.end);
                 source.emit(number as u64, start..stop, count, run.seed, run.sets, &mut births);
+                self.count(&births, number);
                 self.begin(&births, number, start);
                 self.finish();
                 for kept in &mut self.out.events {
@@ -192,6 +179,28 @@ impl<'a> Walk<'a> {
                 self.first += stop - start;
                 start = stop;
             }
+        }
+    }
+
+    /// Counts the rays that a source gave out.
+    #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 sources")]
+    fn count(&mut self, births: &RayBatch, number: usize) {
+        let (fluxes, all) = (&births.flux[..births.len], self.scene.sources.len());
+        if self.dealing.stratum_of(number) > 0 {
+            for cell in [number, all] {
+                let marks = (self.first..).zip(fluxes).map(|(ray, flux)| (cell as u32, ray, *flux));
+                self.out.copies.extend(marks);
+            }
+            return;
+        }
+        let sums = fluxes
+            .iter()
+            .fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
+        for cell in [number, all] {
+            let cell = &mut self.out.born[cell];
+            cell.sum += sums.0;
+            cell.squares += sums.1;
+            cell.rays += births.len as u64;
         }
     }
 

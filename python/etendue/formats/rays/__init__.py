@@ -174,7 +174,7 @@ def write_rays(
             rays = rays.without_spectrum()
             notes = (f"{chosen.title} holds wavelengths and spectra of rays beside W only: they are left out, for lm.",)
     with atomic_output(path) as temporary:
-        return (*notes, *chosen.write(rays, temporary))
+        return (*notes, *chosen.write(rays, temporary), *rays.notes)
 
 
 def _format_named(name: str) -> RayFormat:

@@ -1,0 +1,276 @@
+//! Which source gives out which ray of a run, and which rays of a run are copies of one another.
+//!
+//! A set of n rays that has to give out more than n of them gives out each several times, and sources may share a set. Copies
+//! of one ray are not independent of each other: the light field that a set is a sample of is known no better by them. What
+//! is independent is called a *unit* here: a ray of its own, or a ray of a set with all its copies. Units of one *stratum*
+//! were drawn alike: stratum 0 has the rays of their own, each set with copies is a stratum of its own.
+
+use std::ops::Range;
+
+use etendue_geometry::RaySource;
+use etendue_optics::source::Emitter;
+use etendue_sampling::ordered::BATCH;
+
+use crate::scene::Scene;
+
+/// More rays than a run has: longer sets are never given out twice by one source.
+const LONGEST: u64 = 1 << 50;
+
+/// The rays of a run, dealt to its sources.
+#[derive(Clone, Debug)]
+pub struct Dealing {
+    /// Of the whole run.
+    rays: u64,
+    /// Sums of the sources' shares of the flux.
+    shares: Vec<f64>,
+    /// Rays of each source in the whole run.
+    counts: Vec<u64>,
+    /// The stratum of each source.
+    stratum: Vec<usize>,
+    /// For each stratum its first unit; at the end, the first number that is none. Rays of their own are their own units.
+    units: Vec<u64>,
+}
+
+impl Dealing {
+    /// A run of `rays` rays of sources with these fluxes and, of those that give out rays of a set, its number and length.
+    #[must_use]
+    pub fn new(fluxes: &[f64], sets: &[Option<(usize, u64)>], rays: u64) -> Self {
+        let total: f64 = fluxes.iter().sum();
+        let mut sum = 0.0;
+        let mut shares = vec![0.0];
+        for flux in fluxes {
+            sum += flux;
+            shares.push(sum / total);
+        }
+        let mut dealing = Self {
+            rays,
+            shares,
+            counts: Vec::new(),
+            stratum: vec![0; fluxes.len()],
+            units: vec![0, rays],
+        };
+        dealing.counts = dealing.edges(rays).windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let mut strata: Vec<usize> = Vec::new();
+        for (source, set) in sets.iter().enumerate() {
+            let Some((number, length)) = *set else { continue };
+            let shared = sets.iter().flatten().filter(|other| other.0 == number).count() > 1;
+            if (shared || dealing.counts[source] > length) && (1..LONGEST).contains(&length) {
+                let known = strata.iter().position(|other| *other == number);
+                let place = known.unwrap_or_else(|| {
+                    strata.push(number);
+                    dealing.units.push(dealing.units[strata.len()] + length);
+                    strata.len() - 1
+                });
+                dealing.stratum[source] = place + 1;
+            }
+        }
+        dealing
+    }
+
+    /// A run of `rays` rays of a scene.
+    #[must_use]
+    pub fn of(scene: &Scene, rays: u64, sets: &[&dyn RaySource]) -> Self {
+        let fluxes: Vec<f64> = scene.sources.iter().map(|source| source.flux).collect();
+        let set = |emitter: &Emitter| match emitter {
+            Emitter::Rays { set, .. } => Some((*set, sets[*set].len())),
+            _ => None,
+        };
+        let sets: Vec<_> = scene.sources.iter().map(|source| set(&source.emitter)).collect();
+        Self::new(&fluxes, &sets, rays)
+    }
+
+    /// Number of sources.
+    #[must_use]
+    pub const fn sources(&self) -> usize {
+        self.counts.len()
+    }
+
+    /// Number of strata.
+    #[must_use]
+    pub const fn strata(&self) -> usize {
+        self.units.len() - 1
+    }
+
+    /// Rays of a source in the whole run.
+    #[must_use]
+    pub fn count(&self, source: usize) -> u64 {
+        self.counts[source]
+    }
+
+    /// The stratum of a source's rays.
+    #[must_use]
+    pub fn stratum_of(&self, source: usize) -> usize {
+        self.stratum[source]
+    }
+
+    /// Rays of the first s sources among the first `done` rays.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of `done`"
+    )]
+    fn edges(&self, done: u64) -> Vec<u64> {
+        let mut edges: Vec<u64> = self.shares.iter().map(|q| (q * done as f64).floor() as u64).collect();
+        if let Some(last) = edges.last_mut() {
+            *last = done;
+        }
+        edges
+    }
+
+    /// Rays of each source among the first `done` rays.
+    fn dealt(&self, done: u64) -> impl Iterator<Item = u64> {
+        let edges = self.edges(done);
+        (1..edges.len()).map(move |s| edges[s] - edges[s - 1])
+    }
+
+    /// The rays of each source in batch `batch`, counted among those of the source.
+    ///
+    /// After b batches, source s has had ⌊b B `Q_s`⌋ − ⌊b B Q_{s−1}⌋ rays, Q being the sums of the shares of the flux: every
+    /// beginning of a run serves all sources in proportion, and each number is known without counting.
+    #[must_use]
+    pub fn batch(&self, batch: u64) -> Vec<Range<u64>> {
+        let (from, to) = (batch * BATCH, (batch + 1) * BATCH);
+        let from = self.dealt(from.min(self.rays));
+        from.zip(self.dealt(to.min(self.rays)))
+            .map(|(from, to)| from..to)
+            .collect()
+    }
+
+    /// The unit of ray `i` of a source that gives out a set with copies.
+    #[allow(clippy::cast_possible_truncation, reason = "a quotient below the set's length")]
+    fn unit(&self, source: usize, i: u64) -> u64 {
+        let first = self.units[self.stratum[source]];
+        let length = self.units[self.stratum[source] + 1] - first;
+        first + (u128::from(i) * u128::from(length) / u128::from(self.counts[source])) as u64
+    }
+
+    /// The units of rays of one batch, by their numbers in the run.
+    pub fn units<'a>(&self, batch: u64, rays: impl Iterator<Item = &'a mut u64>) {
+        if self.strata() == 1 {
+            return;
+        }
+        let ranges = self.batch(batch);
+        let mut firsts = vec![batch * BATCH];
+        firsts.extend(ranges.iter().scan(batch * BATCH, |first, range| {
+            *first += range.end - range.start;
+            Some(*first)
+        }));
+        for ray in rays {
+            let source = firsts.partition_point(|first| first <= ray) - 1;
+            if self.stratum.get(source).is_some_and(|stratum| *stratum > 0) {
+                *ray = self.unit(source, ranges[source].start + (*ray - firsts[source]));
+            }
+        }
+    }
+
+    /// The stratum of a unit.
+    #[inline]
+    #[must_use]
+    pub fn stratum(&self, unit: u64) -> usize {
+        if unit < self.rays {
+            return 0;
+        }
+        self.units.partition_point(|first| *first <= unit) - 1
+    }
+
+    /// For each stratum the first unit of which rays may come after `done` rays.
+    #[must_use]
+    pub fn ahead(&self, done: u64) -> Vec<u64> {
+        let mut ahead = self.units[1..].to_vec();
+        ahead[0] = 0;
+        for (source, dealt) in self.dealt(done).enumerate() {
+            if self.stratum[source] > 0 && dealt < self.counts[source] {
+                let next = self.unit(source, dealt);
+                let least = &mut ahead[self.stratum[source]];
+                *least = (*least).min(next);
+            }
+        }
+        ahead
+    }
+
+    /// For each stratum how many units there are among the first `done` rays. Sources that go through parts of one set are
+    /// taken to meet different rays of it, unless they are as long as each other.
+    #[must_use]
+    pub fn done(&self, done: u64) -> Vec<u64> {
+        let mut found = vec![0; self.strata()];
+        let mut parts: Vec<(usize, u64, u64)> = Vec::new();
+        for (source, dealt) in self.dealt(done).enumerate() {
+            let stratum = self.stratum[source];
+            if stratum == 0 {
+                found[0] += dealt;
+            } else if dealt > 0 {
+                let length = self.units[stratum + 1] - self.units[stratum];
+                let met = if self.counts[source] > length {
+                    self.unit(source, dealt - 1) - self.units[stratum] + 1
+                } else {
+                    dealt
+                };
+                parts.push((stratum, self.counts[source].min(length), met));
+            }
+        }
+        parts.sort_unstable();
+        for same in parts.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let (stratum, _, met) = same[same.len() - 1];
+            let length = self.units[stratum + 1] - self.units[stratum];
+            found[stratum] = (found[stratum] + met).min(length);
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    /// A lamp of its own, a set of 1000 rays given out many times, one of 10⁶ given out in part, one that two sources share.
+    fn dealing() -> Dealing {
+        let sets = [None, Some((0, 1000)), Some((1, 1_000_000)), Some((2, 7)), Some((2, 7))];
+        Dealing::new(&[0.3, 1.7, 0.25, 0.05, 0.11], &sets, 5 * BATCH + 1234)
+    }
+
+    #[test]
+    fn sets_with_copies_are_strata_of_their_own() {
+        let dealing = dealing();
+        assert_eq!(dealing.stratum, [0, 1, 0, 2, 2]);
+        assert_eq!(dealing.strata(), 3);
+        assert_eq!(dealing.done(dealing.rays)[1..], [1000, 7]);
+        let own = dealing.count(0) + dealing.count(2);
+        assert_eq!(dealing.done(dealing.rays)[0], own);
+        assert_eq!(Dealing::new(&[1.0], &[Some((0, 1000))], 1000).strata(), 1);
+        assert_eq!(Dealing::new(&[1.0], &[Some((0, 1000))], 1001).strata(), 2);
+    }
+
+    #[test]
+    fn every_ray_has_one_unit_and_none_comes_back_that_is_passed() {
+        let dealing = dealing();
+        let (mut met, mut all) = (BTreeSet::new(), 0);
+        for batch in 0..6 {
+            let (from, to) = (batch * BATCH, ((batch + 1) * BATCH).min(dealing.rays));
+            let mut units: Vec<u64> = (from..to).collect();
+            let ahead = dealing.ahead(from);
+            dealing.units(batch, units.iter_mut());
+            all += units.len() as u64;
+            assert!(units.iter().all(|u| *u >= ahead[dealing.stratum(*u)]));
+            met.extend(units.iter().filter(|u| dealing.stratum(**u) > 0).copied());
+            let found = |stratum| met.iter().filter(|u| dealing.stratum(**u) == stratum).count() as u64;
+            assert_eq!(dealing.done(to)[1..], [found(1), found(2)]);
+            // What is still open was given out already.
+            let ahead = dealing.ahead(to);
+            assert!((1..3).all(|s| to == dealing.rays || met.contains(&ahead[s]) || met.contains(&(ahead[s] - 1))));
+        }
+        assert_eq!(all, dealing.rays);
+        assert_eq!(met.len(), 1007);
+    }
+
+    #[test]
+    fn sources_that_share_a_set_meet_the_same_rays_of_it() {
+        let dealing = Dealing::new(&[1.0, 1.0], &[Some((0, 1 << 20)), Some((0, 1 << 20))], 2 * BATCH);
+        assert_eq!(dealing.strata(), 2);
+        assert_eq!(dealing.done(2 * BATCH), [0, BATCH]);
+        let mut units: Vec<u64> = (0..BATCH).collect();
+        dealing.units(0, units.iter_mut());
+        let distinct: BTreeSet<u64> = units.into_iter().collect();
+        assert_eq!(distinct.len() as u64, BATCH / 2);
+    }
+}

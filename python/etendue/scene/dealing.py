@@ -1,0 +1,108 @@
+"""Which source gives out which ray of a run, and which rays are copies of one another: what errors rest on."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+
+Array = npt.NDArray[np.float64]
+Counts = npt.NDArray[np.uint64]
+CellSums = tuple[Array, Array, Counts]
+"""Σ w, Σ w² and number of units of each cell, shape (strata, cells)."""
+
+
+def added(a: CellSums, b: CellSums) -> CellSums:
+    """The sums of both."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@dataclasses.dataclass(frozen=True)
+class Dealing:
+    """The rays of a run, dealt to its sources in proportion to their flux.
+
+    A source of n rays that gives out more than n gives out each several times, and sources may share a set. Copies of one
+    ray are not independent of each other. What is independent is called a *unit*: a ray of its own, or a ray of a set with
+    all its copies. Units of one *stratum* are alike: stratum 0 has the rays of their own, and each set of which copies are
+    given out is a stratum.
+
+    Parameters
+    ----------
+    flux : tuple of float
+        Of each source [flux unit].
+    sets : tuple of (int, int) or None
+        Number and length of the set whose rays a source gives out; None: it draws its own.
+    rays : int
+        Of the whole run.
+
+    Examples
+    --------
+    >>> dealing = Dealing((30.0, 70.0), ((0, 2000), None), 100_000)
+    >>> dealing.strata, dealing.done(100_000).tolist()         # 15 copies of each ray of the set, and the rays of the other
+    (2, [70000, 2000])
+    """
+
+    flux: tuple[float, ...]
+    sets: tuple[tuple[int, int] | None, ...]
+    rays: int
+
+    @classmethod
+    def of(cls, sources: list[Mapping[str, Any]], rays: int) -> Dealing:
+        """Of the sources of a compiled scene."""
+        known: list[Any] = []
+        sets: list[tuple[int, int] | None] = []
+        for source in sources:
+            if source["kind"] != "rays":
+                sets.append(None)
+                continue
+            number = next((i for i, held in enumerate(known) if held is source["rays"]), len(known))
+            known += [source["rays"]] if number == len(known) else []
+            sets.append((number, len(source["rays"])))
+        return cls(tuple(float(source["flux"]) for source in sources), tuple(sets), rays)
+
+    @cached_property
+    def core(self) -> _core.Dealing:
+        """As the core knows it."""
+        return _core.Dealing(list(self.flux), list(self.sets), self.rays)
+
+    @property
+    def strata(self) -> int:
+        """Number of strata."""
+        return self.core.strata
+
+    def done(self, rays: int) -> npt.NDArray[np.int64]:
+        """Units of each stratum among the first `rays` rays, shape (strata,)."""
+        return np.array(self.core.done(rays), dtype=np.int64)
+
+    def variance(self, cells: CellSums, rays: int) -> Array:
+        """Variance of Σ w of each cell over the first `rays` rays, shape (cells,).
+
+        A unit adds w to a cell, mostly 0. The n units of a stratum are independent of each other and alike, so that the
+        variance of their sum is n times that of w: n/(n − 1) (Σ w² − (Σ w)²/n). NaN where light is that of one ray of a set:
+        what another one would have done is unknown.
+        """
+        sum_, squares, count = cells
+        units = self.done(rays).astype(np.float64)[:, None]
+        variance = np.maximum(squares - sum_ * sum_ / np.maximum(units, 1.0), 0.0)
+        # Rays of their own are many; of a set of few rays the last factor matters.
+        factor = np.divide(units, units - 1.0, out=np.full_like(units, np.nan), where=units > 1.0)
+        factor[0] = 1.0
+        total: Array = np.where(count > 0, variance * factor, 0.0).sum(axis=0)
+        return total
+
+    def copied(self) -> Iterator[tuple[int, list[int]]]:
+        """Each stratum of copies, with the numbers of its sources."""
+        of_source = [stratum for stratum, _ in self.core.sources()]
+        for stratum in range(1, self.strata):
+            yield stratum, [i for i, held in enumerate(of_source) if held == stratum]
+
+    def most_copies(self) -> float:
+        """Largest number of copies of a ray, on average over its set; 1 if there are none."""
+        units, counts = self.core.done(self.rays), [count for _, count in self.core.sources()]
+        return max([1.0, *(sum(counts[i] for i in sources) / units[j] for j, sources in self.copied() if units[j])])
