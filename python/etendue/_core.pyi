@@ -309,7 +309,7 @@ class Dealing:
     def done(self, done: int) -> list[int]:
         """Units of each stratum among the first `done` rays."""
 
-    def units(self, rays: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint64]]:
+    def units(self, rays: npt.NDArray[np.uint64]) -> list[npt.NDArray[np.uint64]]:
         """The unit of each ray and its stratum, by the rays' numbers in the run."""
 
 def losses() -> list[str]:

@@ -95,7 +95,9 @@ def test_a_set_beside_another_source_keeps_its_errors() -> None:
 
 
 def test_until_is_not_reached_by_copies() -> None:
-    scene = et.Scene(sources=[{"kind": "rays", "rays": lopsided(500, 3)}, {"kind": "point", "flux": 1}], detectors=[GRID])
+    scene = et.Scene(
+        sources=[{"kind": "rays", "rays": lopsided(500, 3)}, {"kind": "point", "flux": 1}], detectors=[GRID]
+    )
     result = et.trace(scene, 3 * ROUND * _core.batch_size(), until=0.02)
     assert result.complete
     assert result.relative_error > 0.05

@@ -44,13 +44,13 @@ impl Dealing {
         &self,
         py: Python<'py>,
         rays: PyReadonlyArray1<'py, u64>,
-    ) -> PyResult<(Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<u64>>)> {
+    ) -> PyResult<[Bound<'py, PyArray1<u64>>; 2]> {
         let mut units = rays.as_slice()?.to_vec();
         for same in units.chunk_by_mut(|a, b| *a / BATCH == *b / BATCH) {
             let batch = same[0] / BATCH;
             self.0.units(batch, same.iter_mut());
         }
         let strata: Vec<u64> = units.iter().map(|unit| self.0.stratum(*unit) as u64).collect();
-        Ok((PyArray1::from_vec(py, units), PyArray1::from_vec(py, strata)))
+        Ok([PyArray1::from_vec(py, units), PyArray1::from_vec(py, strata)])
     }
 }

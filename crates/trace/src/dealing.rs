@@ -53,8 +53,8 @@ impl Dealing {
         let mut strata: Vec<usize> = Vec::new();
         for (source, set) in sets.iter().enumerate() {
             let Some((number, length)) = *set else { continue };
-            let shared = sets.iter().flatten().filter(|other| other.0 == number).count() > 1;
-            if (shared || dealing.counts[source] > length) && (1..LONGEST).contains(&length) {
+            let several = sets.iter().flatten().filter(|other| other.0 == number).count() > 1;
+            if (several || dealing.counts[source] > length) && (1..LONGEST).contains(&length) {
                 let known = strata.iter().position(|other| *other == number);
                 let place = known.unwrap_or_else(|| {
                     strata.push(number);
