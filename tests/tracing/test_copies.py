@@ -1,4 +1,4 @@
-"""Sets that give out more rays than they hold: copies of a ray are not independent, and errors are those of distinct rays."""
+"""Sets that give out more rays than they hold: copies are not independent, and errors are those of distinct rays."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_errors_are_those_of_the_distinct_rays(n: int, rays: int) -> None:
 
 
 def test_a_set_beside_another_source_keeps_its_errors() -> None:
-    """Two sources: the variance of a cell is that of the set's rays and of the other's; the other's grows with its rays only."""
+    """The variance of a cell is that of the set's rays and of the other source's."""
     lamp = lopsided(2000, 7)
     point = {"name": "pilot", "kind": "point", "flux": 300, "at": [0, 0, 5]}
     both = et.trace(et.Scene(sources=[{"name": "led", "kind": "rays", "rays": lamp, "flux": 700}, point],
@@ -236,8 +236,8 @@ def ball(lamp: et.RaySet) -> et.Scene:
 
 
 def truth() -> Array:
-    """Illuminance of the cells: by the wall, whose exitance is even, ρ/(1 − ρ) Φ/(4π R²); by the lamp, I = Φ cos θ/π about its
-    axis; by the point, I = Φ/4π; the last two by quadrature over each cell."""
+    """Illuminance of the cells: by the wall, whose exitance is even, ρ/(1 − ρ) Φ/(4π R²); by the lamp, I = Φ cos θ/π about
+    its axis; by the point, I = Φ/4π; the last two by quadrature over each cell."""
     right, up = axes()
     node, weight = np.polynomial.legendre.leggauss(48)
     step = (np.arange(2)[:, None] + 0.5 + node / 2) / 2 - 0.5

@@ -396,10 +396,9 @@ class RaySet(RayOperations, RayUnits, RayStream):
         copies = self._meaning.copies
         if copies <= 1.0:
             return ()
-        return (
-            f"up to {copies:,.4g} of the rays are copies of one ray of a set: standard errors made as if all were "
-            f"independent of each other are too small, up to {math.sqrt(copies):,.3g} times",
-        )
+        found = f"up to {copies:,.4g} of the rays are copies of one ray of a set"
+        told = f"errors made as if all were independent are too small, up to {math.sqrt(copies):,.3g} times"
+        return (f"{found}: standard {told}",)
 
     @property
     def complaints(self) -> tuple[Complaint, ...]:

@@ -19,7 +19,14 @@ CellSums = tuple[Array, Array, Counts]
 
 
 def added(a: CellSums, b: CellSums) -> CellSums:
-    """The sums of both."""
+    """The sums of both.
+
+    Examples
+    --------
+    >>> one = np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1), np.uint64)
+    >>> added(one, one)[2].tolist()
+    [[2]]
+    """
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
