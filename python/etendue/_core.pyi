@@ -299,7 +299,6 @@ class Dealing:
     """The rays of a run, dealt to sources: their fluxes, and number and length of the set that each gives out, if any."""
 
     def __new__(cls, fluxes: Sequence[float], sets: Sequence[tuple[int, int] | None], rays: int) -> Dealing: ...
-    @property
     def strata(self) -> int:
         """Number of strata: the rays of their own, and each set of which copies are given out."""
 

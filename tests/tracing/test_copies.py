@@ -137,7 +137,7 @@ def test_what_one_ray_says_has_no_error() -> None:
 # --- through scattering surfaces ---------------------------------------------------------------------------------------
 
 
-def room(*lamps: et.RaySet, **more: Any) -> et.Scene:
+def room(*lamps: et.RaySet, most: int = 10**6, **more: Any) -> et.Scene:
     """A diffuse wall that lights of few rays shine at, beside a source of its own; every kind of detector."""
     keys: dict[str, Any] = {
         "sources": [
@@ -150,7 +150,7 @@ def room(*lamps: et.RaySet, **more: Any) -> et.Scene:
             {"name": "far", "kind": "intensity", "c_planes": 6, "gamma_step": 30},
             GRID,
             {"name": "eye", "kind": "image", "observer": "side"},
-            {"name": "scatter", "kind": "scatter", "most": 10**5},
+            {"name": "scatter", "kind": "scatter", "most": most},
             {"name": "rcs", "kind": "rays", "shape": {"kind": "rectangle", "width": 60, "height": 60}, "at": [0, 0, 10]},
         ],
         "observers": [{"name": "side", "theta": 150, "phi": 190, "distance": 200, "target": [3, 0, 22],
@@ -167,8 +167,8 @@ def bits(result: TraceResult) -> list[Any]:
 
 def test_the_same_bits_for_threads_and_after_stops(tmp_path: Path) -> None:
     """Three rays and five, whose copies are on their way at the end of every batch and round."""
-    scene = room(lopsided(3, 1), lopsided(5, 2), detectors=[d for d in room().detectors if d.name != "rcs"])
-    n = (ROUND + 1.5) * _core.batch_size()
+    scene = room(lopsided(3, 1), lopsided(5, 2), detectors=[d for d in room(most=10**5).detectors if d.name != "rcs"])
+    n = (ROUND + 1.25) * _core.batch_size()
     whole = et.trace(scene, n, 3, threads=2)
     first = next(et.trace_rounds(scene, n, 3, threads=7))
     assert sum(len(cell) for cell, _, _ in first.sums.open_units) > 20

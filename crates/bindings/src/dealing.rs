@@ -23,7 +23,6 @@ impl Dealing {
     }
 
     /// Number of strata.
-    #[getter]
     const fn strata(&self) -> usize {
         self.0.strata()
     }

@@ -81,7 +81,7 @@ class Dealing:
     @property
     def strata(self) -> int:
         """Number of strata."""
-        return self.core.strata
+        return self.core.strata()
 
     def done(self, rays: int) -> npt.NDArray[np.int64]:
         """Units of each stratum among the first `rays` rays, shape (strata,)."""
