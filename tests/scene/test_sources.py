@@ -168,6 +168,20 @@ def test_a_light_field(tmp_path: Path) -> None:
     assert source(sources.Field(field=field, flux=5))["flux"] == 5.0
 
 
+def test_a_gridded_source_has_the_flux_of_its_rays() -> None:
+    """Coarse bins do not hold the flux of the rays; one factor over all patches gives it back."""
+    rng = np.random.default_rng(3)
+    position = np.column_stack([rng.random((4000, 2)) * [3, 2], np.zeros(4000)])
+    direction = np.column_stack([rng.normal(size=(4000, 2)) * [0.4, 0.2] + [0.1, 0.3], np.ones(4000)])
+    lamp = et.RaySet(position, direction, np.full(4000, 500 / 4000))
+    grid = et.GriddedSource.fit(lamp, et.Plane(z=0), 1.0, 2.0)
+    assert abs(grid.table_flux / 500 - 1) > 0.004
+    scene = et.Scene(sources=[{"name": "led", "kind": "gridded", "gridded": grid, "draws": 5000, "wavelength": 600}])
+    result = et.trace(scene, rays=None)
+    assert result.ledger.total.flux == pytest.approx(500, rel=1e-9)
+    assert any(f"multiplied by {500 / grid.table_flux:.7g}, to 500 lm" in note for note in result.notes)
+
+
 def test_a_gridded_source_is_the_rays_that_it_draws(tmp_path: Path) -> None:
     """From a file and from memory: the same bits as drawn by hand, with the flux of the tables or the one that is stated."""
     made = et.RingSource(rays=20_000)
@@ -180,7 +194,7 @@ def test_a_gridded_source_is_the_rays_that_it_draws(tmp_path: Path) -> None:
     by_file = {"kind": "gridded", "file": "rings.tm25ray", **keys}
     scene = Scene.from_dict({"sources": [by_file]}, folder=tmp_path)
     in_memory = sources.Gridded(gridded=grid, draws=1000, seed=7, flux=5)
-    for record, flux in ((compile_scene(scene).record["sources"][0], grid.table_flux), (source(in_memory), 5.0)):
+    for record, flux in ((compile_scene(scene).record["sources"][0], grid.total_flux), (source(in_memory), 5.0)):
         found = _core.read_rays(record["rays"], 0, 1000)
         assert np.array_equal(found[0], drawn.position)
         assert record["flux"] == pytest.approx(flux, rel=1e-9)

@@ -282,6 +282,7 @@ class _Compiler:
                         }
                     )
                     self.names["sources"].append(f"{name}.{emitter.name}" if emitter.name else name)
+                    self.notes += [f"{name}: {note}" for note in emitter.flux_notes]
                     if source.wavelength is None and source.spectrum is None:
                         self.notes += [f"{name}: {note}" for note in emitter.notes]
         if len(units) > 1:

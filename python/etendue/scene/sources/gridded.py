@@ -39,7 +39,7 @@ class Gridded(Source):
     seed : int
         Of the draws.
     flux : number, optional
-        Total flux that overrides that of the tables [the file's own unit].
+        Total flux that overrides that of the rays on patches [the file's own unit].
 
     Examples
     --------
@@ -75,16 +75,19 @@ class Gridded(Source):
         """The source as one of the rays that are drawn, in its place: what can be fitted and then seen."""
         gridded = self._gridded(files)
         place = {key: getattr(self, key) for key in (*Source.model_fields, *Placement.model_fields)}
-        return Rays(**place, rays=gridded.sample(self.draws, self.seed), flux=self.flux, flux_unit=gridded.flux_unit)
+        flux = gridded.total_flux if self.flux is None else self.flux
+        return Rays(**place, rays=gridded.sample(self.draws, self.seed), flux=flux, flux_unit=gridded.flux_unit)
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
-        """The rays that were drawn."""
+        """The rays that were drawn, with the flux of the rays on patches, which tables of coarse bins do not hold."""
         gridded = self._gridded(files)
         drawn = gridded.sample(self.draws, self.seed)
-        flux = drawn.total_flux if self.flux is None else self.flux
+        flux = gridded.total_flux if self.flux is None else self.flux
         scale = drawn.flux_scale * flux / drawn.total_flux
         record = {"kind": "rays", "rays": drawn.core_source(), "scale": scale, "flux": flux}
-        return (Emitter(record, gridded.flux_unit),)
+        unit, factor = gridded.flux_unit, flux / drawn.total_flux
+        note = f"the tables hold {drawn.total_flux:.7g} {unit}; what is drawn from them is multiplied by {factor:.7g}"
+        return (Emitter(record, unit, flux_notes=(f"{note}, to {flux:.7g} {unit}",)),)
 
     def _gridded(self, files: Files) -> GriddedSource:
         gridded = self.gridded

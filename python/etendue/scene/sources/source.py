@@ -36,7 +36,9 @@ class Emitter:
     name : str
         Within the source, if it is made of several.
     notes : tuple of str
-        What the user should know.
+        What the user should know of the colours, unless they are stated.
+    flux_notes : tuple of str
+        What the user should know of the flux.
 
     Examples
     --------
@@ -49,6 +51,7 @@ class Emitter:
     spectrum: Spectrum | None = None
     name: str = ""
     notes: tuple[str, ...] = ()
+    flux_notes: tuple[str, ...] = ()
 
 
 class Source(Placement, abc.ABC):
