@@ -284,7 +284,7 @@ def test_info_counts_and_names_defects(run: Run, folder: Path) -> None:
 def test_info_tells_the_wavelengths_that_are_known(run: Run, tmp_path: Path, folder: Path) -> None:
     data = bytearray((folder / "watts.tm25ray").read_bytes())
     rays = et.read_rays(folder / "watts.tm25ray").records
-    first = len(data) - rays.nbytes + rays.dtype.fields["wavelength"][1]  # type: ignore[index]
+    first = len(data) - len(rays) * rays.itemsize + rays.dtype.fields["wavelength"][1]  # type: ignore[index]
     for index, stored in ((0, math.nan), (7, math.inf)):
         data[first + index * rays.itemsize : first + index * rays.itemsize + 4] = np.float32(stored).tobytes()
     (tmp_path / "odd.tm25ray").write_bytes(data)
