@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import hypothesis
@@ -10,6 +11,9 @@ import pytest
 # The same examples in every run: a failure is a failure, not a draw.
 hypothesis.settings.register_profile("fixed", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("fixed")
+
+# What a test fits, it fits: only the tests of the cache name a folder.
+os.environ["ETENDUE_CACHE_DIR"] = ""
 
 ROOT = Path(__file__).resolve().parents[1]
 

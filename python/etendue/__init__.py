@@ -17,6 +17,7 @@ from etendue.formats.rays.ray_index import RayIndex
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.goniophotometry.threshold_sweep import threshold_sweep
 from etendue.lightfield.diagnostics import diagnose
+from etendue.lightfield.fit_cache import cache_content, clear_cache
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, parse_surface
@@ -71,6 +72,8 @@ __all__ = [
     "Spectrum",
     "Sphere",
     "TraceResult",
+    "cache_content",
+    "clear_cache",
     "combine_maps",
     "compare",
     "cross_section",

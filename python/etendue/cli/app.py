@@ -9,7 +9,21 @@ from typing import Annotated, cast
 
 import typer
 
-from etendue.cli import compare, convert, demo, draw, filter_, fit, info, intensity, luminance, patches, sample, trace
+from etendue.cli import (
+    cache,
+    compare,
+    convert,
+    demo,
+    draw,
+    filter_,
+    fit,
+    info,
+    intensity,
+    luminance,
+    patches,
+    sample,
+    trace,
+)
 from etendue.cli.terminal import INTERRUPTED, complain, complain_of, complain_of_usage, spell_out_unknown_letters
 from etendue.errors import EtendueError, SceneWarning
 from etendue.quantities.provenance import version
@@ -33,6 +47,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "patches": patches.patches,
     "filter": filter_.filter_,
     "compare": compare.compare,
+    "cache": cache.cache,
 }
 for _name, _verb in VERBS.items():
     app.command(_name)(_verb)

@@ -124,6 +124,9 @@ def luminance(
     ] = None,
     unit: Annotated[str | None, typer.Option("--unit", help="lm or W: convert through the file's spectrum.")] = None,
     scale: Annotated[str, typer.Option("--scale", help="Colours of a picture: linear or log.")] = "linear",
+    cache: Annotated[
+        bool, typer.Option("--cache/--no-cache", help="Take light fields from those fitted before (etendue cache).")
+    ] = True,
     threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
@@ -177,6 +180,7 @@ def luminance(
                 seed=seed,
                 forward_rays=forward_rays,
                 gather=gather,
+                cache=cache,
                 threads=threads,
                 progress=progress,
             )
@@ -197,6 +201,7 @@ def luminance(
                 acceptance=cone,
                 surface=carrier,
                 samples=samples,
+                cache=cache,
                 threads=threads,
                 progress=progress,
             )

@@ -9,6 +9,7 @@ import numpy as np
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.rays.ray_index import RayIndex
+from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.probe import check_near_field
 from etendue.lightfield.surfaces import Surface
@@ -46,6 +47,7 @@ def luminance_map(
     acceptance: Acceptance = ...,
     surface: Surface | Literal["auto"] = ...,
     samples: int | None = ...,
+    cache: bool = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> LuminanceMap: ...
@@ -59,6 +61,7 @@ def luminance_map(
     acceptance: Acceptance = ...,
     surface: Surface | Literal["auto"] = ...,
     samples: int | None = ...,
+    cache: bool = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> list[LuminanceMap]: ...
@@ -73,6 +76,7 @@ def luminance_map(
     seed: int | None = ...,
     forward_rays: float | None = ...,
     gather: bool = ...,
+    cache: bool = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> LuminanceMap: ...
@@ -87,6 +91,7 @@ def luminance_map(
     seed: int | None = ...,
     forward_rays: float | None = ...,
     gather: bool = ...,
+    cache: bool = ...,
     threads: int | None = ...,
     progress: Progress | None = ...,
 ) -> list[LuminanceMap]: ...
@@ -104,6 +109,7 @@ def luminance_map(
     seed: int | None = None,
     forward_rays: float | None = None,
     gather: bool = False,
+    cache: bool = True,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> LuminanceMap | list[LuminanceMap]:
@@ -151,6 +157,9 @@ def luminance_map(
         Of a scene: lines of sight end at the second diffuse surface, whose light is then known from rays traced forwards,
         as a mean over small patches. Many times as fast where light goes to and fro between diffuse surfaces. Patches
         that light does not reach evenly are not used; the map's notes tell how it compares with lines that go on.
+    cache : bool
+        Whether a light field that has to be fitted is taken from those fitted before (`etendue.cache_content`), and kept.
+        The map is the same, bit by bit.
     threads : int, optional
         All cores if None. The result has the same bits for any number.
     progress : callable, optional
@@ -222,7 +231,7 @@ def luminance_map(
     by_cone = method == "cone" or (method == "auto" and (acceptance is not None or isinstance(source, RayIndex)))
     if isinstance(source, Scene | ScatterEvents):
         given = {name: value for name, value in for_scenes.items() if value is not None}
-        how = Looking(**given, threads=threads)  # type: ignore[arg-type]
+        how = Looking(**given, cache=cache, threads=threads)  # type: ignore[arg-type]
         if isinstance(source, Scene):
             maps = look_at_scene(source, pairs, how, progress)
         else:
@@ -241,7 +250,7 @@ def luminance_map(
             )
         for o, s in pairs:
             s.axes(o)  # a view without area is refused before the work
-        field = LightField.fit(source, surface, threads=threads, progress=progress)
+        field = fit_or_recall(source, surface, cache=cache, threads=threads, progress=progress)
         maps = [look_at_field(field, o, s, samples, threads) for o, s in pairs]
     else:
         check_near_field(source)

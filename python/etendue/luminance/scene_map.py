@@ -13,7 +13,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.formats.rays import read_rays
-from etendue.lightfield.light_field import LightField
+from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.luminance.gathering import CHECKS, FIRST_CHECK, blocks, comparison_note, survey_notes
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.luminance_map import LuminanceMap
@@ -62,6 +62,7 @@ class Looking:
     seed: int = 1
     forward_rays: float | None = None
     gather: bool = False
+    cache: bool = True
     threads: int | None = None
 
     def __post_init__(self) -> None:
@@ -137,7 +138,7 @@ def look_at_scene(
         If it has no sources, or a screen has no apparent area.
     """
     views = [screen.core_view(observer) for observer, screen in pairs]
-    seeable, notes = with_fields(scene, how.threads)
+    seeable, notes = with_fields(scene, how.threads, cache=how.cache)
     compiled = compile_scene(seeable)
     if not compiled.record["sources"]:
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
@@ -274,7 +275,7 @@ class _Passes:
         return notes
 
 
-def with_fields(scene: Scene, threads: int | None = None) -> tuple[Scene, list[str]]:
+def with_fields(scene: Scene, threads: int | None = None, *, cache: bool = True) -> tuple[Scene, list[str]]:
     """The scene with a light field in the place of each ray set, which has no luminance that could be seen; and notes.
 
     Raises
@@ -289,21 +290,21 @@ def with_fields(scene: Scene, threads: int | None = None) -> tuple[Scene, list[s
             continue
         name = source.name or f"sources[{i}]"
         rays = source.as_rays(scene.files) if isinstance(source, Gridded) else source
-        field, surface, share = _fitted(rays, scene, threads)
+        field, surface, share = _fitted(rays, scene, threads, cache=cache)
         sources.append(field)
         lost = f"; {share:.2%} of the flux does not come from it" if share > 1e-4 else ""
         notes.append(f"{name}: a light field on {surface} was fitted to its rays{lost}")
     return scene.replace(sources=tuple(sources)), notes
 
 
-def _fitted(source: Rays, scene: Scene, threads: int | None) -> tuple[Field, str, float]:
+def _fitted(source: Rays, scene: Scene, threads: int | None, *, cache: bool) -> tuple[Field, str, float]:
     """The light field of a ray source in its place, its carrier surface, and the share of the flux it does not hold."""
     rays: Any = read_rays(scene.files.find(source.file)) if source.file is not None else source.rays
     unit = source.flux_unit if source.flux_unit is not None else rays.flux_unit
     if unit != rays.flux_unit and source.flux is None and isinstance(rays, RaySet):
         rays = rays.in_unit(unit)
     (emitter,) = source.emitters(scene.files)
-    field = LightField.fit(rays, threads=threads)
+    field = fit_or_recall(rays, cache=cache, threads=threads)
     scale = emitter.record["flux"] / rays.total_flux
     wavelengths, shares = source.colours(emitter, scene.wavelength)
     place = {key: getattr(source, key) for key in Placement.model_fields}

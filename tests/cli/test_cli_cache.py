@@ -1,0 +1,26 @@
+"""The verb that shows and clears the light fields that are kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import etendue as et
+import pytest
+from etendue.lightfield.fit_cache import FOLDER_VARIABLE
+
+from cli.outcome import Run
+
+
+def test_fields_are_kept_shown_and_cleared(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "kept"))
+    et.write_rays(tmp_path / "led.tm25ray", et.RingSource(rays=3000))
+    look = ("luminance", "led.tm25ray", "--observer", "0,0", "--size", "70,70", "--pixels", "4,4", "-o", "map.npz")
+    assert run(*look, "--no-cache").status == 0
+    assert run("cache", "--json").json["fields"] == 0
+    assert run(*look).status == 0
+    assert run("cache", "--json").json["fields"] == 1
+    assert "1 light fields" in run("cache").out
+    assert "removed" in run("cache", "--clear").out
+    assert run("cache", "--json").json["fields"] == 0
+    monkeypatch.setenv(FOLDER_VARIABLE, "")
+    assert "no light fields are kept" in run("cache").out
