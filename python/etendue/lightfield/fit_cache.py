@@ -57,6 +57,11 @@ class CacheContent:
     fields : int
     size : int
         [bytes]
+
+    Examples
+    --------
+    >>> CacheContent(None, 0, 0).folder is None
+    True
     """
 
     folder: Path | None
@@ -85,6 +90,13 @@ def fit_or_recall(
     ------
     ArgumentError
         As `LightField.fit`. A cache folder that cannot be read or written is done without.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> field = fit_or_recall(et.RingSource(rays=1000), et.Disk(radius=30))
+    >>> round(field.total_flux)
+    600
     """
     if not cache or _folder() is None:
         return as_stored(LightField.fit(rays, surface, threads=threads, progress=progress))
@@ -103,7 +115,14 @@ def fit_or_recall(
 
 
 def cache_content() -> CacheContent:
-    """The cache folder, and what it holds."""
+    """The cache folder, and what it holds.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> et.cache_content().size >= 0
+    True
+    """
     folder = _folder()
     files = [] if folder is None else list(_files(folder))
     return CacheContent(folder, len(files), sum(size for _, size, _ in files))
