@@ -94,6 +94,13 @@ class _Harvest(TypedDict):
     rays: int
     imbalance: float
 
+class _Colours(TypedDict):
+    flux: _Floats
+    mean: _Floats
+    low: _Floats
+    high: _Floats
+    unknown: tuple[float, int]
+
 @final
 class StoredBytes:
     """Bytes of a file, read where they are asked for: never mapped, so that a file that shrinks is an error and no crash.
@@ -129,6 +136,7 @@ class RayTable:
         flux: int,
         double: bool,
         length_scale: float,
+        colour: tuple[int, str, float] | None = None,
     ) -> RayTable: ...
     def __len__(self) -> int: ...
 
@@ -189,8 +197,19 @@ _Source: TypeAlias = RayTable | RingSource | FieldRays
 def read_rays(source: _Source, start: int, stop: int) -> tuple[_Floats, _Floats, _Floats]:
     """Rays ``start..stop`` as (position (n, 3) [mm], unit direction (n, 3), flux (n,))."""
 
+def read_colours(source: _Source, start: int, stop: int) -> _Floats:
+    """What the records of rays ``start..stop`` state of their colours, as they were opened, shape (n,); (0,) if nothing."""
+
+def draw_wavelengths(
+    wavelengths: Sequence[float], shares: Sequence[float], seed: int, start: int, stop: int
+) -> _Floats:
+    """Wavelengths [nm] of rays ``start..stop`` of a stream that have nothing but a spectrum in common, shape (n,)."""
+
 def scan(source: _Source, threads: int | None = None, progress: _Progress | None = None) -> tuple[_Tally, _Moments]:
     """One pass over a source."""
+
+def scan_colours(source: _Source, threads: int | None = None, progress: _Progress | None = None) -> _Colours:
+    """The flux of a source by what its records say of the colour of each ray."""
 
 def cone_sums(
     source: _Source,

@@ -13,7 +13,6 @@ from etendue.errors import SceneError
 from etendue.quantities.ray_set import RaySetMeaning
 from etendue.quantities.spectrum import photopic_efficiency
 from etendue.scene import Compiled, Scene, compile_scene, detectors, sources
-from etendue.scene.sources.source import lines_of
 
 DISK = {"kind": "disk", "radius": 1}
 
@@ -109,23 +108,27 @@ def test_what_is_stated_goes_before_the_file_and_the_file_before_the_scene() -> 
     assert lines["shares"].tolist() == [0.25, 0.75]
 
 
-def test_rays_with_a_colour_each_are_told_of() -> None:
+def test_rays_with_a_colour_each_keep_it_unless_one_is_stated() -> None:
+    """Flux 1 and 3 at two wavelengths; what is stated for all goes before them, and is told."""
     coloured = rays(wavelength=[450.0, 600.0])
     found = compiled(sources.Rays(rays=coloured, name="led"))
-    assert found.record["sources"][0]["wavelengths"].tolist() == [555]
-    assert found.notes == ("led: every ray has a colour of its own in the file; state wavelength or spectrum for all",)
-    assert compiled(sources.Rays(rays=coloured, name="led", wavelength=500)).notes == ()
+    assert found.record["sources"][0]["wavelengths"].tolist() == [450, 600]
+    assert found.record["sources"][0]["shares"].tolist() == [0.25, 0.75]
+    assert found.notes == ()
+    stated = compiled(sources.Rays(rays=coloured, name="led", wavelength=500))
+    assert stated.record["sources"][0]["wavelengths"].tolist() == [500]
+    assert stated.notes == ("led: the rays' own colours are not used, because 'wavelength' is stated for all of them",)
 
 
 def test_a_spectrum_as_lines() -> None:
     """Trapezoids around the nodes; in lumens every node counts with V(λ), and the mean wavelength is that integral's."""
     nodes = np.array([400.0, 500.0, 550.0, 700.0, 900.0])
     weight = np.array([1.0, 2.0, 4.0, 1.0, 1.0])
-    wavelength, shares = lines_of(et.Spectrum(nodes, weight), "W")
+    wavelength, shares = et.Spectrum(nodes, weight).lines("W")
     widths = np.array([50.0, 75.0, 100.0, 175.0, 100.0])
     assert shares == pytest.approx(weight * widths / (weight * widths).sum())
     assert wavelength.tolist() == nodes.tolist()
-    wavelength, shares = lines_of(et.Spectrum(nodes, weight), "lm")
+    wavelength, shares = et.Spectrum(nodes, weight).lines("lm")
     bright = weight * widths * photopic_efficiency(nodes)
     assert wavelength.tolist() == nodes[:4].tolist()  # V is 0 at 900 nm
     assert shares == pytest.approx((bright / bright.sum())[:4])

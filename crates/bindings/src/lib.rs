@@ -34,7 +34,10 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<survey::Survey>()?;
     module.add_class::<dealing::Dealing>()?;
     module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;
+    module.add_function(wrap_pyfunction!(source::read_colours, module)?)?;
+    module.add_function(wrap_pyfunction!(source::draw_wavelengths, module)?)?;
     module.add_function(wrap_pyfunction!(scan::scan, module)?)?;
+    module.add_function(wrap_pyfunction!(scan::scan_colours, module)?)?;
     module.add_function(wrap_pyfunction!(cone::cone_sums, module)?)?;
     module.add_function(wrap_pyfunction!(ray_index::index_leaf, module)?)?;
     module.add_function(wrap_pyfunction!(ray_index::index_count, module)?)?;

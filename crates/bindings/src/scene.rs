@@ -8,7 +8,7 @@ use etendue_geometry::shape::{Asphere, Flat, Outline, Quadric, Shape, Torus};
 use etendue_math::{Frame, Vec3};
 use etendue_optics::finish::Finish;
 use etendue_optics::medium::{Index, Medium};
-use etendue_optics::source::{Emitter, Lantern, PointSource, Source, SurfaceSource};
+use etendue_optics::source::{Emitter, Lantern, Lines, PointSource, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_trace::detector::Detector;
 use etendue_trace::reverse::lanterns;
@@ -224,9 +224,16 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
                 sets.push(rays.unbind());
                 sets.len() - 1
             });
+            let spectra: Option<Vec<(Vec<f64>, Vec<f64>)>> = optional(dict, "spectra")?;
             Emitter::Rays {
                 set,
                 scale: get(dict, "scale")?,
+                coloured: optional(dict, "coloured")?.unwrap_or(true),
+                spectra: spectra
+                    .unwrap_or_default()
+                    .into_iter()
+                    .map(|(wavelengths, shares)| lines(wavelengths, &shares))
+                    .collect::<PyResult<_>>()?,
             }
         }
         "field" => {
@@ -252,29 +259,34 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
             .ok_or_else(|| refuse("a beam needs a flat shape of finite area"))?,
         other => return Err(refuse(format!("no source is called {other}"))),
     };
-    let wavelengths: Vec<f64> = get(dict, "wavelengths")?;
-    let shares: Vec<f64> = get(dict, "shares")?;
     let flux: f64 = get(dict, "flux")?;
-    let sound = !shares.is_empty()
-        && wavelengths.len() == shares.len()
-        && flux > 0.0
-        && flux.is_finite()
-        && shares.iter().chain(&wavelengths).all(|v| *v >= 0.0 && v.is_finite());
-    if !sound {
-        return Err(refuse("a source needs flux, and a share for each wavelength"));
+    if !(flux > 0.0 && flux.is_finite()) {
+        return Err(refuse("a source needs flux"));
     }
-    let total: f64 = shares.iter().sum();
-    let mut sum = 0.0;
-    let spectrum = wavelengths.into_iter().zip(shares).map(|(wavelength, share)| {
-        sum += share / total;
-        (wavelength, sum)
-    });
     Ok(Source {
         emitter,
         frame: frame(dict)?,
         flux,
-        spectrum: spectrum.collect(),
+        spectrum: lines(get(dict, "wavelengths")?, &get::<Vec<f64>>(dict, "shares")?)?,
     })
+}
+
+/// A spectrum from its wavelengths and their shares of the flux.
+pub fn lines(wavelengths: Vec<f64>, shares: &[f64]) -> PyResult<Lines> {
+    let total: f64 = shares.iter().sum();
+    let sound = wavelengths.len() == shares.len()
+        && total > 0.0
+        && total.is_finite()
+        && shares.iter().chain(&wavelengths).all(|v| *v >= 0.0 && v.is_finite());
+    if !sound {
+        return Err(refuse("a spectrum needs a share of the flux for each wavelength"));
+    }
+    let mut sum = 0.0;
+    let lines = wavelengths.into_iter().zip(shares).map(|(wavelength, share)| {
+        sum += share / total;
+        (wavelength, sum)
+    });
+    Ok(lines.collect())
 }
 
 fn detector(dict: &Bound<'_, PyDict>, faces: usize) -> PyResult<Detector> {

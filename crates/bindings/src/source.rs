@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use etendue_geometry::table::{Float, Layout, RayTable as CoreTable};
+use etendue_geometry::table::{Column, Float, Layout, Number, RayTable as CoreTable};
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_lightfield::field::draw::FieldRays as CoreFieldRays;
 use etendue_optics::source::{Ring, RingSource as CoreRings};
@@ -11,6 +11,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::field::FieldRays;
+use crate::scene::lines;
 use crate::stored::StoredBytes;
 
 /// Where the records of a table are.
@@ -32,7 +33,7 @@ pub struct RayTable {
 #[pymethods]
 impl RayTable {
     #[new]
-    #[pyo3(signature = (records, stride, position, direction, flux, double, length_scale))]
+    #[pyo3(signature = (records, stride, position, direction, flux, double, length_scale, colour=None))]
     #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
     fn new(
         py: Python<'_>,
@@ -43,7 +44,17 @@ impl RayTable {
         flux: usize,
         double: bool,
         length_scale: f64,
+        colour: Option<(usize, &str, f64)>,
     ) -> PyResult<Self> {
+        let column = |(offset, number, scale): (usize, &str, f64)| {
+            let number = match number {
+                "<f4" => Number::Float(Float::F32),
+                "<f8" => Number::Float(Float::F64),
+                "<i4" => Number::Integer,
+                other => return Err(PyValueError::new_err(format!("a column of {other}"))),
+            };
+            Ok(Column { offset, number, scale })
+        };
         let float = if double { Float::F64 } else { Float::F32 };
         let layout = Layout {
             stride,
@@ -51,6 +62,7 @@ impl RayTable {
             direction,
             flux,
             float,
+            colour: colour.map(column).transpose()?,
             length_scale,
         };
         let table = Self { records, layout };
@@ -178,6 +190,37 @@ pub fn with_source<R>(source: &Bound<'_, PyAny>, body: impl FnOnce(&Source<'_>) 
     let found = body(&opened.core()?);
     opened.check()?;
     found
+}
+
+/// What the records of rays `start..stop` state of their colours, as they were opened; empty if nothing.
+#[pyfunction]
+pub fn read_colours<'py>(
+    py: Python<'py>,
+    source: &Bound<'py, PyAny>,
+    start: u64,
+    stop: u64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    with_source(source, |source| {
+        let mut colours = Vec::new();
+        let range = start..stop.min(source.len());
+        py.detach(|| source.for_each_block(range, |_, batch| colours.extend_from_slice(&batch.colour)));
+        Ok(PyArray1::from_vec(py, colours))
+    })
+}
+
+/// The wavelengths of rays `start..stop` of a stream that have nothing but a spectrum in common \[nm\].
+#[pyfunction]
+pub fn draw_wavelengths<'py>(
+    py: Python<'py>,
+    wavelengths: Vec<f64>,
+    shares: Vec<f64>,
+    seed: u64,
+    start: u64,
+    stop: u64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let lines = lines(wavelengths, &shares)?;
+    let drawn = py.detach(|| etendue_optics::source::draw_wavelengths(&lines, seed, start..stop));
+    Ok(PyArray1::from_vec(py, drawn))
 }
 
 type RayArrays<'py> = (

@@ -18,6 +18,9 @@ pub struct RayBatch {
     pub direction: [Vec<f64>; 3],
     /// Flux of each ray.
     pub flux: Vec<f64>,
+    /// What the records say of each ray's colour: its wavelength \[nm\], or the number of its spectrum. Empty if they say
+    /// nothing, and unless it was asked for (see [`crate::table::Layout::colour`]).
+    pub colour: Vec<f64>,
     /// Why rays of this block could not be used, by [`Defect`].
     pub defects: [u64; Defect::COUNT],
     /// Largest | |k| − 1 | of the directions as they were stored.
@@ -50,6 +53,7 @@ impl Default for RayBatch {
             position: std::array::from_fn(|_| zeros()),
             direction: std::array::from_fn(|_| zeros()),
             flux: zeros(),
+            colour: Vec::new(),
             defects: [0; Defect::COUNT],
             norm_error: 0.0,
             room: Vec::new(),

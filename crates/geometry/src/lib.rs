@@ -2,7 +2,7 @@
 //!
 //! Rays: `batch` is a structure of arrays that the inner loops run over, `source` anything that yields rays by index, `table`
 //! records in memory or in a file, `stored` a stretch of a file, `tally` the flux account of a pass, `scan` the statistics of a
-//! ray set in one pass.
+//! ray set in one pass, `colours` its flux by wavelength.
 //!
 //! Surfaces: `shape` holds the kinds of surface, `mesh` triangles, `face` a shape in its place, `lines` a block of rays that
 //! look for surfaces, `assembly` many faces
@@ -12,6 +12,7 @@ pub mod assembly;
 pub mod batch;
 pub mod bounds;
 pub mod bvh;
+pub mod colours;
 pub mod face;
 pub mod lines;
 pub mod mesh;

@@ -24,6 +24,47 @@ impl Float {
     }
 }
 
+/// The type of a column on its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Number {
+    /// IEEE-754 binary32 or binary64.
+    Float(Float),
+    /// A signed integer of 32 bits.
+    Integer,
+}
+
+impl Number {
+    const fn size(self) -> usize {
+        match self {
+            Self::Float(float) => float.size(),
+            Self::Integer => 4,
+        }
+    }
+}
+
+/// A column on its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Column {
+    /// Offset in the record.
+    pub offset: usize,
+    /// Its type.
+    pub number: Number,
+    /// What one stored unit stands for.
+    pub scale: f64,
+}
+
+impl Column {
+    /// Its values, one for each record, behind those of a list.
+    fn append(&self, records: &[u8], stride: usize, out: &mut Vec<f64>) {
+        let each = records.chunks_exact(stride);
+        match self.number {
+            Number::Float(Float::F32) => out.extend(each.map(|r| read_f32(r, self.offset) * self.scale)),
+            Number::Float(Float::F64) => out.extend(each.map(|r| read_f64(r, self.offset) * self.scale)),
+            Number::Integer => out.extend(each.map(|r| read_i32(r, self.offset) * self.scale)),
+        }
+    }
+}
+
 /// Where the columns lie in a record \[bytes\], and what turns them into millimetres.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
@@ -37,6 +78,8 @@ pub struct Layout {
     pub flux: usize,
     /// Type of all these columns.
     pub float: Float,
+    /// What tells the colour of a ray, if passes over the table are to know it.
+    pub colour: Option<Column>,
     /// Millimetres per unit of position.
     pub length_scale: f64,
 }
@@ -82,7 +125,11 @@ impl<'a> RayTable<'a> {
             && bytes.is_multiple_of(layout.stride as u64)
             && layout.position.is_none_or(|offset| fits(offset, 3))
             && fits(layout.direction, 3)
-            && fits(layout.flux, 1);
+            && fits(layout.flux, 1)
+            && layout.colour.is_none_or(|column| {
+                let end = column.offset.checked_add(column.number.size());
+                end.is_some_and(|end| end <= layout.stride)
+            });
         valid.then(|| Self {
             store,
             len: bytes / layout.stride as u64,
@@ -125,9 +172,13 @@ impl<'a> RayTable<'a> {
     /// settled.
     pub fn gather(&self, ranges: impl Iterator<Item = Range<u64>>, batch: &mut RayBatch) {
         batch.len = 0;
+        batch.colour.clear();
         let mut room = std::mem::take(&mut batch.room);
         for range in ranges {
             let records = self.records(range, &mut room);
+            if let Some(column) = &self.layout.colour {
+                column.append(records, self.layout.stride, &mut batch.colour);
+            }
             match self.layout.float {
                 Float::F32 => decode(records, &self.layout, batch, 4, read_f32),
                 Float::F64 => decode(records, &self.layout, batch, 8, read_f64),
@@ -150,6 +201,15 @@ fn read_f32(record: &[u8], offset: usize) -> f64 {
 fn read_f64(record: &[u8], offset: usize) -> f64 {
     let b = &record[offset..offset + 8];
     f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]])
+}
+
+fn read_i32(record: &[u8], offset: usize) -> f64 {
+    f64::from(i32::from_le_bytes([
+        record[offset],
+        record[offset + 1],
+        record[offset + 2],
+        record[offset + 3],
+    ]))
 }
 
 /// One pass over the records with the column reader known at compile time; they come behind those of the batch.
@@ -195,6 +255,7 @@ mod tests {
             direction: 13,
             flux: 25,
             float: Float::F32,
+            colour: None,
             length_scale: 25.4,
         }
     }
@@ -217,6 +278,48 @@ mod tests {
         assert!((batch.position(1).y - 12.7).abs() < 1e-12);
         assert!((batch.direction(1).z - 0.8).abs() < 1e-15 && (batch.norm_error - 4.0).abs() < 1e-15);
         assert_eq!(batch.flux[..2], [5.0, 7.0]);
+    }
+
+    #[test]
+    fn colours_come_with_the_rays_if_they_are_asked_for() {
+        let records: Vec<u8> = (0..5_i16)
+            .flat_map(|i| {
+                let floats: [f32; 8] = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.4 + 0.1 * f32::from(i)];
+                let number = i32::from(i) - 2;
+                floats
+                    .into_iter()
+                    .flat_map(f32::to_le_bytes)
+                    .chain(number.to_le_bytes())
+                    .collect::<Vec<u8>>()
+            })
+            .collect();
+        let silent = Layout {
+            stride: 36,
+            position: Some(0),
+            direction: 12,
+            flux: 24,
+            float: Float::F32,
+            colour: None,
+            length_scale: 1.0,
+        };
+        let column = |offset, number, scale| Layout {
+            colour: Some(Column { offset, number, scale }),
+            ..silent
+        };
+        let colours = |layout| {
+            let mut batch = RayBatch::default();
+            let table = RayTable::new(&records, layout).expect("valid");
+            table.gather([3..5, 0..2].into_iter(), &mut batch);
+            batch.colour
+        };
+        let micrometres = colours(column(28, Number::Float(Float::F32), 1e3));
+        let expected = [700.0, 800.0, 400.0, 500.0];
+        assert_eq!(micrometres.len(), 4);
+        assert!(micrometres.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4));
+        assert_eq!(colours(column(32, Number::Integer, 1.0)), [1.0, 2.0, -2.0, -1.0]);
+        assert!(colours(silent).is_empty());
+        assert!(RayTable::new(&records, column(33, Number::Integer, 1.0)).is_none());
+        assert!(RayTable::new(&records, column(usize::MAX, Number::Integer, 1.0)).is_none());
     }
 
     #[test]
@@ -252,6 +355,7 @@ mod tests {
             direction: 12,
             flux: 24,
             float: Float::F32,
+            colour: None,
             length_scale: 1.0,
         };
         let table = RayTable::new(&bytes, layout).expect("valid");

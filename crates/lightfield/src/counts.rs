@@ -312,6 +312,7 @@ mod tests {
         direction: 24,
         flux: 48,
         float: Float::F64,
+        colour: None,
         length_scale: 1.0,
     };
 

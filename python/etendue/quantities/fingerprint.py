@@ -70,3 +70,6 @@ def _feed(digest: Any, value: Any) -> None:
             for start, stop in ((0, min(n, SAMPLE)), (max(n - SAMPLE, 0), n)):
                 for array in _core.read_rays(value, start, stop):
                     _feed(digest, array)
+                colours = _core.read_colours(value, start, stop)
+                if colours.size:
+                    _feed(digest, colours)

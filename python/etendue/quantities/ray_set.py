@@ -16,6 +16,7 @@ from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.file_records import AnyRecords, FileRecords
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_colours import RayColours
 from etendue.quantities.ray_operations import FLUX_COLUMNS, RayOperations
 from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally, checked_threads
 from etendue.quantities.ray_units import RayUnits
@@ -102,7 +103,7 @@ class RaySetMeaning:
     copies: float = 1.0
 
 
-class RaySet(RayOperations, RayUnits, RayStream):
+class RaySet(RayOperations, RayUnits, RayColours, RayStream):
     """A sample of a source's light: rays with position, direction and flux.
 
     The rays stay where they are, in memory or in their file; properties copy what is asked for, `batches` streams.
@@ -208,6 +209,7 @@ class RaySet(RayOperations, RayUnits, RayStream):
         self._meaning = meaning
         self._tally: Tally | None = None
         self._moments: Moments | None = None
+        self._colours = None
 
     def replace(self, **changes: Any) -> RaySet:
         """A set over the same records with some fields of its meaning changed."""
@@ -335,6 +337,9 @@ class RaySet(RayOperations, RayUnits, RayStream):
 
     def core_source(self) -> Any:
         """The records as the compiled core takes them."""
+        return self._table(None)
+
+    def _table(self, colour: tuple[int, str, float] | None) -> _core.RayTable:
         fields = self._records.dtype.fields
         assert fields is not None  # noqa: S101 - checked on adoption
         records = self._records
@@ -346,6 +351,7 @@ class RaySet(RayOperations, RayUnits, RayStream):
             fields["flux"][1],
             fields["flux"][0] == np.dtype("<f8"),
             self._meaning.length_scale,
+            colour,
         )
 
     def accept_tally(self, tally: Tally) -> float:

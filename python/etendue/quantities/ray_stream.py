@@ -14,6 +14,8 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.spectral_lines import SpectralLines
+from etendue.quantities.spectrum import Spectrum
 from etendue.units import FluxUnit
 
 FloatArray = npt.NDArray[np.float64]
@@ -129,6 +131,22 @@ class RayStream(abc.ABC):
     def notes(self) -> tuple[str, ...]:
         """What all that is made of the rays should tell."""
         return ()
+
+    def coloured_source(self) -> Any:
+        """The source as the compiled core takes it, with the colour of each ray if it has one of its own."""
+        return self.core_source()
+
+    def total_spectrum(
+        self,
+        progress: Progress | None = None,  # noqa: ARG002 - for those that need a pass
+        threads: int | None = None,  # noqa: ARG002
+    ) -> Spectrum | SpectralLines | None:
+        """The spectrum of all rays together; None if it is not known."""
+        return None
+
+    def wavelength_of(self, batch: RayBatch) -> FloatArray | None:  # noqa: ARG002 - for those that know it
+        """Wavelength of each ray of a batch [nm], shape (k,); None if the stream does not know it."""
+        return None
 
     @abc.abstractmethod
     def accept_tally(self, tally: Tally) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.units import LUMINOUS_EFFICACY_MAX
+from etendue.units import LUMINOUS_EFFICACY_MAX, FluxUnit
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -86,6 +86,30 @@ class Spectrum:
         product_middle = np.interp(middle, self.wavelength, self.weight) * photopic_efficiency(middle)
         integral = float(np.sum(np.diff(at) / 6 * (product[1:] + 4 * product_middle + product[:-1])))
         return LUMINOUS_EFFICACY_MAX * integral / self.total
+
+    def lines(self, flux_unit: FluxUnit) -> tuple[FloatArray, FloatArray]:
+        """The spectrum as lines at its nodes: wavelengths [nm], and the share of the flux around each, trapezoidal rule.
+
+        In lumens each node counts with its V(λ).
+
+        Examples
+        --------
+        >>> wavelength, shares = Spectrum([500, 600, 700], [1, 1, 1]).lines("W")
+        >>> shares.tolist()
+        [0.25, 0.5, 0.25]
+        """
+        wavelength, weight = self.wavelength, self.weight
+        if wavelength.size > 1:
+            gaps = np.diff(wavelength)
+            weight = weight * (
+                np.append(gaps, 0.0) + np.insert(gaps, 0, 0.0)
+            )  # twice the trapezoids; only ratios count
+        if flux_unit == "lm":
+            weight = weight * photopic_efficiency(wavelength)
+        kept = weight > 0.0
+        if not kept.any():
+            return wavelength[:1].copy(), np.array([1.0])
+        return wavelength[kept], weight[kept] / weight[kept].sum()
 
 
 def photopic_efficiency(wavelength: npt.ArrayLike) -> FloatArray:

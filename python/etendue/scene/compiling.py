@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
 from etendue.quantities.fingerprint import fingerprint
@@ -108,6 +109,7 @@ class _Compiler:
         self.numbers: dict[tuple[str, str], int] = {}
         self.kinds: list[Kind] = []
         self.sets: list[Any] = []
+        self.used: list[npt.NDArray[np.float64]] = []
 
     def compiled(self) -> Compiled:
         """Everything, or all mistakes."""
@@ -198,8 +200,7 @@ class _Compiler:
 
     def _check_indices(self) -> None:
         """Every medium has an index at every wavelength of the sources; a library's range is a note."""
-        used = [source["wavelengths"] for source in self.rows["sources"]]
-        wavelength = np.unique(np.concatenate(used)) if used else np.array([self.scene.wavelength])
+        wavelength = np.unique(np.concatenate(self.used)) if self.used else np.array([self.scene.wavelength])
         for place, name, medium in self.media:
             with self._at(place):
                 index = medium.index_at(wavelength, self.files)
@@ -270,6 +271,7 @@ class _Compiler:
             with self._at(place):
                 for emitter in source.emitters(self.files):
                     wavelengths, shares = source.colours(emitter, self.scene.wavelength)
+                    self.used += [wavelengths, np.array(emitter.range or ())]
                     units.setdefault(emitter.flux_unit, name)
                     if "rays" in emitter.record:
                         emitter.record["rays"] = self._one_set(emitter.record["rays"])
@@ -282,9 +284,7 @@ class _Compiler:
                         }
                     )
                     self.names["sources"].append(f"{name}.{emitter.name}" if emitter.name else name)
-                    self.notes += [f"{name}: {note}" for note in emitter.flux_notes]
-                    if source.wavelength is None and source.spectrum is None:
-                        self.notes += [f"{name}: {note}" for note in emitter.notes]
+                    self.notes += [f"{name}: {note}" for note in (*emitter.flux_notes, *emitter.notes)]
         if len(units) > 1:
             text = " and ".join(f"{name!r} is in {unit}" for unit, name in units.items())
             self.mistakes.append(("sources", f"{text}; give all of them in one unit, by flux and flux_unit"))

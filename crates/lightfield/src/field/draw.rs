@@ -124,6 +124,7 @@ impl RaySource for FieldRays<'_> {
         let stream = Stream::new(self.seed, PURPOSE_FIELD);
         let flux = self.sampler.flux / self.rays as f64;
         batch.len = (range.end - range.start) as usize;
+        batch.colour.clear();
         for (i, index) in range.enumerate() {
             let (part, place, direction) = self.sampler.draw(stream, index);
             let (x, k) = self.sampler.field.parts[part].part.ray(place, direction);

@@ -29,6 +29,7 @@ pub const DRAWN: Layout = Layout {
     direction: 24,
     flux: 48,
     float: Float::F64,
+    colour: None,
     length_scale: 1.0,
 };
 

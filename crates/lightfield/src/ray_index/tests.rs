@@ -254,6 +254,7 @@ fn keeps_records_byte_by_byte_and_leaves_out_what_cannot_be_used() {
         direction: 13,
         flux: 25,
         float: Float::F32,
+        colour: None,
         length_scale: 25.4,
     };
     #[allow(clippy::cast_possible_truncation, reason = "single precision is meant")]

@@ -43,6 +43,10 @@ pub enum Emitter {
         set: usize,
         /// From stored flux to flux unit.
         scale: f64,
+        /// Whether its rays have the colours that their records state, if these state any.
+        coloured: bool,
+        /// Spectra, if the colour of a ray is the number of one of them, counted from 1; none if it is a wavelength.
+        spectra: Vec<Lines>,
     },
     /// A light field, drawn from.
     Field(Arc<Sampler>),
@@ -62,6 +66,23 @@ impl Emitter {
     }
 }
 
+/// Wavelengths \[nm\], and the share of the flux up to each of them; the last one is 1.
+pub type Lines = Vec<(f64, f64)>;
+
+/// The wavelength that a number between 0 and 1 picks.
+#[inline]
+fn line(lines: &Lines, number: f64) -> f64 {
+    let place = lines.partition_point(|(_, share)| *share < number);
+    lines[place.min(lines.len() - 1)].0
+}
+
+/// The wavelengths of rays `range` of a stream that have nothing but a spectrum in common: each from its address.
+#[must_use]
+pub fn draw_wavelengths(lines: &Lines, seed: u64, range: Range<u64>) -> Vec<f64> {
+    let stream = Stream::new(seed, PURPOSE_COLOUR);
+    range.map(|index| line(lines, stream.uniforms(index, 0)[0])).collect()
+}
+
 /// A source in its place.
 #[derive(Clone, Debug)]
 pub struct Source {
@@ -71,8 +92,8 @@ pub struct Source {
     pub frame: Frame,
     /// \[flux unit\].
     pub flux: f64,
-    /// Wavelengths \[nm\], and the share of the flux up to each of them; the last one is 1.
-    pub spectrum: Vec<(f64, f64)>,
+    /// Of the light whose colour no record tells.
+    pub spectrum: Lines,
 }
 
 impl Source {
@@ -119,13 +140,37 @@ impl Source {
         if let [(wavelength, _)] = self.spectrum[..] {
             return wavelength;
         }
-        let [number, ..] = Stream::new(seed, PURPOSE_COLOUR + source).uniforms(index, 0);
-        let line = self.spectrum.partition_point(|(_, share)| *share < number);
-        self.spectrum[line.min(self.spectrum.len() - 1)].0
+        line(&self.spectrum, Self::colour_number(seed, source, index))
+    }
+
+    fn colour_number(seed: u64, source: u64, index: u64) -> f64 {
+        Stream::new(seed, PURPOSE_COLOUR + source).uniforms(index, 0)[0]
+    }
+
+    /// Turns the colours that records state into wavelengths; a colour that is none counts as not stated.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "numbers of spectra are small; others are in no list"
+    )]
+    fn name_wavelengths(&self, spectra: &[Lines], source: u64, first: u64, seed: u64, colours: &mut [f64]) {
+        for (index, colour) in (first..).zip(colours) {
+            let stated = *colour > 0.0 && colour.is_finite();
+            let spectrum = || spectra.get((*colour as usize).wrapping_sub(1));
+            *colour = match (stated, spectra.is_empty()) {
+                (true, true) => *colour,
+                (true, false) => spectrum().map_or_else(
+                    || self.wavelength(seed, source, index),
+                    |lines| line(lines, Self::colour_number(seed, source, index)),
+                ),
+                (false, _) => self.wavelength(seed, source, index),
+            };
+        }
     }
 
     /// Puts rays `range` of `count` (at most a block) into `batch`, in world coordinates: together the `count` rays carry
-    /// the flux of the source.
+    /// the flux of the source. Where the records of a set tell the colours of their rays, the colours of the batch are their
+    /// wavelengths \[nm\]; else there are none, and [`Source::wavelength`] has them.
     ///
     /// A set of n rays is gone through once: ray i of `count` is ray ⌊i n/count⌋ of the set, in an order that mixes the file,
     /// with n/count of its flux.
@@ -139,8 +184,18 @@ impl Source {
         batch: &mut RayBatch,
     ) {
         match &self.emitter {
-            Emitter::Rays { set, scale } => {
+            Emitter::Rays {
+                set,
+                scale,
+                coloured,
+                spectra,
+            } => {
+                let first = range.start;
                 resample(sets[*set], range, count, batch);
+                if !coloured {
+                    batch.colour.clear();
+                }
+                self.name_wavelengths(spectra, source, first, seed, &mut batch.colour);
                 let scale = scale * sets[*set].len() as f64 / count as f64;
                 batch.flux[..batch.len].iter_mut().for_each(|w| *w *= scale);
             }
@@ -188,6 +243,7 @@ impl Source {
     ) {
         let stream = Stream::new(seed, PURPOSE_EMIT + source);
         batch.len = (range.end - range.start) as usize;
+        batch.colour.clear();
         batch.defects = Default::default();
         batch.norm_error = 0.0;
         batch.flux[..batch.len].fill(self.flux / count as f64);
@@ -251,6 +307,7 @@ fn resample(set: &dyn RaySource, range: Range<u64>, count: u64, batch: &mut RayB
     let len = (range.end - range.start) as usize;
     let mut part = RayBatch::default();
     batch.len = len;
+    batch.colour.clear();
     batch.defects = Default::default();
     batch.norm_error = 0.0;
     let number = |i: u64| (u128::from(i) * u128::from(n) / u128::from(count)) as u64;
@@ -273,6 +330,7 @@ fn resample(set: &dyn RaySource, range: Range<u64>, count: u64, batch: &mut RayB
                 batch.direction[axis][slot] = part.direction[axis][at];
             }
             batch.flux[slot] = part.flux[at];
+            batch.colour.extend(part.colour.get(at));
             slot += 1;
         }
         batch.norm_error = batch.norm_error.max(part.norm_error);

@@ -56,6 +56,7 @@ impl RaySource for RingSource {
     #[allow(clippy::cast_possible_truncation, reason = "a range is at most one block long")]
     fn fill(&self, range: Range<u64>, batch: &mut RayBatch) {
         batch.len = (range.end - range.start) as usize;
+        batch.colour.clear();
         batch.defects = Default::default();
         batch.norm_error = 0.0;
         let [px, py, pz] = &mut batch.position;

@@ -217,7 +217,10 @@ impl<'a> Walk<'a> {
             let ray = self.first + i as u64;
             Rider {
                 flux: births.flux[i],
-                wavelength: source.wavelength(run.seed, number as u64, start + i as u64),
+                wavelength: match births.colour.get(i) {
+                    Some(stated) => *stated,
+                    None => source.wavelength(run.seed, number as u64, start + i as u64),
+                },
                 ray,
                 scattered: false,
                 unseen: !source.is_visible(),

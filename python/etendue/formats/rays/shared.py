@@ -332,9 +332,9 @@ class RayColour:
         """Wavelength [nm] of a batch's rays, shape (k,); only if `has_wavelengths`."""
         if self.single is not None:
             return np.full(len(batch.flux), self.single)
-        rays = self.rays
-        assert isinstance(rays, RaySet)  # noqa: S101 - other streams have no wavelengths
-        return rays.column("wavelength", batch_rows(batch))[batch.usable]
+        wavelength = self.rays.wavelength_of(batch)
+        assert wavelength is not None  # noqa: S101 - see `has_wavelengths`
+        return wavelength
 
     def efficacy(self, batch: RayBatch) -> FloatArray:
         """Luminous efficacy of radiation [lm/W] of a batch's rays, shape (k,); only if the `kind` is known."""

@@ -16,15 +16,14 @@ from etendue.lightfield.light_field import LightField
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
-from etendue.quantities.spectrum import Spectrum
 from etendue.scene.files import Files
-from etendue.scene.sources.source import Emitter, Source
+from etendue.scene.sources.source import Emitter, Record, Source
 from etendue.scene.values import Positive
 from etendue.units import FluxUnit
 
 
 class Rays(Source):
-    """The rays of a ray file, each as it is.
+    """The rays of a ray file, each as it is: with its own wavelength where the file has one for each ray.
 
     Parameters
     ----------
@@ -60,11 +59,7 @@ class Rays(Source):
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The rays and the factor from their stored flux."""
-        rays: RayStream = read_rays(files.find(self.file)) if self.file is not None else self.rays  # type: ignore[assignment]
-        if self.flux_unit is not None and self.flux_unit != rays.flux_unit and self.flux is None:
-            if not isinstance(rays, RaySet):
-                raise ArgumentError(f"flux_unit: the rays are in {rays.flux_unit}, and cannot be turned into lm or W")
-            rays = rays.in_unit(self.flux_unit)
+        rays = self.ray_stream(files)
         total = rays.total_flux
         if not total > 0.0:
             raise ArgumentError("the rays carry no flux")
@@ -73,25 +68,51 @@ class Rays(Source):
             raise ArgumentError("the rays have directions only; use their intensity as a point source")
         record = {
             "kind": "rays",
-            "rays": rays.core_source(),
+            "rays": rays.coloured_source(),
+            "coloured": not self.states_colours,
             "scale": rays.flux_scale * factor,
             "flux": total * factor,
         }
         unit = self.flux_unit if self.flux_unit is not None else rays.flux_unit
-        return (Emitter(record, unit, *_colours_of(rays)),)
+        return (self._coloured(record, rays, unit),)
 
+    def ray_stream(self, files: Files) -> RayStream:
+        """The rays, in the unit that is asked for if their spectrum is known.
 
-def _colours_of(rays: RayStream) -> tuple[Spectrum | None, str, tuple[str, ...]]:
-    """The one spectrum of a set, its name within the source (none), and what cannot be taken over."""
-    if not isinstance(rays, RaySet):
-        return None, "", ()
-    if rays.meaning.single_wavelength is not None:
-        return Spectrum(np.array([rays.meaning.single_wavelength]), np.array([1.0])), "", ()
-    if len(rays.spectra) == 1:
-        return rays.spectra[0], "", ()
-    if rays.spectra or "wavelength" in rays.columns:
-        return None, "", ("every ray has a colour of its own in the file; state wavelength or spectrum for all",)
-    return None, "", ()
+        Raises
+        ------
+        ArgumentError, UnitError, FormatError, OSError
+            If they cannot be read, or their flux cannot be turned into that unit.
+        """
+        rays: RayStream = read_rays(files.find(self.file)) if self.file is not None else self.rays  # type: ignore[assignment]
+        if self.flux_unit is None or self.flux_unit == rays.flux_unit:
+            return rays
+        if self.flux is not None:
+            return rays.with_total_flux(self.flux, self.flux_unit) if isinstance(rays, RaySet) else rays
+        if not isinstance(rays, RaySet):
+            raise ArgumentError(f"flux_unit: the rays are in {rays.flux_unit}, and cannot be turned into lm or W")
+        return rays.in_unit(self.flux_unit)
+
+    def _coloured(self, record: Record, rays: RayStream, unit: FluxUnit) -> Emitter:
+        """With what the rays know of their colours, unless the user states these."""
+        by_ray = isinstance(rays, RaySet) and rays.colour_column is not None
+        if self.states_colours:
+            stated = "wavelength" if self.wavelength is not None else "spectrum"
+            told = f"the rays' own colours are not used, because {stated!r} is stated for all of them"
+            return Emitter(record, unit, notes=(told,) if by_ray else ())
+        colours = rays.colours() if isinstance(rays, RaySet) else None
+        if not isinstance(rays, RaySet) or colours is None:
+            return Emitter(record, unit, rays.total_spectrum())
+        if rays.colour_column == "spectrum_index":
+            record = {**record, "spectra": [spectrum.lines(unit) for spectrum in rays.spectra]}
+        notes = []
+        if colours.unknown_rays:
+            others = "the scene's wavelength" if colours.lines is None else "colours at random from those of the others"
+            notes.append(
+                f"{colours.unknown_rays:,} rays with {colours.unknown_share:.3%} of the flux have no wavelength in the "
+                f"file; they take {others}"
+            )
+        return Emitter(record, unit, colours.lines, notes=tuple(notes), range=colours.range)
 
 
 class Field(Source):

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from annotated_types import MaxLen, MinLen
 from pydantic import model_validator
 
-from etendue.quantities.spectrum import Spectrum, photopic_efficiency
+from etendue.quantities.spectral_lines import SpectralLines
+from etendue.quantities.spectrum import Spectrum
 from etendue.scene.files import Files
 from etendue.scene.placement import Placement
 from etendue.scene.values import AsRow, NotNegative, Wavelength
@@ -31,14 +32,16 @@ class Emitter:
     record : mapping
         Kind, flux, and what belongs to the kind.
     flux_unit : {"lm", "W"}
-    spectrum : Spectrum or None
-        What a file says of the colours.
+    spectrum : Spectrum, SpectralLines or None
+        What a file says of the colours of all the light together.
     name : str
         Within the source, if it is made of several.
     notes : tuple of str
-        What the user should know of the colours, unless they are stated.
+        What the user should know of the colours.
     flux_notes : tuple of str
         What the user should know of the flux.
+    range : tuple of float or None
+        Shortest and longest wavelength of the light [nm], where the lines of `spectrum` are means.
 
     Examples
     --------
@@ -48,10 +51,11 @@ class Emitter:
 
     record: Record
     flux_unit: FluxUnit
-    spectrum: Spectrum | None = None
+    spectrum: Spectrum | SpectralLines | None = None
     name: str = ""
     notes: tuple[str, ...] = ()
     flux_notes: tuple[str, ...] = ()
+    range: tuple[float, float] | None = None
 
 
 class Source(Placement, abc.ABC):
@@ -83,6 +87,11 @@ class Source(Placement, abc.ABC):
                 raise ValueError("'spectrum': all shares are 0")
         return self
 
+    @property
+    def states_colours(self) -> bool:
+        """Whether the user states the colours, whatever a file says."""
+        return self.wavelength is not None or self.spectrum is not None
+
     @abc.abstractmethod
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The source as the core takes it.
@@ -104,28 +113,5 @@ class Source(Placement, abc.ABC):
             wavelength, shares = np.array(self.spectrum).T
             return wavelength.copy(), shares / shares.sum()
         if emitter.spectrum is not None:
-            return lines_of(emitter.spectrum, emitter.flux_unit)
+            return emitter.spectrum.lines(emitter.flux_unit)
         return np.array([default]), np.array([1.0])
-
-
-def lines_of(spectrum: Spectrum, flux_unit: FluxUnit) -> tuple[Array, Array]:
-    """A spectrum as lines at its nodes: the flux around each node by the trapezoidal rule.
-
-    In lumens each node counts with its V(λ).
-
-    Examples
-    --------
-    >>> wavelength, shares = lines_of(Spectrum([500, 600, 700], [1, 1, 1]), "W")
-    >>> shares.tolist()
-    [0.25, 0.5, 0.25]
-    """
-    wavelength, weight = spectrum.wavelength, spectrum.weight
-    if wavelength.size > 1:
-        gaps = np.diff(wavelength)
-        weight = weight * (np.append(gaps, 0.0) + np.insert(gaps, 0, 0.0))  # twice the trapezoids; only ratios count
-    if flux_unit == "lm":
-        weight = weight * photopic_efficiency(wavelength)
-    kept = weight > 0.0
-    if not kept.any():
-        return wavelength[:1].copy(), np.array([1.0])
-    return wavelength[kept], weight[kept] / weight[kept].sum()
