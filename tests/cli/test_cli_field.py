@@ -380,7 +380,13 @@ def test_intensity_of_a_field(run: Run, folder: Path, tmp_path: Path) -> None:
         (["luminance", "{}/dome.h5", *VIEW, "-o", "a.npz", "--acceptance", "3"], 2, "--acceptance: for ray files"),
         (["luminance", "{}/dome.h5", *VIEW, "-o", "a.npz", "--method", "cone"], 2, "--method: for ray files"),
         (["luminance", "{}/dome.h5", *VIEW, "-o", "a.npz", "--surface", "auto"], 2, "--surface: for ray files"),
-        (["luminance", "{}/dome.h5", *VIEW, "-o", "a.npz", "--flux", "3", "--unit", "W"], 2, "--flux, --unit: for ray"),
+        (["luminance", "{}/dome.h5", *VIEW, "-o", "a.npz", "--flux", "3", "--unit", "W"], 2, "--flux: for ray files"),
+        (
+            ["luminance", "{}/dome.h5", *VIEW, "-o", "a.npz", "--unit", "W"],
+            1,
+            "lm cannot become W: the light field knows",
+        ),
+        (["intensity", "{}/dome.h5", "--unit", "watt"], 2, "--unit"),
         (["luminance", "{}/dome.h5", *VIEW, "-o", "a.npz", "--samples", "0"], 2, "--samples"),
         (["luminance", "{}/dome.h5", *VIEW, "-o", "a.npz", "--samples", "9999999"], 1, "samples is 9999999"),
         (["luminance", "{}/led.tm25ray", *VIEW, "-o", "a.npz", "--acceptance", "wide"], 2, "--acceptance 1.5"),
@@ -443,3 +449,30 @@ def test_a_failing_fit_leaves_the_old_field_as_it_was(run: Run, folder: Path, tm
     far = ("--surface", "disk:radius=1,centre=90/0")
     assert run("fit", folder / "led.tm25ray", "-o", "a.h5", *far).status == 1
     assert (tmp_path / "a.h5").read_text() == "mine"
+
+
+def test_the_lumens_of_a_field_in_watts(run: Run, tmp_path: Path) -> None:
+    """Two lines of 0.75 and 0.25 W: told by info, used by --unit; a scene's notes say what its spectrum leaves out."""
+    rng = np.random.default_rng(8)
+    sine, turn = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
+    direction = np.column_stack([sine * np.cos(turn), sine * np.sin(turn), np.sqrt(1 - sine**2)])
+    place = np.column_stack([rng.random((4000, 2)), np.zeros(4000)])
+    wavelength = np.repeat([450.0, 600.0], [3000, 1000])
+    flux = np.full(4000, 1 / 4000)
+    rays = et.RaySet(place, direction, flux, flux_unit="W", wavelength=wavelength)
+    et.write_rays(tmp_path / "led.tm25ray", rays)
+    expected = 683 * (0.75 * 0.038 + 0.25 * 0.631)
+    assert f"450 to 600 nm, {expected:.4g} lm/W" in run("info", "led.tm25ray").out
+    assert run("info", "led.tm25ray", "--json").json[0]["luminous_efficacy"] == pytest.approx(expected, rel=1e-6)
+    assert run("fit", "led.tm25ray", "-o", "led.h5", "--surface", "plane:z=0", "--depths", "2,2,2,2").status == 0
+    assert f"2 lines, 450 to 600 nm, {expected:.4g} lm/W" in run("info", "led.h5").out
+    watts, lumens = (run("intensity", "led.h5", *unit, "--json").json for unit in ((), ("--unit", "lm")))
+    assert (watts["flux_unit"], lumens["flux_unit"]) == ("W", "lm")
+    assert lumens["flux"] == pytest.approx(watts["flux"] * expected, rel=1e-6)
+    scene = '[[sources]]\nname = "led"\nkind = "rays"\nfile = "led.tm25ray"\n'
+    ball = '[[solids]]\nmedium = "BK7"\nat = [0, 0, 5]\nshape = { kind = "ball", radius = 2 }\n'
+    (tmp_path / "lamp.toml").write_text(scene + ball)
+    view = ("--observer", "0,0", "--distance", "300", "--size", "2,2", "--pixels", "2,2", "--rays-per-pixel", "4")
+    seen = run("luminance", "lamp.toml", *view, "-o", "a.npz")
+    assert seen.status == 0, seen.err
+    assert "the index of 'BK7' treats its wavelengths differently" in " ".join((seen.out + seen.err).split())

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
 from etendue.cli.terminal import check_folder, complain, one_of, print_json, progress_bar, say
 from etendue.formats.rays import RAY_FORMATS, read_rays, write_rays
+from etendue.lightfield.light_field import LightField
 from etendue.quantities.ray_set import RaySet
 from etendue.units import FLUX_UNITS, FluxUnit
 
@@ -102,9 +103,13 @@ def with_flux(rays: RaySet, text: str | None) -> RaySet:
     return rays.with_total_flux(value, stated)
 
 
-def in_unit(rays: RaySet, unit: str | None) -> RaySet:
-    """The set in the unit that an option names."""
+Light = TypeVar("Light", RaySet, LightField)
+"""What has a flux in lumens or watts."""
+
+
+def in_unit(light: Light, unit: str | None) -> Light:
+    """The set or field in the unit that an option names."""
     if unit is None:
-        return rays
+        return light
     one_of(unit, FLUX_UNITS, "--unit")
-    return rays.in_unit("lm" if unit == "lm" else "W")
+    return light.in_unit("lm" if unit == "lm" else "W")

@@ -16,6 +16,8 @@ from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import is_field_file
 from etendue.lightfield.surfaces import Surface, parse_surface
 from etendue.quantities.ray_set import RaySet
+from etendue.quantities.spectral_lines import SpectralLines
+from etendue.quantities.spectrum import Spectrum
 
 FIELD_EXTENSIONS = (".h5", ".hdf5")
 """Of the files that hold a light field."""
@@ -34,15 +36,27 @@ def read_source(
     Raises
     ------
     typer.BadParameter
-        If the file is a light field, and one of the options `for_rays`, or flux or unit, was given.
+        If the file is a light field, and one of the options `for_rays`, or flux, was given.
+    UnitError
+        If the unit is another one and the spectrum is not known.
     """
     if not is_field_file(path):
         return in_unit(with_flux(read_rays(path), flux), unit)
-    given = {"--flux": flux, "--unit": unit} | dict(for_rays or {})
+    given = {"--flux": flux} | dict(for_rays or {})
     needless = [option for option, value in given.items() if value is not None]
     if needless:
         raise typer.BadParameter(f"{', '.join(needless)}: for ray files; {path} is a light field")
-    return LightField.load(path)
+    return in_unit(LightField.load(path), unit)
+
+
+def spectrum_text(spectrum: Spectrum | SpectralLines | None) -> str:
+    """The range of a spectrum and its luminous efficacy of radiation, for people."""
+    if spectrum is None:
+        return "unknown"
+    low, high = spectrum.wavelength[0], spectrum.wavelength[-1]
+    kind = f"{spectrum.wavelength.size:,} lines, " if isinstance(spectrum, SpectralLines) else ""
+    span = f"{low:.4g} nm" if low == high else f"{kind}{low:.4g} to {high:.4g} nm"
+    return f"{span}, {spectrum.luminous_efficacy:.4g} lm/W"
 
 
 def complaints_of(source: RaySet | LightField) -> list[str]:
@@ -61,6 +75,8 @@ def describe_field(field: LightField) -> dict[str, Any]:
         ],
         "flux_unit": field.flux_unit,
         "total_flux": field.total_flux,
+        "spectrum": spectrum_text(field.spectrum),
+        "luminous_efficacy": None if field.spectrum is None else field.spectrum.luminous_efficacy,
         **dataclasses.asdict(report),
         "lead_over_histogram": report.score - report.histogram_score,
         "source": field.provenance.source,
@@ -79,6 +95,7 @@ def print_field(field: LightField) -> None:
     rows = [
         ("surface", field.surface.spec),
         ("flux", f"{field.total_flux:.7g} {field.flux_unit}"),
+        ("spectrum", spectrum_text(field.spectrum)),
         *([] if report.symmetry == "none" else [("symmetry", report.symmetry)]),
         ("rays", f"{report.rays - report.unmet_rays:,}{unmet}"),
         *(("grid" if number == 0 else "", text) for number, text in enumerate(_grids(field))),

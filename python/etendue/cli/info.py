@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -106,6 +105,7 @@ def describe(path: Path) -> dict[str, Any]:
         "virtual_focus": list(focus.point) if focus.determined else None,
         "mean_direction": _mean_direction(moments.weighted_direction),
         "spectrum": _spectrum(rays),
+        "luminous_efficacy": _efficacy(rays),
         "columns": list(rays.columns),
         "header": dict(rays.header),
         "complaints": [complaint.to_dict() for complaint in rays.complaints],
@@ -119,23 +119,31 @@ def _mean_direction(weighted: np.ndarray[Any, np.dtype[np.float64]]) -> list[flo
 
 
 def _spectrum(rays: RaySet) -> str:
+    colours = rays.colours()
+    efficacy = _efficacy(rays)
+    worth = "" if efficacy is None else f", {efficacy:.4g} lm/W"
     if "wavelength" in rays.columns:
-        low, high = math.inf, -math.inf
-        for start in range(0, len(rays), 1 << 18):
-            part = rays.column("wavelength", slice(start, start + (1 << 18)))
-            part = part[np.isfinite(part)]
-            low, high = min(low, part.min(initial=math.inf)), max(high, part.max(initial=-math.inf))
-        return f"wavelength per ray, {low:.4g} to {high:.4g} nm" if low <= high else "wavelength per ray, none known"
+        if colours is None or colours.range is None:
+            return "wavelength per ray, none known"
+        low, high = colours.range
+        unknown = f"; {colours.unknown_rays:,} rays state none" if colours.unknown_rays else ""
+        return f"wavelength per ray, {low:.4g} to {high:.4g} nm{worth}{unknown}"
     if rays.meaning.single_wavelength is not None:
-        return f"single wavelength {rays.meaning.single_wavelength:.4g} nm"
+        return f"single wavelength {rays.meaning.single_wavelength:.4g} nm{worth}"
     if "spectrum_index" in rays.columns:
-        return f"one of {len(rays.spectra)} spectra per ray"
+        return f"one of {len(rays.spectra)} spectra per ray{worth}"
     if rays.spectra:
         nodes = rays.spectra[0].wavelength
-        return f"one spectrum for all rays, {nodes[0]:.4g} to {nodes[-1]:.4g} nm"
+        return f"one spectrum for all rays, {nodes[0]:.4g} to {nodes[-1]:.4g} nm{worth}"
     if "tristimulus_x" in rays.columns:
         return "tristimulus values per ray"
     return "unknown"
+
+
+def _efficacy(rays: RaySet) -> float | None:
+    """Luminous efficacy of radiation of all rays [lm/W]."""
+    spectrum = rays.total_spectrum()
+    return None if spectrum is None else spectrum.luminous_efficacy
 
 
 def _print(facts: dict[str, Any]) -> None:

@@ -10,15 +10,18 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.light_field import LightField
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.ray_stream import RayStream, Tally
+from etendue.quantities.ray_stream import FloatArray, Progress, RayBatch, RayStream, Tally
+from etendue.quantities.spectral_lines import SpectralLines
+from etendue.quantities.spectrum import Spectrum
 from etendue.units import FluxUnit
 
 
 class FieldRays(RayStream):
     """Rays of equal flux with the density of a light field's luminance in étendue, drawn exactly.
 
-    Each ray starts on the carrier surface. It depends on the seed and its number alone: any stretch of the stream, read
-    in any order, has the same bits.
+    Each ray starts on the carrier surface. If the field's spectrum is one of lines, each ray has the wavelength of one of
+    them, by their shares of the flux and whatever its place and direction. A ray depends on the seed and its number alone:
+    any stretch of the stream, read in any order, has the same bits.
 
     Parameters
     ----------
@@ -95,7 +98,36 @@ class FieldRays(RayStream):
         del tally
         return 1.0
 
+    def total_spectrum(
+        self,
+        progress: Progress | None = None,  # noqa: ARG002 - nothing has to be read
+        threads: int | None = None,  # noqa: ARG002
+    ) -> Spectrum | SpectralLines | None:
+        """The field's."""
+        return self.field.spectrum
+
+    def wavelength_of(self, batch: RayBatch) -> FloatArray | None:
+        """Wavelength of each ray of a batch [nm], shape (k,), drawn from the lines of the field's spectrum, if there are."""
+        spectrum = self.field.spectrum
+        if spectrum is None or (isinstance(spectrum, Spectrum) and spectrum.wavelength.size > 1):
+            return None
+        return self._wavelengths(spectrum, batch.start, batch.start + len(batch.usable))[batch.usable]
+
+    def _wavelengths(self, spectrum: Spectrum | SpectralLines, start: int, stop: int) -> FloatArray:
+        wavelength, shares = spectrum.lines(self.flux_unit)
+        drawn: FloatArray = _core.draw_wavelengths(wavelength.tolist(), shares.tolist(), self.seed, start, stop)
+        return drawn
+
     def ray_set(self) -> RaySet:
-        """All rays as a ray set, for sets that fit into memory."""
+        """All rays as a ray set, for sets that fit into memory; with the field's spectrum, or a wavelength each."""
         position, direction, flux = _core.read_rays(self._core, 0, len(self))
-        return RaySet(position, direction, flux, flux_unit=self.flux_unit, provenance=self.provenance)
+        spectrum = self.field.spectrum
+        return RaySet(
+            position,
+            direction,
+            flux,
+            flux_unit=self.flux_unit,
+            wavelength=self._wavelengths(spectrum, 0, len(self)) if isinstance(spectrum, SpectralLines) else None,
+            spectra=(spectrum,) if isinstance(spectrum, Spectrum) else (),
+            provenance=self.provenance,
+        )

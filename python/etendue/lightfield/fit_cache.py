@@ -110,8 +110,11 @@ def fit_or_recall(
         _memory.move_to_end(name)
         while len(_memory) > MOST_IN_MEMORY:
             _memory.popitem(last=False)
-    # The same rays may come from another file, or by other steps.
-    return field.replace(provenance=rays.provenance.then(f"light field on {field.surface.spec}"))
+    # The same rays may come from another file, or by other steps; and the field's name says nothing of their colours.
+    return field.replace(
+        provenance=rays.provenance.then(f"light field on {field.surface.spec}"),
+        spectrum=rays.total_spectrum(threads=threads),
+    )
 
 
 def cache_content() -> CacheContent:

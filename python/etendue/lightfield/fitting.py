@@ -27,6 +27,7 @@ from etendue.lightfield.probe import check_near_field, probe_rays
 from etendue.lightfield.surfaces import Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry
 from etendue.lightfield.trees import POSITIONS, Base, Tree
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 
 Depths = tuple[int, int, int, int]
@@ -82,7 +83,17 @@ def fit_light_field(
     if symmetry != "none":
         counts = fold(counts, symmetry)
     field = fit_counts(rays, counts, plan, seed, threads)
-    return field.replace(notes=(*notes, *field.notes, *rays.notes))
+    spectrum = rays.total_spectrum(threads=threads)
+    return field.replace(notes=(*notes, *field.notes, *_unknown_colours(rays), *rays.notes), spectrum=spectrum)
+
+
+def _unknown_colours(rays: RayStream) -> tuple[str, ...]:
+    """What is to be said of rays that state no wavelength though others do."""
+    colours = rays.colours() if isinstance(rays, RaySet) else None
+    if colours is None or not colours.unknown_rays:
+        return ()
+    told = f"{colours.unknown_rays:,} rays with {colours.unknown_share:.3%} of the flux state no wavelength"
+    return (f"{told}; the spectrum of the field is that of the others",)
 
 
 def default_bits(rays: int) -> int:

@@ -11,14 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.errors import ArgumentError
+from etendue.errors import ArgumentError, UnitError, UnknownNameError
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
-from etendue.units import INTENSITY_UNIT, MM2_PER_M2, FluxUnit
+from etendue.quantities.spectral_lines import SpectralLines
+from etendue.quantities.spectrum import Spectrum
+from etendue.units import FLUX_UNITS, INTENSITY_UNIT, MM2_PER_M2, FluxUnit
 
 if TYPE_CHECKING:
     from etendue.lightfield.field_rays import FieldRays
@@ -113,6 +115,8 @@ class LightField:
     provenance : Provenance
     notes : tuple of str
         What the user should know.
+    spectrum : Spectrum, SpectralLines or None
+        Of all the light together, the same for every place and direction: lines where the rays have a wavelength each.
 
     Examples
     --------
@@ -131,6 +135,7 @@ class LightField:
     report: FitReport
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
     notes: tuple[str, ...] = ()
+    spectrum: Spectrum | SpectralLines | None = None
 
     def __post_init__(self) -> None:
         charts = self.surface.parts()
@@ -291,6 +296,59 @@ class LightField:
         return fit_light_field(
             rays, surface, symmetry=symmetry, depths=depths, seed=seed, threads=threads, progress=progress
         )
+
+    def in_unit(self, unit: FluxUnit) -> LightField:
+        """The field in lumens or watts, by the luminous efficacy of its spectrum: that of all its light together.
+
+        Raises
+        ------
+        UnitError
+            If the field knows no spectrum, or its light has no lumens.
+        UnknownNameError
+            If there is no such unit.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> rays = et.RingSource(rays=100_000).ray_set().replace(flux_unit="W", single_wavelength=555.0)
+        >>> field = et.LightField.fit(rays, et.Disk(radius=30), depths=(3, 3, 3, 3))
+        >>> round(field.in_unit("lm").total_flux / field.total_flux)
+        683
+        """
+        if unit not in FLUX_UNITS:
+            raise UnknownNameError("flux unit", unit, FLUX_UNITS)
+        if unit == self.flux_unit:
+            return self
+        if self.spectrum is None:
+            raise UnitError(
+                f"{self.provenance.source}: {self.flux_unit} cannot become {unit}: the light field knows no spectrum. Fit "
+                "it to rays with wavelengths or a spectrum, or give it one: field.replace(spectrum=Spectrum(...))."
+            )
+        efficacy = self.spectrum.luminous_efficacy
+        if not efficacy > 0.0:
+            raise UnitError(
+                f"{self.provenance.source}: {self.flux_unit} cannot become {unit}: V(λ) is 0 at the wavelengths of this "
+                "light."
+            )
+        factor = efficacy if unit == "lm" else 1.0 / efficacy
+        notes = list(self.notes)
+        if self.spectrum_is_mean:
+            notes.append(
+                f"{self.flux_unit} became {unit} by {efficacy:.5g} lm/W, which all rays have together; where their colour "
+                "changes with place or direction, convert the rays before the fit"
+            )
+        return self.replace(
+            parts=tuple(dataclasses.replace(part, level=part.level * factor) for part in self.parts),
+            flux_unit=unit,
+            report=dataclasses.replace(self.report, unmet_flux=self.report.unmet_flux * factor),
+            provenance=self.provenance.then(f"{self.flux_unit} to {unit} through its spectrum"),
+            notes=tuple(notes),
+        )
+
+    @property
+    def spectrum_is_mean(self) -> bool:
+        """Whether the rays had different wavelengths, of which the field only knows the distribution."""
+        return isinstance(self.spectrum, SpectralLines) and self.spectrum.wavelength.size > 1
 
     def replace(self, **changes: Any) -> LightField:
         """The same field with some attributes changed."""

@@ -18,7 +18,7 @@ from typing import Any, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import FormatError
+from etendue.errors import ArgumentError, FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
 from etendue.formats.output import atomic_output
 from etendue.lightfield.counting import MOST_CELLS
@@ -27,6 +27,8 @@ from etendue.lightfield.rounding import digits_for, rounded
 from etendue.lightfield.surfaces import SURFACES, Part, Surface
 from etendue.lightfield.symmetry import SYMMETRIES
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.spectral_lines import SpectralLines
+from etendue.quantities.spectrum import Spectrum
 from etendue.units import LUMINANCE_UNIT, FluxUnit
 
 FORMAT = "etendue light field"
@@ -46,6 +48,11 @@ FACTOR_DIGITS = 10
 
 CHUNK_SIDE = 16
 """Cells of a chunk along each coordinate. Trees are constant over boxes, and blocks cut fewer boxes than slices do."""
+
+CONTINUOUS, LINES = "continuous", "lines"
+"""Kinds of spectra in files."""
+
+MOST_WAVELENGTHS = 1 << 20
 
 DEFLATE = 9
 SAME_FLUX = 1e-9
@@ -133,6 +140,8 @@ def _write(file: Any, field: LightField) -> None:
     known = {name: value for name, value in surface.items() if value is not None}
     put(file.create_group("surface"), name=field.surface.NAME, spec=field.surface.spec, **known)
     put(file.create_group("report"), **_report_values(field.report))
+    if field.spectrum is not None:
+        _put_spectrum(file.create_group("spectrum"), field.spectrum)
     parts = file.create_group("parts")
     for index, (chart, part, flux) in enumerate(zip(field.surface.parts(), field.parts, field.part_flux, strict=True)):
         group = parts.create_group(str(index))
@@ -158,12 +167,21 @@ def _report_values(report: FitReport) -> dict[str, Any]:
     return {name: json.dumps(v) if hints[name] == tuple[str, ...] else v for name, v in values.items()}
 
 
-def _put_array(group: Any, name: str, values: npt.NDArray[Any], meaning: str) -> None:
+def _put_spectrum(group: Any, spectrum: Spectrum | SpectralLines) -> None:
+    lines = isinstance(spectrum, SpectralLines)
+    counted = spectrum.flux_unit if isinstance(spectrum, SpectralLines) else "W"
+    put(group, kind=LINES if lines else CONTINUOUS, flux_unit=counted)
+    weight = "flux at each wavelength" if lines else "spectral flux per nm, linear between the wavelengths"
+    _put_array(group, "wavelength", spectrum.wavelength, "of all the light together", "nm")
+    _put_array(group, "weight", spectrum.weight, f"{weight}, on any scale")
+
+
+def _put_array(group: Any, name: str, values: npt.NDArray[Any], meaning: str, unit: str = "1") -> None:
     chunks = tuple(min(n, CHUNK_SIDE) for n in values.shape) if values.ndim == 4 else values.shape
     dataset = group.create_dataset(
         name, data=values, chunks=chunks, shuffle=True, compression="gzip", compression_opts=DEFLATE, fletcher32=True
     )
-    put(dataset, unit="1", meaning=meaning)
+    put(dataset, unit=unit, meaning=meaning)
 
 
 # --- reading ---------------------------------------------------------------------------------------------------------
@@ -184,12 +202,27 @@ def _read(file: Node) -> LightField:
         report=_report(file.group("report")),
         provenance=_provenance(file),
         notes=file.texts("notes"),
+        spectrum=_spectrum(file.group("spectrum")) if "spectrum" in file.node else None,
     )
     for index, (stated, found) in enumerate(zip(flux, field.part_flux, strict=True)):
         if not math.isclose(stated, found, rel_tol=SAME_FLUX):
             place = f"/parts/{index}, attribute 'flux'"
             raise file.error(place, f"{stated!r} {field.flux_unit}, but the arrays hold {found!r}")
     return field
+
+
+def _spectrum(group: Node) -> Spectrum | SpectralLines:
+    kind, unit = group.text("kind"), _flux_unit(group)
+    if kind not in (CONTINUOUS, LINES):
+        raise group.error("attribute 'kind'", f"{kind!r} is neither {CONTINUOUS!r} nor {LINES!r}")
+    arrays = [group.dataset(name, np.dtype("<f8"), 1) for name in ("wavelength", "weight")]
+    if any(array.size > MOST_WAVELENGTHS for array in arrays):
+        raise group.error("dataset 'wavelength'", f"more than {MOST_WAVELENGTHS:,} wavelengths")
+    wavelength, weight = (array[()] for array in arrays)
+    try:
+        return SpectralLines(wavelength, weight, unit) if kind == LINES else Spectrum(wavelength, weight)
+    except ArgumentError as error:
+        raise group.error("datasets 'wavelength' and 'weight'", str(error)) from error
 
 
 def _flux_unit(file: Node) -> FluxUnit:

@@ -5,21 +5,19 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
-from etendue.formats.rays import read_rays
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.luminance.gathering import CHECKS, FIRST_CHECK, blocks, comparison_note, survey_notes
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
-from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Compiled, Scene, compile_scene
 from etendue.scene.dealing import CellSums, Dealing, added
@@ -299,20 +297,18 @@ def with_fields(scene: Scene, threads: int | None = None, *, cache: bool = True)
 
 def _fitted(source: Rays, scene: Scene, threads: int | None, *, cache: bool) -> tuple[Field, str, float]:
     """The light field of a ray source in its place, its carrier surface, and the share of the flux it does not hold."""
-    rays: Any = read_rays(scene.files.find(source.file)) if source.file is not None else source.rays
+    rays = source.ray_stream(scene.files)
     unit = source.flux_unit if source.flux_unit is not None else rays.flux_unit
-    if unit != rays.flux_unit and source.flux is None and isinstance(rays, RaySet):
-        rays = rays.in_unit(unit)
     (emitter,) = source.emitters(scene.files)
     field = fit_or_recall(rays, cache=cache, threads=threads)
     scale = emitter.record["flux"] / rays.total_flux
-    wavelengths, shares = source.colours(emitter, scene.wavelength)
     place = {key: getattr(source, key) for key in Placement.model_fields}
     seen = Field(
         name=source.name,
         field=field.replace(flux_unit=unit),
         flux=field.total_flux * scale,
-        spectrum=tuple(zip(wavelengths.tolist(), shares.tolist(), strict=True)),
+        wavelength=source.wavelength,
+        spectrum=source.spectrum,
         **place,
     )
     return seen, field.surface.spec, 1.0 - field.total_flux / rays.total_flux

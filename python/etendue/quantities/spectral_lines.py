@@ -36,7 +36,7 @@ class SpectralLines:
     --------
     >>> lines = SpectralLines([450.0, 550.0, 633.0], [1.0, 1.0, 1.0])
     >>> round(lines.luminous_efficacy, 1), lines.lines("W")[1].round(3).tolist()
-    (288.6, [0.333, 0.333, 0.333])
+    (288.7, [0.333, 0.333, 0.333])
     """
 
     wavelength: FloatArray

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
 from etendue.quantities.fingerprint import fingerprint
+from etendue.scene.colour_dependence import telling_finishes, telling_media
 from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
 from etendue.scene.media_library import MEDIA
@@ -110,6 +111,7 @@ class _Compiler:
         self.kinds: list[Kind] = []
         self.sets: list[Any] = []
         self.used: list[npt.NDArray[np.float64]] = []
+        self.means: dict[str, npt.NDArray[np.float64]] = {}
 
     def compiled(self) -> Compiled:
         """Everything, or all mistakes."""
@@ -121,6 +123,7 @@ class _Compiler:
             self._surface(_place("surfaces", i, surface.name), surface.name or f"surfaces[{i}]", surface)
         self._detectors()
         self._check_indices()
+        self._check_colours()
         if self.mistakes:
             raise SceneError(self.scene.name or "scene", self.mistakes)
         for doubt in doubts_about(self.rows, self.kinds, self.names["sources"]):
@@ -217,6 +220,28 @@ class _Compiler:
                     known = f"{name}: its index was measured from {low:g} to {high:g} nm"
                     self.notes.append(f"{known} and is extrapolated to {outside[0]:g} nm")
 
+    def _check_colours(self) -> None:
+        """Light whose colour is known of all of it together only, and things that treat its colours differently."""
+        if self.mistakes:
+            return
+        for name, wavelengths in self.means.items():
+            things = [*telling_media(self.rows["media"], self.names["media"], wavelengths),
+                      *telling_finishes(self.rows["finishes"], self.names["finishes"], wavelengths)]  # fmt: skip
+            if things:
+                self.notes.append(
+                    f"{name}: every place and direction of its light field has the spectrum of all its rays together, and "
+                    f"{', '.join(things)} treat{'s' if len(things) == 1 else ''} its wavelengths differently; where colour "
+                    "changes with place or direction, only the rays themselves, traced forwards, keep it"
+                )
+
+    def _assumed(self, name: str) -> list[str]:
+        if "wavelength" in self.scene.model_fields_set:
+            return []
+        at = self.scene.wavelength
+        return [
+            f"{name}: its watts have no known wavelength; {at:g} nm is taken, which decides what they are in lumens"
+        ]
+
     # --- what stands in the scene --------------------------------------------------------------------------------------
 
     def _solid(self, place: str, name: str, solid: Solid) -> None:
@@ -285,6 +310,10 @@ class _Compiler:
                     )
                     self.names["sources"].append(f"{name}.{emitter.name}" if emitter.name else name)
                     self.notes += [f"{name}: {note}" for note in (*emitter.flux_notes, *emitter.notes)]
+                    if emitter.mean:
+                        self.means[name] = wavelengths
+                    if emitter.spectrum is None and not source.states_colours and emitter.flux_unit == "W":
+                        self.notes += self._assumed(name)
         if len(units) > 1:
             text = " and ".join(f"{name!r} is in {unit}" for unit, name in units.items())
             self.mistakes.append(("sources", f"{text}; give all of them in one unit, by flux and flux_unit"))

@@ -22,7 +22,7 @@ from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.report import Complaint
-from etendue.quantities.spectrum import photopic_efficiency
+from etendue.quantities.spectrum import Spectrum, photopic_efficiency
 from etendue.units import LUMINOUS_EFFICACY_MAX
 
 FloatArray = npt.NDArray[np.float64]
@@ -305,7 +305,7 @@ class RayColour:
     def of(cls, rays: RayStream) -> RayColour:
         """Look at a stream. Columns are checked in one pass: a single impossible wavelength makes them unusable."""
         if not isinstance(rays, RaySet):
-            return cls(rays, Colour.UNKNOWN)
+            return cls._of_drawn(rays)
         if "wavelength" in rays.columns:
             if all((np.isfinite(part) & (part > 0)).all() for part in _stretches(rays, "wavelength")):
                 return cls(rays, Colour.PER_RAY)
@@ -322,6 +322,24 @@ class RayColour:
             note = f"Some rays point to a spectrum outside 1..{known}; spectra and indices are not written."
             return cls(rays, Colour.UNKNOWN, (note,))
         return cls(rays, Colour.UNKNOWN if one is None else Colour.ONE_SPECTRUM)
+
+    @classmethod
+    def _of_drawn(cls, rays: RayStream) -> RayColour:
+        """Of a stream that draws its rays."""
+        spectrum = rays.total_spectrum()
+        if spectrum is None:
+            return cls(rays, Colour.UNKNOWN)
+        if spectrum.wavelength.size == 1:
+            return cls(rays, Colour.SINGLE, single=float(spectrum.wavelength[0]))
+        return cls(rays, Colour.ONE_SPECTRUM if isinstance(spectrum, Spectrum) else Colour.PER_RAY)
+
+    @property
+    def spectra(self) -> tuple[Spectrum, ...]:
+        """The spectrum of all rays, or those that their indices count."""
+        if isinstance(self.rays, RaySet):
+            return self.rays.spectra
+        spectrum = self.rays.total_spectrum()
+        return (spectrum,) if isinstance(spectrum, Spectrum) else ()
 
     @property
     def has_wavelengths(self) -> bool:
@@ -340,11 +358,11 @@ class RayColour:
         """Luminous efficacy of radiation [lm/W] of a batch's rays, shape (k,); only if the `kind` is known."""
         if self.has_wavelengths:
             return LUMINOUS_EFFICACY_MAX * photopic_efficiency(self.wavelength(batch))
-        rays = self.rays
-        assert isinstance(rays, RaySet)  # noqa: S101 - other streams have no spectra
-        table = np.array([spectrum.luminous_efficacy for spectrum in rays.spectra])
+        table = np.array([spectrum.luminous_efficacy for spectrum in self.spectra])
         if self.kind is Colour.ONE_SPECTRUM:
             return np.full(len(batch.flux), table[0])
+        rays = self.rays
+        assert isinstance(rays, RaySet)  # noqa: S101 - other streams have no spectra by index
         values: FloatArray = table[rays.column("spectrum_index", batch_rows(batch))[batch.usable] - 1]
         return values
 

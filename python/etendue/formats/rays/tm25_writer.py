@@ -76,7 +76,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     rays, colour, notes = _in_writable_unit(rays)
     spectral, columns = _contents(rays, colour)
     header: Mapping[str, Any] = rays.header if isinstance(rays, RaySet) else {}
-    spectra = rays.spectra if spectral in (Spectral.ONE_SPECTRUM, Spectral.INDEXED) and isinstance(rays, RaySet) else ()
+    spectra = colour.spectra if spectral in (Spectral.ONE_SPECTRUM, Spectral.INDEXED) else ()
     text = _text_block(header)
     by_spectrum = 0.0
 
@@ -149,7 +149,8 @@ def _contents(rays: RayStream, colour: RayColour) -> tuple[Spectral, Columns]:
     """The spectral identifier and the columns, by the rules of 4.7.2."""
     watts = rays.flux_unit == "W"
     if not isinstance(rays, RaySet):
-        return Spectral.NONE, Columns(radiant=watts, luminous=not watts)
+        drawn = SPECTRAL[colour.kind] if watts or colour.kind not in NEEDS_WATTS else Spectral.NONE
+        return drawn, Columns(radiant=watts, wavelength=drawn == Spectral.PER_RAY, luminous=not watts)
     tristimulus = _has_tristimulus(rays)
     expressible = watts or (colour.kind not in NEEDS_WATTS and not tristimulus)
     spectral = SPECTRAL[colour.kind] if expressible else Spectral.NONE
@@ -170,11 +171,11 @@ def _contents(rays: RayStream, colour: RayColour) -> tuple[Spectral, Columns]:
 
 def _fill(rays: RayStream, colour: RayColour, batch: RayBatch, records: Records) -> None:
     """Set all columns but position, direction and flux."""
-    if not isinstance(rays, RaySet):
-        return
     for name in records.dtype.names or ():
         if name == "wavelength":
             records[name] = colour.wavelength(batch)
+        elif not isinstance(rays, RaySet):
+            continue
         elif name in FLUX_COLUMNS:
             records[name] = own_rows(batch, rays, name) * rays.flux_scale
         elif name in rays.columns:

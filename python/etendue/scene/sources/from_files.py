@@ -125,7 +125,9 @@ class Field(Source):
     field : LightField
         In Python, instead of a file.
     flux : number, optional
-        Total flux that overrides the field's [its own unit].
+        Total flux that overrides the field's [`flux_unit`].
+    flux_unit : {"lm", "W"}, optional
+        Turns the light into this unit, through the spectrum of the field; the field's own if left out.
 
     Examples
     --------
@@ -139,6 +141,7 @@ class Field(Source):
     file: Path | None = None
     field: SkipJsonSchema[InstanceOf[LightField] | None] = None
     flux: Positive | None = None
+    flux_unit: FluxUnit | None = None
 
     @model_validator(mode="after")
     def _one_origin(self) -> Self:
@@ -147,12 +150,16 @@ class Field(Source):
         return self
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
-        """The field and its flux."""
+        """The field, its flux and its spectrum."""
         field: LightField = LightField.load(files.find(self.file)) if self.file is not None else self.field  # type: ignore[assignment]
         if not field.total_flux > 0.0:
             raise ArgumentError("the light field carries no flux")
+        unit = field.flux_unit if self.flux_unit is None else self.flux_unit
+        if self.flux is None and unit != field.flux_unit:
+            field = field.in_unit(unit)
         flux = field.total_flux if self.flux is None else self.flux
-        return (Emitter({"kind": "field", "field": field.core, "flux": flux}, field.flux_unit),)
+        mean = field.spectrum_is_mean and not self.states_colours
+        return (Emitter({"kind": "field", "field": field.core, "flux": flux}, unit, field.spectrum, mean=mean),)
 
 
 class Point(Source):

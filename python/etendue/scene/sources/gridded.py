@@ -12,6 +12,8 @@ from pydantic.json_schema import SkipJsonSchema
 from etendue.formats.rays import read_rays
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.surfaces import parse_surface
+from etendue.quantities.spectral_lines import SpectralLines
+from etendue.quantities.spectrum import Spectrum
 from etendue.scene.files import Files
 from etendue.scene.placement import Placement
 from etendue.scene.sources.from_files import Rays
@@ -73,26 +75,31 @@ class Gridded(Source):
 
     def as_rays(self, files: Files) -> Rays:
         """The source as one of the rays that are drawn, in its place: what can be fitted and then seen."""
-        gridded = self._gridded(files)
+        gridded, known = self._gridded(files)
         place = {key: getattr(self, key) for key in (*Source.model_fields, *Placement.model_fields)}
+        if known is not None and not self.states_colours:
+            wavelengths, shares = known.lines(gridded.flux_unit)
+            place["spectrum"] = tuple(zip(wavelengths.tolist(), shares.tolist(), strict=True))
         flux = gridded.total_flux if self.flux is None else self.flux
         return Rays(**place, rays=gridded.sample(self.draws, self.seed), flux=flux, flux_unit=gridded.flux_unit)
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The rays that were drawn, with the flux of the rays on patches, which tables of coarse bins do not hold."""
-        gridded = self._gridded(files)
+        gridded, known = self._gridded(files)
         drawn = gridded.sample(self.draws, self.seed)
         flux = gridded.total_flux if self.flux is None else self.flux
         scale = drawn.flux_scale * flux / drawn.total_flux
         record = {"kind": "rays", "rays": drawn.core_source(), "scale": scale, "flux": flux}
         unit, factor = gridded.flux_unit, flux / drawn.total_flux
         note = f"the tables hold {drawn.total_flux:.7g} {unit}; what is drawn from them is multiplied by {factor:.7g}"
-        return (Emitter(record, unit, flux_notes=(f"{note}, to {flux:.7g} {unit}",)),)
+        return (Emitter(record, unit, known, flux_notes=(f"{note}, to {flux:.7g} {unit}",)),)
 
-    def _gridded(self, files: Files) -> GriddedSource:
-        gridded = self.gridded
+    def _gridded(self, files: Files) -> tuple[GriddedSource, Spectrum | SpectralLines | None]:
+        """The patches, and the spectrum of the rays that they were made of."""
+        gridded, known = self.gridded, None
         if self.file is not None and self.surface is not None:
             rays = read_rays(files.find(self.file))
             gridded = GriddedSource.fit(rays, parse_surface(self.surface), self.pixel, self.threshold)
+            known = rays.total_spectrum()
         assert gridded is not None  # noqa: S101 - one of the two is given
-        return gridded
+        return gridded, known

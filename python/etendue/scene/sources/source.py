@@ -42,6 +42,8 @@ class Emitter:
         What the user should know of the flux.
     range : tuple of float or None
         Shortest and longest wavelength of the light [nm], where the lines of `spectrum` are means.
+    mean : bool
+        Whether `spectrum` is that of all the light though the colour may differ between places and directions.
 
     Examples
     --------
@@ -56,6 +58,7 @@ class Emitter:
     notes: tuple[str, ...] = ()
     flux_notes: tuple[str, ...] = ()
     range: tuple[float, float] | None = None
+    mean: bool = False
 
 
 class Source(Placement, abc.ABC):
