@@ -11,7 +11,7 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.light_field import LightField
 from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm
-from oracles.verdicts import LARGEST_Z
+from oracles.verdicts import LARGEST_Z, assert_covers
 
 DEPTHS = (4, 4, 4, 4)
 
@@ -72,17 +72,19 @@ def test_the_product_base_is_taken_for_a_film_and_not_for_an_entangled_source() 
 
 @pytest.mark.parametrize("family", ["film", "dome"])
 def test_error_bars_cover_the_truth(family: str) -> None:
-    """Share of cells within one and two standard errors, over three seeds.
+    """Cells within one and two standard errors, over three seeds.
 
-    Cells err together, so their number tells no significance; fits of other seeds of each source had standard deviations
-    below 0.02 of the one-sigma share. On a grid as coarse as this, a product under a dome claims too much: 58 and 89 %.
+    On a grid as coarse as this, errors are a little too small: fits to twelve other seeds covered 67.6 and 90.9 % of the
+    cells of the film, and, since a product under a dome claims too much, 58.7 and 88.2 % of those of the dome. From seed to
+    seed these shares spread by 0.035 and 0.02, as those of 184 and 197 independent cells.
     """
+    one, two = ((0.64, 0.72), (0.89, 0.96)) if family == "film" else ((0.55, 0.63), (0.86, 0.91))
     source = PrismaticFilm() if family == "film" else DieUnderDome()
     surface = et.Disk(radius=source.radius, centre=source.centre) if family == "film" else et.Hemisphere(radius=1.2641)
     rng = np.random.default_rng(1)
     index = rng.integers(0, 16, (3000, 4))
     steps = np.array([0.856675, 0.733892, 0.628707, 0.538597])
-    shares = []
+    deviations = []
     for seed in (1, 2, 3):
         field = LightField.fit(rays_of(source, 100_000, seed), surface, depths=DEPTHS)
         chart = field.surface.parts()[0].core()
@@ -92,11 +94,9 @@ def test_error_bars_cover_the_truth(family: str) -> None:
             x, k = _core.rays_of_part(chart, at)
             sums += np.array([source.luminance(x + 1e-9 * k, k), *field.luminance(x, k)]) / 48
         lit = sums[0] > 0
-        z = np.abs(sums[1] - sums[0])[lit] / sums[2][lit]
-        shares.append([(z < 1).mean(), (z < 2).mean()])
-    one, two = np.mean(shares, axis=0)
-    assert 0.54 < one < 0.77
-    assert 0.86 < two < 0.985
+        deviations.append((sums[1] - sums[0])[lit] / sums[2][lit])
+    effective = 3 * (184 if family == "film" else 197)
+    assert_covers(deviations=np.concatenate(deviations), effective=effective, one=one, two=two)
 
 
 def test_maps_show_the_truth_from_everywhere(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
@@ -148,16 +148,19 @@ def test_flux_through_a_far_sphere_is_the_total(film: tuple[PrismaticFilm, et.Ra
 
 
 def test_a_refit_of_drawn_rays_agrees(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
+    """The drawn field is the truth here. It is rougher than what was smoothed to make it: twelve other draws covered 63.8
+    and 89.5 %, and these shares spread by 0.038 and 0.015, the first as that of 164 independent lines."""
     _, _, field = film
-    again = LightField.fit(field.rays(200_000, seed=5), field.surface, depths=DEPTHS)
-    x, k = field.sample(20_000, seed=6).position, field.sample(20_000, seed=6).direction
-    (a, sa), (b, sb) = field.luminance(x, k), again.luminance(x, k)
-    # The drawn field is the truth here. Over seeds of the draw the shares vary by 0.05 and by 0.02.
-    z = np.abs(a - b) / sb
-    assert 0.55 < (z < 1).mean() < 0.85
-    assert 0.86 < (z < 2).mean() < 0.99
-    assert np.median(np.abs(a / b - 1)) < 0.1
+    lines = field.sample(20_000, seed=6)
+    a, sa = field.luminance(lines.position, lines.direction)
     assert (sa > 0).all()
+    deviations = []
+    for seed in (5, 6, 7):
+        again = LightField.fit(field.rays(200_000, seed=seed), field.surface, depths=DEPTHS)
+        b, sb = again.luminance(lines.position, lines.direction)
+        assert np.median(np.abs(a / b - 1)) < 0.1
+        deviations.append((a - b) / sb)
+    assert_covers(deviations=np.concatenate(deviations), effective=3 * 164, one=(0.6, 0.68), two=(0.87, 0.92))
 
 
 def test_weights_count_as_flux_and_not_as_rays() -> None:

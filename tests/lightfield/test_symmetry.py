@@ -14,6 +14,7 @@ from etendue.lightfield import fitting
 from etendue.lightfield.counting import count_rays
 from etendue.lightfield.symmetry import SYMMETRIES, fold, proven_symmetry
 from oracles.sources import LimbDarkenedDisk
+from oracles.verdicts import assert_covers
 
 DEPTHS = (3, 3, 3, 3)
 MAPS = {
@@ -103,21 +104,25 @@ def test_images_of_a_ray_tell_nothing_more_of_the_flux(
 
 
 def test_error_bars_of_folded_fields_cover_the_truth() -> None:
-    """Each ray stands for two: error bars that took them for independent ones would be too small by √2."""
-    source = LimbDarkenedDisk()
-    x, k = source.rays(60_000, 8)
-    x, k = (np.concatenate([v, v * [1, -1, 1]]) for v in (x - [*source.centre, 0], k))
+    """Each ray stands for two: error bars that took them for independent ones would be too small by √2.
+
+    On a grid as coarse as this, errors are a little too small: fits to twelve other seeds covered 63.5 and 88.1 %, and
+    these shares spread by 0.040 and 0.022, as those of 144 and 217 independent lines.
+    """
+    source, n = LimbDarkenedDisk(), 60_000
     plane = et.Plane(z=0, width=2 * source.radius, height=2 * source.radius, centre=(0, 0))
-    half = et.RaySet(x[:60_000], k[:60_000], np.ones(60_000))
-    field = et.LightField.fit(half, plane, depths=(4, 4, 4, 4), symmetry="mirror-y")
-    # The source that is even in y: the mean of the given one and its image.
-    points, directions = x[::12], k[::12]
     centre = np.array([*source.centre, 0])
-    truth = sum(source.luminance(points * m + centre, directions * m) for m in ([1, 1, 1], [1, -1, 1])) / 2
-    value, error = field.luminance(points, directions)
-    z = np.abs(value * (source.total_flux / 60_000) - truth) / (error * (source.total_flux / 60_000))
-    assert 0.55 < (z < 1).mean() < 0.85
-    assert 0.86 < (z < 2).mean() < 0.995
+    deviations = []
+    for seed in (8, 9, 10):
+        x, k = source.rays(n, seed)
+        half = et.RaySet(x - centre, k, np.full(n, source.total_flux / n))
+        field = et.LightField.fit(half, plane, depths=(4, 4, 4, 4), symmetry="mirror-y")
+        points, directions = (np.concatenate([v, v * [1, -1, 1]])[::12] for v in (x - centre, k))
+        # The source that is even in y: the mean of the given one and its image.
+        truth = sum(source.luminance(points * m + centre, directions * m) for m in ([1, 1, 1], [1, -1, 1])) / 2
+        value, error = field.luminance(points, directions)
+        deviations.append((value - truth) / error)
+    assert_covers(deviations=np.concatenate(deviations), effective=3 * 144, one=(0.62, 0.66), two=(0.86, 0.91))
 
 
 def test_an_asymmetry_of_two_per_cent_is_seen_with_a_million_rays() -> None:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pytest
 from etendue import _core
 from etendue.errors import ArgumentError
+from oracles.verdicts import assert_covers
 from scipy.special import betaln, logsumexp
 
 Array = npt.NDArray[np.float64]
@@ -109,16 +110,17 @@ def test_flux_is_kept_and_the_error_falls() -> None:
 
 
 def test_error_bars_cover() -> None:
-    """68 ± 5 % within one standard error, 95 ± 3 % within two (theory section 12), from few rays to many."""
+    """68 ± 5 % within one standard error, 95 ± 3 % within two (theory section 12), from few rays to many.
+
+    From seed to seed the share of a map spreads by 0.023, 0.046 and 0.035 at the three levels, as those of 369, 99 and 177
+    independent pixels (16 other seeds); the mean over all nine maps as that of 9²/(3/369 + 3/99 + 3/177) = 1461.
+    """
     truth = scene(48, 64)
-    one, two = [], []
+    deviations = []
     for seed, level in itertools.product(range(3), (3.0, 10.0, 30.0)):
         smooth = et.denoise_map(poisson_map(truth, level, seed, et.Screen(8, 6, 64, 48)))
-        z = np.abs(smooth.values - truth) / smooth.standard_error
-        one.append((z < 1).mean())
-        two.append((z < 2).mean())
-    assert 0.63 < np.mean(one) < 0.73, np.mean(one)
-    assert 0.92 < np.mean(two) < 0.98, np.mean(two)
+        deviations.append((smooth.values - truth) / smooth.standard_error)
+    assert_covers(deviations=np.array(deviations), effective=1461, one=(0.63, 0.73), two=(0.92, 0.98))
 
 
 def test_a_uniform_map_becomes_uniform() -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import binomtest, chi2, norm, t
+from scipy.special import betainc
+from scipy.stats import chi2, norm, t
 
 Array = npt.NDArray[np.float64]
 SIGNIFICANCE = 1e-4
@@ -14,10 +15,26 @@ REVERSE = 15.0
 """Degrees of freedom of the errors of a map of a scene: of the spread of 16 passes."""
 
 
-def assert_drawn_with(*, share: float, hits: int, rays: int) -> None:
-    """`hits` of `rays` independent rays, each with probability `share`: the normal limit of the binomial."""
-    z = (hits - rays * share) / np.sqrt(rays * share * (1.0 - share))
-    assert abs(z) < LARGEST_Z, f"{hits / rays} of the rays, {share} expected: z = {z:.2f}"
+Share = float | tuple[float, float]
+"""A probability, or the two between which it lies."""
+
+WITHIN_ONE, WITHIN_TWO = (float(1 - 2 * norm.sf(z)) for z in (1.0, 2.0))
+"""Shares of normal deviates within one and within two standard errors."""
+
+
+def assert_drawn_with(*, share: Share, hits: float, rays: float) -> None:
+    """`hits` of `rays` independent rays, each with probability `share`: binomial, exact, two-sided.
+
+    By the incomplete beta function, which is the binomial's distribution function between whole numbers as well, for
+    numbers of rays that are effective ones.
+    """
+    least, most = share if isinstance(share, tuple) else (share, share)
+    assert 0.0 < least <= most < 1.0
+    assert 0.0 <= hits <= rays
+    as_many = float(betainc(hits, rays - hits + 1.0, most)) if hits > 0.0 else 1.0
+    as_few = float(betainc(rays - hits, hits + 1.0, 1.0 - least)) if hits < rays else 1.0
+    told = f"{hits:.8g} of {rays:.8g}, a share of {hits / rays:.4f}, where {share} is expected"
+    assert min(as_many, as_few) > SIGNIFICANCE / 2, f"{told}: a probability of {min(as_many, as_few):.1e}"
 
 
 def assert_agree(
@@ -50,12 +67,20 @@ def assert_differ(*, values: Array, other: Array, standard_error: Array) -> None
     assert chi2.sf((z**2).sum(), z.size) < SIGNIFICANCE
 
 
-def assert_covers(*, deviations: Array) -> None:
-    """Deviations from the truth, each independent and over its own error, lie within the 68 % and the 95 % of the normal as
-    often as that: binomial, two-sided, so that errors too large are found as well.
+def assert_covers(
+    *, deviations: Array, effective: float | None = None, one: Share = WITHIN_ONE, two: Share = WITHIN_TWO
+) -> None:
+    """Deviations from the truth, each over its own error, lie within one error as often as `one`, within two as often as
+    `two`: binomial, two-sided, so that errors too large are found as well.
+
+    Deviations of one smoothed map err together, so that their number tells no significance. They are worth p (1 - p)/v
+    independent ones, where v is the variance of the share p between maps of other seeds: that is `effective`, of all
+    deviations together, the lesser one of both shares. Errors that are calibrated to a few per cent have an interval for
+    the share: what they promise, to which the verdict adds the sampling error.
     """
     assert np.isfinite(deviations).all()
-    for level in (0.68, 0.95):
-        within = int((np.abs(deviations) < norm.isf((1.0 - level) / 2.0)).sum())
-        told = f"{within} of {deviations.size} within {level:.0%}; deviations spread by {deviations.std():.2f}"
-        assert binomtest(within, deviations.size, level).pvalue > SIGNIFICANCE, told
+    trials = float(deviations.size if effective is None else effective)
+    assert 0.0 < trials <= deviations.size
+    for errors, share in ((1.0, one), (2.0, two)):
+        within = float((np.abs(deviations) < errors).mean())
+        assert_drawn_with(share=share, hits=within * trials, rays=trials)
