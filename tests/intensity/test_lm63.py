@@ -96,7 +96,7 @@ def test_delimiters_and_line_ends_mean_nothing(read) -> None:
 
 
 def test_what_follows_the_table_is_complained_about(read) -> None:
-    led = read(ies(end="\n5 6\nfoo\n"))
+    led = read(ies(end="\nfoo bar baz\n"))
     assert led.values.tolist() == [[10, 6, 1]]
     assert "3 words" in str(led.complaints[0])
     assert not read(ies(end="\n\n \r\n\x1a")).complaints

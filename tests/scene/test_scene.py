@@ -271,7 +271,7 @@ def test_all_mistakes_of_a_scene_are_told_at_once() -> None:
     [
         (b"name = ", "no TOML: "),
         (b"\xff\xfe", "byte 0: no UTF-8"),
-        (b"x = " + b"[" * 100_000, "no TOML: "),
+        (b"x = " + b"[" * 100_000, "brackets within brackets"),
         (b'name = "a"\nname = "b"', "no TOML: "),
     ],
 )

@@ -10,6 +10,7 @@ import typer
 
 from etendue.cli.field import complaints_of, read_source
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, progress_bar, say
+from etendue.errors import UnsupportedFormatError
 from etendue.formats.intensity import (
     INTENSITY_EXTENSIONS,
     detect_intensity_format,
@@ -17,11 +18,13 @@ from etendue.formats.intensity import (
     write_intensity,
 )
 from etendue.formats.maps import PICTURE_EXTENSIONS
+from etendue.formats.rays.refused import INTENSITY_FILE
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.lightfield.light_field import LightField
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
 from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
 from etendue.quantities.intensity_cells import Cells
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
 
 
@@ -68,7 +71,7 @@ def intensity(
         if photometry is not None:
             raise typer.BadParameter(f"--photometry: for intensity files, and {file} is none")
         cells = Cells(36 if c_planes is None else c_planes, 2.5 if gamma_step is None else gamma_step)
-        source = read_source(file, flux, unit)
+        source = _source(file, flux, unit)
         if isinstance(source, LightField):
             result = source.intensity(cells.c_planes, cells.gamma_step)
         else:
@@ -98,6 +101,16 @@ def intensity(
     print_intensity(shown)
     for path in outputs:
         say(f"  {path}")
+
+
+def _source(file: Path, flux: str | None, unit: str | None) -> RaySet | LightField:
+    try:
+        return read_source(file, flux, unit)
+    except UnsupportedFormatError as error:
+        if error.advice == INTENSITY_FILE:
+            # The name promises intensity, which is what this verb reads: say why the content is none.
+            read_intensity(file)
+        raise
 
 
 def summary(distribution: Intensity) -> dict[str, Any]:

@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.formats.encodings import decoded
+from etendue.formats.rays.text_rows import number
 
 Array = npt.NDArray[np.float64]
 
@@ -54,22 +56,20 @@ def read_columns(path: Path) -> Array:
     ...     read_columns(path).tolist()
     [[400.0, 1.6], [700.0, 1.4]]
     """
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        text = file.read(LARGEST_TABLE + 1)
-    if len(text) > LARGEST_TABLE:
+    with path.open("rb") as file:
+        data = file.read(LARGEST_TABLE + 1)
+    if len(data) > LARGEST_TABLE:
         raise FormatError(path, "length", "more than 64 MiB", "A table of a material has some hundred lines.")
     rows: list[tuple[float, float]] = []
-    for number, line in enumerate(text.splitlines(), 1):
+    for at, line in enumerate(decoded(path, data).splitlines(), 1):
         words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
         if not words:
             continue
         try:
-            first, second = map(float, words)
+            first, second = map(number, words)
         except ValueError:
             found = f"{line[:60]!r}"
-            raise FormatError(
-                path, f"line {number}", found, "Each line holds two numbers; # begins a remark."
-            ) from None
+            raise FormatError(path, f"line {at}", found, "Each line holds two numbers; # begins a remark.") from None
         rows.append((first, second))
     table = np.array(sorted(rows), dtype=np.float64).reshape(-1, 2)
     if not len(table):

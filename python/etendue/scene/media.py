@@ -15,14 +15,14 @@ from etendue.errors import ArgumentError
 from etendue.scene.description import Description
 from etendue.scene.files import Files, read_columns
 from etendue.scene.mistakes import BY_NAME, DESCRIBED, NUMBER, TABLE
-from etendue.scene.values import AsNumber, AsRow, Finite, NotNegative, Number, Wavelength
+from etendue.scene.values import AsNumber, AsRow, Finite, FirstMistake, NotNegative, Number, Wavelength
 from etendue.units import NM_PER_UM
 
 Array = npt.NDArray[np.float64]
 Record = dict[str, Any]
 
 Index = Annotated[float, Finite, Ge(1.0), Le(10.0), AsNumber]
-Rising = Annotated[tuple[Wavelength, ...], MinLen(1), MaxLen(1 << 20), AsRow]
+Rising = Annotated[tuple[Wavelength, ...], MinLen(1), MaxLen(1 << 20), FirstMistake, AsRow]
 
 
 def rises(name: str, values: tuple[float, ...]) -> None:
@@ -60,7 +60,7 @@ class Spectral(Description):
     """
 
     wavelength: Rising | None = None
-    values: Annotated[tuple[NotNegative, ...], MinLen(1), MaxLen(1 << 20), AsRow] | None = None
+    values: Annotated[tuple[NotNegative, ...], MinLen(1), MaxLen(1 << 20), FirstMistake, AsRow] | None = None
     file: Path | None = None
 
     @model_validator(mode="after")

@@ -134,5 +134,9 @@ def _wrong_kind(value: Any, context: Mapping[str, Any]) -> str:
 
 def _shown(value: Any) -> str:
     # Whole numbers are floats by now, whichever way they were written.
-    text = str(int(value)) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else repr(value)
+    try:
+        text = str(int(value)) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else repr(value)
+    except ValueError:
+        # Python spells out no whole number of more than some 4000 digits.
+        text = "a whole number of thousands of digits"
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 from annotated_types import MaxLen
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
 from etendue.errors import SceneError
 from etendue.formats.output import atomic_output
@@ -25,14 +24,24 @@ from etendue.scene.observers import ObserverKeys
 from etendue.scene.sources import SOURCES
 from etendue.scene.sources.source import Source
 from etendue.scene.things import Solid, Surface
-from etendue.scene.toml import to_toml
+from etendue.scene.toml import read_toml, to_toml
 from etendue.scene.values import AsRow, Wavelength
 
 MOST = 100_000
 """Sources, solids, surfaces, detectors or observers of one scene."""
 
-LARGEST_FILE = 1 << 28
+LARGEST_FILE = 1 << 25
 """Most bytes of a scene's file."""
+
+
+def _not_too_many(value: Any) -> Any:
+    if isinstance(value, list | tuple) and len(value) > MOST:
+        raise ValueError(f"there are {len(value):,}; a scene may have {MOST:,}")
+    return value
+
+
+NotTooMany = BeforeValidator(_not_too_many)
+"""Looks at the length before the mistakes in millions of entries are told one by one."""
 
 
 class Scene(Description):
@@ -74,11 +83,13 @@ class Scene(Description):
     surroundings: MediumOrName = "air"
     media: dict[str, Medium] = Field(default_factory=dict)
     finishes: dict[str, AnyFinish] = Field(default_factory=dict)
-    sources: Annotated[tuple[Annotated[Source, Family(SOURCES)], ...], MaxLen(MOST), AsRow] = Field(default=())
-    solids: Annotated[tuple[Solid, ...], MaxLen(MOST), AsRow] = Field(default=())
-    surfaces: Annotated[tuple[Surface, ...], MaxLen(MOST), AsRow] = Field(default=())
-    detectors: Annotated[tuple[AnyDetector, ...], MaxLen(MOST), AsRow] = Field(default=())
-    observers: Annotated[tuple[ObserverKeys, ...], MaxLen(MOST), AsRow] = Field(default=())
+    sources: Annotated[tuple[Annotated[Source, Family(SOURCES)], ...], MaxLen(MOST), NotTooMany, AsRow] = Field(
+        default=()
+    )
+    solids: Annotated[tuple[Solid, ...], MaxLen(MOST), NotTooMany, AsRow] = Field(default=())
+    surfaces: Annotated[tuple[Surface, ...], MaxLen(MOST), NotTooMany, AsRow] = Field(default=())
+    detectors: Annotated[tuple[AnyDetector, ...], MaxLen(MOST), NotTooMany, AsRow] = Field(default=())
+    observers: Annotated[tuple[ObserverKeys, ...], MaxLen(MOST), NotTooMany, AsRow] = Field(default=())
     _folder: Path = PrivateAttr(default=Path())
 
     @model_validator(mode="after")
@@ -134,7 +145,7 @@ class Scene(Description):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a TOML file.
+        """Read a TOML file, in UTF-8, or in UTF-16 with a byte-order mark.
 
         Raises
         ------
@@ -155,13 +166,11 @@ class Scene(Description):
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
         if len(raw) > LARGEST_FILE:
-            raise SceneError(path, [("", "more than 256 MiB; this is no description of a scene")])
-        try:
-            data = tomllib.loads(raw.decode("utf-8-sig"))
-        except UnicodeDecodeError as error:
-            raise SceneError(path, [(f"byte {error.start}", "no UTF-8, which TOML files are written in")]) from None
-        except (tomllib.TOMLDecodeError, RecursionError) as error:
-            raise SceneError(path, [("", f"no TOML: {error}")]) from None
+            raise SceneError(
+                path,
+                [("", "more than 32 MiB; this is no description of a scene, whose meshes are in files of their own")],
+            )
+        data = read_toml(path, raw)
         return cls.from_dict(data, folder=path.parent, source=path)
 
     def to_toml(self, folder: str | os.PathLike[str] | None = None) -> str:

@@ -17,11 +17,11 @@ from etendue.scene.description import Description
 from etendue.scene.files import Files, read_columns
 from etendue.scene.media import Rising, rises
 from etendue.scene.mistakes import NUMBER, TABLE
-from etendue.scene.values import AsNumber, AsRow, Finite, Share
+from etendue.scene.values import AsNumber, AsRow, Finite, FirstMistake, Share
 
 Array = npt.NDArray[np.float64]
 Angle = Annotated[float, Finite, Ge(0.0), Le(90.0), AsNumber]
-Row = Annotated[tuple[Share, ...], MinLen(1), MaxLen(1 << 16), AsRow]
+Row = Annotated[tuple[Share, ...], MinLen(1), MaxLen(1 << 16), FirstMistake, AsRow]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -103,9 +103,9 @@ class ShareTable(Description):
     [0.04, 0.09, 1.0]
     """
 
-    angle: Annotated[tuple[Angle, ...], MinLen(1), MaxLen(1 << 16), AsRow] | None = None
+    angle: Annotated[tuple[Angle, ...], MinLen(1), MaxLen(1 << 16), FirstMistake, AsRow] | None = None
     wavelength: Rising | None = None
-    values: Annotated[tuple[Any, ...], MinLen(1), MaxLen(1 << 16), AsRow] | None = None
+    values: Annotated[tuple[Any, ...], MinLen(1), MaxLen(1 << 16), FirstMistake, AsRow] | None = None
     file: Path | None = None
     by: Literal["angle", "wavelength"] | None = None
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, MaxLen, MinLen
-from pydantic import AllowInfNan, BeforeValidator
+from pydantic import AllowInfNan, BeforeValidator, FailFast
 
 
 def _number(value: Any) -> Any:
@@ -39,6 +39,15 @@ def _row(value: Any) -> Any:
 AsNumber = BeforeValidator(_number)
 AsCount = BeforeValidator(_count)
 AsRow = BeforeValidator(_row)
+
+
+class _FirstMistake(FailFast):
+    # Types that are joined with `|` are looked up by their hash.
+    __hash__ = object.__hash__
+
+
+FirstMistake = _FirstMistake()
+"""For long rows: only the first mistake is told, of what may be millions."""
 Finite = AllowInfNan(False)
 
 LONGEST = 1e9
@@ -60,5 +69,7 @@ Pixels = Annotated[int, Ge(1), Le(65536), AsCount]
 Vector = Annotated[tuple[Number, Number, Number], AsRow]
 Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], AsRow]
 Interval = Annotated[tuple[Bound, Bound], AsRow]
-Numbers = Annotated[tuple[Number, ...], AsRow]
-Vertices = Annotated[tuple[Annotated[tuple[Coordinate, Coordinate], AsRow], ...], MinLen(3), MaxLen(1 << 16), AsRow]
+Numbers = Annotated[tuple[Number, ...], FirstMistake, AsRow]
+Vertices = Annotated[
+    tuple[Annotated[tuple[Coordinate, Coordinate], AsRow], ...], MinLen(3), MaxLen(1 << 16), FirstMistake, AsRow
+]

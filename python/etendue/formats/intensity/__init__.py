@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.formats.encodings import refuse_unmarked
 from etendue.formats.input import is_stream, require_file
 from etendue.formats.intensity import eulumdat, gldf, lm63, tm33
 from etendue.formats.intensity.intensity_format import IntensityFormat
@@ -14,9 +15,9 @@ from etendue.formats.rays.ray_format import Head
 from etendue.quantities.intensity import Intensity
 
 INTENSITY_FORMATS: dict[str, IntensityFormat] = {
-    module.FORMAT.name: module.FORMAT for module in (lm63, eulumdat, tm33, gldf)
+    module.FORMAT.name: module.FORMAT for module in (eulumdat, lm63, tm33, gldf)
 }
-"""Every format by name, in the order in which a file is tested."""
+"""Every format by name, in the order in which a file is tested: what must be in seven lines before what may be in one."""
 
 INTENSITY_EXTENSIONS: tuple[str, ...] = tuple(f.extension for f in INTENSITY_FORMATS.values() if f.write)
 """Extensions that choose a format for writing."""
@@ -85,8 +86,10 @@ def read_intensity(path: str | os.PathLike[str], photometry: str | None = None) 
     require_file(Path(path), "intensity files are looked at before they are read")
     found = detect_intensity_format(path)
     if found is None:
+        refuse_unmarked(Path(path), Head.of(Path(path)).data)
         known = ", ".join(f"{f.title} ({f.extension})" for f in INTENSITY_FORMATS.values())
-        raise FormatError(path, "first lines", "this is no intensity distribution", f"Known formats: {known}.")
+        why = "this is no intensity distribution: it begins as none of the known formats do"
+        raise FormatError(path, "first lines", why, f"Known are {known}.")
     if photometry is None:
         return found.read(Path(path))
     if found.pick is None:

@@ -30,10 +30,12 @@ beams are off by up to 4.5 %."""
 
 
 def recognise(head: Head) -> bool:
-    """A text whose lines 2 to 7 are a type, a symmetry, and two counts of angles with their steps."""
+    """Lines 2 to 7 are a type, a symmetry, and two counts of angles with their steps; line 1 is not that of an IES file."""
+    if head.lines and head.lines[0].lstrip().upper().startswith("TILT"):
+        return False
     words = [_first_word(line) for line in head.lines[1:7]]
     numbers = [value for word in words if (value := number(word.replace(",", "."))) is not None]
-    if not head.is_text or len(numbers) < 6:
+    if len(numbers) < 6:
         return False
     kind, symmetry, planes, step, gammas, gamma_step = numbers
     counts = planes >= 1 and planes.is_integer() and gammas >= 2 and gammas.is_integer()

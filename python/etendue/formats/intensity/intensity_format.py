@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from etendue.errors import FormatError
+from etendue.formats.encodings import decoded
 from etendue.formats.rays.ray_format import Head
 from etendue.quantities.intensity import Intensity
 
@@ -68,7 +69,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_lines(path: Path) -> list[str]:
-    """The lines of a text file, UTF-8 or else Latin-1, without a byte-order mark.
+    """The lines of a text file, decoded by `etendue.formats.encodings.decoded`.
 
     The last one is what follows the last line end: empty if the file ends with one.
 
@@ -77,15 +78,8 @@ def read_lines(path: Path) -> list[str]:
     FormatError
         If the file is larger than any distribution, or no text.
     """
-    data = read_bytes(path).removeprefix(b"\xef\xbb\xbf")
-    if b"\0" in data:
-        raise FormatError(path, f"byte {data.index(0)}", "a zero byte in a text", DAMAGED)
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
     # A DOS end-of-file mark is no text.
-    return re.split(r"\r\n|\n|\r", text.removesuffix("\x1a"))
+    return re.split(r"\r\n|\n|\r", decoded(path, read_bytes(path)).removesuffix("\x1a"))
 
 
 def number(word: str) -> float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import re
 from pathlib import Path
@@ -28,6 +29,8 @@ ORIENTATION = (
 
 _TILT = re.compile(r"\s*TILT\s*=\s*(.*?)\s*", re.IGNORECASE)
 _TAG = re.compile(r"\s*IES(?:NA)?\s*:?\s*(?:LM-63-)?(\d{4}|\d{2})\b", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"(?<![^\s])([+-]?\d+),(\d+(?:[eEdD][+-]?\d+)?)(?![^\s])", re.ASCII)
+"""A word of its own; a list such as ``0,45,90`` is none."""
 _KEYWORD = re.compile(r"\s*\[\s*([^\]]*?)\s*\]\s*(.*?)\s*")
 
 FACT_BY_KEYWORD = {
@@ -42,14 +45,17 @@ FACT_BY_KEYWORD = {
 
 
 def recognise(head: Head) -> bool:
-    """A text with a line ``TILT=``, or one that begins with the tag of an edition."""
+    """A file with a line ``TILT=``, or one that begins with the tag of an edition."""
     lines = head.lines
-    return head.is_text and (any(_TILT.fullmatch(line) for line in lines) or bool(lines and _TAG.match(lines[0])))
+    return any(_TILT.fullmatch(line) for line in lines) or bool(lines and _TAG.match(lines[0]))
 
 
 @dataclasses.dataclass
 class _Words:
-    """The words after the line TILT=, taken one after the other; line ends mean nothing there, commas are blanks."""
+    """The words after the line TILT=, taken one after the other; line ends mean nothing there, commas are blanks.
+
+    Or they are decimal commas, which the standard does not know: then `of` has made points of them.
+    """
 
     path: Path
     words: list[str]
@@ -57,8 +63,10 @@ class _Words:
     taken: int = 0
 
     @classmethod
-    def of(cls, path: Path, lines: list[str], first: int) -> _Words:
+    def of(cls, path: Path, lines: list[str], first: int, *, decimal_commas: bool = False) -> _Words:
         """Those from line `first` on, counted from 0."""
+        if decimal_commas:
+            lines = [_DECIMAL_COMMA.sub(r"\1.\2", line) for line in lines]
         found = [(w, n) for n, line in enumerate(lines[first:], first + 1) for w in re.split(r"[\s,]+", line) if w]
         return cls(path, [w for w, _ in found], [n for _, n in found])
 
@@ -94,14 +102,23 @@ class _Words:
 
 def read(path: Path) -> Intensity:
     """Read a file of any photometric type; A becomes C-γ exactly, B by resampling with the error of it in the notes."""
-    return _Reader(path).intensity()
+    try:
+        return _Reader(path).intensity()
+    except FormatError:
+        # Decimal commas are certain only where the file makes no sense without them, and comes out even with them.
+        with contextlib.suppress(FormatError):
+            reader = _Reader(path, decimal_commas=True)
+            if reader.commas:
+                return reader.intensity()
+        raise
 
 
 class _Reader:
     """One file on its way to a distribution."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, decimal_commas: bool = False) -> None:
         self.path = path
+        self.commas = 0
         self.complaints: list[Complaint] = []
         self.lines = read_lines(path)
         tilts = [n for n, line in enumerate(self.lines) if _TILT.fullmatch(line)]
@@ -110,7 +127,11 @@ class _Reader:
         self.header = self.lines[: tilts[0]]
         match = _TILT.fullmatch(self.lines[tilts[0]])
         self.tilt = match[1] if match else ""
-        self.words = _Words.of(path, self.lines, tilts[0] + 1)
+        self.words = _Words.of(path, self.lines, tilts[0] + 1, decimal_commas=decimal_commas)
+        if decimal_commas:
+            self.commas = sum(len(_DECIMAL_COMMA.findall(line)) for line in self.lines[tilts[0] + 1 :])
+            found = f"{self.commas:,} have a decimal comma, which the standard does not know; it was read as a point"
+            self.complain("warning", "numbers", found)
         self.keywords = self._keywords()
         self.version = self._version()
 
@@ -252,9 +273,15 @@ class _Reader:
         return float(np.prod(list(factors.values())))
 
     def _check_end(self) -> None:
-        if self.words.left:
-            found = f"{self.words.left:,} words after the last candela value were ignored"
-            self.complain("warning", f"line {self.words.lines[self.words.taken]}", found)
+        words = self.words
+        if words.left:
+            line = words.lines[words.taken]
+            surplus = f"{words.left:,} words more than the counts announce"
+            # Numbers that nothing announced say that a count is wrong, or an earlier number: then every one is doubtful.
+            if line == words.lines[words.taken - 1] or any(number(w) is not None for w in words.words[words.taken :]):
+                advice = "Which numbers are the table is not certain; mend the counts or ask for the file again."
+                raise FormatError(self.path, f"line {line}", f"there are {surplus}", advice)
+            self.complain("warning", f"line {line}", f"{surplus}, none of them a number; they were ignored")
         elif self.lines[-1].strip():
             found = "the file ends with a digit and not with a line end; the last number may have been cut short"
             self.complain("warning", f"line {len(self.lines)}", found)

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from etendue.errors import FormatError, UnknownNameError
+from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.maps import csv, exr, hdr, npz, tiff
 from etendue.formats.maps.map_format import AnyMap, MapFormat
 from etendue.formats.output import atomic_output
@@ -100,11 +101,13 @@ def read_illuminance_map(path: str | os.PathLike[str]) -> IlluminanceMap:
 
 
 def _read(path: Path) -> AnyMap:
-    with path.open("rb") as stream:
-        head = stream.read(SNIFFED_BYTES)
-    for candidate in MAP_FORMATS.values():
-        if candidate.sniff(head):
-            return candidate.read(path)
+    with in_utf8(path) as readable:
+        with readable.open("rb") as stream:
+            head = stream.read(SNIFFED_BYTES)
+        for candidate in MAP_FORMATS.values():
+            if candidate.sniff(head):
+                return candidate.read(readable)
+    refuse_unmarked(path, head)
     found = f"no map format begins with {head[:8]!r}" if head else "the file is empty"
     raise FormatError(path, "first bytes", found, f"étendue reads the maps it wrote: {', '.join(MAP_EXTENSIONS)}.")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -53,7 +54,7 @@ def _rows(lmap: AnyMap) -> Iterator[str]:
 def read(path: Path) -> AnyMap:
     """Read what `write` wrote; line ends may have become those of another system."""
     with path.open("rb") as stream:
-        top = [stream.readline().rstrip(b"\r\n") for _ in range(3)]
+        top = [stream.readline().removeprefix(BOM_UTF8).rstrip(b"\r\n") for _ in range(3)]
         lines, ended = _count_lines(stream)
     if top[0] not in TITLES or not top[1].startswith(b"# "):
         raise FormatError(path, "lines 1 and 2", "not the title and header of an étendue map", FOREIGN)
@@ -63,7 +64,7 @@ def read(path: Path) -> AnyMap:
     if lines != header.pixels or not ended:
         found = f"{lines} whole lines of pixels, {header.pixels} expected" + ("" if ended else ", and a line cut short")
         raise FormatError(path, "pixels", found, DAMAGED)
-    with parsing(path, "pixels"), path.open(encoding="ascii") as stream:
+    with parsing(path, "pixels"), path.open(encoding="utf-8") as stream:
         table = np.loadtxt(stream, dtype=list(COLUMNS.items()), delimiter=",", comments=None, skiprows=3, ndmin=1)
     row, column = np.divmod(np.arange(header.pixels), header.columns)
     if len(table) != header.pixels or (table["row"] != row).any() or (table["column"] != column).any():
@@ -81,4 +82,4 @@ def _count_lines(stream: BinaryIO) -> tuple[int, bool]:
     return lines, last == b"\n"
 
 
-FORMAT = MapFormat("csv", (".csv",), lambda head: head.startswith(TITLES), read, write)
+FORMAT = MapFormat("csv", (".csv",), lambda head: head.removeprefix(BOM_UTF8).startswith(TITLES), read, write)

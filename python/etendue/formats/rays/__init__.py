@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import at_rest, is_stream, require_readable, stream_in_file
 from etendue.formats.output import atomic_output
 from etendue.formats.rays import (
@@ -58,6 +59,7 @@ def detect_format(path: str | os.PathLike[str]) -> RayFormat:
     for candidate in RAY_FORMATS:
         if candidate.recognise(head):
             return candidate
+    refuse_unmarked(head.path, head.data)
     refused.refuse(head)
     known = ", ".join(f.title for f in RAY_FORMATS)
     raise FormatError(
@@ -67,6 +69,8 @@ def detect_format(path: str | os.PathLike[str]) -> RayFormat:
 
 def read_rays(path: str | os.PathLike[str], *, flux: float | None = None, flux_unit: FluxUnit | None = None) -> RaySet:
     """Read a ray file. Its format is found from the content, never from the extension.
+
+    Text may be in UTF-8, Latin-1, or UTF-16 with a byte-order mark.
 
     The rays of binary files stay where they are: opening 28 GB takes no memory. Files whose per-ray values are relative
     (TM-25, LightTools, Speos) are scaled to the header's total flux.
@@ -111,8 +115,8 @@ def read_rays(path: str | os.PathLike[str], *, flux: float | None = None, flux_u
 
 
 def _from_file(path: Path) -> RaySet:
-    with at_rest(path):
-        return detect_format(path).read(path)
+    with at_rest(path), in_utf8(path) as readable:
+        return detect_format(readable).read(readable)
 
 
 def _from_stream(path: Path) -> RaySet:

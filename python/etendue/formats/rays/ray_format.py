@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import FormatError
+from etendue.formats.encodings import wide_encoding
 from etendue.quantities.file_records import AnyRecords, FileRecords
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
@@ -40,9 +41,15 @@ class Head:
 
     @classmethod
     def of(cls, path: Path) -> Head:
-        """Read the head of a file; OSError if it cannot be opened."""
+        """Read the head of a file, text in UTF-16 as UTF-8; OSError if it cannot be opened."""
         with path.open("rb") as file:
-            return cls(path, os.fstat(file.fileno()).st_size, file.read(HEAD_BYTES))
+            size, data = os.fstat(file.fileno()).st_size, file.read(HEAD_BYTES)
+        wide = wide_encoding(data)
+        if wide is not None:
+            encoding, mark = wide
+            # The last letter may be cut.
+            data = data[mark:].decode(encoding, errors="ignore").encode("utf-8", errors="replace")
+        return cls(path, size, data)
 
     @property
     def is_text(self) -> bool:

@@ -16,7 +16,7 @@ from etendue.scene.files import Files
 from etendue.scene.mesh_files import read_mesh
 from etendue.scene.shapes.shape import Record, Shape, Sheet, Trim
 from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
-from etendue.scene.values import LONGEST, AsNumber, AsRow, Finite, Index, Point
+from etendue.scene.values import LONGEST, AsNumber, AsRow, Finite, FirstMistake, Index, Point
 
 Array = npt.NDArray[np.float64]
 Triangle = Annotated[tuple[Index, Index, Index], AsRow]
@@ -76,8 +76,8 @@ class Mesh(Shape):
 
     kind: Literal["mesh"] = "mesh"
     file: Path | None = None
-    vertices: Annotated[tuple[Point, ...], MinLen(3), MaxLen(1 << 20), AsRow] | None = None
-    triangles: Annotated[tuple[Triangle, ...], MinLen(1), MaxLen(1 << 21), AsRow] | None = None
+    vertices: Annotated[tuple[Point, ...], MinLen(3), MaxLen(1 << 20), FirstMistake, AsRow] | None = None
+    triangles: Annotated[tuple[Triangle, ...], MinLen(1), MaxLen(1 << 21), FirstMistake, AsRow] | None = None
     unit: Unit | None = None
     scale: Annotated[float, Finite, Ge(1e-9), Le(1e9), AsNumber] = 1.0
     tolerance: Annotated[float, Finite, Ge(1e-4), Le(LONGEST), AsNumber] | None = None

@@ -15,7 +15,7 @@ from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
 from etendue.scene.files import Files
 from etendue.scene.placement import Placement
-from etendue.scene.values import AsRow, NotNegative, Wavelength
+from etendue.scene.values import AsRow, FirstMistake, NotNegative, Wavelength
 from etendue.units import FluxUnit
 
 Array = npt.NDArray[np.float64]
@@ -76,7 +76,7 @@ class Source(Placement, abc.ABC):
 
     name: str = ""
     wavelength: Wavelength | None = None
-    spectrum: Annotated[tuple[Line, ...], MinLen(1), MaxLen(1 << 16), AsRow] | None = None
+    spectrum: Annotated[tuple[Line, ...], MinLen(1), MaxLen(1 << 16), FirstMistake, AsRow] | None = None
 
     @model_validator(mode="after")
     def _one_colour(self) -> Self:
