@@ -35,6 +35,11 @@ def read_toml(path: Path, raw: bytes) -> dict[str, Any]:
     SceneError
         If it is none, with line and column; or one that nobody wrote who described a scene: keys of a thousand parts,
         brackets in brackets without end, numbers of a thousand digits.
+
+    Examples
+    --------
+    >>> read_toml(Path("scene.toml"), b'name = "lamp"')
+    {'name': 'lamp'}
     """
     try:
         text = decoded(path, raw)
