@@ -86,7 +86,7 @@ def test_tm33_inside_wherever_it_lies(read: Read, member: str) -> None:
 def test_complaints_name_the_file_inside(read: Read, tmp_path: Path) -> None:
     xml = product({"f": ("ldc/ies", "localFileName", "led.ies")}, {"p": "f"})
     data = ies_of(lid("none"), tmp_path)
-    led = read(archive({"product.xml": xml, "ldc/led.ies": data + b"7 7\r\n"}))
+    led = read(archive({"product.xml": xml, "ldc/led.ies": data + b"by hand\r\n"}))
     assert str(led.complaints[0]).startswith("warning: ldc/led.ies: line")
     with pytest.raises(FormatError, match=r"a\.gldf: ldc/led\.ies: candela values: the file ends"):
         read(archive({"product.xml": xml, "ldc/led.ies": data[:-200]}))
