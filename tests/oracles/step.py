@@ -33,12 +33,16 @@ class Step:
         unit = np.asarray(along, dtype=float) / np.linalg.norm(along)
         return self.add("DIRECTION('',({:.15f},{:.15f},{:.15f}))".format(*unit))
 
-    def file_of(self, shell: list[str]) -> str:
-        """The file of one solid in millimetres, from the faces of its closed shell."""
+    def file_of(self, shells: dict[str, list[str]], product: str = "t", unit: str = "mm") -> str:
+        """The file of one product: a solid for each closed shell, from its faces, with its name."""
         add = self.add
-        closed = add(f"CLOSED_SHELL('',({','.join(shell)}))")
-        solid = add(f"MANIFOLD_SOLID_BREP('',{closed})")
-        length = add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
+        closed = {name: add(f"CLOSED_SHELL('',({','.join(shell)}))") for name, shell in shells.items()}
+        solids = ",".join(add(f"MANIFOLD_SOLID_BREP('{name}',{shell})") for name, shell in closed.items())
+        length = add(f"(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT({'$' if unit == 'm' else '.MILLI.'},.METRE.))")
+        if unit == "inch":
+            inch = add(f"LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),{length})")
+            exponents = add("DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.)")
+            length = add(f"(CONVERSION_BASED_UNIT('INCH',{inch})LENGTH_UNIT()NAMED_UNIT({exponents}))")
         angle = add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
         sphere = add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
         error = add(f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),{length},'d','')")
@@ -47,10 +51,10 @@ class Step:
             f"GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({error}))"
             f"GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{sphere}))REPRESENTATION_CONTEXT('',''))"
         )
-        shape = add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',({solid}),{context})")
+        shape = add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',({solids}),{context})")
         application = add("APPLICATION_CONTEXT('automotive design')")
         of_product = add(f"PRODUCT_CONTEXT('',{application},'mechanical')")
-        product = add(f"PRODUCT('t','t','',({of_product}))")
+        product = add(f"PRODUCT('{product}','{product}','',({of_product}))")
         formation = add(f"PRODUCT_DEFINITION_FORMATION('','',{product})")
         view = add(f"PRODUCT_DEFINITION_CONTEXT('part definition',{application},'design')")
         definition = add(f"PRODUCT_DEFINITION('design','',{formation},{view})")
@@ -58,42 +62,92 @@ class Step:
         add(f"SHAPE_DEFINITION_REPRESENTATION({defined},{shape})")
         return HEAD + "\n".join(self.lines) + "\nENDSEC;\nEND-ISO-10303-21;\n"
 
+    def ball(self, radius: float, middle: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[str]:
+        """One spherical face, whose only bound is a point."""
+        centre, z, x = self.point(*middle), self.direction([0, 0, 1]), self.direction([1, 0, 0])
+        place = self.add(f"AXIS2_PLACEMENT_3D('',{centre},{z},{x})")
+        surface = self.add(f"SPHERICAL_SURFACE('',{place},{radius:.6f})")
+        pole = self.point(middle[0], middle[1], middle[2] - radius)
+        vertex = self.add(f"VERTEX_POINT('',{pole})")
+        loop = self.add(f"VERTEX_LOOP('',{vertex})")
+        bound = self.add(f"FACE_BOUND('',{loop},.T.)")
+        return [self.add(f"ADVANCED_FACE('',({bound}),{surface},.T.)")]
 
-def sphere(radius: float) -> str:
-    """One spherical face, whose only bound is a point."""
+    def polyhedron(self, corners: Any, faces: list[tuple[int, ...]]) -> list[str]:
+        """Plane faces, counter-clockwise seen from outside."""
+        corners = np.asarray(corners, dtype=float)
+        points = [self.point(*c) for c in corners]
+        vertices = [self.add(f"VERTEX_POINT('',{p})") for p in points]
+        edges: dict[tuple[int, int], str] = {}
+        shell = []
+        for face in faces:
+            oriented = []
+            for a, b in zip(face, (*face[1:], face[0]), strict=True):
+                low, high = sorted((a, b))
+                if (low, high) not in edges:
+                    course = self.add(f"VECTOR('',{self.direction(corners[high] - corners[low])},1.)")
+                    line = self.add(f"LINE('',{points[low]},{course})")
+                    edges[low, high] = self.add(f"EDGE_CURVE('',{vertices[low]},{vertices[high]},{line},.T.)")
+                oriented.append(self.add(f"ORIENTED_EDGE('',*,*,{edges[low, high]},{'.T.' if a < b else '.F.'})"))
+            loop = self.add(f"EDGE_LOOP('',({','.join(oriented)}))")
+            p, q, r = corners[list(face[:3])]
+            normal, along = self.direction(np.cross(q - p, r - p)), self.direction(q - p)
+            place = self.add(f"AXIS2_PLACEMENT_3D('',{points[face[0]]},{normal},{along})")
+            plane = self.add(f"PLANE('',{place})")
+            bound = self.add(f"FACE_OUTER_BOUND('',{loop},.T.)")
+            shell.append(self.add(f"ADVANCED_FACE('',({bound}),{plane},.T.)"))
+        return shell
+
+    def half_ball(self, radius: float) -> list[str]:
+        """A plano-convex lens: half a sphere over a disk in z = 0, with a sharp rim."""
+        centre, z, x = self.point(0, 0, 0), self.direction([0, 0, 1]), self.direction([1, 0, 0])
+        place = self.add(f"AXIS2_PLACEMENT_3D('',{centre},{z},{x})")
+        vertex = self.add(f"VERTEX_POINT('',{self.point(radius, 0, 0)})")
+        circle = self.add(f"CIRCLE('',{place},{radius:.6f})")
+        edge = self.add(f"EDGE_CURVE('',{vertex},{vertex},{circle},.T.)")
+        shell = []
+        for surface, sense, same in (
+            (self.add(f"SPHERICAL_SURFACE('',{place},{radius:.6f})"), ".T.", ".T."),
+            (self.add(f"PLANE('',{place})"), ".F.", ".F."),
+        ):
+            oriented = self.add(f"ORIENTED_EDGE('',*,*,{edge},{sense})")
+            loop = self.add(f"EDGE_LOOP('',({oriented}))")
+            bound = self.add(f"FACE_BOUND('',{loop},.T.)")
+            shell.append(self.add(f"ADVANCED_FACE('',({bound}),{surface},{same})"))
+        return shell
+
+
+CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+CUBE_FACES: list[tuple[int, ...]] = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+def sphere(radius: float, unit: str = "mm", product: str = "t") -> str:
+    """A ball."""
     step = Step()
-    centre, z, x = step.point(0, 0, 0), step.direction([0, 0, 1]), step.direction([1, 0, 0])
-    place = step.add(f"AXIS2_PLACEMENT_3D('',{centre},{z},{x})")
-    surface = step.add(f"SPHERICAL_SURFACE('',{place},{radius:.6f})")
-    vertex = step.add(f"VERTEX_POINT('',{step.point(0, 0, -radius)})")
-    loop = step.add(f"VERTEX_LOOP('',{vertex})")
-    bound = step.add(f"FACE_BOUND('',{loop},.T.)")
-    return step.file_of([step.add(f"ADVANCED_FACE('',({bound}),{surface},.T.)")])
+    return step.file_of({"": step.ball(radius)}, product, unit)
+
+
+def half_ball(radius: float) -> str:
+    """Half a ball."""
+    step = Step()
+    return step.file_of({"": step.half_ball(radius)})
 
 
 def tetrahedron(leg: float) -> str:
     """Four plane faces, with three legs along the axes."""
     corners = leg * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
-    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
     step = Step()
-    points = [step.point(*c) for c in corners]
-    vertices = [step.add(f"VERTEX_POINT('',{p})") for p in points]
-    edges: dict[tuple[int, int], str] = {}
-    shell = []
-    for face in faces:
-        oriented = []
-        for a, b in zip(face, (*face[1:], face[0]), strict=True):
-            low, high = sorted((a, b))
-            if (low, high) not in edges:
-                course = step.add(f"VECTOR('',{step.direction(corners[high] - corners[low])},1.)")
-                line = step.add(f"LINE('',{points[low]},{course})")
-                edges[low, high] = step.add(f"EDGE_CURVE('',{vertices[low]},{vertices[high]},{line},.T.)")
-            oriented.append(step.add(f"ORIENTED_EDGE('',*,*,{edges[low, high]},{'.T.' if a < b else '.F.'})"))
-        loop = step.add(f"EDGE_LOOP('',({','.join(oriented)}))")
-        p, q, r = corners[list(face)]
-        normal, along = step.direction(np.cross(q - p, r - p)), step.direction(q - p)
-        place = step.add(f"AXIS2_PLACEMENT_3D('',{points[face[0]]},{normal},{along})")
-        plane = step.add(f"PLANE('',{place})")
-        bound = step.add(f"FACE_OUTER_BOUND('',{loop},.T.)")
-        shell.append(step.add(f"ADVANCED_FACE('',({bound}),{plane},.T.)"))
-    return step.file_of(shell)
+    return step.file_of({"": step.polyhedron(corners, [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])})
+
+
+def optics() -> str:
+    """Four bodies in one product: cubes of 2 mm and 1 mm that touch, the smaller one's face within that of the larger one;
+    a cube beside the first, with corners in common; and a ball."""
+    step = Step()
+    shells = {
+        "block": step.polyhedron(2 * CUBE, CUBE_FACES),
+        "chip": step.polyhedron(CUBE + np.array([0.5, 0.5, 2.0]), CUBE_FACES),
+        "twin": step.polyhedron(2 * CUBE + np.array([2.0, 0.0, 0.0]), CUBE_FACES),
+        "lens": step.ball(1.5, (20.0, 0.0, 0.0)),
+    }
+    return step.file_of(shells, "optics")

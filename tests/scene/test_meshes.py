@@ -95,6 +95,11 @@ WRITERS: dict[str, Callable[[float], bytes]] = {
 }  # fmt: skip
 
 
+def welded_file(path: Path) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    mesh = read_mesh(path, None)
+    return welded(mesh.vertices, mesh.triangles)
+
+
 def test_every_format_is_tested() -> None:
     assert {*WRITERS, "step"} == set(MESH_FORMATS)
 
@@ -104,7 +109,7 @@ def test_an_octahedron_comes_back_from_every_format(name: str, tmp_path: Path) -
     """The content tells the format, whatever the name; the unit is the format's, and 4/3 r³ is the volume with it."""
     path = tmp_path / "body.cad"
     path.write_bytes(WRITERS[name](1e-3 if name in ("gltf", "glb") else 1.0))
-    vertices, triangles = welded(*read_mesh(path, None))
+    vertices, triangles = welded_file(path)
     assert len(vertices) == 6
     assert len(triangles) == 8
     assert not len(open_edges(triangles))
@@ -118,7 +123,7 @@ def test_an_octahedron_comes_back_from_every_format(name: str, tmp_path: Path) -
 def test_step_files_are_read(tmp_path: Path) -> None:
     """A tetrahedron with legs of 30 mm, as a faceted boundary representation: 30³/6 mm³."""
     (tmp_path / "body.step").write_text(step.tetrahedron(30.0), encoding="ascii")
-    vertices, triangles = welded(*read_mesh(tmp_path / "body.step", None))
+    vertices, triangles = welded_file(tmp_path / "body.step")
     assert volume(vertices, triangles) == pytest.approx(30**3 / 6, rel=1e-5)
     with pytest.raises(FormatError, match="state their unit themselves"):
         read_mesh(tmp_path / "body.step", "mm")
@@ -178,11 +183,11 @@ def test_truncated_files_are_refused_or_smaller(name: str, tmp_path: Path) -> No
     for cut in range(0, len(whole), max(1, len(whole) // 23)):
         (tmp_path / "cut").write_bytes(whole[:cut])
         try:
-            vertices, triangles = read_mesh(tmp_path / "cut", "mm")
+            mesh = read_mesh(tmp_path / "cut", "mm")
         except FormatError:
             continue
-        assert len(triangles) <= 8
-        assert np.abs(vertices).max() <= 2.0
+        assert len(mesh.triangles) <= 8
+        assert np.abs(mesh.vertices).max() <= 2.0
 
 
 def test_open_and_twisted_meshes_are_doubted() -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from etendue.cli.bodies import describe_bodies, print_bodies
 from etendue.cli.field import describe_field, print_field
 from etendue.cli.intensity import print_intensity, summary
 from etendue.cli.terminal import complain, print_json, progress_bar, say
@@ -19,18 +20,23 @@ from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import is_field_file
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.ray_set import RaySet
+from etendue.scene.mesh_files import step_bodies
+from etendue.scene.step_files import StepBody
 from etendue.tracing.result import TraceResult
 from etendue.tracing.storage import is_result_file
+
+Found = dict[str, Any] | LightField | TraceResult | Intensity | list[StepBody]
 
 
 def info(
     files: Annotated[
-        list[Path], typer.Argument(help="Ray files and intensity files of any format, light fields, results of traces.")
+        list[Path],
+        typer.Argument(help="Ray and intensity files of any format, light fields, results of traces, STEP files."),
     ],
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Format, rays, flux by header and by sum, bounding box, virtual focus, wavelengths, complaints; a field; a trace."""
-    described: list[dict[str, Any] | LightField | TraceResult | Intensity] = []
+    """Format, rays, flux by header and by sum, bounding box, virtual focus, spectrum, complaints; field, trace, bodies."""
+    described: list[Found] = []
     failed = False
     for file in files:
         try:
@@ -56,26 +62,34 @@ def info(
             elif isinstance(facts, TraceResult):
                 say(f"{file}: result of a trace, {file.stat().st_size / 1000:,.1f} kB")
                 print_result(facts)
+            elif isinstance(facts, list):
+                say(f"{file}: STEP, {len(facts)} {'body' if len(facts) == 1 else 'bodies'}")
+                print_bodies(facts)
             else:
                 _print(facts)
     if failed:
         raise typer.Exit(1)
 
 
-def _opened(path: Path) -> dict[str, Any] | LightField | TraceResult | Intensity:
+def _opened(path: Path) -> Found:
     if is_field_file(path):
         return LightField.load(path)
     if detect_intensity_format(path) is not None:
         return read_intensity(path)
-    return TraceResult.load(path) if is_result_file(path) else describe(path)
+    if is_result_file(path):
+        return TraceResult.load(path)
+    bodies = step_bodies(path)
+    return describe(path) if bodies is None else bodies
 
 
-def _facts(path: Path, found: dict[str, Any] | LightField | TraceResult | Intensity) -> dict[str, Any]:
+def _facts(path: Path, found: Found) -> dict[str, Any]:
     if isinstance(found, LightField):
         return {"file": path, "format": "light field", "bytes": path.stat().st_size} | describe_field(found)
     if isinstance(found, Intensity):
         told = {"complaints": [complaint.to_dict() for complaint in found.complaints]}
         return {"file": path, "bytes": path.stat().st_size} | summary(found) | told
+    if isinstance(found, list):
+        return {"file": path, "format": "STEP", "bytes": path.stat().st_size} | describe_bodies(found)
     if isinstance(found, TraceResult):
         return {"file": path, "format": "trace result", "bytes": path.stat().st_size} | found.to_dict()
     return found

@@ -260,6 +260,7 @@ class _Compiler:
                 where, owner = ("finish", name) if key is None else (f"finishes.{key}", f"{name}.{key}")
                 finish, lets_in = self._finish(join(place, where), owner, given)
                 entered |= lets_in
+                self.notes += [f"{name}: {note}" for note in (*face.notes, *(face.facet_notes if lets_in else ()))]
                 self._face(
                     f"{name}.{face.name}", face.shape, frame.then(face.frame).record(), [], number, face.flip, finish
                 )
@@ -274,6 +275,7 @@ class _Compiler:
     def _surface(self, place: str, name: str, surface: Surface) -> None:
         with self._at(join(place, "shape")):
             sheet = surface.shape.sheet(surface.trim, self.files)
+            self.notes += [f"{name}: {note}" for note in sheet.notes]
             finish, _ = self._finish(join(place, "finish"), name, surface.finish)
             if surface.finish in ("interface", Interface()):
                 self.notes.append(f"{name}: an interface changes nothing on a surface that is no solid's")

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.scene.step_files import StepBody, read_step
 from etendue.units import MM_PER_LENGTH_UNIT
 
 Array = npt.NDArray[np.float64]
@@ -20,9 +21,6 @@ Triangles = npt.NDArray[np.int64]
 
 LARGEST_FILE = 1 << 31
 """Most bytes of a mesh file."""
-
-TOLERANCE = 0.01
-"""Largest distance [mm] between a surface of a STEP file and its triangles, unless another is asked for."""
 
 HEAD = 512
 """Bytes that tell a format."""
@@ -70,7 +68,7 @@ MESH_FORMATS: dict[str, MeshFormat] = {
     for form in (
         MeshFormat("ply", "PLY", lambda head, _: head.startswith(b"ply")),
         MeshFormat("glb", "binary glTF", lambda head, _: head.startswith(b"glTF"), 1000.0),
-        MeshFormat("step", "STEP", lambda head, _: head.lstrip().startswith(b"ISO-10303-21"), 1000.0),
+        MeshFormat("step", "STEP", lambda head, _: head.lstrip().startswith(b"ISO-10303-21")),
         MeshFormat("gltf", "glTF", lambda head, _: head.lstrip().startswith(b"{"), 1000.0),
         # Binary STL before text: there are binary files that begin with "solid".
         MeshFormat("stl", "binary STL", _is_binary_stl),
@@ -79,11 +77,37 @@ MESH_FORMATS: dict[str, MeshFormat] = {
     )
 }
 """Every format by name, in the order in which a file is tested. glTF is in metres by its standard; STEP files state their
-unit, and reach us in metres."""
+unit."""
 
 
-def read_mesh(path: Path, unit: str | None, tolerance: float | None = None) -> tuple[Array, Triangles]:
-    r"""Vertices [mm], shape (n, 3), and triangles, shape (m, 3), of everything in a file, as it is stored.
+@dataclasses.dataclass(frozen=True, eq=False)
+class StoredMesh:
+    """What a file holds.
+
+    Parameters
+    ----------
+    vertices : array, shape (n, 3)
+        [mm]
+    triangles : array of int, shape (m, 3)
+    normals : array, shape (n, 3), or None
+        At the vertices, where the file states them or tells the true surface.
+    chord_error : float or None
+        Largest distance between the triangles and the true surfaces [mm], where the file tells these.
+
+    Examples
+    --------
+    >>> StoredMesh(np.eye(3), np.array([[0, 1, 2]])).normals is None
+    True
+    """
+
+    vertices: Array
+    triangles: Triangles
+    normals: Array | None = None
+    chord_error: float | None = None
+
+
+def read_mesh(path: Path, unit: str | None, tolerance: float | None = None, body: str | None = None) -> StoredMesh:
+    r"""What is in a file, as it is stored.
 
     Parameters
     ----------
@@ -92,13 +116,16 @@ def read_mesh(path: Path, unit: str | None, tolerance: float | None = None) -> t
     unit : str or None
         A key of `etendue.units.MM_PER_LENGTH_UNIT` that overrides the format's; None: the format's own, or mm.
     tolerance : float, optional
-        Largest distance [mm] between the surfaces of a STEP file and the triangles made of them; `TOLERANCE` if None.
+        Largest distance [mm] between the surfaces of a STEP file and the triangles made of them; None: from the size of the
+        body.
+    body : str, optional
+        Name of a body of a STEP file; one that holds several needs it.
 
     Raises
     ------
     FormatError
-        If the file is of no known format or damaged, if its library is not installed, or if it does not take the unit or
-        the tolerance.
+        If the file is of no known format or damaged, if its library is not installed, if it does not take the unit, the
+        tolerance or the body, or holds several bodies and none is named.
     OSError
         If the file cannot be opened.
 
@@ -108,10 +135,59 @@ def read_mesh(path: Path, unit: str | None, tolerance: float | None = None) -> t
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder) / "sheet.obj"
     ...     _ = path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
-    ...     vertices, triangles = read_mesh(path, unit="cm")
-    >>> vertices.max(axis=0).tolist(), len(triangles)
+    ...     mesh = read_mesh(path, unit="cm")
+    >>> mesh.vertices.max(axis=0).tolist(), len(mesh.triangles)
     ([10.0, 10.0, 0.0], 2)
     """
+    form, raw = _opened(path)
+    if form.name != "step":
+        for key, value in (("tolerance", tolerance), ("body", body)):
+            if value is not None:
+                raise FormatError(path, key, f"{form.title} is made of triangles already", f"Leave the {key} out.")
+    elif unit is not None:
+        raise FormatError(path, "unit", f"{unit!r}, and STEP files state their unit themselves", "Leave it out.")
+    if form.name == "step":
+        mesh = _step_body(path, read_step(path, raw, tolerance, body))
+    else:
+        vertices, triangles = _load(path, form, raw)
+        mm = MM_PER_LENGTH_UNIT[unit] if unit is not None else form.mm or 1.0
+        mesh = StoredMesh(vertices * mm, triangles)
+    if not len(mesh.triangles):
+        raise FormatError(path, "whole file", "there are no triangles", "Export the body as a triangle mesh.")
+    if mesh.triangles.min() < 0 or mesh.triangles.max() >= len(mesh.vertices):
+        raise FormatError(path, "triangles", "one names a vertex that is not there", "The file is damaged.")
+    if not np.isfinite(mesh.vertices).all():
+        raise FormatError(path, "vertices", "a coordinate is not finite", "The file is damaged.")
+    return mesh
+
+
+def step_bodies(path: Path) -> list[StepBody] | None:
+    r"""The bodies of a STEP file, with triangles as fine as a scene takes by default; None if it is no such file.
+
+    Raises
+    ------
+    FormatError
+        If it is damaged, or its library is not installed.
+    OSError
+        If it cannot be opened.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "sheet.obj"
+    ...     _ = path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n")
+    ...     step_bodies(path) is None
+    True
+    """
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    if not MESH_FORMATS["step"].recognise(head, 0):
+        return None
+    return read_step(path, _opened(path)[1], None)
+
+
+def _opened(path: Path) -> tuple[MeshFormat, bytes]:
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(HEAD)
@@ -124,31 +200,20 @@ def read_mesh(path: Path, unit: str | None, tolerance: float | None = None) -> t
         if size > LARGEST_FILE:
             raise FormatError(path, "size", f"{size:,} bytes", f"A mesh may have {LARGEST_FILE:,}; make it coarser.")
         file.seek(0)
-        raw = file.read()
-    if form.name != "step" and tolerance is not None:
-        raise FormatError(path, "tolerance", f"{form.title} is made of triangles already", "Leave the tolerance out.")
-    if form.name == "step" and unit is not None:
-        raise FormatError(path, "unit", f"{unit!r}, and STEP files state their unit themselves", "Leave it out.")
-    options = {"tol_linear": TOLERANCE if tolerance is None else tolerance} if form.name == "step" else {}
-    vertices, triangles = _load(path, form, raw, options)
-    if not len(triangles):
-        raise FormatError(path, "whole file", "there are no triangles", "Export the body as a triangle mesh.")
-    if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise FormatError(path, "triangles", "one names a vertex that is not there", "The file is damaged.")
-    if not np.isfinite(vertices).all():
-        raise FormatError(path, "vertices", "a coordinate is not finite", "The file is damaged.")
-    mm = MM_PER_LENGTH_UNIT[unit] if unit is not None else form.mm or 1.0
-    return vertices * mm, triangles
+        return form, file.read()
 
 
-def _load(path: Path, form: MeshFormat, raw: bytes, options: dict[str, float]) -> tuple[Array, Triangles]:
-    if form.name == "step":
-        try:
-            import cascadio  # noqa: F401, PLC0415 - an extra, which only STEP files need
-        except ImportError:
-            raise FormatError(
-                path, "format", "STEP, whose reader is not installed", "Install it: pip install 'etendue[step]'."
-            ) from None
+def _step_body(path: Path, bodies: list[StepBody]) -> StoredMesh:
+    if len(bodies) > 1:
+        names = ", ".join(repr(body.name) for body in bodies)
+        raise FormatError(
+            path, "body", f"there are {len(bodies)} bodies: {names}", "Name one of them with 'body', one in each solid."
+        )
+    (found,) = bodies
+    return StoredMesh(found.vertices, found.triangles, found.normals, found.chord_error)
+
+
+def _load(path: Path, form: MeshFormat, raw: bytes) -> tuple[Array, Triangles]:
     import trimesh  # noqa: PLC0415 - takes a second to import and is needed by few scenes
 
     try:
@@ -157,7 +222,6 @@ def _load(path: Path, form: MeshFormat, raw: bytes, options: dict[str, float]) -
             file_type=form.name,
             process=False,
             resolver=trimesh.resolvers.FilePathResolver(os.fspath(path)),
-            **options,
         )
         vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Triangle meshes: welding, open edges, volume, smooth normals."""
+"""Triangle meshes: welding, open edges, volume, smooth normals, and how far they are from the surfaces they stand for."""
 
 from __future__ import annotations
 
@@ -10,6 +10,15 @@ Triangles = npt.NDArray[np.int64]
 
 BLOCK = 1 << 24
 """Pairs of corners that are compared at once."""
+
+PLANE = 3e-6
+"""Normals in single precision that differ by less from that of a triangle are its own."""
+
+SMALLEST_TURN = 0.05
+"""[°] Neighbours that turn by less are one plane, as files in single precision store it."""
+
+CURVED = 0.1
+"""Of the area of a mesh: less is a fillet, which says little of what the body does to light."""
 
 
 def welded(vertices: Array, triangles: Triangles) -> tuple[Array, Triangles]:
@@ -134,6 +143,115 @@ def smooth_normals(vertices: Array, triangles: Triangles, crease_angle: float) -
     key = np.concatenate([corner_vertex[:, None].astype(np.float64), corner_normal], axis=1)
     split, number = np.unique(key, axis=0, return_inverse=True)
     return vertices[split[:, 0].astype(np.int64)], number.reshape(-1, 3), np.ascontiguousarray(split[:, 1:])
+
+
+def smooth_where_round(vertices: Array, triangles: Triangles, normals: Array) -> Array | None:
+    """Unit normals at the vertices, exactly those of the triangles where these are plane; None if all are.
+
+    Parameters
+    ----------
+    vertices : array, shape (n, 3)
+        [mm]
+    triangles : array of int, shape (m, 3)
+        Those of plane and of curved faces have no vertex in common.
+    normals : array, shape (n, 3)
+        At the vertices, in single precision; a normal that is none becomes that of a triangle.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    >>> smooth_where_round(corners, np.array([[0, 1, 2]]), np.array([[0, 0, 1.0]] * 3)) is None
+    True
+    """
+    doubled, _ = directed_areas(vertices, triangles)
+    length = np.linalg.norm(doubled, axis=1, keepdims=True)
+    real = length[:, 0] > 0.0
+    flat = np.divide(doubled, length, out=np.zeros_like(doubled), where=length > 0.0)
+    size = np.linalg.norm(normals, axis=1, keepdims=True)
+    found: Array = np.divide(normals, size, out=np.zeros_like(normals), where=size > 0.5)
+    turned = np.linalg.norm(found[triangles] - flat[:, None], axis=2)
+    plane = real & (turned < PLANE).all(axis=1)
+    if (plane | ~real).all():
+        return None
+    none = (size[:, 0] <= 0.5) | ~np.isfinite(size[:, 0])
+    for corner in range(3):
+        at = triangles[:, corner]
+        taken = real & (plane | none[at])
+        found[at[taken]] = flat[taken]
+    return found
+
+
+def chord_error(vertices: Array, triangles: Triangles, normals: Array) -> float:
+    """Largest distance between triangles and the surface whose normals they have at their corners.
+
+    Between two corners with unit normals a and b, e from one to the other, a surface that is quadratic along the way is
+    |(b - a)·e|/8 from its chord in the middle. Over a triangle such heights s₁, s₂, s₃ over its sides make
+    4 (s₁ v w + s₂ w u + s₃ u v) in barycentric coordinates: 4/9 (s₁ + s₂ + s₃) at the centroid. Exact but for terms of
+    fourth order in the size of the triangles.
+
+    Parameters
+    ----------
+    vertices : array, shape (n, 3)
+        [mm]
+    triangles : array of int, shape (m, 3)
+        Numbers of vertices.
+    normals : array, shape (n, 3)
+        Unit vectors.
+
+    Returns
+    -------
+    float
+        [mm]
+
+    Examples
+    --------
+    Half a side of the octagon in a circle of radius 1 is 1 - cos 22.5° = 0.076 inside of it:
+
+    >>> angle = np.radians([0.0, 45.0, 22.5])
+    >>> ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> round(chord_error(ring, np.array([[0, 1, 1]]), ring), 3)
+    0.073
+    """
+    corner, normal = vertices[triangles], normals[triangles]
+    sides = np.roll(corner, -1, axis=1) - corner
+    heights = np.einsum("ijk,ijk->ij", np.roll(normal, -1, axis=1) - normal, sides) / 8.0
+    middle = np.abs(heights.sum(axis=1)) * (4.0 / 9.0)
+    return float(max(np.abs(heights).max(initial=0.0), middle.max(initial=0.0)))
+
+
+def facet_angle(vertices: Array, triangles: Triangles, crease_angle: float) -> float:
+    """By how much neighbours of a curved surface turn from each other [°]: the median over its area.
+
+    Of the edges between two triangles those count that turn by more than `SMALLEST_TURN` and less than `crease_angle`; 0 if
+    less than `CURVED` of the area has such an edge.
+
+    Examples
+    --------
+    >>> roof = np.array([[0.0, 0, 0], [0, 1, 0], [1, 0, 0.1], [-1, 0, 0.1]])
+    >>> round(facet_angle(roof, np.array([[0, 2, 1], [0, 1, 3]]), 30), 1)
+    11.4
+    """
+    doubled, _ = directed_areas(vertices, triangles)
+    area = np.linalg.norm(doubled, axis=1)
+    normal = doubled / np.where(area > 0.0, area, 1.0)[:, None]
+    edges = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
+    owner = np.tile(np.arange(len(triangles)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, owner = edges[order], owner[order]
+    pair = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+    a, b = owner[pair], owner[pair + 1]
+    across = np.linalg.norm(np.cross(normal[a], normal[b]), axis=1)
+    turn = np.degrees(np.arctan2(across, np.einsum("ij,ij->i", normal[a], normal[b])))
+    bent = (turn > SMALLEST_TURN) & (turn < crease_angle)
+    largest = np.zeros(len(triangles))
+    np.maximum.at(largest, a[bent], turn[bent])
+    np.maximum.at(largest, b[bent], turn[bent])
+    if area[largest > 0.0].sum() < CURVED * area.sum():
+        return 0.0
+    curved = np.flatnonzero(largest > 0.0)
+    curved = curved[np.argsort(largest[curved])]
+    sums = np.cumsum(area[curved])
+    return float(largest[curved[np.searchsorted(sums, sums[-1] / 2.0)]])
 
 
 def _mean_within(owner: Array, weighted: Array, rows: Triangles, least: float, found: Array) -> None:

@@ -29,6 +29,10 @@ class Face:
         A name that it shares with like faces.
     doubts : tuple of str
         What makes one doubt that the body is closed.
+    notes : tuple of str
+        What the user should know of it.
+    facet_notes : tuple of str
+        Likewise, if light passes the face.
 
     Examples
     --------
@@ -42,6 +46,8 @@ class Face:
     flip: bool = False
     group: str | None = None
     doubts: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    facet_notes: tuple[str, ...] = ()
 
 
 class Body(Description, abc.ABC):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from etendue.scene.bodies.body import Body, Face
 from etendue.scene.files import Files
+from etendue.scene.placement import HERE
 from etendue.scene.shapes import mesh
 
 
@@ -25,10 +26,11 @@ class Mesh(mesh.Mesh, Body):
         mesh = self.triangulation(files)
         edges = mesh.open_edges
         if not len(edges):
-            return (Face("surface", self.record(mesh), flip=mesh.volume < 0.0),)
+            flip, told = mesh.volume < 0.0, (mesh.notes, mesh.facet_notes)
+            return (Face("surface", self.record(mesh), HERE, flip, None, (), *told),)
         x, y, z = mesh.vertices[edges[0]].mean(axis=0)
         doubt = (
             f"the mesh is open: {len(edges):,} edges are not shared by two triangles of the same sense, one of them around "
             f"({x:.4g}, {y:.4g}, {z:.4g}) mm; light that gets in there is in the wrong medium"
         )
-        return (Face("surface", self.record(mesh), doubts=(doubt,)),)
+        return (Face("surface", self.record(mesh), doubts=(doubt,), notes=mesh.notes),)

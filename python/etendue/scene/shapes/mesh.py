@@ -13,19 +13,25 @@ from pydantic import model_validator
 
 from etendue.errors import ArgumentError
 from etendue.scene.files import Files
-from etendue.scene.mesh_files import read_mesh
+from etendue.scene.mesh_files import StoredMesh, read_mesh
 from etendue.scene.shapes.shape import Record, Shape, Sheet, Trim
-from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
+from etendue.scene.triangles import chord_error, facet_angle, open_edges, smooth_normals, volume, welded
 from etendue.scene.values import LONGEST, AsNumber, AsRow, Finite, FirstMistake, Index, Point
 
 Array = npt.NDArray[np.float64]
 Triangle = Annotated[tuple[Index, Index, Index], AsRow]
 Unit = Literal["nm", "um", "mm", "cm", "m", "inch", "feet"]
 
+SMOOTH = 30.0
+"""[°] Neighbours that turn by less are probably meant as one curved surface; it is what the note proposes."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Triangulation:
-    """A mesh, welded, in mm: vertices (n, 3), triangles (m, 3), and edges that no two triangles share (k, 2).
+    """A mesh in mm: vertices (n, 3), triangles (m, 3), and edges that no two triangles share (k, 2).
+
+    It is welded, unless it has the normals of the surfaces that it stands for (n, 3); where these differ, a vertex is there
+    more than once. `notes` are for whoever uses it, `facet_notes` only matter where light passes it.
 
     Examples
     --------
@@ -37,6 +43,9 @@ class Triangulation:
     vertices: Array
     triangles: npt.NDArray[np.int64]
     open_edges: npt.NDArray[np.int64]
+    normals: Array | None = None
+    notes: tuple[str, ...] = ()
+    facet_notes: tuple[str, ...] = ()
 
     @property
     def volume(self) -> float:
@@ -52,7 +61,9 @@ class Mesh(Shape):
     Parameters
     ----------
     file : path, optional
-        STL, OBJ, PLY or glTF; STEP with ``pip install 'etendue[step]'``. All bodies of the file are taken as one.
+        STL, OBJ, PLY or glTF, of which all bodies are taken as one; STEP with ``pip install 'etendue[step]'``.
+    body : str, optional
+        Name of one body of a STEP file; needed if there are several. ``etendue info`` lists them.
     vertices : rows of 3 numbers, optional
         Instead of a file [mm].
     triangles : rows of 3 integers, optional
@@ -63,10 +74,11 @@ class Mesh(Shape):
     scale : number
         By which all lengths are multiplied.
     tolerance : number, optional
-        Of STEP files: largest distance between a surface and the triangles made of it [mm]; 0.01 if left out.
+        Of STEP files: largest distance between a surface and the triangles made of it [mm]. Without it, 1/2000 of the
+        body's longest side, and normals turn by less than 0.05 rad along a triangle.
     crease_angle : number, optional
-        [°] Neighbours whose normals differ by less are one smooth surface, with interpolated normals. Flat triangles
-        without it.
+        [°] Neighbours whose normals differ by less are one smooth surface, with interpolated normals; 0: flat triangles.
+        Without it, triangles of STEP files have the normals of the true surfaces, all others are flat.
 
     Examples
     --------
@@ -79,6 +91,7 @@ class Mesh(Shape):
     vertices: Annotated[tuple[Point, ...], MinLen(3), MaxLen(1 << 20), FirstMistake, AsRow] | None = None
     triangles: Annotated[tuple[Triangle, ...], MinLen(1), MaxLen(1 << 21), FirstMistake, AsRow] | None = None
     unit: Unit | None = None
+    body: Annotated[str, MinLen(1)] | None = None
     scale: Annotated[float, Finite, Ge(1e-9), Le(1e9), AsNumber] = 1.0
     tolerance: Annotated[float, Finite, Ge(1e-4), Le(LONGEST), AsNumber] | None = None
     crease_angle: Annotated[float, Finite, Ge(0.0), Le(180.0), AsNumber] | None = None
@@ -90,7 +103,7 @@ class Mesh(Shape):
         if (self.file is None) == (self.vertices is None):
             raise ValueError("give either a 'file', or 'vertices' and 'triangles'")
         if self.vertices is not None and self.triangles is not None:
-            for key in ("unit", "tolerance"):
+            for key in ("unit", "tolerance", "body"):
                 if getattr(self, key) is not None:
                     raise ValueError(f"{key!r} is that of a file; 'vertices' are in mm, and exact")
             largest = max(map(max, self.triangles))
@@ -111,23 +124,56 @@ class Mesh(Shape):
             If the file cannot be opened.
         """
         if self.file is not None:
-            vertices, triangles = read_mesh(files.find(self.file), self.unit, self.tolerance)
+            stored = read_mesh(files.find(self.file), self.unit, self.tolerance, self.body)
         else:
-            vertices, triangles = np.array(self.vertices), np.array(self.triangles, dtype=np.int64)
-        vertices = vertices * self.scale
-        if not np.abs(vertices).max() <= LONGEST:
+            stored = StoredMesh(np.array(self.vertices), np.array(self.triangles, dtype=np.int64))
+        placed = stored.vertices * self.scale
+        if not np.abs(placed).max() <= LONGEST:
             raise ArgumentError(
-                f"the mesh reaches {np.abs(vertices).max():.3g} mm, more than {LONGEST:g}; check its unit"
+                f"the mesh reaches {np.abs(placed).max():.3g} mm, more than {LONGEST:g}; check its unit"
             )
-        vertices, triangles = welded(vertices, triangles)
+        vertices, triangles = welded(placed, stored.triangles)
         if not len(triangles):
             raise ArgumentError("no triangle of the mesh has an area")
-        return Triangulation(vertices, triangles, open_edges(triangles))
+        edges = open_edges(triangles)
+        if stored.normals is not None and self.crease_angle is None:
+            notes = self._stated(stored)
+            return Triangulation(placed, stored.triangles, edges, stored.normals, notes)
+        return Triangulation(
+            vertices, triangles, edges, notes=self._stated(stored), facet_notes=self._facets(vertices, triangles)
+        )
+
+    def _stated(self, stored: StoredMesh) -> tuple[str, ...]:
+        """How far the triangles of a file are from its surfaces."""
+        if not stored.chord_error:
+            return ()
+        kind = "flat" if self.crease_angle == 0.0 else "with interpolated normals"
+        error = stored.chord_error * self.scale
+        note = (
+            f"{len(stored.triangles):,} triangles, {kind}, stand for curved surfaces and are up to {error:.2g} mm away from "
+            "them (chord error); a smaller 'tolerance' brings them nearer"
+        )
+        return (note,)
+
+    def _facets(self, vertices: Array, triangles: npt.NDArray[np.int64]) -> tuple[str, ...]:
+        """What flat triangles do where a curved surface is meant."""
+        if self.crease_angle:
+            return ()
+        angle = facet_angle(vertices, triangles, SMOOTH)
+        if angle == 0.0:
+            return ()
+        rounded, faces, normals = smooth_normals(vertices, triangles, SMOOTH)
+        note = (
+            f"{len(triangles):,} flat triangles stand for a curved surface: neighbours turn by {angle:.2g}° (median over "
+            f"the area) and are about {chord_error(rounded, faces, normals):.2g} mm away from it; light is refracted and "
+            f"mirrored as by facets. crease_angle = {SMOOTH:g} makes the normals smooth"
+        )
+        return (note,)
 
     def record(self, mesh: Triangulation) -> Record:
-        """The mesh as the core takes it, with normals if creases are given."""
-        vertices, triangles, normals = mesh.vertices, mesh.triangles, None
-        if self.crease_angle is not None:
+        """The mesh as the core takes it, with normals if it has them or creases are given."""
+        vertices, triangles, normals = mesh.vertices, mesh.triangles, mesh.normals
+        if self.crease_angle:
             vertices, triangles, normals = smooth_normals(vertices, triangles, self.crease_angle)
         if len(vertices) > np.iinfo(np.uint32).max:
             raise ArgumentError(f"{len(vertices):,} vertices are more than a mesh can have; make it coarser")
@@ -137,4 +183,5 @@ class Mesh(Shape):
         """The mesh within half spaces; ranges of z are half spaces too."""
         if trim.radius is not None:
             raise ArgumentError("trim.radius: a mesh is trimmed by z and half spaces only")
-        return Sheet(self.record(self.triangulation(files)), [*trim.planes(), *trim.planes_of_z()])
+        mesh = self.triangulation(files)
+        return Sheet(self.record(mesh), [*trim.planes(), *trim.planes_of_z()], mesh.notes)

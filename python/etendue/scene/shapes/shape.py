@@ -104,7 +104,7 @@ WHOLE = Trim()
 
 @dataclasses.dataclass(frozen=True)
 class Sheet:
-    """A surface as the core takes it: a shape and the half spaces that trim it.
+    """A surface as the core takes it: a shape, the half spaces that trim it, and what the user should know of it.
 
     Examples
     --------
@@ -114,6 +114,7 @@ class Sheet:
 
     shape: Record
     trims: list[Plane] = dataclasses.field(default_factory=list)
+    notes: tuple[str, ...] = ()
 
 
 class Shape(Description, abc.ABC):
