@@ -105,6 +105,15 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
     FormatError
         If the library is not installed, the file is damaged or has no body of that name, or the tolerance asks for more
         than `MOST_TRIANGLES`.
+
+    Examples
+    --------
+    >>> from etendue.errors import FormatError
+    >>> try:
+    ...     bodies = read_step(Path("cut.step"), b"ISO-10303-21;HEADER;", tolerance=None)
+    ... except FormatError as error:
+    ...     print(str(error)[:8])
+    cut.step
     """
     names = _Names(raw.decode("latin-1"))
     first = _bodies(path, _meshed(path, raw, ANYTHING, COARSE_TURN), names)
