@@ -1,6 +1,11 @@
 //! Long work: without the interpreter, on a stated number of threads, stopped by Ctrl-C.
 
 use std::ops::ControlFlow;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
 
 use pyo3::prelude::*;
 
@@ -31,6 +36,38 @@ pub fn interruptible<R: Send>(
                 },
                 ControlFlow::Continue,
             )
+        })
+    });
+    failure.map_or(Ok(result), Err)
+}
+
+/// How often the calling thread looks for signals while another one works.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Runs `work` on a thread of its own, with the interpreter released, while the calling thread looks for signals.
+///
+/// An exception of a signal sets the flag that `work` is given, upon which it returns soon, and is returned in its place.
+pub fn stoppable<R: Send>(py: Python<'_>, work: impl FnOnce(&AtomicBool) -> R + Send) -> PyResult<R> {
+    let stop = AtomicBool::new(false);
+    let mut failure = None;
+    let result = py.detach(|| {
+        thread::scope(|scope| {
+            let (done, waiting) = channel::<()>();
+            let stop = &stop;
+            let worker = scope.spawn(move || {
+                let result = work(stop);
+                drop(done);
+                result
+            });
+            while waiting.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+                if failure.is_none()
+                    && let Err(error) = Python::attach(|py| py.check_signals())
+                {
+                    failure = Some(error);
+                    stop.store(true, Ordering::Relaxed);
+                }
+            }
+            worker.join().unwrap_or_else(|panic| resume_unwind(panic))
         })
     });
     failure.map_or(Ok(result), Err)

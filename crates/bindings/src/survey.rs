@@ -6,6 +6,7 @@ use etendue_trace::reverse::Lit;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::run::stoppable;
 use crate::scene::Scene;
 
 /// The diffuse surfaces of a scene as patches, and which of them can be used to end lines of sight.
@@ -30,10 +31,10 @@ impl Survey {
         if !scene.sets().is_empty() {
             return Err(PyValueError::new_err("ray sets have to be fitted before a survey"));
         }
-        let core = py.detach(|| {
-            let lit = Lit::new(scene.core(), scene.lanterns());
+        let core = stoppable(py, |stop| {
+            let lit = Lit::new(scene.core(), scene.lanterns()).until(stop);
             inside(threads.unwrap_or(0), || exitance::Survey::new(&lit, seed, most_events))
-        });
+        })?;
         Ok(Self { core })
     }
 

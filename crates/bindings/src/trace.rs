@@ -19,6 +19,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::run::stoppable;
 use crate::scene::Scene;
 use crate::source::{Opened, Source};
 use crate::surface::vectors;
@@ -153,19 +154,22 @@ pub fn trace_batches<'py>(
     let opened = open(py, scene)?;
     let sets: Vec<Source<'_>> = opened.iter().map(Opened::core).collect::<PyResult<_>>()?;
     let sets: Vec<&dyn RaySource> = sets.iter().map(|s| s as &dyn RaySource).collect();
-    let run = Run {
-        rays,
-        seed,
-        most_events,
-        sets: &sets,
-    };
     let core = scene.core();
     let batches: Range<u64> = first..last;
     let begun = begun(open_units.as_deref().unwrap_or_default())?;
-    let work = || trace_on(core, &run, batches.clone(), begun.clone());
-    let harvest: Harvest = py.detach(|| inside(threads.unwrap_or(0), work));
+    let harvest: Harvest = stoppable(py, |stop| {
+        let run = Run {
+            rays,
+            seed,
+            most_events,
+            sets: &sets,
+            stop: Some(stop),
+        };
+        let work = || trace_on(core, &run, batches.clone(), begun.clone());
+        inside(threads.unwrap_or(0), work)
+    })?;
     opened.iter().try_for_each(Opened::check)?;
-    let strata = CoreDealing::of(core, rays, run.sets).strata();
+    let strata = CoreDealing::of(core, rays, &sets).strata();
     let dict = PyDict::new(py);
     dict.set_item("ledger", ledger_dict(py, &harvest.ledger)?)?;
     let cells = PyList::empty(py);
@@ -223,11 +227,11 @@ pub fn look_at_scene<'py>(
         most_events,
         left,
     };
-    let pixels = py.detach(|| {
-        let lit = Lit::new(scene.core(), scene.lanterns());
+    let pixels = stoppable(py, |stop| {
+        let lit = Lit::new(scene.core(), scene.lanterns()).until(stop);
         let survey = survey.map(Survey::core);
         inside(threads.unwrap_or(0), || lit.look(&view, &method, survey, first..last))
-    });
+    })?;
     let shape = [view.rows as usize, view.columns as usize];
     let array = |pick: fn(&Pixel) -> f64| PyArray1::from_iter(py, pixels.iter().map(pick)).reshape(shape);
     Ok([array(|p| p.sum)?, array(|p| p.squares)?, array(|p| p.deviation)?])
@@ -253,6 +257,7 @@ pub fn trace_trails<'py>(
         seed,
         most_events,
         sets: &sets,
+        stop: None,
     };
     let core = scene.core();
     let found = py.detach(|| trails(core, &run, far));

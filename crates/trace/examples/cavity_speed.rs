@@ -92,6 +92,7 @@ fn main() -> Result<(), String> {
         seed: 1,
         most_events: 100_000,
         sets: &[],
+        stop: None,
     };
     for threads in [1, 2] {
         let begin = Instant::now();

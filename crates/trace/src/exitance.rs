@@ -162,6 +162,7 @@ impl Survey {
                 seed,
                 most_events,
                 sets: &[],
+                stop: lit.stop,
             };
             let harvest = trace(&scene, &run, batches);
             let cells = &harvest.tallies[scene.detectors.len() - 1].cells;
@@ -237,6 +238,7 @@ impl Survey {
             seed: self.seed,
             most_events: self.most_events,
             sets: &[],
+            stop: lit.stop,
         };
         let first = SCOUTS + SURVEYORS + u64::from(pass) * EACH;
         let harvest = trace(&scene, &run, first..first + EACH);

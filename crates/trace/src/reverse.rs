@@ -8,6 +8,7 @@
 //! Radiance grows by (n₁/n₂)² on its way from a medium of index n₂ into one of n₁.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use etendue_lightfield::View;
 use etendue_optics::source::Lantern;
@@ -27,6 +28,8 @@ pub struct Lit<'a> {
     pub(crate) shares: Vec<f64>,
     /// Wavelengths: sum of the shares, the wavelength, and how much of each source's flux has it, over its share.
     pub(crate) lines: Vec<(f64, f64, Vec<f64>)>,
+    /// As of [`Run`](crate::forward::Run).
+    pub(crate) stop: Option<&'a AtomicBool>,
 }
 
 /// What lines of sight do not look for, because something else finds it.
@@ -114,7 +117,21 @@ impl<'a> Lit<'a> {
             lanterns,
             shares: shares.collect(),
             lines,
+            stop: None,
         }
+    }
+
+    /// The same, whose work ends at once when `stop` is set; what it returns is then worth nothing.
+    #[must_use]
+    pub fn until(self, stop: &'a AtomicBool) -> Self {
+        Self {
+            stop: Some(stop),
+            ..self
+        }
+    }
+
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
     /// The map of `view`: for each pixel the sums over passes `passes`. Passes are independent of each other. With a survey,

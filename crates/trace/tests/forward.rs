@@ -100,6 +100,7 @@ fn run(scene: &Scene, rays: u64, threads: usize) -> Harvest {
         seed: 7,
         most_events: 10_000,
         sets: &[],
+        stop: None,
     };
     inside(threads, || trace(scene, &run, 0..rays.div_ceil(1 << 16)))
 }

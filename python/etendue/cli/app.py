@@ -24,9 +24,13 @@ from etendue.cli import (
     sample,
     trace,
 )
+from etendue.cli.guard import guarded
+from etendue.cli.stopping import Stop, stoppable
 from etendue.cli.terminal import INTERRUPTED, complain, complain_of, complain_of_usage, spell_out_unknown_letters
 from etendue.errors import EtendueError, SceneWarning
+from etendue.formats.input import WaitingWarning
 from etendue.quantities.provenance import version
+from etendue.quantities.report import ChangedFileWarning
 
 app = typer.Typer(
     help="Luminance maps of light sources and luminaires from ray files, with an error bar in every pixel.",
@@ -50,7 +54,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "cache": cache.cache,
 }
 for _name, _verb in VERBS.items():
-    app.command(_name)(_verb)
+    app.command(_name)(guarded(_name, _verb))
 
 
 def _print_version(wanted: bool) -> None:
@@ -73,18 +77,29 @@ def _show_warning(message: Warning | str, *_where: object, **_more: object) -> N
 
 
 def main() -> None:
-    """Run the program; the exit status is 0, 1 for an error of the data, 2 for one of usage, 130 after Ctrl-C."""
+    """Run the program; the exit status is 0, 1 for an error of the data, 2 for one of usage.
+
+    After Ctrl-C it is 130, after SIGTERM 143, after SIGHUP 129; all three end it in the same clean way.
+    """
     # Complaints about files are printed by the verbs, once and in full.
     warnings.simplefilter("ignore")
     # What is wrong with a scene is worth knowing before hours of tracing.
     warnings.simplefilter("default", SceneWarning)
+    # So is what nobody can see from the answer: that a file changed meanwhile, or that nothing happens.
+    warnings.simplefilter("default", ChangedFileWarning)
+    warnings.simplefilter("default", WaitingWarning)
     warnings.showwarning = _show_warning
     spell_out_unknown_letters()
+    with stoppable() as stop:
+        sys.exit(_status(stop))
+
+
+def _status(stop: Stop) -> int:
     try:
         status = app(standalone_mode=False)
     except (EtendueError, OSError) as error:
         complain_of(error)
-        sys.exit(1)
+        return 1
     except (KeyboardInterrupt, typer.Abort):
         status = INTERRUPTED
     except Exception as error:
@@ -92,8 +107,9 @@ def main() -> None:
         if not hasattr(error, "show"):
             raise
         complain_of_usage(cast(typer.BadParameter, error))
-        sys.exit(getattr(error, "exit_code", 2))
+        return int(getattr(error, "exit_code", 2))
     # The parser returns this status for Ctrl-C as well; a trace has said what it kept.
     if status == INTERRUPTED:
         complain("stopped; no file was left half-written")
-    sys.exit(status if isinstance(status, int) else 0)
+        return stop.status
+    return status if isinstance(status, int) else 0

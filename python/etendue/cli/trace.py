@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+import shlex
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from etendue.cli.guard import require_apart
 from etendue.cli.terminal import INTERRUPTED, check_folder, complain, print_json, progress_bar, say
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
@@ -103,6 +106,7 @@ def trace(
     count = _number_of_rays(rays, started)
     rounds = trace_rounds(scene, count, seed, until=until, most_events=most_events, threads=threads, resume=started)
     writers = _writers(outputs, rounds.plan)
+    require_apart([file, *scene.read_files()], [*outputs, *(path for path, _, _ in writers)])
     result: TraceResult | None = started
     interrupted = False
     with progress_bar("rays", rounds.plan.rays) as progress:
@@ -125,6 +129,7 @@ def trace(
         losses += [f"{path}: {note}" for note in write(result, name, path)]
     if interrupted:
         complain(f"stopped; what was written is the valid result of {result.rays_done:,} of {result.rays_asked:,} rays")
+        complain(_how_to_go_on(outputs))
     if json:
         print_json({"file": file, **result.to_dict(), "outputs": written, "losses": losses, "interrupted": interrupted})
     else:
@@ -135,6 +140,19 @@ def trace(
             say(f"  {path}")
     if interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _how_to_go_on(outputs: list[Path]) -> str:
+    """The command that goes on from what was written, or that there is none."""
+    results = [path for path in outputs if path.suffix.lower() in RESULT_EXTENSIONS]
+    if not results:
+        return "nothing to go on from was written: with -o result.h5 a trace that is stopped can be resumed"
+    words = sys.argv[1:]
+    kept: list[str] = []
+    for i, word in enumerate(words):
+        if word != "--resume" and not word.startswith("--resume=") and words[max(i - 1, 0)] != "--resume":
+            kept.append(word)
+    return f"to go on: {shlex.join(['etendue', *kept, '--resume', str(results[0])])}"
 
 
 def _number_of_rays(text: str | None, started: TraceResult | None) -> float | None:

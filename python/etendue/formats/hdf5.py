@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.formats.input import require_readable
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """The first bytes of an HDF5 file."""
@@ -31,6 +32,7 @@ DEFLATE_RATIO = 1032
 
 def begins_as_hdf5(path: Path) -> bool:
     """Whether the file begins as HDF5 files do."""
+    require_readable(path)
     with path.open("rb") as stream:
         return stream.read(len(SIGNATURE)) == SIGNATURE
 

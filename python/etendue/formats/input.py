@@ -10,7 +10,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path, PosixPath
 
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.output import naming
@@ -47,6 +47,8 @@ def require_readable(path: Path) -> None:
     OSError
         If there is nothing.
     """
+    if str(path) == "-" and not path.exists():
+        raise ArgumentError("-: cannot read: there is no file of this name. Standard input is /dev/stdin.")
     mode = path.stat().st_mode
     kinds = ((stat.S_ISDIR, "a directory"), (stat.S_ISSOCK, "a socket"))
     devices = ((stat.S_ISCHR, "a device or a terminal"), (stat.S_ISBLK, "a device"))
@@ -68,6 +70,28 @@ def require_file(path: Path, why: str) -> None:
     require_readable(path)
     if is_stream(path):
         raise ArgumentError(f"{path}: cannot read: this is a pipe, and {why}. Write it to a file first.")
+
+
+def as_path(path: str | os.PathLike[str]) -> Path:
+    """A path as such, and the path of a pipe as that: `Path` would forget where its bytes are."""
+    return path if isinstance(path, Path) else Path(path)
+
+
+class StreamPath(PosixPath):
+    """The path of a pipe, whose bytes are in a file: shown as the pipe, opened as the file."""
+
+    copy: Path
+
+    def __fspath__(self) -> str:
+        """Where the bytes are."""
+        return os.fspath(self.copy)
+
+    @classmethod
+    def over(cls, path: Path, copy: Path) -> StreamPath:
+        """The path of a pipe and that of its bytes."""
+        same = cls(path)
+        same.copy = copy
+        return same
 
 
 @contextlib.contextmanager
@@ -106,8 +130,8 @@ def shortened(path: Path, size: int, before: int) -> FormatError:
 
 
 @contextlib.contextmanager
-def stream_in_file(path: Path, limit: int = STREAM_LIMIT) -> Iterator[Path]:
-    """All that comes out of a pipe, in a temporary file that lives as long as the block.
+def stream_in_file(path: Path, limit: int = STREAM_LIMIT) -> Iterator[StreamPath]:
+    """The path of a pipe, of which all that comes out is in a temporary file that lives as long as the block.
 
     Raises
     ------
@@ -133,7 +157,7 @@ def stream_in_file(path: Path, limit: int = STREAM_LIMIT) -> Iterator[Path]:
                 room.write(data)
         if not total:
             raise FormatError(path, "byte 0", "nothing came out of this pipe", "See whether its writer failed.")
-        yield file
+        yield StreamPath.over(path, file)
 
 
 def _arriving(path: Path) -> Iterator[bytes]:

@@ -139,14 +139,31 @@ def _largest_file() -> int | None:
     return None if limit == resource.RLIM_INFINITY else limit
 
 
+def require_writable(path: Path) -> None:
+    """Refuse, before any work is done, a file that could not be written afterwards.
+
+    Raises
+    ------
+    ArgumentError
+        As of `atomic_output`.
+    OutputError
+        If nothing can be written into its folder.
+    """
+    folder = _destination(path).parent
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(
+            errno.EACCES, f"cannot write: the folder {folder} does not let files be made in it", str(path)
+        )
+
+
 def _destination(path: Path) -> Path:
+    if (path.exists() and (not path.is_dir() and not path.is_file())) or path.absolute().parts[:2] == ("/", "dev"):
+        # Taking the place of /dev/null or of a pipe would destroy it for everyone.
+        raise ArgumentError(f"{path}: cannot write: this is a device or a pipe. Give the path of an ordinary file.")
     # A link is followed, so that the file it points to is replaced and the link itself survives.
     target = path.resolve() if path.is_symlink() else path
     if target.is_dir():
         raise ArgumentError(f"{path}: cannot write a file here: this is a directory. Give a file name inside it.")
-    if target.exists() and not target.is_file():
-        # Taking the place of /dev/null or of a pipe would destroy it for everyone.
-        raise ArgumentError(f"{path}: cannot write: this is a device or a pipe. Give the path of an ordinary file.")
     if not target.parent.is_dir():
         raise ArgumentError(
             f"{path}: cannot write: the directory {target.parent} does not exist. Create it first or give another path."

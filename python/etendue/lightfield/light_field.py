@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnitError, UnknownNameError
+from etendue.formats.input import as_path
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
@@ -379,7 +380,7 @@ class LightField:
         """
         from etendue.lightfield.storage import load_field  # noqa: PLC0415 - it needs this class
 
-        return load_field(Path(path))
+        return load_field(as_path(path))
 
 
 def core_part(chart: _core._Part, part: PartField) -> _core._FieldPart:

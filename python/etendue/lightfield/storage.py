@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
+from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.lightfield.counting import MOST_CELLS
 from etendue.lightfield.light_field import FitReport, LightField, PartField
@@ -74,7 +75,7 @@ def is_field_file(path: str | Path) -> bool:
     """
     import h5py  # noqa: PLC0415 - only who has such a file needs the library
 
-    path = Path(path)
+    path = as_path(path)
     if not begins_as_hdf5(path):
         return False
     with contextlib.suppress(FormatError), reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:

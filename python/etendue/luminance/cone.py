@@ -12,6 +12,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.formats.rays.ray_index import RayIndex
+from etendue.quantities.memory import require_memory
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 from etendue.units import MM2_PER_M2
@@ -37,6 +38,10 @@ def check_acceptance(acceptance: float) -> float:
     if not 0.0 < acceptance <= 90.0:
         raise ArgumentError(f"acceptance is {acceptance}°; give a half-angle above 0° and at most 90°.")
     return float(acceptance)
+
+
+CELL_BYTES = 72
+"""Bytes for a pixel and acceptance: three sums of the core, and the estimate with its error that is made of them."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,12 +100,16 @@ def cone_estimates(
     ------
     ArgumentError
         If the rays have no position.
+    MemoryLimitError
+        If the maps do not fit into memory.
     """
     if not rays.has_position:
         raise ArgumentError(
             f"{rays.provenance.source}: the rays have no position (far-field data), so they have no luminance. "
             "Ask for a near-field ray file."
         )
+    cells = sum(math.prod(view.screen.shape) * len(view.acceptances) for view in views)
+    require_memory(cells * CELL_BYTES, f"{rays.provenance.source}: maps with {cells:,} pixels in all")
     cones = [_core_cone(view) for view in views]
     if isinstance(rays, RayIndex):
         found, tally, scale = rays.cone_sums(cones, threads, progress), rays.tally, rays.flux_scale

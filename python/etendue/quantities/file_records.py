@@ -47,11 +47,7 @@ class FileRecords:
     @classmethod
     def of(cls, path: Path, dtype: np.dtype[Any], offset: int, count: int) -> FileRecords:
         """`count` records from byte `offset` of a file; OSError if it cannot be opened."""
-        return cls(_core.StoredBytes(path, offset, count * dtype.itemsize), dtype)
-
-    def named(self, name: str) -> FileRecords:
-        """The same records, of what messages call by this name."""
-        return FileRecords(self.stored.named(name), self.dtype)
+        return cls(_core.StoredBytes(path, offset, count * dtype.itemsize).named(str(path)), dtype)
 
     def __len__(self) -> int:
         """Number of records."""

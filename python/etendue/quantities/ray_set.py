@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import math
 import warnings
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -217,13 +216,6 @@ class RaySet(RayOperations, RayUnits, RayColours, RayStream):
         # The account of the flux as stored depends on the records alone: no second pass for it, and no second warning.
         changed._tally = self._tally  # noqa: SLF001 - its own kind
         return changed
-
-    def named(self, name: str) -> Self:
-        """The same set, whose file messages call by this name."""
-        same = copy.copy(self)
-        if isinstance(self._records, FileRecords):
-            same._records = self._records.named(name)  # noqa: SLF001 - its own kind
-        return same
 
     def __len__(self) -> int:
         """Number of rays, usable or not."""

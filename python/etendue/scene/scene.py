@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -11,6 +11,7 @@ from annotated_types import MaxLen
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
 from etendue.errors import SceneError
+from etendue.formats.input import as_path, require_readable
 from etendue.formats.output import atomic_output
 from etendue.scene.description import Description
 from etendue.scene.detectors import AnyDetector
@@ -112,6 +113,18 @@ class Scene(Description):
             raise SceneError("scene", mistakes)
         return self
 
+    def read_files(self) -> tuple[Path, ...]:
+        """The files that the scene names: ray files, meshes, tables.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> led = {"kind": "rays", "file": "led.tm25ray"}
+        >>> [path.as_posix() for path in Scene.from_dict({"sources": [led]}, folder="lamps").read_files()]
+        ['lamps/led.tm25ray']
+        """
+        return tuple(self.files.find(name) for name in _named_files(self.to_dict()))
+
     @property
     def files(self) -> Files:
         """Where files are looked for that the scene names with a relative path."""
@@ -162,7 +175,8 @@ class Scene(Description):
         ...     Scene.load(Path(folder) / "nothing.toml").name
         'nothing'
         """
-        path = Path(path)
+        path = as_path(path)
+        require_readable(path)
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
         if len(raw) > LARGEST_FILE:
@@ -228,6 +242,19 @@ class Scene(Description):
     def _at(self, folder: Path) -> Self:
         self._folder = folder
         return self
+
+
+def _named_files(value: Any) -> Iterator[str]:
+    """Every ``file`` in descriptions."""
+    if isinstance(value, dict):
+        for key, held in value.items():
+            if key == "file" and isinstance(held, str):
+                yield held
+            else:
+                yield from _named_files(held)
+    elif isinstance(value, list | tuple):
+        for held in value:
+            yield from _named_files(held)
 
 
 def _moved(value: Any, start: Path, end: Path) -> Any:

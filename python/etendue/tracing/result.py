@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from etendue.formats.input import as_path
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
@@ -266,7 +267,7 @@ class TraceResult:
         """
         from etendue.tracing.storage import load_result  # noqa: PLC0415 - likewise
 
-        return load_result(Path(path))
+        return load_result(as_path(path))
 
     def to_dict(self) -> dict[str, Any]:
         """The result in figures, as plain data for JSON."""

@@ -13,6 +13,7 @@ mod note;
 mod step;
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use etendue_geometry::assembly::Hits;
 use etendue_geometry::batch::BLOCK;
@@ -49,6 +50,14 @@ pub struct Run<'a> {
     pub most_events: u32,
     /// The ray sets that sources refer to.
     pub sets: &'a [&'a dyn RaySource],
+    /// Set by whoever wants the work to end at once; what it returns is then worth nothing.
+    pub stop: Option<&'a AtomicBool>,
+}
+
+impl Run<'_> {
+    fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
 }
 
 /// Traces batches `batches` of a run on the threads of the current pool, and merges them in order.
@@ -267,7 +276,7 @@ impl<'a> Walk<'a> {
         let (mut now, mut next) = (std::mem::take(&mut self.now), std::mem::take(&mut self.next));
         let (mut hits, mut sorter) = (std::mem::take(&mut self.hits), std::mem::take(&mut self.sorter));
         let mut event = 0;
-        while !now.is_empty() {
+        while !now.is_empty() && !self.run.is_stopped() {
             self.scene.assembly.nearest(&now.lines, &mut hits);
             self.out.ledger.segments += now.len() as u64;
             let last = event + 1 >= self.run.most_events;

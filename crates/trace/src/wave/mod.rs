@@ -142,7 +142,7 @@ impl<'a> Wave<'a> {
         let total = cells.len() * paths;
         let mut shift = (usize::MAX, [0.0; DIMENSIONS]);
         let mut begin = 0;
-        while begin < total {
+        while begin < total && !self.lit.is_stopped() {
             let end = (begin + BLOCK).min(total);
             self.paths.clear();
             for flat in begin..end {
@@ -228,6 +228,11 @@ impl<'a> Wave<'a> {
     /// Follows all branches of the block to their ends.
     fn follow(&mut self) {
         while !self.branches.is_empty() {
+            if self.lit.is_stopped() {
+                self.lines.clear();
+                self.branches.clear();
+                return;
+            }
             let mut hits = std::mem::take(&mut self.hits);
             self.lit.scene.assembly.nearest(&self.lines, &mut hits);
             self.gather(&hits);

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.encodings import refuse_unmarked
-from etendue.formats.input import is_stream, require_file
+from etendue.formats.input import as_path, is_stream, require_file
 from etendue.formats.intensity import eulumdat, gldf, lm63, tm33
 from etendue.formats.intensity.intensity_format import IntensityFormat
 from etendue.formats.output import atomic_output
@@ -36,9 +36,10 @@ def detect_intensity_format(path: str | os.PathLike[str]) -> IntensityFormat | N
     OSError
         If the file cannot be opened.
     """
-    if is_stream(Path(path)):
+    path = as_path(path)
+    if is_stream(path):
         return None
-    head = Head.of(Path(path))
+    head = Head.of(path)
     return next((f for f in INTENSITY_FORMATS.values() if f.recognise(head)), None)
 
 
@@ -83,7 +84,7 @@ def read_intensity(path: str | os.PathLike[str], photometry: str | None = None) 
     ...     read_intensity(Path(folder) / "spot.ies").values.tolist(), lost
     ([[1000.0, 10.0, 0.0]], ())
     """
-    require_file(Path(path), "intensity files are looked at before they are read")
+    require_file(as_path(path), "intensity files are looked at before they are read")
     found = detect_intensity_format(path)
     if found is None:
         refuse_unmarked(Path(path), Head.of(Path(path)).data)
@@ -91,10 +92,10 @@ def read_intensity(path: str | os.PathLike[str], photometry: str | None = None) 
         why = "this is no intensity distribution: it begins as none of the known formats do"
         raise FormatError(path, "first lines", why, f"Known are {known}.")
     if photometry is None:
-        return found.read(Path(path))
+        return found.read(as_path(path))
     if found.pick is None:
         raise ArgumentError(f"{path}: photometry: {found.title} files hold one distribution; leave it out.")
-    return found.pick(Path(path), photometry)
+    return found.pick(as_path(path), photometry)
 
 
 def write_intensity(

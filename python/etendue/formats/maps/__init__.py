@@ -7,6 +7,7 @@ from pathlib import Path
 
 from etendue.errors import FormatError, UnknownNameError
 from etendue.formats.encodings import in_utf8, refuse_unmarked
+from etendue.formats.input import as_path, require_readable
 from etendue.formats.maps import csv, exr, hdr, npz, tiff
 from etendue.formats.maps.map_format import AnyMap, MapFormat
 from etendue.formats.output import atomic_output
@@ -60,7 +61,7 @@ def read_map(path: str | os.PathLike[str]) -> LuminanceMap:
     ...     read_map(Path(folder) / "map.npz").values.tolist(), lost
     ([[3.0, nan]], ())
     """
-    lmap = _read(Path(path))
+    lmap = _read(as_path(path))
     if not isinstance(lmap, LuminanceMap):
         raise FormatError(path, "header", f"this is a map of {lmap.quantity}", "Read it with read_illuminance_map.")
     return lmap
@@ -94,13 +95,14 @@ def read_illuminance_map(path: str | os.PathLike[str]) -> IlluminanceMap:
     ...     read_illuminance_map(Path(folder) / "desk.csv").centre, lost
     ((1.0, 2.0, 3.0), ())
     """
-    lmap = _read(Path(path))
+    lmap = _read(as_path(path))
     if not isinstance(lmap, IlluminanceMap):
         raise FormatError(path, "header", f"this is a map of {lmap.quantity}", "Read it with read_map.")
     return lmap
 
 
 def _read(path: Path) -> AnyMap:
+    require_readable(path)
     with in_utf8(path) as readable:
         with readable.open("rb") as stream:
             head = stream.read(SNIFFED_BYTES)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from pathlib import Path
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.encodings import in_utf8, refuse_unmarked
-from etendue.formats.input import at_rest, is_stream, require_readable, stream_in_file
+from etendue.formats.input import as_path, at_rest, is_stream, require_readable, stream_in_file
 from etendue.formats.output import atomic_output
 from etendue.formats.rays import (
     asap,
@@ -55,7 +54,7 @@ def detect_format(path: str | os.PathLike[str]) -> RayFormat:
     FormatError
         If it is of no known format.
     """
-    head = Head.of(Path(path))
+    head = Head.of(as_path(path))
     for candidate in RAY_FORMATS:
         if candidate.recognise(head):
             return candidate
@@ -106,7 +105,7 @@ def read_rays(path: str | os.PathLike[str], *, flux: float | None = None, flux_u
     WaitingWarning
         If it is a pipe, and nothing comes. A pipe is read to its end into a temporary file.
     """
-    path = Path(path)
+    path = as_path(path)
     require_readable(path)
     rays = _from_stream(path) if is_stream(path) else _from_file(path)
     if flux is None and flux_unit is not None:
@@ -122,12 +121,7 @@ def _from_file(path: Path) -> RaySet:
 def _from_stream(path: Path) -> RaySet:
     """The rays that come out of a pipe, under its name."""
     with stream_in_file(path) as file:
-        try:
-            rays = _from_file(file)
-        except FormatError as error:
-            raise type(error)(path, error.place, error.found, error.advice) from None
-        origin = dataclasses.replace(rays.provenance, source=path.name)
-        return rays.replace(provenance=origin).named(str(path))
+        return _from_file(file)
 
 
 def write_rays(
@@ -177,7 +171,7 @@ def write_rays(
         if chosen.wants_watts(rays):
             rays = rays.without_spectrum()
             notes = (f"{chosen.title} holds wavelengths and spectra of rays beside W only: they are left out, for lm.",)
-    with atomic_output(path) as temporary:
+    with atomic_output(path, size=chosen.least_size(rays)) as temporary:
         return (*notes, *chosen.write(rays, temporary), *rays.notes)
 
 

@@ -290,5 +290,5 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return losses(rays, written, colour, colour_kept=colour.has_wavelengths)
 
 
-FORMAT = RayFormat("csv", "ray table", (".csv",), recognise, read, write, far_field=True)
+FORMAT = RayFormat("csv", "ray table", (".csv",), recognise, read, write, far_field=True, value_bytes=2)
 """Ray tables. They are read from ``.asc`` and ``.txt`` too, which are not theirs alone."""

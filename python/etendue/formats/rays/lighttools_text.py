@@ -281,5 +281,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return colour_losses(rays, written, colour, held)
 
 
-FORMAT = RayFormat("lighttools-text", "LightTools text ray file", (), recognise, read, write, far_field=True)
+FORMAT = RayFormat(
+    "lighttools-text", "LightTools text ray file", (), recognise, read, write, far_field=True, value_bytes=2
+)
 """LightTools text ray files. Their extensions, ``.ray`` and ``.txt``, belong to other formats as well."""

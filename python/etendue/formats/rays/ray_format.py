@@ -13,6 +13,7 @@ import numpy as np
 
 from etendue.errors import FormatError
 from etendue.formats.encodings import wide_encoding
+from etendue.formats.input import require_readable
 from etendue.quantities.file_records import AnyRecords, FileRecords
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
@@ -42,6 +43,7 @@ class Head:
     @classmethod
     def of(cls, path: Path) -> Head:
         """Read the head of a file, text in UTF-16 as UTF-8; OSError if it cannot be opened."""
+        require_readable(path)
         with path.open("rb") as file:
             size, data = os.fstat(file.fileno()).st_size, file.read(HEAD_BYTES)
         wide = wide_encoding(data)
@@ -85,6 +87,8 @@ class RayFormat:
         Whether it can hold rays without positions.
     wants_watts : callable
         Whether it would write this set in watts because in lumens it cannot hold all that is known of the rays.
+    value_bytes : int
+        Bytes that a number takes at least: those of a float, or of a digit and what parts it from the next.
     """
 
     name: str
@@ -95,6 +99,11 @@ class RayFormat:
     write: Callable[[RayStream, Path], tuple[str, ...]]
     far_field: bool = False
     wants_watts: Callable[[RayStream], bool] = lambda _rays: False
+    value_bytes: int = 4
+
+    def least_size(self, rays: RayStream) -> int:
+        """Bytes that a file of these rays has at least."""
+        return len(rays) * self.value_bytes * (7 if rays.has_position else 4)
 
 
 def stored_records(path: Path, dtype: np.dtype[Any], offset: int, count: int) -> AnyRecords:

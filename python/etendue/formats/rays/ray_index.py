@@ -12,6 +12,7 @@ import numpy as np
 
 from etendue import _core
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.rays.index_building import Counted, IndexTables, Records, count_rays, fill_index
 from etendue.formats.rays.index_file import DAMAGED, HEADER, map_new, read_index, text_of, write_tables
@@ -118,7 +119,7 @@ class RayIndex(RaySet):
         ...     print(et.RayIndex.open(path))
         <RayIndex of 1,000 rays in lm from rings.etd>
         """
-        path = Path(path)
+        path = as_path(path)
         records, meaning, tables, tally = read_index(path)
         try:
             return cls(records, meaning, tables, tally)

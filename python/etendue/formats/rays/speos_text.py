@@ -118,5 +118,5 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return tuple(notes)
 
 
-FORMAT = RayFormat("speos-text", "Speos text ray file", (), recognise, read, write)
+FORMAT = RayFormat("speos-text", "Speos text ray file", (), recognise, read, write, value_bytes=2)
 """Speos text ray files. Their extension, ``.txt``, belongs to other formats as well."""

@@ -146,5 +146,5 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return tuple(notes)
 
 
-FORMAT = RayFormat("tracepro", "TracePro text source file", (".src",), recognise, read, write)
+FORMAT = RayFormat("tracepro", "TracePro text source file", (".src",), recognise, read, write, value_bytes=2)
 """TracePro text source files."""

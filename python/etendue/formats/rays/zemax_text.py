@@ -179,5 +179,5 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return tuple(notes)
 
 
-FORMAT = RayFormat("zemax-text", "Zemax text source file", (), recognise, read, write)
+FORMAT = RayFormat("zemax-text", "Zemax text source file", (), recognise, read, write, value_bytes=2)
 """Zemax OpticStudio text source files. Their extensions, ``.dat`` and ``.txt``, belong to other formats as well."""
