@@ -1,8 +1,8 @@
 """Which statistical tests would not notice an error of 5 %?
 
 One estimate after the other is multiplied by a factor wherever it is made (`oracles.planting`), and the tests are run that
-give statistical verdicts. Listed are those which made that estimate, or had it from a fixture, and passed all the same. A
-test that compares two values of the same estimate, or looks at shapes, bits or errors of errors, cannot notice a common factor;
+give statistical verdicts. Listed are those which made that estimate and passed all the same. A test that compares two values
+of the same estimate, or looks at shapes, bits or errors of errors, cannot notice a common factor;
 `UNMOVED` says of each why it may stay green, and the program ends with 1 if another one does.
 
 usage: python tests/mutate.py [--factor 1.05] [ESTIMATE …]
