@@ -74,7 +74,16 @@ def demo(
     lmap.plot(picture, title="Three Lambertian rings, 300 / 200 / 100 lm", scale="log")
     if json:
         zones = [dataclasses.asdict(r) | {"deviation": r.deviation} for r in results]
-        print_json({"rays": len(source), "seconds": seconds, "zones": zones, "unit": lmap.unit, "picture": picture})
+        print_json(
+            {
+                "rays": len(source),
+                "seconds": seconds,
+                "zones": zones,
+                "unit": lmap.unit,
+                "picture": picture,
+                "notes": list(lmap.notes),
+            }
+        )
         return
     say(f"Three Lambertian rings (300, 200, 100 lm; radii 10, 20, 30 mm), {len(source):,} rays in {seconds:.1f} s,")
     say(f"seen face on from {observer.distance:g} mm within {DEFAULT_ACCEPTANCE}°:")

@@ -39,9 +39,11 @@ def sample(
         losses += [f"{path}: {note}" for note in notes]
     if json:
         facts = {"file": file, "outputs": output, "rays": rays, "seed": seed}
-        print_json(facts | {"total_flux": stream.total_flux, "flux_unit": stream.flux_unit, "notes": losses})
+        print_json(
+            facts | {"total_flux": stream.total_flux, "flux_unit": stream.flux_unit, "notes": [*field.notes, *losses]}
+        )
         return
-    for note in losses:
+    for note in (*field.notes, *losses):
         complain(f"note: {note}")
     for path in output:
         say(f"{path}: {rays:,} rays, {stream.total_flux:.7g} {stream.flux_unit}")

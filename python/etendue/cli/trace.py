@@ -228,5 +228,7 @@ def print_result(result: TraceResult) -> None:
             case _:
                 image = result.images[detection.name]
                 say(f"  {detection.name}: maximum {image.values.max():.6g} {image.unit}")
+        for note in result.notes_of(detection.name):
+            say(f"    {note}")
     for note in result.notes:
         say(f"  {note}")

@@ -223,6 +223,12 @@ class TraceResult:
         pairs = zip(self.plan.detections, self.sums.cells, strict=True)
         return [(d, Counted.of(cells, self.plan.dealing, self.rays_done)) for d, cells in pairs if d.cells]
 
+    def notes_of(self, detector: str) -> tuple[str, ...]:
+        """What there is to say of what a detector saw, beside the `notes` of the whole trace."""
+        kinds = (self.rays, self.intensity, self.illuminance, self.images, self.events)
+        found = next(kind[detector].notes for kind in kinds if detector in kind)
+        return tuple(note for note in found if note not in self.notes)
+
     @property
     def _origin(self) -> Origin:
         """What all quantities have in common."""
@@ -282,7 +288,10 @@ class TraceResult:
             "surfaces_met": self.sums.segments,
             "relative_error": self.relative_error,
             "ledger": self.ledger.to_dict(),
-            "detectors": [{"name": d.name, "kind": d.KIND} | self._counts(d) for d in self.plan.detections],
+            "detectors": [
+                {"name": d.name, "kind": d.KIND, "notes": list(self.notes_of(d.name))} | self._counts(d)
+                for d in self.plan.detections
+            ],
             "notes": list(self.notes),
         }
 

@@ -1,0 +1,336 @@
+"""Every sentence of the `.notes` that Python gives is printed by the verb that does the same, and is in its JSON.
+
+The inputs are made to give notes: rays that cannot be used, rays that do not meet the carrier, a total flux that scales
+them, light towards the eye, solids that overlap, a far field too coarse for its beam.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.cli.app import VERBS
+from etendue.goniophotometry.far_field import intensity_distribution
+from etendue.lightfield.fit_cache import FOLDER_VARIABLE
+from etendue.lightfield.gridded.gridded_source import GriddedSource
+from etendue.lightfield.surfaces import parse_surface
+from etendue.plot.scene_layout import lay_out_scene
+from etendue.quantities.printable import printable
+
+from cli.outcome import Run
+
+EYE = ("--observer", "20,30", "--distance", "200", "--size", "9,7", "--pixels", "6,5")
+OBSERVER, SCREEN = et.Observer(20, 30, 200), et.Screen(9, 7, 6, 5)
+DISK = "disk:radius=1.2,centre=0.3/-0.2"
+
+SCENE = """
+name = "two glasses"
+[[sources]]
+name = "led"
+kind = "rays"
+file = "led.tm25ray"
+[[solids]]
+name = "lower"
+medium = "PMMA"
+at = [0, 0, 4]
+shape = { kind = "ball", radius = 3 }
+[[solids]]
+name = "upper"
+medium = "PC"
+at = [0.5, 0, 8]
+shape = { kind = "ball", radius = 3 }
+[[surfaces]]
+name = "wall"
+at = [9, 0, 5]
+toward = [-1, 0, 0.2]
+shape = { kind = "rectangle", width = 30, height = 20 }
+finish = { kind = "lambertian", reflectance = 0.7 }
+[[observers]]
+name = "eye"
+theta = 20
+phi = 30
+distance = 200
+screen = { width = 9, height = 7, columns = 6, rows = 5 }
+"""
+DETECTORS = """
+[[detectors]]
+name = "rcs"
+kind = "rays"
+at = [0, 0, 15]
+shape = { kind = "disk", radius = 20 }
+[[detectors]]
+name = "far"
+kind = "intensity"
+c_planes = 4
+gamma_step = 30
+[[detectors]]
+name = "card"
+kind = "illuminance"
+at = [0, 0, 30]
+toward = [0, 0, -1]
+width = 40
+height = 30
+columns = 3
+rows = 2
+[[detectors]]
+name = "events"
+kind = "scatter"
+[[detectors]]
+name = "image"
+kind = "image"
+observer = "eye"
+"""
+
+
+class Case(NamedTuple):
+    """A call of the program, and the notes of what Python gives for it."""
+
+    arguments: tuple[object, ...]
+    notes: tuple[str, ...]
+
+
+def led_rays() -> et.RaySet:
+    """A narrow beam; of ten rays one has no flux, direction or place, and one leaves far off the others."""
+    rng = np.random.default_rng(3)
+    n = 4000
+    position = np.c_[rng.uniform(-0.5, 1.0, n), rng.uniform(-0.8, 0.4, n), np.zeros(n)]
+    direction = rng.normal((0.1, 0.05, 1.0), 0.15, (n, 3))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    position[7::20] += [40.0, -30.0, 2.0]
+    return et.RaySet(position, direction, rng.gamma(2.0, 0.01, n))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("notes")
+    rays = led_rays()
+    et.write_rays(place / "led.tm25ray", rays)
+    spoil(place / "led.tm25ray", len(rays))
+    et.write_rays(place / "plain.tm25ray", rays.subset(300, seed=1))
+    kinds = DETECTORS.split("[[detectors]]\n")
+    (place / "scene.toml").write_text(SCENE + DETECTORS, encoding="utf-8")
+    for name, detector in (("rcs", kinds[1]), ("events", kinds[4])):
+        (place / f"{name}.toml").write_text(f"{SCENE}[[detectors]]\n{detector}", encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        spoilt = et.read_rays(place / "led.tm25ray")
+        et.LightField.fit(spoilt, "auto", symmetry="auto", depths=(2, 2, 2, 2)).save(place / "led.h5")
+        for name in ("scene", "events", "rcs"):
+            et.trace(et.Scene.load(place / f"{name}.toml"), 50_000, 2).save(place / f"{name}.result.h5")
+        cone = et.luminance_map(spoilt, OBSERVER, SCREEN, method="cone", acceptance=8)
+        cone.save(place / "map.npz")
+        black = cone.replace(values=np.zeros(cone.values.shape), standard_error=np.zeros(cone.values.shape))
+        black.save(place / "black.npz")
+        et.write_intensity(place / "led.ies", intensity_distribution(spoilt, 4, 30))
+    return place
+
+
+def spoil(path: Path, rays: int) -> None:
+    """Take the direction of one ray of twenty, and state twice the flux in the header."""
+    data = bytearray(path.read_bytes())
+    row = np.dtype("<f4").itemsize * 7
+    start = len(data) - rays * row
+    table = np.frombuffer(data, "<f4", rays * 7, start).reshape(rays, 7)
+    table[3::20, 3:6] = np.nan
+    header = np.frombuffer(data, "<f4", 1, 12)
+    header *= 2.0
+    path.write_bytes(data)
+
+
+def of_rays(rays: et.RaySet) -> tuple[str, ...]:
+    """Complaints of a set, its notes among them."""
+    return tuple(str(complaint) for complaint in rays.complaints)
+
+
+# --- the verbs ---------------------------------------------------------------------------------------------------------
+
+
+def convert(place: Path) -> Iterator[Case]:
+    inputs = [place / "led.tm25ray", place / "plain.tm25ray"]
+    merged = et.RaySet.merge([et.read_rays(path) for path in inputs])
+    losses = et.write_rays("api.dat", merged, "zemax")
+    yield Case(("convert", *inputs, "out.dat", "--format", "zemax"), (*of_rays(merged), *losses, *merged.notes))
+
+
+def fit(place: Path) -> Iterator[Case]:
+    rays = et.read_rays(place / "led.tm25ray")
+    field = et.LightField.fit(rays, parse_surface(DISK), symmetry="auto", depths=(2, 2, 2, 2))
+    call = (
+        "fit",
+        place / "led.tm25ray",
+        "-o",
+        "out.h5",
+        "--surface",
+        DISK,
+        "--symmetry",
+        "auto",
+        "--depths",
+        "2,2,2,2",
+    )
+    yield Case(call, (*field.notes, *of_rays(rays)))
+
+
+def luminance(place: Path) -> Iterator[Case]:
+    rays = et.read_rays(place / "led.tm25ray")
+
+    def case(*arguments: object, notes: Iterable[str]) -> Case:
+        return Case(("luminance", *arguments, "-o", "out.exr"), tuple(notes))
+
+    cone = et.luminance_map(rays, OBSERVER, SCREEN, acceptance="auto")
+    yield case(
+        place / "led.tm25ray", *EYE, "--acceptance", "auto", notes=(*cone.notes, *cone.save("api.exr"), *of_rays(rays))
+    )
+    smooth = et.luminance_map(rays, OBSERVER, SCREEN, surface=parse_surface(DISK))
+    yield case(place / "led.tm25ray", *EYE, "--surface", DISK, notes=smooth.notes)
+    field = et.LightField.load(place / "led.h5")
+    yield case(place / "led.h5", *EYE, notes=et.luminance_map(field, OBSERVER, SCREEN).notes)
+    scene = et.Scene.load(place / "scene.toml")
+    seen = et.luminance_map(scene, OBSERVER, SCREEN, rays_per_pixel=32, forward_rays=20_000)
+    call = (place / "scene.toml", *EYE, "--rays-per-pixel", 32, "--forward-rays", 20_000)
+    yield case(*call, notes=seen.notes)
+    events = et.TraceResult.load(place / "events.result.h5").events.only
+    yield case(place / "events.result.h5", *EYE, notes=et.luminance_map(events, OBSERVER, SCREEN).notes)
+    kept = et.TraceResult.load(place / "rcs.result.h5").rays.only
+    shown = et.luminance_map(kept, OBSERVER, SCREEN, acceptance=8)
+    assert kept.notes
+    yield case(place / "rcs.result.h5", *EYE, "--acceptance", 8, notes=(*shown.notes, *of_rays(kept)))
+
+
+def sample(place: Path) -> Iterator[Case]:
+    field = et.LightField.load(place / "led.h5")
+    drawn = field.rays(500, 1)
+    losses = et.write_rays("api.dis", drawn, "asap")
+    yield Case(("sample", place / "led.h5", "-n", 500, "-o", "out.dis"), (*field.notes, *drawn.notes, *losses))
+
+
+def intensity(place: Path) -> Iterator[Case]:
+    rays = et.read_rays(place / "led.tm25ray")
+    far = intensity_distribution(rays, 4, 30)
+    assert any("%" in note for note in far.notes)  # too coarse: the table has another flux than its cells
+    call = ("intensity", place / "led.tm25ray", "--c-planes", 4, "--gamma-step", 30, "-o", "out.ldt")
+    yield Case(call, (*far.notes, *et.write_intensity("api.ldt", far), *of_rays(rays)))
+    yield Case(("intensity", place / "led.ies"), et.read_intensity(place / "led.ies").notes)
+
+
+def detected(result: et.TraceResult) -> Iterator[str]:
+    """Notes of a trace and of all that its detectors saw."""
+    yield from result.notes
+    for kind in (result.rays, result.intensity, result.illuminance, result.events, result.images):
+        for found in kind.values():
+            yield from found.notes
+
+
+def trace(place: Path) -> Iterator[Case]:
+    result = et.trace(et.Scene.load(place / "scene.toml"), 50_000, 2)
+    losses = et.write_rays("api.tm25ray", result.rays.only)
+    call = ("trace", place / "scene.toml", "--rays", 50_000, "--seed", 2, "-o", "out.tm25ray")
+    yield Case(call, (*detected(result), *losses))
+
+
+def patches(place: Path) -> Iterator[Case]:
+    rays = et.read_rays(place / "led.tm25ray")
+    source = GriddedSource.fit(rays, parse_surface(DISK), 0.5, 0.1)
+    call = (
+        "patches",
+        place / "led.tm25ray",
+        "--surface",
+        DISK,
+        "--pixel",
+        0.5,
+        "--threshold",
+        0.1,
+        "-o",
+        "out.patches",
+    )
+    yield Case(call, (*source.notes, *of_rays(rays)))
+
+
+def filter_(place: Path) -> Iterator[Case]:
+    noisy = et.read_map(place / "map.npz")
+    yield Case(("filter", place / "map.npz", "--kind", "opt", "-o", "out.npz"), et.denoise_map(noisy).notes)
+    average = et.filter_map(noisy, "average", size=3)
+    yield Case(("filter", place / "map.npz", "--kind", "average", "--size", 3, "-o", "out.npz"), average.notes)
+
+
+def compare(place: Path) -> Iterator[Case]:
+    maps = [et.read_map(place / name) for name in ("map.npz", "black.npz")]
+    yield Case(("compare", place / "map.npz", place / "black.npz"), et.compare(*maps).notes)
+
+
+def info(place: Path) -> Iterator[Case]:
+    yield Case(("info", place / "led.tm25ray"), of_rays(et.read_rays(place / "led.tm25ray")))
+    yield Case(("info", place / "led.h5"), et.LightField.load(place / "led.h5").notes)
+    yield Case(("info", place / "led.ies"), et.read_intensity(place / "led.ies").notes)
+    yield Case(("info", place / "scene.result.h5"), tuple(detected(et.TraceResult.load(place / "scene.result.h5"))))
+
+
+def draw(place: Path) -> Iterator[Case]:
+    layout = lay_out_scene(et.Scene.load(place / "scene.toml"))
+    assert layout.compiled.doubts
+    yield Case(("draw", place / "scene.toml"), layout.compiled.notes)
+
+
+def demo(_: Path) -> Iterator[Case]:
+    source = et.RingSource(rays=100_000, seed=1)
+    lmap = et.luminance_map(source, et.Observer(0, 0, 150), et.Screen(70, 70, 64, 64), method="cone")
+    yield Case(("demo", "--rays", 100_000, "-o", "out.png"), lmap.notes)
+
+
+CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
+    "demo": demo,
+    "info": info,
+    "convert": convert,
+    "fit": fit,
+    "luminance": luminance,
+    "sample": sample,
+    "intensity": intensity,
+    "draw": draw,
+    "trace": trace,
+    "patches": patches,
+    "filter": filter_,
+    "compare": compare,
+    "cache": None,  # a count of files and their size: nothing that has notes
+}
+"""Of each verb: what it is called with, and what Python has to say of the same."""
+
+
+def texts(found: Any) -> Iterator[str]:
+    """All texts of a JSON document."""
+    if isinstance(found, str):
+        yield found
+    for part in found.values() if isinstance(found, dict) else found if isinstance(found, list) else ():
+        yield from texts(part)
+
+
+def test_every_verb_is_here() -> None:
+    assert set(CASES) == set(VERBS)
+
+
+@pytest.mark.parametrize("verb", [verb for verb in VERBS if CASES.get(verb)])
+def test_what_python_knows_is_printed(
+    verb: str, run: Run, folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The light field of a file is fitted once for all calls.
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path_factory.mktemp("kept")))
+    call = CASES[verb]
+    assert call is not None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        cases = list(call(folder))
+    for arguments, notes in cases:
+        assert notes, f"{arguments}: an input that gives no notes shows nothing"
+        plain = run(*arguments)
+        assert plain.status == 0, plain.err
+        missing = [note for note in notes if printable(note) not in plain.out + plain.err]
+        assert not missing, f"{arguments} does not print {missing}"
+        document = run(*arguments, "--json")
+        assert document.status == 0, document.err
+        told = "\n".join(texts(json.loads(document.out)))
+        missing = [note for note in notes if note not in told]
+        assert not missing, f"{arguments} --json does not hold {missing}"
