@@ -65,7 +65,7 @@ def seen_by_patches(rays: et.RaySet, traced: int, screen: et.Screen) -> Maps:
         grid = et.GriddedSource.fit(rays, et.Dome(radius=led.CARRIER), PIXEL, threshold, PARALLELS)
         name = f"gridded, {threshold:g} %, {traced / 1e6:g} M rays"
         print(f"{name}: {grid.notes[0]}")
-        found[name] = [gridded_luminance_map(grid, observer, screen) for observer in OBSERVERS]
+        found[name] = [gridded_luminance_map(grid.as_printed, observer, screen) for observer in OBSERVERS]
     return found
 
 

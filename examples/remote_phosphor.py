@@ -152,7 +152,7 @@ def experiment(kind: str, options: argparse.Namespace) -> dict[float, dict[str, 
         found[pixel] = {"truth": truth}
         for threshold in THRESHOLDS[kind]:
             grid = et.GriddedSource.fit(rays, plane, pixel, threshold)
-            maps = [gridded_luminance_map(grid, observer, screen) for observer in observers]
+            maps = [gridded_luminance_map(grid.as_printed, observer, screen) for observer in observers]
             found[pixel][f"gridded, {threshold:g} %"] = maps
             print(f"    Δd = {pixel:g} mm, E = {threshold:g} %: {grid.notes[0]}")
         for name, field in fields.items():

@@ -392,7 +392,9 @@ def test_interpolation_is_bilinear_and_periodic() -> None:
 def test_luminance_is_intensity_over_projected_area() -> None:
     position, direction, flux = slanted(40_000, 12)
     rays = et.RaySet(position, direction, flux)
-    source = GriddedSource.fit(rays, Plane(z=0.0, width=8, height=8, centre=(0, 0)), pixel=0.5, threshold=0.5)
+    source = GriddedSource.fit(
+        rays, Plane(z=0.0, width=8, height=8, centre=(0, 0)), pixel=0.5, threshold=0.5
+    ).as_printed
     rng = np.random.default_rng(1)
     x = np.column_stack([rng.uniform(-4.2, 4.2, (500, 2)), np.zeros(500)])
     d = unit(np.column_stack([rng.normal(size=(500, 2)), rng.uniform(0.01, 1, 500)]))
@@ -418,7 +420,7 @@ def test_light_of_the_window_passes_the_dome() -> None:
     source_rays = DieUnderDome(floor=0.2)
     position, direction = source_rays.rays(60_000, 3)
     rays = et.RaySet(position, direction, np.full(60_000, source_rays.total_flux / 60_000))
-    source = GriddedSource.fit(rays, Dome(radius=1.264, window=0.8), pixel=0.2, threshold=2, parallels=6)
+    source = GriddedSource.fit(rays, Dome(radius=1.264, window=0.8), pixel=0.2, threshold=2, parallels=6).as_printed
     x, d = position[:3000] + 20 * direction[:3000], direction[:3000]
     found, expected = source.luminance(x, d), np.zeros(3000)
     on_plane = x - (x[:, 2] / d[:, 2])[:, None] * d
@@ -451,7 +453,7 @@ def lambertian_table(source: GriddedSource) -> Array:
 
 
 def with_values(source: GriddedSource, values: Array) -> GriddedSource:
-    return dataclasses.replace(source, patches=dataclasses.replace(source.patches, values=values))
+    return dataclasses.replace(source, patches=dataclasses.replace(source.patches, values=values)).as_printed
 
 
 @pytest.mark.parametrize("surface", [Hemisphere(radius=2), Cylinder(radius=2, bottom=0, top=3, ends=False)])
@@ -481,7 +483,7 @@ def test_curved_patches_show_what_they_send(surface: Surface) -> None:
 def test_summed_intensity() -> None:
     """Against the sum of the functions in single directions, and the exact flux of the tables."""
     position, direction, flux = slanted(20_000, 14)
-    source = GriddedSource.fit(et.RaySet(position, direction, flux), Plane(), pixel=0.5, threshold=5)
+    source = GriddedSource.fit(et.RaySet(position, direction, flux), Plane(), pixel=0.5, threshold=5).as_printed
     led = source.intensity(72, 1.25)
     rng = np.random.default_rng(3)
     d = unit(np.column_stack([rng.normal(size=(200, 2)), rng.uniform(0.2, 1.5, 200)]))
@@ -500,7 +502,7 @@ def test_summed_intensity() -> None:
 def test_summed_intensity_of_curved_patches() -> None:
     x, d = from_sphere(20_000, 15, 1.0)
     flux = 1 + 0.5 * d[:, 0]
-    source = GriddedSource.fit(et.RaySet(x, d, flux), Hemisphere(radius=1), threshold=5, parallels=5)
+    source = GriddedSource.fit(et.RaySet(x, d, flux), Hemisphere(radius=1), threshold=5, parallels=5).as_printed
     led = source.intensity(36, 2.5)
     towards = unit([[0.3, 0.5, 0.8], [-0.7, 0.1, -0.2], [0, -0.2, 0.9]])
     expected = sum(by_scipy(source, i, towards) for i in range(len(source.patches)))
@@ -533,7 +535,7 @@ def test_sample_and_tables_agree(surface: Surface, options: dict[str, float]) ->
     """χ² over the cells between the nodes of all patches, exact from the bilinear function; 1 in 10⁴."""
     source, rays = sampled(surface, **options)
     n, patches = len(rays), source.patches
-    assert rays.total_flux == pytest.approx(source.table_flux, rel=1e-9)
+    assert rays.total_flux == pytest.approx(source.emitted_flux, rel=1e-9)
     # Squares reach over the edge of a round part: what starts there belongs to no part, but to its pixel nevertheless.
     owner = next(iter_pixels(source, rays))
     patch = np.searchsorted(patches.pixel, owner)
@@ -640,7 +642,7 @@ def test_a_refit_of_the_sample_agrees() -> None:
     assert again.account.missed == 0
     expected = n * source.patches.table_flux / source.table_flux
     where = np.searchsorted(again.patches.pixel, source.patches.pixel)
-    found = again.patches.flux[where] / source.table_flux * n
+    found = again.patches.flux[where] / source.emitted_flux * n
     assert chi2.sf(((found - expected) ** 2 / expected).sum(), len(expected) - 1) > 1e-4
 
 

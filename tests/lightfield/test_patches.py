@@ -112,8 +112,8 @@ def test_a_failure_leaves_what_was_there(
     source.save_patches(tmp_path / "p")
     before = (tmp_path / "p" / "manifest.json").read_bytes()
 
-    def interrupted(patches: Patches, folder: Path) -> None:
-        (folder / "scene.rad").write_text(f"half of {len(patches)} patches")
+    def interrupted(patches: Patches, folder: Path, factor: float) -> None:
+        (folder / "scene.rad").write_text(f"half of {len(patches)} patches, times {factor}")
         raise KeyboardInterrupt
 
     monkeypatch.setitem(patch_folder.SCENES, "radiance", interrupted)
@@ -190,6 +190,7 @@ def test_text_says_what_was_left_out(run: Run) -> None:
     assert "patches on disk:radius=0.5" in out
     assert "never cross the surface" in out
     assert "the rays on patches have" in out
+    assert "all light is theirs multiplied by" in out
 
 
 @pytest.mark.parametrize(

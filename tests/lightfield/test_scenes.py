@@ -184,7 +184,7 @@ def test_mitsuba_lights_a_wall(tmp_path: Path, mi: Any) -> None:
 
 
 def test_mitsuba_rays_from_the_emitter_carry_the_flux(tmp_path: Path, mi: Any) -> None:
-    """Mean weight of emitted rays: the flux of each patch's table, within 4 standard errors."""
+    """Mean weight of emitted rays: the flux of each patch's table times the factor, within 4 standard errors."""
     source, *_ = fitted("watts")
     source.save_patches(tmp_path / "p", scenes=["mitsuba"])
     _, scene = load(mi, tmp_path / "p" / "mitsuba")
@@ -192,7 +192,7 @@ def test_mitsuba_rays_from_the_emitter_carry_the_flux(tmp_path: Path, mi: Any) -
     assert len(scene.emitters()) == len(source.patches)
     for emitter in scene.emitters()[:4]:
         here = np.linalg.norm(source.patches.centre - np.array(emitter.bbox().center()), axis=1) < 1e-3
-        (flux,) = source.patches.table_flux[here]
+        (flux,) = source.factor * source.patches.table_flux[here]
         weights = np.array([
             emitter.sample_ray(0.0, u[0], mi.Point2f(u[1:3]), mi.Point2f(u[3:5]))[1][0] for u in rng.random((4000, 5))
         ])  # fmt: skip

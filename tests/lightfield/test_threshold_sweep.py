@@ -45,7 +45,7 @@ def test_every_number_by_the_long_way() -> None:
     train = et.RaySet(rays.position[kept], rays.direction[kept], rays.flux[kept])
     reference = et.intensity_distribution(rays, 24, 5.0)
     for i, threshold in enumerate(thresholds):
-        source = GriddedSource.fit(rays, DISK, 2.0, threshold)
+        source = GriddedSource.fit(rays, DISK, 2.0, threshold).as_printed
         assert sweep["bins"][i] == pytest.approx(source.patches.bins.mean())
         assert sweep["unreached"][i] == (source.patches.error > threshold).sum()
         assert sweep["error"][i] == pytest.approx(np.average(source.patches.error, weights=source.patches.flux))
@@ -54,7 +54,7 @@ def test_every_number_by_the_long_way() -> None:
         assert sweep["ncc"][i] == pytest.approx(expected.ncc, rel=1e-9)
         assert sweep["nrmse_thesis"][i] == pytest.approx(expected.nrmse_thesis, rel=1e-9)
         assert sweep["nrmse"][i] == pytest.approx(expected.nrmse, rel=1e-9)
-        model = GriddedSource.fit(train, DISK, 2.0, threshold)
+        model = GriddedSource.fit(train, DISK, 2.0, threshold).as_printed
         seen = model.luminance(rays.position[~kept], rays.direction[~kept]) * 1e-6 / model.table_flux
         log = np.log((1 - UNIFORM) * seen * (math.pi**2 * FILM.radius**2) + UNIFORM)
         weight = rays.flux[~kept]

@@ -60,6 +60,7 @@ def write_patch_folder(
     facts: Mapping[str, Any],
     format: str = "ies",
     scenes: Iterable[str] = (),
+    factor: float = 1.0,
 ) -> None:
     """Write patches: completely, or not at all.
 
@@ -75,6 +76,8 @@ def write_patch_folder(
         Of the intensity files.
     scenes : iterable of str
         Ray tracers for which scenes are added; keys of `etendue.formats.scenes.SCENES`.
+    factor : float
+        What multiplies the tables in the light of scenes; the intensity files hold the tables alone.
 
     Raises
     ------
@@ -94,7 +97,7 @@ def write_patch_folder(
             writer(patches.intensity(i), temporary / row["file"])
         for scene in scenes:
             (temporary / scene).mkdir()
-            SCENES[scene](patches, temporary / scene)
+            SCENES[scene](patches, temporary / scene, factor)
         _write_table(temporary / "manifest.csv", rows)
         head = {"kind": KIND, "version": VERSION, "software": patches.provenance.software}
         head |= {"source": patches.provenance.to_dict(), "flux_unit": patches.flux_unit, **facts}

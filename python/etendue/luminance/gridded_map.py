@@ -22,7 +22,8 @@ def gridded_luminance_map(source: GriddedSource, observer: Observer, screen: Scr
     Parameters
     ----------
     source : GriddedSource
-        Patches with their tables.
+        Patches with their tables. The map shows the light of the source, which has the flux of its rays; that of
+        ``source.as_printed`` shows the tables alone, as chapter 3 of the thesis does.
     observer : Observer
         Whose lines of sight are followed back to the patches.
     screen : Screen
@@ -33,7 +34,8 @@ def gridded_luminance_map(source: GriddedSource, observer: Observer, screen: Scr
     Returns
     -------
     LuminanceMap
-        [cd/m²], or W/(m² sr) for patches in watts. Tables do not know their error, so that it is unknown everywhere.
+        [cd/m²], or W/(m² sr) for patches in watts. Tables do not know their error, so that it is unknown everywhere. The
+        notes tell the factor over the tables.
 
     Raises
     ------

@@ -292,6 +292,7 @@ def with_fields(scene: Scene, threads: int | None = None, *, cache: bool = True)
         sources.append(field)
         lost = f"; {share:.2%} of the flux does not come from it" if share > 1e-4 else ""
         notes.append(f"{name}: a light field on {surface} was fitted to its rays{lost}")
+        notes += [f"{name}: {note}" for note in (rays.rays.notes if rays.rays is not None else ())]
     return scene.replace(sources=tuple(sources)), notes
 
 

@@ -86,6 +86,8 @@ class RaySetMeaning:
     copies : float
         How many copies of a ray there are on average where they are most, of rays traced from a set with more rays than it
         holds: only rays that are no copies are independent of each other.
+    notes : tuple of str
+        What all that is made of the rays should tell.
     """
 
     flux_unit: FluxUnit = "lm"
@@ -100,6 +102,7 @@ class RaySetMeaning:
     complaints: tuple[Complaint, ...] = ()
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
     copies: float = 1.0
+    notes: tuple[str, ...] = ()
 
 
 class RaySet(RayOperations, RayUnits, RayColours, RayStream):
@@ -393,16 +396,16 @@ class RaySet(RayOperations, RayUnits, RayColours, RayStream):
         """What all that is made of the rays should tell."""
         copies = self._meaning.copies
         if copies <= 1.0:
-            return ()
+            return self._meaning.notes
         found = f"up to {copies:,.4g} of the rays are copies of one ray of a set"
         told = f"errors made as if all were independent are too small, up to {math.sqrt(copies):,.3g} times"
-        return (f"{found}: standard {told}",)
+        return (*self._meaning.notes, f"{found}: standard {told}")
 
     @property
     def complaints(self) -> tuple[Complaint, ...]:
         """All that is to be said of the set: by its reader, and by a pass over its rays."""
-        copied = (Complaint("note", "rays", note) for note in self.notes)
-        return (*self._meaning.complaints, *copied, *self._tally_complaints(self.tally))
+        told = (Complaint("note", "rays", note) for note in self.notes)
+        return (*self._meaning.complaints, *told, *self._tally_complaints(self.tally))
 
     def _tally_complaints(self, tally: Tally) -> list[Complaint]:
         return [*self._ray_complaints(tally), *self._total_complaints(tally)]

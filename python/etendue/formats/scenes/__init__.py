@@ -8,5 +8,6 @@ from pathlib import Path
 from etendue.formats.scenes import mitsuba, radiance
 from etendue.quantities.patches import Patches
 
-SCENES: dict[str, Callable[[Patches, Path], None]] = {"radiance": radiance.write, "mitsuba": mitsuba.write}
-"""What writes a scene into an empty folder, by the name of the ray tracer."""
+SCENES: dict[str, Callable[[Patches, Path, float], None]] = {"radiance": radiance.write, "mitsuba": mitsuba.write}
+"""What writes a scene into an empty folder, by the name of the ray tracer: patches, the folder, and what multiplies all
+tables in the light of the scene."""

@@ -24,11 +24,11 @@ CLEAR = '<bsdf type="dielectric"><float name="int_ior" value="1"/><float name="e
 """One that it does. Paths through the plain `null` surface alone count as empty, and would show nothing."""
 
 
-def write(patches: Patches, folder: Path) -> None:
+def write(patches: Patches, folder: Path, factor: float) -> None:
     """Write ``scene.xml``, ``gridded_area.py``, ``tables/`` and, for patches that are no rectangles, ``shapes/``.
 
     What Mitsuba renders is luminance in cd/m² as it stands, or radiance in W/(m² sr) for patches in watts, the same in all
-    channels. Lengths are mm.
+    channels. Lengths are mm. The tables are those of the patches; the scene multiplies their light by `factor`.
     """
     emitter = importlib.resources.files("etendue.formats.scenes").joinpath("gridded_area.py.txt")
     (folder / "gridded_area.py").write_bytes(emitter.read_bytes())
@@ -41,16 +41,17 @@ def write(patches: Patches, folder: Path) -> None:
             mesh = "\n".join(_mesh(patches, i))
             (folder / "shapes" / f"{i + 1:06d}.ply").write_text(f"{mesh}\n", encoding="ascii")
     with (folder / "scene.xml").open("w", encoding="utf-8") as file:
-        file.writelines(f"{line}\n" for line in _scene(patches))
+        file.writelines(f"{line}\n" for line in _scene(patches, factor))
 
 
-def _scene(patches: Patches) -> Iterator[str]:
+def _scene(patches: Patches, factor: float) -> Iterator[str]:
     surface = CLEAR if len(patches.parts) > 1 else BLACK
     source = printable(f"{patches.provenance.source}, by {patches.provenance.software}")
     yield '<scene version="3.0.0">'
     # A comment must not hold two hyphens, which a file name may.
     yield f"  <!-- {len(patches)} patches of {source.replace('--', '- -').rstrip('-')}; lengths in mm, rendered in "
-    yield f"       {LUMINANCE_UNIT[patches.flux_unit]}; import gridded_area before loading -->"
+    yield f"       {LUMINANCE_UNIT[patches.flux_unit]}; the light is that of the tables times {factor:.9g}; "
+    yield "       import gridded_area before loading -->"
     yield '  <integrator type="path"/>'
     for i, (axes, area) in enumerate(zip(patches.axes, patches.projected_area, strict=True)):
         yield from (f"  {line}" for line in _shape(patches, i))
@@ -59,7 +60,7 @@ def _scene(patches: Patches) -> Iterator[str]:
         yield f'      <string name="filename" value="tables/{i + 1:06d}.npy"/>'
         for name, axis in zip("xyz", axes, strict=True):
             yield f'      <vector name="{name}" value={quoteattr(_numbers(axis))}/>'
-        yield f'      <float name="scale" value="{MM2_PER_M2 / area:.9g}"/>'
+        yield f'      <float name="scale" value="{factor * MM2_PER_M2 / area:.9g}"/>'
         yield "    </emitter>"
         yield "  </shape>"
     yield "</scene>"

@@ -19,7 +19,7 @@ SHARE = 1e-5
 FUNCTIONS = f"""\
 {{ Luminance of a patch from its intensities. Real arguments of a pattern: A1 to A9, unit vectors x, y, z of the patch,
   z its normal; A10, what turns intensity into radiance along the normal: 1 / area [m2], over lumens per watt if the
-  tables are in candela. }}
+  tables are in candela, times the factor of the scene. }}
 
 patch_x = -(Dx*A1 + Dy*A2 + Dz*A3);
 patch_y = -(Dx*A4 + Dy*A5 + Dz*A6);
@@ -37,8 +37,10 @@ patch_share = {SHARE!r};
 """
 
 
-def write(patches: Patches, folder: Path) -> None:
+def write(patches: Patches, folder: Path, factor: float) -> None:
     """Write ``scene.rad``, ``patches.cal`` and ``tables/``; a scene is rendered from within its folder.
+
+    The tables are those of the patches; the scene multiplies their light by `factor`.
 
     Luminous flux becomes radiance by the 179 lm/W that Radiance divides by everywhere: 179 times what `rtrace` gives is
     cd/m². Watts stay watts. Lengths are mm.
@@ -49,7 +51,7 @@ def write(patches: Patches, folder: Path) -> None:
         table = "\n".join(_table(patches, i))
         (folder / "tables" / f"{i + 1:06d}.dat").write_text(f"{table}\n", encoding="ascii")
     with (folder / "scene.rad").open("w", encoding="ascii") as file:
-        file.writelines(f"{line}\n" for line in _scene(patches))
+        file.writelines(f"{line}\n" for line in _scene(patches, factor))
 
 
 def _table(patches: Patches, i: int) -> Iterator[str]:
@@ -64,21 +66,22 @@ def _table(patches: Patches, i: int) -> Iterator[str]:
         yield _numbers(row)
 
 
-def _scene(patches: Patches) -> Iterator[str]:
+def _scene(patches: Patches, factor: float) -> Iterator[str]:
     luminous = patches.flux_unit == "lm"
     through = len(patches.parts) > 1
     source = _one_line(f"{patches.provenance.source}, by {patches.provenance.software}")
     yield f"# {len(patches)} patches of {source}; lengths in mm"
     unit = f"watts of {RADIANCE_WHITE_EFFICACY:g} lm; cd/m2 is {RADIANCE_WHITE_EFFICACY:g} times the radiance"
     yield f"# tables in {'cd' if luminous else 'W/sr'}; radiance in {unit if luminous else 'watts'}"
+    yield f"# The light is that of the tables times {factor:.9g}"
     if through:
         yield "# Light of one part passes the others: a patch adds its own light to what is behind it, and casts no shadow."
     for i, (axes, area) in enumerate(zip(patches.axes, patches.projected_area, strict=True)):
         name = f"patch{i + 1:06d}"
-        factor = MM2_PER_M2 / area / (RADIANCE_WHITE_EFFICACY if luminous else 1.0)
+        scale = factor * MM2_PER_M2 / area / (RADIANCE_WHITE_EFFICACY if luminous else 1.0)
         yield f"\nvoid brightdata {name}_lid"
         yield f"5 patch_radiance tables/{i + 1:06d}.dat patches.cal patch_theta patch_phi"
-        yield f"0\n10 {_numbers([*axes.ravel(), factor])}"
+        yield f"0\n10 {_numbers([*axes.ravel(), scale])}"
         if through:
             yield f"{name}_lid glow {name}_glow\n0\n0\n4 {_numbers([1 / SHARE] * 3)} 0"
             yield f"void mixfunc {name}_light\n4 {name}_glow void patch_share patches.cal\n0\n0"

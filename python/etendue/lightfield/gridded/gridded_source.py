@@ -49,6 +49,14 @@ class GriddedSource:
         Δd [mm].
     threshold : float
         Of E [%].
+    stated_flux : float, optional
+        Total flux [`flux_unit`] that overrides that of the rays on patches; see `emitting`.
+
+    Notes
+    -----
+    Tables of wide bins do not integrate to the flux of the rays that they were made of. The tables stay as the thesis
+    has them; all light of the source is theirs times one `factor`, so that the source has the flux of its rays and its
+    distribution is that of the tables. `as_printed` is the source with the light of its tables alone.
 
     Examples
     --------
@@ -68,6 +76,7 @@ class GriddedSource:
     account: Account
     pixel: float
     threshold: float
+    stated_flux: float | None = None
 
     @classmethod
     def fit(
@@ -132,13 +141,62 @@ class GriddedSource:
 
     @property
     def table_flux(self) -> float:
-        """What the tables integrate to, exactly [`flux_unit`]: the flux that `luminance`, `sample` and ray tracers give."""
+        """What the tables integrate to, exactly [`flux_unit`]."""
         return float(self.patches.table_flux.sum())
+
+    @property
+    def emitted_flux(self) -> float:
+        """Of all that shows the source's light [`flux_unit`]: that of the rays on patches, unless another is stated."""
+        return self.total_flux if self.stated_flux is None else self.stated_flux
+
+    @property
+    def factor(self) -> float:
+        """What multiplies all tables alike in the light of the source: `emitted_flux` over `table_flux`."""
+        return self.emitted_flux / self.table_flux
+
+    def emitting(self, flux: float) -> GriddedSource:
+        """The same patches with another total flux.
+
+        Parameters
+        ----------
+        flux : float
+            [`flux_unit`], above 0.
+
+        Returns
+        -------
+        GriddedSource
+
+        Raises
+        ------
+        ArgumentError
+            If the flux is not a number above 0.
+        """
+        if not (math.isfinite(flux) and flux > 0.0):
+            raise ArgumentError(f"flux is {flux!r}; give a number of {self.flux_unit} above 0.")
+        return dataclasses.replace(self, stated_flux=float(flux))
+
+    @property
+    def as_printed(self) -> GriddedSource:
+        """The same patches with the light of their tables alone, as chapter 3 of the thesis prints them: factor 1."""
+        return self.emitting(self.table_flux)
+
+    @property
+    def flux_note(self) -> str:
+        """The flux of the rays, of the tables and of what is made of them, with the factor between."""
+        unit, given = self.flux_unit, f"{self.emitted_flux:.7g} {self.flux_unit}"
+        share = f"{self.table_flux / self.total_flux - 1:+.3%}".replace("-", "−")
+        found = (
+            f"the rays on patches have {self.total_flux:.7g} {unit}, the tables {self.table_flux:.7g} {unit} ({share})"
+        )
+        if self.factor == 1.0:
+            return f"{found}; the light is as the tables have it"
+        stated = "" if self.stated_flux is None else " as stated"
+        return f"{found}; all light is theirs multiplied by {self.factor:.7g}, to {given}{stated}"
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user should know."""
-        patches, unit = self.patches, self.flux_unit
+        patches = self.patches
         finest = int((patches.error > self.threshold).sum())
         bins = f"{patches.bins.mean():,.0f} bins in the mean, {patches.bins.min():,} to {patches.bins.max():,}"
         found = [f"{len(patches):,} patches with {bins}"]
@@ -147,17 +205,13 @@ class GriddedSource:
             found.append(f"hemispheres in {(2 * n - 1) ** 2:,} cells of equal area by {n} parallels")
         if finest:
             found.append(f"{finest:,} patches do not reach E = {self.threshold:g} % even with the finest bins")
-        share = f"{self.table_flux / self.total_flux - 1:+.3%}".replace("-", "−")
-        found.append(
-            f"the rays on patches have {self.total_flux:.7g} {unit}, the tables {self.table_flux:.7g} {unit} ({share})"
-        )
-        return (*found, *self.account.notes(unit))
+        return (*found, self.flux_note, *self.account.notes(self.flux_unit))
 
     def luminance(self, points: npt.ArrayLike, directions: npt.ArrayLike) -> Array:
         """Luminance of the light that leaves along lines, as a reverse ray tracer finds it.
 
         Each line is followed to the patches that it leaves through, one on each part of the surface at most, and their
-        I(θ, φ) / (A cos θ) are added up: light from a window passes the dome above it.
+        I(θ, φ) / (A cos θ) are added up, times `factor`: light from a window passes the dome above it.
 
         Parameters
         ----------
@@ -201,7 +255,7 @@ class GriddedSource:
             # Before 90° the intensity falls to 0 as the cosine does.
             cosine = np.where(local[:, 2] > 0.0, local[:, 2], np.inf)
             total[lit] += patches.at_local(patch, local) / (patches.projected_area[patch] * cosine)
-        return total * MM2_PER_M2
+        return total * (MM2_PER_M2 * self.factor)
 
     def intensity(self, c_planes: int = 36, gamma_step: float = 2.5) -> Intensity:
         """Far-field intensity of all patches together.
@@ -216,14 +270,16 @@ class GriddedSource:
         Returns
         -------
         Intensity
-            Means over the cells around the nodes, to be compared with `etendue.intensity_distribution`.
+            Means over the cells around the nodes, to be compared with `etendue.intensity_distribution`; of the flux
+            `emitted_flux`, within the error of such means.
 
         Raises
         ------
         ArgumentError
             If there are no such planes or steps.
         """
-        return summed_intensity(self.patches, c_planes, gamma_step)
+        found = summed_intensity(self.patches, c_planes, gamma_step)
+        return dataclasses.replace(found, values=found.values * self.factor, notes=(*found.notes, self.flux_note))
 
     def sample(self, n: int, seed: int) -> RaySet:
         """Draw rays of equal flux, patch by patch by the flux of its table, directions exactly from the table.
@@ -242,7 +298,7 @@ class GriddedSource:
         Returns
         -------
         RaySet
-            Of the flux `table_flux`.
+            Of the flux `emitted_flux`; its notes tell the factor.
 
         Raises
         ------
@@ -254,9 +310,10 @@ class GriddedSource:
             raise ArgumentError(f"sample: {n} rays; ask for 1 or more.")
         if not 0 <= seed < 2**64:
             raise ArgumentError(f"sample: seed {seed}; give 0 to 2^64 - 1.")
-        records = spool(sampled_records(self.surface, self.patches, n, seed), RECORD)
+        records = spool(sampled_records(self.surface, self.patches, self.emitted_flux, n, seed), RECORD)
         provenance = self.patches.provenance.then(f"{n} rays drawn from {len(self.patches)} patches, seed {seed}")
-        return RaySet.from_records(records, RaySetMeaning(flux_unit=self.flux_unit, provenance=provenance))
+        meaning = RaySetMeaning(flux_unit=self.flux_unit, provenance=provenance, notes=(self.flux_note,))
+        return RaySet.from_records(records, meaning)
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -268,6 +325,7 @@ class GriddedSource:
             "threshold": self.threshold,
             "flux": self.total_flux,
             "table_flux": self.table_flux,
+            "factor": self.factor,
             "account": dataclasses.asdict(self.account),
             "notes": list(self.notes),
         }
@@ -282,7 +340,8 @@ class GriddedSource:
         format : {"ies", "ldt"}
             Of the intensity files.
         scenes : iterable of str
-            ``"radiance"``, ``"mitsuba"``: scenes that are added.
+            ``"radiance"``, ``"mitsuba"``: scenes that are added. They give the light of the source, the tables times
+            `factor`; the intensity files hold the tables alone.
 
         Raises
         ------
@@ -291,7 +350,7 @@ class GriddedSource:
         ArgumentError
             If the folder cannot be written or holds something else, or the format does not know the unit of flux.
         """
-        write_patch_folder(folder, self.patches, self.facts, format, scenes)
+        write_patch_folder(folder, self.patches, self.facts, format, scenes, self.factor)
 
 
 def check_threshold(threshold: float) -> None:

@@ -18,7 +18,9 @@ BATCH = 1 << 18
 RECORD = np.dtype([("position", "<f8", (3,)), ("direction", "<f8", (3,)), ("flux", "<f8")])
 
 
-def sampled_records(surface: PixelatedSurface, patches: Patches, n: int, seed: int) -> Iterator[npt.NDArray[Any]]:
+def sampled_records(
+    surface: PixelatedSurface, patches: Patches, flux: float, n: int, seed: int
+) -> Iterator[npt.NDArray[Any]]:
     """Records of n rays of equal flux, batch by batch.
 
     A bilinear table is the sum of hat functions about its nodes. A ray chooses a node by the flux of its hat, then θ and φ
@@ -31,6 +33,8 @@ def sampled_records(surface: PixelatedSurface, patches: Patches, n: int, seed: i
         What the patches are pixels of.
     patches : Patches
         At least one of them has light.
+    flux : float
+        Of all rays together.
     n : int
         Rays.
     seed : int
@@ -42,7 +46,6 @@ def sampled_records(surface: PixelatedSurface, patches: Patches, n: int, seed: i
             table = slice(patches.start[i], patches.start[i + 1])
             weight[table] = patches.values[table] * solid_angle
     up_to = np.cumsum(weight)
-    flux = float(patches.table_flux.sum()) / n
     for batch, start in enumerate(range(0, n, BATCH)):
         rng = np.random.Generator(np.random.Philox(key=np.array([seed, batch], dtype=np.uint64)))
         count = min(BATCH, n - start)
@@ -55,7 +58,7 @@ def sampled_records(surface: PixelatedSurface, patches: Patches, n: int, seed: i
         records = np.zeros(count, dtype=RECORD)
         records["direction"] = np.einsum("mij,mi->mj", axes, local)
         records["position"] = surface.points_on(patches.pixel[patch], records["direction"], axes[:, 2], rng)
-        records["flux"] = flux
+        records["flux"] = flux / n
         yield records
 
 

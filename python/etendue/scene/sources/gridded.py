@@ -80,19 +80,16 @@ class Gridded(Source):
         if known is not None and not self.states_colours:
             wavelengths, shares = known.lines(gridded.flux_unit)
             place["spectrum"] = tuple(zip(wavelengths.tolist(), shares.tolist(), strict=True))
-        flux = gridded.total_flux if self.flux is None else self.flux
-        return Rays(**place, rays=gridded.sample(self.draws, self.seed), flux=flux, flux_unit=gridded.flux_unit)
+        drawn = gridded.sample(self.draws, self.seed)
+        return Rays(**place, rays=drawn, flux=gridded.emitted_flux, flux_unit=gridded.flux_unit)
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The rays that were drawn, with the flux of the rays on patches, which tables of coarse bins do not hold."""
         gridded, known = self._gridded(files)
-        drawn = gridded.sample(self.draws, self.seed)
-        flux = gridded.total_flux if self.flux is None else self.flux
+        drawn, flux = gridded.sample(self.draws, self.seed), gridded.emitted_flux
         scale = drawn.flux_scale * flux / drawn.total_flux
         record = {"kind": "rays", "rays": drawn.core_source(), "scale": scale, "flux": flux}
-        unit, factor = gridded.flux_unit, flux / drawn.total_flux
-        note = f"the tables hold {drawn.total_flux:.7g} {unit}; what is drawn from them is multiplied by {factor:.7g}"
-        return (Emitter(record, unit, known, flux_notes=(f"{note}, to {flux:.7g} {unit}",)),)
+        return (Emitter(record, gridded.flux_unit, known, flux_notes=drawn.notes),)
 
     def _gridded(self, files: Files) -> tuple[GriddedSource, Spectrum | SpectralLines | None]:
         """The patches, and the spectrum of the rays that they were made of."""
@@ -102,4 +99,4 @@ class Gridded(Source):
             gridded = GriddedSource.fit(rays, parse_surface(self.surface), self.pixel, self.threshold)
             known = rays.total_spectrum()
         assert gridded is not None  # noqa: S101 - one of the two is given
-        return gridded, known
+        return (gridded if self.flux is None else gridded.emitting(self.flux)), known
