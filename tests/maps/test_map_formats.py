@@ -25,6 +25,7 @@ from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from oracles.little_memory import told
 from oracles.map_files import EXACT, FLOAT32, NAN, as_stored, assert_same, make_map, path_of
 
 ALL = pytest.mark.parametrize("name", MAP_FORMATS)
@@ -165,9 +166,9 @@ def claim(path: Path, name: str, rows: int, columns: int) -> None:
 def test_sizes_that_the_file_cannot_hold_set_no_memory_aside(name: str, tmp_path: Path) -> None:
     path = path_of(name, tmp_path)
     save_map(make_map((11, 12)), path)
-    claim(path, name, rows=11111, columns=22222)
+    claim(path, name, rows=5555, columns=11111)
     tracemalloc.start()
-    with pytest.raises(FormatError, match="246908642"):
+    with pytest.raises(FormatError, match="61721605"):
         read_map(path)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
@@ -175,14 +176,14 @@ def test_sizes_that_the_file_cannot_hold_set_no_memory_aside(name: str, tmp_path
 
 
 def test_npz_sizes_that_the_file_cannot_hold_set_no_memory_aside(tmp_path: Path) -> None:
-    """An archive whose directory, array headers and JSON header agree on 2 GB that are not there."""
+    """An archive whose directory, array headers and JSON header agree on 0.5 GB that are not there."""
     path = tmp_path / "map.npz"
     save_map(make_map((11, 12)), path)
     with np.load(path) as archive:
         header = json.loads(archive["header"].item())
-    header["screen"] |= {"rows": 11111, "columns": 22222}
+    header["screen"] |= {"rows": 5555, "columns": 11111}
     arrays = io.BytesIO()
-    np.lib.format.write_array_header_1_0(arrays, {"shape": (11111, 22222), "fortran_order": False, "descr": "<f8"})
+    np.lib.format.write_array_header_1_0(arrays, {"shape": (5555, 11111), "fortran_order": False, "descr": "<f8"})
     text = io.BytesIO()
     np.save(text, np.array(json.dumps(header)))
     with zipfile.ZipFile(path, "w") as archive:
@@ -335,3 +336,75 @@ def test_exact_formats_hold_every_float64(name: str, tmp_path: Path) -> None:
     assert restored.values.tobytes() == lmap.values.tobytes()
     assert restored.standard_error.tobytes() == lmap.standard_error.tobytes()
     assert restored.rays.tolist() == lmap.rays.tolist()
+
+
+# --- numbers and archives that were made to do harm --------------------------------------------------------------------
+
+
+def altered(path: Path, name: str, old: str, new: str) -> None:
+    """Another text in the JSON header, of the same length if the format has no room for more."""
+    save_map(make_map(), path)
+    if name == "npz":
+        with np.load(path) as archive:
+            arrays = dict(archive)
+        with path.open("wb") as stream:
+            np.savez(stream, **(arrays | {"header": np.array(arrays["header"].item().replace(old, new))}))
+    else:
+        content = path.read_bytes()
+        assert content.count(old.encode()) == 1
+        path.write_bytes(content.replace(old.encode(), new.encode()))
+
+
+@ALL
+@pytest.mark.parametrize("number", ["1e400", "  NaN", " 1e99"])
+def test_numbers_that_are_none_in_the_header(name: str, number: str, tmp_path: Path) -> None:
+    path = path_of(name, tmp_path)
+    altered(path, name, '"distance": 812.5', f'"distance": {number}')
+    with pytest.raises(FormatError, match="checksum" if "1e99" in number else "is no finite number"):
+        read_map(path)
+
+
+@pytest.mark.parametrize("name", ["csv", "npz"])
+@pytest.mark.parametrize("number", ["9" * 6000, "-" + "9" * 400, "Infinity", "\u0663", "[" * 100_000])
+def test_long_and_foreign_numbers_in_the_header(name: str, number: str, tmp_path: Path) -> None:
+    path = path_of(name, tmp_path)
+    altered(path, name, '"distance": 812.5', f'"distance": {number}')
+    with pytest.raises(FormatError, match="not valid JSON"):
+        read_map(path)
+
+
+def test_npz_members_are_not_unpacked_beyond_what_a_map_holds(tmp_path: Path) -> None:
+    """Blanks where the JSON text should be, zeros behind the pixels; few bytes in the
+    file, 300 MB unpacked."""
+    long = 300 << 20
+    npy = b"\x93NUMPY\x02\x00" + long.to_bytes(4, "little")
+    save_map(make_map(), tmp_path / "map.npz")
+    paths = []
+    for member in ("header.npy", "values.npy"):
+        path = tmp_path / f"long-{member}.npz"
+        with zipfile.ZipFile(tmp_path / "map.npz") as old, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
+            for name in old.namelist():
+                new.writestr(name, old.read(name) if name != member else npy + b" " * long)
+        assert path.stat().st_size < 1e6
+        paths.append(path)
+    imports = "import numpy.lib.format\nfrom etendue.formats.maps import read_map, MAP_FORMATS"
+    found = told(imports, "read_map(path)", paths, spare=100 << 20)
+    assert [
+        f"{member}: 314,572,8" in line for member, line in zip(("header.npy", "values.npy"), found, strict=True)
+    ] == [
+        True,
+        True,
+    ]
+
+
+def test_maps_that_shrink_as_far_as_anything_can(tmp_path: Path) -> None:
+    path = tmp_path / "dead.npz"
+    lmap = make_map((600, 700))
+    dead = lmap.replace(
+        values=np.full((600, 700), np.nan), standard_error=np.full((600, 700), np.nan), rays=0 * lmap.rays
+    )
+    save_map(dead, path)
+    with zipfile.ZipFile(path) as archive:
+        packed = archive.getinfo("rays.npy")
+    assert packed.file_size > 500 * packed.compress_size
+    assert_same(read_map(path), dead)

@@ -44,6 +44,8 @@ class Archive:
     Parameters
     ----------
     path : Path
+    most_bytes : int
+        Of the file.
 
     Raises
     ------
@@ -53,9 +55,9 @@ class Archive:
         If it cannot be opened.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, most_bytes: int = MOST_BYTES) -> None:
         self.path = path
-        _check_end(path)
+        _check_end(path, most_bytes)
         try:
             with zipfile.ZipFile(path) as archive:
                 members = archive.infolist()
@@ -67,8 +69,8 @@ class Archive:
         if len(self.members) != len(files):
             raise FormatError(path, "directory of the archive", "two members have the same name", ADVICE)
 
-    def read(self, name: str, most: int) -> bytes:
-        """The content of a member, of `most` bytes at most.
+    def read(self, name: str, most: int, most_ratio: int = MOST_RATIO) -> bytes:
+        """The content of a member, of `most` bytes at most, and of `most_ratio` times the packed ones.
 
         Raises
         ------
@@ -81,7 +83,7 @@ class Archive:
         packed = max(member.compress_size, 1)
         if member.file_size > most:
             raise FormatError(self.path, name, f"{member.file_size:,} bytes, more than {most:,}", ADVICE)
-        if member.file_size > FREE_RATIO_BYTES and member.file_size > MOST_RATIO * packed:
+        if member.file_size > FREE_RATIO_BYTES and member.file_size > most_ratio * packed:
             found = f"{packed:,} bytes that unpack to {member.file_size:,}"
             raise FormatError(self.path, name, found, ADVICE)
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
@@ -99,12 +101,12 @@ class Archive:
         return data
 
 
-def _check_end(path: Path) -> None:
+def _check_end(path: Path, most_bytes: int) -> None:
     """Refuse an archive whose directory alone would fill the memory, before anything reads it."""
     with path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
-        if size > MOST_BYTES:
-            raise FormatError(path, "size", f"{size:,} bytes", f"Product data have {MOST_BYTES:,} at most.")
+        if size > most_bytes:
+            raise FormatError(path, "size", f"{size:,} bytes", f"Such a file has {most_bytes:,} at most.")
         start = max(0, size - (1 << 16) - 42)
         file.seek(start)
         tail = file.read()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.input import require_readable
+from etendue.formats.strict_json import strict_json
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """The first bytes of an HDF5 file."""
@@ -112,7 +112,7 @@ class Node:
 
     def texts(self, name: str) -> tuple[str, ...]:
         """An attribute that is a list of texts, as JSON."""
-        stored = json.loads(self.text(name))
+        stored = strict_json(self.text(name))
         if not (isinstance(stored, list) and all(isinstance(item, str) for item in stored)):
             raise self.error(f"attribute {name!r}", "it is not a list of texts")
         return tuple(stored)

@@ -14,6 +14,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.intensity import INTENSITY_FORMATS
 from etendue.formats.output_folder import atomic_folder, check_output_folder
 from etendue.formats.scenes import SCENES
+from etendue.formats.strict_json import strict_json
 from etendue.quantities.patches import Patches
 
 MANIFEST = "manifest.json"
@@ -48,8 +49,8 @@ def check_patch_folder(
 def is_patch_folder(folder: Path) -> bool:
     """Whether a folder holds patches, by its manifest."""
     try:
-        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        manifest = strict_json((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, RecursionError, ValueError):
         return False
     return isinstance(manifest, dict) and manifest.get("kind") == KIND
 

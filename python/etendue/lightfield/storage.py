@@ -22,6 +22,7 @@ from etendue.errors import ArgumentError, FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
 from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
+from etendue.formats.strict_json import strict_json
 from etendue.lightfield.counting import MOST_CELLS
 from etendue.lightfield.light_field import FitReport, LightField, PartField
 from etendue.lightfield.rounding import digits_for, rounded
@@ -293,7 +294,7 @@ def _report(group: Node) -> FitReport:
 
 
 def _provenance(file: Node) -> Provenance:
-    provenance = Provenance.from_dict(json.loads(file.text("provenance")))
+    provenance = Provenance.from_dict(strict_json(file.text("provenance")))
     texts = (provenance.source, provenance.format, provenance.fingerprint, provenance.software, *provenance.steps)
     if not all(isinstance(text, str) for text in texts):
         raise file.error("attribute 'provenance'", "something else than texts")

@@ -13,14 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.scene.mesh_limits import LARGEST_FILE, check_mesh
 from etendue.scene.step_files import StepBody, read_step
 from etendue.units import MM_PER_LENGTH_UNIT
 
 Array = npt.NDArray[np.float64]
 Triangles = npt.NDArray[np.int64]
-
-LARGEST_FILE = 1 << 31
-"""Most bytes of a mesh file."""
 
 HEAD = 512
 """Bytes that tell a format."""
@@ -200,7 +198,9 @@ def _opened(path: Path) -> tuple[MeshFormat, bytes]:
         if size > LARGEST_FILE:
             raise FormatError(path, "size", f"{size:,} bytes", f"A mesh may have {LARGEST_FILE:,}; make it coarser.")
         file.seek(0)
-        return form, file.read()
+        raw = file.read()
+    check_mesh(path, form.name, raw)
+    return form, raw
 
 
 def _step_body(path: Path, bodies: list[StepBody]) -> StoredMesh:
@@ -216,15 +216,20 @@ def _step_body(path: Path, bodies: list[StepBody]) -> StoredMesh:
 def _load(path: Path, form: MeshFormat, raw: bytes) -> tuple[Array, Triangles]:
     import trimesh  # noqa: PLC0415 - takes a second to import and is needed by few scenes
 
+    # Pictures and the files of materials would be read for nothing; STL has none.
+    options: dict[str, Any] = {} if form.name.startswith("stl") else {"skip_materials": True}
     try:
         mesh: Any = trimesh.load_mesh(
             io.BytesIO(raw),
             file_type=form.name,
             process=False,
             resolver=trimesh.resolvers.FilePathResolver(os.fspath(path)),
+            **options,
         )
         vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    except MemoryError:
+        raise
     except Exception as error:  # noqa: BLE001 - whatever a damaged file makes the library raise
         raise FormatError(path, form.title, f"cannot be read ({error})", "The file is damaged, or no mesh.") from None
     return vertices, triangles

@@ -21,6 +21,7 @@ from etendue import _core
 from etendue.errors import FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
 from etendue.formats.output import atomic_output
+from etendue.formats.strict_json import strict_json
 from etendue.quantities.spool import Spool
 from etendue.scene.dealing import CellSums, Dealing
 from etendue.scene.scatter_events import EVENT
@@ -190,7 +191,7 @@ def _plan(group: Node, path: Path) -> Plan:
     unit = group.text("flux_unit")
     if unit not in FLUX_UNITS:
         raise group.error("attribute 'flux_unit'", f"{unit!r} is none of {', '.join(FLUX_UNITS)}")
-    detections = tuple(detection_from_dict(data) for data in json.loads(_text(group, "detectors")))
+    detections = tuple(detection_from_dict(data) for data in strict_json(_text(group, "detectors")))
     check_cells(detections)
     text = _text(group, "scene")
     return Plan(
@@ -328,7 +329,7 @@ def _text(group: Node, name: str) -> str:
 
 
 def _texts(group: Node, name: str) -> tuple[str, ...]:
-    texts = json.loads(_text(group, name))
+    texts = strict_json(_text(group, name))
     if not (isinstance(texts, list) and all(isinstance(text, str) for text in texts)):
         raise group.error(f"dataset {name!r}", "it is not a list of texts")
     return tuple(texts)

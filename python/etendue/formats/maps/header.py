@@ -14,8 +14,10 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.maps.map_format import DAMAGED, AnyMap, parsing
+from etendue.formats.strict_json import strict_json
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap, MapValues
+from etendue.quantities.observer import MAX_PIXELS
 from etendue.units import FLUX_UNITS, ILLUMINANCE_NAME
 
 VERSION = 1
@@ -77,7 +79,7 @@ class MapHeader:
             If it is not such a text, or one of a newer version.
         """
         try:
-            data = json.loads(text)
+            data = strict_json(text)
         except (ValueError, RecursionError) as error:
             raise FormatError(path, place, f"not valid JSON ({error})", DAMAGED) from error
         if not isinstance(data, dict) or VERSION_KEY not in data:
@@ -90,8 +92,8 @@ class MapHeader:
         with parsing(path, place):
             checksum = data.pop(CHECKSUM_KEY)
             rows, columns = (int(data["screen"][name]) for name in ("rows", "columns"))
-        if not 1 <= min(rows, columns) <= max(rows, columns) <= 65536:
-            raise FormatError(path, place, f"a screen of {rows} × {columns} pixels", DAMAGED)
+        if min(rows, columns) < 1 or rows * columns > MAX_PIXELS:
+            raise FormatError(path, place, f"a screen of {rows:,} × {columns:,} pixels", DAMAGED)
         return cls(path, place, data, checksum, rows, columns)
 
     @property

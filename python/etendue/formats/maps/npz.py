@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import zipfile
+import io
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +10,21 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.formats.archive import Archive
 from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
-from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, parsing
+from etendue.formats.maps.map_format import DAMAGED, DEFLATE_RATIO, AnyMap, MapFormat, parsing
+from etendue.quantities.observer import MAX_PIXELS
 
 ARRAYS = {"values": np.dtype("<f8"), "standard_error": np.dtype("<f8"), "rays": np.dtype("<i8")}
+
+NPY_HEADER_BYTES = 10 + 65535
+"""Most bytes before the numbers of an array, by the format of version 1.0."""
+
+MOST_HEADER_BYTES = 1 << 22
+"""Of the JSON text, which takes 4 bytes a character: about a thousand pages."""
+
+MOST_BYTES = 24 * MAX_PIXELS + MOST_HEADER_BYTES + (1 << 20)
+"""Of the archive of the largest map, were nothing of it to shrink."""
 
 
 def write(lmap: AnyMap, path: Path) -> tuple[str, ...]:
@@ -27,34 +38,37 @@ def write(lmap: AnyMap, path: Path) -> tuple[str, ...]:
 
 def read(path: Path) -> AnyMap:
     """Read what `write` wrote."""
-    with parsing(path, "zip archive"), zipfile.ZipFile(path) as archive:
-        missing = [f"{name}.npy" for name in ("header", *ARRAYS) if f"{name}.npy" not in archive.namelist()]
-        if missing:
-            raise FormatError(path, "zip archive", f"no {', '.join(missing)} in it", FOREIGN)
-        text = _member(archive, path, "header", (), np.dtype(str))
-        header = MapHeader.parse(path, "array 'header'", str(text.item()))
-        arrays = {name: _member(archive, path, name, header.shape, dtype) for name, dtype in ARRAYS.items()}
+    archive = Archive(path, MOST_BYTES)
+    missing = [f"{name}.npy" for name in ("header", *ARRAYS) if f"{name}.npy" not in archive.members]
+    if missing:
+        raise FormatError(path, "zip archive", f"no {', '.join(missing)} in it", FOREIGN)
+    text = _member(archive, "header", (), np.dtype(str), MOST_HEADER_BYTES)
+    header = MapHeader.parse(path, "array 'header'", str(text.item()))
+    arrays = {
+        name: _member(archive, name, header.shape, dtype, header.pixels * dtype.itemsize)
+        for name, dtype in ARRAYS.items()
+    }
     return header.restore(arrays["values"], arrays["standard_error"], arrays["rays"])
 
 
 def _member(
-    archive: zipfile.ZipFile, path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]
+    archive: Archive, name: str, shape: tuple[int, ...], dtype: np.dtype[Any], most_bytes: int
 ) -> npt.NDArray[Any]:
-    """One array of the archive."""
-    with archive.open(f"{name}.npy") as stream:
+    """One array of the archive, which the archive does not unpack if it claims more than it may hold."""
+    # Pixels that are all dead shrink as far as deflate can shrink anything.
+    data = archive.read(f"{name}.npy", NPY_HEADER_BYTES + most_bytes, DEFLATE_RATIO)
+    with parsing(archive.path, f"array {name!r}"):
+        stream = io.BytesIO(data)
         version = np.lib.format.read_magic(stream)
         if version != (1, 0):
-            raise FormatError(path, f"array {name!r}", f"npy version {version}", DAMAGED)
+            raise FormatError(archive.path, f"array {name!r}", f"npy version {version}", DAMAGED)
         found_shape, fortran, found_dtype = np.lib.format.read_array_header_1_0(stream)
         # A text array has no set length.
         expected = found_dtype if dtype.kind == found_dtype.kind == "U" else dtype
         if found_shape != shape or found_dtype != expected or fortran:
             found = f"{found_dtype} of shape {found_shape}, expected {dtype} of shape {shape}"
-            raise FormatError(path, f"array {name!r}", found, DAMAGED)
-        # To the end and not by the length that the header claims: no memory is set aside for a claim, and the
-        # archive's own checksum is verified.
-        data = stream.read()
-    return np.frombuffer(data, dtype=found_dtype).reshape(shape)
+            raise FormatError(archive.path, f"array {name!r}", found, DAMAGED)
+        return np.frombuffer(data, dtype=found_dtype, offset=stream.tell()).reshape(shape)
 
 
 FORMAT = MapFormat("npz", (".npz",), lambda head: head.startswith(b"PK\x03\x04"), read, write)

@@ -17,7 +17,7 @@ from etendue.formats.rays.column_names import ColumnName, column_name
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
 from etendue.formats.rays.shared import FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.text_output import geometry, usable_rays, write_rows
-from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
+from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows, whole
 from etendue.quantities.provenance import version
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import RayBatch, RayStream
@@ -213,7 +213,6 @@ class _Table:
         return {key: value for key, value in pairs}  # noqa: C416 - dict() would not be typed
 
     def layout(self) -> RowLayout:
-        stated = self.facts().get("rays", "")
         return RowLayout(
             fields=self.fields,
             columns=self.columns,
@@ -221,7 +220,7 @@ class _Table:
             separator=self.separator,
             decimal_comma=self.decimal_comma(),
             comments=COMMENTS,
-            expected=int(stated) if stated.isdecimal() else None,
+            expected=whole(self.facts().get("rays", "")),
             stated_at="comment 'rays'",
         )
 

@@ -20,6 +20,7 @@ from etendue.errors import ArgumentError, FormatError
 from etendue.formats.rays.index_building import SIDES, Counted, IndexTables, Records, leaf_count
 from etendue.formats.rays.ray_format import file_provenance, stored_records
 from etendue.formats.rays.shared import read_bytes
+from etendue.formats.strict_json import strict_json
 from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySetMeaning
@@ -195,7 +196,7 @@ def read_index(path: Path) -> tuple[AnyRecords, RaySetMeaning, IndexTables, Tall
         found = f"the checksum is {checksum:08x}, but that of header and tables {found_checksum:08x}"
         raise FormatError(path, f"byte {CHECKSUM_AT}", found, DAMAGED)
     try:
-        content = json.loads(tables[place.json : place.json + text_bytes])
+        content = strict_json(tables[place.json : place.json + text_bytes])
         dtype = _dtype(content["columns"], width)
         tally = Tally(**content["tally"])
         meaning = _meaning(content["meaning"], path)

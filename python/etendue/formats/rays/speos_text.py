@@ -14,7 +14,7 @@ from etendue.errors import ArgumentError, FormatError
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
 from etendue.formats.rays.shared import FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.text_output import usable_rays, write_rows
-from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
+from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows, whole
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.report import Complaint
@@ -33,10 +33,11 @@ def recognise(head: Head) -> bool:
 def _first_lines(head: Head) -> tuple[TextLine, int, int] | None:
     """The first line, the number that it states, and the number of columns below; None if it is no Speos file."""
     lines = [line for line in head_lines(head) if line.text][:2]
-    if len(lines) < 2 or not lines[0].text.isdecimal():
+    stated = whole(lines[0].text) if len(lines) == 2 else None
+    if stated is None:
         return None
     columns = len(numbers(lines[1].text.split()) or [])
-    return (lines[0], int(lines[0].text), columns) if columns in (UNPOLARISED, POLARISED) else None
+    return (lines[0], stated, columns) if columns in (UNPOLARISED, POLARISED) else None
 
 
 def read(path: Path) -> RaySet:

@@ -40,6 +40,7 @@ BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 _FORTRAN_EXPONENT = bytes.maketrans(b"dD", b"eE")
 _MICROSOFT = re.compile(r"([+-]?)\d\.#(\w*)|[+-]?nan\(\w*\)", re.IGNORECASE)
+_DIGITS = re.compile(r"[0-9]{1,18}")
 _NO_EXPONENT_LETTER = re.compile(r"([+-]?\d*\.?\d*)([+-]\d{3})")
 
 
@@ -166,6 +167,17 @@ def head_lines(head: Head) -> list[TextLine]:
 
 def _end_of_line(data: bytes) -> bytes:
     return b"\n" if b"\n" in data else b"\r"
+
+
+def whole(entry: str) -> int | None:
+    """The count that an entry states in plain digits; None if it states none, or one beyond any file.
+
+    Examples
+    --------
+    >>> whole("1000"), whole("1e3"), whole("9" * 6000)
+    (1000, None, None)
+    """
+    return int(entry) if _DIGITS.fullmatch(entry) else None
 
 
 def number(entry: str) -> float:

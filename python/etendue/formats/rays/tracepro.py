@@ -14,7 +14,7 @@ from etendue.errors import FormatError
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
 from etendue.formats.rays.shared import FloatArray, RayColour, losses
 from etendue.formats.rays.text_output import usable_rays, write_rows
-from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
+from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows, whole
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.report import Complaint
@@ -82,7 +82,7 @@ def read(path: Path) -> RaySet:
 def _stated_rays(lines: list[TextLine]) -> tuple[int | None, str]:
     for line in lines:
         if match := GENERATED.search(line.text):
-            return int(match[1]), f"line {line.number}"
+            return whole(match[1]), f"line {line.number}"
     return None, "header"
 
 
