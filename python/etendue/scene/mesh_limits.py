@@ -70,11 +70,11 @@ def check_mesh(path: Path, name: str, raw: bytes) -> None:
     Examples
     --------
     >>> header = b"ply\nformat ascii 1.0\nelement vertex 99999999\nproperty float x\nend_header\n0\n"
-    >>> check_mesh(Path("sheet.ply"), "ply", header)
-    Traceback (most recent call last):
-    ...
-    etendue.errors.FormatError: sheet.ply: element vertex: 99,999,999 of them, and 2 bytes left for them. The file is \
-damaged, or made to do harm; export it again.
+    >>> try:
+    ...     check_mesh(Path("sheet.ply"), "ply", header)
+    ... except FormatError as error:
+    ...     print(error.place, "|", error.found)
+    element vertex | 99,999,999 of them, and 2 bytes left for them
     """
     if name == "ply":
         _check_ply(path, raw)
