@@ -203,7 +203,7 @@ def test_text_says_what_was_left_out(run: Run) -> None:
         (["led.tm25ray", "-o", "p", "--pixel", "0"], 1, "above 0"),
         (["led.tm25ray", "-o", "p", "--threshold", "-3"], 1, "percent"),
         (["led.tm25ray", "-o", "p", "--parallels", "4"], 1, "has none"),
-        (["led.tm25ray", "-o", "led.tm25ray"], 1, "this is a file"),
+        (["led.tm25ray", "-o", "led.tm25ray"], 1, "also an input"),
         (["led.tm25ray", "-o", "none/p"], 1, "does not exist"),
         (["nothing.ray", "-o", "p"], 1, "nothing.ray"),
         (["led.tm25ray", "-o", "p", "--surface", "disk:radius=1,z=-5"], 1, "no light crosses"),
