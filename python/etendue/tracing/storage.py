@@ -51,6 +51,9 @@ OPEN = {"open_cell": "<u4", "open_unit": "<u8", "open_sum": "<f8"}
 DAMAGED = "The file is damaged or cut short: copy it again, or trace the scene again."
 FOREIGN = "Give an HDF5 file that TraceResult.save wrote."
 
+MOST_TEXT_BYTES = 1 << 28
+"""Of a text in the file: a scene that spells out a mesh of a million triangles has a third of it."""
+
 
 def is_result_file(path: Path) -> bool:
     """Whether a file is the result of a trace, by its content.
@@ -325,7 +328,10 @@ def _events(group: Node, most: int) -> Scattered:
 
 
 def _text(group: Node, name: str) -> str:
-    return bytes(group.dataset(name, np.dtype("u1"), 1)[()]).decode("utf-8")
+    data = group.dataset(name, np.dtype("u1"), 1)
+    if data.size > MOST_TEXT_BYTES:
+        raise group.error(f"dataset {name!r}", f"a text of {data.size:,} bytes; {MOST_TEXT_BYTES:,} are allowed")
+    return bytes(data[()]).decode("utf-8")
 
 
 def _texts(group: Node, name: str) -> tuple[str, ...]:
