@@ -182,6 +182,26 @@ class Scene:
     """A scene, ready to be traced and to be looked at; `record` is what `etendue.scene.compile_scene` makes."""
 
     def __new__(cls, record: dict[str, Any]) -> Scene: ...
+    def with_far_fields(self, nodes: list[FarField]) -> Scene:
+        """The same scene, whose detectors of the far field share rays by these nodes, in their order."""
+
+@final
+class FarField:
+    """Nodes of a far field [rad]: rows of γ, and the nodes C of each row."""
+
+    def __new__(cls, gamma: list[float], c: list[list[float]]) -> FarField: ...
+    def __len__(self) -> int:
+        """Number of nodes, and the cell of all rays together."""
+
+    def add(
+        self,
+        direction: _Floats,
+        flux: _Floats,
+        sums: _Floats,
+        squares: _Floats,
+        rays: npt.NDArray[np.uint64],
+    ) -> None:
+        """Add rays to Σ w, Σ w² and the number of rays of each cell."""
 
 @final
 class Survey:

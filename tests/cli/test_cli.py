@@ -59,7 +59,7 @@ def verbs() -> dict[str, Any]:
 def test_help_names_every_verb_with_what_it_does(run: Run) -> None:
     outcome = run("--help")
     assert outcome.status == 0
-    expected = "demo info convert fit luminance sample intensity trace draw patches filter compare"
+    expected = "demo info convert fit luminance sample intensity trace draw patches filter compare cache"
     assert set(verbs()) == set(expected.split())
     for name, verb in verbs().items():
         assert f" {name} " in outcome.out
@@ -283,8 +283,8 @@ def test_info_counts_and_names_defects(run: Run, folder: Path) -> None:
 
 def test_info_tells_the_wavelengths_that_are_known(run: Run, tmp_path: Path, folder: Path) -> None:
     data = bytearray((folder / "watts.tm25ray").read_bytes())
-    rays = et.read_rays(folder / "watts.tm25ray").records
-    first = len(data) - len(rays) * rays.itemsize + rays.dtype.fields["wavelength"][1]  # type: ignore[index]
+    rays = np.asarray(et.read_rays(folder / "watts.tm25ray").records)
+    first = len(data) - rays.nbytes + rays.dtype.fields["wavelength"][1]  # type: ignore[index]
     for index, stored in ((0, math.nan), (7, math.inf)):
         data[first + index * rays.itemsize : first + index * rays.itemsize + 4] = np.float32(stored).tobytes()
     (tmp_path / "odd.tm25ray").write_bytes(data)

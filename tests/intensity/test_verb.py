@@ -11,6 +11,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.cli import main
+from etendue.quantities.measured import measured
 from oracles.intensity import lid
 from oracles.luminaire_files import archive, ies_of, product, tm33_of
 
@@ -62,9 +63,15 @@ def test_rays_to_files_and_pictures(run: Run, led: et.RaySet, tmp_path: Path) ->
 def test_defaults_flux_and_text(run: Run) -> None:
     status, out, _ = run("led.tm25ray", "--flux", "500lm")
     assert status == 0
-    assert "36 planes, 73 angles" in out
-    assert "the cells hold 500 lm" in out
-    assert "±" not in out
+    assert "flux 500.0 ± 3.3 lm" in out
+    status, out, _ = run("led.tm25ray")
+    far = et.intensity_distribution(et.read_rays("led.tm25ray"))
+    assert f"{far.c.size} planes, {far.gamma.size} angles" in out
+    assert measured(far.maximum, far.maximum_error, "cd") in out
+    status, out, _ = run("led.tm25ray", "--json")
+    facts = json.loads(out)
+    assert facts["maximum_error"] > 0.0
+    assert facts["flux_error"] > 0.0
 
 
 def test_files_are_turned_and_converted(run: Run) -> None:

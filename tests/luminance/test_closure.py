@@ -42,24 +42,24 @@ def lantern(**more: Any) -> et.Scene:
 def test_what_is_seen_from_everywhere_is_the_flux() -> None:
     """V12: Σ L A⊥ of a map is the intensity of its view, ∫ I dω = ∫∫ L dU the flux that leaves.
 
-    Views are drawn evenly in each cell of the far field of a trace, more of them where there is more light; their spread is
-    the error of their mean.
+    Views are drawn around each node of the far field of a trace, by its hat, more of them where there is more light; their
+    spread is the error of their mean.
     """
     result = et.trace(lantern(), 1e6, 3)
     far = result.intensity.only
     rng, seed = np.random.default_rng(6), 0
     cells: list[tuple[float, ...]] = []
     screen = et.Screen(23, 23, 16, 16)
-    half = 15.0
-    cones = [(0.0, half, 0.0, 360.0, 0, 0), (180.0 - half, 180.0, 0.0, 360.0, 0, 6)]
-    cones += [(g - half, g + half, c - 30, c + 30, i, j) for i, c in enumerate(far.c) for j, g in enumerate(far.gamma)
-              if 0 < g < 180]  # fmt: skip
-    for low, high, left, right, i, j in cones:
-        solid = math.radians(right - left) * float(np.cos(np.radians(low)) - np.cos(np.radians(high)))
+    nodes = [(0, 0), (0, 6), *((i, j) for i in range(6) for j in range(1, 6))]
+    for i, j in nodes:
+        pole, g = j in {0, 6}, far.gamma[j]
+        solid = float(far.node_solid_angle[:, j].sum() if pole else far.node_solid_angle[i, j])
         count = 6 + int(150 * solid * far.values[i, j] / far.flux)
-        z = rng.uniform(*np.cos(np.radians([high, low])), count)
+        thetas = np.degrees(np.arccos(rng.uniform(*np.cos(np.radians([min(g + 30, 180), max(g - 30, 0)])), 40 * count)))
+        thetas = thetas[rng.random(thetas.size) < 1.0 - np.abs(thetas - g) / 30.0][:count]
+        phis = rng.uniform(0, 360, count) if pole else far.c[i] + rng.triangular(-60, 0, 60, count)
         seen = []
-        for theta, phi in zip(np.degrees(np.arccos(z)), rng.uniform(left, right, count), strict=True):
+        for theta, phi in zip(thetas, phis, strict=True):
             seed += 1
             view = et.Observer(theta, phi, 1e7)
             seen.append(et.luminance_map(lantern(), view, screen, rays_per_pixel=8, seed=seed).intensity)

@@ -293,4 +293,4 @@ def test_detectors_in_place() -> None:
     assert first["frame"][:3] == [0, 0, 30]
     assert second["frame"][9:] == [0, 0, -1]
     assert (second["columns"], second["rows"]) == (8, 3)
-    assert third == {"kind": "intensity", "planes": 24, "gammas": 19}
+    assert third == {"kind": "intensity", "c_planes": 24, "gamma_step": 10}

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 from etendue.tracing.result import TraceResult
 from numpy.polynomial.legendre import leggauss
+from oracles.intensity import hat_means
 from oracles.verdicts import SIGNIFICANCE, assert_agree, assert_drawn_with
 from scipy.stats import chi2
 
@@ -68,26 +69,27 @@ def test_light_from_behind_is_not_counted() -> None:
 
 @pytest.mark.parametrize("exponent", [1.0, 4.0])
 def test_far_field_of_a_cosine_emitter(exponent: float) -> None:
-    """V2: I = I₀ cosⁿγ about an axis that is tilted against the table; the mean over each cell by quadrature."""
+    """V2: I = I₀ cosⁿγ about an axis that is tilted against the table; the mean around each node by quadrature."""
     flux, axis = 100.0, np.array([math.sin(0.5) * math.cos(0.7), math.sin(0.5) * math.sin(0.7), math.cos(0.5)])
     source = {"kind": "surface", "shape": {"kind": "rectangle", "width": 3, "height": 1}, "exponent": exponent,
               "flux": flux, "toward": axis, "at": [4, 5, 6]}  # fmt: skip
     far = traced(
         2e6, 5, sources=[source], detectors=[{"name": "far", "kind": "intensity", "c_planes": 8, "gamma_step": 15}]
     ).intensity.only
-    gamma, c = np.radians(far.gamma[1:-1]), np.radians(far.c)
-    fine = 24
-    offset = (np.arange(fine) + 0.5) / fine - 0.5
-    g = gamma[:, None] + offset * np.radians(15)
-    azimuth = c[:, None] + offset * np.radians(45)
-    G, C = g[None, :, :, None], azimuth[:, None, None, :]
-    cosine = np.sin(G) * np.cos(C) * axis[0] + np.sin(G) * np.sin(C) * axis[1] + np.cos(G) * axis[2]
-    intensity = flux * (exponent + 1) / (2 * np.pi) * np.maximum(cosine, 0.0) ** exponent
-    expected = (intensity * np.sin(G)).sum(axis=(2, 3)) / (np.sin(G).sum(axis=(2, 3)) * fine)
-    inner, error = far.values[:, 1:-1], far.standard_error[:, 1:-1]
+
+    def intensity(c: Array, gamma: Array) -> Array:
+        c, gamma = np.radians(c), np.radians(gamma)
+        cosine = np.sin(gamma) * np.cos(c) * axis[0] + np.sin(gamma) * np.sin(c) * axis[1] + np.cos(gamma) * axis[2]
+        return flux * (exponent + 1) / (2 * np.pi) * np.maximum(cosine, 0.0) ** exponent
+
+    expected = hat_means(intensity, far.c, far.gamma)[0]
+    assert far.flux == pytest.approx(flux, rel=1e-12)
+    # Nodes whose hats have no ray in common.
+    expected, far_values, far_errors = (a[::2, 1:-1:2] for a in (expected, far.values, far.standard_error))
+    inner, error = far_values, far_errors
     lit = inner > 0
     assert (expected[~lit] < 1e-3 * expected.max()).all()
-    # Quadrature is off by 1e-3 in cells that the terminator crosses: they have fewer rays than that could show.
+    # Quadrature is off by 1e-3 in nodes that the terminator crosses: they have fewer rays than that could show.
     assert_agree(values=inner[lit], standard_error=error[lit], expected=expected[lit])
 
 
@@ -233,8 +235,10 @@ def test_luminance_out_of_a_dome() -> None:
         5e5, 7, media={"glass": {"index": n}}, sources=[source], solids=[dome],
         detectors=[{"name": "far", "kind": "intensity", "c_planes": 4, "gamma_step": 10}],
     ).intensity.only  # fmt: skip
-    gamma = np.radians(far.gamma[1:9])
-    half = np.radians(5)
-    mean = (np.sin(gamma + half) ** 2 - np.sin(gamma - half) ** 2) / 2 / (np.cos(gamma - half) - np.cos(gamma + half))
-    expected = np.tile(transmittance * flux / math.pi * mean, (4, 1))
-    assert_agree(values=far.values[:, 1:9], standard_error=far.standard_error[:, 1:9], expected=expected)
+
+    def intensity(_: Array, gamma: Array) -> Array:
+        return transmittance * flux / math.pi * np.maximum(np.cos(np.radians(gamma)), 0.0) + 0.0 * _
+
+    expected = hat_means(intensity, far.c, far.gamma)[0]
+    apart = np.s_[::2, 1:9:2]
+    assert_agree(values=far.values[apart], standard_error=far.standard_error[apart], expected=expected[apart])

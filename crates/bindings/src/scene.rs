@@ -18,6 +18,7 @@ use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::far_field::FarField;
 use crate::field::LightField;
 use crate::surface::vectors;
 use crate::view::View;
@@ -299,10 +300,8 @@ fn detector(dict: &Bound<'_, PyDict>, faces: usize) -> PyResult<Detector> {
             columns: get(dict, "columns")?,
             rows: get(dict, "rows")?,
         },
-        "intensity" => Detector::Intensity {
-            planes: get(dict, "planes")?,
-            steps: get::<u32>(dict, "gammas")? - 1,
-        },
+        // Until it is known which nodes suit it: `Scene::with_far_fields`.
+        "intensity" => Detector::Escapes,
         "image" => Detector::Image {
             view: get::<View>(dict, "view")?.core(),
             complement: optional(dict, "complement")?.unwrap_or(false),
@@ -378,6 +377,23 @@ impl Scene {
         Ok(Self {
             core: Arc::new(core),
             sets,
+            lanterns: OnceLock::new(),
+        })
+    }
+
+    /// The same scene, whose detectors of escaping rays share them by these nodes, in their order.
+    fn with_far_fields(&self, py: Python<'_>, nodes: Vec<PyRef<'_, FarField>>) -> PyResult<Self> {
+        let mut core = CoreScene::clone(&self.core);
+        let mut nodes = nodes.iter();
+        for detector in &mut core.detectors {
+            if matches!(detector, Detector::Escapes) {
+                let next = nodes.next().ok_or_else(|| refuse("more far fields than nodes"))?;
+                *detector = Detector::Intensity(next.nodes());
+            }
+        }
+        Ok(Self {
+            core: Arc::new(core),
+            sets: self.sets.iter().map(|set| set.clone_ref(py)).collect(),
             lanterns: OnceLock::new(),
         })
     }

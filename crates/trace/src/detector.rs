@@ -1,6 +1,5 @@
 //! Detectors: what takes note of light and does not change it.
 
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 use etendue_geometry::Face;
@@ -9,6 +8,7 @@ use etendue_lightfield::View;
 use etendue_math::{Frame, Vec3};
 
 use crate::exitance::Patches;
+use crate::far_field::Nodes;
 
 /// A detector.
 #[derive(Clone, Debug)]
@@ -28,13 +28,10 @@ pub enum Detector {
         /// Cells along y; row 0 is the top, at the largest y.
         rows: u32,
     },
-    /// The far field: flux of what escapes, in the cells around the nodes of a C-γ table, plane by plane.
-    Intensity {
-        /// Planes, from C = 0 in equal steps.
-        planes: u32,
-        /// Steps of γ from 0 to π.
-        steps: u32,
-    },
+    /// Keeps every ray that escapes: a look at the far field before it is known which nodes suit it.
+    Escapes,
+    /// The far field: flux of what escapes, shared by the nodes around its direction.
+    Intensity(Arc<Nodes>),
     /// The light image: every diffuse scatter, connected to the eye of an observer.
     Image {
         /// What he sees.
@@ -73,7 +70,7 @@ impl Detector {
                 trims: vec![],
                 flipped: false,
             }),
-            Self::Intensity { .. } | Self::Image { .. } | Self::Exitance(_) | Self::Events { .. } => None,
+            Self::Escapes | Self::Intensity(_) | Self::Image { .. } | Self::Exitance(_) | Self::Events { .. } => None,
         }
     }
 
@@ -86,16 +83,16 @@ impl Detector {
     /// Whether it wants to know of light that leaves the scene.
     #[must_use]
     pub const fn watches_escape(&self) -> bool {
-        matches!(self, Self::Intensity { .. })
+        matches!(self, Self::Escapes | Self::Intensity(_))
     }
 
     /// Number of cells that flux is summed in.
     #[must_use]
     pub fn cells(&self) -> usize {
         match self {
-            Self::Rays(_) | Self::Events { .. } => 0,
+            Self::Rays(_) | Self::Escapes | Self::Events { .. } => 0,
             Self::Illuminance { columns, rows, .. } => *columns as usize * *rows as usize,
-            Self::Intensity { planes, steps } => *planes as usize * (*steps as usize + 1),
+            Self::Intensity(nodes) => nodes.cells(),
             Self::Image { view, .. } => view.pixels(),
             Self::Exitance(patches) => patches.cells(),
         }
@@ -120,30 +117,12 @@ pub fn illuminance_cell(frame: &Frame, size: [f64; 2], cells: [u32; 2], point: V
     Some(row * cells[0] + column)
 }
 
-/// The cell of a C-γ table whose node is nearest to a direction: γ from +z, C from +x towards +y; the nodes at the poles
-/// have one cell each, that of the first plane.
-#[must_use]
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "inside the number of cells"
-)]
-pub fn intensity_cell(planes: u32, steps: u32, d: Vec3) -> u32 {
-    let gamma = d.x.hypot(d.y).atan2(d.z);
-    let row = ((gamma * f64::from(steps) / PI).round() as u32).min(steps);
-    if row == 0 || row == steps {
-        return row;
-    }
-    let plane = (d.y.atan2(d.x) * f64::from(planes) / (2.0 * PI)).round() as i64;
-    plane.rem_euclid(i64::from(planes)) as u32 * (steps + 1) + row
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn cells_are_counted_from_the_top_left_and_planes_from_c_0() {
+    fn cells_are_counted_from_the_top_left() {
         let frame = Frame {
             origin: Vec3::new(1.0, 2.0, 3.0),
             x: Vec3::new(1.0, 0.0, 0.0),
@@ -163,17 +142,5 @@ mod tests {
         assert_eq!(cell(2.9, 2.9, -1.0), Some(3));
         assert_eq!(cell(-0.9, 1.1, -1.0), Some(4));
         assert_eq!(cell(0.5, 2.5, 1.0), None);
-        let towards = |gamma: f64, c: f64| {
-            let (gamma, c) = (gamma.to_radians(), c.to_radians());
-            intensity_cell(
-                36,
-                72,
-                Vec3::new(gamma.sin() * c.cos(), gamma.sin() * c.sin(), gamma.cos()),
-            )
-        };
-        assert_eq!(towards(1.0, 200.0), 0);
-        assert_eq!(towards(45.0, 90.0), 9 * 73 + 18);
-        assert_eq!(towards(45.0, 356.0), 18);
-        assert_eq!(towards(179.0, 200.0), 72);
     }
 }

@@ -4,7 +4,7 @@
 //! `inside`: which solids it is in; `meeting`: which of the faces that it meets decides what becomes of it.
 //!
 //! `forward`: from the sources to the detectors; `dealing`: which source gives out which ray, and which rays are copies of
-//! one; `detector`: what takes note of light; `ledger`: the flux account;
+//! one; `detector`: what takes note of light, `far_field`: of what leaves; `ledger`: the flux account;
 //! `harvest`: what batches amount to. `eye`: diffuse scatters connected to an observer; `kept`: those that are kept for later,
 //! thinned to a number of them.
 //!
@@ -15,6 +15,7 @@ pub mod dealing;
 pub mod detector;
 pub mod exitance;
 pub mod eye;
+pub mod far_field;
 pub mod forward;
 pub mod harvest;
 pub mod inside;

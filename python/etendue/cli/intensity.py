@@ -23,9 +23,13 @@ from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.lightfield.light_field import LightField
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
 from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
-from etendue.quantities.intensity_cells import Cells
+from etendue.quantities.intensity_nodes import check_steps
+from etendue.quantities.measured import measured
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
+
+FIELD_PLANES, FIELD_STEP = 36, 2.5
+"""Planes C and step of γ [°] of a light field, unless others are asked for."""
 
 
 def intensity(
@@ -38,12 +42,16 @@ def intensity(
     ] = None,
     c_planes: Annotated[
         int | None,
-        typer.Option("--c-planes", help="Half planes C made of rays or of a field [36].", min=1, show_default=False),
+        typer.Option(
+            "--c-planes", help="Half planes C [of rays: chosen from them; of a field: 36].", min=1, show_default=False
+        ),
     ] = None,
     gamma_step: Annotated[
         float | None,
         typer.Option(
-            "--gamma-step", help="Step of γ made of rays or of a field, in degrees [2.5].", show_default=False
+            "--gamma-step",
+            help="Step of γ in degrees [of rays: chosen from them; of a field: 2.5].",
+            show_default=False,
         ),
     ] = None,
     flux: Annotated[
@@ -70,13 +78,13 @@ def intensity(
     if detect_intensity_format(file) is None:
         if photometry is not None:
             raise typer.BadParameter(f"--photometry: for intensity files, and {file} is none")
-        cells = Cells(36 if c_planes is None else c_planes, 2.5 if gamma_step is None else gamma_step)
+        check_steps(c_planes, gamma_step)
         source = _source(file, flux, unit)
         if isinstance(source, LightField):
-            result = source.intensity(cells.c_planes, cells.gamma_step)
+            result = source.intensity(c_planes or FIELD_PLANES, gamma_step or FIELD_STEP)
         else:
             with progress_bar("rays", len(source)) as progress:
-                result = intensity_distribution(source, cells.c_planes, cells.gamma_step, progress=progress)
+                result = intensity_distribution(source, c_planes, gamma_step, progress=progress)
         complaints = complaints_of(source)
     else:
         given = {"--c-planes": c_planes, "--gamma-step": gamma_step, "--flux": flux, "--unit": unit}
@@ -121,8 +129,10 @@ def summary(distribution: Intensity) -> dict[str, Any]:
         "unit": distribution.unit,
         "format": distribution.provenance.format,
         "flux": distribution.flux,
+        "flux_error": distribution.flux_error,
         "flux_unit": distribution.flux_unit,
         "maximum": distribution.maximum,
+        "maximum_error": distribution.maximum_error,
         "maximum_at": {"c": c, "gamma": gamma},
         "symmetry": distribution.symmetry(),
         "planes": distribution.c.size,
@@ -139,14 +149,21 @@ def _plain(fact: Any) -> Any:
     )
 
 
+def peak_line(distribution: Intensity) -> str:
+    """The peak of a distribution with its error and direction."""
+    c, gamma = distribution.peak
+    peak = measured(distribution.maximum, distribution.maximum_error, distribution.unit)
+    return f"peak {peak} at C = {c:g}°, γ = {gamma:g}°"
+
+
 def print_intensity(distribution: Intensity) -> None:
     """A distribution in figures, for people."""
     facts = summary(distribution)
     low, high = facts["gamma_range"]
     say(f"{facts['quantity']}, {facts['planes']} planes, {facts['gammas']} angles γ from {low:g}° to {high:g}°")
-    say(f"  flux {distribution.flux:.6g} {distribution.flux_unit}, symmetry {facts['symmetry']}")
-    where = facts["maximum_at"]
-    say(f"  maximum {distribution.maximum:.6g} {distribution.unit} at C = {where['c']:g}°, γ = {where['gamma']:g}°")
+    flux = measured(distribution.flux, distribution.flux_error, distribution.flux_unit)
+    say(f"  flux {flux}, symmetry {facts['symmetry']}")
+    say(f"  {peak_line(distribution)}")
     for name, value in distribution.luminaire.items():
         if isinstance(value, Spectrum):
             say(

@@ -12,12 +12,14 @@ from typing import Annotated, Any
 import typer
 
 from etendue.cli.guard import require_apart
+from etendue.cli.intensity import peak_line
 from etendue.cli.terminal import INTERRUPTED, check_folder, complain, print_json, progress_bar, say
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import RAY_FORMATS, write_rays
 from etendue.plot.intensity_picture import plot_intensity
+from etendue.quantities.measured import measured
 from etendue.scene import Scene
 from etendue.tracing.plan import Plan
 from etendue.tracing.result import TraceResult
@@ -217,7 +219,9 @@ def print_result(result: TraceResult) -> None:
                 say(f"  {detection.name}: {len(rays):,} rays, {rays.total_flux:.6g} {rays.flux_unit}")
             case "intensity":
                 far = result.intensity[detection.name]
-                say(f"  {detection.name}: {far.flux:.6g} {far.flux_unit}, maximum {far.maximum:.6g} {far.unit}")
+                say(f"  {detection.name}: flux {measured(far.flux, far.flux_error, far.flux_unit)}, {peak_line(far)}")
+                for note in result.told(detection):
+                    say(f"    {note}")
             case "illuminance":
                 seen = result.illuminance[detection.name]
                 say(f"  {detection.name}: mean {seen.mean:.6g} {seen.unit}, least/mean {seen.uniformity:.3f}")

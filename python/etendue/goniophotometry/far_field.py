@@ -5,36 +5,46 @@ from __future__ import annotations
 import numpy as np
 
 from etendue.quantities.intensity import Intensity
-from etendue.quantities.intensity_cells import Cells
+from etendue.quantities.node_choice import Choice, choose_nodes
 from etendue.quantities.ray_stream import Progress, RayStream
+
+SAMPLE = 1 << 18
+"""Rays that nodes are chosen from, at least if there are so many: every third of three times as many …"""
+
+FEW = 20_000
+"""Up to so many rays, all of them choose the nodes; of more at most every second one, so that nodes depend less on the rays
+that they are filled with."""
 
 
 def intensity_distribution(
-    rays: RayStream, c_planes: int = 36, gamma_step: float = 2.5, *, progress: Progress | None = None
+    rays: RayStream, c_planes: int | None = None, gamma_step: float | None = None, *, progress: Progress | None = None
 ) -> Intensity:
     """Far-field intensity of rays, from their directions alone.
 
-    Every ray counts for the cell of the table whose node it is nearest to, and the intensity of a node is the flux of its
-    cell over the exact solid angle of the cell: a mean over the cell, whose centre is the node (a node at γ = 0° or 180°
-    is the centre of a cap that all planes share). Where rays start has no influence, so that far-field sets will do.
+    The table stands for the function that is linear in C and γ between its nodes. Every ray is shared by the nodes around
+    its direction as a reader shares it, and the intensity of a node is the sum of its shares over the solid angle of its
+    hat function: a mean around the node. So the integral of the function is the flux of the rays exactly, for any steps.
+    Where rays start has no influence, so that far-field sets will do.
 
     Parameters
     ----------
     rays : RayStream
         A ray set, or a source that draws its rays on demand; they are read in batches.
-    c_planes : int
+    c_planes : int, optional
         Half planes C, from 0° in equal steps. C is the azimuth from +X towards +Y; 1 means the mean over all of them.
-    gamma_step : float
-        [°], a whole part of 180. γ is the angle from +Z.
+        None: chosen from the rays, for each γ.
+    gamma_step : float, optional
+        [°], a whole part of 180. γ is the angle from +Z. None: chosen from the rays, narrow in beams and wide where the
+        light is even. The table then states its function in between as well, every 2.5° or closer.
     progress : callable, optional
         Called with the number of rays done.
 
     Returns
     -------
     Intensity
-        [cd] for rays in lm, [W/sr] for rays in W. Its `standard_error` is √(Σ w²) over the solid angle, NaN for a cell
-        that no ray reached, whose intensity is 0. The flux of all cells is that of the rays; the bilinear function
-        between their means has a slightly different integral, and the notes state both.
+        [cd] for rays in lm, [W/sr] for rays in W. Its `standard_error` is √(Σ (w φ)²) over the solid angle, with the share
+        φ of the node in a ray of flux w; NaN for a node that no ray reached, whose intensity is 0. `flux_error` is √(Σ w²).
+        The notes tell if the steps cannot hold a beam.
 
     Raises
     ------
@@ -45,51 +55,46 @@ def intensity_distribution(
     --------
     >>> import etendue as et
     >>> rays = et.RingSource(rays=1_000_000, seed=1)             # Lambertian: I = Φ/π · cos γ
-    >>> led = et.intensity_distribution(rays, c_planes=1, gamma_step=5)
-    >>> round(float(led.at(30, 60)) * np.pi / rays.total_flux, 2), led.unit
-    (0.5, 'cd')
+    >>> led = et.intensity_distribution(rays)
+    >>> bool(abs(led.at(30, 60) * np.pi / rays.total_flux - 0.5) < 0.01), led.unit, round(led.flux / rays.total_flux, 9)
+    (True, 'cd', 1.0)
     """
-    cells = Cells(c_planes, gamma_step)
-    shape = (cells.c.size, cells.gamma.size)
-    flux, squares = np.zeros(shape[0] * shape[1]), np.zeros(shape[0] * shape[1])
-    usable = 0
+    nodes, told = _nodes(rays, c_planes, gamma_step)
+    core = nodes.core()
+    sums, squares, count = np.zeros(len(nodes)), np.zeros(len(nodes)), np.zeros(len(nodes), dtype=np.uint64)
     for batch in rays.batches():
-        index = cells.index(batch.direction)
-        flux += np.bincount(index, batch.flux, flux.size)
-        squares += np.bincount(index, batch.flux * batch.flux, flux.size)
-        usable += batch.flux.size
+        core.add(batch.direction, batch.flux, sums, squares, count)
         if progress is not None:
             progress(batch.start + batch.usable.size)
-    total = float(flux.sum())
-    values = flux.reshape(shape) / cells.solid_angle
-    error = np.sqrt(squares).reshape(shape) / cells.solid_angle
-    error[error == 0.0] = np.nan
-    for table in (values, error):
-        table[:, [0, -1]] = table[0, [0, -1]]
-    result = Intensity(
-        cells.c,
-        cells.gamma,
-        values,
-        error,
-        flux_unit=rays.flux_unit,
-        provenance=rays.provenance.then(f"far-field intensity in {shape[0]} planes, γ in steps of {gamma_step:.9g}°"),
-    )
-    return result.replace(notes=(*_notes(result, total, len(rays), usable), *rays.notes))
+    error = np.where(count > 0, np.sqrt(squares), np.nan)
+    usable = int(count[-1])
+    left_out = f", {len(rays) - usable:,} others cannot be used" if usable < len(rays) else ""
+    notes = [*told, f"{nodes.describe()}; from the directions of {usable:,} rays{left_out}"]
+    asked = c_planes is not None and gamma_step is not None
+    step = "far-field intensity, " + ("steps as asked" if asked else "steps chosen from the rays")
+    result = nodes.intensity(sums, error, rays.flux_unit, rays.provenance.then(step))
+    return result.replace(notes=(*notes, *_notes(result), *rays.notes))
 
 
-def _notes(result: Intensity, total: float, rays: int, usable: int) -> list[str]:
-    unit = result.flux_unit
-    left_out = f", {rays - usable:,} others cannot be used" if usable < rays else ""
-    notes = [f"mean over the cell around each node, from the directions of {usable:,} rays{left_out}"]
-    if total > 0.0:
-        deviation = f"{result.flux / total - 1.0:+.3%}".replace("-", "−")
-        found = f"the function of the table has {result.flux:.7g} {unit} ({deviation})"
-        notes.append(f"the cells hold {total:.7g} {unit}, {found}")
-    known = np.isfinite(result.standard_error)
+def _nodes(rays: RayStream, c_planes: int | None, gamma_step: float | None) -> Choice:
+    """Nodes chosen from evenly spread rays."""
+    every = max(2 if len(rays) > FEW else 1, len(rays) // SAMPLE)
+    parts = [
+        (batch.direction[-batch.start % every :: every], batch.flux[-batch.start % every :: every])
+        for batch in rays.batches()
+    ]
+    direction = np.concatenate([np.zeros((0, 3)), *(part[0] for part in parts)])
+    flux = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
+    return choose_nodes(direction, flux, len(rays), c_planes, gamma_step)
+
+
+def _notes(result: Intensity) -> list[str]:
+    notes = []
+    known = np.isfinite(result.standard_error) & (result.values > 0.0)
     if known.any():
         share = result.standard_error[known] / result.values[known]
-        notes.append(f"median relative standard error {np.median(share):.2%} of the cells that rays reached")
-    empty = int((~known).sum())
+        notes.append(f"median relative standard error {np.median(share):.2%} of the nodes that rays reached")
+    empty = int(np.isnan(result.standard_error).sum())
     if empty:
-        notes.append(f"{empty:,} of {known.size:,} nodes saw no ray: their intensity is 0, its error unknown")
+        notes.append(f"{empty:,} of {result.values.size:,} nodes saw no ray: their intensity is 0, its error unknown")
     return notes

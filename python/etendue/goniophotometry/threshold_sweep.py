@@ -21,7 +21,7 @@ from etendue.lightfield.gridded.gridded_source import GriddedSource, check_thres
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
 from etendue.lightfield.gridded.sampling import RECORD
 from etendue.lightfield.surfaces import Surface
-from etendue.quantities.intensity_cells import Cells
+from etendue.quantities.intensity_nodes import check_steps
 from etendue.quantities.ray_set import RaySet, RaySetMeaning
 from etendue.quantities.ray_stream import Progress, RayBatch, RayStream
 from etendue.quantities.spool import spool
@@ -96,7 +96,7 @@ def threshold_sweep(
         check_threshold(threshold)
     if not 0 <= operator.index(seed) < 2**64:
         raise ArgumentError(f"threshold_sweep: seed {seed}; give 0 to 2^64 - 1.")
-    Cells(c_planes, gamma_step)  # refuses what is no grid before the work begins
+    check_steps(c_planes, gamma_step)  # refuses what is no grid before the work begins
     pixels = PixelatedSurface.cut(surface.sized_for(rays), pixel, parallels)
     passes = 6
     first = None if progress is None else lambda done: progress(done // passes)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from etendue.errors import UnknownNameError
 from etendue.plot import style
 from etendue.quantities.intensity import Intensity
+from etendue.quantities.measured import measured
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -238,14 +239,13 @@ def _cartesian(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: fl
 def _facts(intensity: Intensity) -> Iterator[str]:
     """What the picture rests on, fact by fact."""
     unit = intensity.flux_unit
-    yield f"{'luminous' if unit == 'lm' else 'radiant'} flux {style.plain(intensity.flux)} {unit}"
-    node = _peak(intensity)
-    where = f"γ = {intensity.gamma[node[1]]:g}°"
-    if intensity.c.size > 1 and intensity.gamma[node[1]] not in (0.0, 180.0):
-        where = f"C = {intensity.c[node[0]]:g}°, {where}"
-    error = float(intensity.standard_error[node])
-    noise = f" ± {style.plain(float(f'{error:.2g}'))}" if np.isfinite(error) else ""
-    yield f"maximum {style.plain(intensity.values[node])}{noise} {intensity.unit} at {where}"
+    flux = measured(intensity.flux, intensity.flux_error, unit)
+    yield f"{'luminous' if unit == 'lm' else 'radiant'} flux {flux}"
+    c, gamma = intensity.peak
+    where = f"γ = {gamma:g}°"
+    if intensity.c.size > 1 and gamma not in (0.0, 180.0):
+        where = f"C = {c:g}°, {where}"
+    yield f"peak {measured(intensity.maximum, intensity.maximum_error, intensity.unit)} at {where}"
     known = np.isfinite(intensity.standard_error) & (intensity.values > 0.0)
     if known.any():
         share = 100.0 * float(np.median(intensity.standard_error[known] / intensity.values[known]))

@@ -119,23 +119,25 @@ class FarField(Detector):
 
     Parameters
     ----------
-    c_planes : int
-        C planes over 360°.
-    gamma_step : number
-        [°] Between the angles γ, from 0° to 180°, which it divides.
+    c_planes : int, optional
+        C planes over 360°. None: chosen from the light, for each γ.
+    gamma_step : number, optional
+        [°] Between the angles γ, from 0° to 180°, which it divides. None: chosen from the light.
 
     Examples
     --------
     >>> FarField(c_planes=24, gamma_step=5).record(Files(), {})
-    {'kind': 'intensity', 'planes': 24, 'gammas': 37}
+    {'kind': 'intensity', 'c_planes': 24, 'gamma_step': 5.0}
     """
 
     kind: Literal["intensity"] = "intensity"
-    c_planes: Pixels = 36
-    gamma_step: Annotated[float, Finite, Gt(0.0), Le(90.0), AsNumber] = 2.5
+    c_planes: Pixels | None = None
+    gamma_step: Annotated[float, Finite, Gt(0.0), Le(90.0), AsNumber] | None = None
 
     @model_validator(mode="after")
     def _divides(self) -> Self:
+        if self.gamma_step is None:
+            return self
         steps = round(180.0 / max(self.gamma_step, 1e-9))
         if steps > MOST_STEPS or not math.isclose(steps * self.gamma_step, 180.0, rel_tol=1e-9):
             raise ValueError(
@@ -144,8 +146,8 @@ class FarField(Detector):
         return self
 
     def record(self, files: Files, observers: dict[str, ObserverKeys], faces: Sequence[str] = ()) -> Record:  # noqa: ARG002
-        """The numbers of planes and of angles, 0° and 180° among them."""
-        return {"kind": "intensity", "planes": self.c_planes, "gammas": round(180.0 / self.gamma_step) + 1}
+        """The steps that are asked for; the nodes are chosen when light is traced."""
+        return {"kind": "intensity", "c_planes": self.c_planes, "gamma_step": self.gamma_step}
 
 
 class LightImage(Detector):

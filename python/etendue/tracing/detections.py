@@ -13,7 +13,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.quantities.illuminance_map import IlluminanceMap, Point
 from etendue.quantities.intensity import Intensity
-from etendue.quantities.intensity_cells import MOST_CELLS, Cells
+from etendue.quantities.intensity_nodes import MOST_CELLS, Nodes
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
 from etendue.quantities.provenance import Provenance
@@ -95,6 +95,10 @@ class Detection(abc.ABC):
         """Number of scatter events that are kept at most."""
         return 0
 
+    def relative_error(self, counted: Counted) -> float:
+        """Median over the flux of the relative standard errors of its cells; NaN if no ray reached any."""
+        return counted.relative_error
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for files."""
         return {"kind": self.KIND, **dataclasses.asdict(self)}
@@ -135,46 +139,35 @@ class FarFieldIntensity(Detection):
 
     Parameters
     ----------
-    c_planes, gamma_step
-        As of `Cells`.
+    nodes : Nodes
+        What rays are shared by.
+    told : tuple of str
+        What there is to say about them.
     """
 
     KIND = "intensity"
-    c_planes: int
-    gamma_step: float
+    nodes: Nodes
+    told: tuple[str, ...] = ()
 
-    @property
-    def table(self) -> Cells:
-        """The cells around the nodes."""
-        return Cells(self.c_planes, self.gamma_step)
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Detection:
+        """Inverse of `to_dict`."""
+        return cls(data["name"], Nodes.from_dict(data["nodes"]), tuple(data["told"]))
 
     @property
     def cells(self) -> int:
-        """Number of cells that flux is summed in."""
-        return self.table.c.size * self.table.gamma.size
+        """Number of cells that flux is summed in: one for each node, and the last one for all rays together."""
+        return len(self.nodes)
+
+    def relative_error(self, counted: Counted) -> float:
+        """As of the nodes."""
+        return Counted(counted.flux[:-1], counted.error[:-1], counted.rays[:-1]).relative_error
 
     def read(self, counted: Counted, origin: Origin) -> Intensity:
-        """Flux of each cell over its solid angle."""
-        cells = self.table
-        shape = (cells.c.size, cells.gamma.size)
-        values, error = (array.reshape(shape) / cells.solid_angle for array in (counted.flux, counted.error))
-        for table in (values, error):
-            table[:, [0, -1]] = table[0, [0, -1]]
-        result = Intensity(
-            cells.c,
-            cells.gamma,
-            values,
-            error,
-            flux_unit=origin.flux_unit,
-            provenance=origin.provenance.then(f"far-field intensity by {self.name!r}"),
-        )
-        unit, total = origin.flux_unit, float(counted.flux.sum())
-        notes = ["mean over the cell around each node"]
-        if total > 0.0:
-            deviation = f"{result.flux / total - 1.0:+.3%}".replace("-", "−")
-            found = f"the function of the table has {result.flux:.7g} {unit} ({deviation})"
-            notes.append(f"the cells hold {total:.7g} {unit}, {found}")
-        return result.replace(notes=(*notes, *origin.notes))
+        """Shares of each node over the solid angle of its hat."""
+        notes = (*self.told, self.nodes.describe(), *origin.notes)
+        provenance = origin.provenance.then(f"far-field intensity by {self.name!r}")
+        return self.nodes.intensity(counted.flux, counted.error, origin.flux_unit, provenance, notes)
 
 
 @dataclasses.dataclass(frozen=True)

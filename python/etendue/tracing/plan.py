@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 from etendue import _core
 from etendue.errors import ArgumentError, SceneError
 from etendue.quantities.fingerprint import fingerprint
+from etendue.quantities.intensity_nodes import Nodes
+from etendue.quantities.node_choice import Choice
 from etendue.quantities.provenance import Provenance
 from etendue.scene import Compiled, Scene
 from etendue.scene.dealing import Dealing
@@ -75,6 +77,11 @@ class Plan:
         step = f"traced with {self.rays:,} rays, seed {self.seed}, at most {self.most_events:,} surfaces met by each"
         return Provenance(self.scene_name or "scene", "traced scene", self.fingerprint, (step,))
 
+    @property
+    def far_fields(self) -> tuple[Nodes, ...]:
+        """The nodes of each far field."""
+        return tuple(detection.nodes for detection in self.detections if isinstance(detection, FarFieldIntensity))
+
     def check_same(self, other: Plan) -> None:
         """Refuse to go on with a trace of something else.
 
@@ -94,8 +101,31 @@ class Plan:
             raise ArgumentError(f"this result cannot be continued: {'; '.join(differences)}.")
 
 
-def make_plan(scene: Scene, compiled: Compiled, rays: float | None, seed: int, most_events: int) -> Plan:
+LookAround = Callable[[int], Iterable[Choice]]
+"""From a number of rays to the nodes of each far field, in the order of the detectors."""
+
+
+def make_plan(
+    scene: Scene,
+    compiled: Compiled,
+    rays: float | None,
+    seed: int,
+    most_events: int,
+    look_around: LookAround,
+    before: Plan | None = None,
+) -> Plan:
     """The plan of a trace.
+
+    Parameters
+    ----------
+    scene, compiled
+        What is traced.
+    rays, seed, most_events
+        As of `etendue.trace`.
+    look_around : callable
+        Chooses the nodes of far fields, if there are any.
+    before : Plan, optional
+        Of a trace that shall be gone on with: if it is one of the same scene, far fields keep their nodes.
 
     Raises
     ------
@@ -109,14 +139,20 @@ def make_plan(scene: Scene, compiled: Compiled, rays: float | None, seed: int, m
         raise ArgumentError(f"seed is {seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
     if not (isinstance(most_events, int) and 1 <= most_events <= MOST_EVENTS):
         raise ArgumentError(f"most_events is {most_events!r}; give a whole number from 1 to {MOST_EVENTS:,}.")
-    detections = tuple(_detections(scene, compiled))
+    mark = fingerprint(compiled.record)
+    choices: Iterable[Choice] = ()
+    if before is not None and before.fingerprint == mark:
+        choices = [Choice(d.nodes, d.told) for d in before.detections if isinstance(d, FarFieldIntensity)]
+    elif any(record["kind"] == "intensity" for record in compiled.record["detectors"]):
+        choices = look_around(count)
+    detections = tuple(_detections(scene, compiled, iter(choices)))
     check_cells(detections)
     # The faces of detectors stand behind those of the scene.
     detector_faces = [d.name for d in detections if isinstance(d, IncidentRays | GridIlluminance)]
     return Plan(
         scene.name,
         _text(scene),
-        fingerprint(compiled.record),
+        mark,
         count,
         seed,
         most_events,
@@ -168,7 +204,7 @@ def _unique(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(result)
 
 
-def _detections(scene: Scene, compiled: Compiled) -> Iterable[Detection]:
+def _detections(scene: Scene, compiled: Compiled, choices: Iterator[Choice]) -> Iterable[Detection]:
     observers = {observer.name: observer for observer in scene.observers}
     rows = zip(_unique(compiled.detector_names), scene.detectors, compiled.record["detectors"], strict=True)
     for name, described, record in rows:
@@ -176,7 +212,7 @@ def _detections(scene: Scene, compiled: Compiled) -> Iterable[Detection]:
             case "rays":
                 yield IncidentRays(name)
             case "intensity":
-                yield FarFieldIntensity(name, record["planes"], 180.0 / (record["gammas"] - 1))
+                yield FarFieldIntensity(name, *next(choices))
             case "illuminance":
                 ox, oy, oz, xx, xy, xz, yx, yy, yz, *_ = record["frame"]
                 width, height = record["width"], record["height"]

@@ -215,7 +215,7 @@ class TraceResult:
 
         NaN if a detector saw nothing yet, or the scene has none with cells.
         """
-        errors = [counted.relative_error for _, counted in self._counted]
+        errors = [detection.relative_error(counted) for detection, counted in self._counted]
         return max(errors) if errors and all(error == error for error in errors) else float("nan")  # noqa: PLR0124
 
     @cached_property
@@ -295,8 +295,27 @@ class TraceResult:
             "notes": list(self.notes),
         }
 
-    def _counts(self, detection: Detection) -> dict[str, float]:
-        """How much a detector kept, of those that keep rays or events."""
+    def told(self, detection: Detection) -> tuple[str, ...]:
+        """What is to be said about a far field alone, beside the notes of the trace."""
+        notes = self.intensity[detection.name].notes if isinstance(detection, FarFieldIntensity) else ()
+        return tuple(note for note in notes if note not in self.notes)
+
+    def _counts(self, detection: Detection) -> dict[str, Any]:
+        """How much a detector kept, of those that keep rays or events; the figures of a far field."""
+        if isinstance(detection, FarFieldIntensity):
+            far = self.intensity[detection.name]
+            c, gamma = far.peak
+            return {
+                "flux": far.flux,
+                "flux_error": far.flux_error,
+                "maximum": far.maximum,
+                "maximum_error": far.maximum_error,
+                "maximum_at": {"c": c, "gamma": gamma},
+                "unit": far.unit,
+                "planes": far.c.size,
+                "gammas": far.gamma.size,
+                "notes": list(self.told(detection)),
+            }
         if isinstance(detection, IncidentRays):
             return {"rays": len(self.rays[detection.name])}
         if isinstance(detection, ScatteredLight):

@@ -12,6 +12,7 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Scene, compile_scene
+from etendue.tracing.far_fields import far_field_nodes
 from etendue.tracing.ledger import NOTEWORTHY, TraceWarning
 from etendue.tracing.plan import DEFAULT_RAYS, Plan, make_plan
 from etendue.tracing.result import TraceResult
@@ -141,14 +142,24 @@ def trace_rounds(
     if until is not None and not (math.isfinite(until) and until > 0.0):
         raise ArgumentError(f"until is {until!r}; give the relative error to be reached, e.g. 0.01.")
     compiled = compile_scene(scene)
-    plan = make_plan(scene, compiled, rays, seed, most_events)
-    if until is not None and not any(detection.cells for detection in plan.detections):
-        raise ArgumentError("until: the scene has no detector with cells (intensity, illuminance, image) to judge by.")
+    core = _core.Scene(compiled.record)
     start = None
     if resume is not None:
         start = resume if isinstance(resume, TraceResult) else TraceResult.load(Path(resume))
+    plan = make_plan(
+        scene,
+        compiled,
+        rays,
+        seed,
+        most_events,
+        lambda count: far_field_nodes(core, compiled, count, seed, most_events, threads),
+        None if start is None else start.plan,
+    )
+    if start is not None:
         plan.check_same(start.plan)
-    return Rounds(_core.Scene(compiled.record), plan, start, until, threads)
+    if until is not None and not any(detection.cells for detection in plan.detections):
+        raise ArgumentError("until: the scene has no detector with cells (intensity, illuminance, image) to judge by.")
+    return Rounds(core.with_far_fields([nodes.core() for nodes in plan.far_fields]), plan, start, until, threads)
 
 
 class Rounds(Iterator[TraceResult]):

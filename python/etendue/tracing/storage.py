@@ -34,7 +34,8 @@ from etendue.tracing.sums import ENTRIES, RECORD, Collected, Open, Sums
 from etendue.units import FLUX_UNITS
 
 FORMAT = "etendue trace result"
-VERSION = 2
+VERSION = 3
+"""Far fields are shared by nodes since version 3, and copies of rays are counted together since version 2."""
 
 CHUNK = 1 << 13
 """Rows of a chunk of rays: half a megabyte."""

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use etendue_math::Vec3;
 use etendue_optics::finish::Incidence;
 
-use crate::detector::{Detector, illuminance_cell, intensity_cell};
+use crate::detector::{Detector, illuminance_cell};
 use crate::exitance::Place;
 use crate::eye::Event;
 use crate::harvest::{Record, Yield};
@@ -18,9 +18,19 @@ use super::flock::Rider;
 impl Walk<'_> {
     /// The far field takes note of a ray that leaves the scene.
     pub(super) fn escape(&mut self, d: Vec3, rider: &Rider) {
-        for (detector, marks) in self.scene.detectors.iter().zip(&mut self.out.marks) {
-            if let Detector::Intensity { planes, steps } = detector {
-                marks.push((intensity_cell(*planes, *steps, d), rider.ray, rider.flux));
+        for (number, detector) in self.scene.detectors.iter().enumerate() {
+            match detector {
+                Detector::Intensity(nodes) => {
+                    let marks = &mut self.out.marks[number];
+                    nodes.share(d, |node, share| marks.push((node, rider.ray, share * rider.flux)));
+                }
+                Detector::Escapes => self.out.records[number].push(Record {
+                    position: [0.0; 3],
+                    direction: [d.x, d.y, d.z],
+                    flux: rider.flux,
+                    wavelength: rider.wavelength,
+                }),
+                _ => {}
             }
         }
     }
@@ -84,6 +94,10 @@ pub fn detect(scene: &Scene, out: &mut Yield, detector: u32, point: Vec3, d: Vec
                 out.marks[number].push((cell, rider.ray, rider.flux));
             }
         }
-        Detector::Intensity { .. } | Detector::Image { .. } | Detector::Exitance(_) | Detector::Events { .. } => {}
+        Detector::Escapes
+        | Detector::Intensity(_)
+        | Detector::Image { .. }
+        | Detector::Exitance(_)
+        | Detector::Events { .. } => {}
     }
 }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import ArgumentError
-from etendue.formats.intensity.intensity_format import decimal, fitted, general_losses
+from etendue.formats.intensity.intensity_format import decimal, figures, fitted, general_losses
 from etendue.formats.intensity.symmetry import Array, folded, unfolded, whole_hemispheres
 from etendue.quantities.intensity import Intensity, Symmetry
 from etendue.units import LUMENS_PER_KILOLUMEN
@@ -47,7 +47,7 @@ def write(intensity: Intensity, path: Path) -> tuple[str, ...]:
     lamp_flux = flux if absolute else lamp_flux
     table = values * (LUMENS_PER_KILOLUMEN / lamp_flux)
     lines = [
-        *_identity(whole, symmetry, planes),
+        *_identity(intensity, whole.gamma, symmetry, planes),
         *_sizes(facts),
         *(decimal(n, DIGITS) for n in (100.0 * _downward(whole) / flux, 100.0 * flux / lamp_flux)),
         *("1", "0", "1"),
@@ -71,17 +71,19 @@ def _stored(whole: Intensity, symmetry: Symmetry) -> Array:
     return values[::-1] if symmetry == "C90-C270" else values
 
 
-def _identity(intensity: Intensity, symmetry: Symmetry, planes: Array) -> Iterator[str]:
+def _identity(intensity: Intensity, gamma: Array, symmetry: Symmetry, planes: Array) -> Iterator[str]:
     """Lines 1 to 12."""
     facts, provenance = intensity.luminaire, intensity.provenance
     kind = 1 if symmetry == "rotational" else 2 if facts.get("linear") else 3
     yield _text(facts.get("manufacturer") or provenance.software)
     yield str(kind)
     yield str(NUMBER_OF_SYMMETRY[symmetry])
-    for angles, whole_turn in ((planes, True), (intensity.gamma, False)):
+    for angles, whole_turn in ((planes, True), (gamma, False)):
         yield str(angles.size)
         yield decimal(_step(angles, whole_turn), 9)
-    yield _text(facts.get("test_report", ""))
+    # What is to be said about a table with errors stands where the report on its measurement is named.
+    peak = [*figures(intensity)][:1]
+    yield _text(facts.get("test_report") or "; ".join(peak + [*intensity.notes][: len(peak)]))
     yield _text(facts.get("luminaire") or provenance.source)
     yield _text(facts.get("catalogue_number", ""))
     yield _text(provenance.source)
@@ -127,4 +129,4 @@ def _downward(intensity: Intensity) -> float:
 
 
 def _text(value: object) -> str:
-    return fitted(str(value), "latin-1", TEXT).strip()
+    return fitted(str(value).replace("γ", "gamma"), "latin-1", TEXT).strip()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import textwrap
+import unicodedata
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
-from etendue.formats.intensity.intensity_format import decimal, fitted, general_losses
+from etendue.formats.intensity.intensity_format import decimal, figures, fitted, general_losses
 from etendue.formats.intensity.opening import opening_lengths
 from etendue.formats.intensity.symmetry import folded, whole_hemispheres
 from etendue.quantities.intensity import Intensity
@@ -27,6 +28,7 @@ REQUIRED = {
     "ISSUEDATE": "issue_date",
     "MANUFAC": "manufacturer",
 }
+SPELT_OUT = {"γ": "gamma", "°": " deg", "±": "+/-", "−": "-", "–": "-", "√": "sqrt", "Σ": "sum"}
 OPTIONAL = {"LUMCAT": "catalogue_number", "LUMINAIRE": "luminaire", "LAMP": "lamp"}
 
 
@@ -46,7 +48,7 @@ def write(intensity: Intensity, path: Path) -> tuple[str, ...]:
     lumens = decimal(lamp_flux / lamps, DIGITS) if lamp_flux > 0.0 else "-1"
     counts = f"{lamps} {lumens} 1 {whole.gamma.size} {c.size} 1 2"
     opening = " ".join(decimal(extent, DIGITS) for extent in (width, length, height))
-    lines = ["IESNA:LM-63-2002", *_keywords(whole), "TILT=NONE", f"{counts} {opening}"]
+    lines = ["IESNA:LM-63-2002", *_keywords(intensity), "TILT=NONE", f"{counts} {opening}"]
     lines += [f"1 1 {decimal(float(facts.get('input_power', 0.0)), DIGITS)}"]
     for row in (whole.gamma, c):
         lines += wrapped(decimal(angle, 9) for angle in row)
@@ -68,15 +70,22 @@ def _keywords(intensity: Intensity) -> Iterator[str]:
     if intensity.flux_unit == "W":
         yield f"[_INTENSITYUNITS] {RADIOMETRIC_UNIT}"
     yield from _entry("OTHER", f"from {provenance.source} ({provenance.format}) by {provenance.software}")
-    for step in provenance.steps:
+    for step in (*provenance.steps, *figures(intensity), *intensity.notes):
         yield from _entry("OTHER", step)
 
 
 def _entry(keyword: str, text: str) -> Iterator[str]:
     """One keyword; what has no room in its line continues under [MORE]."""
-    for part in textwrap.wrap(fitted(text, "ascii", 10_000), LINE - len(keyword) - 8) or [""]:
+    for part in textwrap.wrap(fitted(_spelt_out(text), "ascii", 10_000), LINE - len(keyword) - 8) or [""]:
         yield f"[{keyword}] {part}".rstrip()
         keyword = "MORE"
+
+
+def _spelt_out(text: str) -> str:
+    """Letters that ASCII does not have, by those that it has."""
+    for letter, words in SPELT_OUT.items():
+        text = text.replace(letter, words)
+    return "".join(letter for letter in unicodedata.normalize("NFKD", text) if not unicodedata.combining(letter))
 
 
 def wrapped(words: Iterable[str]) -> Iterator[str]:

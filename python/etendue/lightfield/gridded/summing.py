@@ -10,13 +10,14 @@ import numpy as np
 from etendue.errors import ArgumentError
 from etendue.lightfield.gridded.pixels import Array
 from etendue.quantities.intensity import Intensity
+from etendue.quantities.intensity_nodes import Nodes
 from etendue.quantities.patches import Patches, interpolated
 
 WORK = 1 << 24
 """Table look-ups that a distribution may cost: some two seconds."""
 
 MOST_POINTS = 6
-"""Points along each side of a cell over which a mean is taken, at most."""
+"""Points between two nodes, along C and along γ, that means are taken over, at most."""
 
 
 def summed_intensity(patches: Patches, c_planes: int, gamma_step: float) -> Intensity:
@@ -34,8 +35,7 @@ def summed_intensity(patches: Patches, c_planes: int, gamma_step: float) -> Inte
     Returns
     -------
     Intensity
-        The mean over each cell, by points of equal solid angle, as `etendue.intensity_distribution` has it of rays; a node
-        at γ = 0° or 180° is the centre of a cap that all planes share.
+        The mean around each node, weighted by its hat function, as `etendue.intensity_distribution` has it of rays.
 
     Raises
     ------
@@ -48,19 +48,27 @@ def summed_intensity(patches: Patches, c_planes: int, gamma_step: float) -> Inte
         raise ArgumentError(f"c_planes is {c_planes}; give 1 or more.")
     if rows < 2 or not math.isclose(rows * gamma_step, 180.0, rel_tol=1e-9):
         raise ArgumentError(f"gamma_step is {gamma_step}°; give a whole part of 180°, at most 90°.")
+    nodes = Nodes.even(c_planes, gamma_step)
     tables = _added_up(patches)
-    cells = c_planes * (rows + 1)
-    points = int(np.clip(math.isqrt(WORK // max(1, len(tables) * cells)), 1, MOST_POINTS))
-    direction = _directions(c_planes, rows, points)
+    points = int(np.clip(math.isqrt(WORK // max(1, len(tables) * len(nodes))), 1, MOST_POINTS))
+    # Midpoints of even steps in C and γ, a number of them between any two nodes.
+    c: Array = (np.arange(points * c_planes, dtype=np.float64) + 0.5) * (2.0 * np.pi / (points * c_planes))
+    gamma: Array = (np.arange(points * rows, dtype=np.float64) + 0.5) * (np.pi / (points * rows))
+    direction = _directions(c, gamma)
     total = np.zeros(len(direction))
     for axes, theta_step, phi_step, table in tables:
         front = np.flatnonzero(direction @ axes[2] > 0.0)
         total[front] += interpolated(table, 0, theta_step, phi_step, np.einsum("mj,ij->mi", direction[front], axes))
-    values = total.reshape(c_planes, points, rows + 1, points).mean(axis=(1, 3))
-    values[:, [0, -1]] = values[:, [0, -1]].mean(axis=0)
+    # Each point is a ray of its intensity and solid angle.
+    weight = np.sin(gamma) * (np.pi / gamma.size) * (2.0 * np.pi / c.size)
+    sums, solid_angle = np.zeros(len(nodes)), np.zeros(len(nodes))
+    spare, count = np.zeros(len(nodes)), np.zeros(len(nodes), dtype=np.uint64)
+    nodes.core().add(direction, (total.reshape(c.size, gamma.size) * weight).ravel(), sums, spare, count)
+    nodes.core().add(direction, np.tile(weight, c.size), solid_angle, spare, count)
+    values, _ = nodes.tables(sums[:-1] / solid_angle[:-1] * nodes.solid_angle, np.zeros(len(nodes) - 1))
     return Intensity(
-        np.arange(c_planes, dtype=np.float64) * (360.0 / c_planes),
-        np.linspace(0.0, 180.0, rows + 1),
+        np.array(nodes.planes),
+        np.array(nodes.table),
         values,
         flux_unit=patches.flux_unit,
         provenance=patches.provenance.then(f"summed in {c_planes} planes, γ in steps of {gamma_step:.9g}°"),
@@ -83,13 +91,7 @@ def _added_up(patches: Patches) -> list[tuple[Array, int, int, Array]]:
     return result
 
 
-def _directions(c_planes: int, rows: int, points: int) -> Array:
-    """Unit vectors: for each plane and each of its points, for each γ the points of its cell, in equal solid angles."""
-    within = (np.arange(points) + 0.5) / points
-    c = (np.arange(c_planes)[:, None] - 0.5 + within) * (2 * np.pi / c_planes)
-    edges = np.concatenate([[0.0], (np.arange(rows) + 0.5) * (np.pi / rows), [np.pi]])
-    top, bottom = np.cos(edges[:-1]), np.cos(edges[1:])
-    cosine = (top[:, None] + within * (bottom - top)[:, None]).ravel()
-    sine = np.sqrt((1.0 - cosine) * (1.0 + cosine))
-    x, y = (np.outer(f(c.ravel()), sine) for f in (np.cos, np.sin))
-    return np.stack([x, y, np.broadcast_to(cosine, x.shape)], axis=-1).reshape(-1, 3)
+def _directions(c: Array, gamma: Array) -> Array:
+    """Unit vectors for each C and each γ [rad]."""
+    x, y = (np.outer(f(c), np.sin(gamma)) for f in (np.cos, np.sin))
+    return np.stack([x, y, np.broadcast_to(np.cos(gamma), x.shape)], axis=-1).reshape(-1, 3)

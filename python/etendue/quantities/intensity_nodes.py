@@ -1,0 +1,208 @@
+"""The nodes of a far field: what rays are shared by, and how their sums become a table of intensity."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.quantities.intensity import Intensity, gaps_of, hat_integrals
+from etendue.quantities.provenance import Provenance
+from etendue.units import FluxUnit
+
+Array = npt.NDArray[np.float64]
+
+MOST_CELLS = 1 << 26
+"""Cells of a table: half a gigabyte for each of its sums."""
+
+NEIGHBOURS = 0.25
+"""Correlation of the errors of neighbouring nodes: ∫φφ' over ∫φ² of two hats in even light."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Nodes:
+    """Nodes in C and γ, and the table that is made of them.
+
+    A table stands for a function that is linear in C and γ between its nodes. Its basis are the hats φ of the nodes, which
+    add up to 1 in every direction. A ray of flux w gives each node the share w φ, and the intensity of a node is the sum
+    of the shares over ∫φ dΩ: a mean of the intensity, weighted by the hat. So the integral of the function is the flux of
+    the rays, exactly, whatever the steps are.
+
+    Rows of γ have nodes C of their own: few where rays are few, as about the poles, where one node stands for all C.
+
+    Parameters
+    ----------
+    gamma : tuple of float
+        [°] Rows, from 0 to 180.
+    c : tuple of tuples of float
+        [°] For each row its nodes, from 0 up to below 360.
+    table : tuple of float
+        [°] Angles γ of the table: the rows, and angles between them at which the same function is stated again, for
+        readers whose rule of integration needs small steps.
+    planes : tuple of float
+        [°] Planes C of the table: those of all rows, and others at which the same function is stated again.
+
+    Examples
+    --------
+    >>> nodes = Nodes.even(4, 45)
+    >>> len(nodes), nodes.planes, nodes.table
+    (15, (0.0, 90.0, 180.0, 270.0), (0.0, 45.0, 90.0, 135.0, 180.0))
+    >>> bool(np.isclose(nodes.solid_angle.sum(), 4 * np.pi))
+    True
+    """
+
+    gamma: tuple[float, ...]
+    c: tuple[tuple[float, ...], ...]
+    table: tuple[float, ...]
+    planes: tuple[float, ...]
+
+    @classmethod
+    def even(cls, c_planes: int, gamma_step: float) -> Nodes:
+        """Nodes in equal steps; one at each pole.
+
+        Parameters
+        ----------
+        c_planes : int
+            Planes, from C = 0°.
+        gamma_step : float
+            [°], a whole part of 180.
+
+        Raises
+        ------
+        ArgumentError
+            If there are no such planes or steps, or too many nodes.
+        """
+        check_steps(c_planes, gamma_step)
+        gamma = tuple(np.linspace(0.0, 180.0, round(180.0 / gamma_step) + 1).tolist())
+        plane = planes_of(c_planes)
+        return cls(gamma, ((0.0,), *[plane] * (len(gamma) - 2), (0.0,)), gamma, plane)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Nodes:
+        """From plain data as `dataclasses.asdict` makes them."""
+        rows = tuple(tuple(map(float, row)) for row in data["c"])
+        gamma, table, planes = (tuple(map(float, data[name])) for name in ("gamma", "table", "planes"))
+        return cls(gamma, rows, table, planes)
+
+    def __len__(self) -> int:
+        """Cells that rays are summed in: one for each node, and the last one for all rays together."""
+        return sum(map(len, self.c)) + 1
+
+    def describe(self) -> str:
+        """What the table is made of, in a sentence."""
+        steps, planes = np.diff(self.gamma), [len(row) for row in self.c[1:-1]]
+        low, high = float(steps.min()), float(steps.max())
+        gamma = f"{low:.3g}°" if np.isclose(low, high) else f"{low:.3g}° to {high:.3g}°"
+        most = f"{max(planes)}" if min(planes) == max(planes) else f"{min(planes)} to {max(planes)}"
+        return f"each node is the mean around it; nodes in steps of {gamma} of γ, {most} around the axis"
+
+    def core(self) -> _core.FarField:
+        """The nodes as the compiled core takes them."""
+        return _core.FarField(np.radians(self.gamma).tolist(), [np.radians(row).tolist() for row in self.c])
+
+    @cached_property
+    def solid_angle(self) -> Array:
+        """∫φ dΩ of each node [sr], row by row."""
+        rows = []
+        for weight, row in zip(hat_integrals(np.array(self.gamma)), self.c, strict=True):
+            gaps = np.radians(gaps_of(np.array(row)))
+            rows.append(weight * (gaps + np.roll(gaps, 1)) / 2.0)
+        return np.concatenate(rows)
+
+    def tables(self, flux: Array, error: Array) -> tuple[Array, Array]:
+        """Intensity and its standard error at the nodes of the table, each of shape (planes, γ).
+
+        Parameters
+        ----------
+        flux, error : array
+            Of each node, without the cell of all rays: its shares of the rays, and their standard error; NaN if unknown.
+
+        Returns
+        -------
+        values, error : array
+            Where the table has a value between nodes, its error is that of the interpolation in even light, where the
+            errors of neighbours have a correlation of ¼.
+        """
+        values, error = flux / self.solid_angle, error / self.solid_angle
+        ends = np.cumsum([len(row) for row in self.c])[:-1]
+        pairs = zip(self.c, np.split(values, ends), np.split(error, ends), strict=True)
+        planes = np.array(self.planes)
+        rows = [_around(np.array(c), v, e, planes) for c, v, e in pairs]
+        value_rows, error_rows = (np.stack(arrays) for arrays in zip(*rows, strict=True))
+        gamma, table = np.array(self.gamma), np.array(self.table)
+        before = (np.searchsorted(gamma, table, side="right") - 1).clip(0, gamma.size - 2)
+        up = ((table - gamma[before]) / (gamma[before + 1] - gamma[before]))[:, None]
+        between = _between(value_rows[before], value_rows[before + 1], error_rows[before], error_rows[before + 1], up)
+        return between[0].T, between[1].T
+
+    def intensity(
+        self,
+        flux: Array,
+        error: Array,
+        unit: FluxUnit,
+        provenance: Provenance,
+        notes: tuple[str, ...] = (),
+    ) -> Intensity:
+        """The table of sums over rays; `flux` and `error` are those of all cells, the one of all rays being the last."""
+        values, errors = self.tables(flux[:-1], error[:-1])
+        return Intensity(
+            np.array(self.planes),
+            np.array(self.table),
+            values,
+            errors,
+            flux_unit=unit,
+            flux_error=float(error[-1]),
+            provenance=provenance,
+            notes=notes,
+        )
+
+
+def check_steps(c_planes: int | None, gamma_step: float | None) -> None:
+    """Refuse steps that no table can have; None is any.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+    """
+    if c_planes is not None and not (isinstance(c_planes, int) and c_planes >= 1):
+        raise ArgumentError(f"c_planes is {c_planes!r}; give a whole number of planes, 1 or more.")
+    if gamma_step is None:
+        steps = 0
+    else:
+        if not (math.isfinite(gamma_step) and 0.0 < gamma_step <= 90.0):
+            raise ArgumentError(f"gamma_step is {gamma_step}°; give an angle above 0° and up to 90°.")
+        steps = round(180.0 / gamma_step)
+        if not math.isclose(steps * gamma_step, 180.0, rel_tol=1e-9):
+            near = 180.0 / steps
+            raise ArgumentError(f"gamma_step is {gamma_step}°, which does not divide 180°; {near:.9g}° would do.")
+    cells = (c_planes or 1) * (steps + 1)
+    if cells > MOST_CELLS:
+        raise ArgumentError(f"{cells:,} cells; give fewer c_planes or a larger gamma_step, at most {MOST_CELLS:,}.")
+
+
+def planes_of(number: int) -> tuple[float, ...]:
+    """Planes in equal steps from C = 0° [°]."""
+    return tuple(np.linspace(0.0, 360.0, number, endpoint=False).tolist())
+
+
+def _around(c: Array, values: Array, error: Array, planes: Array) -> tuple[Array, Array]:
+    """Values and errors of a row at other planes."""
+    first = np.searchsorted(c, planes, side="right") - 1
+    second = (first + 1) % c.size
+    share = (planes - c[first]) / gaps_of(c)[first]
+    return _between(values[first], values[second], error[first], error[second], share if c.size > 1 else 0.0 * share)
+
+
+def _between(a: Array, b: Array, error_a: Array, error_b: Array, share: Array) -> tuple[Array, Array]:
+    """Linear interpolation, and its error; a value of no weight is of no consequence."""
+    error_a, error_b = np.where(share < 1.0, error_a, 0.0), np.where(share > 0.0, error_b, 0.0)
+    low, high = (1.0 - share) * error_a, share * error_b
+    return (1.0 - share) * a + share * b, np.sqrt(low * low + high * high + 2.0 * NEIGHBOURS * low * high)

@@ -1,0 +1,25 @@
+"""A number with its standard error, as people read it."""
+
+from __future__ import annotations
+
+import math
+
+
+def measured(value: float, error: float, unit: str) -> str:
+    """A value to the digits that its standard error leaves, two of the error's; to six digits if there is none.
+
+    Examples
+    --------
+    >>> measured(91.9955, 0.02714, "lm"), measured(45812.3, 1471.3, "cd"), measured(12.3456789, math.nan, "lm")
+    ('91.996 ± 0.027 lm', '45800 ± 1500 cd', '12.3457 lm')
+    """
+    if not (math.isfinite(error) and error > 0.0 and math.isfinite(value)):
+        return f"{value:.6g} {unit}"
+    digits = 1 - math.floor(math.log10(error))
+    # 0.0996 has two digits as 0.10.
+    digits = 1 - math.floor(math.log10(round(error, digits)))
+    # A table of numbers that differ by more than a double holds is shown to what it holds.
+    if digits > 12 or abs(value) >= 1e15:
+        return f"{value:.6g} ± {error:.2g} {unit}"
+    places = max(digits, 0)
+    return f"{round(value, digits):.{places}f} ± {round(error, digits):.{places}f} {unit}"

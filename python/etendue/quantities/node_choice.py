@@ -1,0 +1,362 @@
+"""Which nodes a far field deserves: steps that hold its beams, and no more of them than its rays bear."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.quantities.intensity import gaps_of, hat_integrals
+from etendue.quantities.intensity_nodes import Nodes, check_steps, planes_of
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+Counts = npt.NDArray[np.intp]
+
+GAMMA_STEP = 30.0
+"""[°] The widest step of γ that is tried; narrower ones are half as wide, a quarter, …"""
+
+TURN = 360.0
+"""[°] The widest step of C: one node stands for all."""
+
+DEPTH = {"gamma": 11, "c": 15}
+"""Halvings that are tried."""
+
+FINEST = GAMMA_STEP / 2 ** (DEPTH["gamma"] + 1)
+"""[°] The finest step that is tried, halved."""
+
+PARTS = 2
+"""Parts of the widest steps that pass, at least."""
+
+CERTAIN, LIKELY = 5.5, 2.5
+"""Standard errors by which halved steps must change the value of a node to be wanted: anywhere, and where steps of twice
+the width were halved. Some 10^5 nodes are looked at, and there shall be no such change by chance."""
+
+FEWEST = 128.0
+"""Equal rays that a hat must hold to be judged by its normal limit."""
+
+MATERIAL = 3e-4
+"""Share of the maximum below which a change is of no consequence."""
+
+MOST_ROWS, MOST_ANGLES, MOST_PLANES = 240, 361, 720
+"""Rows of nodes; angles γ and planes C of a table: those of EULUMDAT, less the plane of 360°."""
+
+WIDEST_STATED = 2.5
+"""[°] The widest step of a table: between rows that are farther apart, the function is stated again."""
+
+READING = 2e-4
+"""Share of the flux by which the trapezium rule over I sin γ may differ from the integral of the table's function."""
+
+MOST_TESTED = 1 << 22
+"""Nodes of one step that are tested at once."""
+
+TOO_WIDE = 0.01
+"""Share of a beam's peak that asked steps may lose before it is told."""
+
+
+class Choice(NamedTuple):
+    """Nodes, and what there is to say about them."""
+
+    nodes: Nodes
+    notes: tuple[str, ...]
+
+
+def choose_nodes(
+    direction: Array,
+    flux: Array,
+    rays: float,
+    c_planes: int | None = None,
+    gamma_step: float | None = None,
+) -> Choice:
+    """The nodes that suit a far field, from a sample of its rays.
+
+    A node's value is the mean over its hat, too low at a beam and too high beside it by about h² I″/12 for a step h. If
+    halving the steps around a node changes its value by more than its noise, they are halved, as often as it takes;
+    steps half as wide as those that pass are taken, so that what is left undiscovered stays well below the standard error.
+    Where there is little light or light is even, steps stay wide: the noise of a node then is as low as it can be. First
+    rows of γ are chosen by the light of all C, then for each row its nodes C.
+
+    Parameters
+    ----------
+    direction : array, shape (n, 3)
+        Unit vectors.
+    flux : array, shape (n,)
+        Of any scale.
+    rays : float
+        Rays that the nodes are meant for: the bias of a mean falls with h², its error rises with h^(-1/2), so that steps
+        shrink with the fifth root of rays over sample.
+    c_planes, gamma_step : int and float, optional
+        Steps that are asked for; the others are chosen.
+
+    Returns
+    -------
+    Choice
+        The notes tell if the steps that were asked for, or the finest ones, cannot hold the beam.
+
+    Raises
+    ------
+    ArgumentError
+        If there are no such planes or steps.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> spot = np.concatenate([rng.normal(0, 0.01, (20_000, 2)), np.ones((20_000, 1))], axis=1)
+    >>> spot /= np.linalg.norm(spot, axis=1)[:, None]
+    >>> nodes, notes = choose_nodes(spot, np.ones(20_000), 20_000)
+    >>> nodes.gamma[1] < 0.5, nodes.gamma[-2], notes
+    (True, 165.0, ())
+    """
+    check_steps(c_planes, gamma_step)
+    sample = _Sample.of(direction, flux)
+    finer = math.ceil(PARTS * max(rays / max(sample.flux.size, 1), 1.0) ** 0.2)
+    if c_planes is not None and gamma_step is not None:
+        chosen, unresolved = Nodes.even(c_planes, gamma_step), False
+    else:
+        chosen, unresolved = _chosen(sample, finer, c_planes, gamma_step)
+    notes = []
+    if c_planes is not None or gamma_step is not None:
+        notes += _too_wide(sample, chosen, _chosen(sample, finer, None, None)[0])
+    elif unresolved:
+        notes.append(
+            "narrower than the finest steps of a table: the peak is a lower bound, set by steps of "
+            f"{_smallest(chosen):.2g}°; the flux is not touched"
+        )
+    return Choice(chosen, tuple(notes))
+
+
+class _Sample(NamedTuple):
+    """Rays that carry flux, by their angles [°]."""
+
+    direction: Array
+    flux: Array
+    gamma: Array
+    c: Array
+
+    @classmethod
+    def of(cls, direction: Array, flux: Array) -> _Sample:
+        lit = flux > 0.0
+        direction, flux = np.ascontiguousarray(direction[lit], dtype=np.float64), np.array(flux[lit], dtype=np.float64)
+        x, y, z = direction.T
+        gamma = np.degrees(np.arctan2(np.hypot(x, y), z))
+        return cls(direction, flux, gamma, np.mod(np.degrees(np.arctan2(y, x)), TURN))
+
+    def tables(self, nodes: Nodes) -> tuple[Array, Array]:
+        """What the sample makes of nodes: values and errors."""
+        sums, squares = np.zeros(len(nodes)), np.zeros(len(nodes))
+        nodes.core().add(self.direction, self.flux, sums, squares, np.zeros(len(nodes), dtype=np.uint64))
+        return nodes.tables(sums[:-1], np.sqrt(squares[:-1]))
+
+
+def _chosen(sample: _Sample, finer: int, c_planes: int | None, gamma_step: float | None) -> tuple[Nodes, bool]:
+    """Nodes, and whether they cannot hold the beam."""
+    if gamma_step is None:
+        tree = _Tree.grown(
+            sample.gamma, sample.flux, np.zeros(sample.flux.size, dtype=np.intp), np.array([90.0]), "gamma"
+        )
+        rows, unresolved = tree.angles(finer, MOST_ROWS)
+        gamma = (*rows[0], 180.0)
+    else:
+        gamma, unresolved = Nodes.even(1, gamma_step).gamma, False
+    inner = len(gamma) - 2
+    if c_planes is None:
+        found, short = _planes(sample, finer, np.array(gamma))
+        unresolved |= short
+    else:
+        found = [planes_of(c_planes)] * inner
+    planes = planes_of(1 if c_planes is None else c_planes)
+    if c_planes is None:
+        # Four planes at least: two are no table to people, nor to all programs.
+        planes = tuple(sorted({*planes_of(4), *(c for row in found for c in row)}))
+    nodes = Nodes(gamma, ((0.0,), *found, (0.0,)), gamma, planes)
+    if gamma_step is None and sample.flux.size:
+        nodes = dataclasses.replace(nodes, table=_stated(nodes, sample.tables(nodes)[0]))
+    return nodes, unresolved
+
+
+def _planes(sample: _Sample, finer: int, gamma: Array) -> tuple[list[tuple[float, ...]], bool]:
+    """The nodes C of each row but the poles, from the rays around the row; and whether the steps are too wide."""
+    row = (np.searchsorted(gamma, sample.gamma, side="right") - 1).clip(0, gamma.size - 2)
+    up = (sample.gamma - gamma[row]) / (gamma[row + 1] - gamma[row])
+    each = np.concatenate([row, row + 1])
+    weight = np.concatenate([(1.0 - up) * sample.flux, up * sample.flux])
+    inside = (each > 0) & (each < gamma.size - 1) & (weight > 0.0)
+    c = np.concatenate([sample.c, sample.c])
+    tree = _Tree.grown(c[inside], weight[inside], each[inside] - 1, gamma[1:-1], "c")
+    return tree.angles(finer, MOST_PLANES)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Tree:
+    """Intervals of γ, or of C for each row: which exist at each level, and which of them are halved."""
+
+    step: float
+    exist: list[Flags]
+    split: list[Flags]
+    unresolved: bool
+
+    @classmethod
+    def grown(cls, angle: Array, weight: Array, row: Counts, gamma: Array, axis: str) -> _Tree:
+        """Halved where the light asks for it, from the finest steps to the widest, and from there once more.
+
+        Structure that wide steps average away is found by narrow ones; what is beside it is judged less strictly.
+        """
+        span, step = (180.0, GAMMA_STEP) if axis == "gamma" else (TURN, TURN)
+        certain, likely = [], []
+        for level in range(DEPTH[axis]):
+            size = round(span / step) << level
+            if size * gamma.size > MOST_TESTED:
+                break
+            change, limit = _change(angle, weight, row, gamma.size, size, axis)
+            if not np.isfinite(limit).any():
+                break
+            # Steps of C that are narrower than the finest ones of γ at their γ do not count.
+            wide = (span / size * np.sin(np.radians(gamma)) >= FINEST)[:, None]
+            certain.append(_beside(wide & (change > CERTAIN * limit), size))
+            likely.append(_beside(wide & (change > LIKELY * limit), size))
+        for level in range(len(certain) - 1, 0, -1):
+            certain[level - 1] |= certain[level].reshape(gamma.size, -1, 2).any(axis=2)
+        exist = [np.ones((gamma.size, round(span / step)), dtype=np.bool_)]
+        split = []
+        for sure, maybe in zip(certain, likely, strict=True):
+            split.append(exist[-1] & (sure | maybe))
+            exist.append(np.repeat(split[-1], 2, axis=1))
+        return cls(step, exist, split, len(split) == DEPTH[axis] and bool(certain[-1].any()))
+
+    def angles(self, finer: int, most: int) -> tuple[list[tuple[float, ...]], bool]:
+        """The nodes of each row, of `most` different ones at most; and whether they are too far apart for the light.
+
+        Intervals that are not halved further are cut into `finer` parts, or fewer if there are too many.
+        """
+        for deepest in range(len(self.split), -1, -1):
+            for parts in range(finer, PARTS - 1, -1):
+                rows = self._leaves(deepest, parts)
+                if len(set().union(*rows)) <= most:
+                    cut = any(flags.any() for flags in self.split[deepest:])
+                    return rows, cut or self.unresolved
+        return self._leaves(0, PARTS), True
+
+    def _leaves(self, deepest: int, parts: int) -> list[tuple[float, ...]]:
+        rows, angles = [], []
+        for level, exist in enumerate(self.exist[: deepest + 1]):
+            leaf = exist & ~self.split[level] if level < deepest else exist
+            row, start = np.nonzero(leaf)
+            rows.append(np.repeat(row, parts))
+            angles.append((self.step / (1 << level) * (start[:, None] + np.arange(parts) / parts)).ravel())
+        row, angle = np.concatenate(rows), np.concatenate(angles)
+        order = np.lexsort((angle, row))
+        ends = np.cumsum(np.bincount(row, minlength=len(self.exist[0])))[:-1]
+        return [tuple(nodes.tolist()) for nodes in np.split(angle[order], ends)]
+
+
+def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis: str) -> tuple[Array, Array]:
+    """How much the value at each node changes if all steps are halved, and its standard error; shape (rows, nodes).
+
+    The error is infinite where there are too few rays, and so large that a change of no consequence is none.
+    """
+    span = 180.0 if axis == "gamma" else TURN
+    step, nodes = span / size, size + 1 if axis == "gamma" else size
+    if axis == "gamma":
+        wide, narrow = (hat_integrals(np.linspace(0.0, 180.0, n * size + 1))[::n] for n in (1, 2))
+    else:
+        wide, narrow = np.full(nodes, step), np.full(nodes, step / 2.0)
+    first = np.minimum((angle / step).astype(np.intp), size - 1)
+    on = angle / step - first
+    if nodes == 1:
+        # One node stands for all C: the hats on both sides of it are the same.
+        pairs = [(first, np.ones_like(on), np.abs(1.0 - 2.0 * on))]
+    else:
+        second = (first + 1) % nodes
+        pairs = [(first, 1.0 - on, np.maximum(1.0 - 2.0 * on, 0.0)), (second, on, np.maximum(2.0 * on - 1.0, 0.0))]
+    sums = np.zeros((4, rows * nodes))
+    for node, hat, half in pairs:
+        index, w = row * nodes + node, weight * hat
+        for number, term in enumerate((weight * (half / narrow[node] - hat / wide[node]), w, w * w)):
+            sums[number] += np.bincount(index, term, rows * nodes)
+            if number == 0:
+                sums[3] += np.bincount(index, term * term, rows * nodes)
+    change, held, squares, variance = sums.reshape(4, rows, nodes)
+    value = held / wide
+    with np.errstate(divide="ignore", invalid="ignore"):
+        enough = held * held / squares >= FEWEST
+    top = value[enough].max(initial=0.0)
+    error = np.where(enough, np.maximum(np.sqrt(variance), MATERIAL * top / LIKELY), np.inf)
+    return np.abs(change), error
+
+
+def _beside(nodes: Flags, size: int) -> Flags:
+    """The intervals on both sides of nodes; at a pole, whose hat is by far the smallest, the pole alone decides."""
+    if nodes.shape[1] == size:
+        return nodes | np.roll(nodes, -1, axis=1)
+    before, after = nodes[:, :-1].copy(), nodes[:, 1:].copy()
+    before[:, -1], after[:, 0] = False, False
+    return before | after
+
+
+def _smallest(nodes: Nodes) -> float:
+    """The smallest step of γ [°]."""
+    return float(np.diff(nodes.gamma).min())
+
+
+def _stated(nodes: Nodes, values: Array) -> tuple[float, ...]:
+    """Angles at which the function is stated, so that other rules of integration find its flux as well.
+
+    A reader may sum I sin γ by the trapezium rule; for what is linear in γ that differs from the integral by about
+    h²/12 · Δ(I sin γ)′. Intervals are halved until all differences together are below `READING` of the flux.
+    """
+    gaps = gaps_of(np.array(nodes.planes))
+    mean = ((gaps + np.roll(gaps, 1)) / 2.0 @ values) / TURN
+    rows = np.array(nodes.gamma)
+    flux = float(mean @ hat_integrals(rows))
+    table = rows
+    while True:
+        level = np.interp(table, rows, mean)
+        width = np.diff(table)
+        between = (
+            np.radians(width)
+            / 2.0
+            * (level[:-1] * np.sin(np.radians(table[:-1])) + level[1:] * np.sin(np.radians(table[1:])))
+        )
+        exact = _pieces(table, level)
+        off = np.abs(between - exact)
+        wanted = width > WIDEST_STATED
+        if off.sum() > READING * flux:
+            wanted |= off > 0.25 * off.max()
+        wanted &= width > FINEST / 64.0
+        if not wanted.any() or table.size + int(wanted.sum()) > MOST_ANGLES:
+            return tuple(table.tolist())
+        table = np.sort(np.concatenate([table, (table[:-1] + width / 2.0)[wanted]]))
+
+
+def _pieces(gamma: Array, values: Array) -> Array:
+    """∫ I sin γ dγ over each interval, for I linear in it."""
+    result = np.zeros(gamma.size - 1)
+    for i in range(gamma.size - 1):
+        result[i] = values[i : i + 2] @ hat_integrals(gamma[i : i + 2])
+    return result
+
+
+def _too_wide(sample: _Sample, asked: Nodes, suited: Nodes) -> list[str]:
+    """What is to be said if the steps that were asked for lower the peak."""
+    if not sample.flux.size:
+        return []
+    values, errors = sample.tables(asked)
+    better, better_errors = sample.tables(suited)
+    low, high = int(values.argmax()), int(better.argmax())
+    noise = math.hypot(*(float(np.nan_to_num(e.ravel()[i])) for e, i in ((errors, low), (better_errors, high))))
+    loss = float(better.max() - values.max())
+    if not (loss > 3.0 * noise and loss > TOO_WIDE * float(better.max())):
+        return []
+    row = high % better.shape[1]
+    around = np.array(suited.gamma)
+    step = float(np.diff(around)[max(0, np.searchsorted(around, suited.table[row]) - 1)])
+    told = (
+        f"steps too wide for the beam: peak about {100.0 * loss / float(better.max()):.2g} % too low; steps as asked, "
+        f"{max(np.diff(asked.gamma)):.4g}° of γ and {len(asked.planes)} planes, cannot hold it, γ in steps of {step:.2g}°"
+        f"{f' and {len(suited.planes)} planes' if len(suited.planes) > len(asked.planes) else ''} would; "
+        "the flux is not touched"
+    )
+    return [told]
