@@ -219,6 +219,7 @@ WITHOUT_EXAMPLE = {
     "etendue.quantities.ray_stream": "what ray sets and sources share; RaySet and RingSource show it",
     "etendue.quantities.report.RayFileWarning": "a category of warnings",
     "etendue.quantities.report.ChangedFileWarning": "a category of warnings",
+    "etendue.quantities.node_choice.Choice": "what choose_nodes returns",
     "etendue.formats.input": "about files that change and pipes that wait; its tests show it",
 }
 """Public things whose docstring may do without an example, with the reason."""

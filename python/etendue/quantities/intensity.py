@@ -380,12 +380,24 @@ class Intensity:
 
 
 def gaps_of(c: Array) -> Array:
-    """Degrees from each plane to the next one, around the circle."""
+    """Degrees from each plane to the next one, around the circle.
+
+    Examples
+    --------
+    >>> gaps_of(np.array([0.0, 90.0, 270.0])).tolist()
+    [90.0, 180.0, 90.0]
+    """
     return np.append(np.diff(c), 360.0 - (c[-1] - c[0]))
 
 
 def hat_integrals(gamma: Array) -> Array:
-    """∫ (hat function of the node) sin γ dγ for nodes γ [°], in closed form: with 2π, solid angles."""
+    """∫ (hat function of the node) sin γ dγ for nodes γ [°], in closed form: with 2π, solid angles.
+
+    Examples
+    --------
+    >>> round(float(hat_integrals(np.array([0.0, 40.0, 180.0])).sum()), 12)
+    2.0
+    """
     gamma = np.radians(gamma)
     half, middle = np.diff(gamma) / 2.0, (gamma[1:] + gamma[:-1]) / 2.0
     even = np.sin(middle) * np.sin(half)

@@ -171,6 +171,11 @@ def check_steps(c_planes: int | None, gamma_step: float | None) -> None:
     ------
     ArgumentError
         If so.
+
+    Examples
+    --------
+    >>> check_steps(36, 2.5), check_steps(None, None)
+    (None, None)
     """
     if c_planes is not None and not (isinstance(c_planes, int) and c_planes >= 1):
         raise ArgumentError(f"c_planes is {c_planes!r}; give a whole number of planes, 1 or more.")
@@ -189,7 +194,13 @@ def check_steps(c_planes: int | None, gamma_step: float | None) -> None:
 
 
 def planes_of(number: int) -> tuple[float, ...]:
-    """Planes in equal steps from C = 0° [°]."""
+    """Planes in equal steps from C = 0° [°].
+
+    Examples
+    --------
+    >>> planes_of(3)
+    (0.0, 120.0, 240.0)
+    """
     return tuple(np.linspace(0.0, 360.0, number, endpoint=False).tolist())
 
 
