@@ -220,6 +220,7 @@ WITHOUT_EXAMPLE = {
     "etendue.quantities.report.RayFileWarning": "a category of warnings",
     "etendue.quantities.report.ChangedFileWarning": "a category of warnings",
     "etendue.quantities.node_choice.Choice": "what choose_nodes returns",
+    "etendue.tracing.far_fields.far_field_nodes": "a step of trace_rounds, which shows it",
     "etendue.formats.input": "about files that change and pipes that wait; its tests show it",
 }
 """Public things whose docstring may do without an example, with the reason."""
