@@ -91,6 +91,7 @@ class _Harvest(TypedDict):
     open_units: list[_Open]
     records: list[_Floats]
     events: list[tuple[npt.NDArray[np.uint64], int]]
+    arrivals: _Floats
     rays: int
     imbalance: float
 
@@ -185,6 +186,10 @@ class Scene:
     def with_far_fields(self, nodes: list[FarField]) -> Scene:
         """The same scene, whose detectors of the far field share rays by these nodes, in their order."""
 
+    def may_focus(self) -> bool:
+        """Whether light can reach a diffuse surface in a way that lines of sight find by chance, or not at all."""
+
+
 @final
 class FarField:
     """Nodes of a far field [rad]: rows of γ, and the nodes C of each row."""
@@ -202,6 +207,12 @@ class FarField:
         rays: npt.NDArray[np.uint64],
     ) -> None:
         """Add rays to Σ w, Σ w² and the number of rays of each cell."""
+
+@final
+class Guide:
+    """Directions in which lines of sight go on from diffuse surfaces by preference, from the arrivals of a trace."""
+
+    def __new__(cls, scene: Scene, arrivals: _Floats) -> Guide: ...
 
 @final
 class Survey:
@@ -372,7 +383,8 @@ def trace_batches(
     that contributed), shape (strata, cells); births are the same of the flux of each source, and of all of them at the end.
     Open units are cell, unit and Σ w of each detector and, at the end, of the sources, where more copies of a ray may come;
     records are rows of position [mm], direction, flux, wavelength [nm], shape (n, 8); events are rows of
-    scatter events, shape (n, 15), and how often they were thinned.
+    scatter events, shape (n, 15), and how often they were thinned; arrivals are rows of point, unit vector to where light
+    came from, and number of the face, shape (n, 7).
     """
 
 def look_at_scene(
@@ -386,12 +398,18 @@ def look_at_scene(
     last: int,
     threads: int | None = None,
     survey: Survey | None = None,
+    shared: float | None = None,
+    guide: Guide | None = None,
 ) -> list[_Floats]:
-    """For each pixel Σ mean, Σ mean² and Σ deviation of the sources over passes ``first..last`` of `paths` paths each.
+    """What lines of sight find, pixel by pixel, in passes ``first..last`` of `paths` paths each.
+
+    Σ mean, Σ mean of the light that drawn directions find behind smooth surfaces, Σ deviation of the sources, and Σ shares
+    of the paths that meet a smooth surface first, and that see a diffuse one directly.
 
     `left`: light that is not looked for, because rays traced forwards find it. Caustics: what reaches a diffuse surface
     through smooth ones, and from there the eye directly or over other diffuse ones. Scattered: all that reaches the eye
-    directly from a diffuse surface.
+    directly from a diffuse surface. `shared`: rays forwards for each path of a pixel, with which caustics are shared; they
+    are left out altogether without.
     """
 
 def look_at_events(

@@ -10,9 +10,10 @@ use etendue_optics::finish::Finish;
 use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, Lantern, Lines, PointSource, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
-use etendue_trace::detector::Detector;
+use etendue_trace::detector::{Detector, Portion};
 use etendue_trace::reverse::lanterns;
 use etendue_trace::scene::{Part, Scene as CoreScene};
+use etendue_trace::sharing::Sharing;
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
@@ -304,8 +305,16 @@ fn detector(dict: &Bound<'_, PyDict>, faces: usize) -> PyResult<Detector> {
         "intensity" => Detector::Escapes,
         "image" => Detector::Image {
             view: get::<View>(dict, "view")?.core(),
-            complement: optional(dict, "complement")?.unwrap_or(false),
+            portion: match (
+                optional(dict, "complement")?.unwrap_or(false),
+                optional(dict, "shared")?,
+            ) {
+                (false, _) => Portion::Whole,
+                (true, None) => Portion::Unseen,
+                (true, Some(rays)) => Portion::Shared(Sharing { rays }),
+            },
         },
+        "arrivals" => Detector::Arrivals,
         "scatter" => {
             let listed: Option<Vec<usize>> = optional(dict, "faces")?;
             let flags = |listed: Vec<usize>| -> PyResult<Vec<bool>> {
@@ -354,6 +363,11 @@ impl Scene {
 
 #[pymethods]
 impl Scene {
+    /// Whether light can reach a diffuse surface in a way that lines of sight find by chance, or not at all.
+    fn may_focus(&self) -> bool {
+        self.core.may_focus()
+    }
+
     #[new]
     fn new(record: &Bound<'_, PyDict>) -> PyResult<Self> {
         let each = |key: &str| list(record, key);

@@ -7,18 +7,22 @@ use etendue_geometry::lines::Leaving;
 use etendue_math::Vec3;
 use etendue_sampling::ordered::{BATCH, inside};
 use etendue_trace::dealing::Dealing as CoreDealing;
+use etendue_trace::detector::Detector;
 use etendue_trace::eye;
 use etendue_trace::forward::{Run, trace_on, trails};
+use etendue_trace::guide::Arrival;
 use etendue_trace::harvest::{Cell, Harvest, Mark, Open, Record, Tally};
 use etendue_trace::kept::{DEEPEST, Kept, WORDS};
 use etendue_trace::ledger::{Entry, Ledger};
 use etendue_trace::meeting::Loss;
 use etendue_trace::reverse::{Left, Lit, Method, Pixel};
+use etendue_trace::sharing::Sharing;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::guide::Guide;
 use crate::run::stoppable;
 use crate::scene::Scene;
 use crate::source::{Opened, Source};
@@ -116,6 +120,15 @@ fn record_array<'py>(py: Python<'py>, records: &[Record]) -> PyResult<Bound<'py,
     PyArray1::from_iter(py, rows).reshape([records.len(), 8])
 }
 
+/// Rows of point, direction to where the light came from, and the number of the face.
+fn arrival_rows<'py>(py: Python<'py>, arrivals: &[Arrival]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let rows = arrivals.iter().flat_map(|a| {
+        let (p, k) = (a.point, a.towards);
+        [p.x, p.y, p.z, k.x, k.y, k.z, f64::from(a.face)]
+    });
+    PyArray1::from_iter(py, rows).reshape([arrivals.len(), 7])
+}
+
 /// Why rays are lost, in the order of a ledger.
 #[pyfunction]
 pub fn losses() -> Vec<&'static str> {
@@ -154,6 +167,12 @@ pub fn trace_batches<'py>(
     let opened = open(py, scene)?;
     let sets: Vec<Source<'_>> = opened.iter().map(Opened::core).collect::<PyResult<_>>()?;
     let sets: Vec<&dyn RaySource> = sets.iter().map(|s| s as &dyn RaySource).collect();
+    // Made ready only where they are asked for: that takes a while for light fields.
+    let lanterns = if scene.core().detectors.iter().any(Detector::shares) {
+        scene.lanterns()
+    } else {
+        &[]
+    };
     let core = scene.core();
     let batches: Range<u64> = first..last;
     let begun = begun(open_units.as_deref().unwrap_or_default())?;
@@ -163,6 +182,7 @@ pub fn trace_batches<'py>(
             seed,
             most_events,
             sets: &sets,
+            lanterns,
             stop: Some(stop),
         };
         let work = || trace_on(core, &run, batches.clone(), begun.clone());
@@ -191,16 +211,18 @@ pub fn trace_batches<'py>(
         events.append(event_rows(py, detector)?)?;
     }
     dict.set_item("events", events)?;
+    dict.set_item("arrivals", arrival_rows(py, &harvest.arrivals)?)?;
     dict.set_item("rays", harvest.rays)?;
     dict.set_item("imbalance", harvest.imbalance)?;
     Ok(dict)
 }
 
-/// Looks at a scene: for each pixel, row by row, the sums over passes `first..last` of the mean luminance of a pass, of its
-/// square, and of the sources' own deviation \[flux unit/(mm² sr)\].
+/// Looks at a scene: for each pixel, row by row, the sums over passes `first..last` of the mean luminance of a pass, of the
+/// part that is found by chance, and of the sources' own deviation \[flux unit/(mm² sr)\]; and of the shares of the lines that
+/// meet a smooth surface first, and that see a diffuse one directly.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
-#[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None))]
+#[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None, shared=None, guide=None))]
 pub fn look_at_scene<'py>(
     py: Python<'py>,
     scene: &Scene,
@@ -213,11 +235,13 @@ pub fn look_at_scene<'py>(
     last: u32,
     threads: Option<usize>,
     survey: Option<&Survey>,
-) -> PyResult<[Bound<'py, PyArray2<f64>>; 3]> {
+    shared: Option<f64>,
+    guide: Option<&Guide>,
+) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
     let view = view.core();
     let left = match left {
         "nothing" => Left::Nothing,
-        "caustics" => Left::Caustics,
+        "caustics" => shared.map_or(Left::Caustics, |rays| Left::Shared(Sharing { rays })),
         "scattered" => Left::Scattered,
         other => return Err(PyValueError::new_err(format!("nothing is called {other}"))),
     };
@@ -226,6 +250,7 @@ pub fn look_at_scene<'py>(
         seed,
         most_events,
         left,
+        guide: guide.map(Guide::core),
     };
     let pixels = stoppable(py, |stop| {
         let lit = Lit::new(scene.core(), scene.lanterns()).until(stop);
@@ -234,7 +259,13 @@ pub fn look_at_scene<'py>(
     })?;
     let shape = [view.rows as usize, view.columns as usize];
     let array = |pick: fn(&Pixel) -> f64| PyArray1::from_iter(py, pixels.iter().map(pick)).reshape(shape);
-    Ok([array(|p| p.sum)?, array(|p| p.squares)?, array(|p| p.deviation)?])
+    Ok([
+        array(|p| p.sum)?,
+        array(|p| p.chance)?,
+        array(|p| p.deviation)?,
+        array(|p| p.met[0])?,
+        array(|p| p.met[1])?,
+    ])
 }
 
 /// Where the first `rays` rays of a run of as many start, turn and end: one (k, 3) array each \[mm\]; a ray that escapes ends
@@ -258,6 +289,7 @@ pub fn trace_trails<'py>(
         most_events,
         sets: &sets,
         stop: None,
+        lanterns: &[],
     };
     let core = scene.core();
     let found = py.detach(|| trails(core, &run, far));

@@ -155,6 +155,15 @@ impl Finish {
         }
     }
 
+    /// Whether any light can be mirrored, or pass without being scattered.
+    #[must_use]
+    pub fn is_smooth(&self) -> bool {
+        match self {
+            Self::Interface => true,
+            Self::Scatter(scatter) => !(scatter.tables[0].is_zero() && scatter.tables[1].is_zero()),
+        }
+    }
+
     /// The BSDF \[1/sr\] of the diffuse lobes for light that arrives as `light` says and leaves on the same side, or on
     /// the other one if `through`.
     #[inline]

@@ -93,6 +93,7 @@ fn main() -> Result<(), String> {
         most_events: 100_000,
         sets: &[],
         stop: None,
+        lanterns: &[],
     };
     for threads in [1, 2] {
         let begin = Instant::now();

@@ -9,6 +9,19 @@ use etendue_math::{Frame, Vec3};
 
 use crate::exitance::Patches;
 use crate::far_field::Nodes;
+use crate::sharing::Sharing;
+
+/// The part of scattered light that a light image shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Portion {
+    /// All of it.
+    Whole,
+    /// What the reverse tracer cannot find, or leaves to the light image: of sources that cannot be seen backwards, and of all
+    /// sources through smooth surfaces onto the first diffuse one.
+    Unseen,
+    /// Of that light, the share that lines of sight do not have.
+    Shared(Sharing),
+}
 
 /// A detector.
 #[derive(Clone, Debug)]
@@ -36,10 +49,12 @@ pub enum Detector {
     Image {
         /// What he sees.
         view: View,
-        /// Whether only light counts that the reverse tracer cannot find, or leaves to the light image: of sources that
-        /// cannot be seen backwards, and of all sources through smooth surfaces onto the first diffuse one.
-        complement: bool,
+        /// Which light counts.
+        portion: Portion,
     },
+    /// Light that smooth surfaces send to the first diffuse one, of sources that can be seen: where it arrives, and from
+    /// where.
+    Arrivals,
     /// The flux that diffuse surfaces send out, by the cells of patches.
     Exitance(Arc<Patches>),
     /// Diffuse scatters, to be looked at later from anywhere.
@@ -70,14 +85,35 @@ impl Detector {
                 trims: vec![],
                 flipped: false,
             }),
-            Self::Escapes | Self::Intensity(_) | Self::Image { .. } | Self::Exitance(_) | Self::Events { .. } => None,
+            Self::Escapes
+            | Self::Intensity(_)
+            | Self::Image { .. }
+            | Self::Arrivals
+            | Self::Exitance(_)
+            | Self::Events { .. } => None,
         }
     }
 
     /// Whether it wants to know of light at diffuse surfaces.
     #[must_use]
     pub const fn watches_scatter(&self) -> bool {
-        matches!(self, Self::Image { .. } | Self::Exitance(_) | Self::Events { .. })
+        matches!(
+            self,
+            Self::Image { .. } | Self::Arrivals | Self::Exitance(_) | Self::Events { .. }
+        )
+    }
+
+    /// Whether it wants to know how bright the sources of rays are.
+    #[must_use]
+    pub const fn shares(&self) -> bool {
+        matches!(
+            self,
+            Self::Arrivals
+                | Self::Image {
+                    portion: Portion::Shared(_),
+                    ..
+                }
+        )
     }
 
     /// Whether it wants to know of light that leaves the scene.
@@ -90,7 +126,7 @@ impl Detector {
     #[must_use]
     pub fn cells(&self) -> usize {
         match self {
-            Self::Rays(_) | Self::Escapes | Self::Events { .. } => 0,
+            Self::Rays(_) | Self::Escapes | Self::Arrivals | Self::Events { .. } => 0,
             Self::Illuminance { columns, rows, .. } => *columns as usize * *rows as usize,
             Self::Intensity(nodes) => nodes.cells(),
             Self::Image { view, .. } => view.pixels(),

@@ -163,6 +163,7 @@ impl Survey {
                 most_events,
                 sets: &[],
                 stop: lit.stop,
+                lanterns: &[],
             };
             let harvest = trace(&scene, &run, batches);
             let cells = &harvest.tallies[scene.detectors.len() - 1].cells;
@@ -239,6 +240,7 @@ impl Survey {
             most_events: self.most_events,
             sets: &[],
             stop: lit.stop,
+            lanterns: &[],
         };
         let first = SCOUTS + SURVEYORS + u64::from(pass) * EACH;
         let harvest = trace(&scene, &run, first..first + EACH);

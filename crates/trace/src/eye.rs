@@ -15,6 +15,7 @@ use crate::inside::Inside;
 use crate::kept::{WORDS, from_row, ray_of};
 use crate::meeting::{Fillings, Meeting, transmittance};
 use crate::scene::{Act, Scene};
+use crate::sharing::density;
 
 /// Light that was scattered diffusely: what is needed to look at it, now or later, from anywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +48,8 @@ struct Sight {
     pixel: u32,
     /// What it adds to the luminance of the pixel.
     light: f64,
+    /// Density by area with which lines of sight of the pixel meet the point \[1/mm²\].
+    density: f64,
     /// Unit vector to the eye, and how far that is.
     k: Vec3,
     distance: f64,
@@ -108,11 +111,11 @@ impl Event {
             // It is behind the observer, who looks the other way.
             return None;
         }
-        let area = view.width * view.height / view.pixels() as f64;
-        let weight = bsdf * cosine.abs() / (distance * distance) * (t * t) / (area * k.dot(view.normal).abs());
+        let density = density(view, k, distance, cosine);
         Some(Sight {
             pixel,
-            light: self.flux * weight,
+            light: self.flux * bsdf * density,
+            density,
             k,
             distance,
             inside: if through { self.after } else { self.before },
@@ -133,12 +136,13 @@ impl Event {
         )
     }
 
-    /// The pixel in which the scatter is seen, and what it adds to the luminance there; None if it is not.
+    /// The pixel in which the scatter is seen, what it adds to the luminance there, and the density by area with which lines
+    /// of sight of the pixel meet it \[1/mm²\]; None if it is not seen.
     #[must_use]
-    pub fn seen(&self, scene: &Scene, view: &View, fillings: &mut Fillings) -> Option<(u32, f64)> {
+    pub fn seen(&self, scene: &Scene, view: &View, fillings: &mut Fillings) -> Option<(u32, f64, f64)> {
         let sight = self.sight(scene, view, fillings)?;
         let share = self.passes(scene, view, &sight, fillings);
-        (share > 0.0).then_some((sight.pixel, sight.light * share))
+        (share > 0.0).then_some((sight.pixel, sight.light * share, sight.density))
     }
 }
 

@@ -3,6 +3,7 @@
 use etendue_sampling::ordered::BATCH;
 
 use crate::dealing::Dealing;
+use crate::guide::Arrival;
 use crate::kept::Kept;
 use crate::ledger::Ledger;
 use crate::scene::Scene;
@@ -110,6 +111,8 @@ pub struct Harvest {
     pub records: Vec<Vec<Record>>,
     /// Diffuse scatters of each detector of them.
     pub events: Vec<Kept>,
+    /// Light that smooth surfaces sent to diffuse ones, if a detector asks for it.
+    pub arrivals: Vec<Arrival>,
     /// Rays that the sources gave out.
     pub rays: u64,
     /// Largest | emitted − Σ fates | / emitted of a batch.
@@ -130,6 +133,8 @@ pub struct Yield {
     pub records: Vec<Vec<Record>>,
     /// Diffuse scatters of each detector of them.
     pub events: Vec<Kept>,
+    /// Light that smooth surfaces sent to diffuse ones, if a detector asks for it.
+    pub arrivals: Vec<Arrival>,
 }
 
 impl Yield {
@@ -144,6 +149,7 @@ impl Yield {
             copies: Vec::new(),
             records: vec![Vec::new(); detectors],
             events: scene.detectors.iter().map(|d| Kept::of_batch(d, batches)).collect(),
+            arrivals: Vec::new(),
         }
     }
 }
@@ -163,6 +169,7 @@ impl Harvest {
             births: tally(scene.sources.len() + 1),
             records: vec![Vec::new(); scene.detectors.len()],
             events: scene.detectors.iter().map(Kept::of).collect(),
+            arrivals: Vec::new(),
             rays: 0,
             imbalance: 0.0,
         }
@@ -189,6 +196,7 @@ impl Harvest {
         for (all, events) in self.events.iter_mut().zip(part.events) {
             all.add(events);
         }
+        self.arrivals.extend(part.arrivals);
         for (all, records) in self.records.iter_mut().zip(part.records) {
             all.extend(records);
         }

@@ -9,7 +9,9 @@
 //! thinned to a number of them.
 //!
 //! `reverse`: from the eye to the sources; `wave`: a block of its paths; `exitance`: the light of diffuse surfaces, known
-//! beforehand, at which paths may end. `lists`: what rays of a block are sorted into.
+//! beforehand, at which paths may end; `guide`: where they go on from diffuse
+//! surfaces; `sharing`: light that both directions find. `lists`: what rays of a block are sorted
+//! into.
 
 pub mod dealing;
 pub mod detector;
@@ -17,6 +19,7 @@ pub mod exitance;
 pub mod eye;
 pub mod far_field;
 pub mod forward;
+pub mod guide;
 pub mod harvest;
 pub mod inside;
 pub mod kept;
@@ -25,5 +28,6 @@ mod lists;
 pub mod meeting;
 pub mod reverse;
 pub mod scene;
+pub mod sharing;
 mod start;
 mod wave;

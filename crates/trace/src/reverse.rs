@@ -15,7 +15,9 @@ use etendue_optics::source::Lantern;
 use rayon::prelude::*;
 
 use crate::exitance::{Exitance, Survey};
+use crate::guide::Guide;
 use crate::scene::Scene;
+use crate::sharing::Sharing;
 use crate::wave::{BLOCK, Wave};
 
 /// A scene with what its sources need to be looked at.
@@ -24,6 +26,8 @@ pub struct Lit<'a> {
     pub(crate) scene: &'a Scene,
     /// None for those that cannot be seen backwards.
     pub(crate) lanterns: &'a [Option<Lantern>],
+    /// Flux of all sources.
+    pub(crate) flux: f64,
     /// Sums of the shares of the sources' flux.
     pub(crate) shares: Vec<f64>,
     /// Wavelengths: sum of the shares, the wavelength, and how much of each source's flux has it, over its share.
@@ -33,19 +37,21 @@ pub struct Lit<'a> {
 }
 
 /// What lines of sight do not look for, because something else finds it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Left {
     /// Nothing.
     Nothing,
     /// Light that reaches a diffuse surface through smooth ones, and from there the eye directly or over other diffuse ones.
     Caustics,
+    /// Of that light, the share of rays traced forwards.
+    Shared(Sharing),
     /// All light that reaches the eye directly from a diffuse surface.
     Scattered,
 }
 
 /// How a map is computed.
 #[derive(Clone, Copy, Debug)]
-pub struct Method {
+pub struct Method<'a> {
     /// Paths per pixel in each of the independent passes.
     pub paths: u32,
     /// Seed.
@@ -54,17 +60,23 @@ pub struct Method {
     pub most_events: u32,
     /// What is left to the light image, or to scatter events.
     pub left: Left,
+    /// Where paths that do not see a diffuse surface directly go on from there, if that is known.
+    pub guide: Option<&'a Guide>,
 }
 
-/// Sums over passes: of the mean of each pass, of its square, and of the sources' own deviation.
+/// Sums over passes: of the mean of each pass, of that part of it which is found by chance only, of the sources' own
+/// deviation, and of the shares of the lines of sight that meet smooth and diffuse surfaces first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pixel {
     /// Σ mean.
     pub sum: f64,
-    /// Σ mean².
-    pub squares: f64,
+    /// Σ mean of the light that drawn directions bring to a source through smooth surfaces, where rays forwards cannot take it
+    /// over: rare, and bright.
+    pub chance: f64,
     /// Σ deviation.
     pub deviation: f64,
+    /// Σ share of the lines that meet a smooth surface first, and of those that see a diffuse one directly.
+    pub met: [f64; 2],
 }
 
 /// What each source needs to be seen: None for those that cannot be.
@@ -115,6 +127,7 @@ impl<'a> Lit<'a> {
         Self {
             scene,
             lanterns,
+            flux: total,
             shares: shares.collect(),
             lines,
             stop: None,
@@ -139,7 +152,7 @@ impl<'a> Lit<'a> {
     ///
     /// Runs on the threads of the current pool; the same bits for any number.
     #[must_use]
-    pub fn look(&self, view: &View, method: &Method, survey: Option<&Survey>, passes: Range<u32>) -> Vec<Pixel> {
+    pub fn look(&self, view: &View, method: &Method<'_>, survey: Option<&Survey>, passes: Range<u32>) -> Vec<Pixel> {
         let known: Vec<Exitance<'_>> = survey
             .iter()
             .filter(|survey| survey.patches() > 0)

@@ -153,6 +153,18 @@ impl Scene {
         })
     }
 
+    /// Whether light can reach a diffuse surface in a way that lines of sight find by chance, or not at all: through smooth
+    /// surfaces, or from a source that cannot be seen.
+    #[must_use]
+    pub fn may_focus(&self) -> bool {
+        let any = |test: fn(&Finish) -> bool| {
+            self.roles
+                .iter()
+                .any(|role| matches!(role.act, Act::Optical(finish) if test(&self.finishes[finish as usize])))
+        };
+        any(Finish::is_diffuse) && (any(Finish::is_smooth) || !self.sources.iter().all(Source::is_visible))
+    }
+
     /// The medium that fills the space of a solid, 0 being the surroundings.
     #[inline]
     #[must_use]

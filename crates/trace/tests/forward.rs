@@ -12,7 +12,7 @@ use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_sampling::ordered::inside;
-use etendue_trace::detector::Detector;
+use etendue_trace::detector::{Detector, Portion};
 use etendue_trace::eye::look_at_events;
 use etendue_trace::far_field::Nodes;
 use etendue_trace::forward::{Run, trace};
@@ -103,6 +103,7 @@ fn run(scene: &Scene, rays: u64, threads: usize) -> Harvest {
         most_events: 10_000,
         sets: &[],
         stop: None,
+        lanterns: &[],
     };
     inside(threads, || trace(scene, &run, 0..rays.div_ceil(1 << 16)))
 }
@@ -136,7 +137,7 @@ fn mixed(watched: bool) -> Scene {
     if watched {
         detectors.push(Detector::Image {
             view: VIEW,
-            complement: false,
+            portion: Portion::Whole,
         });
     }
     mixed_with(detectors)
@@ -205,7 +206,7 @@ fn kept(most: usize) -> Scene {
     mixed_with(vec![
         Detector::Image {
             view: VIEW,
-            complement: false,
+            portion: Portion::Whole,
         },
         Detector::Events { most, faces: None },
     ])

@@ -104,7 +104,10 @@ def luminance(
     forward_rays: Annotated[
         float | None,
         typer.Option(
-            "--forward-rays", help="Of a scene: rays traced forwards besides, for caustics and beams, e.g. 1e7."
+            "--forward-rays",
+            help="Of a scene: rays traced forwards besides, for caustics and beams [as many as they need]; 0: none.",
+            min=0,
+            show_default=False,
         ),
     ] = None,
     gather: Annotated[

@@ -145,14 +145,17 @@ def luminance_map(
         256 if None. Of scatter events: so many are followed for what the events leave out, sources that are seen directly,
         in mirrors or through lenses, and diffuse surfaces seen so; none if None.
     until : float, optional
-        Of a scene: more passes are made until the median relative error of the pixels with light is below it, up to 64
-        times `rays_per_pixel`. What light fields do not know of themselves does not count here, but in the map's errors.
+        Of a scene: more passes are made until the median relative error of the pixels with light is below it, by both
+        routes together, up to 64 times `rays_per_pixel`. What light fields do not know of themselves does not count here,
+        but in the map's errors.
     seed : int, optional
         Of a scene; 1 if None.
     forward_rays : int, optional
         Of a scene: so many rays are traced forwards besides, and what they send to the eye from diffuse surfaces is added:
         light that reaches these through lenses and mirrors (caustics), which lines of sight find by chance only, or not
-        at all if it comes from points, and that of beams. No light is counted twice.
+        at all if it comes from points, and that of beams. No light is counted twice. If None, a pilot finds out whether
+        there is such light, and how many rays balance its error with that of the rest; 0: none, and the map's notes say
+        that it may be too low. With `until` their number grows with that of the lines of sight.
     gather : bool, optional
         Of a scene: lines of sight end at the second diffuse surface, whose light is then known from rays traced forwards,
         as a mean over small patches. Many times as fast where light goes to and fro between diffuse surfaces. Patches

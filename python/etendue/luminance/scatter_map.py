@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
-from etendue.luminance.scene_map import Forward, Looking, look_at_scene
+from etendue.luminance.caustics import Forward
+from etendue.luminance.scene_map import Looking, look_at_scene
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress

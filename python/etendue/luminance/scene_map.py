@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import time
 from collections.abc import Sequence
 from typing import Literal
 
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.fit_cache import fit_or_recall
+from etendue.luminance.caustics import Forward, LightImages, Plan, at_least_nearby, plan
 from etendue.luminance.gathering import CHECKS, FIRST_CHECK, blocks, comparison_note, survey_notes
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.luminance_map import LuminanceMap
@@ -20,7 +22,6 @@ from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Compiled, Scene, compile_scene
-from etendue.scene.dealing import CellSums, Dealing, added
 from etendue.scene.placement import Placement
 from etendue.scene.sources.from_files import Field, Rays
 from etendue.scene.sources.gridded import Gridded
@@ -47,9 +48,6 @@ MOST_EVENTS = 10_000
 
 MOST_FORWARD_RAYS = 1 << 50
 
-ROUND = 16
-"""Batches of rays traced forwards at a time."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Looking:
@@ -72,8 +70,10 @@ class Looking:
         if not (isinstance(self.seed, int) and 0 <= self.seed <= MOST_SEED):
             raise ArgumentError(f"seed is {self.seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
         rays = self.forward_rays
-        if rays is not None and not (1 <= rays <= MOST_FORWARD_RAYS and int(rays) == rays):
-            raise ArgumentError(f"forward_rays is {rays!r}; give a whole number from 1 to {MOST_FORWARD_RAYS:,}.")
+        if rays is not None and not (0 <= rays <= MOST_FORWARD_RAYS and int(rays) == rays):
+            raise ArgumentError(
+                f"forward_rays is {rays!r}; give a whole number up to {MOST_FORWARD_RAYS:,}, 0 for none, or leave it out."
+            )
         checked_threads(self.threads)
 
     @property
@@ -85,35 +85,6 @@ class Looking:
     def paths(self) -> int:
         """Lines of sight per pixel and pass."""
         return -(-self.rays_per_pixel // self.passes)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Forward:
-    """What rays traced forwards send to the eye of an observer.
-
-    Parameters
-    ----------
-    values, error : array, shape (rows, columns)
-        Luminance and its standard error [flux unit/(mm² sr)].
-    rays : array of int64, shape (rows, columns)
-        Rays that each pixel rests on.
-    note : str
-        What it is.
-    """
-
-    values: Array
-    error: Array
-    rays: npt.NDArray[np.int64]
-    note: str
-
-    @classmethod
-    def of(
-        cls, sums: CellSums, shape: tuple[int, ...], dealing: Dealing, rays: int, scale: float, note: str
-    ) -> Forward:
-        """From the sums of each pixel over the first `rays` rays of a run; each w stands for `scale` w."""
-        error = np.sqrt(dealing.variance(sums, rays)).reshape(shape)
-        sum_, count = (row.sum(axis=0).reshape(shape) for row in (sums[0], sums[2]))
-        return cls(sum_ * scale, error * scale, count.astype(np.int64), note)
 
 
 def look_at_scene(
@@ -142,40 +113,56 @@ def look_at_scene(
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
     core = _core.Scene({**compiled.record, "detectors": []})
     survey = _core.Survey(core, how.seed, MOST_EVENTS, how.threads) if how.gather else None
-    forwards = scattered is not None or how.forward_rays is not None
-    notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=forwards)]
+    forward = _forward(core, compiled, views, how, wanted=scattered is None)
+    images = forward.images
+    notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=scattered is not None or images is not None)]
     notes += [] if survey is None else survey_notes(survey)
-    rest = _light_images(compiled, views, how) if scattered is None else scattered
-    left: Left = "scattered" if scattered is not None else "caustics" if forwards else "nothing"
+    notes += [] if scattered is not None else forward.notes(how)
+    left: Left = "scattered" if scattered is not None else "caustics" if images is not None else "nothing"
     origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
     maps, done = [], 0
-    for (observer, screen), view, image in zip(pairs, views, rest, strict=True):
-        passes, gathered = _Passes(screen.shape), []
+    for number, ((observer, screen), view) in enumerate(zip(pairs, views, strict=True)):
+        passes, gathered, started = _Passes(screen.shape), [], time.perf_counter()
 
         def look(number: int, known: _core.Survey | None, view: _core._View = view) -> list[Array]:
-            passes = number, number + 1
-            return _core.look_at_scene(core, view, how.paths, how.seed, MOST_EVENTS, left, *passes, how.threads, known)
+            first, shared, guide = (number, number + 1), forward.shared, forward.plan.guide
+            return _core.look_at_scene(
+                core, view, how.paths, how.seed, MOST_EVENTS, left, *first, how.threads, known, shared, guide
+            )
 
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
+        image = None if scattered is None else scattered[number]
+        before = 0.0 if images is None else images.seconds
         while passes.done < wanted:
-            sum_, _, deviation = look(passes.done, survey)
-            passes.add(sum_, deviation)
+            sum_, chance, deviation, *met = look(passes.done, survey)
+            passes.add(sum_, chance, deviation, *met)
             gathered.append(blocks(sum_))
             done += how.paths * screen.columns * screen.rows
             if progress is not None:
                 progress(done)
-            if passes.done == wanted and how.until is not None:
-                wanted = passes.wanted(how.until, most)
+            if passes.done == wanted:
+                if images is not None:
+                    # Rays forwards keep their number for each line of sight.
+                    images.trace(-(-passes.done // how.passes))
+                    image = images.seen(number)
+                if how.until is not None:
+                    wanted = passes.wanted(how.until, most, image)
         paths = how.paths * passes.done
-        told = [f"{paths:,} lines of sight per pixel, in {passes.done} independent passes", *passes.notes(how.until)]
+        told = [
+            f"{paths:,} lines of sight per pixel, in {passes.done} independent passes",
+            *passes.notes(how.until, image),
+        ]
         if survey is not None and survey.patches()[0]:
             told.append(comparison_note(gathered, [look(FIRST_CHECK + i, None)[0] for i in range(CHECKS)]))
-        if image is None and not passes.lit:
+        values, error = passes.total(image)
+        if not values.any():
             told.append("the map is dark")
-        values, error = passes.mean, passes.standard_error
         if image is not None:
-            values, error = values + image.values, np.hypot(error, image.error)
             told.append(image.note)
+        if images is not None:
+            spent = images.seconds - before
+            rest = time.perf_counter() - started - spent
+            told[-1] += f": {(spent + forward.seconds) / (spent + forward.seconds + rest):.0%} of the time"
         maps.append(
             LuminanceMap(
                 values * MM2_PER_M2,
@@ -191,29 +178,51 @@ def look_at_scene(
     return maps
 
 
-def _light_images(compiled: Compiled, views: list[_core._View], how: Looking) -> Sequence[Forward | None]:
-    """What each observer sees of light that lines of sight do not find: luminance of the pixels and its standard error.
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Forward:
+    """The part of rays forwards in a map: their plan, what they show, and how they share light with lines of sight."""
 
-    It reaches a diffuse surface through smooth ones, or comes from a beam; from the surface, or over other diffuse ones,
-    it gets to the eye directly.
-    """
-    if how.forward_rays is None:
-        return [None] * len(views)
-    detectors = [{"kind": "image", "view": view, "complement": True} for view in views]
-    core = _core.Scene({**compiled.record, "detectors": detectors})
-    rays = int(how.forward_rays)
-    batches = -(-rays // _core.batch_size())
-    dealing = Dealing.of(compiled.record["sources"], rays)
-    sums: list[CellSums] = []
-    begun = None
-    for first in range(0, batches, ROUND):
-        last = min(first + ROUND, batches)
-        harvest = _core.trace_batches(core, rays, how.seed, MOST_EVENTS, first, last, how.threads, begun)
-        cells, begun = harvest["cells"], harvest["open_units"]
-        sums = [added(*pair) for pair in zip(sums, cells, strict=True)] if sums else cells
-    note = f"{rays:,} rays forwards, for light that smooth surfaces or beams send to diffuse ones"
-    found = zip(sums, views, strict=True)
-    return [Forward.of(s, (v["rows"], v["columns"]), dealing, rays, 1.0, note) for s, v in found]
+    plan: Plan
+    images: LightImages | None
+    shared: float | None
+    possible: bool
+    seconds: float
+    """What the plan took [s]."""
+
+    def notes(self, how: Looking) -> list[str]:
+        """What is left to lines of sight, that these find by chance only."""
+        if not self.possible or self.images is not None:
+            return []
+        if how.forward_rays == 0:
+            note = (
+                "no rays forwards, as forward_rays is 0: light that smooth surfaces send to diffuse ones is found by "
+                "chance only, and where it is not found the map is too low and its error too small"
+            )
+        else:
+            note = (
+                f"none of {self.plan.beforehand:,} rays forwards sent light through smooth surfaces to diffuse ones that "
+                "are seen directly; what there is of it, lines of sight find by chance"
+            )
+        return [note]
+
+
+def _forward(
+    core: _core.Scene, compiled: Compiled, views: list[_core._View], how: Looking, *, wanted: bool
+) -> _Forward:
+    """Rays forwards as the scene asks for them, or the user; none where lines of sight find all light well."""
+    started = time.perf_counter()
+    possible = core.may_focus()
+    if not possible or how.forward_rays == 0:
+        return _Forward(Plan(0, None, 0), None, None, possible, 0.0)
+    lines = how.paths * how.passes
+    asked = None if how.forward_rays is None and wanted else int(how.forward_rays or 0)
+    found = plan(compiled.record, views, how.seed, MOST_EVENTS, lines, asked, how.threads)
+    images, shared = None, None
+    if found.rays and wanted:
+        # Where lines of sight end at patches, these do not tell what they hold of each source.
+        shared = None if how.gather else found.rays / lines
+        images = LightImages(compiled.record, views, found, shared, how.seed, MOST_EVENTS, how.threads)
+    return _Forward(found, images, shared, possible, time.perf_counter() - started)
 
 
 class _Passes:
@@ -221,56 +230,94 @@ class _Passes:
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self.done = 0
-        self.mean = np.zeros(shape)
-        self._spread = np.zeros(shape)
+        self._all = _Spread(shape)
+        self._chance = _Spread(shape)
+        self._lucky = np.zeros(shape, dtype=np.int64)
+        self._smooth = np.zeros(shape, dtype=bool)
+        self._diffuse = np.zeros(shape, dtype=bool)
         self._deviation = np.zeros(shape)
 
-    def add(self, values: Array, deviation: Array) -> None:
-        """One pass more: its mean luminances, and the deviation that sources state of theirs."""
+    def add(self, values: Array, chance: Array, deviation: Array, smooth: Array, diffuse: Array) -> None:
+        """One pass more.
+
+        Its mean luminances, what of them was found by chance, the deviation that sources state of theirs, and the shares of
+        the lines that met a smooth surface first, and that saw a diffuse one directly.
+        """
         self.done += 1
-        off = values - self.mean
-        self.mean = self.mean + off / self.done
-        self._spread = self._spread + off * (values - self.mean)
+        self._all.add(values, self.done)
+        self._chance.add(chance, self.done)
+        self._lucky += chance > 0.0
+        self._smooth |= smooth > 0.0
+        self._diffuse |= diffuse > 0.0
         self._deviation = self._deviation + (deviation - self._deviation) / self.done
 
-    @property
-    def sampling_error(self) -> Array:
-        """Standard error of the mean, from the spread of the passes."""
-        error: Array = np.sqrt(self._spread / ((self.done - 1) * self.done))
-        return error
+    def total(self, image: Forward | None, *, known: bool = True) -> tuple[Array, Array]:
+        """The luminance of both routes and its standard error; with what the sources know of their own, if `known`.
 
-    @property
-    def standard_error(self) -> Array:
-        """With what the sources do not know of themselves."""
-        return np.hypot(self.sampling_error, self._deviation)
+        What is found by chance, in few passes of a pixel, errs by no less than in its neighbourhood.
+        """
+        chance = self._chance.variance(self.done)
+        variance = self._all.variance(self.done) + (at_least_nearby(chance, self._lucky, self._smooth) - chance)
+        values = self._all.mean
+        if image is not None:
+            values = values + image.values
+            variance = variance + image.with_neighbours(self._diffuse).error ** 2
+        return values, np.sqrt(variance + (self._deviation**2 if known else 0.0))
 
-    def relative_error(self) -> float:
+    def relative_error(self, image: Forward | None) -> float:
         """Median of the sampling error over the value, of pixels with light; 0 if there are none."""
-        lit = self.mean > 0.0
-        return float(np.median(self.sampling_error[lit] / self.mean[lit])) if lit.any() else 0.0
+        values, error = self.total(image, known=False)
+        lit = values > 0.0
+        return float(np.median(error[lit] / values[lit])) if lit.any() else 0.0
 
-    def wanted(self, until: float, most: int) -> int:
+    def wanted(self, until: float, most: int, image: Forward | None) -> int:
         """Passes that should be made to reach a relative error: as many as its fall with 1/√n asks for, twice at most."""
-        error = self.relative_error()
+        error = self.relative_error(image)
         if error < until:
             return self.done
         return min(most, 2 * self.done, max(self.done + 1, math.ceil(1.1 * self.done * (error / until) ** 2)))
 
-    @property
-    def lit(self) -> bool:
-        """Whether any line of sight met light."""
-        return bool((self.mean > 0.0).any())
-
-    def notes(self, until: float | None) -> list[str]:
+    def notes(self, until: float | None, image: Forward | None) -> list[str]:
         """How sure the map is."""
-        lit = self.mean > 0.0
+        values, error = self.total(image)
+        lit = values > 0.0
+        notes = [] if (self._all.mean > 0.0).any() else ["no line of sight met light"]
         if not lit.any():
-            return ["no line of sight met light"]
-        total = float(np.median(self.standard_error[lit] / self.mean[lit]))
-        notes = [f"median relative standard error {total:.2%} of the pixels with light"]
-        if until is not None and self.relative_error() >= until:
+            return notes
+        notes.append(
+            f"median relative standard error {np.median(error[lit] / values[lit]):.2%} of the pixels with light; "
+            f"that of lines of sight has {self.done - 1} degrees of freedom"
+        )
+        if until is not None and self.relative_error(image) >= until:
             notes.append(f"stopped before {until:.2%} was reached, at {MOST_TIMES} times rays_per_pixel")
+        rare = (self._lucky > 0) & (self._lucky < self.done / 2)
+        if rare.any():
+            part = float(self._chance.mean.sum() / values.sum())
+            largest = np.unravel_index(np.argmax(np.where(rare, self._chance.mean, 0.0)), values.shape)
+            row, column = (int(i) for i in largest)
+            notes.append(
+                f"{part:.2%} of the light was found by chance, behind lenses or in mirrors; pixels where fewer than half "
+                f"of the passes found any: {int(rare.sum()):,}, most in row {row}, column {column} (from 0); single ones "
+                "may err by more than their errors say"
+            )
         return notes
+
+
+class _Spread:
+    """Mean of passes, and the sum of the squares of what they differ from it."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.mean = np.zeros(shape)
+        self._squares = np.zeros(shape)
+
+    def add(self, values: Array, number: int) -> None:
+        off = values - self.mean
+        self.mean = self.mean + off / number
+        self._squares = self._squares + off * (values - self.mean)
+
+    def variance(self, passes: int) -> Array:
+        """Of the mean."""
+        return self._squares / ((passes - 1) * passes)
 
 
 def with_fields(scene: Scene, threads: int | None = None, *, cache: bool = True) -> tuple[Scene, list[str]]:
@@ -324,12 +371,16 @@ def _unseen(compiled: Compiled, *, forwards: bool) -> list[str]:
     notes = []
     if names["point"]:
         notes.append(
-            f"{', '.join(names['point'])}: a point has no finite luminance and is not seen itself"
-            + ("" if forwards else "; what it lights through lenses and mirrors is seen with forward_rays only")
+            f"{', '.join(names['point'])}: a point has no finite luminance and is not seen itself; what it lights through "
+            + (
+                "lenses and mirrors is seen directly, not through or in others"
+                if forwards
+                else "lenses and mirrors is not seen"
+            )
         )
     if names["beam"]:
         notes.append(
-            f"{', '.join(names['beam'])}: parallel light is met by no line of sight and is not seen itself"
-            + ("" if forwards else "; what it lights is seen with forward_rays only")
+            f"{', '.join(names['beam'])}: parallel light is met by no line of sight and is not seen itself; what it lights "
+            + ("is seen directly, not through lenses or in mirrors" if forwards else "is not seen")
         )
     return notes

@@ -23,6 +23,9 @@ pub struct Rider {
     pub scattered: bool,
     /// Whether the reverse tracer does not find it, or leaves it to the light image.
     pub unseen: bool,
+    /// Luminance of the source where it started, over the flux of all sources \[1/(mm² sr)\], if a detector asks for it; ∞ if
+    /// lines of sight cannot meet it.
+    pub brightness: f64,
     /// How often the kept events can be thinned before those of this ray are dropped.
     pub depth: u32,
 }

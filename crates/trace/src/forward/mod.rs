@@ -20,6 +20,7 @@ use etendue_geometry::batch::BLOCK;
 use etendue_geometry::lines::NONE;
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_math::Vec3;
+use etendue_optics::source::Lantern;
 use etendue_sampling::ordered::BATCH;
 use etendue_sampling::philox::{Pairs, fill_pairs};
 use rayon::prelude::*;
@@ -31,6 +32,7 @@ use crate::kept::depth;
 use crate::ledger::Fate;
 use crate::meeting::{Fillings, Loss};
 use crate::scene::Scene;
+use crate::sharing::Brightness;
 use crate::start::place_near;
 
 use bounce::{Bouncer, Gathered, bouncers};
@@ -52,6 +54,8 @@ pub struct Run<'a> {
     pub sets: &'a [&'a dyn RaySource],
     /// Set by whoever wants the work to end at once; what it returns is then worth nothing.
     pub stop: Option<&'a AtomicBool>,
+    /// What each source needs to be seen; none are needed unless a light image shares light with lines of sight.
+    pub lanterns: &'a [Option<Lantern>],
 }
 
 impl Run<'_> {
@@ -218,6 +222,10 @@ impl<'a> Walk<'a> {
     fn begin(&mut self, births: &RayBatch, number: usize, start: u64) {
         let (scene, run) = (self.scene, self.run);
         let (source, near) = (&scene.sources[number], &scene.near[number]);
+        let total = scene.sources.iter().map(|s| s.flux).sum();
+        let lantern = run.lanterns.get(number).and_then(Option::as_ref);
+        let shared = scene.detectors.iter().any(Detector::shares);
+        let brightness = shared.then(|| Brightness::new(source, lantern, total));
         let keeps = scene.detectors.iter().any(|d| matches!(d, Detector::Events { .. }));
         let n = births.len;
         self.out.ledger.emitted[number].add_all(&births.flux[..n]);
@@ -233,6 +241,7 @@ impl<'a> Walk<'a> {
                 ray,
                 scattered: false,
                 unseen: !source.is_visible(),
+                brightness: brightness.map_or(f64::INFINITY, |b| b.at(births.position(i), births.direction(i))),
                 depth: if keeps { depth(run.seed, ray) } else { 0 },
             }
         }));

@@ -5,9 +5,10 @@ use std::f64::consts::PI;
 use etendue_math::Vec3;
 use etendue_optics::finish::Incidence;
 
-use crate::detector::{Detector, illuminance_cell};
+use crate::detector::{Detector, Portion, illuminance_cell};
 use crate::exitance::Place;
 use crate::eye::Event;
+use crate::guide::Arrival;
 use crate::harvest::{Record, Yield};
 use crate::meeting::Meeting;
 use crate::scene::Scene;
@@ -40,10 +41,21 @@ impl Walk<'_> {
         let event = Event::new(meeting, finish, d, [rider.flux, rider.wavelength], rider.ray);
         for (number, detector) in self.scene.detectors.iter().enumerate() {
             match detector {
-                Detector::Image { view, complement } if rider.unseen || !complement => {
-                    if let Some((pixel, light)) = event.seen(self.scene, view, &mut self.fillings) {
-                        self.out.marks[number].push((pixel, rider.ray, light));
+                Detector::Image { view, portion } if rider.unseen || *portion == Portion::Whole => {
+                    if let Some((pixel, light, density)) = event.seen(self.scene, view, &mut self.fillings) {
+                        let share = match portion {
+                            Portion::Shared(sharing) => sharing.forwards(density, rider.brightness),
+                            Portion::Whole | Portion::Unseen => 1.0,
+                        };
+                        self.out.marks[number].push((pixel, rider.ray, light * share));
                     }
+                }
+                Detector::Arrivals if rider.unseen && !rider.scattered && rider.brightness.is_finite() => {
+                    self.out.arrivals.push(Arrival {
+                        face: meeting.face,
+                        point: meeting.point,
+                        towards: -d,
+                    });
                 }
                 Detector::Exitance(patches) => {
                     for through in [false, true] {
@@ -97,6 +109,7 @@ pub fn detect(scene: &Scene, out: &mut Yield, detector: u32, point: Vec3, d: Vec
         Detector::Escapes
         | Detector::Intensity(_)
         | Detector::Image { .. }
+        | Detector::Arrivals
         | Detector::Exitance(_)
         | Detector::Events { .. } => {}
     }

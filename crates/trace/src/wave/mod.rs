@@ -30,7 +30,7 @@ const PURPOSE_SHIFT: u64 = 0x5348_4946;
 const PURPOSE_PATH: u64 = 0x5041_5448;
 
 /// Chains of smooth surfaces are followed on every branch down to this weight; below, one branch is drawn.
-const SPLIT: f64 = 1e-3;
+const SPLIT: f64 = 1e-4;
 
 /// Diffuse scatters before a path may be ended by chance.
 const SURE: u32 = 3;
@@ -58,8 +58,12 @@ struct Branch {
     travelled: f64,
     events: u32,
     scatters: u32,
+    /// Whether one of several smooth ways was drawn.
+    drawn: bool,
     /// Whether the eye sees the first diffuse surface directly.
     direct: bool,
+    /// Density by area with which lines of sight meet that surface there \[1/mm²\].
+    density: f64,
 }
 
 /// One path: its random numbers, its wavelength, and the light that it has found, with its deviation.
@@ -69,6 +73,10 @@ struct Path {
     /// Its pass, counted from the first of those that are made.
     pass: usize,
     sum: [f64; 2],
+    /// Of the light, that which was found by chance.
+    chance: f64,
+    /// Whether it met a smooth surface first, and whether it saw a diffuse one directly.
+    met: [bool; 2],
 }
 
 /// A connection of a diffuse surface to a source, that counts if nothing is in between.
@@ -86,7 +94,7 @@ pub const BLOCK: usize = 1024;
 pub struct Wave<'a> {
     lit: &'a Lit<'a>,
     view: &'a View,
-    method: &'a Method,
+    method: &'a Method<'a>,
     /// The light of diffuse surfaces, for each pass, if it is known.
     known: &'a [Exitance<'a>],
     fillings: Fillings,
@@ -111,7 +119,7 @@ pub struct Wave<'a> {
 
 impl<'a> Wave<'a> {
     /// An empty block.
-    pub fn new(lit: &'a Lit<'a>, view: &'a View, method: &'a Method, known: &'a [Exitance<'a>]) -> Self {
+    pub fn new(lit: &'a Lit<'a>, view: &'a View, method: &'a Method<'a>, known: &'a [Exitance<'a>]) -> Self {
         Self {
             lit,
             view,
@@ -138,7 +146,7 @@ impl<'a> Wave<'a> {
     pub fn paint(&mut self, first: usize, passes: Range<u32>, pixels: &mut [Pixel]) {
         let paths = self.method.paths as usize;
         let share = 1.0 / f64::from(self.method.paths);
-        let mut cells = vec![[0.0; 2]; pixels.len() * passes.len()];
+        let mut cells = vec![[0.0; 5]; pixels.len() * passes.len()];
         let total = cells.len() * paths;
         let mut shift = (usize::MAX, [0.0; DIMENSIONS]);
         let mut begin = 0;
@@ -160,15 +168,22 @@ impl<'a> Wave<'a> {
             self.follow();
             for (flat, path) in (begin..end).zip(&self.paths) {
                 let cell = &mut cells[flat / paths];
-                *cell = [cell[0] + path.sum[0] * share, cell[1] + path.sum[1] * share];
+                let [smooth, diffuse] = path.met.map(|met| if met { 1.0 } else { 0.0 });
+                for (sum, value) in cell
+                    .iter_mut()
+                    .zip([path.sum[0], path.sum[1], path.chance, smooth, diffuse])
+                {
+                    *sum += value * share;
+                }
             }
             begin = end;
         }
         for (pixel, means) in pixels.iter_mut().zip(cells.chunks(passes.len().max(1))) {
-            for [mean, deviation] in means {
+            for [mean, deviation, chance, smooth, diffuse] in means {
                 pixel.sum += mean;
-                pixel.squares += mean * mean;
+                pixel.chance += chance;
                 pixel.deviation += deviation;
+                pixel.met = [pixel.met[0] + smooth, pixel.met[1] + diffuse];
             }
         }
     }
@@ -196,6 +211,8 @@ impl<'a> Wave<'a> {
             line: 0,
             pass: made as usize,
             sum: [0.0; 2],
+            chance: 0.0,
+            met: [false; 2],
         });
         let Path { numbers, line, .. } = &mut self.paths[path as usize];
         let columns = u64::from(view.columns);
@@ -220,7 +237,9 @@ impl<'a> Wave<'a> {
                 travelled: 0.0,
                 events: 0,
                 scatters: 0,
+                drawn: false,
                 direct: true,
+                density: 0.0,
             });
         }
     }
@@ -309,18 +328,23 @@ impl<'a> Wave<'a> {
             };
             lantern.mark(source, sights, &mut self.marks);
             for (i, branch) in self.branches.iter().enumerate().filter(|(i, _)| self.marks[*i]) {
-                if branch.seen == Seen::Caustic && self.method.left == Left::Caustics && branch.direct {
+                let caustic = branch.seen == Seen::Caustic && branch.direct;
+                if caustic && self.method.left == Left::Caustics {
                     continue;
                 }
                 let (o, d) = (self.lines.origin(i), self.lines.direction(i));
                 let path = &mut self.paths[branch.path as usize];
                 let (_, wavelength, colour) = &self.lit.lines[path.line];
-                let (sum, fillings) = (&mut path.sum, &mut self.fillings);
+                let (sum, chance, fillings) = (&mut path.sum, &mut path.chance, &mut self.fillings);
+                let rare = branch.drawn && !branch.direct;
                 lantern.along(source, o, d, self.reach[i], |lit| {
                     let mut weight = branch.weight * colour[number];
                     let absorption = fillings.at(scene, branch.inside.top(), *wavelength).absorption;
                     if absorption > 0.0 {
                         weight *= (-absorption * lit.t).exp();
+                    }
+                    if let (true, Left::Shared(sharing)) = (caustic, self.method.left) {
+                        weight *= 1.0 - sharing.forwards(branch.density, lit.luminance / self.lit.flux);
                     }
                     if let Seen::Diffuse { density, all } = branch.seen {
                         let distance = branch.travelled + lit.t;
@@ -330,6 +354,9 @@ impl<'a> Wave<'a> {
                     }
                     sum[0] += weight * lit.luminance;
                     sum[1] += weight * lit.deviation;
+                    if rare {
+                        *chance += weight * lit.luminance;
+                    }
                 });
             }
         }
@@ -367,7 +394,7 @@ impl<'a> Wave<'a> {
         } else {
             Seen::Caustic
         };
-        let go = |wave: &mut Self, transmitted: bool, weight: f64| {
+        let go = |wave: &mut Self, transmitted: bool, weight: f64, drawn: bool| {
             let d = if transmitted {
                 meeting.refracted(d, cosine, n1 / n2, across)
             } else {
@@ -377,21 +404,27 @@ impl<'a> Wave<'a> {
                 inside: if transmitted { meeting.after } else { meeting.before },
                 weight,
                 seen,
+                drawn: branch.drawn || drawn,
                 direct: branch.direct && branch.scatters > 0,
                 ..*branch
             };
             wave.push(meeting, d, branch);
         };
+        if branch.seen == Seen::Smooth {
+            let met = &mut self.paths[branch.path as usize].met;
+            met[0] |= smooth != [0.0; 2];
+            met[1] |= branch.direct && finish.is_diffuse();
+        }
         let diffuse = finish.is_diffuse() && !self.end(branch, meeting, finish);
         // Chains of smooth surfaces branch; everything else is drawn.
         if branch.seen == Seen::Smooth && branch.weight > SPLIT {
             for (transmitted, share) in [(false, smooth[0]), (true, smooth[1])] {
                 if share > 0.0 {
-                    go(self, transmitted, branch.weight * share);
+                    go(self, transmitted, branch.weight * share, false);
                 }
             }
             if diffuse {
-                self.scatter(branch, meeting, finish, [n1, n2], 1.0);
+                self.scatter(branch, d, meeting, finish, [n1, n2], 1.0);
             }
             return;
         }
@@ -412,11 +445,11 @@ impl<'a> Wave<'a> {
         let number = number * total / alive;
         let boost = total / alive;
         if number < shares[0] {
-            go(self, false, branch.weight * boost);
+            go(self, false, branch.weight * boost, true);
         } else if number < shares[0] + shares[1] {
-            go(self, true, branch.weight * smooth[1] / shares[1] * boost);
+            go(self, true, branch.weight * smooth[1] / shares[1] * boost, true);
         } else if diffuse {
-            self.scatter(branch, meeting, finish, [n1, n2], boost / scattered);
+            self.scatter(branch, d, meeting, finish, [n1, n2], boost / scattered);
         }
     }
 }

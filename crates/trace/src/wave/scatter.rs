@@ -4,16 +4,38 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use etendue_geometry::assembly::{Hits, TIE};
+use etendue_math::Vec3;
 use etendue_optics::finish::{Finish, Incidence};
 use etendue_optics::source::surface::about;
 
 use super::{Branch, Connection, Seen, Wave};
 use crate::exitance::Place;
+use crate::guide::{Guide, Leaf, SHARE};
 use crate::meeting::{Meeting, transmittance};
 use crate::reverse::Left;
+use crate::sharing::density;
 
 /// Sources up to this number are all connected to at the first diffuse scatter; of more, one is drawn by its flux.
 const FEW: usize = 8;
+
+/// How the directions are spread in which paths go on from a diffuse surface.
+struct Spread<'a> {
+    /// Shares of those that go on in front of the surface and behind it, by the cosine law.
+    chances: [f64; 2],
+    /// Directions that light is known to come from.
+    guide: Option<(&'a Guide, &'a Leaf)>,
+}
+
+impl Spread<'_> {
+    /// Density of a direction \[1/sr\] on a side of the surface, at an angle to its normal with this cosine.
+    #[inline]
+    fn density(&self, d: Vec3, through: bool, cosine: f64) -> f64 {
+        let even = self.chances[usize::from(through)] * cosine * FRAC_1_PI;
+        self.guide.map_or(even, |(guide, leaf)| {
+            (1.0 - SHARE) * even + SHARE * guide.density(leaf, d)
+        })
+    }
+}
 
 impl Wave<'_> {
     /// Takes what a diffuse surface is known to send back along the branch; false if that is not known.
@@ -39,7 +61,15 @@ impl Wave<'_> {
 
     /// A diffuse scatter: connections to sources, and one direction that is drawn. `boost` makes up for the chance that
     /// it came to this.
-    pub(super) fn scatter(&mut self, branch: &Branch, meeting: &Meeting, finish: &Finish, n: [f64; 2], boost: f64) {
+    pub(super) fn scatter(
+        &mut self,
+        branch: &Branch,
+        d: Vec3,
+        meeting: &Meeting,
+        finish: &Finish,
+        n: [f64; 2],
+        boost: f64,
+    ) {
         if self.method.left == Left::Scattered && branch.direct && branch.scatters == 0 {
             return;
         }
@@ -64,39 +94,63 @@ impl Wave<'_> {
         }
         let chances = sides.map(|side| side / total);
         let all = branch.scatters == 0 && self.lit.scene.sources.len() <= FEW;
-        let branch = Branch {
+        let mut branch = Branch {
             weight: branch.weight * boost,
             ..*branch
         };
+        if branch.scatters == 0 && branch.direct {
+            branch.density = density(self.view, d, branch.travelled, d.dot(meeting.side));
+        }
         // The direction has the first numbers, which are the most evenly spread; a side is drawn only where there are two.
         let numbers = &mut self.paths[branch.path as usize].numbers;
         let (turn, height) = (numbers.draw(), numbers.draw());
         let through = chances[1] > 0.0 && numbers.draw() >= chances[0];
-        self.reach_out(&branch, meeting, finish, n, chances, all);
+        // What the eye sees directly is left to rays traced forwards; the rest is looked for where they came from.
+        let guide = self.method.guide.filter(|_| !branch.direct);
+        let guide = guide.and_then(|guide| Some((guide, guide.near(meeting.face, meeting.point)?)));
+        let spread = Spread { chances, guide };
+        let guided = guide.and_then(|(guide, leaf)| {
+            let numbers = &mut self.paths[branch.path as usize].numbers;
+            let number = numbers.draw() / SHARE;
+            (number < 1.0).then(|| guide.draw(leaf, [number, height, turn]))
+        });
+        self.reach_out(&branch, meeting, finish, n, &spread, all);
 
-        let chance = chances[usize::from(through)];
-        let normal = if through { -meeting.side } else { meeting.side };
-        let cosine = (1.0 - height).sqrt();
+        let (d, through, cosine) = guided.map_or_else(
+            || {
+                let cosine = (1.0 - height).sqrt();
+                let normal = if through { -meeting.side } else { meeting.side };
+                (about(normal, cosine, turn), through, cosine)
+            },
+            |d| {
+                let height = d.dot(meeting.side);
+                (d, height < 0.0, height.abs())
+            },
+        );
         let light = Incidence {
             cosine,
             wavelength,
             n1: if through { n2 } else { n1 },
             n2: if through { n1 } else { n2 },
         };
-        let share = PI * finish.bsdf(&light, through);
+        let density = spread.density(d, through, cosine);
+        let share = if guide.is_some() {
+            finish.bsdf(&light, through) * cosine / density
+        } else {
+            // The cosine cancels.
+            PI * finish.bsdf(&light, through) / chances[usize::from(through)]
+        };
         if share > 0.0 {
             let next = Branch {
                 inside: if through { meeting.after } else { meeting.before },
-                weight: branch.weight * share / chance,
-                seen: Seen::Diffuse {
-                    density: chance * cosine * FRAC_1_PI,
-                    all,
-                },
+                weight: branch.weight * share,
+                seen: Seen::Diffuse { density, all },
+                drawn: false,
                 travelled: 0.0,
                 scatters: branch.scatters + 1,
                 ..branch
             };
-            self.push(meeting, about(normal, cosine, turn), next);
+            self.push(meeting, d, next);
         }
     }
 
@@ -107,7 +161,7 @@ impl Wave<'_> {
         meeting: &Meeting,
         finish: &Finish,
         [n1, n2]: [f64; 2],
-        chances: [f64; 2],
+        spread: &Spread<'_>,
         all: bool,
     ) {
         let scene = self.lit.scene;
@@ -148,7 +202,7 @@ impl Wave<'_> {
             let mut share = branch.weight * colour[number] * bsdf * cosine / picked;
             if beacon.density.is_finite() {
                 let mine = picked * beacon.density;
-                share *= mine / (mine + chances[usize::from(through)] * cosine * FRAC_1_PI);
+                share *= mine / (mine + spread.density(k, through, cosine));
             }
             self.shadows.push(meeting.point, k, meeting.leaving);
             self.connections.push(Connection {

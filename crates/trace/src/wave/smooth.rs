@@ -150,6 +150,9 @@ impl Wave<'_> {
                 continue;
             }
             let branch = &mut self.branches[*i as usize];
+            if branch.seen == Seen::Smooth {
+                self.paths[branch.path as usize].met[0] = true;
+            }
             branch.events += 1;
             branch.travelled += room.t[k];
             branch.direct &= branch.scatters > 0;
@@ -162,6 +165,7 @@ impl Wave<'_> {
             }
             if branch.seen != Seen::Smooth || branch.weight <= SPLIT {
                 // One of both ways is drawn by its share of the flux; radiance carries its factor (n₁/n₂)² besides.
+                branch.drawn = true;
                 let number = self.paths[branch.path as usize].numbers.draw();
                 let mirrored = number < room.shares[0][k];
                 let ratio = n[0] / n[1];

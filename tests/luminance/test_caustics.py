@@ -1,0 +1,157 @@
+"""Light that smooth surfaces send to diffuse ones, in maps by default: seeds against a long run, and a closed form."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from etendue import _core
+from etendue.luminance.caustics import at_least_nearby
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.scene import compile_scene
+from oracles.luminaires import corner, lens_and_mirror
+from oracles.verdicts import LARGEST_Z, REVERSE, SIGNIFICANCE, assert_agree
+from scipy.stats import binom, chi2, norm, t
+
+SEEDS = 12
+WHITE = {"kind": "lambertian", "reflectance": 1.0}
+
+
+def ball_over_paper() -> dict[str, Any]:
+    """A glass ball throws a lamp's light on paper; the lamp is so large that no pixel misses its image in the ball."""
+    return {
+        "sources": [{"kind": "surface", "shape": {"kind": "disk", "radius": 1.5}, "flux": 100, "at": [4, 2, 30],
+                     "toward": [-0.1, -0.05, -1]}],
+        "solids": [{"shape": {"kind": "ball", "radius": 5}, "medium": "BK7", "at": [1, 0.5, 10]}],
+        "surfaces": [{"shape": {"kind": "rectangle", "width": 40, "height": 34}, "finish": {"kind": "lambertian",
+                      "reflectance": 0.8}}],
+        "observers": [{"name": "eye", "theta": 55, "phi": 20, "distance": 300,
+                       "screen": {"width": 30, "height": 18, "columns": 15, "rows": 9}}],
+    }  # fmt: skip
+
+
+SCENES = {"ball over paper": ball_over_paper(), "lens and mirror": lens_and_mirror()}
+
+
+@functools.cache
+def long_run(name: str) -> LuminanceMap:
+    (lmap,) = et.luminance_map(et.Scene(**SCENES[name]), rays_per_pixel=1 << 13, seed=1 << 40, forward_rays=1.5e6)
+    return lmap
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_default_maps_are_unbiased_with_errors_that_hold(name: str) -> None:
+    """Of 12 seeds: the light of each map, and of their mean, is that of the long run; in the bulk of the pixels no error is
+    too small; and 1 % of the pixels at most, where a few lines of sight found a lamp behind glass, is off by 4 errors."""
+    scene, truth = et.Scene(**SCENES[name]), long_run(name)
+    maps = [et.luminance_map(scene, rays_per_pixel=64, seed=seed)[0] for seed in range(1, SEEDS + 1)]
+    light = np.array([lmap.values.sum() for lmap in maps])
+    error = np.array([math.sqrt((lmap.standard_error**2).sum()) for lmap in maps])
+    known = math.sqrt((truth.standard_error**2).sum())
+    z = (light - truth.values.sum()) / np.hypot(error, known)
+    assert chi2.sf((z**2).sum(), SEEDS) > SIGNIFICANCE
+    mean = (light.mean() - truth.values.sum()) / math.hypot(light.std(ddof=1) / math.sqrt(SEEDS), known)
+    assert abs(mean) < t.isf(SIGNIFICANCE / 2, SEEDS - 1)
+    # An error of 5 % would be seen.
+    assert np.hypot(light.std(ddof=1) / math.sqrt(SEEDS), known) < 0.05 * truth.values.sum() / 5.5
+    off = np.array([lmap.values - truth.values for lmap in maps])
+    sure = np.hypot([lmap.standard_error for lmap in maps], truth.standard_error)
+    assert (sure[:, truth.values > 0] > 0).all()
+    deviates = np.abs(off[sure > 0] / sure[sure > 0])
+    for bound in (1.0, 2.0):
+        beyond, expected = (deviates > bound).sum(), 2 * t.sf(bound, REVERSE)
+        assert binom.sf(beyond - 1, deviates.size, expected) > SIGNIFICANCE, (bound, beyond / deviates.size)
+    assert (deviates > 4.0).mean() < 0.01
+
+
+def test_a_lens_over_a_white_floor_in_an_even_surround() -> None:
+    """What the lens takes from the floor it gives elsewhere: L ≡ 1 in every pixel, whichever route has which light. Rays
+    forwards alone could not show it: nearly none of them meets the lens."""
+    sky = {"kind": "surface", "shape": {"kind": "sphere", "radius": 50}, "side": "back",
+           "flux": math.pi * 4 * math.pi * 50**2}  # fmt: skip
+    lens = {"shape": {"kind": "ball", "radius": 2.5}, "medium": "BK7", "at": [3, 2, 3.5]}
+    leaf = {"shape": {"kind": "rectangle", "width": 30, "height": 24}, "finish": WHITE}
+    scene = et.Scene(sources=[sky], solids=[lens], surfaces=[leaf])
+    eye, screen = et.Observer(40, 15, 40, target=(3, 2, 2)), et.Screen(12, 10, 6, 5)
+    for rays in (None, 3e5):
+        lmap = et.luminance_map(scene, eye, screen, rays_per_pixel=512, seed=3, forward_rays=rays)
+        assert np.median(lmap.standard_error) < 0.02e6
+        noisy = lmap.standard_error > 1.0
+        assert np.allclose(lmap.values[~noisy], 1e6, rtol=1e-6)
+        assert_agree(
+            values=lmap.values[noisy],
+            expected=1e6,
+            standard_error=lmap.standard_error[noisy],
+            degrees=REVERSE,
+        )
+
+
+def test_the_same_bits_for_any_number_of_threads() -> None:
+    scene = et.Scene(**ball_over_paper())
+    maps = [et.luminance_map(scene, rays_per_pixel=32, seed=2, until=0.2, threads=n)[0] for n in (1, 2, 7)]
+    for other in maps[1:]:
+        assert np.array_equal(maps[0].values, other.values)
+        assert np.array_equal(maps[0].standard_error, other.standard_error)
+
+
+def test_both_routes_go_on_until_the_error_is_reached() -> None:
+    """The floor beside the lens is noisy by rays forwards, what the lens shows by lines of sight."""
+    scene = et.Scene(**ball_over_paper())
+
+    def error(lmap: LuminanceMap) -> float:
+        lit = lmap.values > 0
+        return float(np.median(lmap.standard_error[lit] / lmap.values[lit]))
+
+    (first,) = et.luminance_map(scene, rays_per_pixel=16)
+    wanted = 0.4 * error(first)
+    (more,) = et.luminance_map(scene, rays_per_pixel=16, until=wanted)
+    assert error(more) < wanted
+    assert more.rays[0, 0] > 16
+
+    def forwards(lmap: LuminanceMap) -> int:
+        (note,) = (note for note in lmap.notes if "rays forwards, and" in note)
+        assert "% of the time" in note
+        return int(note.split()[0].replace(",", ""))
+
+    # Rays come in whole runs, one for every 16 passes or fewer.
+    assert forwards(more) == forwards(first) * -(-int(more.rays[0, 0]) // 16)
+
+
+def test_none_is_told_and_none_is_needed() -> None:
+    scene = et.Scene(**ball_over_paper())
+    (without,) = et.luminance_map(scene, rays_per_pixel=16, forward_rays=0)
+    assert any("forward_rays is 0" in note and "too low" in note for note in without.notes)
+    (asked,) = et.luminance_map(scene, rays_per_pixel=16, forward_rays=12_345)
+    assert any(note.startswith("12,345 rays forwards") for note in asked.notes)
+    plain = et.Scene(**corner())
+    assert not _core.Scene({**compile_scene(plain).record, "detectors": []}).may_focus()
+    (lmap,) = et.luminance_map(plain, rays_per_pixel=16)
+    assert not any("forwards" in note for note in lmap.notes)
+
+
+def test_a_pixel_that_found_nothing_errs_as_its_neighbours() -> None:
+    """Poisson counts of one mean μ, a weight of 2 each: (2 N − 2 μ)² is what the variances say, on average, and no pixel is
+    sure of nothing."""
+    rng = np.random.default_rng(5)
+    possible = np.ones((60, 50), dtype=bool)
+    for mean in (0.05, 0.7, 6.0, 40.0):
+        count = rng.poisson(mean, possible.shape)
+        own: npt.NDArray[np.float64] = 4.0 * count
+        held = at_least_nearby(own, count, possible)
+        assert (held > 0).all()
+        assert (held >= own).all()
+        assert np.array_equal(held[count >= 10], own[count >= 10])
+        # Means of a few squares of Poisson numbers are skew: a tenth for those of the rarest.
+        expected = 4.0 * mean
+        assert expected * (1 - 3.9 * math.sqrt(1 / (mean * count.size))) < held.mean() < 2.6 * expected
+        z = (2.0 * count - 2.0 * mean) / np.sqrt(held)
+        assert (np.abs(z) > 2).mean() < 2 * norm.sf(2) + LARGEST_Z * math.sqrt(0.05 / count.size)
+    dark = possible.copy()
+    dark[:30] = False
+    count = np.where(dark, 3, 0)
+    assert (at_least_nearby(count * 1.0, count, dark)[:30] == 0).all()
