@@ -179,6 +179,7 @@ WITHOUT_EXAMPLE = {
     "etendue.formats.hdf5": "how files of light fields and of traces are written and read",
     "etendue.luminance.looking": "luminance_map is the door",
     "etendue.luminance.scatter_map": "luminance_map is the door",
+    "etendue.luminance.caustics": "luminance_map is the door",
     "etendue.luminance.scene_map": "luminance_map is the door",
     "etendue.tracing.detections": "how TraceResult makes quantities of sums; its properties are the door",
     "etendue.tracing.ledger.Entry": "Ledger shows it",

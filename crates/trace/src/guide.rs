@@ -223,7 +223,7 @@ mod tests {
         let leaf = guide.near(1, Vec3::new(2.0, 1.0, 0.0)).expect("inside");
         // The mean of f/p over directions is ∫ f dω, for f with a closed form: 1, and a cap about another axis.
         let axis = Vec3::new(0.0, 0.6, 0.8);
-        let (n, mut sums) = (200_000_u32, [0.0; 4]);
+        let (n, mut sums) = (1_000_000_u32, [0.0; 4]);
         let stream = Stream::new(5, 6);
         for i in 0..n {
             let [a, b, c, _] = stream.uniforms(u64::from(i), 0);
