@@ -189,7 +189,6 @@ class Scene:
     def may_focus(self) -> bool:
         """Whether light can reach a diffuse surface in a way that lines of sight find by chance, or not at all."""
 
-
 @final
 class FarField:
     """Nodes of a far field [rad]: rows of γ, and the nodes C of each row."""

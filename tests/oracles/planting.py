@@ -25,8 +25,8 @@ def _sums(sums: tuple[Any, Any, Any], factor: float) -> tuple[tuple[Any, Any, An
 
 
 def _passes(sums: list[Any], factor: float) -> tuple[list[Any], bool]:
-    """Σ of means, of their squares and of deviations."""
-    return [sums[0] * factor, sums[1] * factor**2, sums[2] * factor], bool(sums[0].any())
+    """Σ of means, and whatever else is told of them."""
+    return [sums[0] * factor, *sums[1:]], bool(sums[0].any())
 
 
 def _harvest(harvest: Any, factor: float) -> tuple[Any, bool]:
