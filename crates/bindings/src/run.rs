@@ -60,11 +60,9 @@ pub fn stoppable<R: Send>(py: Python<'_>, work: impl FnOnce(&AtomicBool) -> R + 
                 result
             });
             while waiting.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
-                if failure.is_none()
-                    && let Err(error) = Python::attach(|py| py.check_signals())
-                {
-                    failure = Some(error);
-                    stop.store(true, Ordering::Relaxed);
+                if failure.is_none() {
+                    failure = Python::attach(|py| py.check_signals().err());
+                    stop.store(failure.is_some(), Ordering::Relaxed);
                 }
             }
             worker.join().unwrap_or_else(|panic| resume_unwind(panic))

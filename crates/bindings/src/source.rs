@@ -210,14 +210,14 @@ pub fn read_colours<'py>(
 
 /// The wavelengths of rays `start..stop` of a stream that have nothing but a spectrum in common \[nm\].
 #[pyfunction]
-pub fn draw_wavelengths<'py>(
-    py: Python<'py>,
+pub fn draw_wavelengths(
+    py: Python<'_>,
     wavelengths: Vec<f64>,
     shares: Vec<f64>,
     seed: u64,
     start: u64,
     stop: u64,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+) -> PyResult<Bound<'_, PyArray1<f64>>> {
     let lines = lines(wavelengths, &shares)?;
     let drawn = py.detach(|| etendue_optics::source::draw_wavelengths(&lines, seed, start..stop));
     Ok(PyArray1::from_vec(py, drawn))
