@@ -224,7 +224,7 @@ def test_a_folder_that_does_not_exist_is_refused_before_any_work(
         monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail("work was done"))
     outcome = run(*arguments)
     assert outcome.status == 1
-    assert "does not exist; create it first" in outcome.err
+    assert "does not exist. Create it first" in outcome.err
     assert files(tmp_path) == []
 
 
@@ -622,7 +622,7 @@ def test_ctrl_c_ends_long_work_with_status_130_and_no_file(tmp_path: Path) -> No
             seen += os.read(parent, 4096)
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
-        while b"stopped" not in seen:
+        while b"half-written" not in seen:
             seen += os.read(parent, 4096)
         out, _ = process.communicate(timeout=20)
     finally:

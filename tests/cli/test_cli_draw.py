@@ -79,7 +79,7 @@ def test_an_empty_scene_has_bounds_that_json_can_tell(run: Run, tmp_path: Path) 
         (("--window", "4,2,0,1"), 1, "left < right"),
         (("--sections", "y=0"), 2, "--section"),
         (("-o", "lamp.svg"), 1, "'.svg' is none of the known ones: .png, .pdf"),
-        (("-o", "nowhere/lamp.png"), 1, "the folder nowhere does not exist"),
+        (("-o", "nowhere/lamp.png"), 1, "the directory nowhere does not exist"),
     ],
 )
 def test_wrong_options_are_told(run: Run, tmp_path: Path, arguments: tuple[str, ...], status: int, told: str) -> None:

@@ -358,7 +358,7 @@ def test_intensity_of_a_field(run: Run, folder: Path, tmp_path: Path) -> None:
         (["fit", "{}/led.tm25ray", "-o", "a.h5", "--depths", "5,5,5,4.5"], 2, "4 whole numbers"),
         (["fit", "{}/led.tm25ray", "-o", "a.h5", "--threads", "0"], 2, "--threads"),
         (["fit", "{}/led.tm25ray", "-o", "a.npz"], 1, "'.npz' is none of the known ones: .h5"),
-        (["fit", "{}/led.tm25ray", "-o", "none/a.h5"], 1, "does not exist; create it first"),
+        (["fit", "{}/led.tm25ray", "-o", "none/a.h5"], 1, "does not exist. Create it first"),
         (["fit", "{}/led.tm25ray", "-o", "a.h5", "--report", "a.exe"], 1, ".png"),
         (["fit", "{}/led.tm25ray", "-o", "a.h5", "--surface", "plan:z=0"], 1, "'plane'"),
         (["fit", "{}/led.tm25ray", "-o", "a.h5", *GRID, "--symmetry", "mirorx"], 1, "'mirror-x'"),

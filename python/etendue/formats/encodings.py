@@ -36,7 +36,7 @@ def wide_encoding(head: bytes) -> tuple[str, int] | None:
 
     Examples
     --------
-    >>> wide_encoding("IES".encode("utf-16")), wide_encoding(b"\xff\xfe\0\1\2\3"), wide_encoding(b"IES")
+    >>> wide_encoding("IES".encode("utf-16")), wide_encoding(b"\xff\xfe\1\0\2\0"), wide_encoding(b"IES")
     (('utf-16-le', 2), None, None)
     """
     for mark, encoding in WIDE_MARKS.items():

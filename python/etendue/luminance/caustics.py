@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -258,11 +257,9 @@ class LightImages:
         # Luminance, its variance and the rays of each view, over all runs.
         self._sums = [np.zeros((3, view["rows"], view["columns"])) for view in views]
         self.runs = 0
-        self.seconds = 0.0
 
     def trace(self, runs: int) -> None:
         """Traces as many runs as are wanted, if they have not been yet."""
-        started = time.perf_counter()
         seed, most_events, threads = self._how
         rays = self._plan.rays
         batches = -(-rays // _core.batch_size())
@@ -279,7 +276,6 @@ class LightImages:
                 image = Forward.of(found, total.shape[1:], self._dealing, rays, 1.0, "")
                 np.add(total, [image.values, image.error**2, image.rays], out=total)
             self.runs += 1
-        self.seconds += time.perf_counter() - started
 
     def seen(self, number: int) -> Forward:
         """What the observer of this number sees of the runs so far."""

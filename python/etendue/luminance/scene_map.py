@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from collections.abc import Sequence
 from typing import Literal
 
@@ -122,7 +121,7 @@ def look_at_scene(
     origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
     maps, done = [], 0
     for number, ((observer, screen), view) in enumerate(zip(pairs, views, strict=True)):
-        passes, gathered, started = _Passes(screen.shape), [], time.perf_counter()
+        passes, gathered = _Passes(screen.shape), []
 
         def look(number: int, known: _core.Survey | None, view: _core._View = view) -> list[Array]:
             first, shared, guide = (number, number + 1), forward.shared, forward.plan.guide
@@ -132,7 +131,6 @@ def look_at_scene(
 
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
         image = None if scattered is None else scattered[number]
-        before = 0.0 if images is None else images.seconds
         while passes.done < wanted:
             sum_, chance, deviation, *met = look(passes.done, survey)
             passes.add(sum_, chance, deviation, *met)
@@ -160,9 +158,7 @@ def look_at_scene(
         if image is not None:
             told.append(image.note)
         if images is not None:
-            spent = images.seconds - before
-            rest = time.perf_counter() - started - spent
-            told[-1] += f": {(spent + forward.seconds) / (spent + forward.seconds + rest):.0%} of the time"
+            told[-1] += f", beside {paths * screen.columns * screen.rows:,} lines of sight"
         maps.append(
             LuminanceMap(
                 values * MM2_PER_M2,
@@ -186,8 +182,6 @@ class _Forward:
     images: LightImages | None
     shared: float | None
     possible: bool
-    seconds: float
-    """What the plan took [s]."""
 
     def notes(self, how: Looking) -> list[str]:
         """What is left to lines of sight, that these find by chance only."""
@@ -210,10 +204,9 @@ def _forward(
     core: _core.Scene, compiled: Compiled, views: list[_core._View], how: Looking, *, wanted: bool
 ) -> _Forward:
     """Rays forwards as the scene asks for them, or the user; none where lines of sight find all light well."""
-    started = time.perf_counter()
     possible = core.may_focus()
     if not possible or how.forward_rays == 0:
-        return _Forward(Plan(0, None, 0), None, None, possible, 0.0)
+        return _Forward(Plan(0, None, 0), None, None, possible)
     lines = how.paths * how.passes
     asked = None if how.forward_rays is None and wanted else int(how.forward_rays or 0)
     found = plan(compiled.record, views, how.seed, MOST_EVENTS, lines, asked, how.threads)
@@ -222,7 +215,7 @@ def _forward(
         # Where lines of sight end at patches, these do not tell what they hold of each source.
         shared = None if how.gather else found.rays / lines
         images = LightImages(compiled.record, views, found, shared, how.seed, MOST_EVENTS, how.threads)
-    return _Forward(found, images, shared, possible, time.perf_counter() - started)
+    return _Forward(found, images, shared, possible)
 
 
 class _Passes:
