@@ -65,9 +65,10 @@ def test_a_file_that_shrinks_is_an_error_that_names_it(name: str, use: str, writ
     if use == "trace":
         assert rays.total_flux > 0  # or the scene would find the fault before a ray is traced
     os.truncate(path, path.stat().st_size // 2)
-    # A scene tells what is wrong with its files as one of its mistakes.
-    error = SceneError if use == "trace" else FormatError
-    with pytest.raises(error, match=r"shrinking\.rays: byte \d+: the file ended here while it was read"):
+    # A scene that looks at the wavelengths of its rays tells what is wrong with the file as one of its mistakes.
+    with pytest.raises(
+        (FormatError, SceneError), match=r"shrinking\.rays: byte \d+: the file ended here while it was read"
+    ):
         USES[use](rays)
 
 
