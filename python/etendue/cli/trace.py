@@ -220,8 +220,6 @@ def print_result(result: TraceResult) -> None:
             case "intensity":
                 far = result.intensity[detection.name]
                 say(f"  {detection.name}: flux {measured(far.flux, far.flux_error, far.flux_unit)}, {peak_line(far)}")
-                for note in result.told(detection):
-                    say(f"    {note}")
             case "illuminance":
                 seen = result.illuminance[detection.name]
                 say(f"  {detection.name}: mean {seen.mean:.6g} {seen.unit}, least/mean {seen.uniformity:.3f}")
