@@ -250,10 +250,10 @@ impl Source {
         let indices: Vec<u64> = range.collect();
         let mut four: [Vec<f64>; 4] = Default::default();
         fill_fours(Pairs::new(seed, PURPOSE_BIRTH + source as u32), &indices, &mut four);
-        if let Emitter::Surface(surface) = &self.emitter {
-            if surface.draw_block(&four, &mut batch.position, &mut batch.direction) {
-                return;
-            }
+        if let Emitter::Surface(surface) = &self.emitter
+            && surface.draw_block(&four, &mut batch.position, &mut batch.direction)
+        {
+            return;
         }
         for (i, index) in indices.into_iter().enumerate() {
             let (x, k) = ray(&mut Numbers::begun(stream, index, four.each_ref().map(|v| v[i])));
