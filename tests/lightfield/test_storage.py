@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import tracemalloc
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -364,6 +365,37 @@ def virtual(file: Any) -> None:
     file["parts/0"].create_virtual_dataset("ratio", layout, fillvalue=1.0)
 
 
+def chunked(file: Any, *filters: int) -> Any:
+    """A ratio of one chunk that is written as it is given, packed as the file says."""
+    plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plan.set_chunk((4, 2, 2, 4))
+    for number in filters:
+        plan.set_filter(number, h5py.h5z.FLAG_OPTIONAL, (9,))
+    del file["parts/0/ratio"]
+    space = h5py.h5s.create_simple((4, 2, 2, 4))
+    return h5py.h5d.create(file["parts/0"].id, b"ratio", h5py.h5t.IEEE_F32LE, space, plan)
+
+
+def first_chunk(file: Any) -> None:
+    dataset("ratio", shape=(8, 8, 8, 8), dtype="<f4", chunks=(4, 4, 4, 4), fillvalue=1.0)(file)
+    file["parts/0/ratio"][:4, :4, :4, :4] = np.random.default_rng(1).random((4, 4, 4, 4))
+
+
+def packed_twice(file: Any) -> None:
+    data = chunked(file, 1, 1)
+    data.write_direct_chunk((0, 0, 0, 0), zlib.compress(zlib.compress(np.ones(64, "<f4").tobytes())))
+
+
+def unpacks_to_more(file: Any) -> None:
+    """To 300 MB instead of 8, for which the library would make room."""
+    dataset("ratio", shape=(32, 32, 32, 64), dtype="<f4", chunks=(32, 32, 32, 64), compression=9)(file)
+    file["parts/0/ratio"].id.write_direct_chunk((0, 0, 0, 0), zlib.compress(bytes(300 << 20), 9))
+
+
+def larger_chunk(file: Any) -> None:
+    chunked(file, 1).write_direct_chunk((0, 0, 0, 0), zlib.compress(np.random.default_rng(1).bytes(5000)))
+
+
 CHANGES: dict[str, tuple[Callable[[Any], None], str]] = {
     "no format": (drop("format"), "attribute 'format'"),
     "another format": (put("format", "picture"), "LightField.save"),
@@ -432,6 +464,16 @@ CHANGES: dict[str, tuple[Callable[[Any], None], str]] = {
         dataset("ratio", data=np.ones((4, 2, 2, 4), "<f4"), chunks=(64,) * 4, maxshape=(None,) * 4, compression=9),
         "chunks of shape",
     ),
+    "no value written": (dataset("ratio", shape=(4, 2, 2, 4), dtype="<f4", fillvalue=1.0), "not in it|were written"),
+    "no chunk written": (dataset("ratio", shape=(4, 2, 2, 4), dtype="<f4", fillvalue=1.0, chunks=True), "not in it"),
+    "one chunk of sixteen": (first_chunk, "1 of its 16 chunks were written"),
+    "chunks that are packed twice": (packed_twice, r"filters \[1, 1\].*h5repack"),
+    "a chunk that unpacks to more": (unpacks_to_more, "unpacks to more"),
+    "a chunk that is larger in the file": (larger_chunk, "takes more than its"),
+    "other chunks": (
+        dataset("ratio", data=np.ones((4, 2, 2, 4), "<f4"), chunks=(2, 2, 2, 2), compression="lzf"),
+        r"filters \[32000\].*h5repack",
+    ),
     "a group for an array": (link("parts/0/ratio", h5py.SoftLink("/surface")), "dataset 'ratio'"),
     "a link to a link": (link("parts/0/ratio", h5py.SoftLink("/parts/0/ratio")), "dataset 'ratio'"),
     "a link to another file": (link("parts/0/ratio", h5py.ExternalLink("other.h5", "/parts/0/ratio")), "dataset 'ratio'"),
@@ -465,7 +507,7 @@ def test_an_altered_file_that_fits_is_taken(saved: dict[str, Path], tmp_path: Pa
     shutil.copy(saved["dome"], path)
     with h5py.File(path, "r+") as file:
         put("notes", '["new"]')(file)
-        dataset("ratio", data=file["parts/0/ratio"][:], chunks=(2, 2, 2, 2), compression="lzf")(file)
+        dataset("ratio", data=file["parts/0/ratio"][:], chunks=(2, 2, 2, 2), compression="gzip")(file)
     assert_same(LightField.load(path), LightField.load(saved["dome"]).replace(notes=("new",)))
 
 

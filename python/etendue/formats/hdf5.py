@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import FormatError
+from etendue.errors import FormatError, OutputError
 from etendue.formats.input import require_readable
 from etendue.formats.strict_json import strict_json
+from etendue.quantities.memory import require_memory
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """The first bytes of an HDF5 file."""
@@ -28,6 +30,19 @@ LIBRARY = ("v110", "v110")
 
 DEFLATE_RATIO = 1032
 """The largest factor by which deflate can shrink anything: 258 bytes into 2 bits."""
+
+FILTERS = {1: "deflate", 2: "shuffle", 3: "fletcher32"}
+"""What chunks may be packed with, by the numbers of the HDF5 library: filters that every one of them has."""
+
+FREE_BYTES = 1 << 26
+"""A chunk that cannot unpack to more than this does no harm, whatever it announces."""
+
+STRETCH = 1 << 20
+"""Bytes of a chunk that are unpacked at a time to see how many they are."""
+
+CHUNK_ROOM = 64
+"""Bytes by which a chunk may be larger in the file than in memory, beside a 256th of it: what deflate and checksum add
+to numbers that cannot be packed."""
 
 
 def begins_as_hdf5(path: Path) -> bool:
@@ -42,7 +57,7 @@ def reading(path: Path, place: str, damaged: str) -> Iterator[None]:
     """Turn whatever is raised over damaged or foreign content into a `FormatError` that names file and place."""
     try:
         yield
-    except (FormatError, MemoryError):
+    except (FormatError, MemoryError, OutputError):
         raise
     # The library raises anything from OSError to KeyError over damaged files, our own constructors ArgumentError.
     except Exception as error:
@@ -88,17 +103,74 @@ class Node:
         return Node(self.path, self._member(name, "group"), self.damaged)
 
     def dataset(self, name: str, dtype: np.dtype[Any], axes: int) -> Any:
-        """A dataset of this type, all of which is in the file; not read yet."""
+        """A dataset of this type, every value of which is in the file; not read yet."""
         data = self._member(name, "dataset")
         place = f"dataset {name!r}"
         if data.dtype != dtype or len(data.shape or ()) != axes:
             raise self.error(place, f"{data.dtype} of shape {data.shape}, expected {dtype} with {axes} axes")
         # Memory is set aside only for what the file can hold; and nothing is followed to other files.
-        if data.external or data.is_virtual or data.nbytes > DEFLATE_RATIO * data.id.get_storage_size():
-            raise self.error(place, f"the {data.nbytes} bytes of shape {data.shape} are not in it")
-        if data.chunks is not None and math.prod(data.chunks) > data.size:
-            raise self.error(place, f"chunks of shape {data.chunks} in shape {data.shape}")
+        stored = min(data.id.get_storage_size(), self.path.stat().st_size)
+        if data.external or data.is_virtual or data.nbytes > DEFLATE_RATIO * stored:
+            raise self.error(place, f"the {data.nbytes:,} bytes of shape {data.shape} are not in it")
+        if data.chunks is not None:
+            self._check_chunks(data, place)
+        elif data.nbytes > stored:
+            raise self.error(place, f"of the {data.nbytes:,} bytes of shape {data.shape} only {stored:,} were written")
         return data
+
+    def values(self, data: Any) -> npt.NDArray[Any]:
+        """All of a dataset of this group.
+
+        Raises
+        ------
+        MemoryLimitError
+            If there is no room for it; names file, dataset and size.
+        """
+        require_memory(data.nbytes, f"{self.path}: {data.name}, an array of shape {data.shape},")
+        values: npt.NDArray[Any] = data[()]
+        return values
+
+    def _check_chunks(self, data: Any, place: str) -> None:
+        """Refuse chunks that were never written, or that unpack to more than the library is told."""
+        if math.prod(data.chunks) > data.size:
+            raise self.error(place, f"chunks of shape {data.chunks} in shape {data.shape}")
+        made = data.id.get_create_plist()
+        filters = [made.get_filter(i)[0] for i in range(made.get_nfilters())]
+        unknown = [number for number in filters if number not in FILTERS]
+        if unknown or len(set(filters)) != len(filters):
+            found = f"its chunks are packed with filters {filters}"
+            raise self.error(place, found, f"Pack it with {', '.join(FILTERS.values())} at most, each once (h5repack).")
+        expected = math.prod(-(-n // side) for n, side in zip(data.shape, data.chunks, strict=True))
+        whole, large, written = math.prod(data.chunks) * data.dtype.itemsize, [], 0
+
+        def look(chunk: Any) -> bool | None:
+            nonlocal written
+            if chunk.size > whole + whole // 256 + CHUNK_ROOM:
+                return True  # ends the search, and is returned
+            if DEFLATE_RATIO * chunk.size > max(FREE_BYTES, whole):
+                large.append(chunk.chunk_offset)
+            written += 1
+            return None
+
+        if data.id.chunk_iter(look):
+            raise self.error(place, f"a chunk that takes more than its {whole:,} bytes")
+        if written != expected:
+            raise self.error(place, f"{written:,} of its {expected:,} chunks were written; the rest has no values")
+        if "deflate" in (FILTERS[number] for number in filters):
+            for offset in large:
+                self._check_unpacked(data, place, offset, whole)
+
+    def _check_unpacked(self, data: Any, place: str, offset: tuple[int, ...], whole: int) -> None:
+        """Refuse a chunk that unpacks to more than its bytes: the library would make room for all of it."""
+        mask, packed = data.id.read_direct_chunk(offset)
+        if mask:
+            return  # a filter was left out because it gained nothing, so that nothing unpacks
+        unpacking, size = zlib.decompressobj(), 0
+        while packed and not unpacking.eof and size <= whole + CHUNK_ROOM:
+            size += len(unpacking.decompress(packed, STRETCH))
+            packed = unpacking.unconsumed_tail
+        if size > whole + CHUNK_ROOM:
+            raise self.error(place, f"a chunk of {whole:,} bytes unpacks to more of them")
 
     def text(self, name: str) -> str:
         """An attribute that is a text."""

@@ -61,7 +61,7 @@ def atomic_output(path: str | os.PathLike[str], size: int | None = None) -> Iter
     _flush_directory(target.parent)
 
 
-def require_room(target: Path, size: int) -> None:
+def require_room(target: Path, size: int, purpose: str = "") -> None:
     """Refuse, before it is begun, what the disk has no room for.
 
     Parameters
@@ -70,25 +70,23 @@ def require_room(target: Path, size: int) -> None:
         A file, which need not be there, or a folder.
     size : int
         [bytes]
+    purpose : str
+        What for, where `target` does not say it.
 
     Raises
     ------
     OutputError
         If so.
     """
+    needed = f"cannot write: {size:,} bytes are needed{purpose and ' '}{purpose}"
     free = _free(target)
     if free is not None and size > free:
         raise OutputError(
-            errno.ENOSPC, f"cannot write: {size:,} bytes are needed, and {free:,} are free. "
-            "Make room, or write to another disk", str(target),
-        )  # fmt: skip
+            errno.ENOSPC, f"{needed}, and {free:,} are free. Make room, or write to another disk", str(target)
+        )
     limit = _largest_file()
     if limit is not None and size > limit:
-        raise OutputError(
-            errno.EFBIG,
-            f"cannot write: {size:,} bytes are needed, and files may have {limit:,} (ulimit -f)",
-            str(target),
-        )
+        raise OutputError(errno.EFBIG, f"{needed}, and files may have {limit:,} (ulimit -f)", str(target))
 
 
 @contextlib.contextmanager

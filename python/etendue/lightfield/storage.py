@@ -28,6 +28,7 @@ from etendue.lightfield.light_field import FitReport, LightField, PartField
 from etendue.lightfield.rounding import digits_for, rounded
 from etendue.lightfield.surfaces import SURFACES, Part, Surface
 from etendue.lightfield.symmetry import SYMMETRIES
+from etendue.quantities.memory import require_memory
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
@@ -55,6 +56,9 @@ CONTINUOUS, LINES = "continuous", "lines"
 """Kinds of spectra in files."""
 
 MOST_WAVELENGTHS = 1 << 20
+
+FACTORS = ("space", "direction")
+"""Datasets that a part may have beside its ratio and deviation."""
 
 DEFLATE = 9
 SAME_FLUX = 1e-9
@@ -220,7 +224,7 @@ def _spectrum(group: Node) -> Spectrum | SpectralLines:
     arrays = [group.dataset(name, np.dtype("<f8"), 1) for name in ("wavelength", "weight")]
     if any(array.size > MOST_WAVELENGTHS for array in arrays):
         raise group.error("dataset 'wavelength'", f"more than {MOST_WAVELENGTHS:,} wavelengths")
-    wavelength, weight = (array[()] for array in arrays)
+    wavelength, weight = (group.values(array) for array in arrays)
     try:
         return SpectralLines(wavelength, weight, unit) if kind == LINES else Spectrum(wavelength, weight)
     except ArgumentError as error:
@@ -258,7 +262,8 @@ def _parts(group: Node, surface: Surface) -> tuple[tuple[PartField, ...], list[f
     charts = surface.parts()
     if len(group.node) != len(charts):
         raise group.error("members", f"{len(group.node)} parts, expected {len(charts)} of {surface.spec}")
-    parts, flux = [], []
+    held: list[tuple[Node, dict[str, Any]]] = []
+    flux = []
     for index, chart in enumerate(charts):
         part = group.group(str(index))
         for name, value in _chart(chart).items():
@@ -266,14 +271,15 @@ def _parts(group: Node, surface: Surface) -> tuple[tuple[PartField, ...], list[f
             agrees = stored == value if isinstance(value, str) else np.allclose(stored, value, rtol=1e-12, atol=1e-12)
             if not agrees:
                 raise part.error(f"attribute {name!r}", f"{stored!r}, but {surface.spec} has {value!r}")
-        ratio = _array(part, "ratio", np.dtype("<f4"), 4)
-        deviation = _array(part, "deviation", np.dtype("<f4"), 4)
-        space, direction = (
-            _array(part, name, np.dtype("<f8"), 2) if name in part.node else None for name in ("space", "direction")
-        )
-        parts.append(PartField(ratio, deviation, space, direction, part.number("level")))
+        held.append((part, _arrays(part)))
         flux.append(part.number("flux"))
-    return tuple(parts), flux
+    cells = sum(arrays["ratio"].size for _, arrays in held)
+    if cells > MOST_CELLS:
+        raise group.error("datasets 'ratio'", f"{cells:,} cells together; {MOST_CELLS:,} are the most")
+    # The core keeps arrays of its own beside those that are read.
+    needed = 2 * sum(array.nbytes for _, arrays in held for array in arrays.values())
+    require_memory(needed, f"{group.path}: a light field of {cells:,} cells")
+    return tuple(_part(part, arrays) for part, arrays in held), flux
 
 
 def _report(group: Node) -> FitReport:
@@ -301,13 +307,24 @@ def _provenance(file: Node) -> Provenance:
     return provenance
 
 
-def _array(group: Node, name: str, dtype: np.dtype[Any], axes: int) -> npt.NDArray[Any]:
-    """A dataset with 2^k cells along each of its axes, finite and not negative."""
-    data = group.dataset(name, dtype, axes)
-    place = f"dataset {name!r}"
-    if not all(n > 0 and n & (n - 1) == 0 for n in data.shape) or math.prod(data.shape) > MOST_CELLS:
-        raise group.error(place, f"shape {data.shape}, expected powers of two, {MOST_CELLS} at most")
-    values: npt.NDArray[Any] = data[()]
-    if not (np.isfinite(values).all() and (values >= 0).all()):
-        raise group.error(place, "a value that is negative or not finite")
-    return values
+def _arrays(group: Node) -> dict[str, Any]:
+    """The datasets of a part, with 2^k cells along each of their axes; not read yet."""
+    arrays = {name: group.dataset(name, np.dtype("<f4"), 4) for name in ("ratio", "deviation")}
+    arrays |= {name: group.dataset(name, np.dtype("<f8"), 2) for name in FACTORS if name in group.node}
+    for name, data in arrays.items():
+        if not all(n > 0 and n & (n - 1) == 0 for n in data.shape) or data.size > MOST_CELLS:
+            raise group.error(f"dataset {name!r}", f"shape {data.shape}, expected powers of two, {MOST_CELLS} at most")
+    ratio, deviation = arrays["ratio"].shape, arrays["deviation"].shape
+    if ratio != deviation:
+        raise group.error("dataset 'deviation'", f"shape {deviation}, but 'ratio' has {ratio}")
+    return arrays
+
+
+def _part(group: Node, arrays: Mapping[str, Any]) -> PartField:
+    """The field of a part, whose values are finite and not negative."""
+    values = {name: group.values(data) for name, data in arrays.items()}
+    for name, array in values.items():
+        if not (np.isfinite(array).all() and (array >= 0).all()):
+            raise group.error(f"dataset {name!r}", "a value that is negative or not finite")
+    space, direction = (values.get(name) for name in FACTORS)
+    return PartField(values["ratio"], values["deviation"], space, direction, group.number("level"))

@@ -5,11 +5,9 @@ A file holds the sums as they are, not the quantities made of them, so that a tr
 
 from __future__ import annotations
 
-import errno
 import io
 import json
-import shutil
-import tomllib
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,12 +18,14 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
-from etendue.formats.output import atomic_output
+from etendue.formats.output import atomic_output, require_room
 from etendue.formats.strict_json import strict_json
-from etendue.quantities.spool import Spool
+from etendue.quantities.memory import require_memory
+from etendue.quantities.spool import MEMORY_LIMIT, Spool
 from etendue.scene.dealing import CellSums, Dealing
 from etendue.scene.scatter_events import EVENT
 from etendue.scene.scene import Scene
+from etendue.scene.toml import read_toml
 from etendue.tracing.detections import check_cells, detection_from_dict
 from etendue.tracing.plan import Plan
 from etendue.tracing.result import TraceResult
@@ -49,11 +49,17 @@ SUMS = ("batches", "rays", "segments")
 OPEN = {"open_cell": "<u4", "open_unit": "<u8", "open_sum": "<f8"}
 """What is kept of units of which more rays may come."""
 
+CELL_BYTES = 24
+"""Of a cell in memory: two sums and a count."""
+
 DAMAGED = "The file is damaged or cut short: copy it again, or trace the scene again."
 FOREIGN = "Give an HDF5 file that TraceResult.save wrote."
 
-MOST_TEXT_BYTES = 1 << 28
-"""Of a text in the file: a scene that spells out a mesh of a million triangles has a third of it."""
+MOST_SCENE_BYTES = 1 << 28
+"""Of the scene: one that spells out a mesh of a million triangles has a third of it."""
+
+MOST_TEXT_BYTES = 1 << 25
+"""Of any other text: names of a hundred thousand parts, or a hundred detectors with all their nodes."""
 
 
 def is_result_file(path: Path) -> bool:
@@ -80,7 +86,9 @@ def save_result(result: TraceResult, path: Path) -> None:
     import h5py  # noqa: PLC0415
 
     # Rows of 64 bytes, events of 120, three numbers per cell, and room for the rest.
-    size = 64 * sum(held.count for held in result.sums.collected) + 24 * sum(c[0].size for c in result.sums.cells)
+    size = 64 * sum(held.count for held in result.sums.collected) + CELL_BYTES * sum(
+        c[0].size for c in result.sums.cells
+    )
     size += EVENT.itemsize * sum(held.count for held in result.sums.scattered)
     size += len(result.plan.scene_text.encode()) + (1 << 20)
     with atomic_output(path) as temporary:
@@ -91,8 +99,7 @@ def save_result(result: TraceResult, path: Path) -> None:
                 _write(file, result, path.parent)
             temporary.write_bytes(image.getbuffer())
         else:
-            if shutil.disk_usage(temporary.parent).free < size:
-                raise OSError(errno.ENOSPC, f"no room for {size / 1e9:.1f} GB", str(path))
+            require_room(path, size)
             with h5py.File(temporary, "w", libver=LIBRARY) as file:
                 _write(file, result, path.parent)
 
@@ -197,7 +204,7 @@ def _plan(group: Node, path: Path) -> Plan:
         raise group.error("attribute 'flux_unit'", f"{unit!r} is none of {', '.join(FLUX_UNITS)}")
     detections = tuple(detection_from_dict(data) for data in strict_json(_text(group, "detectors")))
     check_cells(detections)
-    text = _text(group, "scene")
+    text = _text(group, "scene", MOST_SCENE_BYTES)
     return Plan(
         scene_name=group.text("scene_name"),
         scene_text=text,
@@ -219,7 +226,7 @@ def _plan(group: Node, path: Path) -> Plan:
 
 def _scene(text: str, path: Path) -> Scene | None:
     """The scene that scatter events are looked at in."""
-    return Scene.from_dict(tomllib.loads(text), folder=path.parent, source=path) if text else None
+    return Scene.from_dict(read_toml(path, text.encode()), folder=path.parent, source=path) if text else None
 
 
 def _sums(group: Node, plan: Plan) -> Sums:
@@ -239,6 +246,9 @@ def _sums(group: Node, plan: Plan) -> Sums:
     if not 0 < numbers["rays"] <= plan.rays:
         raise group.error("attribute 'rays'", f"{numbers['rays']} of {plan.rays} rays are done")
     lost_at = group.numbers("lost_at", (lengths["lost"],)).astype(np.int64).tolist()
+    count = sum(detection.cells for detection in plan.detections) + len(plan.source_names) + 1
+    held = f"{group.path}: sums of {count:,} cells from {plan.dealing.strata:,} strata of rays"
+    require_memory(CELL_BYTES * count * plan.dealing.strata, held)
     cells, begun, collected, scattered = [], [], [], []
     for i, detection in enumerate(plan.detections):
         detector = group.group(f"detector_{i}")
@@ -294,8 +304,7 @@ def _row(group: Node, name: str, dtype: str, *shape: int) -> npt.NDArray[Any]:
     data = group.dataset(name, np.dtype(dtype), len(shape))
     if data.shape != shape:
         raise group.error(f"dataset {name!r}", f"shape {data.shape}, expected {shape}")
-    values: npt.NDArray[Any] = data[()]
-    return values
+    return group.values(data)
 
 
 def _records(group: Node) -> Iterator[npt.NDArray[Any]]:
@@ -303,6 +312,7 @@ def _records(group: Node) -> Iterator[npt.NDArray[Any]]:
     data = group.dataset("records", np.dtype("<f8"), 2)
     if data.shape[1] != RECORD.itemsize // 8:
         raise group.error("dataset 'records'", f"shape {data.shape}, expected 8 columns")
+    _require_spool(group, "records", data.nbytes)
     for start in range(0, len(data), 16 * CHUNK):
         yield np.ascontiguousarray(data[start : start + 16 * CHUNK]).view(RECORD).reshape(-1)
 
@@ -320,6 +330,9 @@ def _events(group: Node, most: int) -> Scattered:
     for name, column in columns.items():
         if column.shape != (count, *EVENT[name].shape):
             raise group.error(f"dataset {name!r}", f"shape {column.shape}, expected {(count, *EVENT[name].shape)}")
+    if count > most:
+        raise group.error("dataset 'ray'", f"{count:,} scatter events, but {most:,} are kept at most")
+    _require_spool(group, "scatter events", count * EVENT.itemsize)
     for start in range(0, count, STRETCH):
         rows = np.zeros(min(STRETCH, count - start), EVENT)
         for name, column in columns.items():
@@ -328,11 +341,17 @@ def _events(group: Node, most: int) -> Scattered:
     return Scattered(events.spool, count, level, most)
 
 
-def _text(group: Node, name: str) -> str:
+def _require_spool(group: Node, what: str, size: int) -> None:
+    """Refuse records that go to a temporary file for which there is no room."""
+    if size > MEMORY_LIMIT:
+        require_room(Path(tempfile.gettempdir()), size, f"for the {what} of {group.path}")
+
+
+def _text(group: Node, name: str, most: int = MOST_TEXT_BYTES) -> str:
     data = group.dataset(name, np.dtype("u1"), 1)
-    if data.size > MOST_TEXT_BYTES:
-        raise group.error(f"dataset {name!r}", f"a text of {data.size:,} bytes; {MOST_TEXT_BYTES:,} are allowed")
-    return bytes(data[()]).decode("utf-8")
+    if data.size > most:
+        raise group.error(f"dataset {name!r}", f"a text of {data.size:,} bytes; {most:,} are allowed")
+    return group.values(data).tobytes().decode("utf-8")
 
 
 def _texts(group: Node, name: str) -> tuple[str, ...]:
