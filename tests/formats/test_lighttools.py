@@ -12,7 +12,7 @@ import pytest
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.rays import read_rays, write_rays
 from etendue.quantities.file_records import FileRecords
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.report import RayFileWarning
 
 ROWS = (

@@ -18,7 +18,7 @@ from etendue.formats import rays as package
 from etendue.formats.rays import RAY_FORMATS, detect_format, read_rays, write_rays
 from etendue.formats.rays.ray_format import Head, RayFormat
 from etendue.quantities.file_records import FileRecords
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_stream import BATCH
 from etendue.quantities.report import RayFileWarning
 from hypothesis import HealthCheck, given, settings

@@ -15,7 +15,7 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import FormatError
 from etendue.quantities.file_records import FileRecords
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.report import Complaint
 
 HEADER = "<8sIIQQIIQQII"

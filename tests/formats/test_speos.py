@@ -12,7 +12,7 @@ import pytest
 from etendue.errors import ArgumentError, FormatError, UnitError, UnsupportedFormatError
 from etendue.formats.rays import read_rays, write_rays
 from etendue.quantities.file_records import FileRecords
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 
 ROWS = (
     (1.0, -2.0, 0.5, 0.6, 0.0, 0.8, 450.5, 0.125),

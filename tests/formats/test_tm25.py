@@ -17,7 +17,7 @@ import pytest
 from etendue.errors import FormatError
 from etendue.formats.rays import detect_format, read_rays, write_rays
 from etendue.quantities.file_records import FileRecords
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.report import RayFileWarning
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

@@ -14,7 +14,7 @@ from etendue.errors import ArgumentError, FormatError
 from etendue.formats import output
 from etendue.formats.rays import detect_format, read_rays, write_rays, zemax
 from etendue.quantities.file_records import FileRecords
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.report import RayFileWarning
 
 ROWS = (

@@ -11,7 +11,7 @@ import pytest
 from etendue.errors import ArgumentError
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.quantities.intensity_nodes import Nodes
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from oracles.intensity import hat_means
 from oracles.verdicts import assert_agree, assert_differ, assert_drawn_with
 

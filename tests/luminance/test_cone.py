@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.luminance.cone import cone_solid_angle
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from oracles.cone import plain_statement
 from oracles.quadrilateral import Quadrilateral
 from scipy import stats

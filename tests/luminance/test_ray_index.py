@@ -10,7 +10,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.report import RayFileWarning
 from oracles.cone import plain_statement
 

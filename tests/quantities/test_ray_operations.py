@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError, UnitError, UnknownNameError
-from etendue.quantities import ray_merge, ray_operations
+from etendue.quantities import ray_merge, ray_operations, ray_rewriting
 from etendue.quantities.provenance import Provenance
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.report import RayFileWarning
 from etendue.quantities.spectrum import Spectrum, photopic_efficiency
 from etendue.quantities.spool import spool
@@ -247,8 +248,9 @@ def test_long_sets_are_streamed_through_files_with_the_same_result(
     rays = with_defects()
     expected = operation(rays)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(ray_operations, "CHUNK", 47)
-    for module in (ray_operations, ray_merge):
+    for module in (ray_operations, ray_rewriting):
+        monkeypatch.setattr(module, "CHUNK", 47)
+    for module in (ray_operations, ray_rewriting, ray_merge):
         monkeypatch.setattr(module, "spool", functools.partial(spool, memory_limit=5000))
     streamed = operation(rays)
     assert isinstance(streamed.records, np.memmap)
@@ -266,13 +268,13 @@ def test_watts_per_lumen_of_a_ray_survive(operation: Callable[[RaySet], RaySet])
 
 
 def test_columns_of_more_rays_than_a_stretch_stay_with_their_rays() -> None:
-    n = 2 * ray_operations.CHUNK + 1000
+    n = 2 * ray_rewriting.CHUNK + 1000
     table = np.zeros(n, [("position", "<f4", 3), ("direction", "<f4", 3), ("flux", "<f4"), ("wavelength", "<f8")])
     table["wavelength"] = np.arange(n)
     table["position"][:, 1] = np.arange(n)
     table["direction"] = (0, 0, 1)
     table["flux"] = 1
-    table["flux"][[5, ray_operations.CHUNK + 7]] = math.nan
+    table["flux"][[5, ray_rewriting.CHUNK + 7]] = math.nan
     rays = RaySet.from_records(table, RaySetMeaning())
     with pytest.warns(RayFileWarning, match="2 of"):
         assert rays.tally.not_finite == 2
@@ -514,8 +516,8 @@ def test_a_column_of_watts_is_better_than_a_spectrum() -> None:
 
 @pytest.mark.parametrize("wavelength", [math.nan, 0.0, -450.0])
 def test_the_ray_whose_wavelength_is_missing_is_named(wavelength: float) -> None:
-    watts = radiometric(ray_operations.CHUNK + 10)
-    watts.records["wavelength"][ray_operations.CHUNK + 3] = wavelength
+    watts = radiometric(ray_rewriting.CHUNK + 10)
+    watts.records["wavelength"][ray_rewriting.CHUNK + 3] = wavelength
     with pytest.raises(UnitError, match=rf"led\.ray: ray 262,148 has the wavelength {wavelength:g} nm.*--flux 54.6lm"):
         watts.in_unit("lm")
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.provenance import Provenance
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.report import Complaint, RayFileWarning
 from etendue.quantities.spectrum import Spectrum
 from hypothesis import given, settings

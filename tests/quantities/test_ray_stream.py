@@ -8,7 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from etendue import _core
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, Tally
 from etendue.quantities.report import RayFileWarning
 from etendue.sources.ring_source import RingSource

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from etendue import _core
 from etendue.errors import SceneError
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.spectrum import photopic_efficiency
 from etendue.scene import Compiled, Scene, compile_scene, detectors, sources
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import SceneError
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.spectrum import photopic_efficiency
 from etendue.tracing.result import TraceResult
 from oracles.verdicts import LARGEST_Z, assert_drawn_with

@@ -22,7 +22,8 @@ from etendue.lightfield.gridded.pixelated import PixelatedSurface
 from etendue.lightfield.gridded.sampling import RECORD
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity_nodes import check_steps
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayBatch, RayStream
 from etendue.quantities.spool import spool
 from etendue.quantities.threshold_sweep import ThresholdSweep

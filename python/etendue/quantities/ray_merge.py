@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_operations import with_total_flux
+from etendue.quantities.ray_records import RayRecords
+from etendue.quantities.ray_rewriting import Rays
 from etendue.quantities.ray_stream import BATCH, RayBatch
+from etendue.quantities.ray_units import in_unit
 from etendue.quantities.report import Complaint
 from etendue.quantities.spool import spool
 from etendue.units import FluxUnit
 
-if TYPE_CHECKING:
-    from etendue.quantities.ray_set import RaySet
 
-
-def merged(sets: Sequence[RaySet], flux: Sequence[float] | None, unit: FluxUnit | None) -> RaySet:
+def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | None) -> Rays:
     """One set of all usable rays; see `etendue.RaySet.merge`."""
     if not sets:
         raise ArgumentError("merge: no ray sets.")
@@ -34,9 +35,9 @@ def merged(sets: Sequence[RaySet], flux: Sequence[float] | None, unit: FluxUnit 
     if flux is not None:
         if len(flux) != len(sets):
             raise ArgumentError(f"merge: {len(flux)} fluxes for {len(sets)} sets.")
-        sets = [rays.with_total_flux(value, unit) for rays, value in zip(sets, flux, strict=True)]
+        sets = [with_total_flux(rays, value, unit) for rays, value in zip(sets, flux, strict=True)]
     if unit is not None:
-        sets = [rays.in_unit(unit) for rays in sets]
+        sets = [in_unit(rays, unit) for rays in sets]
 
     single, by_ray = _wavelengths(sets)
     indexed = all(_knows_spectra(rays) for rays in sets)
@@ -88,7 +89,7 @@ def merged(sets: Sequence[RaySet], flux: Sequence[float] | None, unit: FluxUnit 
     return type(sets[0]).from_records(spool(parts(), dtype), meaning)
 
 
-def _wavelengths(sets: Sequence[RaySet]) -> tuple[float | None, bool]:
+def _wavelengths(sets: Sequence[RayRecords]) -> tuple[float | None, bool]:
     """The wavelength that all sets share [nm], or whether each ray has one of its own."""
     singles = {None if "wavelength" in rays.columns else rays.meaning.single_wavelength for rays in sets}
     if len(singles) == 1 and None not in singles:
@@ -96,18 +97,18 @@ def _wavelengths(sets: Sequence[RaySet]) -> tuple[float | None, bool]:
     return None, all("wavelength" in rays.columns or rays.meaning.single_wavelength is not None for rays in sets)
 
 
-def _knows_spectra(rays: RaySet) -> bool:
+def _knows_spectra(rays: RayRecords) -> bool:
     return len(rays.spectra) == 1 or (bool(rays.spectra) and "spectrum_index" in rays.columns)
 
 
-def _column(rays: RaySet, name: str, batch: RayBatch, otherwise: float | None = None) -> npt.NDArray[Any]:
+def _column(rays: RayRecords, name: str, batch: RayBatch, otherwise: float | None = None) -> npt.NDArray[Any]:
     """Values of a column for a batch's rays, or one value for all if the set does not have it."""
     if name not in rays.columns:
         return np.full(len(batch.flux), otherwise)
     return rays.column(name, slice(batch.start, batch.start + BATCH))[batch.usable]
 
 
-def _losses(rays: RaySet, dtype: np.dtype[Any], single: float | None) -> list[Complaint]:
+def _losses(rays: RayRecords, dtype: np.dtype[Any], single: float | None) -> list[Complaint]:
     """What a set knows that records of `dtype` do not hold, because another set does not know it."""
     kept = dtype.names or ()
     lost = [name for name in rays.columns if name not in kept]
@@ -119,7 +120,7 @@ def _losses(rays: RaySet, dtype: np.dtype[Any], single: float | None) -> list[Co
     return [Complaint("note", "columns", found)] if lost else []
 
 
-def _placed(complaint: Complaint, rays: RaySet) -> Complaint:
+def _placed(complaint: Complaint, rays: RayRecords) -> Complaint:
     """The complaint with the name of the set that it is about."""
     return dataclasses.replace(complaint, place=f"{rays.provenance.source}, {complaint.place}")
 

@@ -1,111 +1,24 @@
-"""A ray set: positions, directions and fluxes, from a file or from arrays."""
+"""A ray set: positions, directions and fluxes, from a file or from arrays, and all that can be done with them."""
 
 from __future__ import annotations
 
-import dataclasses
-import math
-import warnings
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from etendue import _core
-from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.file_records import AnyRecords, FileRecords
+from etendue.errors import ArgumentError
+from etendue.quantities import ray_colours, ray_merge, ray_operations, ray_units
 from etendue.quantities.provenance import Provenance
-from etendue.quantities.ray_colours import RayColours
-from etendue.quantities.ray_operations import FLUX_COLUMNS, RayOperations
-from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally, checked_threads
-from etendue.quantities.ray_units import RayUnits
-from etendue.quantities.report import Complaint, RayFileWarning, Severity
+from etendue.quantities.ray_records import RayRecords, RaySetMeaning
+from etendue.quantities.ray_stream import FloatArray, Progress, RayBatch
+from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
-from etendue.units import FLUX_UNITS, FluxUnit
-
-GEOMETRY_COLUMNS = {"position": (3,), "direction": (3,), "flux": ()}
-"""The columns of every ray, with the shape of each value."""
-
-EXTRA_COLUMNS: dict[str, str] = {
-    "wavelength": "nm",
-    "radiant_flux": "W",
-    "stokes": "1",
-    "polarisation_axis": "1",
-    "tristimulus_x": "lm",
-    "tristimulus_z": "lm",
-    "spectrum_index": "1",
-    "additional": "1",
-}
-"""Further columns a ray may have, with their units. ``spectrum_index`` counts from 1 into `RaySet.spectra`; those of
-`FLUX_COLUMNS` are stored on the scale of the flux."""
-
-FLUX_TOLERANCE = 1e-3
-"""Relative disagreement between a header's total flux and the sum over its rays that becomes a warning."""
+from etendue.units import FluxUnit
 
 
-@dataclasses.dataclass(frozen=True)
-class Moments:
-    """What a full pass over a ray set tells beside the tally; see `RaySet.moments`."""
-
-    zero_flux: int
-    flux_range: tuple[float, float]
-    bounds: FloatArray
-    weighted_position: FloatArray
-    weighted_direction: FloatArray
-    weighted_outer: FloatArray
-    focus_rhs: FloatArray
-
-
-@dataclasses.dataclass(frozen=True)
-class RaySetMeaning:
-    """What the columns of a ray set's records mean.
-
-    Parameters
-    ----------
-    flux_unit : {"lm", "W"}
-    declared_flux : float or None
-        Total flux [`flux_unit`] that the rays share in proportion to their stored flux; None: the stored flux times
-        `stored_flux_scale` is absolute.
-    relative_by_format : bool
-        Whether the format defines its flux values as relative, so that no agreement with `declared_flux` is expected.
-    stored_flux_scale : float
-        Factor from stored to absolute flux when `declared_flux` is None.
-    length_scale : float
-        Millimetres per stored unit of length.
-    wavelength_scale : float
-        Nanometres per stored unit of wavelength.
-    spectra : tuple of Spectrum
-        One for the whole set, or those that ``spectrum_index`` counts.
-    single_wavelength : float or None
-        [nm], of all rays.
-    header : mapping
-        Facts of the file's header under plain names, for people: creator, date, labels, header totals.
-    complaints : tuple of Complaint
-        What the reader had to say.
-    provenance : Provenance
-    copies : float
-        How many copies of a ray there are on average where they are most, of rays traced from a set with more rays than it
-        holds: only rays that are no copies are independent of each other.
-    notes : tuple of str
-        What all that is made of the rays should tell.
-    """
-
-    flux_unit: FluxUnit = "lm"
-    declared_flux: float | None = None
-    relative_by_format: bool = False
-    stored_flux_scale: float = 1.0
-    length_scale: float = 1.0
-    wavelength_scale: float = 1.0
-    spectra: tuple[Spectrum, ...] = ()
-    single_wavelength: float | None = None
-    header: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    complaints: tuple[Complaint, ...] = ()
-    provenance: Provenance = dataclasses.field(default_factory=Provenance)
-    copies: float = 1.0
-    notes: tuple[str, ...] = ()
-
-
-class RaySet(RayOperations, RayUnits, RayColours, RayStream):
+class RaySet(RayRecords):
     """A sample of a source's light: rays with position, direction and flux.
 
     The rays stay where they are, in memory or in their file; properties copy what is asked for, `batches` streams.
@@ -162,287 +75,245 @@ class RaySet(RayOperations, RayUnits, RayColours, RayStream):
         meaning = RaySetMeaning(flux_unit=flux_unit, spectra=tuple(spectra), provenance=provenance or Provenance())
         self._adopt(records, meaning)
 
-    @classmethod
-    def from_records(cls, records: AnyRecords, meaning: RaySetMeaning) -> RaySet:
-        """A ray set over structured records, without copying.
+    _colours: ray_colours.Colours | None = None
 
-        Parameters
-        ----------
-        records : structured array, shape (n,), contiguous, or FileRecords
-            Little-endian fields ``direction`` (3,), ``flux`` and, but for far-field sets, ``position`` (3,), all f4 or
-            all f8, and any of `EXTRA_COLUMNS`.
-        meaning : RaySetMeaning
-            What the fields mean.
+    def subset(self, n: int, seed: int) -> RaySet:
+        """`n` rays drawn at random without replacement, in file order, rescaled to the total flux of the whole set.
+
+        Never the first n: vendors' files may be sorted. Every n-subset is equally likely (Knuth, TAOCP 2, 3.4.2,
+        algorithm S); choice i is a function of (seed, i).
 
         Raises
         ------
         ArgumentError
-            If the records are not one contiguous row, or a field is missing or of another type or shape.
-        UnknownNameError
-            If a field or the flux unit is unknown.
+            If `n` is below 1 or above the number of rays, or the seed is not in 0..2⁶⁴ - 1.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> rays = et.RingSource(rays=1000).ray_set()
+        >>> part = rays.subset(10, seed=1)
+        >>> len(part), round(part.total_flux, 9)
+        (10, 600.0)
         """
-        rays = cls.__new__(cls)
-        rays._adopt(records, meaning)  # noqa: SLF001 - an alternative constructor
-        return rays
+        return ray_operations.subset(self, n, seed)
 
-    def _adopt(self, records: AnyRecords, meaning: RaySetMeaning) -> None:
-        fields: Mapping[str, Any] = records.dtype.fields or {}
-        if meaning.flux_unit not in FLUX_UNITS:
-            raise UnknownNameError("flux unit", meaning.flux_unit, FLUX_UNITS)
-        for name in fields:
-            if name not in GEOMETRY_COLUMNS and name not in EXTRA_COLUMNS:
-                raise UnknownNameError("ray column", name, (*GEOMETRY_COLUMNS, *EXTRA_COLUMNS))
-        if "direction" not in fields or "flux" not in fields:
-            raise ArgumentError("RaySet: records need the fields 'direction' and 'flux'.")
-        if isinstance(records, np.ndarray) and (records.ndim != 1 or not records.flags.c_contiguous):
-            raise ArgumentError(
-                f"RaySet: records of shape {records.shape} and strides {records.strides} are not one contiguous row; "
-                "copy them with numpy.ascontiguousarray, flat."
-            )
-        for name, shape in GEOMETRY_COLUMNS.items():
-            if name in fields and fields[name][0].shape != shape:
-                raise ArgumentError(
-                    f"RaySet: the field {name!r} has shape {fields[name][0].shape}; it must be {shape}."
-                )
-        floats = {fields[name][0].base for name in GEOMETRY_COLUMNS if name in fields}
-        if len(floats) != 1 or floats.isdisjoint({np.dtype("<f4"), np.dtype("<f8")}):
-            raise ArgumentError("RaySet: position, direction and flux must be all '<f4' or all '<f8'.")
-        self._records = records
-        self._meaning = meaning
-        self._tally: Tally | None = None
-        self._moments: Moments | None = None
-        self._colours = None
+    def thin(self, parts: int, seed: int) -> tuple[RaySet, ...]:
+        """Deal the rays at random into independent parts, each scaled by `parts` to stand for the whole.
 
-    def replace(self, **changes: Any) -> RaySet:
-        """A set over the same records with some fields of its meaning changed."""
-        changed = RaySet.from_records(self._records, dataclasses.replace(self._meaning, **changes))
-        # The account of the flux as stored depends on the records alone: no second pass for it, and no second warning.
-        changed._tally = self._tally  # noqa: SLF001 - its own kind
-        return changed
-
-    def __len__(self) -> int:
-        """Number of rays, usable or not."""
-        return int(self._records.shape[0])
-
-    def __repr__(self) -> str:
-        """Say what a person wants to know, without a pass over the rays."""
-        return f"<RaySet of {len(self):,} rays in {self.flux_unit} from {self.provenance.source}>"
-
-    # --- what the rays are -------------------------------------------------------------------------------------------
-
-    @property
-    def records(self) -> AnyRecords:
-        """The structured records as stored, shape (n,); of a binary file, `FileRecords`."""
-        return self._records
-
-    @property
-    def meaning(self) -> RaySetMeaning:
-        """What the records mean."""
-        return self._meaning
-
-    @property
-    def flux_unit(self) -> FluxUnit:
-        """``"lm"`` or ``"W"``."""
-        return self._meaning.flux_unit
-
-    @property
-    def provenance(self) -> Provenance:
-        """Where the rays come from."""
-        return self._meaning.provenance
-
-    @property
-    def spectra(self) -> tuple[Spectrum, ...]:
-        """One spectrum for the whole set, or those that the column ``spectrum_index`` counts from 1; may be empty."""
-        return self._meaning.spectra
-
-    @property
-    def header(self) -> Mapping[str, Any]:
-        """Facts of the file's header under plain names."""
-        return self._meaning.header
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the columns beside position, direction and flux; see `EXTRA_COLUMNS`."""
-        return tuple(name for name in self._records.dtype.names or () if name not in GEOMETRY_COLUMNS)
-
-    @property
-    def has_position(self) -> bool:
-        """False for far-field sets, whose rays have directions only."""
-        return "position" in (self._records.dtype.names or ())
-
-    @property
-    def position(self) -> FloatArray:
-        """Start points [mm], shape (n, 3); zero for far-field sets."""
-        if not self.has_position:
-            return np.zeros((len(self), 3))
-        return self._stored("position") * self._meaning.length_scale
-
-    @property
-    def direction(self) -> FloatArray:
-        """Unit directions, shape (n, 3); rays whose direction cannot be used keep what is stored."""
-        stored = self._stored("direction")
-        with np.errstate(over="ignore", invalid="ignore"):
-            norm = np.sqrt(np.einsum("ij,ij->i", stored, stored))[:, None]
-        unit: FloatArray = np.divide(stored, norm, out=stored, where=(norm >= 1e-6) & np.isfinite(norm))
-        return unit
-
-    @property
-    def flux(self) -> FloatArray:
-        """Flux of each ray [`flux_unit`], shape (n,), scaled to the total."""
-        return self._stored("flux") * self.flux_scale
-
-    @property
-    def wavelength(self) -> FloatArray | None:
-        """Wavelength of each ray [nm], shape (n,), or None if the set does not know it."""
-        if "wavelength" in self.columns:
-            return self.column("wavelength")
-        if self._meaning.single_wavelength is not None:
-            return np.full(len(self), self._meaning.single_wavelength)
-        return None
-
-    def column(self, name: str, rows: slice = slice(None)) -> npt.NDArray[Any]:
-        """Values of a further column [unit as in `EXTRA_COLUMNS`], shape (n,) or (n, k).
-
-        Those of `FLUX_COLUMNS` are scaled as the flux is: what a ray has in watts for each lumen stays as stored.
+        If the set is a sample of a Poisson process, the parts are independent samples of the same luminance, each with
+        1/`parts` of the rays (thinning, [Neufeld2024]_). The factor is `parts`, not what would restore the total: a
+        part's total varies as a Poisson count does, and that variation is its error.
 
         Raises
         ------
-        UnknownNameError
-            If the set has no such column.
+        ArgumentError
+            If `parts` is below 2 or above 2³² - 1, or the seed is not in 0..2⁶⁴ - 1.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> a, b = et.RingSource(rays=1000).ray_set().thin(2, seed=1)
+        >>> len(a) + len(b)
+        1000
         """
-        if name not in self.columns:
-            raise UnknownNameError("ray column", name, self.columns)
-        if name == "spectrum_index":
-            return self._field(name, rows).astype(np.int64)
-        if name == "wavelength":
-            return self._stored(name, rows) * self._meaning.wavelength_scale
-        return self._stored(name, rows) * (self.flux_scale if name in FLUX_COLUMNS else 1.0)
+        return ray_operations.thin(self, parts, seed)
 
-    def _stored(self, name: str, rows: slice = slice(None)) -> FloatArray:
-        """A field of the records as f8, unscaled; the signalling NaN of damaged files pass in silence."""
-        with np.errstate(invalid="ignore"):
-            return self._field(name, rows).astype(np.float64)
+    @classmethod
+    def merge(cls, sets: Sequence[RaySet], flux: Sequence[float] | None = None, unit: FluxUnit | None = None) -> RaySet:
+        """One set of all rays: a white LED from its blue and its yellow file.
 
-    def _field(self, name: str, rows: slice) -> npt.NDArray[Any]:
-        """A field of some records; all of a file's are never in memory at once."""
-        values: npt.NDArray[Any] = self._records[name] if rows == slice(None) else self._records[rows][name]
-        return values
+        Parameters
+        ----------
+        sets : sequence of RaySet
+            In the same coordinates.
+        flux : sequence of float, optional
+            Total flux of each set [`unit`]; their own if None.
+        unit : {"lm", "W"}, optional
+            Of the merged set, and of `flux`; sets in the other unit are converted (`with_total_flux`, else `in_unit`). That
+            of the sets if None.
 
-    # --- passes over all rays ------------------------------------------------------------------------------------------
+        Returns
+        -------
+        RaySet
+            Columns that all sets have are kept. The merged set knows the wavelength of every ray if each set does, and
+            the spectrum of every ray, by ``spectrum_index``, if each set does.
 
-    def core_source(self) -> Any:
-        """The records as the compiled core takes them."""
-        return self._table(None)
+        Raises
+        ------
+        ArgumentError
+            If units differ and none is stated, a set is a far-field set, or the numbers of sets and fluxes differ.
+        UnitError
+            If a set cannot be converted.
 
-    def _table(self, colour: tuple[int, str, float] | None) -> _core.RayTable:
-        fields = self._records.dtype.fields
-        assert fields is not None  # noqa: S101 - checked on adoption
-        records = self._records
-        return _core.RayTable(
-            records.stored if isinstance(records, FileRecords) else records.view(np.uint8).reshape(-1),
-            self._records.dtype.itemsize,
-            fields["position"][1] if "position" in fields else None,
-            fields["direction"][1],
-            fields["flux"][1],
-            fields["flux"][0] == np.dtype("<f8"),
-            self._meaning.length_scale,
-            colour,
-        )
+        Examples
+        --------
+        >>> import etendue as et
+        >>> blue = et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0])
+        >>> yellow = et.RaySet([[0, 0, 0]], [[0, 1, 0]], [1.0])
+        >>> et.RaySet.merge([blue, yellow], flux=[23.0, 314.0]).flux.tolist()
+        [23.0, 314.0]
+        """
+        return ray_merge.merged(sets, flux, unit)
 
-    def accept_tally(self, tally: Tally) -> float:
-        """Take note of a pass over all rays; warns once if the header's total contradicts the rays."""
-        first = self._tally is None
-        self._tally = tally
-        if first:
-            for complaint in self._tally_complaints(tally):
-                if complaint.severity != "note":
-                    warnings.warn(f"{self.provenance.source}: {complaint}", RayFileWarning, stacklevel=3)
-        return self.flux_scale
+    def with_total_flux(self, flux: float, unit: FluxUnit | None = None) -> RaySet:
+        """The same rays sharing a total flux, in proportion to what they carry now.
+
+        Parameters
+        ----------
+        flux : float
+            New total [`unit`], > 0.
+        unit : {"lm", "W"}, optional
+            The set's own if None. For another unit the rays are converted first (`in_unit`) if their spectrum is known.
+            If it is not, the call states that the flux is distributed over the rays in the same way in both units, which
+            is true if they all have the same spectrum; columns of `FLUX_COLUMNS` are then left out.
+
+        Raises
+        ------
+        ArgumentError
+            If `flux` is not finite or not above 0.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> rays = et.RaySet([[0, 0, 0], [1, 0, 0]], [[0, 0, 1], [0, 0, 1]], [1.0, 3.0])
+        >>> rays.with_total_flux(337).flux.tolist()
+        [84.25, 252.75]
+        """
+        return ray_operations.with_total_flux(self, flux, unit)
+
+    def scaled(self, factor: float) -> RaySet:
+        """Positions multiplied by `factor` (> 0); directions and flux stay, so luminance falls by its square."""
+        return ray_operations.scaled(self, factor)
+
+    def moved(self, offset: Sequence[float]) -> RaySet:
+        """Positions shifted by `offset`, three components [mm].
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> et.RaySet([[1, 2, 3]], [[0, 0, 1]], [1.0]).moved((0, 0, -3)).position.tolist()
+        [[1.0, 2.0, 0.0]]
+        """
+        return ray_operations.moved(self, offset)
+
+    def rotated(self, axis: Sequence[float], angle: float) -> RaySet:
+        """Turned about an axis through the origin by `angle` [°], right-handed.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> et.RaySet([[1, 0, 0]], [[1, 0, 0]], [1.0]).rotated((0, 0, 1), 90).position.round(12).tolist()
+        [[0.0, 1.0, 0.0]]
+        """
+        return ray_operations.rotated(self, axis, angle)
+
+    def propagated_to_plane(self, point: Sequence[float], normal: Sequence[float] = (0.0, 0.0, 1.0)) -> RaySet:
+        """Start points moved along the rays, forwards or backwards, onto the plane through `point` [mm].
+
+        Rays parallel to the plane never meet it: they are left out, and the number and flux are complained about.
+        """
+        return ray_operations.propagated_to_plane(self, point, normal)
+
+    def propagated_to_sphere(self, centre: Sequence[float], radius: float) -> RaySet:
+        """Start points moved along the rays, forwards or backwards, to where they leave a sphere [mm].
+
+        Rays whose line misses the sphere are left out, and the number and flux are complained about.
+        """
+        return ray_operations.propagated_to_sphere(self, centre, radius)
 
     @property
-    def tally(self) -> Tally:
-        """The flux account as stored; costs one pass over the rays the first time."""
-        return self._tally if self._tally is not None else self.pass_over()
+    def virtual_focus(self) -> ray_operations.VirtualFocus:
+        """The point F with the least Σ w |distance of F to the ray's line|² ([Muschaweck2019]_).
 
-    def moments(self, progress: Progress | None = None, threads: int | None = None) -> Moments:
-        """Bounding box, centroid, mean direction and the sums behind the virtual focus; one pass the first time."""
-        if self._moments is None:
-            tally, moments = _core.scan(self.core_source(), checked_threads(threads), progress)
-            self.accept_tally(Tally.from_core(tally))
-            arrays = {k: np.array(v) for k, v in moments.items() if k not in ("zero_flux", "flux_range")}
-            low, high = moments["flux_range"]
-            self._moments = Moments(moments["zero_flux"], (low, high), **arrays)
-        return self._moments
+        The normal equations (theory eq. 24) A F = b with A = Σ w (1 - k kᵀ), b = Σ w (1 - k kᵀ) x; vendors print F in their
+        data sheets.
+        """
+        return ray_operations.virtual_focus(self)
 
-    @property
-    def flux_scale(self) -> float:
-        """Factor from stored flux to `flux_unit`; costs one pass if the set's total is declared."""
-        declared = self._meaning.declared_flux
-        if declared is None:
-            return self._meaning.stored_flux_scale
-        stored = self.tally.flux
-        return declared / stored if stored > 0 else 0.0
+    # --- units and colours
 
-    @property
-    def total_flux(self) -> float:
-        """Flux of all usable rays [`flux_unit`]."""
-        declared = self._meaning.declared_flux
-        if declared is not None and self.tally.flux > 0:
-            return declared
-        return self.tally.flux * self.flux_scale
+    def in_unit(self, unit: FluxUnit) -> RaySet:
+        """The set with its flux in lumens or watts, through its spectrum: Φ_v = K_m ∫ Φ_e,λ V(λ) dλ.
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What all that is made of the rays should tell."""
-        copies = self._meaning.copies
-        if copies <= 1.0:
-            return self._meaning.notes
-        found = f"up to {copies:,.4g} of the rays are copies of one ray of a set"
-        told = f"errors made as if all were independent are too small, up to {math.sqrt(copies):,.3g} times"
-        return (*self._meaning.notes, f"{found}: standard {told}")
+        If no spectrum is known, but the header of the rays' file states the total in both units, their ratio is taken for
+        all rays. The last step of the provenance says how it was done.
+
+        Raises
+        ------
+        UnitError
+            If the set knows neither the spectrum of its rays nor both totals; the message says what would help.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> rays = et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0], flux_unit="W", wavelength=[555.0])
+        >>> round(rays.in_unit("lm").total_flux, 6)
+        683.0
+        """
+        return ray_units.in_unit(self, unit)
 
     @property
-    def complaints(self) -> tuple[Complaint, ...]:
-        """All that is to be said of the set: by its reader, and by a pass over its rays."""
-        told = (Complaint("note", "rays", note) for note in self.notes)
-        return (*self._meaning.complaints, *told, *self._tally_complaints(self.tally))
+    def knows_spectrum(self) -> bool:
+        """Whether every ray has a wavelength or a spectrum, so that watts and lumens can be converted."""
+        return ray_units.knows_spectrum(self)
 
-    def _tally_complaints(self, tally: Tally) -> list[Complaint]:
-        return [*self._ray_complaints(tally), *self._total_complaints(tally)]
+    def without_spectrum(self) -> RaySet:
+        """The same rays with nothing known of their spectra, wavelengths and polarisation.
 
-    def _ray_complaints(self, tally: Tally) -> list[Complaint]:
-        found: list[Complaint] = []
-        reasons: list[tuple[int, str]] = [
-            (tally.not_finite, "have a coordinate, direction or flux that is not finite"),
-            (tally.no_direction, "have no direction"),
-            (tally.negative_flux, "have negative flux"),
-        ]
-        found.extend(
-            Complaint("error", "rays", f"{count:,} of {tally.rays:,} rays {why}; they are left out")
-            for count, why in reasons
-            if count
-        )
-        # Sets made in memory may give directions of any length; a file states unit vectors.
-        if tally.norm_error > 1e-3 and self.provenance.format != "memory":
-            found.append(
-                Complaint(
-                    "warning", "rays", f"direction lengths differ from 1 by up to {tally.norm_error:.2g}; normalised"
-                )
-            )
-        return found
+        Examples
+        --------
+        >>> import etendue as et
+        >>> et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0], wavelength=[450.0]).without_spectrum().knows_spectrum
+        False
+        """
+        return ray_units.without_spectrum(self)
 
-    def _total_complaints(self, tally: Tally) -> list[Complaint]:
-        stated = self.header.get("total_flux")
-        if not (isinstance(stated, float) and math.isfinite(stated) and stated > 0 and tally.flux > 0):
-            return []
-        stored = tally.flux * self._meaning.stored_flux_scale
-        if abs(stated / stored - 1) <= FLUX_TOLERANCE:
-            return []
-        rule = (
-            "the rays' values are relative and are scaled to the header's total"
-            if self._meaning.declared_flux is not None
-            else "the rays' sum is kept"
-        )
-        found = f"the header says {stated:.7g} {self.flux_unit}, the rays sum to {stored:.7g}; {rule}"
-        severity: Severity = "note" if self._meaning.relative_by_format else "warning"
-        return [Complaint(severity, "total flux", found)]
+    def with_spectrum(self, spectrum: Spectrum) -> RaySet:
+        """The same rays with one spectrum for all, in place of whatever was known of their spectra and wavelengths.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> rays = et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0], flux_unit="W", wavelength=[450.0])
+        >>> round(rays.with_spectrum(et.Spectrum([555.0], [1.0])).in_unit("lm").total_flux)
+        683
+        """
+        return ray_units.with_spectrum(self, spectrum)
+
+    @property
+    def colour_column(self) -> str | None:
+        """The column that tells the colour of each ray, if there is one: ``wavelength`` or ``spectrum_index``."""
+        return ray_colours.colour_column(self)
+
+    def coloured_source(self) -> Any:
+        """The records as the compiled core takes them, with the column that tells the colours of the rays, if any.
+
+        Raises
+        ------
+        ArgumentError
+            If that column is of a type that no ray file has.
+        """
+        return ray_colours.coloured_source(self)
+
+    def wavelength_of(self, batch: RayBatch) -> FloatArray | None:
+        """Wavelength of each ray of a batch [nm], shape (k,); None if the set does not know it."""
+        return ray_colours.wavelength_of(self, batch)
+
+    def colours(self, progress: Progress | None = None, threads: int | None = None) -> ray_colours.Colours | None:
+        """What the rays' own colours amount to, by one pass the first time; None if they have none of their own."""
+        if self._colours is None:
+            self._colours = ray_colours.scan_colours(self, progress, threads)
+        return self._colours
+
+    def total_spectrum(
+        self, progress: Progress | None = None, threads: int | None = None
+    ) -> Spectrum | SpectralLines | None:
+        """The spectrum of all rays together, whatever their places and directions; None if it is not known.
+
+        Rays with a wavelength or a spectrum each take one pass the first time. Flux of rays that state none is left out.
+        """
+        if self.colour_column is None:
+            return ray_colours.shared_spectrum(self)
+        colours = self.colours(progress, threads)
+        return None if colours is None else colours.lines

@@ -17,7 +17,8 @@ from etendue.quantities.intensity_nodes import MOST_CELLS, Nodes
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
 from etendue.quantities.provenance import Provenance
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.scene.dealing import Array, CellSums, Dealing
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.scene.scene import Scene

@@ -25,7 +25,8 @@ from etendue.formats.rays.shared import (
     whole_records,
     write_records,
 )
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 from etendue.quantities.report import Complaint
 from etendue.units import MM_PER_LENGTH_UNIT, FluxUnit

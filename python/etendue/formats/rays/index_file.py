@@ -23,7 +23,7 @@ from etendue.formats.rays.shared import read_bytes
 from etendue.formats.strict_json import strict_json
 from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.provenance import Provenance
-from etendue.quantities.ray_set import RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_stream import Tally
 from etendue.quantities.report import Complaint
 from etendue.quantities.spectrum import Spectrum

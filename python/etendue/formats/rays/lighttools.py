@@ -31,7 +31,8 @@ from etendue.formats.rays.shared import (
     wavelength_complaints,
     write_records,
 )
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.report import Complaint
 from etendue.units import MM_PER_LENGTH_UNIT, FluxUnit

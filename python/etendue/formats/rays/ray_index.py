@@ -17,7 +17,8 @@ from etendue.formats.output import atomic_output
 from etendue.formats.rays.index_building import Counted, IndexTables, Records, count_rays, fill_index
 from etendue.formats.rays.index_file import DAMAGED, HEADER, map_new, read_index, text_of, write_tables
 from etendue.quantities.file_records import AnyRecords
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 from etendue.quantities.report import Complaint
 
@@ -128,11 +129,11 @@ class RayIndex(RaySet):
             raise FormatError(path, place, found, DAMAGED) from error
 
     @classmethod
-    def from_records(cls, records: AnyRecords, meaning: RaySetMeaning) -> RaySet:
+    def from_records(cls, records: AnyRecords, meaning: RaySetMeaning) -> RaySet:  # type: ignore[override]
         """A plain ray set: records that were made of an index's rays stand in no order that its tables know."""
         return RaySet.from_records(records, meaning)
 
-    def replace(self, **changes: Any) -> RaySet:
+    def replace(self, **changes: Any) -> RaySet:  # type: ignore[override]
         """The index over the same rays with some fields of its meaning changed; a plain set if lengths are among them."""
         if changes.get("length_scale", self.meaning.length_scale) != self.meaning.length_scale:
             return super().replace(**changes)

@@ -46,7 +46,8 @@ from etendue.formats.rays.tm25_layout import (
 )
 from etendue.formats.rays.tm25_writer import wants_watts, write
 from etendue.quantities.file_records import AnyRecords
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.report import Complaint
 from etendue.quantities.spectrum import Spectrum
 from etendue.quantities.spool import spool

@@ -39,7 +39,7 @@ from etendue.formats.rays.tm25_layout import (
     padded,
 )
 from etendue.quantities.provenance import version
-from etendue.quantities.ray_operations import FLUX_COLUMNS
+from etendue.quantities.ray_records import FLUX_COLUMNS
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.spectrum import Spectrum

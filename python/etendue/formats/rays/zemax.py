@@ -28,7 +28,8 @@ from etendue.formats.rays.shared import (
 )
 from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.provenance import version
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.report import Complaint
 from etendue.units import MM_PER_LENGTH_UNIT, NM_PER_UM, FluxUnit

@@ -16,7 +16,8 @@ from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
 from etendue.formats.rays.shared import Colour, FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.text_output import usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayBatch, RayStream
 from etendue.quantities.report import Complaint
 from etendue.units import MM_PER_LENGTH_UNIT, NM_PER_UM, FluxUnit

@@ -24,7 +24,8 @@ from etendue.lightfield.probe import check_near_field
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.patches import Patches
-from etendue.quantities.ray_set import RaySet, RaySetMeaning
+from etendue.quantities.ray_records import RaySetMeaning
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream
 from etendue.quantities.spool import spool
 from etendue.units import MM2_PER_M2, FluxUnit
