@@ -18,8 +18,9 @@ import etendue as et
 import numpy as np
 from etendue.lightfield.candidate import grow_candidate, product_bases, uniform_bases
 from etendue.lightfield.counting import EtendueCounts, count_rays
+from etendue.lightfield.etendue_density import PartField
 from etendue.lightfield.fitting import fine_depths
-from etendue.lightfield.light_field import LightField, PartField
+from etendue.lightfield.light_field import LightField
 from etendue.lightfield.trees import grow, log_evidence
 from etendue.units import MM2_PER_M2
 from light_field import Family, families

@@ -18,9 +18,10 @@ from etendue.lightfield import learning
 from etendue.lightfield.candidate import Score
 from etendue.lightfield.characteristic import CharacteristicCurve, characteristic_curve
 from etendue.lightfield.diagnostics import diagnose
+from etendue.lightfield.etendue_density import FitReport, PartField
 from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.learning import EXPONENTS, REFITS, LearningCurve, law_of_gains, learning_curve
-from etendue.lightfield.light_field import FitReport, LightField, PartField
+from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Hemisphere, Plane, Surface
 from etendue.plot.characteristic_picture import plot_characteristic
 from oracles.light_fields import SURFACES, make_field

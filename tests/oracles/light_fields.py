@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from etendue.lightfield.light_field import FitReport, LightField, PartField
+from etendue.lightfield.etendue_density import FitReport, PartField
+from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, Surface
 from etendue.quantities.provenance import Provenance
 from etendue.units import FluxUnit

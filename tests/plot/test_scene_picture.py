@@ -19,7 +19,7 @@ from etendue.plot.scene_legend import FILLS, FINISH_LINES, RAY, legend_handles
 from etendue.plot.scene_parts import FINISH_KINDS
 from etendue.plot.scene_picture import plot_layout
 from etendue.scene import Scene, compile_scene
-from etendue.tracing.sections import Section
+from etendue.tracing.section import Section
 from etendue.tracing.trails import near_section, trace_trails
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb

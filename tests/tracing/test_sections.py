@@ -21,8 +21,9 @@ from etendue.scene.files import Files
 from etendue.scene.placement import Placement
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.shape import Trim
+from etendue.tracing.section import Section
 from etendue.tracing.section_chains import chains, rings
-from etendue.tracing.sections import Section, cut_faces
+from etendue.tracing.sections import cut_faces
 from oracles.scenes import OCTAHEDRON, OCTANTS
 from scipy.integrate import quad
 

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.lightfield.candidate import FINE_POSITIONS, grow_symmetric, product_bases, unit_field
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
-from etendue.lightfield.light_field import core_part
+from etendue.lightfield.etendue_density import core_part
 from etendue.lightfield.surfaces import Part
 from etendue.lightfield.symmetry import order, sum_of_images
 from etendue.lightfield.trees import ELSEWHERE, POSITIONS, Base, Tree, grow, grow_moved

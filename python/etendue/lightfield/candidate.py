@@ -9,7 +9,7 @@ import numpy as np
 
 from etendue import _core
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
-from etendue.lightfield.light_field import PartField, core_part
+from etendue.lightfield.etendue_density import PartField, core_part
 from etendue.lightfield.nodes import node_values
 from etendue.lightfield.shifted_trees import LATTICE
 from etendue.lightfield.symmetry import order, sum_of_images

@@ -13,9 +13,10 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.characteristic import CharacteristicCurve, characteristic_curve
 from etendue.lightfield.counting import FloatArray
+from etendue.lightfield.etendue_density import FitReport, PartField
 from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.learning import Forecast, LearningCurve, learning_curve
-from etendue.lightfield.light_field import FitReport, LightField, PartField
+from etendue.lightfield.light_field import LightField
 from etendue.lightfield.trees import Base
 from etendue.quantities.ray_stream import RayStream, checked_threads
 from etendue.units import LUMINANCE_UNIT, MM2_PER_M2, FluxUnit

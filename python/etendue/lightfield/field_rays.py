@@ -7,7 +7,7 @@ from typing import Any
 
 from etendue import _core
 from etendue.errors import ArgumentError
-from etendue.lightfield.light_field import LightField
+from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import FloatArray, Progress, RayBatch, RayStream, Tally
@@ -25,7 +25,7 @@ class FieldRays(RayStream):
 
     Parameters
     ----------
-    field : LightField
+    field : EtendueDensity
         What is drawn from.
     rays : int
         Number of rays, which together carry the field's flux.
@@ -43,13 +43,13 @@ class FieldRays(RayStream):
     --------
     >>> import etendue as et
     >>> from etendue.lightfield.surfaces import Disk
-    >>> field = LightField.fit(et.RingSource(rays=100_000), Disk(radius=30), depths=(3, 3, 3, 3))
+    >>> field = et.LightField.fit(et.RingSource(rays=100_000), Disk(radius=30), depths=(3, 3, 3, 3))
     >>> rays = FieldRays(field, 10**9, seed=4)
     >>> len(rays), round(rays.total_flux, 6), len(next(rays.batches()).flux)
     (1000000000, 600.0, 262144)
     """
 
-    def __init__(self, field: LightField, rays: int, seed: int = 1) -> None:
+    def __init__(self, field: EtendueDensity, rays: int, seed: int = 1) -> None:
         # Python's own TypeError for 1e6, as everywhere a number of rays is asked for.
         rays, seed = map(operator.index, (rays, seed))
         if not 1 <= rays < 2**63:

@@ -25,7 +25,7 @@ import platformdirs
 from etendue import _core
 from etendue.errors import FormatError
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.storage import as_stored, load_field, save_field
+from etendue.lightfield.storage import as_stored, save_field
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
@@ -178,7 +178,7 @@ def _recall(name: str) -> LightField | None:
     path = folder / f"{name}.h5"
     # One that is damaged is fitted and written anew.
     try:
-        field = load_field(path)
+        field = LightField.load(path)
         os.utime(path)
     except (OSError, FormatError):
         return None

@@ -21,8 +21,8 @@ from etendue.lightfield.candidate import (
     uniform_bases,
 )
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, count_rays
+from etendue.lightfield.etendue_density import EtendueDensity, FitReport
 from etendue.lightfield.expected_loss import loss_of_gamma
-from etendue.lightfield.light_field import FitReport, LightField
 from etendue.lightfield.probe import check_near_field, probe_rays
 from etendue.lightfield.surfaces import Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry
@@ -62,7 +62,7 @@ def fit_light_field(
     seed: int = 1,
     threads: int | None = None,
     progress: Progress | None = None,
-) -> LightField:
+) -> EtendueDensity:
     """See `LightField.fit`."""
     threads = checked_threads(threads)
     check_near_field(rays)
@@ -151,7 +151,7 @@ def _depths(bits: int, lend: int) -> Depths:
     return (place, place, direction, direction)
 
 
-def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, threads: int | None) -> LightField:
+def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, threads: int | None) -> EtendueDensity:
     """The field of counted rays: base measures compared on the held-out rays, the better one grown on all."""
 
     def bases(name: str, fold: Fold) -> tuple[Base, ...]:
@@ -183,7 +183,7 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
         effective_cells=_effective_cells(counts, final),
         symmetry=counts.symmetry,
     )
-    return LightField(
+    return EtendueDensity(
         surface=counts.surface,
         parts=final.fields(counts),
         flux_unit=rays.flux_unit,

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.lightfield.candidate import MIXED_IN, Score
 from etendue.lightfield.counting import FloatArray, Sums
-from etendue.lightfield.light_field import PartField, core_part
+from etendue.lightfield.etendue_density import PartField, core_part
 from etendue.lightfield.surfaces import Part
 from etendue.lightfield.trees import Base, grow
 from etendue.quantities.ray_set import RaySet

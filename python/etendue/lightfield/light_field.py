@@ -5,102 +5,29 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from etendue import _core
-from etendue.errors import ArgumentError, UnitError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.formats.input import as_path
 from etendue.lightfield.counting import FloatArray
+from etendue.lightfield.etendue_density import EtendueDensity
+from etendue.lightfield.field_rays import FieldRays
+from etendue.lightfield.fitting import fit_light_field
+from etendue.lightfield.storage import load_field, save_field
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
-from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
-from etendue.quantities.spectral_lines import SpectralLines
-from etendue.quantities.spectrum import Spectrum
-from etendue.units import FLUX_UNITS, INTENSITY_UNIT, MM2_PER_M2, FluxUnit
-
-if TYPE_CHECKING:
-    from etendue.lightfield.field_rays import FieldRays
+from etendue.units import INTENSITY_UNIT
 
 INTENSITY_SIDE = 96
 """Points along each coordinate of a part over which an intensity is summed: 9216 per part and direction."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class PartField:
-    """The light that leaves one part: L = level · B_s(s₁, s₂) · B_d(a, b) · r(s₁, s₂, a, b), theory eq. 38.
-
-    Parameters
-    ----------
-    ratio : array of float32, shape (n₁, n₂, n₃, n₄)
-        r at the centres of equal cells; between them it is linear in each coordinate.
-    deviation : array of float32, same shape
-        Its standard deviation.
-    space : array, shape (n, n), or None
-        B_s at the centres of finer cells, bilinear between them; None: 1.
-    direction : array, shape (m, m), or None
-        B_d, likewise.
-    level : float
-        [flux unit/(mm² sr)]
-    """
-
-    ratio: npt.NDArray[np.float32]
-    deviation: npt.NDArray[np.float32]
-    space: FloatArray | None
-    direction: FloatArray | None
-    level: float
-
-
-@dataclasses.dataclass(frozen=True)
-class FitReport:
-    """What is known of how a field was fitted, and how well it fits.
-
-    Parameters
-    ----------
-    rays, unmet_rays : int
-        Rays with flux, and those that no part of the surface met.
-    unmet_flux : float
-        Flux of the latter [flux unit].
-    bases : tuple of str
-        The base measure of each part: ``"uniform"`` or ``"product"``.
-    concentrations : tuple of float
-        Of each part's tree.
-    log_evidence : float
-        ln of the evidence of the trees against their base measures, summed over the parts.
-    score : float
-        Mean ln of the density in étendue [1/(mm² sr)] that the field gives to held-out rays: the larger the better. Rays
-        that do not meet the surface count with an even density over all lines through the source, so that fields of the
-        same rays on different surfaces can be compared. It is that of one tree on nine tenths of the rays; the field, an
-        average of trees on all rays, is somewhat better.
-    score_error : float
-        Standard error of the score.
-    histogram_score : float
-        That of the equal-étendue histogram of the fitted rays, on the same rays.
-    effective_cells : float
-        Effective degrees of freedom: how many free cells would be as uncertain as the field is.
-    symmetry : str
-        What the field was folded by: ``"none"``, or the symmetry that was stated or borne out by the rays.
-    """
-
-    rays: int
-    unmet_rays: int
-    unmet_flux: float
-    bases: tuple[str, ...]
-    concentrations: tuple[float, ...]
-    log_evidence: float
-    score: float
-    score_error: float
-    histogram_score: float
-    effective_cells: float
-    symmetry: str = "none"
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class LightField:
+class LightField(EtendueDensity):
     """Luminance as flux density in étendue, on a carrier surface, with its standard error.
 
     Make one with `LightField.fit`, keep it with `save`, get it back with `LightField.load`.
@@ -130,66 +57,6 @@ class LightField:
     True
     """
 
-    surface: Surface
-    parts: tuple[PartField, ...]
-    flux_unit: FluxUnit
-    report: FitReport
-    provenance: Provenance = dataclasses.field(default_factory=Provenance)
-    notes: tuple[str, ...] = ()
-    spectrum: Spectrum | SpectralLines | None = None
-
-    def __post_init__(self) -> None:
-        charts = self.surface.parts()
-        if len(charts) != len(self.parts):
-            raise ArgumentError(f"{len(self.parts)} fields for the {len(charts)} parts of {self.surface.spec}.")
-        core = _core.LightField([core_part(chart.core(), part) for chart, part in zip(charts, self.parts, strict=True)])
-        object.__setattr__(self, "_core", core)
-
-    @property
-    def core(self) -> _core.LightField:
-        """The field as the compiled core takes it; luminance in [flux unit/(mm² sr)]."""
-        core: _core.LightField = self._core  # type: ignore[attr-defined]
-        return core
-
-    @property
-    def part_flux(self) -> tuple[float, ...]:
-        """∫ L dU over each part [flux unit]."""
-        return tuple(self.core.flux())
-
-    @property
-    def total_flux(self) -> float:
-        """∫ L dU over all parts [flux unit]: the flux of the rays that met the surface."""
-        return math.fsum(self.part_flux)
-
-    def luminance(
-        self, points: npt.ArrayLike, directions: npt.ArrayLike, *, threads: int | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Luminance along lines, and its standard error, each of shape (n,) [cd/m² or W/(m² sr)].
-
-        Parameters
-        ----------
-        points : array_like, shape (n, 3)
-            Any points of the lines outside the source [mm]; luminance is constant along a line.
-        directions : array_like, shape (n, 3)
-            In which the light travels; normalised on use.
-        threads : int, optional
-            All cores if None.
-
-        Raises
-        ------
-        ArgumentError
-            If the shapes disagree or a value is not finite.
-        """
-        x, k = _lines(points, directions)
-        value, deviation = self.core.luminance(x, k, checked_threads(threads))
-        return value * MM2_PER_M2, deviation * MM2_PER_M2
-
-    def pdf(self, points: npt.ArrayLike, directions: npt.ArrayLike) -> FloatArray:
-        """Density of `sample` in étendue along lines [1/(mm² sr)], shape (n,): L/Φ."""
-        x, k = _lines(points, directions)
-        density: FloatArray = self.core.luminance(x, k)[0] / self.total_flux
-        return density
-
     def rays(self, n: int, seed: int = 1) -> FieldRays:
         """`n` rays of equal flux drawn from the field, as a stream that needs no memory.
 
@@ -205,8 +72,6 @@ class LightField:
         ArgumentError
             If there are no rays to be drawn, or there is no such seed.
         """
-        from etendue.lightfield.field_rays import FieldRays  # noqa: PLC0415 - it needs this class
-
         return FieldRays(self, n, seed)
 
     def sample(self, n: int, seed: int = 1) -> RaySet:
@@ -292,68 +157,10 @@ class LightField:
         UnknownNameError
             If there is no such symmetry.
         """
-        from etendue.lightfield.fitting import fit_light_field  # noqa: PLC0415 - it needs this class
-
-        return fit_light_field(
+        density = fit_light_field(
             rays, surface, symmetry=symmetry, depths=depths, seed=seed, threads=threads, progress=progress
         )
-
-    def in_unit(self, unit: FluxUnit) -> LightField:
-        """The field in lumens or watts, by the luminous efficacy of its spectrum: that of all its light together.
-
-        Raises
-        ------
-        UnitError
-            If the field knows no spectrum, or its light has no lumens.
-        UnknownNameError
-            If there is no such unit.
-
-        Examples
-        --------
-        >>> import etendue as et
-        >>> rays = et.RingSource(rays=100_000).ray_set().replace(flux_unit="W", single_wavelength=555.0)
-        >>> field = et.LightField.fit(rays, et.Disk(radius=30), depths=(3, 3, 3, 3))
-        >>> round(field.in_unit("lm").total_flux / field.total_flux)
-        683
-        """
-        if unit not in FLUX_UNITS:
-            raise UnknownNameError("flux unit", unit, FLUX_UNITS)
-        if unit == self.flux_unit:
-            return self
-        if self.spectrum is None:
-            raise UnitError(
-                f"{self.provenance.source}: {self.flux_unit} cannot become {unit}: the light field knows no spectrum. Fit "
-                "it to rays with wavelengths or a spectrum, or give it one: field.replace(spectrum=Spectrum(...))."
-            )
-        efficacy = self.spectrum.luminous_efficacy
-        if not efficacy > 0.0:
-            raise UnitError(
-                f"{self.provenance.source}: {self.flux_unit} cannot become {unit}: V(λ) is 0 at the wavelengths of this "
-                "light."
-            )
-        factor = efficacy if unit == "lm" else 1.0 / efficacy
-        notes = list(self.notes)
-        if self.spectrum_is_mean:
-            notes.append(
-                f"{self.flux_unit} became {unit} by {efficacy:.5g} lm/W, which all rays have together; where their colour "
-                "changes with place or direction, convert the rays before the fit"
-            )
-        return self.replace(
-            parts=tuple(dataclasses.replace(part, level=part.level * factor) for part in self.parts),
-            flux_unit=unit,
-            report=dataclasses.replace(self.report, unmet_flux=self.report.unmet_flux * factor),
-            provenance=self.provenance.then(f"{self.flux_unit} to {unit} through its spectrum"),
-            notes=tuple(notes),
-        )
-
-    @property
-    def spectrum_is_mean(self) -> bool:
-        """Whether the rays had different wavelengths, of which the field only knows the distribution."""
-        return isinstance(self.spectrum, SpectralLines) and self.spectrum.wavelength.size > 1
-
-    def replace(self, **changes: Any) -> LightField:
-        """The same field with some attributes changed."""
-        return dataclasses.replace(self, **changes)
+        return LightField(**density.content())
 
     def save(self, path: str | Path) -> None:
         """Write the field to an HDF5 file, whole or not at all; see docs/formats/light-fields.md.
@@ -363,8 +170,6 @@ class LightField:
         OSError
             If the file cannot be written.
         """
-        from etendue.lightfield.storage import save_field  # noqa: PLC0415 - it needs this class
-
         save_field(self, Path(path))
 
     @staticmethod
@@ -378,28 +183,4 @@ class LightField:
         OSError
             If there is no such file.
         """
-        from etendue.lightfield.storage import load_field  # noqa: PLC0415 - it needs this class
-
-        return load_field(as_path(path))
-
-
-def core_part(chart: _core._Part, part: PartField) -> _core._FieldPart:
-    """A part as the compiled core takes it."""
-    return {
-        "part": chart,
-        "cells": part.ratio.shape,
-        "ratio": np.ascontiguousarray(part.ratio, dtype=np.float32).ravel(),
-        "deviation": np.ascontiguousarray(part.deviation, dtype=np.float32).ravel(),
-        "space": part.space,
-        "direction": part.direction,
-        "level": part.level,
-    }
-
-
-def _lines(points: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    x, k = (np.ascontiguousarray(np.atleast_2d(v), dtype=np.float64) for v in (points, directions))
-    if x.shape != k.shape or x.shape[-1] != 3 or x.ndim != 2:
-        raise ArgumentError(f"points of shape {x.shape} and directions of shape {k.shape}; give both as (n, 3).")
-    if not (np.isfinite(x).all() and np.isfinite(k).all() and (np.abs(k).max(axis=1, initial=0) > 0).all()):
-        raise ArgumentError("points and directions must be finite, and no direction may be zero.")
-    return x, k
+        return LightField(**load_field(as_path(path)).content())

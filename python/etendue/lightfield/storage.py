@@ -13,7 +13,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,7 @@ from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.strict_json import strict_json
 from etendue.lightfield.counting import MOST_CELLS
-from etendue.lightfield.light_field import FitReport, LightField, PartField
+from etendue.lightfield.etendue_density import EtendueDensity, FitReport, PartField
 from etendue.lightfield.rounding import digits_for, rounded
 from etendue.lightfield.surfaces import SURFACES, Part, Surface
 from etendue.lightfield.symmetry import SYMMETRIES
@@ -33,6 +33,8 @@ from etendue.quantities.provenance import Provenance
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
 from etendue.units import LUMINANCE_UNIT, FluxUnit
+
+Density = TypeVar("Density", bound=EtendueDensity)
 
 FORMAT = "etendue light field"
 VERSION = 1
@@ -88,7 +90,7 @@ def is_field_file(path: str | Path) -> bool:
     return True
 
 
-def save_field(field: LightField, path: Path) -> None:
+def save_field(field: EtendueDensity, path: Path) -> None:
     """See `LightField.save`.
 
     What is saved is `as_stored`: a field that was loaded gives the same file again, bit by bit.
@@ -104,7 +106,7 @@ def save_field(field: LightField, path: Path) -> None:
         temporary.write_bytes(image.getbuffer())
 
 
-def load_field(path: Path) -> LightField:
+def load_field(path: Path) -> EtendueDensity:
     """See `LightField.load`."""
     import h5py  # noqa: PLC0415
 
@@ -114,7 +116,7 @@ def load_field(path: Path) -> LightField:
         return _read(Node(path, file, DAMAGED))
 
 
-def as_stored(field: LightField) -> LightField:
+def as_stored(field: Density) -> Density:
     """The field as a file holds it: rounded to what it is worth, each part with exactly the flux it had."""
     parts = tuple(_rounded_part(part) for part in field.parts)
     flux = field.replace(parts=parts).part_flux
@@ -138,7 +140,7 @@ def _rounded_part(part: PartField) -> PartField:
 # --- writing ---------------------------------------------------------------------------------------------------------
 
 
-def _write(file: Any, field: LightField) -> None:
+def _write(file: Any, field: EtendueDensity) -> None:
     unit = f"{field.flux_unit}/(mm2 sr)"
     put(file, format=FORMAT, version=VERSION, flux_unit=field.flux_unit, length_unit="mm", level_unit=unit)
     put(file, provenance=json.dumps(field.provenance.to_dict(), sort_keys=True), notes=json.dumps(field.notes))
@@ -193,7 +195,7 @@ def _put_array(group: Any, name: str, values: npt.NDArray[Any], meaning: str, un
 # --- reading ---------------------------------------------------------------------------------------------------------
 
 
-def _read(file: Node) -> LightField:
+def _read(file: Node) -> EtendueDensity:
     if not file.has_text("format", FORMAT):
         raise file.error("attribute 'format'", f"it is not {FORMAT!r}", FOREIGN)
     version = file.integer("version")
@@ -201,7 +203,7 @@ def _read(file: Node) -> LightField:
         raise file.error("attribute 'version'", f"version {version}", f"This étendue reads {VERSION}; update it.")
     surface = _surface(file.group("surface"))
     parts, flux = _parts(file.group("parts"), surface)
-    field = LightField(
+    field = EtendueDensity(
         surface=surface,
         parts=parts,
         flux_unit=_flux_unit(file),

@@ -13,8 +13,9 @@ from etendue.errors import ArgumentError
 from etendue.plot.scene_parts import Glow, Part, View, finish_kind, within
 from etendue.scene import MEDIA, Compiled, Medium, Scene, compile_scene
 from etendue.scene.extents import box_of
+from etendue.tracing.section import Section
 from etendue.tracing.section_chains import rings
-from etendue.tracing.sections import Section, Window, cut_faces
+from etendue.tracing.sections import Window, cut_faces
 from etendue.tracing.trails import (
     CANDIDATES,
     MOST_TRACED,

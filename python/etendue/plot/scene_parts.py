@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from etendue.tracing.sections import Section, Window
+from etendue.tracing.section import Section
+from etendue.tracing.sections import Window
 
 Array = npt.NDArray[np.float64]
 Record = dict[str, Any]

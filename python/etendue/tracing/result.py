@@ -30,6 +30,7 @@ from etendue.tracing.detections import (
 from etendue.tracing.ledger import Entry, Ledger, Loss
 from etendue.tracing.named import ByName
 from etendue.tracing.plan import Plan
+from etendue.tracing.storage import load_result, save_result
 from etendue.tracing.sums import Sums
 
 
@@ -246,9 +247,7 @@ class TraceResult:
         OSError
             If there is no room for it.
         """
-        from etendue.tracing.storage import save_result  # noqa: PLC0415 - it needs this class
-
-        save_result(self, Path(path))
+        save_result(self.plan, self.sums, Path(path))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> TraceResult:
@@ -271,9 +270,7 @@ class TraceResult:
         ...     TraceResult.load(Path(folder) / "result.h5").ledger == result.ledger
         True
         """
-        from etendue.tracing.storage import load_result  # noqa: PLC0415 - likewise
-
-        return load_result(as_path(path))
+        return TraceResult(*load_result(as_path(path)))
 
     def to_dict(self) -> dict[str, Any]:
         """The result in figures, as plain data for JSON."""

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
+from etendue.tracing.section import Section
 from etendue.tracing.section_chains import chains
-
-if TYPE_CHECKING:
-    from etendue.tracing.sections import Section
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -265,7 +263,7 @@ def crossed_curves(
 
     Examples
     --------
-    >>> from etendue.tracing.sections import Section
+    >>> from etendue.tracing.section import Section
     >>> disk = {"kind": "flat", "outline": {"kind": "annulus", "inner": 1.0, "outer": 2.0}}
     >>> here = [0.0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]
     >>> curves = crossed_curves(disk, here, [], Section("y", 0.0), np.array([[-2.0, 0.0], [2.0, 0.0]]))

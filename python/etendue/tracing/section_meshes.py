@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from etendue.tracing.section import Section
 from etendue.tracing.section_chains import chains
-
-if TYPE_CHECKING:
-    from etendue.tracing.sections import Section
 
 Array = npt.NDArray[np.float64]
 
@@ -35,7 +33,7 @@ def mesh_curves(shape: dict[str, Any], origin: Array, axes: Array, section: Sect
 
     Examples
     --------
-    >>> from etendue.tracing.sections import Section
+    >>> from etendue.tracing.section import Section
     >>> kite = {"vertices": [[0, -1, 0], [1, 1, 0], [0, 1, 1]], "triangles": [[0, 1, 2]]}
     >>> [c.tolist() for c in mesh_curves(kite, np.zeros(3), np.eye(3), Section("y", 0.0))]
     [[[0.5, 0.0], [0.0, 0.5]]]

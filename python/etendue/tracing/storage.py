@@ -28,7 +28,6 @@ from etendue.scene.scene import Scene
 from etendue.scene.toml import read_toml
 from etendue.tracing.detections import check_cells, detection_from_dict
 from etendue.tracing.plan import Plan
-from etendue.tracing.result import TraceResult
 from etendue.tracing.scattered import STRETCH, Scattered
 from etendue.tracing.sums import ENTRIES, RECORD, Collected, Open, Sums
 from etendue.units import FLUX_UNITS
@@ -81,30 +80,28 @@ def is_result_file(path: Path) -> bool:
         return False
 
 
-def save_result(result: TraceResult, path: Path) -> None:
+def save_result(plan: Plan, sums: Sums, path: Path) -> None:
     """See `TraceResult.save`."""
     import h5py  # noqa: PLC0415
 
     # Rows of 64 bytes, events of 120, three numbers per cell, and room for the rest.
-    size = 64 * sum(held.count for held in result.sums.collected) + CELL_BYTES * sum(
-        c[0].size for c in result.sums.cells
-    )
-    size += EVENT.itemsize * sum(held.count for held in result.sums.scattered)
-    size += len(result.plan.scene_text.encode()) + (1 << 20)
+    size = 64 * sum(held.count for held in sums.collected) + CELL_BYTES * sum(c[0].size for c in sums.cells)
+    size += EVENT.itemsize * sum(held.count for held in sums.scattered)
+    size += len(plan.scene_text.encode()) + (1 << 20)
     with atomic_output(path) as temporary:
         if size <= IMAGE_LIMIT:
             # In one go, because an HDF5 library whose disk is full cannot even close its file.
             image = io.BytesIO()
             with h5py.File(image, "w", libver=LIBRARY) as file:
-                _write(file, result, path.parent)
+                _write(file, plan, sums, path.parent)
             temporary.write_bytes(image.getbuffer())
         else:
             require_room(path, size)
             with h5py.File(temporary, "w", libver=LIBRARY) as file:
-                _write(file, result, path.parent)
+                _write(file, plan, sums, path.parent)
 
 
-def load_result(path: Path) -> TraceResult:
+def load_result(path: Path) -> tuple[Plan, Sums]:
     """See `TraceResult.load`."""
     import h5py  # noqa: PLC0415
 
@@ -120,14 +117,13 @@ def load_result(path: Path) -> TraceResult:
             advice = "of an earlier étendue; trace the scene again" if older else "update étendue"
             raise node.error("attribute 'version'", found, f"This étendue reads {VERSION}: {advice}.")
         plan = _plan(node.group("plan"), path)
-        return TraceResult(plan, _sums(node.group("sums"), plan))
+        return plan, _sums(node.group("sums"), plan)
 
 
 # --- writing ---------------------------------------------------------------------------------------------------------
 
 
-def _write(file: Any, result: TraceResult, folder: Path) -> None:
-    plan, sums = result.plan, result.sums
+def _write(file: Any, plan: Plan, sums: Sums, folder: Path) -> None:
     put(file, format=FORMAT, version=VERSION, length_unit="mm", wavelength_unit="nm", flux_unit=plan.flux_unit)
     group = file.create_group("plan")
     put(group, scene_name=plan.scene_name, fingerprint=plan.fingerprint, flux_unit=plan.flux_unit)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.scene import Compiled
-from etendue.tracing.sections import Section
+from etendue.tracing.section import Section
 
 Array = npt.NDArray[np.float64]
 
