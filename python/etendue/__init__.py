@@ -10,6 +10,19 @@
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from etendue.errors import (
+    ArgumentError,
+    EtendueError,
+    FormatError,
+    MemoryLimitError,
+    OutputError,
+    SceneError,
+    SceneWarning,
+    UnitError,
+    UnknownNameError,
+    UnsupportedFormatError,
+)
+from etendue.formats.input import WaitingWarning
 from etendue.formats.intensity import read_intensity, write_intensity
 from etendue.formats.maps import read_illuminance_map, read_map
 from etendue.formats.rays import read_rays, write_rays
@@ -40,38 +53,54 @@ from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
+from etendue.quantities.report import ChangedFileWarning, RayFileWarning
 from etendue.quantities.spectrum import Spectrum
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.sources.ring_source import RingSource
 from etendue.tracing import TraceResult, trace, trace_rounds
+from etendue.tracing.ledger import TraceWarning
 
 if TYPE_CHECKING:
     from etendue import scene
     from etendue.scene import Scene
 
 __all__ = [
+    "ArgumentError",
     "Box",
+    "ChangedFileWarning",
     "Cylinder",
     "Disk",
     "Dome",
+    "EtendueError",
+    "FormatError",
     "GriddedSource",
     "Hemisphere",
     "IlluminanceMap",
     "Intensity",
     "LightField",
     "LuminanceMap",
+    "MemoryLimitError",
     "Observer",
+    "OutputError",
     "Plane",
+    "RayFileWarning",
     "RayIndex",
     "RaySet",
     "Region",
     "RingSource",
     "ScatterEvents",
     "Scene",
+    "SceneError",
+    "SceneWarning",
     "Screen",
     "Spectrum",
     "Sphere",
     "TraceResult",
+    "TraceWarning",
+    "UnitError",
+    "UnknownNameError",
+    "UnsupportedFormatError",
+    "WaitingWarning",
     "cache_content",
     "clear_cache",
     "combine_maps",
@@ -107,6 +136,12 @@ def __getattr__(name: str) -> Any:
     # Scenes are checked by pydantic, which takes as long to import as all the rest: only when somebody asks for one.
     if name == "scene":
         return importlib.import_module("etendue.scene")
+    if name == "__version__":
+        return importlib.import_module("importlib.metadata").version("etendue")
     if name == "Scene":
         return importlib.import_module("etendue.scene").Scene
     raise AttributeError(f"module 'etendue' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

@@ -7,6 +7,45 @@ from typing import Any, Literal, TypeAlias, TypedDict, final
 import numpy as np
 import numpy.typing as npt
 
+__all__ = [
+    "Dealing",
+    "FarField",
+    "FieldRays",
+    "Guide",
+    "LightField",
+    "RayTable",
+    "RingSource",
+    "Scene",
+    "StoredBytes",
+    "Survey",
+    "batch_size",
+    "cone_sums",
+    "count_rays",
+    "cross_parts",
+    "deal_parts",
+    "deepest",
+    "draw_wavelengths",
+    "index_arrange",
+    "index_count",
+    "index_leaf",
+    "index_place",
+    "index_sums",
+    "look_at_events",
+    "look_at_scene",
+    "losses",
+    "polya_evidence",
+    "polya_posterior",
+    "rays_of_part",
+    "read_colours",
+    "read_rays",
+    "scan",
+    "scan_colours",
+    "scene_crossings",
+    "select_subset",
+    "trace_batches",
+    "trace_trails",
+]
+
 _Floats: TypeAlias = npt.NDArray[np.float64]
 _Progress: TypeAlias = Callable[[int], Any]
 

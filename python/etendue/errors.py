@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 
 class EtendueError(Exception):
@@ -22,10 +23,15 @@ class UnknownNameError(EtendueError, ValueError):
     """A name (option, key, format, filter) that does not exist; the message suggests the nearest one."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
-        choices = sorted(known)
+        choices = tuple(sorted(known))
         near = nearest_name(name, choices)
         hint = f" Did you mean {near!r}?" if near else ""
+        self.kind, self.name, self.known = kind, name, choices
         super().__init__(f"unknown {kind} {name!r}.{hint} Known: {', '.join(choices)}.")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, which would give the message alone."""
+        return type(self), (self.kind, self.name, self.known)
 
 
 class FormatError(EtendueError, ValueError):
@@ -37,6 +43,10 @@ class FormatError(EtendueError, ValueError):
         self.place = place
         self.found = found
         self.advice = advice
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, which would give the message alone."""
+        return type(self), (self.path, self.place, self.found, self.advice)
 
 
 class UnsupportedFormatError(FormatError):
@@ -77,6 +87,10 @@ class SceneError(EtendueError, ValueError):
         self.lines = (f"{source}: {told[0]}",) if len(told) == 1 else (f"{source}: {len(told)} mistakes", *told)
         """The message, line by line."""
         super().__init__("\n  ".join(self.lines))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, which would give the message alone."""
+        return type(self), (self.source, self.mistakes)
 
 
 class SceneWarning(UserWarning):

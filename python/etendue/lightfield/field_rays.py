@@ -60,6 +60,14 @@ class FieldRays(RayStream):
         self.seed = seed
         self._core = _core.FieldRays(field.core, rays, seed)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: the compiled part is made anew."""
+        return FieldRays, (self.field, len(self), self.seed)
+
+    def __repr__(self) -> str:
+        """Rays and field."""
+        return f"<FieldRays, {len(self):,}, seed {self.seed}, of {self.field!r}>"
+
     def __len__(self) -> int:
         """Number of rays."""
         return len(self._core)

@@ -1,4 +1,4 @@
-"""From a ray set to its light field, without a knob."""
+"""From a ray set to its light field, without tuning parameters."""
 
 from __future__ import annotations
 

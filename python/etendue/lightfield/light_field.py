@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -56,6 +56,15 @@ class LightField(EtendueDensity):
     >>> bool(abs(luminance[0] / 303_964 - 1) < 0.1)
     True
     """
+
+    def __repr__(self) -> str:
+        """Surface, rays that it rests on, flux and origin."""
+        rests = f"{self.report.rays:,} rays, {self.total_flux:.6g} {self.flux_unit}"
+        return f"<LightField on {self.surface.spec} of {rests} from {self.provenance.source}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: the compiled part is made anew."""
+        return LightField, tuple(self.content().values())
 
     def rays(self, n: int, seed: int = 1) -> FieldRays:
         """`n` rays of equal flux drawn from the field, as a stream that needs no memory.

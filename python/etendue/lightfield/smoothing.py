@@ -53,7 +53,7 @@ def smooth_counts(
     shifts: int = 16,
     threads: int | None = None,
 ) -> Smoothed:
-    r"""Estimate the intensity of a Poisson process on the cells of an image, without a knob.
+    r"""Estimate the intensity of a Poisson process on the cells of an image, without tuning parameters.
 
     Three estimates are made. The average of optional Pólya trees over positions of their grid (theory eqs. 29 to 33)
     is unsurpassed at edges along the axes. A Wiener filter on a frame of octaves and directions follows edges and lines

@@ -13,7 +13,7 @@ Array = npt.NDArray[np.float64]
 
 
 def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None) -> LuminanceMap:
-    r"""Smooth a map without a knob: what its counts prove stays sharp, the rest becomes smooth.
+    r"""Smooth a map without tuning parameters: what its counts prove stays sharp, the rest becomes smooth.
 
     The flux of each pixel is a sample of a Poisson process over the pixels, whose étendue is the base measure. The map
     is a mixture of three estimates of that process (`smooth_counts`, theory section 12): optional Pólya trees, which

@@ -74,6 +74,13 @@ class IlluminanceMap:
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Size, brightest cell and origin."""
+        brightest = np.max(self.values, initial=0.0, where=np.isfinite(self.values))
+        rows, columns = self.screen.shape
+        size = f"{columns} × {rows} cells"
+        return f"<IlluminanceMap of {size} up to {brightest:.4g} {self.unit} from {self.provenance.source}>"
+
     def __post_init__(self) -> None:
         if self.flux_unit not in FLUX_UNITS:
             raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)

@@ -109,6 +109,11 @@ class Intensity:
     notes: tuple[str, ...] = ()
     complaints: tuple[Complaint, ...] = ()
 
+    def __repr__(self) -> str:
+        """Size, peak and origin."""
+        size = f"{self.c.size} C planes × {self.gamma.size} γ angles"
+        return f"<Intensity of {size} up to {self.values.max():.4g} {self.unit} from {self.provenance.source}>"
+
     def __post_init__(self) -> None:
         if self.flux_unit not in FLUX_UNITS:
             raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)

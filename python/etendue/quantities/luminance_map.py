@@ -74,6 +74,12 @@ class LuminanceMap:
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Size, brightest pixel and origin."""
+        brightest = np.max(self.values, initial=0.0, where=np.isfinite(self.values))
+        rows, columns = self.screen.shape
+        return f"<LuminanceMap of {columns} × {rows} pixels up to {brightest:.4g} {self.unit} from {self.provenance.source}>"
+
     def __post_init__(self) -> None:
         if self.flux_unit not in FLUX_UNITS:
             raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)

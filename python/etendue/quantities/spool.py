@@ -62,6 +62,10 @@ class Spool:
         if sum(stretch.nbytes for stretch in held) > self._limit:
             self._flush()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: the records, wherever they are."""
+        return _spooled, (self._dtype, self._limit, self.array())
+
     def __len__(self) -> int:
         """Number of records."""
         written, held = self._state
@@ -107,6 +111,12 @@ class Spool:
             # What found no room has been told; the file's buffer would tell it again in its place.
             with contextlib.suppress(OSError):
                 self._file.close()
+
+
+def _spooled(dtype: np.dtype[Any], memory_limit: int, records: npt.NDArray[Any]) -> Spool:
+    spool = Spool(dtype, memory_limit)
+    spool.append(records)
+    return spool
 
 
 def spool(

@@ -73,6 +73,10 @@ class Dealing:
             sets.append((number, len(source["rays"])))
         return cls(tuple(float(source["flux"]) for source in sources), tuple(sets), rays)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: the compiled part is made anew."""
+        return Dealing, (self.flux, self.sets, self.rays)
+
     @cached_property
     def core(self) -> _core.Dealing:
         """As the core knows it."""

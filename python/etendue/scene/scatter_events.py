@@ -110,6 +110,10 @@ class ScatterEvents:
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Name, events and origin."""
+        return f"<ScatterEvents {self.name!r}: {len(self):,} of {self.rays:,} rays from {self.provenance.source}>"
+
     def __len__(self) -> int:
         """Number of events."""
         return len(self.rows)

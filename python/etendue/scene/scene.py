@@ -93,6 +93,13 @@ class Scene(Description):
     observers: Annotated[tuple[ObserverKeys, ...], MaxLen(MOST), NotTooMany, AsRow] = Field(default=())
     _folder: Path = PrivateAttr(default=Path())
 
+    def __repr__(self) -> str:
+        """Name, and how much of what there is."""
+        kinds = ("sources", "solids", "surfaces", "detectors", "observers")
+        counts = ((len(getattr(self, kind)), kind) for kind in kinds)
+        told = ", ".join(f"{n} {kind if n > 1 else kind[:-1]}" for n, kind in counts if n) or "empty"
+        return f"<Scene {self.name!r}: {told}>"
+
     @model_validator(mode="after")
     def _names_are_names(self) -> Self:
         mistakes = [

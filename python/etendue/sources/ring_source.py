@@ -111,6 +111,15 @@ class RingSource(RayStream):
         rings = zip(edges, edges[1:], self.ring_flux, self.allocation, strict=False)
         self._core = _core.RingSource(list(rings), runs, seed)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: the compiled part is made anew."""
+        return RingSource, (self.edges[1:], self.ring_flux, sum(self.allocation), self.runs, self.seed)
+
+    def __repr__(self) -> str:
+        """How to make it again."""
+        rays = f"rays={sum(self.allocation)}, runs={self.runs}, seed={self.seed}"
+        return f"RingSource(radii={self.edges[1:]}, flux={self.ring_flux}, {rays})"
+
     @property
     def ring_area(self) -> tuple[float, ...]:
         """Area of each ring [mm²]."""

@@ -68,6 +68,13 @@ class TraceResult:
     plan: Plan
     sums: Sums
 
+    def __repr__(self) -> str:
+        """Rays done and asked for, and the detectors."""
+        detectors = ", ".join(detection.name for detection in self.plan.detections) or "none"
+        return (
+            f"<TraceResult of {self.rays_done:,} of {self.rays_asked:,} rays, seed {self.seed}; detectors: {detectors}>"
+        )
+
     @property
     def rays_asked(self) -> int:
         """Rays of the whole trace."""

@@ -79,6 +79,11 @@ class GriddedSource:
     threshold: float
     stated_flux: float | None = None
 
+    def __repr__(self) -> str:
+        """Surface, patches and flux."""
+        flux = f"{self.total_flux:.6g} {self.patches.flux_unit}"
+        return f"<GriddedSource of {len(self.patches):,} patches on {self.surface.surface.spec}, {flux}>"
+
     @classmethod
     def fit(
         cls,

@@ -1,0 +1,59 @@
+"""Write docs/api.md, the page of everything that `import etendue` gives, from the docstrings.
+
+usage: python docs/api_page.py
+"""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import etendue as et
+
+PAGE = Path(__file__).with_name("api.md")
+
+GROUPS = {
+    "Rays": ("read_rays", "write_rays", "RaySet", "RayIndex", "RingSource"),
+    "Light fields": (
+        "LightField", "Plane", "Disk", "Hemisphere", "Sphere", "Cylinder", "Dome", "Box", "parse_surface", "diagnose",
+        "cache_content", "clear_cache", "GriddedSource", "threshold_sweep",
+    ),
+    "Luminance": (
+        "luminance_map", "Observer", "Screen", "LuminanceMap", "read_map", "combine_maps", "compare", "Region",
+        "cross_section", "filter_map", "denoise_map",
+    ),
+    "Scenes": (
+        "scene", "Scene", "trace", "trace_rounds", "TraceResult", "ScatterEvents", "IlluminanceMap",
+        "read_illuminance_map",
+    ),
+    "Intensity and spectra": ("intensity_distribution", "Intensity", "read_intensity", "write_intensity", "Spectrum"),
+    "Pictures": (
+        "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",
+        "plot_threshold_sweep", "draw_scene",
+    ),
+    "Errors and warnings": tuple(name for name in et.__all__ if name.endswith(("Error", "Warning"))),
+}  # fmt: skip
+"""Every public name stands in one group."""
+
+HEAD = """# Everything that `import etendue as et` gives
+
+Written by `docs/api_page.py` from the docstrings. `help(et.luminance_map)` tells the rest: shapes, units, errors and an
+example.
+"""
+
+
+def page() -> str:
+    """The page as text."""
+    lines = [HEAD]
+    for group, names in GROUPS.items():
+        lines += [f"## {group}", "", "| name | what it is |", "|---|---|"]
+        for name in names:
+            text = inspect.getdoc(getattr(et, name)) or ""
+            first = " ".join(text.split("\n\n")[0].split())
+            lines.append(f"| `et.{name}` | {first.replace('|', chr(92) + '|')} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

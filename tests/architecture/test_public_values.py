@@ -1,0 +1,136 @@
+"""Every public value can be pickled, for pools of processes, and says in a line what it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.quantities.spool import Spool
+from oracles.light_fields import SURFACES, make_field
+from oracles.map_files import make_map
+
+LAMP = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 100, "toward": [0.3, 0, 1]}
+PAPER = {
+    "name": "paper",
+    "shape": {"kind": "rectangle", "width": 60, "height": 40},
+    "at": [0, 0, 30],
+    "finish": {"kind": "lambertian", "reflectance": 0.8},
+}
+DETECTORS = [{"kind": kind, "name": kind} for kind in ("scatter", "intensity")]
+
+
+def rays() -> et.RaySet:
+    return et.RingSource(rays=2000, seed=5).ray_set()
+
+
+def scene() -> et.Scene:
+    return et.Scene(name="paper", sources=[LAMP], surfaces=[PAPER], detectors=DETECTORS)
+
+
+def result() -> et.TraceResult:
+    return et.trace(scene(), rays=5000, seed=2)
+
+
+def illuminance() -> et.IlluminanceMap:
+    return et.IlluminanceMap(np.eye(2), np.ones((2, 2)), np.ones((2, 2), dtype=np.int64), et.Screen(2, 1, 2, 2, "xy"))
+
+
+MAKERS: dict[str, Callable[[], Any]] = {
+    **{type(surface).__name__: lambda surface=surface: surface for surface in SURFACES.values()},
+    "GriddedSource": lambda: et.GriddedSource.fit(rays(), et.Disk(radius=30), pixel=20, threshold=5),
+    "IlluminanceMap": illuminance,
+    "Intensity": lambda: et.intensity_distribution(rays()),
+    "LightField": lambda: make_field(SURFACES["dome"]),
+    "LuminanceMap": make_map,
+    "Observer": lambda: et.Observer(30, 10, 500, target=(1, 2, 3)),
+    "RayIndex": lambda: et.RayIndex.build(rays()),
+    "RaySet": rays,
+    "Region": lambda: et.Region(left=-1, right=0, bottom=-2, top=2),
+    "RingSource": lambda: et.RingSource(rays=77, runs=3, seed=9),
+    "Scene": scene,
+    "ScatterEvents": lambda: result().events["scatter"],
+    "Screen": lambda: et.Screen(2, 1, 8, 4),
+    "Spectrum": lambda: et.Spectrum([450.0, 650.0], [1.0, 0.5]),
+    "TraceResult": result,
+}
+"""A value of each public class."""
+
+ERRORS = {
+    "ArgumentError": et.ArgumentError("radius is -1; give one above 0."),
+    "EtendueError": et.EtendueError("told"),
+    "FormatError": et.FormatError("led.ray", "byte 3", "nothing", "Copy it again."),
+    "MemoryLimitError": et.MemoryLimitError("1 TB for a map"),
+    "OutputError": et.OutputError(28, "no room", "map.exr"),
+    "SceneError": et.SceneError("lamp.toml", [("sources[0]", "no flux"), ("", "dark")]),
+    "UnitError": et.UnitError("W cannot become lm"),
+    "UnknownNameError": et.UnknownNameError("format", "tm52", ["tm25", "zemax"]),
+    "UnsupportedFormatError": et.UnsupportedFormatError("led.xyz", "byte 0", "a secret", "Ask for TM-25."),
+}
+
+
+def public_classes() -> dict[str, type]:
+    return {name: thing for name in et.__all__ if inspect.isclass(thing := getattr(et, name))}
+
+
+def same(one: Any, other: Any) -> bool:
+    """Equality through arrays, mappings and values that hold them."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and one.tobytes() == other.tobytes()
+    if isinstance(one, et.RaySet):
+        return same(np.asarray(one.records), np.asarray(other.records)) and same(one.meaning, other.meaning)
+    if isinstance(one, Spool):
+        return same(np.asarray(one.array()), np.asarray(other.array()))
+    if dataclasses.is_dataclass(one):
+        return all(same(getattr(one, f.name), getattr(other, f.name)) for f in dataclasses.fields(one) if f.compare)
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, (tuple, list)):
+        return len(one) == len(other) and all(map(same, one, other))
+    return bool(one == other) or repr(one) == repr(other)  # NaN
+
+
+def test_there_is_a_value_of_every_public_class() -> None:
+    errors = {name for name, kind in public_classes().items() if issubclass(kind, Exception)}
+    assert set(public_classes()) - errors == set(MAKERS)
+    assert {name for name in errors if not name.endswith("Warning")} == set(ERRORS)
+
+
+@pytest.mark.parametrize("name", sorted(MAKERS))
+def test_it_can_be_pickled_and_says_what_it_is_in_a_line(name: str) -> None:
+    value = MAKERS[name]()
+    again = pickle.loads(pickle.dumps(value))  # noqa: S301 - our own
+    assert same(value, again)
+    line = repr(value)
+    assert "\n" not in line
+    assert len(line) < 250
+    assert name in line
+
+
+def test_a_pickled_field_and_source_still_work() -> None:
+    field = make_field(SURFACES["box"])
+    source = et.RingSource(rays=77, runs=3, seed=9)
+    for stream in (field.rays(50, seed=3), source):
+        again = pickle.loads(pickle.dumps(stream))  # noqa: S301 - our own
+        assert again.ray_set().records.tobytes() == stream.ray_set().records.tobytes()
+
+
+@pytest.mark.parametrize("name", sorted(ERRORS))
+def test_an_error_can_be_pickled(name: str) -> None:
+    error = ERRORS[name]
+    again = pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    assert vars(again) == vars(error)
+
+
+def test_the_top_shows_public_names_only() -> None:
+    assert dir(et) == sorted([*et.__all__, "__version__"])
+    assert et.__version__.count(".") >= 1
