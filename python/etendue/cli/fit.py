@@ -53,7 +53,7 @@ def fit(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Estimate the luminance of every point in every direction from all rays of a file, with error bars, without tuning parameters."""
+    """Estimate the luminance of every point in every direction from all rays of a file, with error bars."""
     check_outputs([output], FIELD_EXTENSIONS)
     check_outputs([report] if report else [], PICTURE_EXTENSIONS)
     carrier = surface_option(surface)
