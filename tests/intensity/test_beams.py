@@ -68,7 +68,7 @@ def test_two_beams_and_a_batwing(tmp_path: Path) -> None:
 def test_light_of_no_width_says_what_sets_its_peak(tmp_path: Path) -> None:
     for towards in ((0.0, 0.0), (70.0, 20.0)):
         far = et.intensity_distribution(rays_of((np.tile(direction(*towards), (5000, 1)), 7.0)))
-        assert "lower bound, set by steps of 0.0073°" in far.notes[0]
+        assert "lower bound, set by steps of 0.0049°" in far.notes[0]
         assert read_back(far, tmp_path) == pytest.approx([7.0, 7.0], rel=1e-3)
 
 
@@ -109,7 +109,7 @@ def test_the_far_field_of_a_searchlight(tmp_path: Path) -> None:
     assert far.flux == pytest.approx(result.ledger.escaped.flux, rel=1e-11)
     assert read_back(far, tmp_path) == pytest.approx([far.flux] * 2, rel=1e-3)
     assert abs(far.maximum - PEAK) < LARGEST_Z * far.maximum_error
-    assert far.maximum_error < 0.08 * PEAK
+    assert far.maximum_error < 0.1 * PEAK
     # All of Φ leaves or is absorbed: the flux that escapes is binomial.
     share = far.flux / 60
     assert far.flux_error == pytest.approx(60 * np.sqrt(share * (1 - share) / 4e5), rel=1e-3)

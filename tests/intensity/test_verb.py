@@ -11,7 +11,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.cli import main
-from etendue.quantities.measured import measured
+from etendue.quantities.measured import measured_peak
 from oracles.intensity import lid
 from oracles.luminaire_files import archive, ies_of, product, tm33_of
 
@@ -67,7 +67,7 @@ def test_defaults_flux_and_text(run: Run) -> None:
     status, out, _ = run("led.tm25ray")
     far = et.intensity_distribution(et.read_rays("led.tm25ray"))
     assert f"{far.c.size} planes, {far.gamma.size} angles" in out
-    assert measured(far.maximum, far.maximum_error, "cd") in out
+    assert measured_peak(far) in out
     status, out, _ = run("led.tm25ray", "--json")
     facts = json.loads(out)
     assert facts["maximum_error"] > 0.0

@@ -24,7 +24,7 @@ from etendue.lightfield.light_field import LightField
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
 from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
 from etendue.quantities.intensity_nodes import check_steps
-from etendue.quantities.measured import measured
+from etendue.quantities.measured import measured, measured_peak
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
 
@@ -133,6 +133,8 @@ def summary(distribution: Intensity) -> dict[str, Any]:
         "flux_unit": distribution.flux_unit,
         "maximum": distribution.maximum,
         "maximum_error": distribution.maximum_error,
+        "peak_intensity": distribution.peak_intensity,
+        "peak_error": distribution.peak_error,
         "maximum_at": {"c": c, "gamma": gamma},
         "symmetry": distribution.symmetry(),
         "planes": distribution.c.size,
@@ -152,8 +154,7 @@ def _plain(fact: Any) -> Any:
 def peak_line(distribution: Intensity) -> str:
     """The peak of a distribution with its error and direction."""
     c, gamma = distribution.peak
-    peak = measured(distribution.maximum, distribution.maximum_error, distribution.unit)
-    return f"peak {peak} at C = {c:g}°, γ = {gamma:g}°"
+    return f"peak {measured_peak(distribution)} at C = {c:g}°, γ = {gamma:g}°"
 
 
 def print_intensity(distribution: Intensity) -> None:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from etendue.errors import UnknownNameError
 from etendue.plot import style
 from etendue.quantities.intensity import Intensity
-from etendue.quantities.measured import measured
+from etendue.quantities.measured import measured, measured_peak
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -245,7 +245,7 @@ def _facts(intensity: Intensity) -> Iterator[str]:
     where = f"γ = {gamma:g}°"
     if intensity.c.size > 1 and gamma not in (0.0, 180.0):
         where = f"C = {c:g}°, {where}"
-    yield f"peak {measured(intensity.maximum, intensity.maximum_error, intensity.unit)} at {where}"
+    yield f"peak {measured_peak(intensity)} at {where}"
     known = np.isfinite(intensity.standard_error) & (intensity.values > 0.0)
     if known.any():
         share = 100.0 * float(np.median(intensity.standard_error[known] / intensity.values[known]))

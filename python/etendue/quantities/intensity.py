@@ -255,29 +255,42 @@ class Intensity:
 
     @property
     def maximum(self) -> float:
-        """Largest intensity [`unit`]; a bilinear function has it at a node."""
+        """Largest value of the table [`unit`]; a bilinear function has it at a node. See `peak_intensity`."""
         return float(self.values.max())
 
     @property
     def maximum_error(self) -> float:
-        """Standard error of `maximum` [`unit`]; NaN where unknown.
+        """Root mean square deviation of `maximum` from the largest intensity that there is [`unit`]; NaN where unknown.
 
-        The largest of K values that are as good as equal is too large by m of their standard errors s, m being the mean of
-        the largest of K normal deviates, Φ⁻¹((K − ⅜)/(K + ¼)) [Blom1958]_. K is counted softly, as the sum over all
-        nodes of exp(−½ (difference/its error)²), and the error is s √(1 + m²): that of the node alone where nothing comes
-        near the maximum.
-        Nodes in which the function has no kink are between others, and have no error of their own.
+        The largest of many noisy values is too large; its deviation is the root of the squares of that (`peak_intensity`)
+        and of its standard error.
         """
-        error = float(self.standard_error.ravel()[self.values.argmax()])
+        return math.hypot(self.peak_error, self.maximum - self.peak_intensity)
+
+    @property
+    def peak_intensity(self) -> float:
+        """The largest intensity, less what chance lifts the largest of many noisy values by [`unit`].
+
+        The largest of K values that are as good as equal is too large by m of their standard errors s on average, m being
+        the mean of the largest of K normal deviates, Φ⁻¹((K − ⅜)/(K + ¼)) [Blom1958]_. K is counted softly, as the sum over
+        all nodes of exp(−(difference/error)²), with the root mean square of the errors of both; it is 1 where nothing
+        comes near the maximum. Nodes in which the function has no kink are between others, and have no error of their own.
+        `maximum` where no error is known.
+        """
+        error = self.peak_error
         if not error > 0.0:
-            return error
-        below = (self.maximum - self.values) ** 2 / (error**2 + np.nan_to_num(self.standard_error) ** 2)
+            return self.maximum
+        below = 2.0 * (self.maximum - self.values) ** 2 / (error**2 + np.nan_to_num(self.standard_error) ** 2)
         weight = self._kinks.astype(np.float64)
         # The first and the last node of all planes are one direction if they are poles.
         weight[:, (self.gamma == 0.0) | (self.gamma == 180.0)] = 1.0 / self.c.size
-        alike = float((np.exp(-below / 2.0) * weight).sum())
-        alike = max(alike, 1.0)
-        return error * math.hypot(1.0, NormalDist().inv_cdf((alike - 0.375) / (alike + 0.25)))
+        alike = max(float((np.exp(-below) * weight).sum()), 1.0)
+        return self.maximum - error * NormalDist().inv_cdf((alike - 0.375) / (alike + 0.25))
+
+    @property
+    def peak_error(self) -> float:
+        """Standard error of `peak_intensity` [`unit`]: that of the largest node; NaN where unknown."""
+        return float(self.standard_error.ravel()[self.values.argmax()])
 
     @property
     def _kinks(self) -> npt.NDArray[np.bool_]:

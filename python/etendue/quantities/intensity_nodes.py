@@ -127,8 +127,8 @@ class Nodes:
         Returns
         -------
         values, error : array
-            Where the table has a value between nodes, its error is that of the interpolation in even light, where the
-            errors of neighbours have a correlation of ¼.
+            Where the table has a value between nodes, its error is that of the interpolation, with the correlation of ¼
+            that neighbours have in even light, and with what the curvature around makes of a straight line.
         """
         values, error = flux / self.solid_angle, error / self.solid_angle
         ends = np.cumsum([len(row) for row in self.c])[:-1]
@@ -138,8 +138,15 @@ class Nodes:
         value_rows, error_rows = (np.stack(arrays) for arrays in zip(*rows, strict=True))
         gamma, table = np.array(self.gamma), np.array(self.table)
         before = (np.searchsorted(gamma, table, side="right") - 1).clip(0, gamma.size - 2)
-        up = ((table - gamma[before]) / (gamma[before + 1] - gamma[before]))[:, None]
-        between = _between(value_rows[before], value_rows[before + 1], error_rows[before], error_rows[before + 1], up)
+        width = gamma[before + 1] - gamma[before]
+        up = ((table - gamma[before]) / width)[:, None]
+        # A plane through a pole goes on at the other side; the curvature there is taken as that of the row beside.
+        bend = _curvature(value_rows, np.diff(gamma)[:, None])
+        bend = np.concatenate([bend[:1], bend, bend[-1:]]) if bend.size else np.zeros_like(value_rows)
+        off = (bend[before] + bend[before + 1]) / 2.0 * width[:, None] ** 2
+        between = _between(
+            value_rows[before], value_rows[before + 1], error_rows[before], error_rows[before + 1], up, off
+        )
         return between[0].T, between[1].T
 
     def intensity(
@@ -208,12 +215,28 @@ def _around(c: Array, values: Array, error: Array, planes: Array) -> tuple[Array
     """Values and errors of a row at other planes."""
     first = np.searchsorted(c, planes, side="right") - 1
     second = (first + 1) % c.size
-    share = (planes - c[first]) / gaps_of(c)[first]
-    return _between(values[first], values[second], error[first], error[second], share if c.size > 1 else 0.0 * share)
+    gaps = gaps_of(c)
+    if c.size == 1:
+        share = off = np.zeros_like(planes)
+    else:
+        share = (planes - c[first]) / gaps[first]
+        bend = _curvature(np.concatenate([values[-1:], values, values[:1]]), np.append(gaps[-1], gaps))
+        off = (bend[first] + bend[second]) / 2.0 * gaps[first] ** 2
+    return _between(values[first], values[second], error[first], error[second], share, off)
 
 
-def _between(a: Array, b: Array, error_a: Array, error_b: Array, share: Array) -> tuple[Array, Array]:
-    """Linear interpolation, and its error; a value of no weight is of no consequence."""
+def _curvature(values: Array, gaps: Array) -> Array:
+    """Second derivatives at the inner ones of values along the first axis, by divided differences."""
+    slope = np.diff(values, axis=0) / gaps
+    result: Array = 2.0 * np.diff(slope, axis=0) / (gaps[1:] + gaps[:-1])
+    return result
+
+
+def _between(a: Array, b: Array, error_a: Array, error_b: Array, share: Array, off: Array) -> tuple[Array, Array]:
+    """Linear interpolation, and its error; a value of no weight is of no consequence.
+
+    `off` is the second derivative times the square of the step, ½ share (1 − share) of which a straight line is off by.
+    """
     error_a, error_b = np.where(share < 1.0, error_a, 0.0), np.where(share > 0.0, error_b, 0.0)
-    low, high = (1.0 - share) * error_a, share * error_b
-    return (1.0 - share) * a + share * b, np.sqrt(low * low + high * high + 2.0 * NEIGHBOURS * low * high)
+    low, high, bent = (1.0 - share) * error_a, share * error_b, share * (1.0 - share) / 2.0 * off
+    return (1.0 - share) * a + share * b, np.sqrt(low * low + high * high + 2.0 * NEIGHBOURS * low * high + bent * bent)

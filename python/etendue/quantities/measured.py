@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from etendue.quantities.intensity import Intensity
 
 
 def measured(value: float, error: float, unit: str) -> str:
@@ -23,3 +27,20 @@ def measured(value: float, error: float, unit: str) -> str:
         return f"{value:.6g} ± {error:.2g} {unit}"
     places = max(digits, 0)
     return f"{round(value, digits):.{places}f} ± {round(error, digits):.{places}f} {unit}"
+
+
+def measured_peak(found: Intensity) -> str:
+    """The peak with its standard error, and the largest value if chance lifts that by more than half of it.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> measured_peak(et.Intensity([0], [0, 90, 180], [[500.0, 0, 0]], [[20.0, 0, 0]]))
+    '500 ± 20 cd'
+    >>> measured_peak(et.Intensity([0], [0, 60, 120, 180], [[500.0, 505, 498, 502]], 20.0))
+    '485 ± 20 cd (largest value 505 cd, lifted by chance)'
+    """
+    peak = measured(found.peak_intensity, found.peak_error, found.unit)
+    if not found.maximum - found.peak_intensity > 0.5 * found.peak_error:
+        return peak
+    return f"{peak} (largest value {found.maximum:.4g} {found.unit}, lifted by chance)"

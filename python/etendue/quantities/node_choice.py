@@ -28,8 +28,9 @@ DEPTH = {"gamma": 11, "c": 15}
 FINEST = GAMMA_STEP / 2 ** (DEPTH["gamma"] + 1)
 """[°] The finest step that is tried, halved."""
 
-PARTS = 2
-"""Parts of the widest steps that pass, at least."""
+PARTS = {"gamma": 3, "c": 2}
+"""Parts of the widest steps that pass, at least. Around the axis fewer: there light that is not even is told by the rays of
+each row alone, so that steps of it are halved by less."""
 
 CERTAIN, LIKELY = 5.5, 2.5
 """Standard errors by which halved steps must change the value of a node to be wanted: anywhere, and where steps of twice
@@ -37,6 +38,16 @@ the width were halved. Some 10^5 nodes are looked at, and there shall be no such
 
 FEWEST = 128.0
 """Equal rays that a hat must hold to be judged by its normal limit."""
+
+FEW = 8.0
+"""Equal rays that it must hold for light that stands out of its surroundings: where the sum of few terms is over its own
+scatter, what stands out does so by chance less often than in the normal limit, and a hole in the light more often."""
+
+FEW_NODES = 2
+"""So many nodes around the axis are judged all together: tests of each would see light of some directions only."""
+
+ALIKE = 2.0
+"""Rows whose hats in γ are wider by up to this factor are judged together."""
 
 MATERIAL = 3e-4
 """Share of the maximum below which a change is of no consequence."""
@@ -74,10 +85,11 @@ def choose_nodes(
     """The nodes that suit a far field, from a sample of its rays.
 
     A node's value is the mean over its hat, too low at a beam and too high beside it by about h² I″/12 for a step h. If
-    halving the steps around a node changes its value by more than its noise, they are halved, as often as it takes;
-    steps half as wide as those that pass are taken, so that what is left undiscovered stays well below the standard error.
-    Where there is little light or light is even, steps stay wide: the noise of a node then is as low as it can be. First
-    rows of γ are chosen by the light of all C, then for each row its nodes C.
+    halving the steps around a node changes its value by more than its noise, they are halved, as often as it takes; a
+    third or half of the steps that pass is taken, so that what is left undiscovered stays well below the standard error.
+    Steps beside each other differ by little more than a factor of 2, so that no hat is lopsided. Where there is little
+    light or it is even, steps stay wide: the noise of a node then is as low as it can be. First rows of γ are chosen by the
+    light of all C, then for each row its nodes C, by its light and that of the rows beside it.
 
     Parameters
     ----------
@@ -112,7 +124,7 @@ def choose_nodes(
     """
     check_steps(c_planes, gamma_step)
     sample = _Sample.of(direction, flux)
-    finer = math.ceil(PARTS * max(rays / max(sample.flux.size, 1), 1.0) ** 0.2)
+    finer = max(rays / max(sample.flux.size, 1), 1.0) ** 0.2
     if c_planes is not None and gamma_step is not None:
         chosen, unresolved = Nodes.even(c_planes, gamma_step), False
     else:
@@ -151,13 +163,13 @@ class _Sample(NamedTuple):
         return nodes.tables(sums[:-1], np.sqrt(squares[:-1]))
 
 
-def _chosen(sample: _Sample, finer: int, c_planes: int | None, gamma_step: float | None) -> tuple[Nodes, bool]:
+def _chosen(sample: _Sample, finer: float, c_planes: int | None, gamma_step: float | None) -> tuple[Nodes, bool]:
     """Nodes, and whether they cannot hold the beam."""
     if gamma_step is None:
         tree = _Tree.grown(
             sample.gamma, sample.flux, np.zeros(sample.flux.size, dtype=np.intp), np.array([90.0]), "gamma"
         )
-        rows, unresolved = tree.angles(finer, MOST_ROWS)
+        rows, unresolved = tree.angles(PARTS["gamma"], finer, MOST_ROWS)
         gamma = (*rows[0], 180.0)
     else:
         gamma, unresolved = Nodes.even(1, gamma_step).gamma, False
@@ -177,16 +189,23 @@ def _chosen(sample: _Sample, finer: int, c_planes: int | None, gamma_step: float
     return nodes, unresolved
 
 
-def _planes(sample: _Sample, finer: int, gamma: Array) -> tuple[list[tuple[float, ...]], bool]:
+def _planes(sample: _Sample, finer: float, gamma: Array) -> tuple[list[tuple[float, ...]], bool]:
     """The nodes C of each row but the poles, from the rays around the row; and whether the steps are too wide."""
     row = (np.searchsorted(gamma, sample.gamma, side="right") - 1).clip(0, gamma.size - 2)
     up = (sample.gamma - gamma[row]) / (gamma[row + 1] - gamma[row])
-    each = np.concatenate([row, row + 1])
-    weight = np.concatenate([(1.0 - up) * sample.flux, up * sample.flux])
+    width = np.concatenate([[np.nan], gamma[2:] - gamma[:-2], [np.nan]])
+    alike = np.maximum(width[1:], width[:-1]) <= ALIKE * np.minimum(width[1:], width[:-1])
+    # A row is judged with the light of those beside it, whose steps of γ are as narrow: what the light does around the
+    # axis changes little from one to the next, and one alone has few rays where a beam ends.
+    below, above = np.append(False, alike)[row], np.append(alike, False)[row + 1]
+    share = [(row - 1, np.where(below, 1.0 - up, 0.0)), (row, np.where(alike[row], 1.0, 1.0 - up)),
+             (row + 1, np.where(alike[row], 1.0, up)), (row + 2, np.where(above, up, 0.0))]  # fmt: skip
+    each = np.concatenate([number for number, _ in share])
+    weight = np.concatenate([hat * sample.flux for _, hat in share])
     inside = (each > 0) & (each < gamma.size - 1) & (weight > 0.0)
-    c = np.concatenate([sample.c, sample.c])
+    c = np.tile(sample.c, len(share))
     tree = _Tree.grown(c[inside], weight[inside], each[inside] - 1, gamma[1:-1], "c")
-    return tree.angles(finer, MOST_PLANES)
+    return tree.angles(PARTS["c"], finer, MOST_PLANES)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -197,6 +216,7 @@ class _Tree:
     exist: list[Flags]
     split: list[Flags]
     unresolved: bool
+    poles: bool
 
     @classmethod
     def grown(cls, angle: Array, weight: Array, row: Counts, gamma: Array, axis: str) -> _Tree:
@@ -210,52 +230,74 @@ class _Tree:
             size = round(span / step) << level
             if size * gamma.size > MOST_TESTED:
                 break
-            change, limit = _change(angle, weight, row, gamma.size, size, axis)
-            if not np.isfinite(limit).any():
+            if axis == "c" and size <= FEW_NODES:
+                change = _modulation(angle, weight, row, gamma.size, size)
+            else:
+                change = _change(angle, weight, row, gamma.size, size, axis)
+            if not change.any():
                 break
             # Steps of C that are narrower than the finest ones of γ at their γ do not count.
             wide = (span / size * np.sin(np.radians(gamma)) >= FINEST)[:, None]
-            certain.append(_beside(wide & (change > CERTAIN * limit), size))
-            likely.append(_beside(wide & (change > LIKELY * limit), size))
-        for level in range(len(certain) - 1, 0, -1):
-            certain[level - 1] |= certain[level].reshape(gamma.size, -1, 2).any(axis=2)
-        exist = [np.ones((gamma.size, round(span / step)), dtype=np.bool_)]
+            certain.append(_beside(wide & (np.abs(change) > CERTAIN), size))
+            likely.append(_beside(wide & (np.abs(change) > LIKELY), size))
+        for level in range(len(certain) - 1, -1, -1):
+            certain[level] = _grown_along(certain[level], likely[level])
+            if level:
+                certain[level - 1] |= certain[level].reshape(gamma.size, -1, 2).any(axis=2)
+        exist = np.ones((gamma.size, round(span / step)), dtype=np.bool_)
         split = []
         for sure, maybe in zip(certain, likely, strict=True):
-            split.append(exist[-1] & (sure | maybe))
-            exist.append(np.repeat(split[-1], 2, axis=1))
-        return cls(step, exist, split, len(split) == DEPTH[axis] and bool(certain[-1].any()))
+            split.append(exist & (sure | maybe))
+            exist = np.repeat(split[-1], 2, axis=1)
+        unresolved = len(split) == DEPTH[axis] and bool(split[-1].any())
+        return cls.graded(step, round(span / step), gamma.size, split, unresolved, axis)
 
-    def angles(self, finer: int, most: int) -> tuple[list[tuple[float, ...]], bool]:
+    @classmethod
+    def graded(cls, step: float, widest: int, rows: int, split: list[Flags], unresolved: bool, axis: str) -> _Tree:
+        """With intervals that differ by a factor of 2 at most from those beside them.
+
+        A hat of two unequal sides has its mean beside its node, which is off by a third of their difference times the slope.
+        """
+        for level in range(len(split) - 1, 0, -1):
+            beside = np.roll(split[level], 1, axis=1) | np.roll(split[level], -1, axis=1)
+            if axis == "gamma":
+                beside[:, 0], beside[:, -1] = split[level][:, 1], split[level][:, -2]
+            split[level - 1] |= (split[level] | beside).reshape(rows, -1, 2).any(axis=2)
+        exist = [np.ones((rows, widest), dtype=np.bool_), *(np.repeat(flags, 2, axis=1) for flags in split)]
+        return cls(step, exist, split, unresolved, axis == "gamma")
+
+    def angles(self, fewest: int, finer: float, most: int) -> tuple[list[tuple[float, ...]], bool]:
         """The nodes of each row, of `most` different ones at most; and whether they are too far apart for the light.
 
-        Intervals that are not halved further are cut into `finer` parts, or fewer if there are too many.
+        Intervals that are not halved further are cut into `finer` times `fewest` parts, or fewer if there are too many.
         """
         for deepest in range(len(self.split), -1, -1):
-            for parts in range(finer, PARTS - 1, -1):
+            for parts in range(math.ceil(fewest * finer), fewest - 1, -1):
                 rows = self._leaves(deepest, parts)
                 if len(set().union(*rows)) <= most:
                     cut = any(flags.any() for flags in self.split[deepest:])
                     return rows, cut or self.unresolved
-        return self._leaves(0, PARTS), True
+        return self._leaves(0, fewest), True
 
     def _leaves(self, deepest: int, parts: int) -> list[tuple[float, ...]]:
         rows, angles = [], []
         for level, exist in enumerate(self.exist[: deepest + 1]):
-            leaf = exist & ~self.split[level] if level < deepest else exist
-            row, start = np.nonzero(leaf)
-            rows.append(np.repeat(row, parts))
-            angles.append((self.step / (1 << level) * (start[:, None] + np.arange(parts) / parts)).ravel())
+            row, start = np.nonzero(exist & ~self.split[level] if level < deepest else exist)
+            # The hat of a pole is by far the smallest: one part fewer beside it.
+            polar = (start == 0) | (start == exist.shape[1] - 1) if self.poles else np.zeros_like(start, dtype=np.bool_)
+            for which, number in ((polar, parts - 1), (~polar, parts)):
+                rows.append(np.repeat(row[which], number))
+                angles.append((self.step / (1 << level) * (start[which][:, None] + np.arange(number) / number)).ravel())
         row, angle = np.concatenate(rows), np.concatenate(angles)
         order = np.lexsort((angle, row))
         ends = np.cumsum(np.bincount(row, minlength=len(self.exist[0])))[:-1]
         return [tuple(nodes.tolist()) for nodes in np.split(angle[order], ends)]
 
 
-def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis: str) -> tuple[Array, Array]:
-    """How much the value at each node changes if all steps are halved, and its standard error; shape (rows, nodes).
+def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis: str) -> Array:
+    """How much the value at each node changes if all steps are halved, in standard errors; shape (rows, nodes).
 
-    The error is infinite where there are too few rays, and so large that a change of no consequence is none.
+    It is 0 where there are too few rays; the error is so large that a change of no consequence is none.
     """
     span = 180.0 if axis == "gamma" else TURN
     step, nodes = span / size, size + 1 if axis == "gamma" else size
@@ -265,12 +307,8 @@ def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis
         wide, narrow = np.full(nodes, step), np.full(nodes, step / 2.0)
     first = np.minimum((angle / step).astype(np.intp), size - 1)
     on = angle / step - first
-    if nodes == 1:
-        # One node stands for all C: the hats on both sides of it are the same.
-        pairs = [(first, np.ones_like(on), np.abs(1.0 - 2.0 * on))]
-    else:
-        second = (first + 1) % nodes
-        pairs = [(first, 1.0 - on, np.maximum(1.0 - 2.0 * on, 0.0)), (second, on, np.maximum(2.0 * on - 1.0, 0.0))]
+    second = (first + 1) % nodes
+    pairs = [(first, 1.0 - on, np.maximum(1.0 - 2.0 * on, 0.0)), (second, on, np.maximum(2.0 * on - 1.0, 0.0))]
     sums = np.zeros((4, rows * nodes))
     for node, hat, half in pairs:
         index, w = row * nodes + node, weight * hat
@@ -280,11 +318,35 @@ def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis
                 sums[3] += np.bincount(index, term * term, rows * nodes)
     change, held, squares, variance = sums.reshape(4, rows, nodes)
     value = held / wide
-    with np.errstate(divide="ignore", invalid="ignore"):
-        enough = held * held / squares >= FEWEST
-    top = value[enough].max(initial=0.0)
-    error = np.where(enough, np.maximum(np.sqrt(variance), MATERIAL * top / LIKELY), np.inf)
-    return np.abs(change), error
+    fewest = np.where(change > 0.0, FEW, FEWEST)
+    return _in_errors(change, np.sqrt(variance), value, _equal(held, squares), fewest)
+
+
+def _modulation(angle: Array, weight: Array, row: Counts, rows: int, size: int) -> Array:
+    """What one or two nodes around the axis cannot hold, as `_change`, the same for all nodes of a row.
+
+    They stand for an even row and, on four nodes at most, for light to one side; whatever the direction of that side, the
+    amplitude of the first or second harmonic tells whether there is more: Σ w exp(ikC), whose parts have the variance
+    ½ Σ w² in even light.
+    """
+    turn = np.exp(1j * size * np.radians(angle))
+    terms = (weight * turn.real, weight * turn.imag, weight, weight * weight)
+    across, along, held, squares = (np.asarray(np.bincount(row, term, rows), dtype=np.float64) for term in terms)
+    error = np.sqrt(squares / 2.0)
+    found = _in_errors(np.hypot(across, along), error, held / 2.0, _equal(held, squares), np.full(rows, FEW))
+    return np.repeat(found[:, None], size, axis=1)
+
+
+def _equal(held: Array, squares: Array) -> Array:
+    """How many equal rays have this Σ w and Σ w²."""
+    return np.divide(held * held, squares, out=np.zeros(held.shape), where=squares > 0.0)
+
+
+def _in_errors(change: Array, error: Array, value: Array, equal: Array, fewest: Array) -> Array:
+    """Changes of values in standard errors; 0 for fewer equal rays than `fewest`, and for what is of no consequence."""
+    top = value[equal >= FEWEST].max(initial=0.0)
+    error = np.maximum(error, MATERIAL * top / LIKELY)
+    return np.divide(change, error, out=np.zeros(change.shape), where=(error > 0.0) & (equal >= fewest))
 
 
 def _beside(nodes: Flags, size: int) -> Flags:
@@ -294,6 +356,17 @@ def _beside(nodes: Flags, size: int) -> Flags:
     before, after = nodes[:, :-1].copy(), nodes[:, 1:].copy()
     before[:, -1], after[:, 0] = False, False
     return before | after
+
+
+def _grown_along(sure: Flags, maybe: Flags) -> Flags:
+    """With what may be so wherever it is so in a row beside it."""
+    while True:
+        more = sure.copy()
+        more[1:] |= sure[:-1] & maybe[1:]
+        more[:-1] |= sure[1:] & maybe[:-1]
+        if (more == sure).all():
+            return sure
+        sure = more
 
 
 def _smallest(nodes: Nodes) -> float:

@@ -314,6 +314,8 @@ class TraceResult:
                 "flux_error": far.flux_error,
                 "maximum": far.maximum,
                 "maximum_error": far.maximum_error,
+                "peak_intensity": far.peak_intensity,
+                "peak_error": far.peak_error,
                 "maximum_at": {"c": c, "gamma": gamma},
                 "unit": far.unit,
                 "planes": far.c.size,

@@ -13,7 +13,7 @@ from etendue.errors import FormatError
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.ray_format import Head
 from etendue.quantities.intensity import Intensity
-from etendue.quantities.measured import measured
+from etendue.quantities.measured import measured, measured_peak
 
 MOST_BYTES = 1 << 27
 """Largest file that is read: a table of 0.1° by 0.1° over the whole sphere has half as much."""
@@ -105,7 +105,7 @@ def fitted(text: str, encoding: str, length: int) -> str:
 def figures(intensity: Intensity) -> Iterator[str]:
     """Peak and flux with their standard errors, if these are known."""
     if np.isfinite(intensity.maximum_error):
-        yield f"peak {measured(intensity.maximum, intensity.maximum_error, intensity.unit)}"
+        yield f"peak {measured_peak(intensity)}"
     if np.isfinite(intensity.flux_error):
         yield f"flux {measured(intensity.flux, intensity.flux_error, intensity.flux_unit)}"
 
