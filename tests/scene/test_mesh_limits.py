@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from etendue.errors import FormatError
+from etendue.errors import ArgumentError, FormatError, MemoryLimitError
+from etendue.quantities import memory
 from etendue.scene.mesh_files import read_mesh
-from etendue.scene.mesh_limits import LARGEST_STEP, check_mesh
+from etendue.scene.mesh_limits import LARGEST_STEP, WORD_BYTES, check_mesh
+from etendue.scene.triangles import smooth_normals
 from oracles.little_memory import told
 
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
@@ -177,3 +179,56 @@ def test_buffers_lie_beside_the_file(escape: str, tmp_path: Path) -> None:
 def test_step_files_are_bounded() -> None:
     with pytest.raises(FormatError, match="A STEP file may have"):
         check_mesh(Path("a.step"), "step", bytes(LARGEST_STEP + 1))
+
+
+POINTS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+FACET = b"facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+ROWS = b"0 0 0\n" * 1_000_000 + b"3 0 1 2\n" * 500_000
+TEXTS: dict[str, bytes] = {
+    "polygon.obj": POINTS + b"f " + b"1 2 3 " * 1_200_000 + b"\n",
+    "faces.obj": POINTS + b"f 1//1 2//1 3//1\n" * 500_000,
+    "long.stl": b"solid a\n" + FACET * 250_000,
+    "short.ply": ply(f"element vertex 1000000\n{XYZ}\n{FACES.format(500_000)}", ROWS),
+}
+
+
+def test_texts_that_no_memory_holds_name_file_and_size(tmp_path: Path) -> None:
+    """Texts of some 10 MB that become half a gigabyte while they are read."""
+    for name, content in TEXTS.items():
+        (tmp_path / name).write_bytes(content)
+    imports = "import trimesh, scipy.spatial\nfrom etendue.scene.mesh_files import read_mesh"
+    found = told(imports, "read_mesh(path, None)", [tmp_path / name for name in TEXTS], 250 << 20)
+    for line, (name, content) in zip(found, TEXTS.items(), strict=True):
+        assert line.startswith(f"MemoryLimitError {tmp_path / name}: to read a mesh of {len(content):,} bytes"), line
+
+
+def test_triangles_that_no_memory_holds_are_refused_before_they_are_welded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """300 000 triangles of 15 MB, which take 400 MB until they are welded and smooth."""
+    path = tmp_path / "large.stl"
+    path.write_bytes(bytes(80) + struct.pack("<I", 300_000) + bytes(50 * 300_000))
+    monkeypatch.setattr(memory, "available_memory", lambda: 350 << 20)
+    with pytest.raises(MemoryLimitError, match=r"large\.stl: a mesh of 300,000 triangles needs 0\.4 GB"):
+        read_mesh(path, None)
+
+
+def test_what_is_asked_for_covers_what_is_taken(tmp_path: Path) -> None:
+    """With as much memory as is asked for, and the room that libraries take, it becomes triangles."""
+    content = POINTS + b"f " + b"1 2 3 " * 300_000 + b"\n"
+    path = tmp_path / "polygon.obj"
+    path.write_bytes(content)
+    imports = "import trimesh, scipy.spatial\nfrom etendue.scene.mesh_files import read_mesh"
+    asked = len(content) + WORD_BYTES * 900_000
+    (found,) = told(imports, "read_mesh(path, None)", [path], asked + (64 << 20))
+    assert found.startswith(f"MemoryLimitError {path}: a mesh of 899,998 triangles needs"), found
+
+
+def test_a_vertex_that_all_triangles_share_is_no_smooth_surface() -> None:
+    """200 000 triangles around one point: 4·10¹⁰ pairs."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 200_001)
+    rim = np.stack([np.cos(turn), np.sin(turn), 0.1 * np.sin(9 * turn)], axis=1)
+    ring = np.arange(200_000)
+    triangles = np.stack([ring, ring + 1, np.full_like(ring, 200_001)], axis=1)
+    with pytest.raises(ArgumentError, match="200,000 triangles of the mesh meet at one vertex"):
+        smooth_normals(np.concatenate([rim, [[0.0, 0, 0]]]), triangles, 30.0)

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
-from etendue.scene.mesh_limits import LARGEST_FILE, check_mesh
+from etendue.quantities.memory import require_memory
+from etendue.scene.mesh_limits import LARGEST_FILE, check_mesh, require_mesh_memory
 from etendue.scene.step_files import StepBody, read_step
 from etendue.units import MM_PER_LENGTH_UNIT
 
@@ -124,6 +125,8 @@ def read_mesh(path: Path, unit: str | None, tolerance: float | None = None, body
     FormatError
         If the file is of no known format or damaged, if its library is not installed, if it does not take the unit, the
         tolerance or the body, or holds several bodies and none is named.
+    MemoryLimitError
+        If there is no room for it.
     OSError
         If the file cannot be opened.
 
@@ -150,6 +153,7 @@ def read_mesh(path: Path, unit: str | None, tolerance: float | None = None, body
         vertices, triangles = _load(path, form, raw)
         mm = MM_PER_LENGTH_UNIT[unit] if unit is not None else form.mm or 1.0
         mesh = StoredMesh(vertices * mm, triangles)
+    require_mesh_memory(path, len(mesh.triangles))
     if not len(mesh.triangles):
         raise FormatError(path, "whole file", "there are no triangles", "Export the body as a triangle mesh.")
     if mesh.triangles.min() < 0 or mesh.triangles.max() >= len(mesh.vertices):
@@ -197,6 +201,7 @@ def _opened(path: Path) -> tuple[MeshFormat, bytes]:
             )
         if size > LARGEST_FILE:
             raise FormatError(path, "size", f"{size:,} bytes", f"A mesh may have {LARGEST_FILE:,}; make it coarser.")
+        require_memory(size, f"{path}: a mesh of {size:,} bytes")
         file.seek(0)
         raw = file.read()
     check_mesh(path, form.name, raw)

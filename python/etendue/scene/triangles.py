@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from etendue.errors import ArgumentError
+
 Array = npt.NDArray[np.float64]
 Triangles = npt.NDArray[np.int64]
 
 BLOCK = 1 << 24
 """Pairs of corners that are compared at once."""
+
+MOST_PAIRS = 1 << 34
+"""Pairs of triangles around one vertex, of all vertices together: some minutes. Bodies have some twenty per triangle."""
 
 PLANE = 3e-6
 """Normals in single precision that differ by less from that of a triangle are its own."""
@@ -112,6 +117,11 @@ def smooth_normals(vertices: Array, triangles: Triangles, crease_angle: float) -
     vertices, triangles, normals
         With one unit normal for each vertex.
 
+    Raises
+    ------
+    ArgumentError
+        If so many triangles meet at one vertex that comparing them would take hours.
+
     Examples
     --------
     >>> roof = np.array([[0.0, 0, 0], [0, 1, 0], [1, 0, 0.1], [-1, 0, 0.1]])
@@ -130,6 +140,12 @@ def smooth_normals(vertices: Array, triangles: Triangles, crease_angle: float) -
     found = np.zeros_like(weighted)
     starts = np.searchsorted(corner_vertex[order], np.arange(len(vertices) + 1))
     valences = np.diff(starts)
+    pairs = int((valences.astype(np.float64) ** 2).sum())
+    if pairs > MOST_PAIRS:
+        raise ArgumentError(
+            f"up to {valences.max():,} triangles of the mesh meet at one vertex: {pairs:,} pairs of them would have to be "
+            f"compared for smooth normals, and {MOST_PAIRS:,} are allowed. Export the body anew, or leave crease_angle out."
+        )
     least = np.cos(np.radians(crease_angle))
     for valence in np.unique(valences[valences > 0]):
         first = starts[:-1][valences == valence]
