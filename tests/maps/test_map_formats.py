@@ -18,8 +18,9 @@ import numpy as np
 import OpenEXR
 import pytest
 import tifffile
-from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.errors import ArgumentError, FormatError, MemoryLimitError, UnknownNameError
 from etendue.formats.maps import MAP_FORMATS, read_map, save_map
+from etendue.quantities import memory
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
@@ -196,6 +197,62 @@ def test_npz_sizes_that_the_file_cannot_hold_set_no_memory_aside(tmp_path: Path)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 20e6
+
+
+@pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r"])
+def test_csv_with_the_line_ends_of_any_system(end: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "map.csv"
+    lmap = make_map()
+    save_map(lmap, path)
+    path.write_bytes(path.read_bytes().replace(b"\n", end))
+    assert np.array_equal(read_map(path).values, lmap.values, equal_nan=True)
+    path.write_bytes(path.read_bytes()[: -len(end) - 1])
+    with pytest.raises(FormatError, match="a line cut short"):
+        read_map(path)
+
+
+@pytest.mark.parametrize("tag", [256, 270, 273, 305])
+def test_tiff_tags_that_announce_more_than_the_file_has_are_refused_in_little_memory(tag: int, tmp_path: Path) -> None:
+    """A count of 2³¹: 8 GB of numbers, for which the library would make room."""
+    path = tmp_path / "map.tif"
+    save_map(make_map(), path)
+    content = path.read_bytes()
+    entries = [i for i in range(0, len(content) - 12, 2) if struct.unpack_from("<H", content, i)[0] == tag]
+    changed = 0
+    for at in entries:
+        kind, count = struct.unpack_from("<HI", content, at + 2)
+        if kind in {2, 3, 4} and count < 10_000:
+            content = content[: at + 2] + struct.pack("<HI", 4, 1 << 31) + content[at + 8 :]
+            changed += 1
+            break
+    assert changed
+    path.write_bytes(content)
+    (found,) = told("from etendue.formats.maps import read_map\nimport tifffile", "read_map(path)", [path], 300 << 20)
+    assert found.startswith(f"{path}: tag {tag}: 2,147,483,648 values"), found
+
+
+def test_a_packed_tiff_is_refused_with_advice(tmp_path: Path) -> None:
+    """A strip that unpacks to more than it announces would be unpacked whole."""
+    path = tmp_path / "map.tif"
+    save_map(make_map(), path)
+    with tifffile.TiffFile(path) as file:
+        pages = [page.asarray() for page in file.pages]
+        text = file.pages.first.description
+    with tifffile.TiffWriter(path) as writer:
+        for number, page in enumerate(pages):
+            writer.write(page, compression="zlib", description=None if number else text, metadata=None)
+    with pytest.raises(FormatError, match=r"packed by ADOBE_DEFLATE.*without compression"):
+        read_map(path)
+
+
+def test_maps_that_no_memory_holds_name_file_and_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "NOTEWORTHY", 0)
+    monkeypatch.setattr(memory, "available_memory", lambda: 10)
+    for name in ("tiff", "exr", "hdr"):
+        path = path_of(name, tmp_path)
+        save_map(make_map(), path)
+        with pytest.raises(MemoryLimitError, match=rf"{path.name}: a map of \d+ pixels needs"):
+            read_map(path)
 
 
 @ALL

@@ -10,6 +10,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArra
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::run::stoppable;
 use crate::surface::{Part, vectors};
 use crate::view::View;
 
@@ -125,7 +126,9 @@ impl LightField {
         if points.len() != directions.len() {
             return Err(PyValueError::new_err("points and directions differ in number"));
         }
-        let found = py.detach(|| along(&self.field, &points, &directions, threads.unwrap_or(0)));
+        let found = stoppable(py, |stop| {
+            along(&self.field, &points, &directions, threads.unwrap_or(0), Some(stop))
+        })?;
         Ok(readings(py, found))
     }
 
@@ -159,7 +162,9 @@ impl LightField {
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let directions = vectors(&directions)?;
-        let found = py.detach(|| intensity(&self.field, &directions, side, threads.unwrap_or(0)));
+        let found = stoppable(py, |stop| {
+            intensity(&self.field, &directions, side, threads.unwrap_or(0), Some(stop))
+        })?;
         Ok(PyArray1::from_vec(py, found))
     }
 
@@ -167,7 +172,9 @@ impl LightField {
     #[pyo3(signature = (view, samples, threads=None))]
     fn look<'py>(&self, py: Python<'py>, view: View, samples: u32, threads: Option<usize>) -> PyResult<Pixels<'py>> {
         let view = view.core();
-        let found = py.detach(|| look(&self.field, &view, samples, threads.unwrap_or(0)));
+        let found = stoppable(py, |stop| {
+            look(&self.field, &view, samples, threads.unwrap_or(0), Some(stop))
+        })?;
         let shape = [view.rows as usize, view.columns as usize];
         let (values, deviations) = readings(py, found);
         Ok((values.reshape(shape)?, deviations.reshape(shape)?))

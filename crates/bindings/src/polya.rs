@@ -5,6 +5,8 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::run::stoppable;
+
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 type Moments<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64);
 
@@ -64,14 +66,15 @@ pub fn polya_posterior<'py>(
     let weight = weight.as_slice()?;
     let squared = weight_squared.as_ref().map(PyReadonlyArray1::as_slice).transpose()?;
     let Problem { grid, base } = Problem::new(depths, weight, squared, base.as_ref())?;
-    let result = py.detach(|| {
+    let result = stoppable(py, |stop| {
         let data = Data {
             weight,
             squared,
             base: &base,
+            stop: Some(stop),
         };
         posterior(&grid, &data, concentration, threads.unwrap_or(0))
-    });
+    })?;
     Ok((
         PyArray1::from_vec(py, result.ratio),
         PyArray1::from_vec(py, result.ratio_squared),
@@ -94,12 +97,13 @@ pub fn polya_evidence<'py>(
     let weight = weight.as_slice()?;
     let squared = weight_squared.as_ref().map(PyReadonlyArray1::as_slice).transpose()?;
     let Problem { grid, base } = Problem::new(depths, weight, squared, base.as_ref())?;
-    Ok(py.detach(|| {
+    stoppable(py, |stop| {
         let data = Data {
             weight,
             squared,
             base: &base,
+            stop: Some(stop),
         };
         log_evidence(&grid, &data, concentration, threads.unwrap_or(0))
-    }))
+    })
 }

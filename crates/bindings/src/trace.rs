@@ -283,16 +283,18 @@ pub fn trace_trails<'py>(
     let opened = open(py, scene)?;
     let sets: Vec<Source<'_>> = opened.iter().map(Opened::core).collect::<PyResult<_>>()?;
     let sets: Vec<&dyn RaySource> = sets.iter().map(|s| s as &dyn RaySource).collect();
-    let run = Run {
-        rays,
-        seed,
-        most_events,
-        sets: &sets,
-        stop: None,
-        lanterns: &[],
-    };
     let core = scene.core();
-    let found = py.detach(|| trails(core, &run, far));
+    let found = stoppable(py, |stop| {
+        let run = Run {
+            rays,
+            seed,
+            most_events,
+            sets: &sets,
+            stop: Some(stop),
+            lanterns: &[],
+        };
+        trails(core, &run, far)
+    })?;
     opened.iter().try_for_each(Opened::check)?;
     found
         .into_iter()
@@ -377,7 +379,11 @@ pub fn look_at_events<'py>(
         )));
     }
     let (core, view, rows) = (scene.core(), view.core(), events.as_slice()?);
-    let cells = py.detach(|| inside(threads.unwrap_or(0), || eye::look_at_events(core, rows, &view)));
+    let cells = stoppable(py, |stop| {
+        inside(threads.unwrap_or(0), || {
+            eye::look_at_events(core, rows, &view, Some(stop))
+        })
+    })?;
     let cells = cells.ok_or_else(|| PyValueError::new_err("the events are of another scene"))?;
     Ok(cell_arrays(py, &cells))
 }

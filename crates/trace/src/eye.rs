@@ -1,6 +1,7 @@
 //! A diffuse scatter, connected to the eye of an observer: the light image, at once or from stored events.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use etendue_geometry::assembly::Hits;
 use etendue_geometry::lines::{Leaving, Lines, NONE};
@@ -155,12 +156,18 @@ const BLOCK: usize = 1024;
 /// The light image of stored events (see [`crate::kept`]), on the threads of the current pool; the same bits for any number
 /// of them. None if they are not of this scene.
 ///
-/// The rows of a ray follow each other: its contributions to a pixel are taken together.
+/// The rows of a ray follow each other: its contributions to a pixel are taken together. Once `stop` is set, the rest is left
+/// out.
 #[must_use]
-pub fn look_at_events(scene: &Scene, rows: &[u64], view: &View) -> Option<Vec<Cell>> {
+pub fn look_at_events(scene: &Scene, rows: &[u64], view: &View, stop: Option<&AtomicBool>) -> Option<Vec<Cell>> {
     let parts: Vec<Option<Vec<(u32, f64)>>> = stretches(rows)
         .into_par_iter()
-        .map(|range| Gaze::new(scene, view).look(&rows[range]))
+        .map(|range| {
+            if stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                return Some(Vec::new());
+            }
+            Gaze::new(scene, view).look(&rows[range])
+        })
         .collect();
     let mut cells = vec![Cell::default(); view.pixels()];
     for part in parts {

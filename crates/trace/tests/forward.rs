@@ -224,7 +224,7 @@ fn events_looked_at_later_are_the_light_image() {
     assert!(rows.len() > 30_000 && harvest.events[1].level() == 0);
     assert!(rows.windows(2).all(|two| ray_of(&two[0]) <= ray_of(&two[1])));
     let flat: Vec<u64> = rows.iter().flatten().copied().collect();
-    let later = look_at_events(&scene, &flat, &VIEW).expect("of this scene");
+    let later = look_at_events(&scene, &flat, &VIEW, None).expect("of this scene");
     let lit = later.iter().filter(|cell| cell.rays > 0).count();
     assert!(lit > 20, "{lit}");
     for (a, b) in later.iter().zip(&harvest.tallies[0].cells) {
@@ -233,7 +233,7 @@ fn events_looked_at_later_are_the_light_image() {
     }
     for threads in [1, 7] {
         assert_eq!(
-            inside(threads, || look_at_events(&scene, &flat, &VIEW)),
+            inside(threads, || look_at_events(&scene, &flat, &VIEW, None)),
             Some(later.clone())
         );
     }
@@ -241,7 +241,7 @@ fn events_looked_at_later_are_the_light_image() {
     for (word, value) in [(9, 77), (11, 1), (13, 2 << 48), (6, f64::NAN.to_bits())] {
         let mut other = flat.clone();
         other[word] = value;
-        assert_eq!(look_at_events(&scene, &other, &VIEW), None);
+        assert_eq!(look_at_events(&scene, &other, &VIEW, None), None);
     }
 }
 

@@ -19,6 +19,7 @@ from etendue.luminance.looking import look_at_field
 from etendue.luminance.scatter_map import look_at_events
 from etendue.luminance.scene_map import Looking, look_at_scene
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.memory import require_memory
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally
 from etendue.scene import Scene
@@ -32,6 +33,10 @@ DEFAULT_ACCEPTANCE = 1.5
 
 Acceptance = float | Literal["auto"] | None
 
+
+SCENE_PIXEL_BYTES, FIELD_PIXEL_BYTES, KEPT_PIXEL_BYTES = 250, 60, 50
+"""Of a pixel in memory: while the map of a scene or of a light field is made, and as long as other maps follow. 290 and 76
+together were measured."""
 
 DEFAULT_SAMPLES = 16
 """Points per pixel at which a light field is read."""
@@ -180,6 +185,8 @@ def luminance_map(
         option belongs to another kind of source.
     SceneError
         If a scene has mistakes.
+    MemoryLimitError
+        If there is no room for the maps.
     UnknownNameError
         If there is no such method.
 
@@ -232,6 +239,8 @@ def luminance_map(
     pairs = list(zip(observers, screens, strict=True))
     # A stated acceptance asks for the cone, and so does an index, which was built for nothing else.
     by_cone = method == "cone" or (method == "auto" and (acceptance is not None or isinstance(source, RayIndex)))
+    if not by_cone:
+        _require_memory(source, screens)
     if isinstance(source, Scene | ScatterEvents):
         given = {name: value for name, value in for_scenes.items() if value is not None}
         how = Looking(**given, cache=cache, threads=threads)  # type: ignore[arg-type]
@@ -259,6 +268,20 @@ def luminance_map(
         check_near_field(source)
         maps = _by_cone(source, pairs, acceptance, threads, progress)
     return maps[0] if isinstance(observer, Observer) else maps
+
+
+def _require_memory(source: RayStream | LightField | Scene | ScatterEvents, screens: list[Screen]) -> None:
+    """Refuse maps for which there is no room, before any work is done; the cone does so itself."""
+    pixels = [screen.columns * screen.rows for screen in screens]
+    sizes = ", ".join(f"{screen.columns} x {screen.rows}" for screen in screens[:4])
+    what = (
+        f"a map of {sizes} pixels"
+        if len(screens) == 1
+        else f"{len(screens)} maps of {sizes}{' …' * (len(screens) > 4)} pixels"
+    )
+    name = source.name if isinstance(source, Scene | ScatterEvents) else source.provenance.source
+    while_made = SCENE_PIXEL_BYTES if isinstance(source, Scene | ScatterEvents) else FIELD_PIXEL_BYTES
+    require_memory(while_made * max(pixels) + KEPT_PIXEL_BYTES * sum(pixels), f"{name or 'the scene'}: {what}")
 
 
 def _check_events(given: Mapping[str, object]) -> None:

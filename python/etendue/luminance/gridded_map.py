@@ -10,9 +10,12 @@ import numpy as np
 from etendue.errors import ArgumentError
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.memory import require_memory
 from etendue.quantities.observer import Observer, Screen
 
 MOST_SAMPLES = 4096
+PIXEL_BYTES = 60
+"""Of a pixel in memory while a map is made."""
 """Lines of sight per pixel."""
 
 
@@ -55,6 +58,8 @@ def gridded_luminance_map(source: GriddedSource, observer: Observer, screen: Scr
     samples = operator.index(samples)
     if not 1 <= samples <= MOST_SAMPLES:
         raise ArgumentError(f"samples is {samples}; give 1 to {MOST_SAMPLES} lines of sight per pixel.")
+    size = f"a map of {screen.columns} x {screen.rows} pixels"
+    require_memory(PIXEL_BYTES * screen.columns * screen.rows, f"{source.patches.provenance.source}: {size}")
     fine = max(1, round(math.sqrt(samples)))
     right, up, _ = screen.axes(observer)
     eye, target = observer.position, np.asarray(observer.target)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.quantities.memory import require_memory
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Scene, compile_scene
 from etendue.tracing.far_fields import far_field_nodes
@@ -74,6 +75,8 @@ def trace(
         If the scene has mistakes.
     ArgumentError
         If a number is out of its range, the scene has no sources, or `resume` is the result of something else.
+    MemoryLimitError
+        If there is no room for the cells of its detectors.
     KeyboardInterrupt
         Upon Ctrl-C; who wants to keep what was done uses `trace_rounds`.
 
@@ -124,7 +127,7 @@ def trace_rounds(
 
     Raises
     ------
-    SceneError, ArgumentError
+    SceneError, ArgumentError, MemoryLimitError
         As `trace`.
 
     Examples
@@ -159,7 +162,14 @@ def trace_rounds(
         plan.check_same(start.plan)
     if until is not None and not any(detection.cells for detection in plan.detections):
         raise ArgumentError("until: the scene has no detector with cells (intensity, illuminance, image) to judge by.")
+    cells = sum(detection.cells for detection in plan.detections)
+    held = f"{scene.name or 'the scene'}: detectors with {cells:,} cells"
+    require_memory(CELL_BYTES * cells * plan.dealing.strata, held)
     return Rounds(core.with_far_fields([nodes.core() for nodes in plan.far_fields]), plan, start, until, threads)
+
+
+CELL_BYTES = 90
+"""Of a cell of a detector in memory while it is counted in: 87 were measured, of illuminance."""
 
 
 class Rounds(Iterator[TraceResult]):

@@ -1,18 +1,29 @@
 //! Far-field intensity of a light field, by quadrature over its surface.
 
+use std::sync::atomic::AtomicBool;
+
 use rayon::prelude::*;
 
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 
-use super::{LightField, PartField};
+use super::{LightField, PartField, stopped};
 
 /// I(k) = Σ ∫ L(x, k) (n·k) dA over the parts, for each direction: a midpoint rule of `side`² points on every part.
 ///
-/// The same bits for any number of threads.
+/// The same bits for any number of threads; 0 once `stop` is set.
 #[must_use]
-pub fn intensity(field: &LightField, directions: &[[f64; 3]], side: u32, threads: usize) -> Vec<f64> {
+pub fn intensity(
+    field: &LightField,
+    directions: &[[f64; 3]],
+    side: u32,
+    threads: usize,
+    stop: Option<&AtomicBool>,
+) -> Vec<f64> {
     let towards = |k: &[f64; 3]| {
+        if stopped(stop) {
+            return 0.0;
+        }
         let k = Vec3::from(*k).normalized();
         field.parts.iter().map(|part| of_part(part, k, side)).sum()
     };
@@ -65,7 +76,7 @@ mod tests {
             let (theta, phi) = (0.7_f64, 2.1_f64);
             let local = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
             let k = part.frame.direction_to_world(local);
-            let found = intensity(&LightField { parts: vec![field] }, &[[k.x, k.y, k.z]], 200, 2)[0];
+            let found = intensity(&LightField { parts: vec![field] }, &[[k.x, k.y, k.z]], 200, 2, None)[0];
             let expected = 3.0
                 * match part.shape {
                     crate::surface::Shape::Rectangle { width, height } => width * height * theta.cos(),

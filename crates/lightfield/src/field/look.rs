@@ -1,5 +1,7 @@
 //! What an observer sees of a light field: luminance averaged over each pixel, by quadrature.
 
+use std::sync::atomic::AtomicBool;
+
 use rayon::prelude::*;
 
 use etendue_geometry::RayBatch;
@@ -7,7 +9,7 @@ use etendue_geometry::batch::BLOCK;
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 
-use super::{LightField, Reading};
+use super::{LightField, Reading, stopped};
 use crate::surface::{Coordinates, carry};
 use crate::view::View;
 
@@ -18,12 +20,16 @@ const CHUNK: usize = 256;
 ///
 /// The average runs over `samples` points, at most [`BLOCK`], of a rank-1 lattice in the pixel: of all point sets that
 /// small its shadows on rows, columns and slanted edges are the most even. Deviations of the points add up, as they err
-/// together.
+/// together. Once `stop` is set, the rest is left out.
 #[must_use]
-pub fn look(field: &LightField, view: &View, samples: u32, threads: usize) -> Vec<Reading> {
+pub fn look(field: &LightField, view: &View, samples: u32, threads: usize, stop: Option<&AtomicBool>) -> Vec<Reading> {
     let points = lattice(samples);
     let chunk = (BLOCK / points.len()).max(1);
-    let work = |(index, pixels): (usize, &mut [Reading])| see(field, view, index * chunk, &points, pixels);
+    let work = |(index, pixels): (usize, &mut [Reading])| {
+        if !stopped(stop) {
+            see(field, view, index * chunk, &points, pixels);
+        }
+    };
     let serial = threads == 1 || view.pixels() <= 4 * chunk;
     let paint = |parallel: bool| {
         let mut pixels = vec![Reading::default(); view.pixels()];
@@ -81,10 +87,21 @@ fn aim(view: &View, first: usize, points: &[[f64; 2]], count: usize, batch: &mut
     }
 }
 
-/// Luminance along lines given by points and directions.
+/// Luminance along lines given by points and directions; 0 once `stop` is set.
 #[must_use]
-pub fn along(field: &LightField, points: &[[f64; 3]], directions: &[[f64; 3]], threads: usize) -> Vec<Reading> {
-    let read = |(p, k): (&[f64; 3], &[f64; 3])| field.luminance(Vec3::from(*p), Vec3::from(*k).normalized());
+pub fn along(
+    field: &LightField,
+    points: &[[f64; 3]],
+    directions: &[[f64; 3]],
+    threads: usize,
+    stop: Option<&AtomicBool>,
+) -> Vec<Reading> {
+    let read = |(p, k): (&[f64; 3], &[f64; 3])| {
+        if stopped(stop) {
+            return Reading::default();
+        }
+        field.luminance(Vec3::from(*p), Vec3::from(*k).normalized())
+    };
     if threads == 1 || points.len() <= CHUNK {
         return points.iter().zip(directions).map(read).collect();
     }
@@ -163,9 +180,9 @@ mod tests {
         let field = LightField {
             parts: (0..4).map(rough).collect(),
         };
-        let (coarse, fine) = (look(&field, &view(), 16, 2), look(&field, &view(), 2048, 2));
-        assert_eq!(coarse, look(&field, &view(), 16, 1));
-        assert_eq!(coarse, look(&field, &view(), 16, 7));
+        let (coarse, fine) = (look(&field, &view(), 16, 2, None), look(&field, &view(), 2048, 2, None));
+        assert_eq!(coarse, look(&field, &view(), 16, 1, None));
+        assert_eq!(coarse, look(&field, &view(), 16, 7, None));
         let total: f64 = fine.iter().map(|r| r.value).sum();
         let difference: f64 = coarse.iter().zip(&fine).map(|(a, b)| (a.value - b.value).abs()).sum();
         assert!(total > 0.0 && difference < 0.05 * total, "{difference} {total}");
@@ -189,8 +206,8 @@ mod tests {
         };
         let points: Vec<[f64; 3]> = (0..2000).map(|i| [f64::from(i) * 1e-3 - 1.0, 0.2, 3.0]).collect();
         let directions = vec![[0.1, 0.2, 1.0]; 2000];
-        let readings = along(&field, &points, &directions, 2);
-        assert_eq!(readings, along(&field, &points, &directions, 1));
+        let readings = along(&field, &points, &directions, 2, None);
+        assert_eq!(readings, along(&field, &points, &directions, 1, None));
         assert_eq!(
             readings[700],
             field.luminance(points[700].into(), Vec3::from(directions[700]).normalized())

@@ -11,6 +11,8 @@ pub mod intensity;
 pub mod look;
 pub mod tent;
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use etendue_math::Vec3;
 
 use crate::surface::Part;
@@ -98,6 +100,11 @@ impl LightField {
         }
         sum
     }
+}
+
+/// Whether somebody has set the flag that ends long work.
+fn stopped(stop: Option<&AtomicBool>) -> bool {
+    stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
 }
 
 #[cfg(test)]

@@ -14,6 +14,8 @@ mod grid;
 mod kernel;
 mod tree;
 
+use std::sync::atomic::AtomicBool;
+
 use etendue_sampling::ordered;
 
 pub use base::Base;
@@ -31,6 +33,8 @@ pub struct Data<'a> {
     pub squared: Option<&'a [f64]>,
     /// The base measure. Cells without base mass hold no mass and must hold no points.
     pub base: &'a Base,
+    /// Set by somebody else: then the rest is left out, and the result means nothing.
+    pub stop: Option<&'a AtomicBool>,
 }
 
 impl Data<'_> {
@@ -119,6 +123,7 @@ mod tests {
             weight: &[3.0, 1.0],
             squared: None,
             base: &Base::uniform(),
+            stop: None,
         };
         let post = posterior(&grid, &data, 2.0, 1);
         let b = (libm::tgamma(4.0) * libm::tgamma(2.0) / libm::tgamma(6.0)) * 16.0;
@@ -163,6 +168,7 @@ mod tests {
                     weight: &weight,
                     squared,
                     base: &measure,
+                    stop: None,
                 };
                 let post = posterior(&grid, &data, 3.0, 2);
                 let mass: f64 = post.ratio.iter().zip(&base).map(|(r, b)| r * b).sum();
@@ -190,6 +196,7 @@ mod tests {
                 weight: &counts,
                 squared: None,
                 base: &uniform,
+                stop: None,
             },
             3.0,
             1,
@@ -204,6 +211,7 @@ mod tests {
                         weight: &counts,
                         squared,
                         base,
+                        stop: None,
                     },
                     3.0,
                     1,
@@ -236,6 +244,7 @@ mod tests {
             weight: &weight,
             squared: Some(&squared),
             base: &Base::uniform(),
+            stop: None,
         };
         let bits = |threads| {
             let post = posterior(&grid, &data, 3.0, threads);
@@ -262,6 +271,7 @@ mod tests {
                     weight,
                     squared: None,
                     base: &Base::uniform(),
+                    stop: None,
                 },
                 3.0,
                 1,

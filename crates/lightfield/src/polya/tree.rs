@@ -1,5 +1,7 @@
 //! The two sweeps over the lattice: evidence from the cells to the root, ratios from the root to the cells.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -31,8 +33,13 @@ struct UpTask<'a> {
     splits: Vec<&'a mut [f32]>,
 }
 
-/// Runs tasks side by side if that is worth it: in the pool, or on the caller's thread.
-fn each<T: Send>(pool: Option<&ThreadPool>, tasks: Vec<T>, work: impl Fn(T) + Sync + Send) {
+/// Runs tasks until it is stopped, side by side if that is worth it: in the pool, or on the caller's thread.
+fn each<T: Send>(pool: Option<&ThreadPool>, stop: Option<&AtomicBool>, tasks: Vec<T>, work: impl Fn(T) + Sync + Send) {
+    let work = |task| {
+        if !stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            work(task);
+        }
+    };
     match pool {
         Some(pool) if tasks.len() > 8 => pool.install(|| tasks.into_par_iter().for_each(work)),
         _ => tasks.into_iter().for_each(work),
@@ -93,7 +100,9 @@ pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, pool: Opt
             squared: &squared[depth + 1],
             log_r: &log_r[depth + 1],
         };
-        each(pool, tasks, |task| ascend_chunk(data, (c, &split_terms), &finer, task));
+        each(pool, data.stop, tasks, |task| {
+            ascend_chunk(data, (c, &split_terms), &finer, task);
+        });
         if data.squared.is_some() {
             effective[depth] = Array::zeros(boxes);
             for ((e, w), w2) in effective[depth].iter_mut().zip(&*w).zip(&*w2) {
@@ -263,7 +272,7 @@ pub(super) fn descend(
                 });
             }
         }
-        each(pool, tasks, |task| {
+        each(pool, data.stop, tasks, |task| {
             descend_chunk(levels, data, c, evidence, &coarser, task);
         });
         coarser = own;

@@ -10,7 +10,7 @@ from typing import BinaryIO
 import numpy as np
 
 from etendue.errors import FormatError
-from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
+from etendue.formats.maps.header import FOREIGN, MOST_HEADER_BYTES, MapHeader, header_text
 from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, parsing
 from etendue.units import ILLUMINANCE_NAME
 
@@ -52,17 +52,24 @@ def _rows(lmap: AnyMap) -> Iterator[str]:
 
 
 def read(path: Path) -> AnyMap:
-    """Read what `write` wrote; line ends may have become those of another system."""
+    """Read what `write` wrote; line ends may have become those of another system, old or new."""
     with path.open("rb") as stream:
-        top = [stream.readline().removeprefix(BOM_UTF8).rstrip(b"\r\n") for _ in range(3)]
-        lines, ended = _count_lines(stream)
+        head = stream.read(MOST_HEADER_BYTES).removeprefix(BOM_UTF8)
+        end = b"\n" if b"\n" in head else b"\r"
+        top = [line.rstrip(b"\r") for line in head.split(end, 3)[:3]]
+        stream.seek(0)
+        lines, ended = _count_lines(stream, end)
+    if len(top) < 3:
+        raise FormatError(path, "lines 1 to 3", f"no end of them within {len(head):,} bytes", DAMAGED)
     if top[0] not in TITLES or not top[1].startswith(b"# "):
         raise FormatError(path, "lines 1 and 2", "not the title and header of an étendue map", FOREIGN)
     if top[2] != ",".join(COLUMNS).encode("ascii"):
         raise FormatError(path, "line 3", f"found {top[2][:80]!r}", f"It must be {','.join(COLUMNS)!r}.")
     header = MapHeader.parse(path, "line 2", top[1][2:].decode("ascii", errors="replace"))
-    if lines != header.pixels or not ended:
-        found = f"{lines} whole lines of pixels, {header.pixels} expected" + ("" if ended else ", and a line cut short")
+    if lines - 3 != header.pixels or not ended:
+        found = f"{lines - 3} whole lines of pixels, {header.pixels} expected" + (
+            "" if ended else ", and a line cut short"
+        )
         raise FormatError(path, "pixels", found, DAMAGED)
     with parsing(path, "pixels"), path.open(encoding="utf-8") as stream:
         table = np.loadtxt(stream, dtype=list(COLUMNS.items()), delimiter=",", comments=None, skiprows=3, ndmin=1)
@@ -73,13 +80,13 @@ def read(path: Path) -> AnyMap:
     return header.restore(value, error, rays)
 
 
-def _count_lines(stream: BinaryIO) -> tuple[int, bool]:
+def _count_lines(stream: BinaryIO, end: bytes) -> tuple[int, bool]:
     """Number of line ends from here on, and whether the file stops with one."""
-    lines, last = 0, b"\n"
+    lines, last = 0, end
     while block := stream.read(1 << 20):
-        lines += block.count(b"\n")
+        lines += block.count(end)
         last = block[-1:]
-    return lines, last == b"\n"
+    return lines, last == end
 
 
 FORMAT = MapFormat("csv", (".csv",), lambda head: head.removeprefix(BOM_UTF8).startswith(TITLES), read, write)

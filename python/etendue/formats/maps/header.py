@@ -20,6 +20,9 @@ from etendue.quantities.luminance_map import LuminanceMap, MapValues
 from etendue.quantities.observer import MAX_PIXELS
 from etendue.units import FLUX_UNITS, ILLUMINANCE_NAME
 
+MOST_HEADER_BYTES = 1 << 22
+"""Of the JSON text, which takes 4 bytes a character in some files: about a thousand pages."""
+
 VERSION = 1
 VERSION_KEY = "etendue_map"
 CHECKSUM_KEY = "sha256"

@@ -10,11 +10,15 @@ from pathlib import Path
 from etendue.errors import FormatError
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.memory import require_memory
 
 AnyMap = LuminanceMap | IlluminanceMap
 """What a map file may hold: its header names the quantity."""
 
 DAMAGED = "The file is damaged or cut short: copy it again, or make it again with the map's save."
+
+PIXEL_BYTES = 48
+"""Of a pixel in memory: as the file has it, and as the map has it."""
 
 DEFLATE_RATIO = 1032
 """The largest factor by which deflate can shrink anything: 258 bytes into 2 bits."""
@@ -73,7 +77,10 @@ def check_room(path: Path, pixels: int, bytes_per_pixel: int, ratio: int = DEFLA
     ------
     FormatError
         If the file cannot hold that much.
+    MemoryLimitError
+        If there is no room for it.
     """
     size = path.stat().st_size
     if pixels * bytes_per_pixel > ratio * size:
         raise FormatError(path, "pixels", f"the header claims {pixels} pixels, the file has only {size} bytes", DAMAGED)
+    require_memory(PIXEL_BYTES * pixels, f"{path}: a map of {pixels:,} pixels")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.archive import Archive
-from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
+from etendue.formats.maps.header import FOREIGN, MOST_HEADER_BYTES, MapHeader, header_text
 from etendue.formats.maps.map_format import DAMAGED, DEFLATE_RATIO, AnyMap, MapFormat, parsing
 from etendue.quantities.observer import MAX_PIXELS
 
@@ -19,9 +19,6 @@ ARRAYS = {"values": np.dtype("<f8"), "standard_error": np.dtype("<f8"), "rays": 
 
 NPY_HEADER_BYTES = 10 + 65535
 """Most bytes before the numbers of an array, by the format of version 1.0."""
-
-MOST_HEADER_BYTES = 1 << 22
-"""Of the JSON text, which takes 4 bytes a character: about a thousand pages."""
 
 MOST_BYTES = 24 * MAX_PIXELS + MOST_HEADER_BYTES + (1 << 20)
 """Of the archive of the largest map, were nothing of it to shrink."""
