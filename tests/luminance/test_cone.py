@@ -54,16 +54,19 @@ def quadrilateral_rays() -> et.RaySet:
 def test_every_pixel_of_a_tilted_quadrilateral_is_in_its_place(
     quadrilateral_rays: et.RaySet, theta: float, phi: float, plane: str
 ) -> None:
-    """Counts against the exact expectation by quadrature: χ² at 1e-4, and no ray where none can be."""
+    """Luminance against the exact expectation by quadrature: χ² at 1e-4, and no ray where none can be."""
     source, acceptance = Quadrilateral(), 2.0
     observer, screen = et.Observer(theta, phi, 200.0, target=(1.0, -1.0, 0.0)), et.Screen(16.0, 14.0, 16, 14, plane)
     lmap = et.luminance_map(quadrilateral_rays, observer, screen, method="cone", acceptance=acceptance)
     expected = source.cone_expectation(observer, screen, acceptance)
     apparent = screen.pixel_area * 1e-6 * screen.cosine(observer)
-    counts = expected * apparent * cone_solid_angle(acceptance) / (source.flux / len(quadrilateral_rays))
+    # What one ray adds to a pixel: with it, luminance is a Poisson count.
+    one = source.flux / len(quadrilateral_rays) / (apparent * cone_solid_angle(acceptance))
+    counts = expected / one
     enough = counts > 5
     assert enough.sum() > 25
-    chi2 = float(((lmap.rays - counts)[enough] ** 2 / counts[enough]).sum())
+    np.testing.assert_allclose(lmap.values[lmap.rays > 0], (lmap.rays * one)[lmap.rays > 0], rtol=1e-9)
+    chi2 = float(((lmap.values / one - counts)[enough] ** 2 / counts[enough]).sum())
     p = stats.chi2.sf(chi2, int(enough.sum()))
     assert p > 1e-4, f"chi2 = {chi2:.1f} with {enough.sum()} pixels, p = {p:.2g}"
     assert lmap.rays[counts == 0].sum() == 0

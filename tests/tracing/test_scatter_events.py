@@ -117,12 +117,17 @@ def test_the_same_picture_as_a_light_image_of_the_same_rays(traced: et.TraceResu
 def test_light_leaves_all_faces_that_coincide(tmp_path: Path) -> None:
     """Where a label lies on a block, light is sent off from both: of one alone it would meet the other at once."""
     scene = et.Scene.from_dict(everything(tmp_path), folder=tmp_path)
-    events = et.trace(scene, 5000, seed=5).events["scatter"]
+    result = et.trace(scene, 5000, seed=5)
+    events = result.events["scatter"]
     rows = np.array(events.rows)
     shared = rows["face"][:, 1] != NO_FACE
     assert 20 < shared.sum() < 0.5 * len(rows)
     rows["face"][:, 1:] = NO_FACE
-    assert et.luminance_map(events.replace(rows=rows))[0].rays.sum() < et.luminance_map(events)[0].rays.sum()
+    whole, one = et.luminance_map(events)[0], et.luminance_map(events.replace(rows=rows))[0]
+    assert one.rays.sum() < whole.rays.sum()
+    assert one.values.sum() < whole.values.sum()
+    # A light image of the same rays, which holds no faces in store.
+    np.testing.assert_allclose(whole.values, result.images["eye"].values, rtol=1e-11)
 
 
 def test_what_events_say(traced: et.TraceResult) -> None:
@@ -188,17 +193,27 @@ def test_with_what_lines_of_sight_find_besides() -> None:
 
 def test_rays_as_a_source_are_counted_once() -> None:
     """Among diffuse surfaces, lines of sight add to events only what they see where all is black: the field that was fitted
-    to the rays of the source."""
-    lamp = et.Scene(**corner(surfaces=[], detectors=[{"name": "all", "kind": "rays", "shape": {"kind": "disk", "radius": 9},
-                    "at": [4, 3, 39]}]))  # fmt: skip
-    rays = et.trace(lamp, 4000, 2).rays.only
-    source = {"name": "file", "kind": "rays", "rays": rays}
+    to the rays of the source, which is in view. The events are those of lines of sight that start from its true luminance."""
+    led = {"name": "led", "kind": "surface", "shape": {"kind": "rectangle", "width": 6, "height": 4}, "flux": 100,
+           "at": [2, 3, 14], "toward": [0.3, 0.1, -1]}  # fmt: skip
+    # Behind the lamp a second one, that shines up.
+    lamps = [led, {**led, "name": "up", "toward": [-0.3, -0.1, 1], "at": [2.1, 3.1, 14.5]}]
+    shell = {"name": "all", "kind": "rays", "shape": {"kind": "sphere", "radius": 6}, "at": [2, 3, 14]}
+    caught = et.trace(et.Scene(**corner(sources=lamps, surfaces=[], detectors=[shell])), 12_000, 2)
+    source = {"name": "file", "kind": "rays", "rays": caught.rays.only}
     events = et.trace(et.Scene(**corner(sources=[source])), None, 3).events.only
     black = [{**surface, "finish": "absorber"} for surface in corner()["surfaces"]]
     direct = et.luminance_map(et.Scene(**corner(sources=[source], surfaces=black)), rays_per_pixel=16)
     wholes, parts = et.luminance_map(events, rays_per_pixel=16), et.luminance_map(events)
-    for whole, part, alone in zip(wholes, parts, direct, strict=True):
+    lit = et.luminance_map(et.Scene(**corner(sources=lamps)), rays_per_pixel=512, seed=5)
+    dark = et.luminance_map(et.Scene(**corner(sources=lamps, surfaces=black)), rays_per_pixel=512, seed=5)
+    for whole, part, alone, on, off in zip(wholes, parts, direct, lit, dark, strict=True):
         np.testing.assert_allclose(whole.values, part.values + alone.values, rtol=1e-12)
+        assert (alone.values > 0).sum() > 3
+        # Where the lamp is not in view.
+        hidden = (off.values == 0) & (on.values > 0)
+        error = np.hypot(part.standard_error, on.standard_error)[hidden]
+        assert_agree(values=part.values[hidden], expected=on.values[hidden], standard_error=error)
 
 
 def test_integrating_sphere() -> None:

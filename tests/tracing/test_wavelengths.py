@@ -101,7 +101,9 @@ def test_a_prism_sends_each_line_where_snell_says(tmp_path: Path, stored: str) -
         mine = wavelength[which] == line
         assert mine.sum() > 1000
         straight = np.abs(seen.direction[mine][:, :2] - expected).max(axis=1) < 2e-6
-        assert_drawn_with(share=float(share), hits=int(straight.sum()), rays=int((wavelength == line).sum()))
+        # Each ray of the set holds 1/n of a watt.
+        hits = n * float(seen.flux[mine][straight].sum())
+        assert_drawn_with(share=float(share), hits=hits, rays=int((wavelength == line).sum()))
         # The directions of the lines lie much farther apart than that.
         others = np.abs(out[line != LINES] - expected).max(axis=1)
         assert (others > 1e-3).all()
@@ -177,12 +179,12 @@ def test_beers_law_with_the_absorption_of_each_wavelength() -> None:
             detectors=[{**SCREEN, "at": [0, 0, 30]}],
         )
     )
-    seen = result.rays["out"].wavelength
-    assert seen is not None
+    seen = result.rays["out"]
     for line in LINES:
         alpha = float(np.interp(line, table["wavelength"], table["values"]))
-        left = int((seen == line).sum())
+        left = n * float(seen.flux[seen.wavelength == line].sum())
         assert_drawn_with(share=float(np.exp(-alpha * thickness)), hits=left, rays=int((wavelength == line).sum()))
+    assert result.ledger.absorbed.flux == pytest.approx(1.0 - seen.total_flux, rel=1e-9)
 
 
 def test_white_light_through_a_filter_has_the_lumens_of_the_integral() -> None:
@@ -224,10 +226,9 @@ def test_finishes_see_the_wavelength_of_each_ray() -> None:
                    "finish": "filter"}],
         detectors=[{**SCREEN, "at": [20, 0, 0], "toward": [1, 0, 0]}],
     )  # fmt: skip
-    seen = traced(scene).rays["out"].wavelength
-    assert seen is not None
+    seen = traced(scene).rays["out"]
     for line, share in zip(LINES, [0.2, 0.55, 0.9], strict=True):
-        hits = int((seen == line).sum())
+        hits = n * float(seen.flux[seen.wavelength == line].sum())
         assert_drawn_with(share=share, hits=hits, rays=int((wavelength == line).sum()))
 
 
@@ -284,11 +285,14 @@ def test_rays_with_a_spectrum_each_draw_from_their_own() -> None:
     which = np.rint(seen.position[:, 0]).astype(int)
     # Shares of the lines at the nodes, by the trapezoidal rule.
     for own, lines in ((1, {450.0: 1.0}), (2, {540.0: 1 / 6, 560.0: 1 / 2, 600.0: 1 / 3})):
-        found = seen.wavelength[which == own]
+        found, flux = seen.wavelength[which == own], n * seen.flux[which == own]
         assert set(found.tolist()) == set(lines)
         for line, share in lines.items():
+            hits, rays = float(flux[found == line].sum()), len(found)
             if share < 1.0:
-                assert_drawn_with(share=share, hits=int((found == line).sum()), rays=len(found))
+                assert_drawn_with(share=share, hits=hits, rays=rays)
+            else:
+                assert hits == pytest.approx(rays, rel=1e-6)
     assert set(seen.wavelength[which == 7].tolist()) <= {450.0, 540.0, 560.0, 600.0}
     lost = int((index == 7).sum())
     assert any(f"{lost:,} rays" in note and "no wavelength" in note for note in result.notes)
