@@ -14,7 +14,7 @@ from cli.outcome import Run
 
 
 def test_asked_steps_that_cannot_hold_the_beam_are_told(run: Run, tmp_path: Path) -> None:
-    et.write_rays(tmp_path / "spot.tm25ray", rays_of((beam(50_000, 3e3, 0.0, 0.0, 5), 10.0)))
+    et.write_rays(tmp_path / "spot.tm25ray", rays_of((beam(50_000, exponent=3e3, c=0.0, gamma=0.0, seed=5), 10.0)))
     status, out, _ = run(
         "intensity", "spot.tm25ray", "--gamma-step", 2.5, "--c-planes", 36, "-o", "a.ies", "-o", "a.ldt"
     )

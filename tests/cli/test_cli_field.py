@@ -28,7 +28,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An off-centre source as a ray file, in watts too, and a light field made by hand."""
     place = tmp_path_factory.mktemp("fields")
     source, n = LimbDarkenedDisk(), 20_000
-    x, k = source.rays(n, 2)
+    x, k = source.rays(n, seed=2)
     et.write_rays(place / "led.tm25ray", et.RaySet(x, k, np.full(n, source.total_flux / n)))
     watts = et.RaySet(x[:3000], k[:3000], np.full(3000, 1e-3), flux_unit="W", wavelength=np.full(3000, 555.0))
     et.write_rays(place / "watts.tm25ray", watts)
@@ -194,7 +194,7 @@ def test_sample_draws_the_rays_of_the_api(run: Run, folder: Path, name: str) -> 
     outcome = run("sample", folder / name, "-n", 5000, "-o", "a.tm25ray", "-o", "a.csv", "--seed", 3, "--json")
     assert outcome.status == 0
     field = et.LightField.load(folder / name)
-    expected = next(field.rays(5000, 3).batches())
+    expected = next(field.rays(5000, seed=3).batches())
     for path in ("a.tm25ray", "a.csv"):
         drawn = et.read_rays(path)
         assert (len(drawn), drawn.flux_unit) == (5000, field.flux_unit)

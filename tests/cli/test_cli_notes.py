@@ -204,7 +204,7 @@ def luminance(place: Path) -> Iterator[Case]:
 
 def sample(place: Path) -> Iterator[Case]:
     field = et.LightField.load(place / "led.h5")
-    drawn = field.rays(500, 1)
+    drawn = field.rays(500, seed=1)
     losses = et.write_rays("api.dis", drawn, "asap")
     yield Case(("sample", place / "led.h5", "-n", 500, "-o", "out.dis"), (*field.notes, *drawn.notes, *losses))
 

@@ -19,7 +19,7 @@ def test_intensity_files(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     led = lid("none")
     et.write_intensity("a.ies", led)
     Path("b.gldf").write_bytes(gldf_of(led, tmp_path))
-    Path("c.xml").write_bytes(tm33(emitter([0], led.gamma, led.values[:1], number=2)))
+    Path("c.xml").write_bytes(tm33(emitter(h=[0], v=led.gamma, values=led.values[:1], number=2)))
 
     def run(*arguments: str) -> str:
         monkeypatch.setattr(sys, "argv", ["etendue", "info", *arguments])

@@ -23,7 +23,7 @@ def read_back(intensity: et.Intensity, folder: Path) -> list[float]:
     for name in ("a.ies", "a.ldt"):
         et.write_intensity(folder / name, intensity)
         table = et.read_intensity(folder / name)
-        found.append(read_by_trapezium(table.values, table.c, table.gamma))
+        found.append(read_by_trapezium(table.values, c=table.c, gamma=table.gamma))
     return found
 
 
@@ -43,7 +43,7 @@ BEAMS = [
 def test_files_hold_the_flux_of_a_beam_and_its_peak(exponent: float, c: float, gamma: float, tmp_path: Path) -> None:
     """I₀ = Φ (n + 1)/2π of cosⁿ; a reader's trapezium rule finds Φ to 0.1 %."""
     n, flux = 100_000, 92.0
-    far = et.intensity_distribution(rays_of((beam(n, exponent, c, gamma, 3), flux)))
+    far = et.intensity_distribution(rays_of((beam(n, exponent=exponent, c=c, gamma=gamma, seed=3), flux)))
     assert far.flux == pytest.approx(flux, rel=1e-12)
     assert read_back(far, tmp_path) == pytest.approx([flux, flux], rel=1e-3)
     peak = flux * (exponent + 1) / (2 * np.pi)
@@ -53,11 +53,14 @@ def test_files_hold_the_flux_of_a_beam_and_its_peak(exponent: float, c: float, g
 
 
 def test_two_beams_and_a_batwing(tmp_path: Path) -> None:
-    two = rays_of((beam(60_000, 3e3, 10.0, 30.0, 1), 50.0), (beam(40_000, 300.0, 200.0, 60.0, 2), 40.0))
+    two = rays_of(
+        (beam(60_000, exponent=3e3, c=10.0, gamma=30.0, seed=1), 50.0),
+        (beam(40_000, exponent=300.0, c=200.0, gamma=60.0, seed=2), 40.0),
+    )
     rng = np.random.default_rng(7)
     # I ∝ cos^-3 up to 60°, as for even light on a floor.
     tangent = np.sqrt(3.0 * rng.random(100_000))
-    wings = rays_of((direction(rng.uniform(0, 360, 100_000), np.degrees(np.arctan(tangent))), 90.0))
+    wings = rays_of((direction(c=rng.uniform(0, 360, 100_000), gamma=np.degrees(np.arctan(tangent))), 90.0))
     for rays, peak in ((two, 50.0 * 3001 / (2 * np.pi)), (wings, 90.0 / (3.0 * np.pi) * 8.0)):
         far = et.intensity_distribution(rays)
         assert read_back(far, tmp_path) == pytest.approx([90.0, 90.0], rel=1e-3)
@@ -67,7 +70,7 @@ def test_two_beams_and_a_batwing(tmp_path: Path) -> None:
 
 def test_light_of_no_width_says_what_sets_its_peak(tmp_path: Path) -> None:
     for towards in ((0.0, 0.0), (70.0, 20.0)):
-        far = et.intensity_distribution(rays_of((np.tile(direction(*towards), (5000, 1)), 7.0)))
+        far = et.intensity_distribution(rays_of((np.tile(direction(c=towards[0], gamma=towards[1]), (5000, 1)), 7.0)))
         assert "lower bound, set by steps of 0.0049°" in far.notes[0]
         assert read_back(far, tmp_path) == pytest.approx([7.0, 7.0], rel=1e-3)
 
@@ -76,7 +79,7 @@ def test_few_rays_of_a_lambertian_source_make_no_spike() -> None:
     """10⁴ rays, 20 seeds: the pole's node is not worse than a tenth, and the peak lies within its error."""
     z = []
     for seed in range(20):
-        far = et.intensity_distribution(rays_of((beam(10_000, 1.0, 0.0, 0.0, seed), np.pi)))
+        far = et.intensity_distribution(rays_of((beam(10_000, exponent=1.0, c=0.0, gamma=0.0, seed=seed), np.pi)))
         assert far.standard_error[0, 0] < 0.1
         assert far.maximum < 1.4
         z.append((far.maximum - 1.0) / far.maximum_error)
@@ -92,10 +95,10 @@ def test_errors_of_nodes_cover_the_truth_over_seeds(exponent: float, c: float, g
     n, flux, seeds = 25_000, 5.0, 40
     inside = 0
     for seed in range(seeds):
-        far = et.intensity_distribution(rays_of((beam(n, exponent, c, gamma, 1000 + seed), flux)))
-        near = direction(far.c[:, None], far.gamma) @ direction(c, gamma)
+        far = et.intensity_distribution(rays_of((beam(n, exponent=exponent, c=c, gamma=gamma, seed=1000 + seed), flux)))
+        near = direction(c=far.c[:, None], gamma=far.gamma) @ direction(c=c, gamma=gamma)
         i, j = np.unravel_index(int(np.argmax(near)), near.shape)
-        truth = flux * float(lobe(exponent, c, gamma)(far.c[i], far.gamma[j]))
+        truth = flux * float(lobe(exponent=exponent, c=c, gamma=gamma)(far.c[i], far.gamma[j]))
         inside += bool(abs(far.values[i, j] - truth) < 1.645 * far.standard_error[i, j])
     assert_drawn_with(share=0.9, hits=inside, rays=seeds)
 
@@ -140,7 +143,7 @@ def test_traced_errors_cover_the_truth() -> None:
     """A cosine emitter about an axis off every plane, at asked steps, 8 seeds: nodes with no ray in common."""
     c, gamma, exponent, flux = 101.0, 28.0, 3.0, 9.0
     source = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "exponent": exponent, "flux": flux,
-              "toward": direction(c, gamma).tolist()}  # fmt: skip
+              "toward": direction(c=c, gamma=gamma).tolist()}  # fmt: skip
     scene = et.Scene(
         sources=[source], detectors=[{"name": "far", "kind": "intensity", "c_planes": 12, "gamma_step": 7.5}]
     )
@@ -148,7 +151,11 @@ def test_traced_errors_cover_the_truth() -> None:
     truth: Array | None = None
     for seed in range(8):
         far = et.trace(scene, 60_000, seed).intensity.only
-        truth = flux * hat_means(lobe(exponent, c, gamma), far.c, far.gamma)[0] if truth is None else truth
+        truth = (
+            flux * hat_means(lobe(exponent=exponent, c=c, gamma=gamma), c=far.c, gamma=far.gamma)[0]
+            if truth is None
+            else truth
+        )
         sure = (truth > 0.05 * truth.max())[::2, 2:-2:2]
         z = ((far.values - truth) / far.standard_error)[::2, 2:-2:2][sure]
         inside, tried = inside + int((np.abs(z) < 1.0).sum()), tried + z.size

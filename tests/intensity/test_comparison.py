@@ -25,7 +25,7 @@ def test_a_distribution_agrees_with_itself_and_its_multiple() -> None:
 
 
 def test_the_measures_by_their_formulas_on_different_grids() -> None:
-    test, reference = lid("none", (0, 90, 200), (0, 40, 180)), lid("both", (0, 30, 180), (0, 90, 180))
+    test, reference = lid("none", c=(0, 90, 200), gamma=(0, 40, 180)), lid("both", c=(0, 30, 180), gamma=(0, 90, 180))
     c, gamma = np.array([0, 30, 90, 180, 200.0])[:, None], np.array([0, 40, 90, 180.0])
     a, b = test.at(c, gamma), reference.at(c, gamma)
     found = compare_intensities(test, reference)

@@ -170,7 +170,7 @@ def test_what_is_written(tmp_path: Path) -> None:
 
 
 def test_planes_of_c90_c270_go_from_270_over_0_to_90(tmp_path: Path) -> None:
-    led = lid("C90-C270", (20, 90, 160, 200, 270, 340), (0, 45, 90))
+    led = lid("C90-C270", c=(20, 90, 160, 200, 270, 340), gamma=(0, 45, 90))
     write_intensity(tmp_path / "a.ldt", led)
     lines = (tmp_path / "a.ldt").read_text(encoding="latin-1").splitlines()
     assert [float(v) for v in lines[42:48]] == [20, 90, 160, 200, 270, 340]
@@ -179,7 +179,7 @@ def test_planes_of_c90_c270_go_from_270_over_0_to_90(tmp_path: Path) -> None:
 
 
 def test_ratio_and_fraction_of_a_table_that_has_no_node_at_90(tmp_path: Path) -> None:
-    led = lid("rotational", [0], [0, 60, 120, 180]).replace(luminaire={"lamp_flux": 20000.0, "lamps": 4})
+    led = lid("rotational", c=[0], gamma=[0, 60, 120, 180]).replace(luminaire={"lamp_flux": 20000.0, "lamps": 4})
     write_intensity(tmp_path / "a.ldt", led)
     lines = (tmp_path / "a.ldt").read_text(encoding="latin-1").splitlines()
     below = Intensity([0], [0, 60, 90], led.at(0, [[0, 60, 90]])).flux

@@ -36,7 +36,8 @@ def nodes_of(planes: int, step: float) -> tuple[Array, Array]:
 
 def hat_weights(planes: int, step: float) -> Array:
     """∫φ dΩ of every node, by quadrature; all planes of a pole are one node."""
-    return hat_means(lambda c, gamma: np.ones(np.broadcast_shapes(c.shape, gamma.shape)), *nodes_of(planes, step))[1]
+    c, gamma = nodes_of(planes, step)
+    return hat_means(lambda a, b: np.ones(np.broadcast_shapes(a.shape, b.shape)), c=c, gamma=gamma)[1]
 
 
 def shares_of(planes: int, step: float, c: float, gamma: float) -> Array:
@@ -110,7 +111,7 @@ def test_a_leaning_lobe_node_by_node(exponent: float, c: float, gamma: float) ->
     n, planes, step = 400_000, 24, 7.5
     axis = direction(c, gamma)
     led = intensity_distribution(rays_of(leaning_lobe(n, exponent, axis, 5), np.full(n, 3.0 / n)), planes, step)
-    expected = 3.0 * hat_means(lobe(exponent, axis), led.c, led.gamma)[0]
+    expected = 3.0 * hat_means(lobe(exponent, axis), c=led.c, gamma=led.gamma)[0]
     apart = np.s_[::3, 1:-1:3]
     held = led.values[apart] > 6.0 * led.standard_error[apart]
     values, errors = led.values[apart][held], led.standard_error[apart][held]
@@ -127,7 +128,7 @@ def test_error_bars_cover_the_truth() -> None:
     for seed in range(12):
         weights = np.random.default_rng(seed).gamma(2.0, 0.5, n)
         led = intensity_distribution(rays_of(leaning_lobe(n, 2.0, axis, seed), weights), planes, step)
-        truth = n * hat_means(lobe(2.0, axis), led.c, led.gamma)[0] if truth is None else truth
+        truth = n * hat_means(lobe(2.0, axis), c=led.c, gamma=led.gamma)[0] if truth is None else truth
         sure = (truth > 0.05 * truth.max())[::2, 2:-2:2]
         z = ((led.values - truth) / led.standard_error)[::2, 2:-2:2][sure]
         inside, tried = inside + int((np.abs(z) < 1.0).sum()), tried + z.size

@@ -59,7 +59,7 @@ def test_the_registry_holds_every_module_that_has_a_format() -> None:
 )
 @pytest.mark.parametrize("gamma", [(0, 90), tuple(range(0, 181, 5)), (90, 91, 110, 180)], ids=["down", "all", "up"])
 def test_round_trip(name: str, symmetry: str, c: tuple[float, ...], gamma: tuple[float, ...], tmp_path: Path) -> None:
-    led = lid(symmetry, c, gamma)
+    led = lid(symmetry, c=c, gamma=gamma)
     lost = write_intensity(path_of(name, tmp_path), led)
     again = read_intensity(path_of(name, tmp_path))
     assert_same_function(again, led)
@@ -226,7 +226,7 @@ def test_wrong_names_and_places(tmp_path: Path) -> None:
 def test_cut_at_every_byte(name: str, symmetry: str, tmp_path: Path) -> None:
     """A cut is an error, or makes no difference, or is complained about: inside the very last number."""
     path = path_of(name, tmp_path)
-    led = lid(symmetry, (0, 90, 180, 270), (0, 45, 90))
+    led = lid(symmetry, c=(0, 90, 180, 270), gamma=(0, 45, 90))
     write_intensity(path, led)
     data = path.read_bytes()
     outcomes = []
@@ -252,7 +252,7 @@ def test_cut_at_every_byte(name: str, symmetry: str, tmp_path: Path) -> None:
 def test_cut_at_every_byte_where_an_end_is_marked(name: str, tmp_path: Path) -> None:
     """XML ends with a tag and ZIP with a record: whatever is cut short is an error."""
     path = path_of(name, tmp_path)
-    led = lid("none", (0, 180), (0, 90))
+    led = lid("none", c=(0, 180), gamma=(0, 90))
     write_any(name, path, led)
     data = path.read_bytes()
     whole = len(data.rstrip()) if name != "gldf" else len(data)
@@ -270,7 +270,7 @@ def test_cut_at_every_byte_where_an_end_is_marked(name: str, tmp_path: Path) -> 
 def test_damage_gives_a_format_error_or_a_distribution(name: str, data: st.DataObject, tmp_path: Path) -> None:
     """Bytes overwritten, removed and inserted; the formats have no checksum, so a digit may have become another."""
     path = path_of(name, tmp_path)
-    write_any(name, path, lid("both", (0, 90, 180, 270), (0, 45, 90)))
+    write_any(name, path, lid("both", c=(0, 90, 180, 270), gamma=(0, 45, 90)))
     content = bytearray(path.read_bytes())
     for _ in range(data.draw(st.integers(1, 4))):
         place = data.draw(st.integers(0, len(content) - 1))

@@ -28,7 +28,7 @@ FIXED = """<Emitters>
 VARIANTS = """<Variant id="v1"><Name><Locale language="en">Wide</Locale><Locale language="de">Breit</Locale></Name>
 <Geometry><EmitterReference emitterId="e2"/></Geometry></Variant>"""
 FILES = {"f1": ("ldc/ies", "localFileName", "a.ies"), "f2": ("ldc/eulumdat", "localFileName", "b.ldt")}
-TWO = product(FILES, {"p1": "f1", "p2": "f2"}, FIXED, VARIANTS)
+TWO = product(FILES, {"p1": "f1", "p2": "f2"}, body=FIXED, variants=VARIANTS)
 
 
 @pytest.fixture

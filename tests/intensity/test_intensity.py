@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.intensity import TERMS, flux_by_quadrature, interpolator, lid
 
-UNEVEN = lid("none", [3, 10, 50, 51, 200, 359.5], [0, 1, 20, 89, 90, 150, 180])
+UNEVEN = lid("none", c=[3, 10, 50, 51, 200, 359.5], gamma=[0, 1, 20, 89, 90, 150, 180])
 
 
 # --- the function ----------------------------------------------------------------------------------------------------
@@ -58,7 +58,7 @@ def test_flux_is_the_integral_of_the_function(symmetry: str) -> None:
 
 
 def test_flux_of_uneven_and_partial_tables() -> None:
-    for table in (UNEVEN, lid("none", [7], [10, 11, 64]), lid("none", [0, 200], [90, 180])):
+    for table in (UNEVEN, lid("none", c=[7], gamma=[10, 11, 64]), lid("none", c=[0, 200], gamma=[90, 180])):
         assert table.flux == pytest.approx(flux_by_quadrature(table), rel=1e-12)
 
 
@@ -77,7 +77,7 @@ def test_flux_in_closed_form() -> None:
 @pytest.mark.parametrize("symmetry", TERMS)
 def test_symmetry_is_found(symmetry: str) -> None:
     assert lid(symmetry).symmetry() == symmetry
-    assert lid(symmetry, np.arange(0, 360, 0.7 if symmetry == "none" else 1)).symmetry() == symmetry
+    assert lid(symmetry, c=np.arange(0, 360, 0.7 if symmetry == "none" else 1)).symmetry() == symmetry
 
 
 def test_symmetry_within_a_tolerance() -> None:
@@ -91,7 +91,7 @@ def test_symmetry_within_a_tolerance() -> None:
 
 def test_symmetry_of_the_function_not_of_the_nodes() -> None:
     """A node more on one side, on the straight line between its neighbours, changes no function."""
-    table = lid("C0-C180", np.arange(0, 360, 20.0))
+    table = lid("C0-C180", c=np.arange(0, 360, 20.0))
     c = np.sort(np.append(table.c, 27.0))
     assert Intensity(c, table.gamma, table.planes(c)).symmetry() == "C0-C180"
 

@@ -23,7 +23,7 @@ def curves(figure: Figure) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("symmetry", TERMS)
 def test_the_curves_are_the_function(symmetry: str) -> None:
-    led = lid(symmetry, tuple(range(7, 367 - 15, 15)))
+    led = lid(symmetry, c=tuple(range(7, 367 - 15, 15)))
     drawn = curves(plot_intensity(led, kind="cartesian"))
     assert len(drawn) == 1 if symmetry == "rotational" else len(drawn) >= 2
     for label, points in drawn.items():

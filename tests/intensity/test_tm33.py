@@ -41,7 +41,7 @@ def some(h: int, v: int) -> np.ndarray:
 
 @pytest.mark.parametrize("root", [root for root in ROOTS if root != "LuminaireOpticalData"])
 def test_every_root(read: Read, root: str) -> None:
-    led = read(tm33(emitter(CIRCLE, GAMMA, some(5, 4) - 40.0 * (np.arange(5)[:, None] == 4)), root=root))
+    led = read(tm33(emitter(h=CIRCLE, v=GAMMA, values=some(5, 4) - 40.0 * (np.arange(5)[:, None] == 4)), root=root))
     assert led.c.tolist() == [0, 90, 180, 270]
     assert led.values.tolist() == some(4, 4).tolist()
     assert led.complaints == ()
@@ -64,7 +64,9 @@ def test_sectors(read: Read, symmetry: str, stated: bool) -> None:
         "C0-C180": [*range(0, 181, 15)],
         "C90-C270": [*range(90, 271, 15)],
     }[symmetry]
-    led = read(tm33(emitter(sector, whole.gamma, whole.planes(sector), symm=SYMM[symmetry] if stated else "")))
+    led = read(
+        tm33(emitter(h=sector, v=whole.gamma, values=whole.planes(sector), symm=SYMM[symmetry] if stated else ""))
+    )
     assert led.symmetry() == symmetry
     assert np.allclose(led.planes(whole.c), whole.values)
     assert not led.complaints
@@ -72,7 +74,7 @@ def test_sectors(read: Read, symmetry: str, stated: bool) -> None:
 
 @pytest.mark.parametrize("spelt", ["Symm _ Bi _90", " SYMM_BI_90 "])
 def test_spellings_of_a_symmetry(read: Read, spelt: str) -> None:
-    led = read(tm33(emitter([90, 180, 270], GAMMA, some(3, 4), symm=spelt)))
+    led = read(tm33(emitter(h=[90, 180, 270], v=GAMMA, values=some(3, 4), symm=spelt)))
     assert led.at(0, 0) == led.at(180, 0) == 110
 
 
@@ -87,11 +89,11 @@ def test_spellings_of_a_symmetry(read: Read, spelt: str) -> None:
 )
 def test_symmetries_that_are_not_certain_are_refused(read: Read, sector: list[float], symm: str, message: str) -> None:
     with pytest.raises(FormatError, match=message):
-        read(tm33(emitter(sector, GAMMA, some(len(sector), 4), symm=symm)))
+        read(tm33(emitter(h=sector, v=GAMMA, values=some(len(sector), 4), symm=symm)))
 
 
 def test_any_order_of_directions(read: Read) -> None:
-    rows = tm33(emitter([0, 90], GAMMA, some(2, 4))).decode().split("\n")
+    rows = tm33(emitter(h=[0, 90], v=GAMMA, values=some(2, 4))).decode().split("\n")
     data = [n for n, row in enumerate(rows) if "<IntData" in row]
     for n, row in zip(data, [rows[n] for n in reversed(data)], strict=True):
         rows[n] = row
@@ -99,7 +101,7 @@ def test_any_order_of_directions(read: Read) -> None:
 
 
 def test_multiplier_watts_and_stated_flux(read: Read) -> None:
-    content = emitter([0], GAMMA, some(1, 4), quantity="Radiant", table="<Multiplier>0.01</Multiplier>")
+    content = emitter(h=[0], v=GAMMA, values=some(1, 4), quantity="Radiant", table="<Multiplier>0.01</Multiplier>")
     content = content.replace("</RadiantData>", "<RadiantFlux>99</RadiantFlux></RadiantData>")
     led = read(tm33(content))
     assert led.flux_unit == "W"
@@ -109,7 +111,7 @@ def test_multiplier_watts_and_stated_flux(read: Read) -> None:
 
 
 def test_relative_photometry_and_rated_lumens(read: Read) -> None:
-    content = emitter([0], GAMMA, some(1, 4), table="<AbsolutePhotometry>false</AbsolutePhotometry>")
+    content = emitter(h=[0], v=GAMMA, values=some(1, 4), table="<AbsolutePhotometry>false</AbsolutePhotometry>")
     content = content.replace("<InputWattage>", "<RatedLumens>200</RatedLumens><InputWattage>")
     led = read(tm33(content))
     assert np.array_equal(led.values, some(1, 4))
@@ -119,7 +121,10 @@ def test_relative_photometry_and_rated_lumens(read: Read) -> None:
 
 def test_several_emitters_are_added(read: Read) -> None:
     """On different nodes and ranges: the function of the sum is the sum of the functions."""
-    a, b = lid("none", range(0, 360, 30), range(0, 91, 10)), lid("C0-C180", range(0, 360, 45), range(0, 181, 15))
+    a, b = (
+        lid("none", c=range(0, 360, 30), gamma=range(0, 91, 10)),
+        lid("C0-C180", c=range(0, 360, 45), gamma=range(0, 181, 15)),
+    )
     content = [tm33_of(led).decode().split("</Equipment>")[1].removesuffix("</IESTM33-22>\n") for led in (a, b)]
     both = read(tm33(*content))
     rng = np.random.default_rng(1)
@@ -136,8 +141,11 @@ def test_several_emitters_are_added(read: Read) -> None:
 
 
 def test_quantities_that_cannot_be_added(read: Read) -> None:
-    lumens, watts = emitter([0], GAMMA, some(1, 4)), emitter([0], GAMMA, some(1, 4), quantity="Radiant")
-    photons = emitter([0], GAMMA, some(1, 4), quantity="Photon")
+    lumens, watts = (
+        emitter(h=[0], v=GAMMA, values=some(1, 4)),
+        emitter(h=[0], v=GAMMA, values=some(1, 4), quantity="Radiant"),
+    )
+    photons = emitter(h=[0], v=GAMMA, values=some(1, 4), quantity="Photon")
     with pytest.raises(FormatError, match=r"1 \(module, luminous\); 2 \(module, radiant\)"):
         read(tm33(lumens, watts))
     assert read(tm33(lumens, watts), "2").flux_unit == "W"
@@ -151,7 +159,7 @@ def test_quantities_that_cannot_be_added(read: Read) -> None:
 
 
 def test_quantity_of_an_emitter_is_told(read: Read) -> None:
-    led = read(tm33(emitter([0], GAMMA, some(1, 4), number=3)))
+    led = read(tm33(emitter(h=[0], v=GAMMA, values=some(1, 4), number=3)))
     assert np.array_equal(led.values, some(1, 4))
     assert "there are 3 of this emitter; the table was taken as that of all" in told(led)
 
@@ -159,16 +167,16 @@ def test_quantity_of_an_emitter_is_told(read: Read) -> None:
 def test_type_b_and_a(read: Read) -> None:
     h, v = [-20.0, 0, 20], [-30.0, 0, 30]
     values = np.array([[0, 0, 0], [0, 500, 0], [0, 250.0, 0]])
-    flood = read(tm33(emitter(h, v, values), equipment="IES_B"))
+    flood = read(tm33(emitter(h=h, v=v, values=values), equipment="IES_B"))
     assert float(flood.at(270, 20)) == pytest.approx(250, rel=0.01)
     assert float(flood.at(90, 20)) == pytest.approx(0, abs=1)
     assert "largest difference" in told(flood)
-    head = read(tm33(emitter(h, v, values), equipment="IES_A"))
+    head = read(tm33(emitter(h=h, v=v, values=values), equipment="IES_A"))
     assert float(head.at(340, 90)) == pytest.approx(250)
     with pytest.raises(UnsupportedFormatError, match="whose angles are not certain"):
-        read(tm33(emitter(h, v, values), equipment="CIE_B"))
+        read(tm33(emitter(h=h, v=v, values=values), equipment="CIE_B"))
     with pytest.raises(FormatError, match="Symm_None, but horizontal angles begin at 0°"):
-        read(tm33(emitter([0, 20], v, values[1:], symm="Symm_None"), equipment="IES_B"))
+        read(tm33(emitter(h=[0, 20], v=v, values=values[1:], symm="Symm_None"), equipment="IES_B"))
 
 
 def test_a_spectrum_goes_with_the_source(read: Read, tmp_path: Path) -> None:
@@ -179,26 +187,28 @@ def test_a_spectrum_goes_with_the_source(read: Read, tmp_path: Path) -> None:
     data = (
         f"<SpectralData><EmitterSpectral><NumberWavelength>3</NumberWavelength>{pairs}</EmitterSpectral></SpectralData>"
     )
-    led = read(tm33(emitter([0], GAMMA, some(1, 4), after=data)))
+    led = read(tm33(emitter(h=[0], v=GAMMA, values=some(1, 4), after=data)))
     assert led.luminaire["spectrum"].wavelength.tolist() == [450, 550, 650]
     assert led.luminaire["spectrum"].weight.tolist() == [1, 3, 0]
     (of_source,) = Point(file=tmp_path / "a.xml").emitters(Files())
     assert of_source.spectrum is not None
     assert of_source.spectrum.weight.tolist() == [1, 3, 0]
     assert "the spectrum is not kept" in write_intensity(tmp_path / "a.ies", led)
-    bad = read(tm33(emitter([0], GAMMA, some(1, 4), after=data.replace("3.0", "-3"))))
+    bad = read(tm33(emitter(h=[0], v=GAMMA, values=some(1, 4), after=data.replace("3.0", "-3"))))
     assert "spectrum" not in bad.luminaire
     assert "the spectrum was not kept" in told(bad)
 
 
 def test_what_is_not_known_or_not_kept_is_told(read: Read) -> None:
-    content = emitter([0], GAMMA, some(1, 4), before="<Colour/>", after="<Channels/>", table="<Colour>1</Colour>")
+    content = emitter(
+        h=[0], v=GAMMA, values=some(1, 4), before="<Colour/>", after="<Channels/>", table="<Colour>1</Colour>"
+    )
     led = read(tm33(content.replace("12.5", "much"), more="<Colour/>"))
     text = told(led)
     assert text.count("Colour: no element of the format here; it was ignored") == 3
     assert "Channels: not kept" in text
     assert "InputWattage: 'much' is no number" in text
-    large = read(tm33(emitter([0], GAMMA, some(1, 4))).replace(b">1.2<", b">1200<"))
+    large = read(tm33(emitter(h=[0], v=GAMMA, values=some(1, 4))).replace(b">1.2<", b">1200<"))
     assert "housing_x" not in large.luminaire
     assert "1200 m, which no luminaire has" in told(large)
 
@@ -217,7 +227,7 @@ def test_the_dialect_with_long_names(read: Read) -> None:
 
 @pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
 def test_encodings(read: Read, encoding: str) -> None:
-    text = tm33(emitter([0], GAMMA, some(1, 4))).decode().replace("Ł", "L").replace("№", "N")
+    text = tm33(emitter(h=[0], v=GAMMA, values=some(1, 4))).decode().replace("Ł", "L").replace("№", "N")
     led = read(text.replace("UTF-8", encoding).encode(encoding))
     assert led.luminaire["manufacturer"] == "Lampa & Söhne"
 
@@ -243,14 +253,14 @@ def test_encodings(read: Read, encoding: str) -> None:
     ],
 )
 def test_what_is_refused(read: Read, old: str, new: str, message: str) -> None:
-    content = tm33(emitter([0, 90], GAMMA, some(2, 4))).decode()
+    content = tm33(emitter(h=[0, 90], v=GAMMA, values=some(2, 4))).decode()
     assert old in content
     with pytest.raises(FormatError, match=message):
         read(content.replace(old, new).encode())
 
 
 def test_counts_that_disagree_are_told(read: Read) -> None:
-    content = tm33(emitter([0, 90], GAMMA, some(2, 4))).replace(b"<NumberHorz>2", b"<NumberHorz>999999999")
+    content = tm33(emitter(h=[0, 90], v=GAMMA, values=some(2, 4))).replace(b"<NumberHorz>2", b"<NumberHorz>999999999")
     assert "NumberHorz: it says 999999999, there are 2" in told(read(content))
 
 
@@ -271,16 +281,16 @@ LAUGHS = "<!DOCTYPE a [<!ENTITY a 'ha'>" + "".join(
 def test_a_document_type_is_refused(read: Read, prologue: str) -> None:
     """What can grow or reach outside is declared there."""
     with pytest.raises(FormatError, match="document type declaration"):
-        read(tm33(emitter([0], GAMMA, some(1, 4)), prologue=prologue))
+        read(tm33(emitter(h=[0], v=GAMMA, values=some(1, 4)), prologue=prologue))
 
 
 def test_depth_and_number_are_bounded(read: Read, monkeypatch: pytest.MonkeyPatch) -> None:
     deep = "<a>" * 100_000 + "</a>" * 100_000
     with pytest.raises(FormatError, match="64 deep"):
-        read(tm33(emitter([0], GAMMA, some(1, 4), before=deep)))
+        read(tm33(emitter(h=[0], v=GAMMA, values=some(1, 4), before=deep)))
     monkeypatch.setattr(xml_tree, "MOST_ELEMENTS", 10)
     with pytest.raises(FormatError, match="more than 10 elements"):
-        read(tm33(emitter([0], GAMMA, some(1, 4))))
+        read(tm33(emitter(h=[0], v=GAMMA, values=some(1, 4))))
 
 
 def test_planes_are_counted_as_in_ies_files(read: Read, tmp_path: Path) -> None:

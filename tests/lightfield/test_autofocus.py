@@ -37,7 +37,7 @@ def rays_of(position: Array, direction: Array, **more: object) -> et.RaySet:
 
 @functools.cache
 def led_lines(n: int = N) -> tuple[Array, Array]:
-    position, direction = StructuredLed().rays(n, 1)
+    position, direction = StructuredLed().rays(n, seed=1)
     return scattered(position + MOVE, direction, 3.0)
 
 
@@ -62,7 +62,7 @@ FLAT = {
 @pytest.mark.parametrize("name", list(FLAT))
 def test_a_flat_source_is_found_at_its_depth(name: str) -> None:
     source, kind, radius, error = FLAT[name]
-    position, direction = source.rays(N, 1)  # type: ignore[attr-defined]
+    position, direction = source.rays(N, seed=1)  # type: ignore[attr-defined]
     choice = choose_surface(rays_of(*scattered(position + MOVE, direction, 0.3 * radius)))
     surface = choice.surface
     assert type(surface) is kind
@@ -94,7 +94,7 @@ def test_a_flat_source_is_found_at_its_depth(name: str) -> None:
 @pytest.mark.parametrize("seed", [2, 3, 4])
 def test_a_film_of_few_details_is_found_by_its_rim(seed: int) -> None:
     """Its cut-offs move with the place, so that what is within it hardly tells the depth."""
-    position, direction = PrismaticFilm().rays(N, seed)
+    position, direction = PrismaticFilm().rays(N, seed=seed)
     choice = choose_surface(rays_of(*scattered(position + MOVE, direction, 3.0, seed)))
     assert isinstance(choice.surface, Disk)
     assert choice.surface.z == pytest.approx(MOVE[2], abs=2e-3 * 11.2)
@@ -105,7 +105,7 @@ def test_a_film_of_few_details_is_found_by_its_rim(seed: int) -> None:
 
 def test_a_globe_is_a_sphere() -> None:
     globe = Globe()
-    choice = choose_surface(rays_of(*scattered(*globe.rays(N, 1), 3.0)))
+    choice = choose_surface(rays_of(*scattered(*globe.rays(N, seed=1), 3.0)))
     assert isinstance(choice.surface, Sphere)
     assert choice.surface.radius == pytest.approx(globe.radius, rel=0.01)
     assert choice.surface.centre == pytest.approx(globe.middle, abs=0.01 * globe.radius)
@@ -114,7 +114,7 @@ def test_a_globe_is_a_sphere() -> None:
 
 def test_the_upper_half_of_a_globe_is_a_hemisphere() -> None:
     globe = Globe()
-    position, direction = globe.rays(2 * N, 1)
+    position, direction = globe.rays(2 * N, seed=1)
     upper = position[:, 2] > globe.middle[2]
     choice = choose_surface(rays_of(*scattered(position[upper], direction[upper], 3.0)))
     assert isinstance(choice.surface, Hemisphere)
@@ -124,7 +124,7 @@ def test_the_upper_half_of_a_globe_is_a_hemisphere() -> None:
 
 def test_a_rod_is_a_cylinder() -> None:
     rod = Rod()
-    choice = choose_surface(rays_of(*scattered(*rod.rays(N, 1), 3.0)))
+    choice = choose_surface(rays_of(*scattered(*rod.rays(N, seed=1), 3.0)))
     surface = choice.surface
     assert isinstance(surface, Cylinder)
     assert surface.radius == pytest.approx(rod.radius, rel=0.01)
@@ -135,7 +135,7 @@ def test_a_rod_is_a_cylinder() -> None:
 
 def test_a_block_is_a_box_by_its_start_points_and_something_tight_by_its_lines() -> None:
     block = Block()
-    position, direction = block.rays(N, 1)
+    position, direction = block.rays(N, seed=1)
     surface = choose_surface(rays_of(position, direction)).surface
     assert isinstance(surface, Box)
     assert (surface.width, surface.height, surface.depth) == pytest.approx(2 * np.array(block.half), rel=1e-3)
@@ -272,8 +272,8 @@ def test_too_few_rays_say_what_to_do() -> None:
 def test_no_surface_foretells_better_than_the_truth(weighted: bool) -> None:
     """Gibbs' inequality: the densities add up to one. And the right surface comes close."""
     source = LimbDarkenedDisk()
-    position, direction = source.rays(2 * N, 3)
-    density = source.luminance(position, direction) * 1e-6 / source.total_flux
+    position, direction = source.rays(2 * N, seed=3)
+    density = source.luminance(points=position, directions=direction) * 1e-6 / source.total_flux
     weights = np.random.default_rng(6).gamma(2.0, 1.0, 2 * N) if weighted else np.ones(2 * N)
     rays = et.RaySet(position, direction, weights)
     jury = Jury.of(rays, 1.0 / (4 * np.pi**2 * source.radius**2), 1, 1)

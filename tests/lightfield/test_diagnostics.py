@@ -116,13 +116,14 @@ def test_the_curve_holds_the_flux_of_a_rough_field(name: str) -> None:
 def test_the_curve_of_a_fit_is_at_least_as_close_to_the_true_one_as_the_field_to_the_source() -> None:
     """Sorting by luminance never brings two functions further apart: ∫|f* - g*| ≤ ∫|f - g|."""
     source, n = LimbDarkenedDisk(), 60_000
-    x, k = source.rays(n, 5)
+    x, k = source.rays(n, seed=5)
     disk = Disk(radius=source.radius * 1.02, centre=source.centre)
     field = LightField.fit(et.RaySet(x, k, np.full(n, source.total_flux / n)), disk, depths=(4, 4, 3, 3))
     curve = characteristic_curve(field)
     chart = disk.parts()[0]
-    lines = _core.rays_of_part(chart.core(), np.random.default_rng(6).random((400_000, 4)))
-    truth, found = source.luminance(*lines), field.luminance(*lines)[0]
+    points, directions = _core.rays_of_part(chart.core(), np.random.default_rng(6).random((400_000, 4)))
+    truth = source.luminance(points=points, directions=directions)
+    found = field.luminance(points, directions)[0]
     of_line = chart.etendue / len(truth) * 1e-6
     apart = np.abs(truth - found).sum() * of_line / source.total_flux
     true_curve = np.interp(
@@ -135,7 +136,7 @@ def test_the_curve_of_a_fit_is_at_least_as_close_to_the_true_one_as_the_field_to
     # Both integrals are sums over 4e5 random lines: their errors are below 1e-3 of the flux.
     assert sorted_apart < apart + 2e-3
     assert apart < 0.1
-    assert curve.luminance[0] < 1.25 * source.luminance(*lines).max()
+    assert curve.luminance[0] < 1.25 * truth.max()
 
 
 def test_the_luminance_of_a_lambertian_disk_is_a_step() -> None:
@@ -284,8 +285,8 @@ class Trial:
 
     def __init__(self) -> None:
         self.source, self.surface = DieUnderDome(), Plane(z=0, width=2.6, height=2.6, centre=(0, 0))
-        self.x, self.k = self.source.rays(128 * self.N, 3)
-        self.fresh = self.source.rays(200_000, 4)
+        self.x, self.k = self.source.rays(128 * self.N, seed=3)
+        self.fresh = self.source.rays(200_000, seed=4)
 
     def rays(self, n: int) -> et.RaySet:
         return et.RaySet(self.x[:n], self.k[:n], np.full(n, self.source.total_flux / n))
@@ -360,7 +361,7 @@ def plain_field(surface: Surface, depths: tuple[int, ...], rays: int) -> LightFi
 def test_rays_of_unequal_flux_are_judged_by_their_flux() -> None:
     """The same source by equal rays, and by rays half of which carry twice the flux and are half as many."""
     source, n = LimbDarkenedDisk(), 20_000
-    x, k = source.rays(n, 7)
+    x, k = source.rays(n, seed=7)
     heavy = np.random.default_rng(1).random(n) < 0.5
     kept = ~heavy | (np.random.default_rng(2).random(n) < 0.5)
     plane = Plane(z=0, width=23, height=23, centre=(0.9, -0.5))

@@ -17,7 +17,7 @@ NAMES = [type(body).__name__.lower() for body in BODIES]
 
 def lines(body: Body, n: int = 20_000) -> tuple[Array, Array]:
     """Lines of a lamp with start points anywhere on them."""
-    position, direction = body.rays(n, 1)
+    position, direction = body.rays(n, seed=1)
     return position + direction * np.random.default_rng(2).uniform(-9, 9, (n, 1)), direction
 
 
@@ -34,12 +34,12 @@ def test_lamps_of_the_tests_have_the_flux_they_state(body: Body) -> None:
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     direction = normal + turn / np.linalg.norm(turn, axis=1)[:, None]
     direction /= np.linalg.norm(direction, axis=1)[:, None]
-    luminance = body.luminance(around * normal + body.middle, direction)
+    luminance = body.luminance(points=around * normal + body.middle, directions=direction)
     etendue = 4 * np.pi**2 * around**2 * 1e-6
     flux, error = luminance.mean() * etendue, luminance.std() * etendue / np.sqrt(n)
     assert abs(flux - body.total_flux) < 4 * error
-    position, direction = body.rays(50_000, 3)
-    seen = body.luminance(position + 3.0 * direction, direction)
+    position, direction = body.rays(50_000, seed=3)
+    seen = body.luminance(points=position + 3.0 * direction, directions=direction)
     # E[1 / L] over rays is the étendue of the lamp over its flux: π times its area, for a convex one.
     inverse = 1 / seen
     area = inverse.mean() * body.total_flux / np.pi * 1e6
@@ -85,7 +85,7 @@ def test_strays_are_those_beyond_a_gap(share: float) -> None:
 
 
 def test_start_points_on_a_sphere_show_its_centre_and_others_none() -> None:
-    position, _ = Globe().rays(500, 1)
+    position, _ = Globe().rays(500, seed=1)
     centre = start_centre(position)
     assert centre is not None
     assert centre == pytest.approx(Globe().middle, abs=1e-12)

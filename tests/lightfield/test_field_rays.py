@@ -166,7 +166,7 @@ def test_lines_are_as_frequent_as_they_are_bright(which: str) -> None:
     field = make_field(SURFACES[which], seed=11)
     n = 300_000
     point, direction, etendue = lines_out_of(field.surface, n, np.random.default_rng(2))
-    value = field.luminance(point, direction)[0] * MM2 * etendue / field.total_flux / n
+    value = field.luminance(points=point, directions=direction)[0] * MM2 * etendue / field.total_flux / n
     rays = field.sample(n, seed=5)
     even, drawn = features(point, direction), features(rays.position, rays.direction)
     edges = [np.quantile(f, [0.25, 0.5, 0.75]) for f in even]
@@ -303,8 +303,8 @@ def test_numbers_out_of_their_domain(field: LightField, n: int, seed: int) -> No
 def test_numbers_that_are_no_integers(field: LightField) -> None:
     for n, seed in ((1e6, 1), (10, 1.5), ("10", 1)):
         with pytest.raises(TypeError):
-            field.rays(n, seed)  # type: ignore[arg-type]
-    assert len(field.rays(np.int64(5), np.uint64(3))) == 5
+            field.rays(n, seed=seed)  # type: ignore[arg-type]
+    assert len(field.rays(np.int64(5), seed=np.uint64(3))) == 5
 
 
 # --- streams -----------------------------------------------------------------------------------------------------------

@@ -186,7 +186,7 @@ def test_the_sequence_is_that_of_the_divisors() -> None:
 @pytest.mark.parametrize("pair", thesis.DIVISORS)
 def test_bins_and_solid_angles(pair: tuple[int, int]) -> None:
     grid = AngularGrid(*pair)
-    thetas, phis = thesis.bin_ranges(*pair)
+    thetas, phis = thesis.bin_ranges(theta_step=pair[0], phi_step=pair[1])
     assert (len(thetas), len(phis)) == (grid.shape[0] - 1, grid.shape[1])
     omega = [math.radians(pair[1]) * (math.cos(math.radians(a)) - math.cos(math.radians(b))) for a, b in thetas]
     assert np.allclose(angular.solid_angles(grid), omega, rtol=1e-12)
@@ -207,7 +207,7 @@ def test_every_number_of_the_algorithm() -> None:
     source = GriddedSource.fit(
         et.RaySet(position - 3 * direction, direction, flux), Plane(0, 6, 6, (0, 0)), pixel=1.5, threshold=threshold
     )
-    expected = thesis.square_pixels(position, direction, flux, 1.5)
+    expected = thesis.square_pixels(position=position, direction=direction, flux=flux, side=1.5)
     patches = source.patches
     keys = [tuple(np.floor(c[:2] / 1.5).astype(int)) for c in patches.centre]
     assert keys == sorted(expected)
@@ -217,8 +217,10 @@ def test_every_number_of_the_algorithm() -> None:
         assert patches.flux[i] == pytest.approx(sum(f for *_, f in pixel.rays), rel=1e-12)
         if grid.bins < 5000:
             assert (grid.theta_step, grid.phi_step) == thesis.chosen_step(pixel, threshold)
-            assert patches.error[i] == pytest.approx(thesis.flux_error(pixel, grid.theta_step, grid.phi_step), rel=1e-9)
-            centres, table = thesis.table(pixel, grid.theta_step, grid.phi_step)
+            assert patches.error[i] == pytest.approx(
+                thesis.flux_error(pixel, theta_step=grid.theta_step, phi_step=grid.phi_step), rel=1e-9
+            )
+            centres, table = thesis.table(pixel, theta_step=grid.theta_step, phi_step=grid.phi_step)
             assert np.allclose(grid.theta, centres)
             assert np.allclose(patches.table(i), table, rtol=1e-9, atol=0)
     assert len({(t, p) for t, p in zip(patches.theta_step, patches.phi_step, strict=True)}) > 2
@@ -233,7 +235,7 @@ def test_the_error_of_every_step() -> None:
     ring, _ = angular.rings_and_sectors(direction)
     rings = np.bincount(ring, flux, angular.RINGS)
     found = angular.quadrature_errors(rings[None])[0]
-    expected = [thesis.flux_error(pixel, *pair) for pair in thesis.DIVISORS[:14]]
+    expected = [thesis.flux_error(pixel, theta_step=pair[0], phi_step=pair[1]) for pair in thesis.DIVISORS[:14]]
     assert np.allclose(found[:14], expected, rtol=1e-9)
     assert np.array_equal(found[14:], np.full(7, found[13]))
     for grid in angular.SEQUENCE[:12]:
@@ -276,7 +278,11 @@ def test_spherical_pixels_against_the_oracle() -> None:
             pixel.add(direction, f)
         grid = source.patches.grid(i)
         assert (grid.theta_step, grid.phi_step) == thesis.chosen_step(pixel, 40.0)
-        assert np.allclose(source.patches.table(i), thesis.table(pixel, grid.theta_step, grid.phi_step)[1], rtol=1e-9)
+        assert np.allclose(
+            source.patches.table(i),
+            thesis.table(pixel, theta_step=grid.theta_step, phi_step=grid.phi_step)[1],
+            rtol=1e-9,
+        )
     assert source.account.hidden == hidden > 20
     assert source.account.missed == 0
     assert source.account.hidden_flux + source.total_flux == pytest.approx(flux.sum(), rel=1e-12)
@@ -398,7 +404,7 @@ def test_luminance_is_intensity_over_projected_area() -> None:
     rng = np.random.default_rng(1)
     x = np.column_stack([rng.uniform(-4.2, 4.2, (500, 2)), np.zeros(500)])
     d = unit(np.column_stack([rng.normal(size=(500, 2)), rng.uniform(0.01, 1, 500)]))
-    found = source.luminance(x + 400 * d, 3 * d)
+    found = source.luminance(points=x + 400 * d, directions=3 * d)
     expected = np.zeros(500)
     for i, centre in enumerate(source.patches.centre):
         here = (np.abs(x - centre)[:, :2] <= 0.25).all(axis=1)
@@ -406,23 +412,23 @@ def test_luminance_is_intensity_over_projected_area() -> None:
     assert np.allclose(found, expected, rtol=1e-6)
     assert (found > 0).sum() > 50
     assert (found == 0).sum() > 50
-    assert not source.luminance(x, -d).any()
-    assert source.luminance(np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
+    assert not source.luminance(points=x, directions=-d).any()
+    assert source.luminance(points=np.zeros((0, 3)), directions=np.zeros((0, 3))).shape == (0,)
     for bad in (np.nan, np.inf):
         with pytest.raises(ArgumentError, match="finite"):
-            source.luminance([[bad, 0, 0]], [[0, 0, 1]])
+            source.luminance(points=[[bad, 0, 0]], directions=[[0, 0, 1]])
     with pytest.raises(ArgumentError, match="no length"):
-        source.luminance([[0, 0, 0]], [[0, 0, 0]])
+        source.luminance(points=[[0, 0, 0]], directions=[[0, 0, 0]])
 
 
 def test_light_of_the_window_passes_the_dome() -> None:
     """Both parts of a dome are added up, each in its own pixel."""
     source_rays = DieUnderDome(floor=0.2)
-    position, direction = source_rays.rays(60_000, 3)
+    position, direction = source_rays.rays(60_000, seed=3)
     rays = et.RaySet(position, direction, np.full(60_000, source_rays.total_flux / 60_000))
     source = GriddedSource.fit(rays, Dome(radius=1.264, window=0.8), pixel=0.2, threshold=2, parallels=6).as_printed
     x, d = position[:3000] + 20 * direction[:3000], direction[:3000]
-    found, expected = source.luminance(x, d), np.zeros(3000)
+    found, expected = source.luminance(points=x, directions=d), np.zeros(3000)
     on_plane = x - (x[:, 2] / d[:, 2])[:, None] * d
     nearest = x - np.einsum("ij,ij->i", x, d)[:, None] * d
     on_dome = nearest + np.sqrt(1.264**2 - np.sum(nearest**2, axis=1))[:, None] * d
@@ -467,7 +473,7 @@ def test_curved_patches_show_what_they_send(surface: Surface) -> None:
     source = GriddedSource.fit(et.RaySet(x, d, np.ones(n)), surface, pixel=0.25, threshold=0.0)
     source = with_values(source, lambertian_table(source) * np.repeat(
         source.patches.projected_area, np.diff(source.patches.start)))  # fmt: skip
-    seen = source.luminance(x, d) / 1e6
+    seen = source.luminance(points=x, directions=d) / 1e6
     local = source.patches.local(np.searchsorted(source.patches.pixel, source.surface.owner(x, d)), d)
     clear = local[:, 2] > 0.2
     assert np.allclose(seen[clear], 1.0, atol=2e-4)
@@ -634,7 +640,7 @@ def test_points_on_curved_pixels_follow_the_cosine() -> None:
 def test_a_refit_of_the_sample_agrees() -> None:
     """Fit, draw, fit again on the same bins: fluxes of all patches within the noise, 1 in 10⁴."""
     film = PrismaticFilm(radius=2.0, centre=(0.1, -0.2))
-    x, d = film.rays(100_000, 2)
+    x, d = film.rays(100_000, seed=2)
     surface = Plane(0, 6, 6, (0, 0))
     source = GriddedSource.fit(et.RaySet(x, d, np.full(len(x), film.total_flux / len(x))), surface, 0.5, 0.5)
     n = 400_000
@@ -681,7 +687,7 @@ def test_the_noise_of_the_mean_luminance_is_that_of_the_rays() -> None:
     start = np.column_stack([rng.uniform(-1, 1, m), rng.uniform(-0.5, 0.5, m), np.zeros(m)])
     turn = rng.random(m) * 2 * np.pi
     towards = np.column_stack([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.full(m, np.cos(theta))])
-    seen = source.luminance(start, towards).mean() / (1e6 / np.pi)
+    seen = source.luminance(points=start, directions=towards).mean() / (1e6 / np.pi)
     # Bins up to 30° wide flatten the cosine a little; its curvature over Δθ²/8 + Δθ²/24 bounds that.
     step = math.radians(float(source.patches.theta_step.max()))
     rays_behind = n * 2 * math.sin(theta) * math.cos(theta) * step

@@ -83,7 +83,7 @@ def test_luminance_over_area_and_angle_is_the_flux_of_the_rays(grid: et.GriddedS
         direction, weight = quadrature(grid.patches.grid(i).theta, grid.patches.grid(i).phi)
         points = np.tile(centre, (len(direction), 1))
         for k, source in enumerate((grid, grid.as_printed)):
-            seen = source.luminance(points, direction)
+            seen = source.luminance(points=points, directions=direction)
             sums[k] += float((seen * direction[:, 2] * weight).sum()) * grid.patches.area[i] / 1e6
     assert sums[0] == pytest.approx(FLUX, rel=1e-9)
     assert sums[1] == pytest.approx(flux_of_files(folder), rel=1e-5)

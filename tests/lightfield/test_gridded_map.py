@@ -16,7 +16,7 @@ FILM = PrismaticFilm()
 
 @pytest.fixture(scope="module")
 def source() -> GriddedSource:
-    position, direction = FILM.rays(300_000, 1)
+    position, direction = FILM.rays(300_000, seed=1)
     rays = et.RaySet(position, direction, np.full(300_000, FILM.total_flux / 300_000))
     return GriddedSource.fit(rays, Disk(radius=FILM.radius, centre=FILM.centre), pixel=1.0, threshold=2.1)
 
@@ -32,7 +32,7 @@ def test_pixels_are_means_over_lines_of_sight(source: GriddedSource, plane: str)
         x = screen.x[column] + (rng.random(n) - 0.5) * 6
         y = screen.y[row] + (rng.random(n) - 0.5) * 6
         points = np.array([1, -2, 0]) + x[:, None] * right + y[:, None] * up
-        seen = source.luminance(points, observer.position - points)
+        seen = source.luminance(points=points, directions=observer.position - points)
         assert abs(seen.mean() - lmap.values[row, column]) < 4 * seen.std() / np.sqrt(n)
     assert np.isnan(lmap.standard_error).all()
     assert (lmap.unit, lmap.values.shape) == ("cd/m²", (3, 4))
@@ -47,7 +47,11 @@ def test_the_map_is_the_right_way_round(source: GriddedSource) -> None:
         points = fine[None, :, None] * right - fine[:, None, None] * up
         sight = observer.position - points
         sight /= np.linalg.norm(sight, axis=-1, keepdims=True)
-        truth = FILM.luminance(points.reshape(-1, 3), sight.reshape(-1, 3)).reshape(10, 10, 10, 10).mean(axis=(1, 3))
+        truth = (
+            FILM.luminance(points=points.reshape(-1, 3), directions=sight.reshape(-1, 3))
+            .reshape(10, 10, 10, 10)
+            .mean(axis=(1, 3))
+        )
         values = gridded_luminance_map(source, observer, screen).values
         right_way = np.corrcoef(values.ravel(), truth.ravel())[0, 1]
         for wrong in (values[::-1], values[:, ::-1], values[::-1, ::-1], values.T):

@@ -17,7 +17,7 @@ DEPTHS = (4, 4, 4, 4)
 
 
 def rays_of(source: object, n: int, seed: int = 1, weights: np.ndarray | None = None) -> et.RaySet:
-    x, k = source.rays(n, seed)  # type: ignore[attr-defined]
+    x, k = source.rays(n, seed=seed)  # type: ignore[attr-defined]
     flux = np.full(n, source.total_flux / n) if weights is None else weights  # type: ignore[attr-defined]
     return et.RaySet(x, k, flux)
 
@@ -31,9 +31,9 @@ def film() -> tuple[PrismaticFilm, et.RaySet, LightField]:
 
 def excess(source: object, field: LightField, luminance: np.ndarray | None = None) -> float:
     """Mean ln of true over estimated density on fresh rays [nat], each mixed with 1e-4 of a uniform field."""
-    x, k = source.rays(30_000, 77)  # type: ignore[attr-defined]
-    truth = source.luminance(x, k) / source.total_flux  # type: ignore[attr-defined]
-    found = field.luminance(x, k)[0] / field.total_flux if luminance is None else luminance
+    x, k = source.rays(30_000, seed=77)  # type: ignore[attr-defined]
+    truth = source.luminance(points=x, directions=k) / source.total_flux  # type: ignore[attr-defined]
+    found = field.luminance(points=x, directions=k)[0] / field.total_flux if luminance is None else luminance
     return float(np.mean(np.log(truth) - np.log((1 - 1e-4) * found + 1e-4 * 1e6 / (np.pi * field.surface.area))))
 
 
@@ -46,11 +46,11 @@ def test_it_beats_the_grid_of_the_thesis_by_far_whatever_its_threshold(
     film: tuple[PrismaticFilm, et.RaySet, LightField],
 ) -> None:
     source, rays, field = film
-    x, k = source.rays(30_000, 77)
+    x, k = source.rays(30_000, seed=77)
     ours = excess(source, field)
     for threshold in (20.0, 5.0, 1.0, 0.2):
         grid = et.GriddedSource.fit(rays, et.Plane(z=0), pixel=source.radius / 16, threshold=threshold)
-        theirs = excess(source, field, grid.luminance(x, k) / grid.total_flux)
+        theirs = excess(source, field, grid.luminance(points=x, directions=k) / grid.total_flux)
         assert ours < theirs / 4
 
 
@@ -66,7 +66,9 @@ def test_the_product_base_is_taken_for_a_film_and_not_for_an_entangled_source() 
     q = rng.uniform(-0.3, 0.3, 30_000)
     k = np.column_stack([p, q, np.sqrt(1 - p * p - q * q)])
     entangled = LightField.fit(et.RaySet(x, k, np.ones(30_000)), et.Plane(z=0), depths=DEPTHS)
-    bright = entangled.luminance([[1, 0, 0], [1, 0, 0]], [[0.5, 0, np.sqrt(0.75)], [-0.5, 0, np.sqrt(0.75)]])[0]
+    bright = entangled.luminance(
+        points=[[1, 0, 0], [1, 0, 0]], directions=[[0.5, 0, np.sqrt(0.75)], [-0.5, 0, np.sqrt(0.75)]]
+    )[0]
     assert bright[1] < 0.01 * bright[0]
 
 
@@ -92,7 +94,12 @@ def test_error_bars_cover_the_truth(family: str) -> None:
         for i in range(48):
             at = np.ascontiguousarray((index + ((i + 0.5) / 48 + i * steps) % 1.0) / 16)
             x, k = _core.rays_of_part(chart, at)
-            sums += np.array([source.luminance(x + 1e-9 * k, k), *field.luminance(x, k)]) / 48
+            sums += (
+                np.array(
+                    [source.luminance(points=x + 1e-9 * k, directions=k), *field.luminance(points=x, directions=k)]
+                )
+                / 48
+            )
         lit = sums[0] > 0
         deviations.append((sums[1] - sums[0])[lit] / sums[2][lit])
     effective = 3 * (184 if family == "film" else 197)
@@ -111,7 +118,11 @@ def test_maps_show_the_truth_from_everywhere(film: tuple[PrismaticFilm, et.RaySe
         points = yy[:, None, None] * up + xx[None, :, None] * right
         k = observer.position - points
         k /= np.linalg.norm(k, axis=-1, keepdims=True)
-        truth = source.luminance(points.reshape(-1, 3), k.reshape(-1, 3)).reshape(24, 8, 24, 8).mean(axis=(1, 3))
+        truth = (
+            source.luminance(points=points.reshape(-1, 3), directions=k.reshape(-1, 3))
+            .reshape(24, 8, 24, 8)
+            .mean(axis=(1, 3))
+        )
         found = et.compare(lmap, lmap.replace(values=truth))
         assert found.ncc > 0.99
         assert found.nrmse < 0.06
@@ -125,13 +136,13 @@ def test_both_parts_of_a_dome_are_seen() -> None:
     assert all(flux > 0 for flux in field.part_flux)
     # A line through the dome's edge misses the window; the shell's own light is there all the same.
     x, k = np.array([[1.2, 0, 0.2]]), np.array([[0.0, 1.0, 0.0]])
-    assert field.luminance(x, k)[0][0] > 0
+    assert field.luminance(points=x, directions=k)[0][0] > 0
     parts = [
         field.core.at(i, _core.cross_parts([part.core()], p, d)[1])[0][0]
         for p, d in [(np.array([[0.1, 0.1, 5.0]]), np.array([[0.0, 0.0, 1.0]]))]
         for i, part in enumerate(field.surface.parts())
     ]
-    both = field.luminance([[0.1, 0.1, 5.0]], [[0, 0, 1]])[0][0]
+    both = field.luminance(points=[[0.1, 0.1, 5.0]], directions=[[0, 0, 1]])[0][0]
     assert both == pytest.approx(sum(parts) * 1e6, rel=1e-12)
 
 
@@ -152,12 +163,12 @@ def test_a_refit_of_drawn_rays_agrees(film: tuple[PrismaticFilm, et.RaySet, Ligh
     and 89.5 %, and these shares spread by 0.038 and 0.015, the first as that of 164 independent lines."""
     _, _, field = film
     lines = field.sample(20_000, seed=6)
-    a, sa = field.luminance(lines.position, lines.direction)
+    a, sa = field.luminance(points=lines.position, directions=lines.direction)
     assert (sa > 0).all()
     deviations = []
     for seed in (5, 6, 7):
         again = LightField.fit(field.rays(200_000, seed=seed), field.surface, depths=DEPTHS)
-        b, sb = again.luminance(lines.position, lines.direction)
+        b, sb = again.luminance(points=lines.position, directions=lines.direction)
         assert np.median(np.abs(a / b - 1)) < 0.1
         deviations.append((a - b) / sb)
     assert_covers(deviations=np.concatenate(deviations), effective=3 * 164, one=(0.6, 0.68), two=(0.87, 0.92))
@@ -165,7 +176,7 @@ def test_a_refit_of_drawn_rays_agrees(film: tuple[PrismaticFilm, et.RaySet, Ligh
 
 def test_weights_count_as_flux_and_not_as_rays() -> None:
     source = LimbDarkenedDisk()
-    x, k = source.rays(120_000, 3)
+    x, k = source.rays(120_000, seed=3)
     # Thin by place: where rays are kept with a smaller chance, they weigh more; the light is the same.
     chance = np.where(x[:, 0] > source.centre[0], 1.0, 1 / 3)
     kept = np.random.default_rng(4).random(len(x)) < chance
@@ -179,8 +190,8 @@ def test_weights_count_as_flux_and_not_as_rays() -> None:
         + np.array([[0, 0.5, 0]])
     )
     directions = np.tile([0.3, -0.2, 0.93], (4, 1))
-    value, error = field.luminance(points, directions)
-    truth = source.luminance(points, directions / np.linalg.norm(directions[0]))
+    value, error = field.luminance(points=points, directions=directions)
+    truth = source.luminance(points=points, directions=directions / np.linalg.norm(directions[0]))
     assert (np.abs(value - truth) < 4 * error).all()
 
 
@@ -206,9 +217,9 @@ def test_what_makes_no_sense_is_refused(film: tuple[PrismaticFilm, et.RaySet, Li
     with pytest.raises(ArgumentError, match="points per pixel"):
         et.luminance_map(field, observer, screen, samples=0)
     with pytest.raises(ArgumentError, match="shape"):
-        field.luminance([[0, 0, 0]], [[0, 0, 1], [0, 0, 1]])
+        field.luminance(points=[[0, 0, 0]], directions=[[0, 0, 1], [0, 0, 1]])
     with pytest.raises(ArgumentError, match="direction"):
-        field.luminance([[0, 0, 0]], [[0, 0, 0]])
+        field.luminance(points=[[0, 0, 0]], directions=[[0, 0, 0]])
     with pytest.raises(ArgumentError, match="whole part"):
         field.intensity(24, 7.0)
 

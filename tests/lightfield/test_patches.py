@@ -26,7 +26,7 @@ Run = Callable[..., tuple[int, str, str]]
 
 def dome_rays(n: int = 20_000, unit: str = "lm") -> et.RaySet:
     source = DieUnderDome(floor=0.1)
-    position, direction = source.rays(n, 7)
+    position, direction = source.rays(n, seed=7)
     flux = np.full(n, source.total_flux / n)
     return et.RaySet(position, direction, flux, flux_unit=unit)  # type: ignore[arg-type]
 

@@ -32,7 +32,7 @@ def fitted(name: str) -> tuple[GriddedSource, Array, Array]:
     """A source that no mirror image or turn leaves as it is, and lines from it."""
     surface, options = SURFACES[name]
     truth = DieUnderDome(floor=0.3) if name in {"dome", "cylinder"} else PrismaticFilm()
-    position, direction = truth.rays(30_000, 5)
+    position, direction = truth.rays(30_000, seed=5)
     unit = "W" if name == "watts" else "lm"
     rays = et.RaySet(position, direction, np.full(30_000, truth.total_flux / 30_000), flux_unit=unit)  # type: ignore[arg-type]
     source = GriddedSource.fit(rays, surface, **options)  # type: ignore[arg-type]
@@ -76,7 +76,7 @@ def expected(name: str) -> tuple[GriddedSource, Array, Array, Array]:
         np.ones(len(points), dtype=bool) if name in {"film", "watts"} else away_from_edges(source, points, directions)
     )
     points, directions = points[chosen], directions[chosen]
-    luminance = source.luminance(points, directions)
+    luminance = source.luminance(points=points, directions=directions)
     assert (luminance > 0).sum() >= 40
     assert (luminance == 0).sum() >= 40
     return source, points, directions, luminance
@@ -116,7 +116,7 @@ def test_radiance_lights_a_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     p, q = np.meshgrid(*[(np.arange(600) + 0.5) / 300 - 1] * 2)
     p, q = p[p * p + q * q < 1], q[p * p + q * q < 1]
     up = np.column_stack([p, q, np.sqrt(1 - p * p - q * q)])
-    illuminance = source.luminance(np.tile(wall[0, :3], (len(up), 1)), up).sum() / 300**2
+    illuminance = source.luminance(points=np.tile(wall[0, :3], (len(up), 1)), directions=up).sum() / 300**2
     # Both are rules with steps: pieces of 1/20 of their distance, 600 directions across.
     assert np.frombuffer(answer)[1] * RADIANCE_WHITE_EFFICACY == pytest.approx(illuminance, rel=2e-3)
 
@@ -177,7 +177,9 @@ def test_mitsuba_lights_a_wall(tmp_path: Path, mi: Any) -> None:
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     distance = np.linalg.norm(at - points, axis=1)
     directions = (at - points) / distance[:, None]
-    illuminance = (source.luminance(points, directions) * directions[:, 2] ** 2 / distance**2).sum() * step**2
+    illuminance = (
+        source.luminance(points=points, directions=directions) * directions[:, 2] ** 2 / distance**2
+    ).sum() * step**2
     error = seen.std() / np.sqrt(len(seen))
     assert error < 0.02 * seen.mean()
     assert abs(seen.mean() - 0.5 * illuminance / np.pi) < 4 * error

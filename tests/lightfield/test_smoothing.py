@@ -64,9 +64,9 @@ def test_a_hundred_thousand_rays_beat_the_gaussian_that_knew_the_truth(name: str
     """By both measures; and the error bars hold."""
     counts, truth = counts_of(name, 1e5, 1)
     found = smoothed(counts)
-    best, best_ncc = oracle_gaussian(counts, truth)
-    assert nrmse(found.mass, truth) < 0.85 * best
-    assert 1 - ncc(found.mass, truth) < 0.75 * (1 - best_ncc)
+    best, best_ncc = oracle_gaussian(counts, truth=truth)
+    assert nrmse(found.mass, truth=truth) < 0.85 * best
+    assert 1 - ncc(found.mass, truth=truth) < 0.75 * (1 - best_ncc)
     assert found.mass.sum() == pytest.approx(counts.sum(), rel=1e-12)
     effective, one, two = HUNDRED_THOUSAND[name]
     assert_covers(deviations=deviations(found, truth), effective=effective, one=one, two=two)
@@ -101,8 +101,8 @@ def test_the_unit_of_weight_does_not_matter() -> None:
 
 
 def test_unequal_weights_are_worth_fewer_rays_and_their_errors_hold() -> None:
-    """Exponential weights: E w² = 2 (E w)², so the rays are worth half their number. From seed to seed the coverage spreads as
-    that of 213 independent cells."""
+    """Exponential weights: E w² = 2 (E w)², so the rays are worth half their number. From seed to seed the coverage spreads
+    as that of 213 independent cells."""
     counts, truth = counts_of("blobs", 1e5, 5, 96)
     generator = np.random.default_rng(6)
     weight = generator.gamma(np.maximum(counts, 1e-300)) * (counts > 0)
@@ -111,8 +111,8 @@ def test_unequal_weights_are_worth_fewer_rays_and_their_errors_hold() -> None:
     found = smooth_counts(weight, squared, np.ones_like(weight))
     assert found.mass.sum() == pytest.approx(weight.sum(), rel=1e-12)
     assert_covers(deviations=deviations(found, truth), effective=213)
-    equal = nrmse(smoothed(counts).mass, truth)
-    assert equal < nrmse(found.mass, truth) < 2.2 * equal
+    equal = nrmse(smoothed(counts).mass, truth=truth)
+    assert equal < nrmse(found.mass, truth=truth) < 2.2 * equal
 
 
 def test_base_measure_sets_the_level_and_nothing_lies_where_it_is_zero() -> None:

@@ -81,12 +81,12 @@ NAMES = [type(source).__name__ for source, *_ in FAMILIES]
 def test_rays_follow_the_luminance(source, lines, unit_of) -> None:
     """χ² over étendue cells: counts against luminance at random points of each cell, both with their variance."""
     place, direction, etendue = lines(source, stratified(11))
-    luminance = source.luminance(place, direction).reshape(-1, POINTS)
+    luminance = source.luminance(points=place, directions=direction).reshape(-1, POINTS)
     share = etendue / len(luminance) / source.total_flux
     expected = RAYS * share * luminance.mean(axis=1)
     variance = (RAYS * share) ** 2 * luminance.var(axis=1, ddof=1) / POINTS
 
-    counts = np.bincount(cells(unit_of(source, *source.rays(RAYS, 5))), minlength=len(luminance))
+    counts = np.bincount(cells(unit_of(source, *source.rays(RAYS, seed=5))), minlength=len(luminance))
     assert counts[expected == 0].sum() <= RAYS * 1e-4  # a corner of the source that no point met
     enough = expected > 10
     squares = (counts - expected)[enough] ** 2 / (expected + variance)[enough]
@@ -97,7 +97,7 @@ def test_rays_follow_the_luminance(source, lines, unit_of) -> None:
 @pytest.mark.parametrize(("source", "lines", "unit_of"), FAMILIES, ids=NAMES)
 def test_the_flux_is_the_integral_of_the_luminance(source, lines, unit_of) -> None:  # noqa: ARG001
     place, direction, etendue = lines(source, stratified(23))
-    luminance = source.luminance(place, direction).reshape(-1, POINTS)
+    luminance = source.luminance(points=place, directions=direction).reshape(-1, POINTS)
     error = np.sqrt(luminance.var(axis=1, ddof=1).sum() / POINTS) / len(luminance) * etendue
     assert error < 0.005 * source.total_flux
     deviation = (luminance.mean() * etendue - source.total_flux) / error
@@ -108,7 +108,10 @@ def test_the_flux_is_the_integral_of_the_luminance(source, lines, unit_of) -> No
 def test_the_luminance_belongs_to_the_line(source, lines, unit_of) -> None:  # noqa: ARG001
     """Moved along its line, outside the source, a point sees the same, but for lines within rounding of an edge."""
     place, direction, _ = lines(source, np.random.default_rng(3).random((20_000, 4)))
-    here, far = source.luminance(place, direction), source.luminance(place + 750.0 * direction, direction)
+    here, far = (
+        source.luminance(points=place, directions=direction),
+        source.luminance(points=place + 750.0 * direction, directions=direction),
+    )
     same = np.isclose(here, far, rtol=1e-6, atol=0)
     assert same.mean() > 0.9995
     assert (here > 0).mean() > 0.2
@@ -116,10 +119,10 @@ def test_the_luminance_belongs_to_the_line(source, lines, unit_of) -> None:  # n
 
 @pytest.mark.parametrize(("source", "lines", "unit_of"), FAMILIES, ids=NAMES)
 def test_every_ray_lies_where_its_source_shines(source, lines, unit_of) -> None:  # noqa: ARG001
-    place, direction = source.rays(50_000, 9)
+    place, direction = source.rays(50_000, seed=9)
     assert place.shape == direction.shape == (50_000, 3)
     assert np.allclose(np.sum(direction**2, axis=1), 1.0, rtol=0, atol=1e-14)
-    luminance = source.luminance(place + 1e-9 * direction, direction)
+    luminance = source.luminance(points=place + 1e-9 * direction, directions=direction)
     assert (luminance > 0).mean() > 0.9999
     if source is not DOME:
         assert luminance.max() < source.ceiling
@@ -133,7 +136,7 @@ def test_every_ray_lies_where_its_source_shines(source, lines, unit_of) -> None:
 @pytest.mark.parametrize("source", [*PLANAR, DOME], ids=NAMES)
 def test_no_mirror_and_no_half_turn_leaves_a_source_unchanged(source) -> None:
     """The centre of the light and of the directions: not on any axis, not on a diagonal."""
-    place, direction = source.rays(200_000, 13)
+    place, direction = source.rays(200_000, seed=13)
     middle = (np.array(source.extent[::2]) + source.extent[1::2]) / 2
     for values in (place[:, :2] - middle, direction[:, :2]):
         mean, error = values.mean(axis=0), values.std(axis=0) / np.sqrt(len(values))
@@ -146,7 +149,7 @@ def test_planar_sources_are_dark_from_behind_and_beside(source) -> None:
     x, y = source.centre
     points = np.array([[x, y, 0.0], [x, y, 0.0], [source.extent[1] + 1, y, 0.0]])
     directions = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    assert (source.luminance(points, directions) == 0).all()
+    assert (source.luminance(points=points, directions=directions) == 0).all()
 
 
 def test_the_flux_does_not_change_with_finer_gauss_rules(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,18 +170,20 @@ def test_a_dome_magnifies_a_die_at_its_centre_by_its_index() -> None:
     inside = np.arcsin(np.sin(i) / DOME.index)
     reach = height / (DOME.index * np.cos(i - inside))
     points = np.stack([-height, np.zeros(3), np.full(3, 40.0)], axis=-1)
-    transmittance = DOME.transmittance(np.cos(inside), np.cos(i))
-    die = DOME.die_luminance(-reach, np.zeros(3), -np.sin(i - inside), np.zeros(3))  # inside it leans outwards
+    transmittance = DOME.transmittance(cos_inside=np.cos(inside), cos_outside=np.cos(i))
+    die = DOME.die_luminance(x=-reach, y=np.zeros(3), p=-np.sin(i - inside), q=np.zeros(3))  # inside it leans outwards
     expected = transmittance * die / DOME.index**2 + DOME.floor_luminance
-    assert DOME.luminance(points, np.tile([0.0, 0.0, 1.0], (3, 1))) == pytest.approx(expected, rel=1e-12)
+    assert DOME.luminance(points=points, directions=np.tile([0.0, 0.0, 1.0], (3, 1))) == pytest.approx(
+        expected, rel=1e-12
+    )
 
 
 def test_fresnel_at_the_normal() -> None:
-    assert DOME.transmittance(np.ones(1), np.ones(1)) == pytest.approx([0.96], rel=1e-15)
+    assert DOME.transmittance(cos_inside=np.ones(1), cos_outside=np.ones(1)) == pytest.approx([0.96], rel=1e-15)
 
 
 def test_the_floor_carries_its_share_in_every_direction() -> None:
-    place, direction = DOME.rays(400_000, 17)
+    place, direction = DOME.rays(400_000, seed=17)
     downwards = (direction[:, 2] < 0).sum()  # a quarter of what a hemisphere scatters, and nothing of the die
     expected = 0.25 * DOME.floor * 400_000
     assert stats.poisson.cdf(downwards, expected) > SIGNIFICANCE

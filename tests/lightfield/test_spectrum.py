@@ -56,7 +56,7 @@ def test_a_field_of_watts_knows_its_lumens(field: LightField) -> None:
     assert lumens.flux_unit == "lm"
     assert any("which all rays have together" in note for note in lumens.notes)
     point, up = [[0.1, 0.2, 0.0]], [[0.1, 0.0, 1.0]]
-    both = lumens.luminance(point, up)[0] / field.luminance(point, up)[0]
+    both = lumens.luminance(points=point, directions=up)[0] / field.luminance(points=point, directions=up)[0]
     assert both[0] == pytest.approx(lumens.total_flux / 2.0, rel=1e-9)
     assert lumens.in_unit("W").total_flux == pytest.approx(2.0, rel=1e-9)
     assert lumens.in_unit("W").spectrum is spectrum

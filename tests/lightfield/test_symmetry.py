@@ -68,11 +68,11 @@ def test_a_symmetric_source_is_found_and_its_errors_shrink() -> None:
     assert any("c4" in note or "mirror-xy" in note for note in folded.notes)
     assert folded.total_flux == pytest.approx(plain.total_flux, rel=1e-9)
     x = np.array([[3.0, 4, 0], [-4, 3, 0], [-3, -4, 0], [4, -3, 0]])
-    value, error = folded.luminance(x, np.tile([0.0, 0, 1], (4, 1)))
+    value, error = folded.luminance(points=x, directions=np.tile([0.0, 0, 1], (4, 1)))
     # The half-turn is part of either symmetry; the trees on moved grids, each by itself, know none.
     np.testing.assert_allclose(value[2:], value[:2], rtol=1e-6)
     np.testing.assert_allclose(error[2:], error[:2], rtol=1e-6)
-    assert (np.abs(value - rays.luminance(3, 4)) < 4 * error).all()
+    assert (np.abs(value - rays.luminance(points=3, directions=4)) < 4 * error).all()
 
 
 def test_what_a_field_was_folded_by_is_known_and_kept(tmp_path: Path) -> None:
@@ -114,13 +114,18 @@ def test_error_bars_of_folded_fields_cover_the_truth() -> None:
     centre = np.array([*source.centre, 0])
     deviations = []
     for seed in (8, 9, 10):
-        x, k = source.rays(n, seed)
+        x, k = source.rays(n, seed=seed)
         half = et.RaySet(x - centre, k, np.full(n, source.total_flux / n))
         field = et.LightField.fit(half, plane, depths=(4, 4, 4, 4), symmetry="mirror-y")
         points, directions = (np.concatenate([v, v * [1, -1, 1]])[::12] for v in (x - centre, k))
         # The source that is even in y: the mean of the given one and its image.
-        truth = sum(source.luminance(points * m + centre, directions * m) for m in ([1, 1, 1], [1, -1, 1])) / 2
-        value, error = field.luminance(points, directions)
+        truth = (
+            sum(
+                source.luminance(points=points * m + centre, directions=directions * m) for m in ([1, 1, 1], [1, -1, 1])
+            )
+            / 2
+        )
+        value, error = field.luminance(points=points, directions=directions)
         deviations.append((value - truth) / error)
     assert_covers(deviations=np.concatenate(deviations), effective=3 * 144, one=(0.62, 0.66), two=(0.86, 0.91))
 

@@ -31,7 +31,7 @@ DISK = Disk(radius=FILM.radius, centre=FILM.centre)
 
 
 def film_rays(n: int) -> et.RaySet:
-    position, direction = FILM.rays(n, 3)
+    position, direction = FILM.rays(n, seed=3)
     weight = 0.5 + np.random.default_rng(1).random(n)
     return et.RaySet(position, direction, weight * FILM.total_flux / weight.sum())
 
@@ -55,7 +55,7 @@ def test_every_number_by_the_long_way() -> None:
         assert sweep["nrmse_thesis"][i] == pytest.approx(expected.nrmse_thesis, rel=1e-9)
         assert sweep["nrmse"][i] == pytest.approx(expected.nrmse, rel=1e-9)
         model = GriddedSource.fit(train, DISK, 2.0, threshold).as_printed
-        seen = model.luminance(rays.position[~kept], rays.direction[~kept]) * 1e-6 / model.table_flux
+        seen = model.luminance(points=rays.position[~kept], directions=rays.direction[~kept]) * 1e-6 / model.table_flux
         log = np.log((1 - UNIFORM) * seen * (math.pi**2 * FILM.radius**2) + UNIFORM)
         weight = rays.flux[~kept]
         mean = np.average(log, weights=weight)
@@ -80,7 +80,7 @@ def test_no_score_is_above_that_of_the_truth() -> None:
     rays = film_rays(60_000)
     sweep = threshold_sweep(rays, DISK, 2.0, (5.0, 1.0, 0.2))
     lots = _core.deal_parts(0, 60_000, 10, 1) == 0
-    truth = FILM.luminance(rays.position[lots], rays.direction[lots]) * 1e-6 / FILM.total_flux
+    truth = FILM.luminance(points=rays.position[lots], directions=rays.direction[lots]) * 1e-6 / FILM.total_flux
     # The rays are those of the film with weights that know nothing of it.
     best = np.average(np.log(truth * math.pi**2 * FILM.radius**2), weights=rays.flux[lots])
     assert (sweep["score"] < best + norm.isf(1e-4) * sweep["score_error"]).all()
@@ -89,7 +89,7 @@ def test_no_score_is_above_that_of_the_truth() -> None:
 
 def test_domes_have_a_sweep_too() -> None:
     truth = DieUnderDome(floor=0.05)
-    position, direction = truth.rays(30_000, 2)
+    position, direction = truth.rays(30_000, seed=2)
     seen: list[int] = []
     sweep = threshold_sweep(
         et.RaySet(position, direction, np.full(30_000, truth.total_flux / 30_000)),

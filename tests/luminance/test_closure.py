@@ -71,6 +71,7 @@ def test_what_is_seen_from_everywhere_is_the_flux() -> None:
     assert_agree(values=off, expected=np.zeros_like(off), standard_error=error, degrees=degrees)
     escaped = result.ledger.escaped.flux
     assert 50 < escaped < 99
+    assert far.flux == pytest.approx(escaped, rel=1e-9)
     total = math.sqrt(((error * solid) ** 2).sum())
     assert total < 0.05 * escaped
     assert abs(mean @ solid - escaped) < LARGEST_Z * total

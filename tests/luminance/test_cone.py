@@ -58,7 +58,7 @@ def test_every_pixel_of_a_tilted_quadrilateral_is_in_its_place(
     source, acceptance = Quadrilateral(), 2.0
     observer, screen = et.Observer(theta, phi, 200.0, target=(1.0, -1.0, 0.0)), et.Screen(16.0, 14.0, 16, 14, plane)
     lmap = et.luminance_map(quadrilateral_rays, observer, screen, method="cone", acceptance=acceptance)
-    expected = source.cone_expectation(observer, screen, acceptance)
+    expected = source.cone_expectation(observer, screen, acceptance=acceptance)
     apparent = screen.pixel_area * 1e-6 * screen.cosine(observer)
     # What one ray adds to a pixel: with it, luminance is a Poisson count.
     one = source.flux / len(quadrilateral_rays) / (apparent * cone_solid_angle(acceptance))

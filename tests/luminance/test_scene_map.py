@@ -265,11 +265,11 @@ def test_rings_through_a_collecting_surface() -> None:
     cone = et.luminance_map(incident, observer, screen, method="cone", acceptance=4.0)
     lit = cone.rays > 50
     assert lit.sum() > 60
-    assert_agree(
-        values=cone.values[lit],
-        expected=reverse.values[lit],
-        standard_error=np.hypot(cone.standard_error, reverse.standard_error)[lit],
-    )
+    error = np.hypot(cone.standard_error, reverse.standard_error)[lit]
+    assert_agree(values=cone.values[lit], expected=reverse.values[lit], standard_error=error)
+    total = math.sqrt((error**2).sum())
+    assert total < 0.012 * reverse.values[lit].sum()
+    assert abs((cone.values - reverse.values)[lit].sum()) < LARGEST_Z * total
 
 
 def test_a_beam_on_paper() -> None:
@@ -410,9 +410,12 @@ def test_rays_are_fitted_before_they_are_looked_at(tmp_path: Path) -> None:
         scene = et.Scene(sources=[{"name": "led", "kind": "rays", "flux": 300, "at": [0, 0, 5], **given}])
         (lmap,) = et.luminance_map(scene, [et.Observer(0, 0, 1000)], et.Screen(12, 12, 4, 4), rays_per_pixel=64)
         assert any("light field" in note for note in lmap.notes)
-        # Half of the flux, half of the luminance; what the field does not know is in the error.
-        assert np.abs(lmap.values / (rings.zone_luminance[0] / 2) - 1).max() < 0.1
+        # Half of the flux, half of the luminance; what the field does not know is in the error, and may go together all over
+        # the map.
         assert (lmap.standard_error > 0).all()
+        error = float(lmap.standard_error.mean())
+        assert error < 0.01 * lmap.values.mean()
+        assert abs(lmap.values.mean() - rings.zone_luminance[0] / 2) < LARGEST_Z * error
     fitted, notes = with_fields(scene)
     assert fitted.sources[0].kind == "light-field"
     assert fitted.sources[0].name == "led"

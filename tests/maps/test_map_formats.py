@@ -445,7 +445,7 @@ def test_npz_members_are_not_unpacked_beyond_what_a_map_holds(tmp_path: Path) ->
         assert path.stat().st_size < 1e6
         paths.append(path)
     imports = "import numpy.lib.format\nfrom etendue.formats.maps import read_map, MAP_FORMATS"
-    found = told(imports, "read_map(path)", paths, spare=100 << 20)
+    found = told(imports=imports, call="read_map(path)", paths=paths, spare=100 << 20)
     assert [
         f"{member}: 314,572,8" in line for member, line in zip(("header.npy", "values.npy"), found, strict=True)
     ] == [

@@ -12,25 +12,25 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 
-def direction(c: npt.ArrayLike, gamma: npt.ArrayLike) -> Array:
+def direction(*, c: npt.ArrayLike, gamma: npt.ArrayLike) -> Array:
     """Unit vectors of (C, γ) [°]."""
     a, b = np.broadcast_arrays(np.radians(c), np.radians(gamma))
     return np.stack([np.sin(b) * np.cos(a), np.sin(b) * np.sin(a), np.cos(b)], axis=-1)
 
 
-def beam(n: int, exponent: float, c: float, gamma: float, seed: int) -> Array:
+def beam(n: int, *, exponent: float, c: float, gamma: float, seed: int) -> Array:
     """Directions of I ∝ cosⁿ about an axis, by inversion."""
     rng = np.random.default_rng(seed)
     cos = rng.random(n) ** (1.0 / (exponent + 1.0))
     sin, phi = np.sqrt(1.0 - cos**2), rng.uniform(0, 2 * np.pi, n)
-    frame = [direction(c, gamma + 90.0), direction(c + 90.0, 90.0), direction(c, gamma)]
+    frame = [direction(c=c, gamma=gamma + 90.0), direction(c=c + 90.0, gamma=90.0), direction(c=c, gamma=gamma)]
     return np.stack([sin * np.cos(phi), sin * np.sin(phi), cos], axis=1) @ np.stack(frame)
 
 
-def lobe(exponent: float, c: float, gamma: float) -> Callable[[Array, Array], Array]:
+def lobe(*, exponent: float, c: float, gamma: float) -> Callable[[Array, Array], Array]:
     """Intensity of a beam I ∝ cosⁿ of unit flux over (C, γ) [°]."""
-    axis = direction(c, gamma)
-    return lambda a, b: (exponent + 1) / (2 * np.pi) * np.maximum(direction(a, b) @ axis, 0.0) ** exponent
+    axis = direction(c=c, gamma=gamma)
+    return lambda a, b: (exponent + 1) / (2 * np.pi) * np.maximum(direction(c=a, gamma=b) @ axis, 0.0) ** exponent
 
 
 def rays_of(*beams: tuple[Array, float]) -> et.RaySet:

@@ -20,7 +20,7 @@ SIGMA = 2 * np.pi / 3
 """∫ (b·k)(k·n) dΩ over the half-space about n, in units of b·n; without b it is π."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Body(abc.ABC):
     """Lengths in mm, luminance in cd/m²."""
 
@@ -33,18 +33,18 @@ class Body(abc.ABC):
         """Uniform points on the surface, from the middle, and normals there."""
 
     @abc.abstractmethod
-    def exits(self, points: Array, directions: Array) -> tuple[Array, Array]:
+    def exits(self, *, points: Array, directions: Array) -> tuple[Array, Array]:
         """Where lines leave the body, from its middle; and whether they meet it."""
 
     def _level(self, x: Array, k: Array) -> Array:
         return self.scale * (1 + x @ A / self.size) * (1 + k @ B)
 
-    def luminance(self, points: Array, directions: Array) -> Array:
+    def luminance(self, *, points: Array, directions: Array) -> Array:
         """Luminance [cd/m²] along lines."""
-        x, met = self.exits(points - self.middle, directions)
+        x, met = self.exits(points=points - self.middle, directions=directions)
         return np.where(met, self._level(x, directions), 0.0)
 
-    def rays(self, n: int, seed: int) -> tuple[Array, Array]:
+    def rays(self, n: int, *, seed: int) -> tuple[Array, Array]:
         """Position on the surface and direction (n, 3) of rays of equal flux."""
         rng = np.random.default_rng(seed)
         position, direction = np.zeros((0, 3)), np.zeros((0, 3))
@@ -57,7 +57,7 @@ class Body(abc.ABC):
         return position[:n] + self.middle, direction[:n]
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Globe(Body):
     """A sphere."""
 
@@ -75,13 +75,13 @@ class Globe(Body):
         v /= np.linalg.norm(v, axis=1)[:, None]
         return self.radius * v, v
 
-    def exits(self, points: Array, directions: Array) -> tuple[Array, Array]:
+    def exits(self, *, points: Array, directions: Array) -> tuple[Array, Array]:
         near = points - np.sum(points * directions, axis=1)[:, None] * directions
         square = self.radius**2 - np.sum(near**2, axis=1)
         return near + np.sqrt(np.maximum(square, 0.0))[:, None] * directions, square > 0
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Block(Body):
     """A box with faces along the axes."""
 
@@ -107,14 +107,14 @@ class Block(Body):
         normal[np.arange(n), axis] = sign
         return x * self.half, normal
 
-    def exits(self, points: Array, directions: Array) -> tuple[Array, Array]:
+    def exits(self, *, points: Array, directions: Array) -> tuple[Array, Array]:
         with np.errstate(divide="ignore"):
             ways = np.stack([(s * np.array(self.half) - points) / directions for s in (-1, 1)])
         enters, leaves = ways.min(axis=0).max(axis=1), ways.max(axis=0).min(axis=1)
         return points + leaves[:, None] * directions, leaves > enters
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Rod(Body):
     """A cylinder about Z, closed by its ends, which shine too."""
 
@@ -137,7 +137,7 @@ class Rod(Body):
         x = np.where(side, 1.0, reach)[:, None] * self.radius * round_about + height[:, None] * up
         return x, np.where(side[:, None], round_about, sign[:, None] * up)
 
-    def exits(self, points: Array, directions: Array) -> tuple[Array, Array]:
+    def exits(self, *, points: Array, directions: Array) -> tuple[Array, Array]:
         across = np.sum(directions[:, :2] ** 2, axis=1)
         middle = -np.sum(points[:, :2] * directions[:, :2], axis=1) / across
         near = points[:, :2] + middle[:, None] * directions[:, :2]

@@ -16,7 +16,7 @@ Hit = tuple[float, float, int]
 """Distance along the ray, cosine between ray and outward normal, number of the face."""
 
 
-def in_polygon(x: float, y: float, vertices: Array) -> bool:
+def _in_polygon(x: float, y: float, vertices: Array) -> bool:
     """Crossing number of a ray along +x."""
     a, b = vertices, np.roll(vertices, -1, axis=0)
     straddles = (a[:, 1] > y) != (b[:, 1] > y)
@@ -25,7 +25,7 @@ def in_polygon(x: float, y: float, vertices: Array) -> bool:
     return bool(np.count_nonzero(crossing > x) % 2)
 
 
-def in_outline(outline: dict[str, Any], p: Array) -> bool:
+def _in_outline(outline: dict[str, Any], p: Array) -> bool:
     match outline["kind"]:
         case "whole":
             return True
@@ -34,11 +34,11 @@ def in_outline(outline: dict[str, Any], p: Array) -> bool:
         case "annulus":
             return bool(outline["inner"] <= math.hypot(p[0], p[1]) <= outline["outer"])
         case "polygon":
-            return in_polygon(p[0], p[1], outline["vertices"])
+            return _in_polygon(p[0], p[1], outline["vertices"])
     raise AssertionError(outline)
 
 
-def sag(shape: dict[str, Any], r: Array) -> Array:
+def _sag(shape: dict[str, Any], r: Array) -> Array:
     """The asphere's equation, term by term."""
     c, k = shape["curvature"], shape["conic"]
     z = c * r**2 / (1 + np.sqrt(1 - (1 + k) * c**2 * r**2))
@@ -47,14 +47,14 @@ def sag(shape: dict[str, Any], r: Array) -> Array:
     return z
 
 
-def surface_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
+def _surface_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
     """(t, unit normal) where the line o + t d meets a shape, in its own coordinates."""
     found: list[tuple[float, Array]] = []
     match shape["kind"]:
         case "flat":
             if d[2] != 0:
                 t = -o[2] / d[2]
-                if in_outline(shape["outline"], o + t * d):
+                if _in_outline(shape["outline"], o + t * d):
                     found.append((t, np.array([0.0, 0.0, 1.0])))
         case "quadric":
             w = np.array([shape["r2"], shape["r2"], shape["z2"]])
@@ -69,26 +69,26 @@ def surface_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float,
                         n = 2 * w * p + linear
                         found.append((float(t.real), n / np.linalg.norm(n)))
         case "asphere":
-            found = asphere_hits(shape, o, d)
+            found = _asphere_hits(shape, o, d)
         case "torus":
-            found = torus_hits(shape, o, d)
+            found = _torus_hits(shape, o, d)
         case "mesh":
-            found = mesh_hits(shape, o, d)
+            found = _mesh_hits(shape, o, d)
         case kind:
             raise AssertionError(kind)
     return found
 
 
-def asphere_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
+def _asphere_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
     """Sign changes of z - sag(r) between the crossings of the cylinder r = outer, refined by halving."""
     low, high = shape["r"]
     a, b, c = d[0] ** 2 + d[1] ** 2, o[0] * d[0] + o[1] * d[1], o[0] ** 2 + o[1] ** 2 - high**2
     if a == 0:  # parallel to the axis
-        starts = [float((sag(shape, np.array(math.sqrt(c + high**2))) - o[2]) / d[2])] if c <= 0 else []
+        starts = [float((_sag(shape, np.array(math.sqrt(c + high**2))) - o[2]) / d[2])] if c <= 0 else []
     elif b * b - a * c <= 0:
         starts = []
     else:
-        starts = asphere_roots(shape, o, d, (-b - math.sqrt(b * b - a * c)) / a, (-b + math.sqrt(b * b - a * c)) / a)
+        starts = _asphere_roots(shape, o, d, (-b - math.sqrt(b * b - a * c)) / a, (-b + math.sqrt(b * b - a * c)) / a)
     found = []
     for t in starts:
         p = o + t * d
@@ -97,18 +97,18 @@ def asphere_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float,
             # The slope by a difference, one-sided at the rim.
             h = 1e-6 * high
             outer = min(r + h, high)
-            slope = float(sag(shape, np.array(outer)) - sag(shape, np.array(r - h))) / (outer - r + h)
+            slope = float(_sag(shape, np.array(outer)) - _sag(shape, np.array(r - h))) / (outer - r + h)
             n = np.array([-slope * p[0] / max(r, 1e-300), -slope * p[1] / max(r, 1e-300), 1.0])
             found.append((t, n / np.linalg.norm(n)))
     return found
 
 
-def asphere_roots(shape: dict[str, Any], o: Array, d: Array, start: float, stop: float) -> list[float]:
+def _asphere_roots(shape: dict[str, Any], o: Array, d: Array, start: float, stop: float) -> list[float]:
     high = shape["r"][1]
 
     def height(t: Array) -> Array:
         p = o + t[:, None] * d
-        return p[:, 2] - sag(shape, np.minimum(np.hypot(p[:, 0], p[:, 1]), high))
+        return p[:, 2] - _sag(shape, np.minimum(np.hypot(p[:, 0], p[:, 1]), high))
 
     t = np.linspace(start, stop, 2001)
     sign = np.sign(height(t))
@@ -122,7 +122,7 @@ def asphere_roots(shape: dict[str, Any], o: Array, d: Array, start: float, stop:
     return found
 
 
-def torus_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
+def _torus_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
     """Real roots of the quartic (p² + R² - r²)² = 4 R² (x² + y²)."""
     R, r = shape["major"], shape["minor"]
     square = np.polynomial.Polynomial([o @ o + R * R - r * r, 2 * (o @ d), d @ d])
@@ -136,7 +136,7 @@ def torus_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, A
     return found
 
 
-def mesh_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
+def _mesh_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
     """Every triangle by Cramer's rule."""
     a, b, c = (shape["vertices"][shape["triangles"][:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
@@ -149,19 +149,19 @@ def mesh_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Ar
     return [(float(t[i]), normal[i] / np.linalg.norm(normal[i])) for i in np.nonzero(hit)[0]]
 
 
-def face_hits(face: dict[str, Any], o: Array, d: Array) -> list[tuple[float, float]]:
+def _face_hits(face: dict[str, Any], o: Array, d: Array) -> list[tuple[float, float]]:
     """(t, cosine between ray and the face's normal) of every hit, unordered."""
     frame = np.array(face["frame"])
     origin, axes = frame[:3], frame[3:].reshape(3, 3)  # rows are the local axes
     local_o, local_d = axes @ (o - origin), axes @ d
     found = []
-    for t, n in surface_hits(face["shape"], local_o, local_d):
+    for t, n in _surface_hits(face["shape"], local_o, local_d):
         p = local_o + t * local_d
         if all(x * p[0] + y * p[1] + z * p[2] <= limit for x, y, z, limit in face["trims"]):
             found.append((t, float(n @ local_d) * (-1 if face["flip"] else 1)))
     return found
 
 
-def hits(faces: list[dict[str, Any]], o: Array, d: Array) -> list[Hit]:
+def hits(faces: list[dict[str, Any]], *, o: Array, d: Array) -> list[Hit]:
     """Every hit of a line with some faces, in order."""
-    return sorted((t, cosine, i) for i, face in enumerate(faces) for t, cosine in face_hits(face, o, d))
+    return sorted((t, cosine, i) for i, face in enumerate(faces) for t, cosine in _face_hits(face, o, d))

@@ -28,7 +28,7 @@ class Pixel:
         self.rays.append((theta, math.degrees(math.atan2(cosines[1], cosines[0])) % 360.0, flux))
 
 
-def bin_ranges(theta_step: float, phi_step: float) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+def bin_ranges(*, theta_step: float, phi_step: float) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
     """Step 4b: R_θ and R_φ; those of φ may begin below 0."""
     thetas = [(0.0, theta_step / 2)]
     while thetas[-1][1] < 90 - 1e-9:
@@ -36,9 +36,9 @@ def bin_ranges(theta_step: float, phi_step: float) -> tuple[list[tuple[float, fl
     return thetas, [((k - 0.5) * phi_step, (k + 0.5) * phi_step) for k in range(round(360 / phi_step))]
 
 
-def table(pixel: Pixel, theta_step: float, phi_step: float) -> tuple[list[float], Array]:
+def table(pixel: Pixel, *, theta_step: float, phi_step: float) -> tuple[list[float], Array]:
     """Steps 4b to 4e: central directions θ and intensities, the row at 90° included."""
-    thetas, phis = bin_ranges(theta_step, phi_step)
+    thetas, phis = bin_ranges(theta_step=theta_step, phi_step=phi_step)
     intensity = np.zeros((len(thetas) + 1, len(phis)))
     for k, (low, high) in enumerate(thetas):
         for m, (left, right) in enumerate(phis):
@@ -51,9 +51,9 @@ def table(pixel: Pixel, theta_step: float, phi_step: float) -> tuple[list[float]
     return centres, intensity
 
 
-def flux_error(pixel: Pixel, theta_step: float, phi_step: float) -> float:
+def flux_error(pixel: Pixel, *, theta_step: float, phi_step: float) -> float:
     """Steps 4f and 4g: E [%]."""
-    centres, intensity = table(pixel, theta_step, phi_step)
+    centres, intensity = table(pixel, theta_step=theta_step, phi_step=phi_step)
     integral = 0.0
     for k in range(len(centres) - 1):
         for m in range(intensity.shape[1]):
@@ -65,10 +65,10 @@ def flux_error(pixel: Pixel, theta_step: float, phi_step: float) -> float:
 
 def chosen_step(pixel: Pixel, threshold: float) -> tuple[int, int]:
     """Step 4h."""
-    return next((pair for pair in DIVISORS if flux_error(pixel, *pair) <= threshold), DIVISORS[-1])
+    return next((s for s in DIVISORS if flux_error(pixel, theta_step=s[0], phi_step=s[1]) <= threshold), DIVISORS[-1])
 
 
-def square_pixels(position: Array, direction: Array, flux: Array, side: float) -> dict[tuple[int, int], Pixel]:
+def square_pixels(*, position: Array, direction: Array, flux: Array, side: float) -> dict[tuple[int, int], Pixel]:
     """Steps 1 to 3 on the XY plane."""
     found: dict[tuple[int, int], Pixel] = {}
     for x, d, f in zip(position, direction, flux, strict=True):

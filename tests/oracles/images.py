@@ -109,18 +109,18 @@ IMAGES: dict[str, Callable[[], Array]] = {
 }
 
 
-def ncc(image: Array, truth: Array) -> float:
+def ncc(image: Array, *, truth: Array) -> float:
     """Normalised cross correlation."""
     return float(np.corrcoef(image.ravel(), truth.ravel())[0, 1])
 
 
-def nrmse(image: Array, truth: Array) -> float:
+def nrmse(image: Array, *, truth: Array) -> float:
     """Root mean square error over the greatest true value."""
     return float(np.sqrt(((image - truth) ** 2).mean()) / truth.max())
 
 
-def oracle_gaussian(counts: Array, truth: Array) -> tuple[float, float]:
+def oracle_gaussian(counts: Array, *, truth: Array) -> tuple[float, float]:
     """Least NRMSE and greatest NCC of Gaussians of fixed width; each may choose its own, knowing the truth."""
     smooth = [gaussian_filter(counts, width, mode="reflect", truncate=5) for width in WIDTHS]
     scaled = [image * (truth.sum() / image.sum()) for image in smooth]
-    return min(nrmse(image, truth) for image in scaled), max(ncc(image, truth) for image in scaled)
+    return min(nrmse(image, truth=truth) for image in scaled), max(ncc(image, truth=truth) for image in scaled)

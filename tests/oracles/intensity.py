@@ -22,7 +22,7 @@ TERMS = {
 
 
 def lid(
-    symmetry: str, c: npt.ArrayLike = tuple(range(0, 360, 15)), gamma: npt.ArrayLike = tuple(range(0, 181, 5))
+    symmetry: str, *, c: npt.ArrayLike = tuple(range(0, 360, 15)), gamma: npt.ArrayLike = tuple(range(0, 181, 5))
 ) -> Intensity:
     """A distribution that has this symmetry and no other, different in front and behind."""
     c, gamma = np.asarray(c, dtype=np.float64), np.asarray(gamma, dtype=np.float64)
@@ -50,7 +50,9 @@ def flux_by_quadrature(intensity: Intensity) -> float:
     return float(weights[0] @ grid @ (weights[1] * np.sin(np.radians(points[1]))))
 
 
-def hat_means(function: Callable[[Array, Array], Array], c: Array, gamma: Array, sub: int = 24) -> tuple[Array, Array]:
+def hat_means(
+    function: Callable[[Array, Array], Array], *, c: Array, gamma: Array, sub: int = 24
+) -> tuple[Array, Array]:
     """Means of a function of (C, γ) [°] weighted by the hats of a table's nodes, and the integrals of these, by quadrature.
 
     A midpoint rule of `sub` points between any two nodes; all planes of a pole are one node.
@@ -70,7 +72,7 @@ def hat_means(function: Callable[[Array, Array], Array], c: Array, gamma: Array,
     return found / weight, weight
 
 
-def read_by_trapezium(values: Array, c: Array, gamma: Array) -> float:
+def read_by_trapezium(values: Array, *, c: Array, gamma: Array) -> float:
     """The flux of a table as readers find it: the trapezium rule over I sin γ along γ, and around all planes."""
     belts = np.trapezoid(values * np.sin(np.radians(gamma)), np.radians(gamma), axis=1)
     if c.size == 1:

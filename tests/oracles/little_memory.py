@@ -27,7 +27,7 @@ for path in map(Path, sys.argv[1:]):
 """
 
 
-def told(imports: str, call: str, paths: Iterable[Path], spare: int) -> list[str]:
+def told(*, imports: str, call: str, paths: Iterable[Path], spare: int) -> list[str]:
     """What reading each file ended with: the text of a `FormatError`, ``read``, or another error's name and text.
 
     `call` reads ``path``; `spare` is the memory it may take, in bytes.

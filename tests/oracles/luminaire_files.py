@@ -20,7 +20,7 @@ SYMM = {
 }
 
 
-def grid(h: Iterable[float], v: Iterable[float], values: np.ndarray, tag: str = "IntData", names: str = "hv") -> str:
+def grid(*, h: Iterable[float], v: Iterable[float], values: np.ndarray, tag: str = "IntData", names: str = "hv") -> str:
     a, b = names if len(names) == 2 else names.split()
     return "\n".join(
         f'<{tag} {a}="{x:.10g}" {b}="{y:.10g}">{values[i, j]:.9g}</{tag}>'
@@ -30,10 +30,10 @@ def grid(h: Iterable[float], v: Iterable[float], values: np.ndarray, tag: str = 
 
 
 def emitter(
+    *,
     h: Iterable[float],
     v: Iterable[float],
     values: np.ndarray,
-    *,
     symm: str = "",
     quantity: str = "Luminous",
     before: str = "",
@@ -47,7 +47,7 @@ def emitter(
     return f"""<Emitter><Quantity>{number}</Quantity><Description>module</Description><InputWattage>12.5</InputWattage>
 {before}<{quantity}Data>{limits}<{quantity}Intensity>{symmetry}{table}<NumberMeasured>{len(h) * len(v)}</NumberMeasured>
 <NumberHorz>{len(h)}</NumberHorz><NumberVert>{len(v)}</NumberVert>
-{grid(h, v, values)}
+{grid(h=h, v=v, values=values)}
 </{quantity}Intensity></{quantity}Data>{after}</Emitter>"""
 
 
@@ -73,11 +73,11 @@ def whole_circle(led: Intensity) -> tuple[list[float], list[float], np.ndarray]:
 
 def tm33_of(led: Intensity) -> bytes:
     h, v, values = whole_circle(led)
-    return tm33(emitter(h, v, values, quantity="Luminous" if led.flux_unit == "lm" else "Radiant"))
+    return tm33(emitter(h=h, v=v, values=values, quantity="Luminous" if led.flux_unit == "lm" else "Radiant"))
 
 
 def product(
-    files: Mapping[str, tuple[str, str, str]], photometries: Mapping[str, str], body: str = "", variants: str = ""
+    files: Mapping[str, tuple[str, str, str]], photometries: Mapping[str, str], *, body: str = "", variants: str = ""
 ) -> str:
     """product.xml: files as id → (contentType, type, name), photometries as id → file id."""
     rows = "".join(f'<File id="{i}" contentType="{c}" type="{t}">{n}</File>' for i, (c, t, n) in files.items())

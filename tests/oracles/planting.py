@@ -79,15 +79,6 @@ def _field(field: et.LightField, factor: float, _: Arguments) -> tuple[et.LightF
     ), True
 
 
-def _field_errors(field: et.LightField, factor: float, _: Arguments) -> tuple[et.LightField, bool]:
-    return field.replace(
-        parts=tuple(
-            dataclasses.replace(part, deviation=(part.deviation * factor).astype(part.deviation.dtype))
-            for part in field.parts
-        )
-    ), True
-
-
 def _values(found: Any, factor: float, _: Arguments) -> tuple[Any, bool]:
     return dataclasses.replace(found, values=found.values * factor), bool(found.values.any())
 
@@ -110,7 +101,6 @@ ESTIMATES: dict[str, tuple[tuple[Any, str, Spoil], ...]] = {
     "scatter-events": ((_core, "look_at_events", _sums),),
     "cone": ((_core, "cone_sums", _cone), (_core, "index_sums", _indexed)),
     "light-field": ((fitting, "fit_counts", _field),),
-    "light-field-errors": ((fitting, "fit_counts", _field_errors),),
     "intensity": ((far_field, "intensity_distribution", _values),),
     "patches": ((gridded, "patches_of", _patches),),
     "smoothing": ((smoothing, "smooth_counts", _mass),),

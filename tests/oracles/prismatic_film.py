@@ -19,7 +19,7 @@ FLANKS = np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0]]) / np.sqrt(2.0)
 MOST_EVENTS = 20_000
 
 
-def seen_through(directions: npt.ArrayLike, index: float, thickness: float, rng: np.random.Generator) -> Flags:
+def seen_through(directions: npt.ArrayLike, *, index: float, thickness: float, rng: np.random.Generator) -> Flags:
     """Whether lines of sight against these directions of the light, shape (n, 3), end below the film.
 
     The prisms are 1 wide and 1/2 high, and run along y. Lines come in anywhere over a period; they are refracted or

@@ -11,7 +11,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Quadrilateral:
     """Lambertian on its upper side; lengths in mm, luminances in cd/m² by quarter (−a −b, +a −b, −a +b, +a +b)."""
 
@@ -33,7 +33,7 @@ class Quadrilateral:
     def flux(self) -> float:
         return np.pi * float(np.mean(self.quarters)) * self.area * 1e-6
 
-    def rays(self, n: int, seed: int) -> et.RaySet:
+    def rays(self, n: int, *, seed: int) -> et.RaySet:
         """Rays of equal flux."""
         rng = np.random.default_rng(seed)
         quarter = rng.choice(4, n, p=np.array(self.quarters) / sum(self.quarters))
@@ -47,18 +47,18 @@ class Quadrilateral:
         direction = sin * (np.cos(v)[:, None] * t + np.sin(v)[:, None] * s) + np.sqrt(1 - u)[:, None] * self.normal
         return et.RaySet(position, direction, np.full(n, self.flux / n))
 
-    def luminance(self, point: Array, direction: Array) -> Array:
-        """Luminance [cd/m²] on the lines through `point` (…, 3) towards `direction` (…, 3)."""
-        slope = direction @ self.normal
-        t = ((np.array(self.centre) - point) @ self.normal) / slope
-        offset = point + t[..., None] * direction - np.array(self.centre)
+    def luminance(self, *, points: Array, directions: Array) -> Array:
+        """Luminance [cd/m²] on the lines through `points` (…, 3) towards `directions` (…, 3)."""
+        slope = directions @ self.normal
+        t = ((np.array(self.centre) - points) @ self.normal) / slope
+        offset = points + t[..., None] * directions - np.array(self.centre)
         basis = np.stack([self.edge_a, self.edge_b, self.normal], axis=1)
         a, b, _ = np.moveaxis(offset @ np.linalg.inv(basis).T, -1, 0)
         inside = (np.abs(a) < 0.5) & (np.abs(b) < 0.5) & (slope > 0)
         return np.where(inside, np.array(self.quarters)[(a > 0).astype(int) + 2 * (b > 0).astype(int)], 0.0)
 
     def cone_expectation(
-        self, observer: et.Observer, screen: et.Screen, acceptance: float, fineness: int = 12
+        self, observer: et.Observer, screen: et.Screen, *, acceptance: float, fineness: int = 12
     ) -> Array:
         """Expected value of eq. 2.4 by quadrature over each pixel and its cone, written from vectors alone."""
         theta, phi = np.radians([observer.theta, observer.phi])
@@ -92,7 +92,7 @@ class Quadrilateral:
                 dx = (x + (step - 0.5) * screen.width / screen.columns)[:, None, None] * right
                 dy = (y + (step - 0.5) * screen.height / screen.rows)[None, :, None] * up
                 points = (np.array(observer.target) + dx + dy).reshape(-1, 1, 3)
-                seen = self.luminance(points, k[None])
+                seen = self.luminance(points=points, directions=k[None])
                 # dω = dω_⊥ / cos; the flux through the pixel carries |k·n|, its apparent area |axis·n|.
                 weight = np.abs(k @ normal) / (k @ axis) / abs(axis @ normal)
                 result[row, column] = (seen * weight).mean()

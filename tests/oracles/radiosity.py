@@ -45,7 +45,7 @@ def _graded(start: float, end: float, levels: int, at_start: bool, at_end: bool)
     return start + (end - start) * np.concatenate([rising, falling])
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Cavity:
     """Lengths in mm; the disk sends out `exitance` (flux per area) and reflects nothing."""
 

@@ -93,34 +93,34 @@ class _Planar(abc.ABC):
     """No luminance is above it [cd/m²]."""
 
     @abc.abstractmethod
-    def at(self, x: Array, y: Array, p: Array, q: Array) -> Array:
+    def at(self, *, x: Array, y: Array, p: Array, q: Array) -> Array:
         """Luminance [cd/m²] at x, y [mm] towards the direction cosines p, q; 0 outside the source."""
 
-    def luminance(self, points: Array, directions: Array) -> Array:
+    def luminance(self, *, points: Array, directions: Array) -> Array:
         """Luminance [cd/m²] along lines; see the module."""
         up = directions[:, 2] > 0
         p, q, cosine = np.where(up[:, None], directions, (0.0, 0.0, 1.0)).T
         x, y, z = points.T
-        return np.where(up, self.at(x - z / cosine * p, y - z / cosine * q, p, q), 0.0)
+        return np.where(up, self.at(x=x - z / cosine * p, y=y - z / cosine * q, p=p, q=q), 0.0)
 
     def positions(self, rng: np.random.Generator) -> tuple[Array, Array]:
         """A batch of x, y [mm], uniform on an area that holds the source."""
         x0, x1, y0, y1 = self.extent
         return x0 + (x1 - x0) * rng.random(BATCH), y0 + (y1 - y0) * rng.random(BATCH)
 
-    def rays(self, n: int, seed: int) -> tuple[Array, Array]:
+    def rays(self, n: int, *, seed: int) -> tuple[Array, Array]:
         """Position and direction (n, 3) of rays of flux ``total_flux / n`` each; see the module."""
         rng = np.random.default_rng(seed)
 
         def batches() -> Iterator[tuple[Array, Array]]:
             while True:
-                z = np.stack([*self.positions(rng), *_on_disk(rng)])
-                yield _rays(*z[:, rng.random(BATCH) * self.ceiling < self.at(*z)])
+                x, y, p, q = z = np.stack([*self.positions(rng), *_on_disk(rng)])
+                yield _rays(*z[:, rng.random(BATCH) * self.ceiling < self.at(x=x, y=y, p=p, q=q)])
 
         return _first(n, batches())
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class _Disk(_Planar):
     """Lengths in mm, the luminance scale in cd/m²."""
 
@@ -142,7 +142,7 @@ class _Disk(_Planar):
         return self.centre[0] + self.radius * x, self.centre[1] + self.radius * y
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class LimbDarkenedDisk(_Disk):
     """Family 1: smooth and separable. The luminance falls by a third towards the limb, about a point beside the centre,
     along a tilted gradient; the deviation from the cosine law depends on the azimuth."""
@@ -157,7 +157,7 @@ class LimbDarkenedDisk(_Disk):
     def _surface(x: Array, y: Array) -> Array:
         return (1 - 0.3 * ((x - 0.25) ** 2 + (y + 0.15) ** 2)) * (1 + 0.18 * x - 0.11 * y)
 
-    def at(self, x: Array, y: Array, p: Array, q: Array) -> Array:
+    def at(self, *, x: Array, y: Array, p: Array, q: Array) -> Array:
         x, y = self.normalised(x, y)
         inside = x * x + y * y <= 1
         return self.scale * inside * self._surface(x, y) * _azimuthal(p, q, self.drop, (0.09, -0.06), 0.08)
@@ -169,7 +169,7 @@ class LimbDarkenedDisk(_Disk):
         return float(self.scale * area * (w @ self._surface(x, y)) * np.pi * (1 - self.drop / 3))
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Cut:
     """What a prism film lets through against u, the direction cosine along its pitch: a lobe 1 − dim u² between `low` and
     `high`, a side lobe beyond `side`, which has its sign, and a leak elsewhere."""
@@ -196,13 +196,13 @@ class Cut:
         return np.where(lobe, 1 - self.dim * u * u, np.where(beyond, self.side_level, self.leak))
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class PrismaticFilm(_Disk):
     """Family 2: two crossed prism films with different, oblique directions and sharp cut-offs on a smooth disk. The
     cut-offs of the first move with x, so that position and direction are not quite separable."""
 
-    first: ClassVar[Cut] = Cut(20.0, -0.52, 0.63, 0.25, 0.83, 0.35, 0.03)
-    second: ClassVar[Cut] = Cut(118.0, -0.45, 0.71, 0.15, -0.88, 0.25, 0.05)
+    first: ClassVar[Cut] = Cut(azimuth=20.0, low=-0.52, high=0.63, dim=0.25, side=0.83, side_level=0.35, leak=0.03)
+    second: ClassVar[Cut] = Cut(azimuth=118.0, low=-0.45, high=0.71, dim=0.15, side=-0.88, side_level=0.25, leak=0.05)
     walk: ClassVar[float] = 0.04
     """Shift of the first film's cut-offs from the centre of the disk to its rim."""
 
@@ -214,7 +214,7 @@ class PrismaticFilm(_Disk):
     def _surface(x: Array, y: Array) -> Array:
         return 1 + 0.2 * x - 0.14 * y - 0.3 * (x * x + y * y)
 
-    def at(self, x: Array, y: Array, p: Array, q: Array) -> Array:
+    def at(self, *, x: Array, y: Array, p: Array, q: Array) -> Array:
         x, y = self.normalised(x, y)
         (a, b), (c, d) = self.first.axis, self.second.axis
         films = self.first.through(a * p + b * q - self.walk * x) * self.second.through(c * p + d * q)
@@ -252,7 +252,7 @@ class PrismaticFilm(_Disk):
         return total
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class StructuredLed(_Planar):
     """Fine structure: a slanted die beside the origin with rounded corners, contact fingers at uneven distances, a bus bar
     and two bond wires across. Its own axes u, v have their origin in the middle of the die."""
@@ -305,7 +305,7 @@ class StructuredLed(_Planar):
             level *= np.where(np.abs(u - self._wire_middle(wire, v)) < self.wire_width / 2, 0.1, 1.0)
         return level
 
-    def at(self, x: Array, y: Array, p: Array, q: Array) -> Array:
+    def at(self, *, x: Array, y: Array, p: Array, q: Array) -> Array:
         (c, s), x, y = self.axes, x - self.centre[0], y - self.centre[1]
         return (
             self.scale * self._surface(c * x + s * y, c * y - s * x) * _azimuthal(p, q, self.drop, (0.05, 0.08), -0.1)
@@ -336,7 +336,7 @@ class StructuredLed(_Planar):
         return float(self.scale * MM2 * total * np.pi * (1 - self.drop / 3))
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class DieUnderDome:
     """Families 3 and 4: an L-shaped die with a dark contact finger on z = 0, in a hemisphere of index n about the origin.
 
@@ -361,7 +361,7 @@ class DieUnderDome:
     def extent(self) -> Extent:
         return -self.radius, self.radius, -self.radius, self.radius
 
-    def die_luminance(self, x: Array, y: Array, p: Array, q: Array) -> Array:
+    def die_luminance(self, *, x: Array, y: Array, p: Array, q: Array) -> Array:
         """Luminance [cd/m²] of the die inside the medium at x, y [mm] towards the direction cosines p, q there."""
         x0, x1, y0, y1 = self.die
         die = (x > x0) & (x < x1) & (y > y0) & (y < y1) & ~((x > self.notch[0]) & (y > self.notch[1]))
@@ -369,14 +369,14 @@ class DieUnderDome:
         angular = _azimuthal(p, q, self.drop, (0.12, -0.08), 0.1)
         return self.scale * die * contact * (1 + 0.35 * x - 0.25 * y) * angular
 
-    def transmittance(self, cos_inside: Array, cos_outside: Array) -> Array:
+    def transmittance(self, *, cos_inside: Array, cos_outside: Array) -> Array:
         """Of the dome's surface, for unpolarised light, from the cosines on both sides."""
         n = self.index
         s = (n * cos_inside - cos_outside) / (n * cos_inside + cos_outside)
         p = (n * cos_outside - cos_inside) / (n * cos_outside + cos_inside)
         return 1 - (s * s + p * p) / 2
 
-    def luminance(self, points: Array, directions: Array) -> Array:
+    def luminance(self, *, points: Array, directions: Array) -> Array:
         """Luminance [cd/m²] along lines; see the module."""
         nearest = points - np.sum(points * directions, axis=1)[:, None] * directions
         square = self.radius**2 - np.sum(nearest**2, axis=1)
@@ -388,7 +388,8 @@ class DieUnderDome:
         rises = inside[:, 2] > 0
         p, q, cosine = np.where(rises[:, None], inside, (0.0, 0.0, 1.0)).T
         x, y = leaves[:, 0] - leaves[:, 2] / cosine * p, leaves[:, 1] - leaves[:, 2] / cosine * q
-        die = self.transmittance(cos_inside, cos_outside) * self.die_luminance(x, y, p, q) / self.index**2
+        die = self.die_luminance(x=x, y=y, p=p, q=q) / self.index**2
+        die *= self.transmittance(cos_inside=cos_inside, cos_outside=cos_outside)
         return np.where((square > 0) & (leaves[:, 2] > 0), die * rises + self.floor_luminance, 0.0)
 
     def _exits(self, x: Array, y: Array, p: Array, q: Array) -> tuple[Array, Array, Array]:
@@ -401,7 +402,7 @@ class DieUnderDome:
         cos_inside = np.sum(normal * inside, axis=1)
         cos_outside = np.sqrt(1 - self.index**2 * (1 - cos_inside**2))  # no corner of the die is beyond R / n
         outside = self.index * inside + (cos_outside - self.index * cos_inside)[:, None] * normal
-        return leaves, outside, self.transmittance(cos_inside, cos_outside)
+        return leaves, outside, self.transmittance(cos_inside=cos_inside, cos_outside=cos_outside)
 
     @functools.cached_property
     def die_flux(self) -> float:
@@ -413,8 +414,13 @@ class DieUnderDome:
         for (a, b), (c, d) in itertools.product(itertools.pairwise(xs), itertools.pairwise(ys)):
             (gx, wx), (gy, wy) = _gauss(8, a, b), _gauss(8, c, d)
             x, y = (g.ravel() for g in np.meshgrid(gx, gy, indexing="ij"))
-            at = [np.repeat(x, len(p)), np.repeat(y, len(p)), np.tile(p, len(x)), np.tile(q, len(x))]
-            leaving = (self.die_luminance(*at) * self._exits(*at)[2]).reshape(len(x), len(p)) @ w
+            at = {
+                "x": np.repeat(x, len(p)),
+                "y": np.repeat(y, len(p)),
+                "p": np.tile(p, len(x)),
+                "q": np.tile(q, len(x)),
+            }
+            leaving = (self.die_luminance(**at) * self._exits(**at)[2]).reshape(len(x), len(p)) @ w
             total += float(np.outer(wx, wy).ravel() @ leaving)
         return total * MM2
 
@@ -427,7 +433,7 @@ class DieUnderDome:
         """Of the scatter floor [cd/m²]."""
         return self.floor * self.total_flux / (2 * np.pi**2 * self.radius**2 * MM2)
 
-    def rays(self, n: int, seed: int) -> tuple[Array, Array]:
+    def rays(self, n: int, *, seed: int) -> tuple[Array, Array]:
         """Position on the dome and direction (n, 3) of rays of flux ``total_flux / n`` each; see the module."""
         rng = np.random.default_rng(seed)
         x0, x1, y0, y1 = self.die
@@ -438,9 +444,9 @@ class DieUnderDome:
                 x, y = x0 + (x1 - x0) * rng.random(BATCH), y0 + (y1 - y0) * rng.random(BATCH)
                 p, q = _on_disk(rng)
                 level = rng.random(BATCH) * (1.6 * self.scale)
-                z = np.stack([x, y, p, q, level])[:, level < self.die_luminance(x, y, p, q)]
-                leaves, outside, share = self._exits(*z[:4])
-                keep = z[4] < self.die_luminance(*z[:4]) * share
+                x, y, p, q, level = np.stack([x, y, p, q, level])[:, level < self.die_luminance(x=x, y=y, p=p, q=q)]
+                leaves, outside, share = self._exits(x, y, p, q)
+                keep = level < self.die_luminance(x=x, y=y, p=p, q=q) * share
                 yield leaves[keep], outside[keep]
 
         def from_floor() -> Iterator[tuple[Array, Array]]:

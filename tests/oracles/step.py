@@ -33,7 +33,7 @@ class Step:
         unit = np.asarray(along, dtype=float) / np.linalg.norm(along)
         return self.add("DIRECTION('',({:.15f},{:.15f},{:.15f}))".format(*unit))
 
-    def file_of(self, shells: dict[str, list[str]], product: str = "t", unit: str = "mm") -> str:
+    def file_of(self, shells: dict[str, list[str]], *, product: str = "t", unit: str = "mm") -> str:
         """The file of one product: a solid for each closed shell, from its faces, with its name."""
         add = self.add
         closed = {name: add(f"CLOSED_SHELL('',({','.join(shell)}))") for name, shell in shells.items()}
@@ -121,10 +121,10 @@ CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dty
 CUBE_FACES: list[tuple[int, ...]] = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 
 
-def sphere(radius: float, unit: str = "mm", product: str = "t") -> str:
+def sphere(radius: float, *, unit: str = "mm", product: str = "t") -> str:
     """A ball."""
     step = Step()
-    return step.file_of({"": step.ball(radius)}, product, unit)
+    return step.file_of({"": step.ball(radius)}, product=product, unit=unit)
 
 
 def half_ball(radius: float) -> str:
@@ -150,4 +150,4 @@ def optics() -> str:
         "twin": step.polyhedron(2 * CUBE + np.array([2.0, 0.0, 0.0]), CUBE_FACES),
         "lens": step.ball(1.5, (20.0, 0.0, 0.0)),
     }
-    return step.file_of(shells, "optics")
+    return step.file_of(shells, product="optics")

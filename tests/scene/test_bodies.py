@@ -41,7 +41,7 @@ def crossed_in_turn(faces: Faces, lines: int) -> int:
     met = 0
     for _ in range(lines):
         d = rng.normal(size=3)
-        found = hits(faces, rng.uniform(-2.5, 2.5, 3) + TURNED["at"], d / np.linalg.norm(d))
+        found = hits(faces, o=rng.uniform(-2.5, 2.5, 3) + TURNED["at"], d=d / np.linalg.norm(d))
         cosines = [cosine for _, cosine, _ in found]
         assert len(found) % 2 == 0, found
         assert all(c < 0 for c in cosines[::2]), found
@@ -95,6 +95,6 @@ def test_volume(kind: str) -> None:
             # Lines farther from the middle than any body reaches cannot meet it.
             if u * u + v * v < 36:
                 o = np.array([1.0, -2.0, 0.5]) + axes[:, 0] * u + axes[:, 1] * v
-                t = [hit[0] for hit in hits(faces, o, axes[:, 2])]
+                t = [hit[0] for hit in hits(faces, o=o, d=axes[:, 2])]
                 total += sum(t[1::2]) - sum(t[::2])
     assert total * (side / n) ** 2 == pytest.approx(volume, rel=8e-3)

@@ -129,7 +129,7 @@ def test_what_a_file_cannot_hold_is_refused_before_it_takes_memory(tmp_path: Pat
     for name, (content, _) in BOMBS.items():
         (tmp_path / name).write_bytes(content)
     imports = "import trimesh, scipy.spatial\nfrom etendue.scene.mesh_files import read_mesh"
-    found = told(imports, "read_mesh(path, None)", [tmp_path / name for name in BOMBS], SPARE)
+    found = told(imports=imports, call="read_mesh(path, None)", paths=[tmp_path / name for name in BOMBS], spare=SPARE)
     for line, (name, (_, place)) in zip(found, BOMBS.items(), strict=True):
         assert f"{name}: {place}" in line
 

@@ -27,7 +27,7 @@ def face(shape: dict[str, Any], **keys: Any) -> list[dict[str, Any]]:
 
 def met(faces: list[dict[str, Any]], o: Any, d: Any) -> list[float]:
     d = np.array(d, dtype=float)
-    return [round(t, 9) for t, _, _ in hits(faces, np.array(o, dtype=float), d / np.linalg.norm(d))]
+    return [round(t, 9) for t, _, _ in hits(faces, o=np.array(o, dtype=float), d=d / np.linalg.norm(d))]
 
 
 def test_every_shape_is_tested() -> None:
@@ -71,7 +71,7 @@ def test_light_from_the_focus_goes_to_the_other(mirror: Any, target: float | Non
     for _ in range(200):
         d = rng.normal(size=3)
         d /= np.linalg.norm(d)
-        for t, _, _ in hits([{"shape": record, "frame": IDENTITY, "trims": [], "flip": False}], focus, d):
+        for t, _, _ in hits([{"shape": record, "frame": IDENTITY, "trims": [], "flip": False}], o=focus, d=d):
             if t <= 0:
                 continue
             p = focus + t * d
@@ -96,7 +96,7 @@ def test_the_record_of_a_conic_is_its_sag(radius: float, conic: float) -> None:
     end = min(profile.reach(), 4.0)
     record = {"shape": profile.record(0.0, end), "frame": IDENTITY, "trims": [], "flip": False}
     for r in np.linspace(0.01, 0.99, 23) * end:
-        found = hits([record], np.array([r, 0.0, -50.0]), np.array([0.0, 0.0, 1.0]))
+        found = hits([record], o=np.array([r, 0.0, -50.0]), d=np.array([0.0, 0.0, 1.0]))
         assert len(found) == 1
         assert found[0][0] - 50.0 == pytest.approx(profile.sag(float(r)), abs=1e-9)
         assert found[0][1] > 0.0

@@ -76,7 +76,7 @@ def test_one_of_several_bodies_is_chosen(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("unit", "mm"), [("mm", 1.0), ("inch", 25.4), ("m", 1000.0)])
 def test_units_of_the_file_count(unit: str, mm: float, tmp_path: Path) -> None:
     """A ball of radius 10 in each of them; its triangles follow its size."""
-    bodies = step_bodies(stored(tmp_path, step.sphere(10.0, unit, "bead")))
+    bodies = step_bodies(stored(tmp_path, step.sphere(10.0, unit=unit, product="bead")))
     assert bodies is not None
     (body,) = bodies
     assert body.name == "bead"
@@ -138,7 +138,7 @@ def test_the_chord_error_is_told_wherever_the_body_is_used(tmp_path: Path) -> No
 
 
 def test_a_tolerance_that_asks_for_too_many_triangles_is_refused(tmp_path: Path) -> None:
-    stored(tmp_path, step.sphere(10.0, "m"))
+    stored(tmp_path, step.sphere(10.0, unit="m"))
     with pytest.raises(SceneError, match=r"0.001 mm would take about \S+ triangles.*Give a larger 'tolerance'"):
         compile_scene(glass(tmp_path, kind="mesh", file="optics.step", tolerance=0.001))
 

@@ -257,7 +257,9 @@ def reflected_once(points: Array) -> Array:
     # Equal heights of a sphere have equal areas.
     area = np.repeat(weight / 2 * (top + RADIUS) * RADIUS * 2 * math.pi / 240, 240)
     r = np.sqrt(RADIUS**2 - z**2)[:, None]
-    wall = np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(z[:, None], (120, 240))], axis=-1).reshape(-1, 3)
+    wall = np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(z[:, None], (120, 240))], axis=-1).reshape(
+        -1, 3
+    )
     normals = wall / RADIUS
     sent = REFLECTANCE / math.pi * direct(wall, normals=normals) * area
 

@@ -82,7 +82,7 @@ def test_far_field_of_a_cosine_emitter(exponent: float) -> None:
         cosine = np.sin(gamma) * np.cos(c) * axis[0] + np.sin(gamma) * np.sin(c) * axis[1] + np.cos(gamma) * axis[2]
         return flux * (exponent + 1) / (2 * np.pi) * np.maximum(cosine, 0.0) ** exponent
 
-    expected = hat_means(intensity, far.c, far.gamma)[0]
+    expected = hat_means(intensity, c=far.c, gamma=far.gamma)[0]
     assert far.flux == pytest.approx(flux, rel=1e-12)
     # Nodes whose hats have no ray in common.
     expected, far_values, far_errors = (a[::2, 1:-1:2] for a in (expected, far.values, far.standard_error))
@@ -239,6 +239,6 @@ def test_luminance_out_of_a_dome() -> None:
     def intensity(_: Array, gamma: Array) -> Array:
         return transmittance * flux / math.pi * np.maximum(np.cos(np.radians(gamma)), 0.0) + 0.0 * _
 
-    expected = hat_means(intensity, far.c, far.gamma)[0]
+    expected = hat_means(intensity, c=far.c, gamma=far.gamma)[0]
     apart = np.s_[::2, 1:9:2]
     assert_agree(values=far.values[apart], standard_error=far.standard_error[apart], expected=expected[apart])

@@ -87,7 +87,7 @@ def test_transmission_of_other_films_in_skew_directions() -> None:
     n, through = 60_000, []
     for theta, phi in np.radians(directions):
         view = [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
-        through.append(seen_through(np.tile(view, (n, 1)), 1.49, 0.37, rng).mean())
+        through.append(seen_through(np.tile(view, (n, 1)), index=1.49, thickness=0.37, rng=rng).mean())
     share = np.array(through)
     assert ((share > 0.1) & (share < 0.96)).all()
     assert_same(found, error, share, np.sqrt(share * (1 - share) / n))
@@ -99,7 +99,9 @@ def mean_transmission() -> tuple[float, float]:
     n = 100_000
     radius, azimuth = np.sqrt(rng.random(n)), 2 * math.pi * rng.random(n)
     p, q = radius * np.cos(azimuth), radius * np.sin(azimuth)
-    share = float(seen_through(np.stack([p, q, np.sqrt(1 - radius**2)], axis=1), 1.59, 1.0, rng).mean())
+    share = float(
+        seen_through(np.stack([p, q, np.sqrt(1 - radius**2)], axis=1), index=1.59, thickness=1.0, rng=rng).mean()
+    )
     return share, math.sqrt(share * (1 - share) / n)
 
 

@@ -193,7 +193,7 @@ def test_with_what_lines_of_sight_find_besides() -> None:
 
 def test_rays_as_a_source_are_counted_once() -> None:
     """Among diffuse surfaces, lines of sight add to events only what they see where all is black: the field that was fitted
-    to the rays of the source, which is in view. The events are those of lines of sight that start from its true luminance."""
+    to the rays of the source, which is in view. What events show is what lines of sight show of the lamps themselves."""
     led = {"name": "led", "kind": "surface", "shape": {"kind": "rectangle", "width": 6, "height": 4}, "flux": 100,
            "at": [2, 3, 14], "toward": [0.3, 0.1, -1]}  # fmt: skip
     # Behind the lamp a second one, that shines up.
