@@ -12,7 +12,7 @@ from etendue.errors import FormatError
 from etendue.tracing import storage
 from oracles.beams import PEAK, beam, direction, lobe, rays_of, searchlight
 from oracles.intensity import hat_means, read_by_trapezium
-from oracles.verdicts import LARGEST_Z, assert_drawn_with
+from oracles.verdicts import LARGEST_Z, assert_agree, assert_drawn_with
 
 Array = npt.NDArray[np.float64]
 
@@ -65,7 +65,15 @@ def test_two_beams_and_a_batwing(tmp_path: Path) -> None:
         far = et.intensity_distribution(rays)
         assert read_back(far, tmp_path) == pytest.approx([90.0, 90.0], rel=1e-3)
         assert abs(far.maximum - peak) < LARGEST_Z * far.maximum_error + 0.1 * peak * (rays is wings)
-    assert far.in_direction([0, 0, 1]) == pytest.approx(90.0 / (3.0 * np.pi), rel=0.15)
+
+    def batwing(c: Array, gamma: Array) -> Array:
+        cosine = np.cos(np.radians(np.minimum(gamma, 60.0)))
+        return np.where(gamma < 60.0, 90.0 / (3.0 * np.pi * cosine**3), 0.0) + 0.0 * c
+
+    expected = hat_means(batwing, c=far.c, gamma=far.gamma)[0]
+    # Nodes whose hats have no ray in common, away from the edge.
+    apart = np.s_[:: 1 if far.c.size == 1 else 2, 1 : int(np.searchsorted(far.gamma, 50.0)) : 2]
+    assert_agree(values=far.values[apart], expected=expected[apart], standard_error=far.standard_error[apart])
 
 
 def test_light_of_no_width_says_what_sets_its_peak(tmp_path: Path) -> None:
@@ -80,6 +88,7 @@ def test_few_rays_of_a_lambertian_source_make_no_spike() -> None:
     z = []
     for seed in range(20):
         far = et.intensity_distribution(rays_of((beam(10_000, exponent=1.0, c=0.0, gamma=0.0, seed=seed), np.pi)))
+        assert far.flux == pytest.approx(np.pi, rel=1e-9)
         assert far.standard_error[0, 0] < 0.1
         assert far.maximum < 1.4
         z.append((far.maximum - 1.0) / far.maximum_error)
@@ -96,6 +105,7 @@ def test_errors_of_nodes_cover_the_truth_over_seeds(exponent: float, c: float, g
     inside = 0
     for seed in range(seeds):
         far = et.intensity_distribution(rays_of((beam(n, exponent=exponent, c=c, gamma=gamma, seed=1000 + seed), flux)))
+        assert far.flux == pytest.approx(flux, rel=1e-9)
         near = direction(c=far.c[:, None], gamma=far.gamma) @ direction(c=c, gamma=gamma)
         i, j = np.unravel_index(int(np.argmax(near)), near.shape)
         truth = flux * float(lobe(exponent=exponent, c=c, gamma=gamma)(far.c[i], far.gamma[j]))

@@ -72,7 +72,7 @@ def test_a_symmetric_source_is_found_and_its_errors_shrink() -> None:
     # The half-turn is part of either symmetry; the trees on moved grids, each by itself, know none.
     np.testing.assert_allclose(value[2:], value[:2], rtol=1e-6)
     np.testing.assert_allclose(error[2:], error[:2], rtol=1e-6)
-    assert (np.abs(value - rays.luminance(points=3, directions=4)) < 4 * error).all()
+    assert (np.abs(value - rays.luminance(3, 4)) < 4 * error).all()
 
 
 def test_what_a_field_was_folded_by_is_known_and_kept(tmp_path: Path) -> None:
