@@ -25,7 +25,7 @@ def exponent(fwhm: float) -> float:
 def wings(seed: int) -> Array:
     """Directions of a batwing, I ∝ sin²γ cos γ: sin⁴γ is even."""
     rng = np.random.default_rng(seed)
-    return direction(rng.uniform(0, 360, RAYS), np.degrees(np.arcsin(rng.random(RAYS) ** 0.25)))
+    return direction(c=rng.uniform(0, 360, RAYS), gamma=np.degrees(np.arcsin(rng.random(RAYS) ** 0.25)))
 
 
 def batwing(c: Array, gamma: Array) -> Array:
@@ -35,7 +35,9 @@ def batwing(c: Array, gamma: Array) -> Array:
 
 def one(fwhm: float, c: float, gamma: float) -> tuple[Callable[[int], et.RaySet], Function]:
     n = exponent(fwhm)
-    return (lambda seed: rays_of((beam(RAYS, n, c, gamma, seed), 1.0))), lobe(n, c, gamma)
+    return (lambda seed: rays_of((beam(RAYS, exponent=n, c=c, gamma=gamma, seed=seed), 1.0))), lobe(
+        exponent=n, c=c, gamma=gamma
+    )
 
 
 def lopsided() -> tuple[Callable[[int], et.RaySet], Function]:
@@ -44,10 +46,12 @@ def lopsided() -> tuple[Callable[[int], et.RaySet], Function]:
     n = RAYS // 2
 
     def rays(seed: int) -> et.RaySet:
-        parts = [beam(n, exponent(w), c, g, 2 * seed + i) for i, (w, c, g) in enumerate((wide, narrow))]
+        parts = [
+            beam(n, exponent=exponent(w), c=c, gamma=g, seed=2 * seed + i) for i, (w, c, g) in enumerate((wide, narrow))
+        ]
         return rays_of((parts[0], 0.7), (parts[1], 0.3))
 
-    lobes = [lobe(exponent(w), c, g) for w, c, g in (wide, narrow)]
+    lobes = [lobe(exponent=exponent(w), c=c, gamma=g) for w, c, g in (wide, narrow)]
     return rays, lambda c, gamma: np.asarray(0.7 * lobes[0](c, gamma) + 0.3 * lobes[1](c, gamma))
 
 
@@ -108,7 +112,8 @@ def test_the_largest_of_values_that_are_alike_is_not_the_peak() -> None:
     for seed in SEEDS:
         rng = np.random.default_rng(seed)
         far = et.intensity_distribution(
-            rays_of((direction(rng.uniform(0, 360, RAYS), np.degrees(np.arccos(rng.uniform(-1, 1, RAYS)))), 4 * np.pi)),
+            rays_of((direction(c=rng.uniform(0, 360, RAYS), gamma=np.degrees(np.arccos(rng.uniform(-1, 1, RAYS)))),
+                     4 * np.pi)),
             24, 7.5,
         )  # fmt: skip
         peaks.append((far.peak_intensity - 1.0) / far.peak_error)

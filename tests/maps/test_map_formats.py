@@ -227,7 +227,12 @@ def test_tiff_tags_that_announce_more_than_the_file_has_are_refused_in_little_me
             break
     assert changed
     path.write_bytes(content)
-    (found,) = told("from etendue.formats.maps import read_map\nimport tifffile", "read_map(path)", [path], 300 << 20)
+    (found,) = told(
+        imports="from etendue.formats.maps import read_map\nimport tifffile",
+        call="read_map(path)",
+        paths=[path],
+        spare=300 << 20,
+    )
     assert found.startswith(f"{path}: tag {tag}: 2,147,483,648 values"), found
 
 

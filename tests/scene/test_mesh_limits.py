@@ -197,7 +197,9 @@ def test_texts_that_no_memory_holds_name_file_and_size(tmp_path: Path) -> None:
     for name, content in TEXTS.items():
         (tmp_path / name).write_bytes(content)
     imports = "import trimesh, scipy.spatial\nfrom etendue.scene.mesh_files import read_mesh"
-    found = told(imports, "read_mesh(path, None)", [tmp_path / name for name in TEXTS], 250 << 20)
+    found = told(
+        imports=imports, call="read_mesh(path, None)", paths=[tmp_path / name for name in TEXTS], spare=250 << 20
+    )
     for line, (name, content) in zip(found, TEXTS.items(), strict=True):
         assert line.startswith(f"MemoryLimitError {tmp_path / name}: to read a mesh of {len(content):,} bytes"), line
 
@@ -220,7 +222,7 @@ def test_what_is_asked_for_covers_what_is_taken(tmp_path: Path) -> None:
     path.write_bytes(content)
     imports = "import trimesh, scipy.spatial\nfrom etendue.scene.mesh_files import read_mesh"
     asked = len(content) + WORD_BYTES * 900_000
-    (found,) = told(imports, "read_mesh(path, None)", [path], asked + (64 << 20))
+    (found,) = told(imports=imports, call="read_mesh(path, None)", paths=[path], spare=asked + (64 << 20))
     assert found.startswith(f"MemoryLimitError {path}: a mesh of 899,998 triangles needs"), found
 
 

@@ -88,7 +88,7 @@ def test_what_a_file_cannot_hold_is_refused_in_little_memory(name: str, result: 
     change, expected = BOMBS[name]
     with h5py.File(path, "r+") as file:
         change(file)
-    (found,) = told("import etendue, h5py", "etendue.TraceResult.load(path)", [path], SPARE)
+    (found,) = told(imports="import etendue, h5py", call="etendue.TraceResult.load(path)", paths=[path], spare=SPARE)
     assert found.startswith(f"{path}: "), found
     assert re.search(expected, found), found
 
