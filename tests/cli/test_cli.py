@@ -513,7 +513,8 @@ def test_a_screen_that_sees_nothing_ends_well_with_a_hint(run: Run, folder: Path
     )
     people = run(*arguments, "-o", "b.npz")
     assert people.status == 0
-    assert "hint: " in people.err
+    assert "the screen shows 0.0% of the light" in people.out
+    assert "about the target" in people.out
 
 
 @pytest.fixture
@@ -697,3 +698,10 @@ def test_warnings_of_the_api_are_not_printed_twice(run: Run, folder: Path) -> No
     with pytest.warns(RayFileWarning, match="negative flux"):
         et.read_rays(folder / "bad.csv").tally  # noqa: B018
     assert run("convert", folder / "bad.csv", "out.csv").err.count("negative flux") == 1
+
+
+def test_no_help_text_loses_words_to_markup() -> None:
+    """Words in square brackets would be taken for a style and left out."""
+    texts = [(name, getattr(option, "help", None) or "") for name, verb in verbs().items() for option in verb.params]
+    assert len(texts) > 100
+    assert [(name, text) for name, text in texts if "[" in text] == []

@@ -24,7 +24,7 @@ def draw(
         list[str] | None,
         typer.Option(
             "--section",
-            help="Plane across one of the axes, in mm, e.g. z=12.5; up to three [y=0 and x=0].",
+            help="Plane across one of the axes, in mm, e.g. z=12.5; up to three (y=0 and x=0).",
             show_default=False,
         ),
     ] = None,

@@ -43,14 +43,14 @@ def intensity(
     c_planes: Annotated[
         int | None,
         typer.Option(
-            "--c-planes", help="Half planes C [of rays: chosen from them; of a field: 36].", min=1, show_default=False
+            "--c-planes", help="Half planes C (of rays: chosen from them; of a field: 36).", min=1, show_default=False
         ),
     ] = None,
     gamma_step: Annotated[
         float | None,
         typer.Option(
             "--gamma-step",
-            help="Step of γ in degrees [of rays: chosen from them; of a field: 2.5].",
+            help="Step of γ in degrees (of rays: chosen from them; of a field: 2.5).",
             show_default=False,
         ),
     ] = None,

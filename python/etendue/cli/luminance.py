@@ -19,6 +19,8 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.lightfield.light_field import LightField
 from etendue.luminance.estimate import METHODS, Acceptance, luminance_map
+from etendue.luminance.framing import centre_of_light, framed, probe
+from etendue.luminance.opening import SCENE_EXTENSION
 from etendue.luminance.scene_map import DEFAULT_RAYS_PER_PIXEL
 from etendue.plot.map_picture import SCALES, plot_map
 from etendue.quantities.luminance_map import LuminanceMap
@@ -29,8 +31,6 @@ from etendue.scene.framing import framed_screen
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.tracing.result import TraceResult
 from etendue.tracing.storage import is_result_file
-
-SCENE_EXTENSION = ".toml"
 
 
 def luminance(
@@ -56,10 +56,20 @@ def luminance(
     ] = None,
     size: Annotated[
         str | None,
-        typer.Option("--size", help="Width and height of the screen in mm; a scene is framed without.", metavar="W,H"),
+        typer.Option(
+            "--size", help="Width and height of the screen in mm; framed to what is seen if not given.", metavar="W,H"
+        ),
     ] = None,
     distance: Annotated[float, typer.Option("--distance", help="From target to observer in mm.")] = 1000.0,
-    target: Annotated[str, typer.Option("--target", help="Point looked at, in mm.", metavar="X,Y,Z")] = "0,0,0",
+    target: Annotated[
+        str | None,
+        typer.Option(
+            "--target",
+            help="Point looked at, in mm (0,0,0; of rays and light fields without --size, where the light is).",
+            metavar="X,Y,Z",
+            show_default=False,
+        ),
+    ] = None,
     pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
     plane: Annotated[str, typer.Option("--plane", help="view or xy.")] = "view",
     method: Annotated[
@@ -73,25 +83,25 @@ def luminance(
         str | None,
         typer.Option(
             "--acceptance",
-            help="Half-angle of the cone in degrees [1.5], or auto: the one of least error.",
+            help="Half-angle of the cone in degrees (1.5), or auto: the one of least error.",
             show_default=False,
         ),
     ] = None,
     surface: Annotated[
         str | None,
-        typer.Option("--surface", help="Carrier surface of the light field, as for fit [auto].", show_default=False),
+        typer.Option("--surface", help="Carrier surface of the light field, as for fit (auto).", show_default=False),
     ] = None,
     samples: Annotated[
         int | None,
         typer.Option(
-            "--samples", help="Points per pixel at which a light field is read [16].", min=1, show_default=False
+            "--samples", help="Points per pixel at which a light field is read (16).", min=1, show_default=False
         ),
     ] = None,
     rays_per_pixel: Annotated[
         int | None,
         typer.Option(
             "--rays-per-pixel",
-            help="Lines of sight per pixel of a scene [256]; of scatter events, for what they leave out [none].",
+            help="Lines of sight per pixel of a scene (256); of scatter events, for what they leave out (none).",
             min=1,
             show_default=False,
         ),
@@ -100,12 +110,12 @@ def luminance(
         float | None,
         typer.Option("--until", help="Of a scene: follow more until this median relative error is reached, e.g. 0.01."),
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Of a scene [1].", min=0, show_default=False)] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Of a scene (1).", min=0, show_default=False)] = None,
     forward_rays: Annotated[
         float | None,
         typer.Option(
             "--forward-rays",
-            help="Of a scene: rays traced forwards besides, for caustics and beams [as many as they need]; 0: none.",
+            help="Of a scene: rays traced forwards besides, for caustics and beams (as many as they need); 0: none.",
             min=0,
             show_default=False,
         ),
@@ -137,24 +147,11 @@ def luminance(
     one_of(method, METHODS, "--method")
     one_of(plane, PLANES, "--plane")
     one_of(scale, SCALES, "--scale")
-    x, y, z = numbers(target, 3, "--target", "0,0,0")
     scene = Scene.load(file) if file.suffix.lower() == SCENE_EXTENSION else None
     kept = _kept(file, detector)
     looked = kept if isinstance(kept, ScatterEvents) else scene
     own = looked.scene if isinstance(looked, ScatterEvents) else scene
-    if own is not None and observer is None and size is None:
-        seen = [(keys.name, keys.observer(), keys.screen.screen()) for keys in own.observers]
-        if not seen:
-            raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
-    else:
-        looking = [Observer(theta, phi, distance, (x, y, z)) for theta, phi in _angles(observer)]
-        seen = [("", o, s) for o, s in zip(looking, _screens(own, looking, size, pixels, plane), strict=True)]
-    targets, everything = _targets(output, seen)
-    check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
-
     for_rays = {"--method": "cone" if method == "cone" else None, "--acceptance": acceptance, "--surface": surface}
-    observers, screens = [o for _, o, _ in seen], [s for _, _, s in seen]
-    source: RaySet | LightField | None = None
     for_scenes = {
         "--rays-per-pixel": rays_per_pixel,
         "--until": until,
@@ -162,6 +159,9 @@ def luminance(
         "--forward-rays": forward_rays,
         "--gather": gather or None,
     }
+    own_observers = own is not None and observer is None and size is None
+    angles = [] if own_observers else _angles(observer)
+    source: RaySet | LightField | None = None
     if looked is not None:
         for_others = {
             "--method": None if method == "auto" else method,
@@ -173,6 +173,24 @@ def luminance(
         }
         what = "is a scene" if kept is None else "holds scatter events"
         _refuse(for_others, f"for rays and light fields; {file} {what}")
+    else:
+        _refuse(for_scenes, f"for scenes; {file} is none")
+        if isinstance(kept, RaySet):
+            source = in_unit(with_flux(kept, flux), unit)
+        else:
+            source = read_source(file, flux, unit, for_rays)
+    if own is not None and own_observers:
+        seen = [(keys.name, keys.observer(), keys.screen.screen()) for keys in own.observers]
+        if not seen:
+            raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
+    else:
+        views = _views(own or source, angles, distance, target, size, pixels, plane)
+        seen = [("", *view) for view in views]
+    targets, everything = _targets(output, seen)
+    check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
+
+    observers, screens = [o for _, o, _ in seen], [s for _, _, s in seen]
+    if looked is not None:
         with progress_bar(*_work(looked, screens, rays_per_pixel)) as progress:
             maps = luminance_map(
                 looked,
@@ -187,14 +205,9 @@ def luminance(
                 threads=threads,
                 progress=progress,
             )
-    else:
-        _refuse(for_scenes, f"for scenes; {file} is none")
+    elif source is not None:
         cone = None if acceptance is None else _acceptance(acceptance)
         carrier = "auto" if surface is None else surface_option(surface)
-        if isinstance(kept, RaySet):
-            source = in_unit(with_flux(kept, flux), unit)
-        else:
-            source = read_source(file, flux, unit, for_rays)
         with progress_bar("rays", len(source)) if isinstance(source, RaySet) else nullcontext() as progress:
             maps = luminance_map(
                 source,
@@ -216,8 +229,6 @@ def luminance(
         return
     for line in (*complaints, *(f"note: {note}" for note in losses)):
         complain(line)
-    if source is not None and not any((lmap.values > 0).any() for lmap in maps):
-        _hint(source, (x, y, z), max(screens[0].width, screens[0].height))
     for lmap, paths in zip(maps, targets, strict=True):
         print_map(lmap)
         for path in paths:
@@ -280,16 +291,34 @@ def _angles(observer: list[str] | None) -> list[tuple[float, ...]]:
     return [numbers(text, 2, "--observer", "30,0") for text in observer]
 
 
-def _screens(scene: Scene | None, observers: list[Observer], size: str | None, pixels: str, plane: str) -> list[Screen]:
-    """One screen for each observer: of the stated size, or one on which all of the scene is seen."""
+def _views(
+    source: Scene | RaySet | LightField | None,
+    angles: list[tuple[float, ...]],
+    distance: float,
+    target: str | None,
+    size: str | None,
+    pixels: str,
+    plane: str,
+) -> list[tuple[Observer, Screen]]:
+    """Observers with their screens: of the stated size, or framed to what each sees of the source."""
     columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
-    if size is None and scene is not None and plane == "view":
-        compiled = compile_scene(scene)
-        return [framed_screen(compiled, observer, columns, rows) for observer in observers]
+    to_frame = size is None and plane == "view"
+    some = probe(source) if to_frame and isinstance(source, RaySet | LightField) else None
+    if target is not None:
+        middle = numbers(target, 3, "--target", "0,0,0")
+    else:
+        middle = (0.0, 0.0, 0.0) if some is None else centre_of_light(some)
+    observers = [Observer(theta, phi, distance, (middle[0], middle[1], middle[2])) for theta, phi in angles]
+    if some is not None:
+        return [(observer, framed(some, observer, columns, rows)) for observer in observers]
+    if to_frame and isinstance(source, Scene):
+        compiled = compile_scene(source)
+        return [(observer, framed_screen(compiled, observer, columns, rows)) for observer in observers]
     if size is None:
         raise typer.BadParameter("give the screen's width and height in mm, e.g. --size 25,25", param_hint="--size")
     width, height = numbers(size, 2, "--size", "25,25")
-    return [Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")] * len(observers)
+    screen = Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")
+    return [(observer, screen) for observer in observers]
 
 
 def _refuse(options: Mapping[str, object], why: str) -> None:
@@ -301,17 +330,6 @@ def _refuse(options: Mapping[str, object], why: str) -> None:
 def _acceptance(text: str) -> Acceptance:
     """The half-angle that an option states, or "auto"."""
     return "auto" if text.strip() == "auto" else numbers(text, 1, "--acceptance", "1.5, or --acceptance auto")[0]
-
-
-def _hint(source: RaySet | LightField, target: tuple[float, float, float], size: float) -> None:
-    """Where to look, if the source lies off a screen on which nothing is seen."""
-    if isinstance(source, RaySet):
-        middle, what = source.moments().bounds.mean(axis=1), "the rays start"
-    else:
-        middle, what = np.mean([part.centre for part in source.surface.parts()], axis=0), "the light field lies"
-    if np.linalg.norm(middle - target) > size / 2:
-        centre, looked_at = (",".join(f"{c:.4g}" for c in point) for point in (middle, target))
-        complain(f"hint: {what} around {centre} mm, off the screen about {looked_at}: try --target {centre}")
 
 
 def write_map(lmap: LuminanceMap, paths: list[Path], scale: str) -> list[str]:

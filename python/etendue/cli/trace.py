@@ -80,7 +80,7 @@ def trace(
     rays: Annotated[
         str | None,
         typer.Option(
-            "--rays", help="Rays of all sources, e.g. 1e8 [1e7; of ray files alone: all].", show_default=False
+            "--rays", help="Rays of all sources, e.g. 1e8 (1e7; of ray files alone: all).", show_default=False
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", help="0 to 2^64 - 1.", min=0)] = 1,

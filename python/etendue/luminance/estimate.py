@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Literal, get_args, overload
 
@@ -15,14 +16,17 @@ from etendue.lightfield.probe import check_near_field
 from etendue.lightfield.surfaces import Surface
 from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
 from etendue.luminance.cone import ConeEstimate, ConeView, check_acceptance, cone_estimates
+from etendue.luminance.framing import framed, missed_notes, probe
 from etendue.luminance.looking import look_at_field
+from etendue.luminance.opening import open_source
 from etendue.luminance.scatter_map import look_at_events
 from etendue.luminance.scene_map import Looking, look_at_scene
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.memory import require_memory
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally
-from etendue.scene import Scene
+from etendue.scene import Scene, compile_scene
+from etendue.scene.framing import framed_screen
 from etendue.scene.scatter_events import ScatterEvents
 
 Method = Literal["auto", "cone", "lightfield"]
@@ -44,9 +48,9 @@ DEFAULT_SAMPLES = 16
 
 @overload
 def luminance_map(
-    source: RayStream | LightField,
+    source: RayStream | LightField | str | os.PathLike[str],
     observer: Observer,
-    screen: Screen,
+    screen: Screen | None = ...,
     *,
     method: Method = ...,
     acceptance: Acceptance = ...,
@@ -58,9 +62,9 @@ def luminance_map(
 ) -> LuminanceMap: ...
 @overload
 def luminance_map(
-    source: RayStream | LightField,
+    source: RayStream | LightField | str | os.PathLike[str],
     observer: Sequence[Observer],
-    screen: Screen | Sequence[Screen],
+    screen: Screen | Sequence[Screen] | None = ...,
     *,
     method: Method = ...,
     acceptance: Acceptance = ...,
@@ -72,9 +76,9 @@ def luminance_map(
 ) -> list[LuminanceMap]: ...
 @overload
 def luminance_map(
-    source: Scene | ScatterEvents,
+    source: Scene | ScatterEvents | str | os.PathLike[str],
     observer: Observer,
-    screen: Screen,
+    screen: Screen | None = ...,
     *,
     rays_per_pixel: int | None = ...,
     until: float | None = ...,
@@ -87,7 +91,7 @@ def luminance_map(
 ) -> LuminanceMap: ...
 @overload
 def luminance_map(
-    source: Scene | ScatterEvents,
+    source: Scene | ScatterEvents | str | os.PathLike[str],
     observer: Sequence[Observer] | None = ...,
     screen: Screen | Sequence[Screen] | None = ...,
     *,
@@ -101,7 +105,7 @@ def luminance_map(
     progress: Progress | None = ...,
 ) -> list[LuminanceMap]: ...
 def luminance_map(
-    source: RayStream | LightField | Scene | ScatterEvents,
+    source: RayStream | LightField | Scene | ScatterEvents | str | os.PathLike[str],
     observer: Observer | Sequence[Observer] | None = None,
     screen: Screen | Sequence[Screen] | None = None,
     *,
@@ -127,14 +131,16 @@ def luminance_map(
 
     Parameters
     ----------
-    source : RayStream, LightField, Scene or ScatterEvents
+    source : RayStream, LightField, Scene, ScatterEvents or path
         A ray set, a source that draws its rays on demand, an index of rays, the light field that was fitted to one, a
         scene, or the scatter events of a trace. Ray sets in a scene are fitted first, since rays have no luminance that a
-        line of sight could meet.
+        line of sight could meet. Of a path, what the file holds: a scene (``.toml``), a light field or rays.
     observer : Observer or sequence of Observer
         Any number is served by one pass over the rays. Of a scene, None: its own observers with their screens.
     screen : Screen or sequence of Screen
-        One for all observers, or one each.
+        One for all observers, or one each. None: for each observer one of 128 × 128 pixels about his target, on which he
+        sees the whole scene, or all light that heads for him but strays. A screen that shows less than nine tenths of the
+        light that rays or a field send to the observer says so in the map's notes.
     method : {"auto", "cone", "lightfield"}
         ``"lightfield"``: fit a light field to all rays, then look at it. ``"cone"``: only rays that head for the observer,
         eqs. 2.2 to 2.4 of [Audenaert2014]_. ``"auto"``: the light field, unless an acceptance is given or the rays are
@@ -206,6 +212,8 @@ def luminance_map(
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
+    if isinstance(source, str | os.PathLike):
+        source = open_source(source)
     for_scenes = {
         "rays_per_pixel": rays_per_pixel,
         "until": until,
@@ -224,23 +232,11 @@ def luminance_map(
     if needless:
         owner, here = ("rays and light fields", "scene") if is_scene else ("scenes", "ray set or light field")
         raise ArgumentError(f"{', '.join(needless)}: for {owner}, and the source is a {here}; leave it out.")
-    if is_scene and observer is None and screen is None:
-        scene = source.scene if isinstance(source, ScatterEvents) else source
-        if not (isinstance(scene, Scene) and scene.observers):
-            raise ArgumentError("the scene has no observers; give an observer and a screen.")
-        observer = [keys.observer() for keys in scene.observers]
-        screen = [keys.screen.screen() for keys in scene.observers]
-    if observer is None or screen is None:
-        raise ArgumentError("give an observer and a screen.")
-    observers = [observer] if isinstance(observer, Observer) else list(observer)
-    screens = [screen] * len(observers) if isinstance(screen, Screen) else list(screen)
-    if len(observers) != len(screens) or not observers:
-        raise ArgumentError(f"{len(observers)} observers and {len(screens)} screens; give one screen, or one for each.")
-    pairs = list(zip(observers, screens, strict=True))
+    pairs = _pairs(source, observer, screen)
     # A stated acceptance asks for the cone, and so does an index, which was built for nothing else.
     by_cone = method == "cone" or (method == "auto" and (acceptance is not None or isinstance(source, RayIndex)))
     if not by_cone:
-        _require_memory(source, screens)
+        _require_memory(source, [screen for _, screen in pairs])
     if isinstance(source, Scene | ScatterEvents):
         given = {name: value for name, value in for_scenes.items() if value is not None}
         how = Looking(**given, cache=cache, threads=threads)  # type: ignore[arg-type]
@@ -267,6 +263,7 @@ def luminance_map(
     else:
         check_near_field(source)
         maps = _by_cone(source, pairs, acceptance, threads, progress)
+    maps = _with_missed(source, maps)
     return maps[0] if isinstance(observer, Observer) else maps
 
 
@@ -282,6 +279,48 @@ def _require_memory(source: RayStream | LightField | Scene | ScatterEvents, scre
     name = source.name if isinstance(source, Scene | ScatterEvents) else source.provenance.source
     while_made = SCENE_PIXEL_BYTES if isinstance(source, Scene | ScatterEvents) else FIELD_PIXEL_BYTES
     require_memory(while_made * max(pixels) + KEPT_PIXEL_BYTES * sum(pixels), f"{name or 'the scene'}: {what}")
+
+
+def _pairs(
+    source: RayStream | LightField | Scene | ScatterEvents,
+    observer: Observer | Sequence[Observer] | None,
+    screen: Screen | Sequence[Screen] | None,
+) -> list[tuple[Observer, Screen]]:
+    """Each observer with his screen."""
+    scene = source.scene if isinstance(source, ScatterEvents) else source
+    if observer is None:
+        if screen is not None or not isinstance(scene, Scene):
+            raise ArgumentError("give an observer.")
+        if not scene.observers:
+            raise ArgumentError("the scene has no observers; give one.")
+        return [(keys.observer(), keys.screen.screen()) for keys in scene.observers]
+    observers = [observer] if isinstance(observer, Observer) else list(observer)
+    if screen is None:
+        screen = _framed(scene, observers)
+    screens = [screen] * len(observers) if isinstance(screen, Screen) else list(screen)
+    if len(observers) != len(screens) or not observers:
+        raise ArgumentError(f"{len(observers)} observers and {len(screens)} screens; give one screen, or one for each.")
+    return list(zip(observers, screens, strict=True))
+
+
+def _framed(source: RayStream | LightField | Scene | None, observers: list[Observer]) -> list[Screen]:
+    """A screen for each observer on which what he sees of the source is shown."""
+    if source is None:
+        raise ArgumentError("the scene of these events is not known; give a screen.")
+    if isinstance(source, Scene):
+        compiled = compile_scene(source)
+        return [framed_screen(compiled, observer) for observer in observers]
+    some = probe(source)
+    return [framed(some, observer) for observer in observers]
+
+
+def _with_missed(source: RayStream | LightField, maps: list[LuminanceMap]) -> list[LuminanceMap]:
+    """The maps, with a note where a screen misses much of the light."""
+    if not source.total_flux > 0.0:
+        return maps
+    some = probe(source)
+    notes = [missed_notes(some, lmap.observer, lmap.screen) for lmap in maps]
+    return [lmap.replace(notes=(*lmap.notes, *more)) if more else lmap for lmap, more in zip(maps, notes, strict=True)]
 
 
 def _check_events(given: Mapping[str, object]) -> None:

@@ -28,7 +28,7 @@ Resume = TraceResult | str | os.PathLike[str] | None
 
 
 def trace(
-    scene: Scene,
+    scene: Scene | str | os.PathLike[str],
     rays: float | None = DEFAULT_RAYS,
     seed: int = 1,
     *,
@@ -45,8 +45,8 @@ def trace(
 
     Parameters
     ----------
-    scene : Scene
-        With at least one source.
+    scene : Scene or path
+        With at least one source; of a path, the scene in that file.
     rays : int or None
         Of all sources together, shared out by their flux. None: if all sources are ray sets, as many as these have, so
         that one set alone gives every ray once; else 10⁷.
@@ -106,7 +106,7 @@ def trace(
 
 
 def trace_rounds(
-    scene: Scene,
+    scene: Scene | str | os.PathLike[str],
     rays: float | None = DEFAULT_RAYS,
     seed: int = 1,
     *,
@@ -144,6 +144,8 @@ def trace_rounds(
     threads = checked_threads(threads)
     if until is not None and not (math.isfinite(until) and until > 0.0):
         raise ArgumentError(f"until is {until!r}; give the relative error to be reached, e.g. 0.01.")
+    if isinstance(scene, str | os.PathLike):
+        scene = Scene.load(scene)
     compiled = compile_scene(scene)
     core = _core.Scene(compiled.record)
     start = None

@@ -1,0 +1,171 @@
+"""Where the light that heads for an observer comes from: a screen that shows it, and how much of it a screen shows."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+from etendue.lightfield.light_field import LightField
+from etendue.lightfield.probe import probe_rays
+from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import RayStream
+
+Array = npt.NDArray[np.float64]
+
+PROBED = 1 << 16
+"""Rays that are looked at."""
+
+CONES = (1.5, 3.0, 6.0, 12.0, 25.0)
+"""Half-angles [°] about the line to the observer within which rays head for him; the first with `ENOUGH` rays is taken,
+else the last."""
+
+ENOUGH = 1000
+
+SHOWN = 0.995
+"""Share of the light along each axis of the screen that a framed screen shows; the rest are strays."""
+
+MARGIN = 1.1
+"""How much larger than that the screen is."""
+
+MOST_MISSED = 0.1
+"""Share of the light towards the observer that a screen may miss without a note."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Light:
+    """Rays that head for an observer, where they cross a plane.
+
+    Parameters
+    ----------
+    right, up : array, shape (n,)
+        Along the axes of the screen, from the observer's target [mm].
+    flux : array, shape (n,)
+    cone : float
+        Half-angle [°] within which they head for him.
+    """
+
+    right: Array
+    up: Array
+    flux: Array
+    cone: float
+
+    def share(self, screen: Screen) -> float:
+        """Of the flux: what crosses the screen; NaN if there is none."""
+        within = (np.abs(self.right) <= screen.width / 2) & (np.abs(self.up) <= screen.height / 2)
+        total = float(self.flux.sum())
+        return float(self.flux[within].sum()) / total if total > 0 else np.nan
+
+
+def probe(source: RayStream | LightField) -> RaySet:
+    """Some rays of a source, or rays drawn from a field."""
+    return source.sample(PROBED) if isinstance(source, LightField) else probe_rays(source, PROBED)
+
+
+def light_towards(rays: RaySet, observer: Observer, screen: Screen) -> Light:
+    """Those of the rays that head for the observer, where their lines cross the plane of the screen.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> rings = et.RingSource(rays=200_000).ray_set()
+    >>> screen = et.Screen(20, 20, 1, 1)                                     # as wide as the innermost ring
+    >>> light = light_towards(rings, et.Observer(0, 0, 1000), screen)
+    >>> abs(light.share(screen) - 100 / np.pi * 300 / 600 * np.pi / 100) < 0.05, light.cone
+    (True, 6.0)
+    """
+    right, up, normal = screen.axes(observer)
+    direction = rays.direction
+    # From where on its line a ray heads somewhere: from where it comes closest to the middle of the light.
+    away = rays.position - np.asarray(rays.virtual_focus.point)
+    start = rays.position - np.einsum("ij,ij->i", away, direction)[:, None] * direction
+    towards = observer.position - start
+    cosine = np.einsum("ij,ij->i", towards, direction) / np.maximum(
+        np.linalg.norm(towards, axis=1), np.finfo(float).tiny
+    )
+    cone = next((a for a in CONES if (cosine > np.cos(np.radians(a))).sum() >= ENOUGH), CONES[-1])
+    heading = cosine > np.cos(np.radians(cone))
+    start, direction = start[heading] - np.asarray(observer.target), direction[heading]
+    slope = direction @ normal
+    crossing = start - ((start @ normal) / np.where(slope == 0.0, np.nan, slope))[:, None] * direction
+    return Light(
+        np.nan_to_num(crossing @ right, nan=np.inf), np.nan_to_num(crossing @ up, nan=np.inf), rays.flux[heading], cone
+    )
+
+
+def framed(rays: RaySet, observer: Observer, columns: int = 128, rows: int = 128) -> Screen:
+    """The smallest screen of square pixels, about the observer's target, that shows the light which heads for him.
+
+    Strays do not count: along each axis 0.5 % of the light may lie beyond. The size is rounded up to two digits.
+
+    Raises
+    ------
+    ArgumentError
+        If none of the rays heads for the observer.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> framed(et.RingSource(rays=200_000).ray_set(), et.Observer(0, 0, 1000), 64, 32)
+    Screen(width=130.0, height=65.0, columns=64, rows=32, plane='view')
+    """
+    light = light_towards(rays, observer, Screen(1.0, 1.0, columns, rows))
+    if not light.flux.any():
+        raise ArgumentError(
+            f"no ray of {rays.provenance.source} heads for the observer at θ {observer.theta:g}°, φ {observer.phi:g}°: "
+            "from there the source is dark. Choose another observer, or state the screen's size."
+        )
+    reach = [_quantile(np.abs(axis), light.flux) for axis in (light.right, light.up)]
+    side = max(2.0 * MARGIN * max(reach[0] / columns, reach[1] / rows), np.finfo(np.float64).tiny)
+    pixel = _rounded_up(side * columns) / columns
+    return Screen(pixel * columns, pixel * rows, columns, rows)
+
+
+def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
+    """The point to look at: the one that the lines of the rays come closest to, or the middle of where they start.
+
+    Rounded to a hundredth of the distance at which the lines pass it.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> centre_of_light(et.RingSource(rays=100_000).ray_set().moved((3, 0, 7)))
+    (3.0, 0.0, 7.0)
+    """
+    point = np.array(rays.virtual_focus.point)
+    off = np.linalg.norm(np.cross(rays.position - point, rays.direction), axis=1)
+    step = 10.0 ** np.floor(np.log10(max(_quantile(off, rays.flux), 1e-6))) / 10.0
+    x, y, z = np.round(point / step) * step + 0.0
+    return (float(f"{x:.12g}"), float(f"{y:.12g}"), float(f"{z:.12g}"))
+
+
+def missed_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str, ...]:
+    """What is to be said of a screen that does not show nine tenths of the light towards its observer."""
+    light = light_towards(rays, observer, screen)
+    if light.share(screen) >= 1.0 - MOST_MISSED:
+        return ()
+    middle = centre_of_light(rays)
+    there = dataclasses.replace(observer, target=middle)
+    if not (light.flux.any() and light_towards(rays, there, screen).flux.any()):
+        return ("of the rays that were looked at none heads for the observer: from there the source is dark",)
+    whole = framed(rays, there, screen.columns, screen.rows)
+    place = ",".join(f"{x:g}" for x in middle)
+    shown = f"{light.share(screen):.1%} of the light that heads for the observer (rays within {light.cone:g}°)"
+    size = f"{whole.width:g} × {whole.height:g} mm"
+    return (f"the screen shows {shown}; one of {size} about the target {place} shows it",)
+
+
+def _quantile(values: Array, weights: Array) -> float:
+    """The value that the share `SHOWN` of the weights does not exceed."""
+    order = np.argsort(values)
+    summed = np.cumsum(weights[order])
+    return float(values[order][min(np.searchsorted(summed, SHOWN * summed[-1]), len(order) - 1)])
+
+
+def _rounded_up(value: float) -> float:
+    """Up to two digits."""
+    step = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(f"{np.ceil(value / step - 1e-9) * step:.12g}")

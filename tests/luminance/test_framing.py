@@ -1,0 +1,115 @@
+"""Screens that are found from where the light is, and the share of it that a stated screen shows."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.luminance.framing import centre_of_light, framed, light_towards
+from oracles.light_fields import make_field
+from scipy import stats
+
+SIGNIFICANCE = 1e-4
+
+
+def lamp(rays: int = 400_000) -> et.RaySet:
+    """Two Lambertian squares, 2 mm wide with 3 parts of the flux and 1 mm wide with 1 part, 10 mm apart; no symmetry."""
+    rng = np.random.default_rng(11)
+    small = rng.random(rays) < 0.25
+    half = np.where(small, 0.5, 1.0)[:, None]
+    place = np.where(small[:, None], (14.0, 3.0), (4.0, 3.0)) + half * rng.uniform(-1, 1, (rays, 2))
+    sine, azimuth = np.sqrt(rng.random(rays)), rng.uniform(0, 2 * np.pi, rays)
+    direction = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.sqrt(1 - sine**2)], axis=1)
+    return et.RaySet(np.column_stack([place, np.full(rays, 7.0)]), direction, np.full(rays, 1 / rays))
+
+
+def test_the_share_is_that_of_the_flux_on_the_screen() -> None:
+    """A screen about the large square shows three quarters of the light, by the binomial of the rays that head there."""
+    observer = et.Observer(20, 35, 2000, target=(4, 3, 7))
+    screen = et.Screen(6, 6, 4, 4)
+    light = light_towards(lamp(380_000), observer, screen)
+    shown, rays = light.share(screen) * light.flux.size, light.flux.size
+    assert rays > 1000
+    assert stats.binomtest(round(shown), rays, 0.75).pvalue > SIGNIFICANCE
+    assert stats.binomtest(round(1.05 * shown), rays, 0.75).pvalue < SIGNIFICANCE
+
+
+@pytest.mark.parametrize("theta", [0, 40, 75])
+def test_a_framed_screen_holds_all_light_and_little_else(theta: float) -> None:
+    """The corners of the larger extent, projected, lie on it, and it is not a third larger."""
+    rays = lamp()
+    observer = et.Observer(theta, 35, 2000, target=(8, 3, 7))
+    screen = framed(rays, observer, 64, 64)
+    corners = np.array([(x, y, 7.0) for x, y in ((3, 2), (3, 4), (14.5, 2.5), (14.5, 3.5))])
+    right, up, _ = screen.axes(observer)
+    reach = np.abs((corners - observer.target) @ np.array([right, up]).T).max()
+    assert reach < screen.width / 2 < 1.35 * reach
+    assert screen.width / 64 == pytest.approx(screen.height / 64, rel=1e-12)
+    assert light_towards(rays, observer, screen).share(screen) > 0.99
+
+
+def test_strays_do_not_frame() -> None:
+    """0.3 % of the flux spread over a metre leaves the screen as it is."""
+    rays = lamp()
+    position = rays.position.copy()
+    position[::333] += np.random.default_rng(2).uniform(-500, 500, (len(position[::333]), 3)) * (1, 1, 0)
+    strayed = et.RaySet(position, rays.direction, rays.flux)
+    observer = et.Observer(10, 0, 2000, target=(8, 3, 7))
+    assert framed(strayed, observer).width < 1.3 * framed(rays, observer).width
+
+
+def test_the_centre_is_where_the_lines_are_closest() -> None:
+    """The flux-weighted middle of the squares: x = (3 · 4 + 14)/4."""
+    np.testing.assert_allclose(centre_of_light(lamp()), (6.5, 3.0, 7.0), atol=0.3)
+
+
+def test_a_map_of_a_path_needs_no_screen(tmp_path: Path) -> None:
+    path = tmp_path / "lamp.tm25ray"
+    et.write_rays(path, lamp(50_000))
+    observer = et.Observer(20, 35, 2000, target=(6.5, 3, 7))
+    lmap = et.luminance_map(str(path), observer, method="cone", acceptance=10)
+    assert lmap.screen == framed(et.read_rays(path).subset(50_000, 1), observer)
+    assert not any("the screen shows" in note for note in lmap.notes)
+
+
+def test_a_field_and_its_file_are_framed_alike(tmp_path: Path) -> None:
+    field = make_field(et.Disk(radius=1.3, z=-0.2, centre=(0.5, 1 / 7)))
+    field.save(tmp_path / "field.h5")
+    observer = et.Observer(20, 35, 2000, target=(0.5, 0, 0))
+    one, other = et.luminance_map(field, observer), et.luminance_map(tmp_path / "field.h5", observer)
+    assert one.screen == other.screen
+    assert 2.6 < one.screen.width < 4.2
+
+
+def test_a_scene_needs_no_screen_and_no_object(tmp_path: Path) -> None:
+    source = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
+    scene = et.Scene(sources=[source])
+    scene.save(tmp_path / "lamp.toml")
+    lmap = et.luminance_map(tmp_path / "lamp.toml", et.Observer(30, 0, 500), rays_per_pixel=16)
+    assert 4.0 < lmap.screen.width < 4.2
+    assert et.trace(tmp_path / "lamp.toml", rays=1000).rays_done == 1000
+
+
+@pytest.mark.parametrize("method", ["cone", "lightfield"])
+def test_a_screen_that_misses_light_says_so(method: str) -> None:
+    observer = et.Observer(20, 35, 2000, target=(4, 3, 7))
+    how = {"acceptance": 10} if method == "cone" else {"surface": et.Box(24, 6, 1, centre=(9, 3, 6.9)), "cache": False}
+    lmap = et.luminance_map(lamp(50_000), observer, et.Screen(6, 6, 8, 8), method=method, **how)
+    (note,) = [note for note in lmap.notes if note.startswith("the screen shows")]
+    share = float(re.search(r"shows ([\d.]+)%", note)[1])
+    assert share == pytest.approx(75, abs=7)
+    advised = re.search(r"one of ([\d.]+) × [\d.]+ mm about the target ([\d.,]+) shows", note)
+    x, y, z = map(float, advised[2].split(","))
+    screen = et.Screen(float(advised[1]), float(advised[1]), 8, 8)
+    whole = et.luminance_map(lamp(50_000), et.Observer(20, 35, 2000, target=(x, y, z)), screen, method="cone")
+    assert not any("the screen shows" in note for note in whole.notes)
+
+
+def test_from_behind_it_is_dark() -> None:
+    with pytest.raises(et.ArgumentError, match="from there the source is dark"):
+        et.luminance_map(lamp(5000), et.Observer(150, 0, 2000), method="cone")
+    lmap = et.luminance_map(lamp(5000), et.Observer(150, 0, 2000), et.Screen(9, 9, 4, 4), method="cone")
+    assert any("from there the source is dark" in note for note in lmap.notes)
