@@ -195,6 +195,7 @@ WITHOUT_EXAMPLE = {
     "etendue.luminance.comparison.MapStatistics": "a part of what compare returns, shown in its example",
     "etendue.luminance.comparison.Comparison": "what compare returns, shown in its example",
     "etendue.luminance.comparison.CrossSection": "what cross_section returns, shown in its example",
+    "etendue.luminance.framing": "how luminance_map finds screens; framed and centre_of_light show it",
     "etendue.luminance.filters.FilterKind": "a row of the registry of filter_map",
     "etendue.scene.scatter_events.geometry_of": "how ScatterEvents knows its scene",
     "etendue.scene.bodies.body.Body": "what its kinds share; each has an example",
