@@ -35,9 +35,26 @@ class Step:
 
     def file_of(self, shells: dict[str, list[str]], *, product: str = "t", unit: str = "mm") -> str:
         """The file of one product: a solid for each closed shell, from its faces, with its name."""
+        solids = [self.solid(shell, name) for name, shell in shells.items()]
+        self.part(solids, product=product, context=self.context(unit))
+        return self.text()
+
+    def text(self) -> str:
+        """The whole file."""
+        return HEAD + "\n".join(self.lines) + "\nENDSEC;\nEND-ISO-10303-21;\n"
+
+    def solid(self, shell: list[str], name: str = "", *, hole: list[str] | None = None) -> str:
+        """A solid of its faces; `hole`: faces of a void in it, as of a solid."""
+        outer = self.add(f"CLOSED_SHELL('',({','.join(shell)}))")
+        if hole is None:
+            return self.add(f"MANIFOLD_SOLID_BREP('{name}',{outer})")
+        inner = self.add(f"CLOSED_SHELL('',({','.join(hole)}))")
+        void = self.add(f"ORIENTED_CLOSED_SHELL('',*,{inner},.F.)")
+        return self.add(f"BREP_WITH_VOIDS('{name}',{outer},({void}))")
+
+    def context(self, unit: str = "mm") -> str:
+        """Units and uncertainty."""
         add = self.add
-        closed = {name: add(f"CLOSED_SHELL('',({','.join(shell)}))") for name, shell in shells.items()}
-        solids = ",".join(add(f"MANIFOLD_SOLID_BREP('{name}',{shell})") for name, shell in closed.items())
         length = add(f"(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT({'$' if unit == 'm' else '.MILLI.'},.METRE.))")
         if unit == "inch":
             inch = add(f"LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),{length})")
@@ -46,12 +63,17 @@ class Step:
         angle = add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
         sphere = add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
         error = add(f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),{length},'d','')")
-        context = add(
+        return add(
             "(GEOMETRIC_REPRESENTATION_CONTEXT(3)"
             f"GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({error}))"
             f"GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{sphere}))REPRESENTATION_CONTEXT('',''))"
         )
-        shape = add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',({solids}),{context})")
+
+    def part(self, items: list[str], *, product: str, context: str) -> tuple[str, str]:
+        """A product of solids, or of axes where others stand: its definition and its shape."""
+        add = self.add
+        kind = "ADVANCED_BREP_SHAPE_REPRESENTATION" if self.has_solid(items) else "SHAPE_REPRESENTATION"
+        shape = add(f"{kind}('',({','.join(items)}),{context})")
         application = add("APPLICATION_CONTEXT('automotive design')")
         of_product = add(f"PRODUCT_CONTEXT('',{application},'mechanical')")
         product = add(f"PRODUCT('{product}','{product}','',({of_product}))")
@@ -60,7 +82,28 @@ class Step:
         definition = add(f"PRODUCT_DEFINITION('design','',{formation},{view})")
         defined = add(f"PRODUCT_DEFINITION_SHAPE('','',{definition})")
         add(f"SHAPE_DEFINITION_REPRESENTATION({defined},{shape})")
-        return HEAD + "\n".join(self.lines) + "\nENDSEC;\nEND-ISO-10303-21;\n"
+        return definition, shape
+
+    def has_solid(self, items: list[str]) -> bool:
+        """Whether some of these entities are solids."""
+        return any(
+            "_BREP" in self.lines[int(item[1:]) - 1] or "BREP_" in self.lines[int(item[1:]) - 1] for item in items
+        )
+
+    def axes(self, at: Any, *, z: Any, x: Any) -> str:
+        """A frame."""
+        return self.add(f"AXIS2_PLACEMENT_3D('',{self.point(*at)},{self.direction(z)},{self.direction(x)})")
+
+    def placed(self, name: str, *, whole: tuple[str, str], part: tuple[str, str], frames: tuple[str, str]) -> None:
+        """A part (definition and shape) in a whole: its own frame falls on one of the whole's."""
+        use = self.add(f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',{whole[0]},{part[0]},$)")
+        defined = self.add(f"PRODUCT_DEFINITION_SHAPE('','',{use})")
+        turned = self.add(f"ITEM_DEFINED_TRANSFORMATION('','',{frames[0]},{frames[1]})")
+        relation = self.add(
+            f"(REPRESENTATION_RELATIONSHIP('','',{part[1]},{whole[1]})"
+            f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION({turned})SHAPE_REPRESENTATION_RELATIONSHIP())"
+        )
+        self.add(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION({relation},{defined})")
 
     def ball(self, radius: float, middle: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[str]:
         """One spherical face, whose only bound is a point."""
@@ -116,9 +159,27 @@ class Step:
             shell.append(self.add(f"ADVANCED_FACE('',({bound}),{surface},{same})"))
         return shell
 
+    def domed_box(self, height: float) -> list[str]:
+        """A cube of 1 mm whose top is a B-spline over its straight sides, 16 h u (1 - u) v (1 - v) above it."""
+        shell = self.polyhedron(CUBE, CUBE_FACES)
+        rows = []
+        for i in range(3):
+            row = [self.point(i / 2, j / 2, 1.0 + 4.0 * height * (i == 1 and j == 1)) for j in range(3)]
+            rows.append(f"({','.join(row)})")
+        surface = self.add(
+            f"B_SPLINE_SURFACE_WITH_KNOTS('',2,2,({','.join(rows)}),.UNSPECIFIED.,.F.,.F.,.F.,(3,3),(3,3),(0.,1.),(0.,1.),"
+            ".UNSPECIFIED.)"
+        )
+        top = shell[CUBE_FACES.index(TOP)]
+        bounds = self.lines[int(top[1:]) - 1].partition("('',(")[2].partition(")")[0]
+        shell[CUBE_FACES.index(TOP)] = self.add(f"ADVANCED_FACE('',({bounds}),{surface},.T.)")
+        return shell
+
 
 CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
 CUBE_FACES: list[tuple[int, ...]] = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+TOP = (1, 5, 7, 3)
+"""The face of the cube at z = 1."""
 
 
 def sphere(radius: float, *, unit: str = "mm", product: str = "t") -> str:
@@ -151,3 +212,39 @@ def optics() -> str:
         "lens": step.ball(1.5, (20.0, 0.0, 0.0)),
     }
     return step.file_of(shells, product="optics")
+
+
+def domed_box(height: float) -> str:
+    """A cube of 1 mm³ and on it a bump of height h, of 16 h/36 mm³."""
+    step = Step()
+    return step.file_of({"": step.domed_box(height)})
+
+
+def hollow(side: float, *, hole: float) -> str:
+    """A cube with a cubic void in its middle."""
+    step = Step()
+    inside = step.polyhedron(hole * CUBE + (side - hole) / 2.0, CUBE_FACES)
+    step.part(
+        [step.solid(step.polyhedron(side * CUBE, CUBE_FACES), hole=inside)], product="hollow", context=step.context()
+    )
+    return step.text()
+
+
+def board() -> str:
+    """Three times one product, a tetrahedron of legs 1, 2, 3 along its x, y, z: as it is, moved by (10, 0, 0), and turned by
+    90° about z and moved by (0, 20, 5)."""
+    step = Step()
+    context = step.context()
+    corners = np.array([(0, 0, 0), (1, 0, 0), (0, 2, 0), (0, 0, 3)])
+    own = step.axes((0, 0, 0), z=(0, 0, 1), x=(1, 0, 0))
+    body = step.solid(step.polyhedron(corners, [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]), "wedge")
+    part = step.part([own, body], product="wedge", context=context)
+    frames = [
+        step.axes((0, 0, 0), z=(0, 0, 1), x=(1, 0, 0)),
+        step.axes((10, 0, 0), z=(0, 0, 1), x=(1, 0, 0)),
+        step.axes((0, 20, 5), z=(0, 0, 1), x=(0, 1, 0)),
+    ]
+    whole = step.part(frames, product="board", context=context)
+    for number, frame in enumerate(frames):
+        step.placed(f"at {number}", whole=whole, part=part, frames=(own, frame))
+    return step.text()

@@ -73,6 +73,49 @@ def test_one_of_several_bodies_is_chosen(tmp_path: Path) -> None:
         compile_scene(glass(tmp_path, kind="mesh", file="optics.step", body="lense"))
 
 
+def test_a_product_that_is_placed_three_times_is_three_bodies(tmp_path: Path) -> None:
+    """Moved and turned: bodies of 1 mm³ each, named and chosen one by one, with their corners where the file puts them."""
+    bodies = step_bodies(stored(tmp_path, step.board()))
+    assert bodies is not None
+    assert [body.name for body in bodies] == ["wedge 1", "wedge 2", "wedge 3"]
+    assert all(body.closed for body in bodies)
+    assert [body.volume for body in bodies] == pytest.approx([1.0, 1.0, 1.0], rel=1e-5)
+    boxes = [(body.vertices.min(axis=0), body.vertices.max(axis=0)) for body in bodies]
+    # Turned by 90° about z, (x, y, z) is (-y, x, z).
+    expected = [((0, 0, 0), (1, 2, 3)), ((10, 0, 0), (11, 2, 3)), ((-2, 20, 5), (0, 21, 8))]
+    for (low, high), (least, most) in zip(boxes, expected, strict=True):
+        assert low == pytest.approx(least, abs=1e-5)
+        assert high == pytest.approx(most, abs=1e-5)
+    (face,) = compile_scene(glass(tmp_path, kind="mesh", file="optics.step", body="wedge 2")).record["faces"]
+    assert face["shape"]["vertices"].min(axis=0) == pytest.approx([10, 0, 0], abs=1e-5)
+
+
+def test_a_void_belongs_to_the_body_around_it(tmp_path: Path) -> None:
+    """4³ less 2³ mm³, in one closed body whose inner surface is inside out."""
+    bodies = step_bodies(stored(tmp_path, step.hollow(4.0, hole=2.0)))
+    assert bodies is not None
+    (body,) = bodies
+    assert (body.name, body.closed) == ("hollow", True)
+    assert body.volume == pytest.approx(64.0 - 8.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("height", [0.2, -0.1])
+def test_a_face_of_splines_is_met_where_it_is(height: float, tmp_path: Path) -> None:
+    """z = 1 + 16 h x (1 - x) y (1 - y): its volume, every corner on it, and the normals of the surface."""
+    bodies = step_bodies(stored(tmp_path, step.domed_box(height)))
+    assert bodies is not None
+    (body,) = bodies
+    assert body.closed
+    assert body.volume == pytest.approx(1.0 + 16.0 * height / 36.0, abs=2.0 * body.chord_error)
+    assert body.normals is not None
+    top = (np.abs(body.normals[:, 2]) > 0.3) & (body.vertices[:, 2] > 0.5)
+    x, y, z = body.vertices[top].T
+    assert z == pytest.approx(1.0 + 16.0 * height * x * (1 - x) * y * (1 - y), abs=1e-5)
+    slope = 16.0 * height * np.array([(1 - 2 * x) * y * (1 - y), x * (1 - x) * (1 - 2 * y)])
+    true = np.stack([-slope[0], -slope[1], np.ones_like(x)], axis=1)
+    assert np.abs(body.normals[top] - true / np.linalg.norm(true, axis=1, keepdims=True)).max() < 1e-5
+
+
 @pytest.mark.parametrize(("unit", "mm"), [("mm", 1.0), ("inch", 25.4), ("m", 1000.0)])
 def test_units_of_the_file_count(unit: str, mm: float, tmp_path: Path) -> None:
     """A ball of radius 10 in each of them; its triangles follow its size."""

@@ -115,8 +115,8 @@ def read_mesh(path: Path, unit: str | None, tolerance: float | None = None, body
     unit : str or None
         A key of `etendue.units.MM_PER_LENGTH_UNIT` that overrides the format's; None: the format's own, or mm.
     tolerance : float, optional
-        Largest distance [mm] between the surfaces of a STEP file and the triangles made of them; None: from the size of the
-        body.
+        Distance [mm] between the surfaces of a STEP file and the triangles made of them that is asked for, see
+        `StoredMesh.chord_error` for what came out; None: from the size of the body.
     body : str, optional
         Name of a body of a STEP file; one that holds several needs it.
 

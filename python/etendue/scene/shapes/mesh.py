@@ -74,8 +74,9 @@ class Mesh(Shape):
     scale : number
         By which all lengths are multiplied.
     tolerance : number, optional
-        Of STEP files: largest distance between a surface and the triangles made of it [mm]. Without it, 1/2000 of the
-        body's longest side, and normals turn by less than 0.05 rad along a triangle.
+        Of STEP files: distance between a surface and the triangles made of it that is asked for [mm]. The reader may exceed
+        it here and there; the notes state the chord error that came out. Without it, 1/2000 of the body's longest side, and
+        normals turn by less than 0.05 rad along a triangle.
     crease_angle : number, optional
         [°] Neighbours whose normals differ by less are one smooth surface, with interpolated normals; 0: flat triangles.
         Without it, triangles of STEP files have the normals of the true surfaces, all others are flat.
