@@ -28,9 +28,6 @@ from etendue.quantities.measured import measured, measured_peak
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
 
-FIELD_PLANES, FIELD_STEP = 36, 2.5
-"""Planes C and step of γ [°] of a light field, unless others are asked for."""
-
 
 def intensity(
     file: Annotated[
@@ -42,15 +39,13 @@ def intensity(
     ] = None,
     c_planes: Annotated[
         int | None,
-        typer.Option(
-            "--c-planes", help="Half planes C (of rays: chosen from them; of a field: 36).", min=1, show_default=False
-        ),
+        typer.Option("--c-planes", help="Half planes C (chosen from the light).", min=1, show_default=False),
     ] = None,
     gamma_step: Annotated[
         float | None,
         typer.Option(
             "--gamma-step",
-            help="Step of γ in degrees (of rays: chosen from them; of a field: 2.5).",
+            help="Step of γ in degrees (chosen from the light).",
             show_default=False,
         ),
     ] = None,
@@ -81,7 +76,7 @@ def intensity(
         check_steps(c_planes, gamma_step)
         source = _source(file, flux, unit)
         if isinstance(source, LightField):
-            result = source.intensity(c_planes or FIELD_PLANES, gamma_step or FIELD_STEP)
+            result = source.intensity(c_planes, gamma_step)
         else:
             with progress_bar("rays", len(source)) as progress:
                 result = intensity_distribution(source, c_planes, gamma_step, progress=progress)

@@ -74,6 +74,8 @@ class FitReport:
         Effective degrees of freedom: how many free cells would be as uncertain as the field is.
     symmetry : str
         What the field was folded by: ``"none"``, or the symmetry that was stated or borne out by the rays.
+    effective_rays : float
+        (Σ w)²/Σ w² of the rays' flux: as many equal ones have the same error; NaN in fields of before it was kept.
     """
 
     rays: int
@@ -87,6 +89,7 @@ class FitReport:
     histogram_score: float
     effective_cells: float
     symmetry: str = "none"
+    effective_rays: float = math.nan
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -182,6 +182,7 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
         histogram_score=histogram.mean,
         effective_cells=_effective_cells(counts, final),
         symmetry=counts.symmetry,
+        effective_rays=counts.tally.effective_rays,
     )
     return EtendueDensity(
         surface=counts.surface,

@@ -293,8 +293,9 @@ def _report(group: Node) -> FitReport:
         tuple[float, ...]: lambda name: tuple(group.numbers(name, None).tolist()),
     }
     hints = get_type_hints(FitReport)
-    if "symmetry" not in group.node.attrs:  # files of before it was kept
-        del hints["symmetry"]
+    for name in ("symmetry", "effective_rays"):
+        if name not in group.node.attrs:  # files of before it was kept
+            del hints[name]
     report = FitReport(**{name: readers[hint](name) for name, hint in hints.items()})
     if report.symmetry not in {"none", *SYMMETRIES}:
         raise group.error("attribute 'symmetry'", f"{report.symmetry!r} is none of {', '.join(SYMMETRIES)}")

@@ -79,6 +79,8 @@ class Intensity:
         What the user should know.
     complaints : tuple of Complaint
         What the reader of a file had to say.
+    smooth : bool
+        Whether nodes err together, as those of a light field do, so that chance lifts none of them above the others.
 
     Raises
     ------
@@ -108,6 +110,7 @@ class Intensity:
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
     notes: tuple[str, ...] = ()
     complaints: tuple[Complaint, ...] = ()
+    smooth: bool = False
 
     def __repr__(self) -> str:
         """Size, peak and origin."""
@@ -275,10 +278,10 @@ class Intensity:
         the mean of the largest of K normal deviates, Φ⁻¹((K − ⅜)/(K + ¼)) [Blom1958]_. K is counted softly, as the sum over
         all nodes of exp(−(difference/error)²), with the root mean square of the errors of both; it is 1 where nothing
         comes near the maximum. Nodes in which the function has no kink are between others, and have no error of their own.
-        `maximum` where no error is known.
+        `maximum` where no error is known, and where nodes err together (`smooth`).
         """
         error = self.peak_error
-        if not error > 0.0:
+        if self.smooth or not error > 0.0:
             return self.maximum
         below = 2.0 * (self.maximum - self.values) ** 2 / (error**2 + np.nan_to_num(self.standard_error) ** 2)
         weight = self._kinks.astype(np.float64)

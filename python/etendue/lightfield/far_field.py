@@ -1,0 +1,120 @@
+"""The far field of a light field: its integral over the surface, at nodes that suit its beams."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from etendue.lightfield.etendue_density import EtendueDensity
+from etendue.lightfield.field_rays import FieldRays
+from etendue.lightfield.symmetry import order
+from etendue.quantities.intensity import Intensity
+from etendue.quantities.intensity_nodes import Array, Nodes, planes_of
+from etendue.quantities.node_choice import choose_nodes
+from etendue.quantities.ray_stream import checked_threads
+from etendue.units import INTENSITY_UNIT
+
+SAMPLE = 1 << 17
+"""Rays drawn from the field that nodes are chosen from, at most."""
+
+FEWEST = 20_000
+
+SIDE = 24
+"""Points along each coordinate of a part over which the intensity of a direction is summed."""
+
+WIDEST = 2.5
+"""[°] Widest interval of γ that has two directions of its own."""
+
+PLANES = 24
+"""Intervals of C around the axis that have two directions each, at least."""
+
+BROADENED = 30.0
+"""Cells of the field's directions that a beam must fill: one of so many has a peak that is some 3 % too low."""
+
+
+def field_intensity(
+    field: EtendueDensity, c_planes: int | None, gamma_step: float | None, threads: int | None
+) -> Intensity:
+    """As `etendue.LightField.intensity`."""
+    rests = field.report.effective_rays
+    known = math.isfinite(rests) and rests > 0.0
+    rays = (rests if known else field.report.rays) * order(field.report.symmetry)
+    drawn = next(FieldRays(field, round(min(SAMPLE, max(FEWEST, rays)))).batches())
+    nodes, told = choose_nodes(drawn.direction, drawn.flux, rays, c_planes, gamma_step)
+    direction, weight = directions(nodes)
+    found = weight * field.core.intensity(direction, SIDE, checked_threads(threads))
+    # What the sum over directions misses is known: the integral of the field is a closed form.
+    total = float(found.sum())
+    found *= field.total_flux / total if total > 0.0 else 0.0
+    flux, _ = _shared(nodes, direction, found)
+    # Of n rays with the flux Φ, Σ (φ Φ/n)² is Φ/n ∫ φ² I dΩ.
+    _, squares = _shared(nodes, direction, np.sqrt(found))
+    error = np.sqrt(squares * field.total_flux / rays)
+    error[flux == 0.0] = np.nan
+    result = nodes.intensity(
+        flux,
+        error,
+        field.flux_unit,
+        field.provenance.then(f"intensity [{INTENSITY_UNIT[field.flux_unit]}] of the light field"),
+    )
+    broadened = _broadened(field, result)
+    counted = f"{rests:,.0f} equal rays" if known else f"{field.report.rays:,} rays, taken as equal ones,"
+    how = f"standard errors are those of counting the {counted} that the field rests on, node by node"
+    # What is to be said of a beam without width is said of one that is as wide as a cell of the field.
+    notes = (*(broadened or told), f"{nodes.describe()}; {how}: the field smooths, and is mostly better")
+    return result.replace(smooth=True, notes=(*notes, *field.notes))
+
+
+def directions(nodes: Nodes) -> tuple[Array, Array]:
+    """Directions with their solid angles [sr] for integrals over the sphere: exact for what is cubic between nodes.
+
+    Gauss's two points in every interval of γ and C, of which wide ones are divided.
+
+    Examples
+    --------
+    >>> d, weight = directions(Nodes.even(4, 45))
+    >>> d.shape[1], bool(np.isclose(weight.sum(), 4 * np.pi)), bool(np.isclose(weight @ d[:, 2] ** 2, 4 * np.pi / 3))
+    (3, True, True)
+    """
+    found, weights = [], []
+    for low, high, *rows in zip(nodes.gamma[:-1], nodes.gamma[1:], nodes.c[:-1], nodes.c[1:], strict=True):
+        gamma, along = _gauss(np.linspace(low, high, math.ceil((high - low) / WIDEST) + 1))
+        c, around = _gauss(np.array(sorted({*planes_of(PLANES), *rows[0], *rows[1], 360.0})))
+        sin, cos = np.sin(gamma)[:, None], np.cos(gamma)[:, None]
+        found.append(np.stack(np.broadcast_arrays(sin * np.cos(c), sin * np.sin(c), cos), axis=-1).reshape(-1, 3))
+        weights.append((along[:, None] * sin * around).ravel())
+    weight = np.concatenate(weights)
+    # The sine is no polynomial: the sphere is whole.
+    return np.concatenate(found), weight * (4.0 * np.pi / weight.sum())
+
+
+def _gauss(edges: Array) -> tuple[Array, Array]:
+    """Two points in each interval between angles [°], and their weights [rad]."""
+    edges = np.radians(edges)
+    half, middle = np.diff(edges)[:, None] / 2.0, (edges[1:] + edges[:-1])[:, None] / 2.0
+    offset = np.array([-1.0, 1.0]) / math.sqrt(3.0)
+    return (middle + half * offset).ravel(), np.repeat(half, 2)
+
+
+def _shared(nodes: Nodes, direction: Array, flux: Array) -> tuple[Array, Array]:
+    """Σ w and Σ w² of the shares of each node, and of all together."""
+    sums, squares = np.zeros(len(nodes)), np.zeros(len(nodes))
+    nodes.core().add(direction, flux, sums, squares, np.zeros(len(nodes), dtype=np.uint64))
+    return sums, squares
+
+
+def _broadened(field: EtendueDensity, found: Intensity) -> list[str]:
+    """What is to be said of a beam that is hardly wider than the field's own cells of direction."""
+    cells = max(
+        max(part.ratio.shape[2] * part.ratio.shape[3], 0 if part.direction is None else part.direction.size)
+        for part in field.parts
+    )
+    if not found.maximum > 0.0:
+        return []
+    beam = field.total_flux / found.maximum
+    filled = beam / (math.pi / cells)
+    if filled >= BROADENED:
+        return []
+    told = f"the beam fills no more than {max(filled, 1.0):.2g} of the light field's {cells:,} cells of direction"
+    return [f"{told}, which broaden it: the peak is too low by more than its error; take it from the rays themselves"]

@@ -1,0 +1,93 @@
+"""The far field of a light field: flux as a reader finds it, errors that hold, and what the field cannot know."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from oracles.beams import beam, lobe
+from oracles.intensity import hat_means, read_by_trapezium
+from oracles.verdicts import assert_drawn_with
+
+Array = npt.NDArray[np.float64]
+FLUX = 7.0
+
+
+def lamp(n: int, exponent: float, c: float, gamma: float, seed: int) -> et.RaySet:
+    """A disk that shines into cosⁿ about an axis, the same from everywhere."""
+    rng = np.random.default_rng(seed + 10_000)
+    radius, turn = 5.0 * np.sqrt(rng.random(n)), rng.uniform(0, 2 * np.pi, n)
+    position = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.zeros(n)], axis=1)
+    return et.RaySet(position, beam(n, exponent, c, gamma, seed), np.full(n, FLUX / n))
+
+
+def field_of(n: int, exponent: float, c: float, gamma: float, seed: int, cells: int) -> et.LightField:
+    return et.LightField.fit(lamp(n, exponent, c, gamma, seed), et.Disk(radius=5.01), depths=(2, 2, cells, cells))
+
+
+@pytest.mark.parametrize(("exponent", "c", "gamma"), [(1.0, 0.0, 0.0), (300.0, 40.0, 25.0), (1e5, 0.0, 0.0)])
+def test_files_of_a_field_hold_its_flux(exponent: float, c: float, gamma: float, tmp_path: Path) -> None:
+    """A reader's trapezium rule finds it to 0.1 %, of a beam of 0.4° too, whose peak the field cannot know."""
+    field = field_of(30_000, exponent, c, gamma, 3, 5).replace(notes=("said before",))
+    far = field.intensity()
+    assert far.flux == pytest.approx(field.total_flux, rel=1e-12)
+    for name in ("a.ies", "a.ldt"):
+        et.write_intensity(tmp_path / name, far)
+        table = et.read_intensity(tmp_path / name)
+        assert read_by_trapezium(table.values, table.c, table.gamma) == pytest.approx(field.total_flux, rel=1e-3)
+    assert far.notes[-1] == "said before"
+    assert any("counting the 30,000 equal rays" in note for note in far.notes)
+    assert any("which broaden it" in note for note in far.notes) == (exponent > 1e4)
+    if exponent < 1e4:
+        assert np.isfinite(far.standard_error[far.values > 0.1 * far.maximum]).all()
+        peak = FLUX * (exponent + 1) / (2 * np.pi)
+        assert far.peak_error < 0.15 * peak
+        assert abs(far.peak_intensity - peak) < 4 * far.peak_error
+
+
+def test_the_values_are_the_integral_over_the_surface() -> None:
+    """Another route: rays drawn from the field, shared by the same nodes; and the intensity of a map from afar."""
+    field = field_of(30_000, 6.0, 200.0, 30.0, 5, 4)
+    far = field.intensity(24, 7.5)
+    drawn = et.intensity_distribution(field.rays(2_000_000, seed=9), 24, 7.5)
+    lit = far.values > 0.05 * far.maximum
+    # 2·10⁶ rays know a node to a percent, which is what the quadrature may be off by at the edges of the field's cells.
+    np.testing.assert_allclose(far.values[lit], drawn.values[lit], atol=5 * float(drawn.standard_error[lit].max()))
+    seen = et.luminance_map(field, et.Observer(30, 195, 1e5), et.Screen(12, 12, 64, 64))
+    assert seen.intensity == pytest.approx(float(far.at(195, 30)), rel=0.03)
+
+
+def test_errors_are_those_of_counting_and_cover_the_truth() -> None:
+    """8 fields: the error of a node is that of the rays themselves, to noise; within it lie no fewer than 68 %."""
+    n, exponent, c, gamma = 20_000, 6.0, 200.0, 30.0
+    inside, tried, ratios = 0, 0, []
+    truth: Array | None = None
+    for seed in range(8):
+        far = field_of(n, exponent, c, gamma, seed, 4).intensity(12, 15.0)
+        if truth is None:
+            truth = FLUX * hat_means(lobe(exponent, c, gamma), far.c, far.gamma)[0]
+        counted = et.intensity_distribution(lamp(n, exponent, c, gamma, seed), 12, 15.0)
+        lit = (truth > 0.1 * truth.max())[::2, 2:-2:2]
+        ratios.append((far.standard_error / counted.standard_error)[::2, 2:-2:2][lit])
+        z = ((far.values - truth) / far.standard_error)[::2, 2:-2:2][lit]
+        inside, tried = inside + int((np.abs(z) < 1.0).sum()), tried + z.size
+    assert np.median(np.concatenate(ratios)) == pytest.approx(1.0, abs=0.05)
+    assert_drawn_with(share=(0.6827, 0.98), hits=inside, rays=tried)
+
+
+def test_rays_of_unequal_flux_count_less(tmp_path: Path) -> None:
+    """Kish's number of them is kept with the field; a field without it takes its rays as equal ones, and says so."""
+    rays = lamp(20_000, 6.0, 0.0, 0.0, 1)
+    weights = np.random.default_rng(4).exponential(size=20_000)
+    lopsided = et.RaySet(rays.position, rays.direction, weights)
+    field = et.LightField.fit(lopsided, et.Disk(radius=5.01), depths=(2, 2, 4, 4))
+    kish = weights.sum() ** 2 / (weights**2).sum()
+    field.save(tmp_path / "a.h5")
+    kept = et.LightField.load(tmp_path / "a.h5")
+    assert kept.report.effective_rays == pytest.approx(kish, rel=1e-9)
+    even = et.LightField.fit(rays, et.Disk(radius=5.01), depths=(2, 2, 4, 4))
+    share = [f.intensity(4, 15).standard_error[0, 0] / f.intensity(4, 15).values[0, 0] for f in (kept, even)]
+    assert share[0] / share[1] == pytest.approx(np.sqrt(20_000 / kish), rel=0.1)
