@@ -36,7 +36,15 @@ BROADENED = 30.0
 def field_intensity(
     field: EtendueDensity, c_planes: int | None, gamma_step: float | None, threads: int | None
 ) -> Intensity:
-    """As `etendue.LightField.intensity`."""
+    """As `etendue.LightField.intensity`.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> field = et.LightField.fit(et.RingSource(rays=50_000), et.Disk(radius=30), depths=(3, 3, 3, 3))
+    >>> field_intensity(field, 4, 30.0, None).values.shape
+    (4, 7)
+    """
     rests = field.report.effective_rays
     known = math.isfinite(rests) and rests > 0.0
     rays = (rests if known else field.report.rays) * order(field.report.symmetry)
