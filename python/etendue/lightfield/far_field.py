@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from etendue.errors import ArgumentError
 from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.lightfield.field_rays import FieldRays
 from etendue.lightfield.symmetry import order
@@ -29,6 +30,9 @@ WIDEST = 2.5
 PLANES = 24
 """Intervals of C around the axis that have two directions each, at least."""
 
+MOST_PLANES, FINEST = 3600, 0.05
+"""Planes, and step of γ [°], that may be asked for: each direction is an integral over the surface."""
+
 BROADENED = 30.0
 """Cells of the field's directions that a beam must fill: one of so many has a peak that is some 3 % too low."""
 
@@ -45,6 +49,11 @@ def field_intensity(
     >>> field_intensity(field, 4, 30.0, None).values.shape
     (4, 7)
     """
+    if (c_planes or 1) > MOST_PLANES or (gamma_step or 90.0) < FINEST:
+        raise ArgumentError(
+            f"c_planes is {c_planes} and gamma_step {gamma_step}°; of a light field, up to {MOST_PLANES:,} planes and steps of "
+            f"{FINEST}° or more can be had."
+        )
     rests = field.report.effective_rays
     known = math.isfinite(rests) and rests > 0.0
     rays = (rests if known else field.report.rays) * order(field.report.symmetry)
