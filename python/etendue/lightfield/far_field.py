@@ -51,8 +51,8 @@ def field_intensity(
     """
     if (c_planes or 1) > MOST_PLANES or (gamma_step or 90.0) < FINEST:
         raise ArgumentError(
-            f"c_planes is {c_planes} and gamma_step {gamma_step}°; of a light field, up to {MOST_PLANES:,} planes and steps of "
-            f"{FINEST}° or more can be had."
+            f"c_planes is {c_planes} and gamma_step {gamma_step}°; of a light field, up to {MOST_PLANES:,} planes and "
+            f"steps of {FINEST}° or more can be had."
         )
     rests = field.report.effective_rays
     known = math.isfinite(rests) and rests > 0.0
