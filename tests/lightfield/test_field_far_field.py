@@ -21,7 +21,7 @@ def lamp(n: int, exponent: float, c: float, gamma: float, seed: int) -> et.RaySe
     rng = np.random.default_rng(seed + 10_000)
     radius, turn = 5.0 * np.sqrt(rng.random(n)), rng.uniform(0, 2 * np.pi, n)
     position = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.zeros(n)], axis=1)
-    return et.RaySet(position, beam(n, exponent, c, gamma, seed), np.full(n, FLUX / n))
+    return et.RaySet(position, beam(n, exponent=exponent, c=c, gamma=gamma, seed=seed), np.full(n, FLUX / n))
 
 
 def field_of(n: int, exponent: float, c: float, gamma: float, seed: int, cells: int) -> et.LightField:
@@ -37,7 +37,9 @@ def test_files_of_a_field_hold_its_flux(exponent: float, c: float, gamma: float,
     for name in ("a.ies", "a.ldt"):
         et.write_intensity(tmp_path / name, far)
         table = et.read_intensity(tmp_path / name)
-        assert read_by_trapezium(table.values, table.c, table.gamma) == pytest.approx(field.total_flux, rel=1e-3)
+        assert read_by_trapezium(table.values, c=table.c, gamma=table.gamma) == pytest.approx(
+            field.total_flux, rel=1e-3
+        )
     assert far.notes[-1] == "said before"
     assert any("counting the 30,000 equal rays" in note for note in far.notes)
     assert any("which broaden it" in note for note in far.notes) == (exponent > 1e4)
@@ -68,7 +70,7 @@ def test_errors_are_those_of_counting_and_cover_the_truth() -> None:
     for seed in range(8):
         far = field_of(n, exponent, c, gamma, seed, 4).intensity(12, 15.0)
         if truth is None:
-            truth = FLUX * hat_means(lobe(exponent, c, gamma), far.c, far.gamma)[0]
+            truth = FLUX * hat_means(lobe(exponent=exponent, c=c, gamma=gamma), c=far.c, gamma=far.gamma)[0]
         counted = et.intensity_distribution(lamp(n, exponent, c, gamma, seed), 12, 15.0)
         lit = (truth > 0.1 * truth.max())[::2, 2:-2:2]
         ratios.append((far.standard_error / counted.standard_error)[::2, 2:-2:2][lit])
