@@ -316,7 +316,7 @@ def test_many_observers_of_a_field(run: Run, folder: Path, tmp_path: Path) -> No
         np.testing.assert_array_equal(seen.values, et.luminance_map(field, seen.observer, seen.screen).values)
 
 
-def test_people_read_figures_and_a_hint_where_nothing_is_seen(run: Run, folder: Path) -> None:
+def test_people_read_figures_and_a_note_where_nothing_is_seen(run: Run, folder: Path) -> None:
     outcome = run("luminance", folder / "watts.h5", *VIEW, "-o", "a.npz")
     assert "radiance from θ = 25°, φ = -40°, 300 mm" in outcome.out
     assert "W/(m² sr)" in outcome.out
@@ -324,9 +324,9 @@ def test_people_read_figures_and_a_hint_where_nothing_is_seen(run: Run, folder: 
     off = [*VIEW[:4], "--target", "500,0,0", "--size", "1,1", "--pixels", "2,2", "-o", "b.npz"]
     blind = run("luminance", folder / "watts.h5", *off)
     assert blind.status == 0
-    assert "hint: the light field lies around 0.1,-0.4,0.7 mm" in blind.err
+    assert "the screen shows 0.0% of the light" in blind.out
     rays = run("luminance", folder / "led.tm25ray", *off, "--surface", "plane:z=0")
-    assert "hint: the rays start around" in rays.err
+    assert "the screen shows 0.0% of the light" in rays.out
 
 
 # --- intensity -------------------------------------------------------------------------------------------------------

@@ -160,7 +160,15 @@ def luminance(
         "--gather": gather or None,
     }
     own_observers = own is not None and observer is None and size is None
-    angles = [] if own_observers else _angles(observer)
+    if own is not None and own_observers:
+        who = [(keys.name, keys.observer()) for keys in own.observers]
+        if not who:
+            raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
+    else:
+        who = [("", Observer(theta, phi, distance)) for theta, phi in _angles(observer)]
+    targets = _targets(output, who)
+    cone = None if acceptance is None else _acceptance(acceptance)
+    carrier = "auto" if surface is None else surface_option(surface)
     source: RaySet | LightField | None = None
     if looked is not None:
         for_others = {
@@ -179,17 +187,11 @@ def luminance(
             source = in_unit(with_flux(kept, flux), unit)
         else:
             source = read_source(file, flux, unit, for_rays)
+    observers = [one for _, one in who]
     if own is not None and own_observers:
-        seen = [(keys.name, keys.observer(), keys.screen.screen()) for keys in own.observers]
-        if not seen:
-            raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
+        screens = [keys.screen.screen() for keys in own.observers]
     else:
-        views = _views(own or source, angles, distance, target, size, pixels, plane)
-        seen = [("", *view) for view in views]
-    targets, everything = _targets(output, seen)
-    check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
-
-    observers, screens = [o for _, o, _ in seen], [s for _, _, s in seen]
+        observers, screens = _views(own or source, observers, target, size, pixels, plane)
     if looked is not None:
         with progress_bar(*_work(looked, screens, rays_per_pixel)) as progress:
             maps = luminance_map(
@@ -206,8 +208,6 @@ def luminance(
                 progress=progress,
             )
     elif source is not None:
-        cone = None if acceptance is None else _acceptance(acceptance)
-        carrier = "auto" if surface is None else surface_option(surface)
         with progress_bar("rays", len(source)) if isinstance(source, RaySet) else nullcontext() as progress:
             maps = luminance_map(
                 source,
@@ -268,21 +268,22 @@ def _work(looked: Scene | ScatterEvents, screens: list[Screen], rays_per_pixel: 
     return "lines of sight", each * sum(screen.columns * screen.rows for screen in screens)
 
 
-def _targets(output: list[Path], seen: list[tuple[str, Observer, Screen]]) -> tuple[list[list[Path]], list[Path]]:
-    """The files of each map, and all of them.
+def _targets(output: list[Path], who: list[tuple[str, Observer]]) -> list[list[Path]]:
+    """The files of each map, which can be written.
 
     Raises
     ------
     ArgumentError
-        If maps of several observers would be written to the same file.
+        If maps of several observers would be written to the same file, or one cannot be written.
     """
-    targets = [[_named(path, observer, name) for path in output] for name, observer, _ in seen]
+    targets = [[_named(path, observer, name) for path in output] for name, observer in who]
     everything = [path for paths in targets for path in paths]
     if len(set(everything)) < len(everything):
         raise ArgumentError(
             "several observers would write to the same file; put {theta} and {phi}, or {observer}, into its name."
         )
-    return targets, everything
+    check_outputs(everything, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
+    return targets
 
 
 def _angles(observer: list[str] | None) -> list[tuple[float, ...]]:
@@ -293,32 +294,30 @@ def _angles(observer: list[str] | None) -> list[tuple[float, ...]]:
 
 def _views(
     source: Scene | RaySet | LightField | None,
-    angles: list[tuple[float, ...]],
-    distance: float,
+    observers: list[Observer],
     target: str | None,
     size: str | None,
     pixels: str,
     plane: str,
-) -> list[tuple[Observer, Screen]]:
-    """Observers with their screens: of the stated size, or framed to what each sees of the source."""
+) -> tuple[list[Observer], list[Screen]]:
+    """Observers of the target with their screens: of the stated size, or framed to what each sees of the source."""
     columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
     to_frame = size is None and plane == "view"
     some = probe(source) if to_frame and isinstance(source, RaySet | LightField) else None
     if target is not None:
-        middle = numbers(target, 3, "--target", "0,0,0")
+        x, y, z = numbers(target, 3, "--target", "0,0,0")
     else:
-        middle = (0.0, 0.0, 0.0) if some is None else centre_of_light(some)
-    observers = [Observer(theta, phi, distance, (middle[0], middle[1], middle[2])) for theta, phi in angles]
+        x, y, z = (0.0, 0.0, 0.0) if some is None else centre_of_light(some)
+    observers = [dataclasses.replace(observer, target=(x, y, z)) for observer in observers]
     if some is not None:
-        return [(observer, framed(some, observer, columns, rows)) for observer in observers]
+        return observers, [framed(some, observer, columns, rows) for observer in observers]
     if to_frame and isinstance(source, Scene):
         compiled = compile_scene(source)
-        return [(observer, framed_screen(compiled, observer, columns, rows)) for observer in observers]
+        return observers, [framed_screen(compiled, observer, columns, rows) for observer in observers]
     if size is None:
         raise typer.BadParameter("give the screen's width and height in mm, e.g. --size 25,25", param_hint="--size")
     width, height = numbers(size, 2, "--size", "25,25")
-    screen = Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")
-    return [(observer, screen) for observer in observers]
+    return observers, [Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")] * len(observers)
 
 
 def _refuse(options: Mapping[str, object], why: str) -> None:
