@@ -247,6 +247,14 @@ class FarField:
         """Add rays to Σ w, Σ w² and the number of rays of each cell."""
 
 @final
+class Glints:
+    """Where in their pixels the sources of a scene are seen that are small there: as many paths again look for them."""
+
+    def __new__(cls, scene: Scene, view: _View, most_events: int, threads: int | None = None) -> Glints: ...
+    def pixels(self) -> int:
+        """Number of pixels that have some."""
+
+@final
 class Guide:
     """Directions in which lines of sight go on from diffuse surfaces by preference, from the arrivals of a trace."""
 
@@ -438,6 +446,7 @@ def look_at_scene(
     survey: Survey | None = None,
     shared: float | None = None,
     guide: Guide | None = None,
+    glints: Glints | None = None,
 ) -> list[_Floats]:
     """What lines of sight find, pixel by pixel, in passes ``first..last`` of `paths` paths each.
 

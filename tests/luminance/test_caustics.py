@@ -25,7 +25,7 @@ WHITE = {"kind": "lambertian", "reflectance": 1.0}
 def ball_over_paper() -> dict[str, Any]:
     """A glass ball throws a lamp's light on paper; the lamp is so large that no pixel misses its image in the ball."""
     return {
-        "sources": [{"kind": "surface", "shape": {"kind": "disk", "radius": 1.5}, "flux": 100, "at": [4, 2, 30],
+        "sources": [{"kind": "surface", "shape": {"kind": "disk", "radius": 0.5}, "flux": 100, "at": [4, 2, 30],
                      "toward": [-0.1, -0.05, -1]}],
         "solids": [{"shape": {"kind": "ball", "radius": 5}, "medium": "BK7", "at": [1, 0.5, 10]}],
         "surfaces": [{"shape": {"kind": "rectangle", "width": 40, "height": 34}, "finish": {"kind": "lambertian",

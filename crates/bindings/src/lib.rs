@@ -8,6 +8,7 @@ mod counts;
 mod dealing;
 mod far_field;
 mod field;
+mod glints;
 mod guide;
 mod polya;
 mod ray_index;
@@ -34,6 +35,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<field::FieldRays>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<far_field::FarField>()?;
+    module.add_class::<glints::Glints>()?;
     module.add_class::<guide::Guide>()?;
     module.add_class::<survey::Survey>()?;
     module.add_class::<dealing::Dealing>()?;

@@ -22,6 +22,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::glints::Glints;
 use crate::guide::Guide;
 use crate::run::stoppable;
 use crate::scene::Scene;
@@ -222,7 +223,7 @@ pub fn trace_batches<'py>(
 /// meet a smooth surface first, and that see a diffuse one directly.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
-#[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None, shared=None, guide=None))]
+#[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None, shared=None, guide=None, glints=None))]
 pub fn look_at_scene<'py>(
     py: Python<'py>,
     scene: &Scene,
@@ -237,6 +238,7 @@ pub fn look_at_scene<'py>(
     survey: Option<&Survey>,
     shared: Option<f64>,
     guide: Option<&Guide>,
+    glints: Option<&Glints>,
 ) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
     let view = view.core();
     let left = match left {
@@ -251,6 +253,7 @@ pub fn look_at_scene<'py>(
         most_events,
         left,
         guide: guide.map(Guide::core),
+        glints: glints.map(Glints::core),
     };
     let pixels = stoppable(py, |stop| {
         let lit = Lit::new(scene.core(), scene.lanterns()).until(stop);

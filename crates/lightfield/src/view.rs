@@ -52,6 +52,16 @@ impl View {
         inside.then(|| row as u32 * self.columns + column as u32)
     }
 
+    /// The unit vector from the observer through a place on the grid: in pixels, along the columns and the rows, from the top
+    /// left corner.
+    #[inline]
+    #[must_use]
+    pub fn through(&self, place: [f64; 2]) -> Vec3 {
+        let u = (place[0] / f64::from(self.columns) - 0.5) * self.width;
+        let v = (0.5 - place[1] / f64::from(self.rows)) * self.height;
+        (self.target + self.right * u + self.up * v - self.eye).normalized()
+    }
+
     /// The unit vector from the centre of a pixel to the observer.
     #[inline]
     #[must_use]

@@ -10,7 +10,7 @@
 //!
 //! `reverse`: from the eye to the sources; `wave`: a block of its paths; `exitance`: the light of diffuse surfaces, known
 //! beforehand, at which paths may end; `guide`: where they go on from diffuse
-//! surfaces; `sharing`: light that both directions find. `lists`: what rays of a block are sorted
+//! surfaces; `glints`: where in a pixel they look for small images of sources; `sharing`: light that both directions find. `lists`: what rays of a block are sorted
 //! into.
 
 pub mod dealing;
@@ -19,6 +19,7 @@ pub mod exitance;
 pub mod eye;
 pub mod far_field;
 pub mod forward;
+pub mod glints;
 pub mod guide;
 pub mod harvest;
 pub mod inside;

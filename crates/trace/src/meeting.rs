@@ -9,7 +9,7 @@ use etendue_geometry::assembly::{Hits, TIE};
 use etendue_geometry::lines::{Leaving, Lines};
 use etendue_geometry::shape::{Crossing, ROUNDING};
 use etendue_math::Vec3;
-use etendue_optics::finish::Finish;
+use etendue_optics::finish::{Finish, Incidence, Shares};
 use etendue_optics::fresnel::{reflect, refract};
 use etendue_optics::medium::Filling;
 
@@ -222,6 +222,33 @@ pub fn meet_one(
     } else {
         alone(scene, o, d, (face, crossing), inside, ignore).map(Some)
     }
+}
+
+/// What of the radiance that comes from where a line of sight leads is mirrored to it, and what is refracted; the shares of
+/// the lobes, and the cosine of the angle of refraction.
+///
+/// Light that is transmitted to the eye arrives from the other side, at the angle of refraction. An interface transmits the
+/// same share both ways.
+#[inline]
+#[must_use]
+pub fn smooth_shares(finish: &Finish, here: &Incidence) -> ([f64; 2], Shares, f64) {
+    let Incidence { n1, n2, wavelength, .. } = *here;
+    let (shares, across) = finish.shares(here);
+    let squared = (n1 / n2) * (n1 / n2);
+    let through = if matches!(finish, Finish::Interface) {
+        shares[1] * squared
+    } else if shares[1] > 0.0 {
+        let there = Incidence {
+            cosine: across,
+            wavelength,
+            n1: n2,
+            n2: n1,
+        };
+        finish.shares(&there).0[1] * squared
+    } else {
+        0.0
+    };
+    ([shares[0], through], shares, across)
 }
 
 /// Surfaces that change nothing, which light may pass between two points: more are a start that is not where it should be.

@@ -15,6 +15,7 @@ use etendue_optics::source::Lantern;
 use rayon::prelude::*;
 
 use crate::exitance::{Exitance, Survey};
+use crate::glints::Glints;
 use crate::guide::Guide;
 use crate::scene::Scene;
 use crate::sharing::Sharing;
@@ -62,6 +63,8 @@ pub struct Method<'a> {
     pub left: Left,
     /// Where paths that do not see a diffuse surface directly go on from there, if that is known.
     pub guide: Option<&'a Guide>,
+    /// Small images of sources, where as many paths again look for them.
+    pub glints: Option<&'a Glints>,
 }
 
 /// Sums over passes: of the mean of each pass, of that part of it which is found by chance only, of the sources' own

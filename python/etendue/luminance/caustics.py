@@ -159,6 +159,7 @@ class Plan:
 def plan(
     record: Mapping[str, Any],
     views: Sequence[_core._View],
+    glints: Sequence[_core.Glints],
     seed: int,
     most_events: int,
     lines: int,
@@ -192,8 +193,8 @@ def plan(
         return Plan(rays, guide, done)
     cost = max(segments / done / LINE, 0.25)
     wanted = [
-        _rays(core, view, total, done, seed, most_events, lines, guide, threads, cost)
-        for view, total in zip(views, sums, strict=True)
+        _rays(core, view, total, done, seed, most_events, lines, (guide, small), threads, cost)
+        for view, total, small in zip(views, sums, glints, strict=True)
     ]
     return Plan(max(wanted), guide, done)
 
@@ -206,7 +207,7 @@ def _rays(
     seed: int,
     most_events: int,
     lines: int,
-    guide: _core.Guide | None,
+    guides: tuple[_core.Guide | None, _core.Glints],
     threads: int | None,
     cost: float,
 ) -> int:
@@ -217,7 +218,7 @@ def _rays(
     passes, paths = 4, max(1, min(4, lines // 16))
     looks = [
         _core.look_at_scene(
-            core, view, paths, seed, most_events, "caustics", i, i + 1, threads, None, float(pixels), guide
+            core, view, paths, seed, most_events, "caustics", i, i + 1, threads, None, float(pixels), *guides
         )[0].ravel()
         for i in range(passes)
     ]

@@ -112,7 +112,8 @@ def look_at_scene(
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
     core = _core.Scene({**compiled.record, "detectors": []})
     survey = _core.Survey(core, how.seed, MOST_EVENTS, how.threads) if how.gather else None
-    forward = _forward(core, compiled, views, how, wanted=scattered is None)
+    glints = [_core.Glints(core, view, MOST_EVENTS, how.threads) for view in views]
+    forward = _forward(core, compiled, views, glints, how, wanted=scattered is None)
     images = forward.images
     notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=scattered is not None or images is not None)]
     notes += [] if survey is None else survey_notes(survey)
@@ -120,13 +121,15 @@ def look_at_scene(
     left: Left = "scattered" if scattered is not None else "caustics" if images is not None else "nothing"
     origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
     maps, done = [], 0
-    for number, ((observer, screen), view) in enumerate(zip(pairs, views, strict=True)):
+    for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, glints, strict=True)):
         passes, gathered = _Passes(screen.shape), []
 
-        def look(number: int, known: _core.Survey | None, view: _core._View = view) -> list[Array]:
-            first, shared, guide = (number, number + 1), forward.shared, forward.plan.guide
+        def look(
+            number: int, known: _core.Survey | None, view: _core._View = view, small: _core.Glints = small
+        ) -> list[Array]:
+            guides = forward.shared, forward.plan.guide, small
             return _core.look_at_scene(
-                core, view, how.paths, how.seed, MOST_EVENTS, left, *first, how.threads, known, shared, guide
+                core, view, how.paths, how.seed, MOST_EVENTS, left, number, number + 1, how.threads, known, *guides
             )
 
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
@@ -201,7 +204,13 @@ class _Forward:
 
 
 def _forward(
-    core: _core.Scene, compiled: Compiled, views: list[_core._View], how: Looking, *, wanted: bool
+    core: _core.Scene,
+    compiled: Compiled,
+    views: list[_core._View],
+    glints: list[_core.Glints],
+    how: Looking,
+    *,
+    wanted: bool,
 ) -> _Forward:
     """Rays forwards as the scene asks for them, or the user; none where lines of sight find all light well."""
     possible = core.may_focus()
@@ -209,7 +218,7 @@ def _forward(
         return _Forward(Plan(0, None, 0), None, None, possible)
     lines = how.paths * how.passes
     asked = None if how.forward_rays is None and wanted else int(how.forward_rays or 0)
-    found = plan(compiled.record, views, how.seed, MOST_EVENTS, lines, asked, how.threads)
+    found = plan(compiled.record, views, glints, how.seed, MOST_EVENTS, lines, asked, how.threads)
     images, shared = None, None
     if found.rays and wanted:
         # Where lines of sight end at patches, these do not tell what they hold of each source.

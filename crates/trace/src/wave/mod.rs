@@ -19,8 +19,9 @@ use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
 use etendue_sampling::philox::Stream;
 
 use crate::exitance::Exitance;
+use crate::glints;
 use crate::inside::Inside;
-use crate::meeting::{Fillings, Meeting, meet};
+use crate::meeting::{Fillings, Meeting, meet, smooth_shares};
 use crate::reverse::{Left, Lit, Method, Pixel};
 use crate::start::place;
 use smooth::{Room, Sorter};
@@ -29,8 +30,11 @@ use smooth::{Room, Sorter};
 const PURPOSE_SHIFT: u64 = 0x5348_4946;
 const PURPOSE_PATH: u64 = 0x5041_5448;
 
+/// What is added to a purpose for the paths that look for small images of sources.
+const AIMED: u64 = 1 << 32;
+
 /// Chains of smooth surfaces are followed on every branch down to this weight; below, one branch is drawn.
-const SPLIT: f64 = 1e-4;
+pub const SPLIT: f64 = 1e-4;
 
 /// Diffuse scatters before a path may be ended by chance.
 const SURE: u32 = 3;
@@ -77,6 +81,10 @@ struct Path {
     chance: f64,
     /// Whether it met a smooth surface first, and whether it saw a diffuse one directly.
     met: [bool; 2],
+    /// Whether it looks for small images of sources and nothing else.
+    aimed: bool,
+    /// How much such an image counts, as paths of both kinds find it.
+    share: f64,
 }
 
 /// A connection of a diffuse surface to a source, that counts if nothing is in between.
@@ -147,27 +155,34 @@ impl<'a> Wave<'a> {
         let paths = self.method.paths as usize;
         let share = 1.0 / f64::from(self.method.paths);
         let mut cells = vec![[0.0; 5]; pixels.len() * passes.len()];
-        let total = cells.len() * paths;
+        // All cells, then once more those with small images of sources.
+        let mut tasks: Vec<(usize, bool)> = (0..cells.len()).map(|cell| (cell, false)).collect();
+        if let Some(glints) = self.method.glints {
+            let has = |cell: &usize| !glints.of_pixel(first + cell / passes.len()).is_empty();
+            tasks.extend((0..cells.len()).filter(has).map(|cell| (cell, true)));
+        }
+        let total = tasks.len() * paths;
         let mut shift = (usize::MAX, [0.0; DIMENSIONS]);
         let mut begin = 0;
         while begin < total && !self.lit.is_stopped() {
             let end = (begin + BLOCK).min(total);
             self.paths.clear();
             for flat in begin..end {
-                let (cell, index) = (flat / paths, flat % paths);
+                let (task, index) = (flat / paths, flat % paths);
+                let (cell, aimed) = tasks[task];
                 let pixel = (first + cell / passes.len()) as u64;
                 #[allow(clippy::cast_possible_truncation, reason = "a number of passes")]
                 let pass = (cell % passes.len()) as u32;
                 let pass = [passes.start + pass, pass];
-                if shift.0 != cell {
-                    shift = (cell, self.shift(pixel, pass[0]));
+                if shift.0 != task {
+                    shift = (task, self.shift(pixel, pass[0], aimed));
                 }
                 #[allow(clippy::cast_possible_truncation, reason = "a number of paths")]
-                self.aim(pixel, pass, index as u32, &shift.1);
+                self.aim(pixel, pass, index as u32, aimed, &shift.1);
             }
             self.follow();
             for (flat, path) in (begin..end).zip(&self.paths) {
-                let cell = &mut cells[flat / paths];
+                let cell = &mut cells[tasks[flat / paths].0];
                 let [smooth, diffuse] = path.met.map(|met| if met { 1.0 } else { 0.0 });
                 for (sum, value) in cell
                     .iter_mut()
@@ -189,8 +204,8 @@ impl<'a> Wave<'a> {
     }
 
     /// How the lattice of a pixel is moved in a pass.
-    fn shift(&self, pixel: u64, pass: u32) -> [f64; DIMENSIONS] {
-        let shifts = Stream::new(self.method.seed, PURPOSE_SHIFT);
+    fn shift(&self, pixel: u64, pass: u32, aimed: bool) -> [f64; DIMENSIONS] {
+        let shifts = Stream::new(self.method.seed, PURPOSE_SHIFT + if aimed { AIMED } else { 0 });
         let mut shift = [0.0; DIMENSIONS];
         for (block, four) in (0_u64..).zip(shift.chunks_mut(4)) {
             four.copy_from_slice(&shifts.uniforms(pixel, u64::from(pass) << 8 | block));
@@ -199,9 +214,9 @@ impl<'a> Wave<'a> {
     }
 
     /// A path from the eye through a point of a pixel.
-    fn aim(&mut self, pixel: u64, [pass, made]: [u32; 2], index: u32, shift: &[f64; DIMENSIONS]) {
+    fn aim(&mut self, pixel: u64, [pass, made]: [u32; 2], index: u32, aimed: bool, shift: &[f64; DIMENSIONS]) {
         let view = self.view;
-        let stream = Stream::new(self.method.seed, PURPOSE_PATH);
+        let stream = Stream::new(self.method.seed, PURPOSE_PATH + if aimed { AIMED } else { 0 });
         let address = ((pixel << 24 | u64::from(pass)) << 20).wrapping_add(u64::from(index));
         #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
         let path = self.paths.len() as u32;
@@ -213,21 +228,37 @@ impl<'a> Wave<'a> {
             sum: [0.0; 2],
             chance: 0.0,
             met: [false; 2],
+            aimed,
+            share: 1.0,
         });
-        let Path { numbers, line, .. } = &mut self.paths[path as usize];
+        let Path {
+            numbers, line, share, ..
+        } = &mut self.paths[path as usize];
         let columns = u64::from(view.columns);
-        let (row, column) = ((pixel / columns) as f64, (pixel % columns) as f64);
+        let corner = [(pixel % columns) as f64, (pixel / columns) as f64];
+        #[allow(clippy::cast_possible_truncation, reason = "a number of a pixel")]
+        let images = self
+            .method
+            .glints
+            .map_or(&[][..], |glints| glints.of_pixel(pixel as usize));
         let (du, dv) = (numbers.draw(), numbers.draw());
-        let u = ((column + du) / f64::from(view.columns) - 0.5) * view.width;
-        let v = (0.5 - (row + dv) / f64::from(view.rows)) * view.height;
-        let through = view.target + view.right * u + view.up * v;
-        let d = (through - view.eye).normalized();
+        let place = if aimed {
+            glints::draw(images, [numbers.draw(), du, dv])
+        } else {
+            [corner[0] + du, corner[1] + dv]
+        };
+        if !images.is_empty() {
+            *share = 1.0 / (1.0 + glints::density(images, place));
+        }
+        let d = view.through(place);
         let lines = &self.lit.lines;
         if lines.len() > 1 {
             let number = numbers.draw();
             *line = lines.partition_point(|l| l.0 < number).min(lines.len() - 1);
         }
-        if let Some((inside, leaving)) = self.eye {
+        // What is drawn about an image may lie in another pixel.
+        let here = !aimed || (0..2).all(|k| (corner[k]..corner[k] + 1.0).contains(&place[k]));
+        if let (Some((inside, leaving)), true) = (self.eye, here) {
             self.lines.push(view.eye, d, leaving);
             self.branches.push(Branch {
                 path,
@@ -334,11 +365,16 @@ impl<'a> Wave<'a> {
                 }
                 let (o, d) = (self.lines.origin(i), self.lines.direction(i));
                 let path = &mut self.paths[branch.path as usize];
+                let small = branch.seen == Seen::Smooth && self.method.glints.is_some_and(|g| g.has(number));
+                if path.aimed && !small {
+                    continue;
+                }
+                let shared = if small { path.share } else { 1.0 };
                 let (_, wavelength, colour) = &self.lit.lines[path.line];
                 let (sum, chance, fillings) = (&mut path.sum, &mut path.chance, &mut self.fillings);
                 let rare = branch.drawn && !branch.direct;
                 lantern.along(source, o, d, self.reach[i], |lit| {
-                    let mut weight = branch.weight * colour[number];
+                    let mut weight = branch.weight * shared * colour[number];
                     let absorption = fillings.at(scene, branch.inside.top(), *wavelength).absorption;
                     if absorption > 0.0 {
                         weight *= (-absorption * lit.t).exp();
@@ -372,23 +408,7 @@ impl<'a> Wave<'a> {
             n1,
             n2,
         };
-        let (shares, across) = finish.shares(&here);
-        // Light that is transmitted to the eye arrives from the other side, at the angle of refraction. An interface transmits
-        // the same share both ways.
-        let through = if matches!(finish, Finish::Interface) {
-            shares[1] * (n1 / n2) * (n1 / n2)
-        } else if shares[1] > 0.0 {
-            let there = Incidence {
-                cosine: across,
-                wavelength,
-                n1: n2,
-                n2: n1,
-            };
-            finish.shares(&there).0[1] * (n1 / n2) * (n1 / n2)
-        } else {
-            0.0
-        };
-        let smooth = [shares[0], through];
+        let (smooth, shares, across) = smooth_shares(finish, &here);
         let seen = if branch.seen == Seen::Smooth {
             Seen::Smooth
         } else {
@@ -415,7 +435,8 @@ impl<'a> Wave<'a> {
             met[0] |= smooth != [0.0; 2];
             met[1] |= branch.direct && finish.is_diffuse();
         }
-        let diffuse = finish.is_diffuse() && !self.end(branch, meeting, finish);
+        let aimed = self.paths[branch.path as usize].aimed;
+        let diffuse = !aimed && finish.is_diffuse() && !self.end(branch, meeting, finish);
         // Chains of smooth surfaces branch; everything else is drawn.
         if branch.seen == Seen::Smooth && branch.weight > SPLIT {
             for (transmitted, share) in [(false, smooth[0]), (true, smooth[1])] {

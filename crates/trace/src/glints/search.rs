@@ -1,0 +1,533 @@
+//! Small images of sources: chains of smooth surfaces from the eye, bent until they end on a point of the source.
+//!
+//! From starts in every pixel all chains are followed. Two more lines beside each tell how it moves with the place in the
+//! pixel; by Newton's method that place is found from which it meets a point of the source. As for manifolds of specular
+//! paths `[Jakob2012]`, but with differences in the place of derivatives, which asks nothing of the surfaces.
+
+use etendue_geometry::RayBatch;
+use etendue_geometry::lines::Leaving;
+use etendue_lightfield::View;
+use etendue_math::Vec3;
+use etendue_optics::finish::{Finish, Incidence};
+use etendue_optics::source::surface::across;
+use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
+
+use super::{Found, Glint};
+use crate::inside::Inside;
+use crate::meeting::{Fillings, Meeting, meet_one, smooth_shares};
+use crate::reverse::Lit;
+use crate::scene::Scene;
+use crate::start::place;
+use crate::wave::SPLIT;
+
+/// How far beside a line its neighbours start, in pixels: far above rounding, far below what surfaces do.
+const BESIDE: f64 = 1e-4;
+
+/// From how far away an image is looked for, in pixels.
+const NEAR: f64 = 3.0;
+
+/// Surfaces met by all chains from one start, at most: light that is caught in a solid has no end.
+const MOST_MEETINGS: usize = 128;
+
+/// Points of each source that are looked for.
+const POINTS: usize = 64;
+
+/// Those among them that tell how large the source is about one of them.
+const TOGETHER: usize = 8;
+
+/// Parts of a source are images by themselves if their area on the screen is so much smaller than its own.
+const APART: f64 = 1.0 / 400.0;
+
+/// Steps to an image.
+const STEPS: usize = 20;
+
+/// Width of an image in units of the standard deviation of the places of its light.
+const WIDTH: f64 = 1.5;
+
+/// The least and the largest width, in pixels. Lines that are spread evenly find what is larger both ways.
+const NARROWEST: f64 = 1e-9;
+const WIDEST: f64 = 0.5;
+
+/// The seed of the points of sources: any does.
+const SEED: u64 = 0x474C_494E_5453;
+
+/// Wavelengths that images are looked for at.
+const COLOURS: usize = 4;
+
+type Pair = [f64; 2];
+/// By rows.
+type Square = [Pair; 2];
+type Spread = [[f64; 3]; 3];
+
+/// Points of a source and how they are spread.
+#[derive(Debug)]
+struct Target {
+    source: usize,
+    points: Vec<Vec3>,
+    middle: Vec3,
+    radius: f64,
+    /// Covariance of all points, and of those about each.
+    spread: Spread,
+    about: Vec<Spread>,
+}
+
+/// A line of sight on its way.
+#[derive(Clone, Copy)]
+struct Line {
+    o: Vec3,
+    d: Vec3,
+    inside: Inside,
+    leaving: Leaving,
+}
+
+/// A chain of smooth surfaces from a start: the line there and those beside it.
+#[derive(Clone)]
+struct Chain {
+    lines: [Line; 3],
+    weight: f64,
+    ways: Vec<bool>,
+}
+
+/// How lines pass a point: offset of the line, and its change with the place in pixels, across it; distance along it.
+struct Passing {
+    off: Pair,
+    change: Square,
+    along: f64,
+    axes: [Vec3; 2],
+}
+
+/// What is needed to look for images.
+#[derive(Clone)]
+pub struct Search<'a> {
+    scene: &'a Scene,
+    view: &'a View,
+    most_events: u32,
+    targets: std::sync::Arc<Vec<Target>>,
+    wavelengths: Vec<f64>,
+    /// What the eye is in and on.
+    eye: (Inside, Leaving),
+    fillings: Fillings,
+}
+
+impl<'a> Search<'a> {
+    /// None if there is nothing to look for.
+    pub fn new(lit: &Lit<'a>, view: &'a View, most_events: u32) -> Option<Self> {
+        let eye = place(lit.scene, view.eye, (view.target - view.eye).normalized()).ok()?;
+        let targets: Vec<Target> = (0..lit.scene.sources.len())
+            .filter_map(|number| target(lit, number))
+            .collect();
+        let n = lit.lines.len();
+        let colours = n.min(COLOURS);
+        // In the middle of each of as many parts of the light.
+        let wavelengths = (0..colours).map(|k| {
+            let share = (k as f64 + 0.5) / colours as f64;
+            lit.lines[lit.lines.partition_point(|line| line.0 < share).min(n - 1)].1
+        });
+        (!targets.is_empty()).then(|| Self {
+            scene: lit.scene,
+            view,
+            most_events,
+            targets: std::sync::Arc::new(targets),
+            wavelengths: wavelengths.collect(),
+            eye,
+            fillings: Fillings::new(lit.scene),
+        })
+    }
+
+    /// Images that are found from starts in a pixel, wherever they are.
+    #[allow(clippy::cast_possible_truncation, reason = "a small number")]
+    pub fn from_pixel(&mut self, pixel: usize, starts: usize) -> Vec<Found> {
+        let columns = self.view.columns as usize;
+        let corner = [(pixel % columns) as f64, (pixel / columns) as f64];
+        let mut found = Vec::new();
+        for start in 0..starts {
+            let point = lattice_point(start as u32, &[0.5; DIMENSIONS]);
+            let wavelength = self.wavelengths[(pixel + start) % self.wavelengths.len()];
+            let number = pixel * starts + start;
+            self.from_place(
+                [corner[0] + point[0], corner[1] + point[1]],
+                wavelength,
+                number,
+                &mut found,
+            );
+        }
+        found
+    }
+
+    fn from_place(&mut self, at: Pair, wavelength: f64, number: usize, found: &mut Vec<Found>) {
+        let mut chains = vec![Chain {
+            lines: self.lines(at),
+            weight: 1.0,
+            ways: Vec::new(),
+        }];
+        let mut meetings = 0;
+        while let Some(mut chain) = chains.pop() {
+            let mut events = chain.ways.len();
+            loop {
+                let met = self.meet(&chain.lines);
+                let reach = met.as_ref().map_or(f64::INFINITY, |met| met[0].t);
+                let targets = self.targets.clone();
+                for target in targets.iter() {
+                    self.aim(target, at, &chain, reach, wavelength, number, found);
+                }
+                meetings += 1;
+                events += 1;
+                let Some(met) = met else { break };
+                if meetings >= MOST_MEETINGS || events > self.most_events as usize {
+                    return;
+                }
+                let Some(shares) = self.shares(&chain.lines[0], &met[0], wavelength) else {
+                    chain.lines = met.map(|met| Line {
+                        o: met.point,
+                        d: chain.lines[0].d,
+                        inside: met.after,
+                        leaving: met.leaving,
+                    });
+                    continue;
+                };
+                for (transmitted, share) in [(false, shares[0]), (true, shares[1])] {
+                    let weight = chain.weight * share;
+                    let lines = (weight > SPLIT).then(|| self.turned(&chain.lines, &met, transmitted, wavelength));
+                    if let Some(lines) = lines.flatten() {
+                        let mut ways = chain.ways.clone();
+                        ways.push(transmitted);
+                        chains.push(Chain { lines, weight, ways });
+                    }
+                }
+                break;
+            }
+        }
+    }
+
+    /// The lines of sight through a place and beside it.
+    fn lines(&self, at: Pair) -> [Line; 3] {
+        [[0.0, 0.0], [BESIDE, 0.0], [0.0, BESIDE]].map(|off| Line {
+            o: self.view.eye,
+            d: self.view.through([at[0] + off[0], at[1] + off[1]]),
+            inside: self.eye.0,
+            leaving: self.eye.1,
+        })
+    }
+
+    /// What three lines meet; None if it is nothing, or not the same.
+    fn meet(&self, lines: &[Line; 3]) -> Option<[Meeting; 3]> {
+        let meet = |line: &Line| meet_one(self.scene, line.o, line.d, &line.leaving, f64::INFINITY, line.inside);
+        let first = meet(&lines[0]).ok()??;
+        let same = |line: &Line| {
+            let met = meet(line).ok()??;
+            (met.face == first.face && met.finish == first.finish && met.after == first.after).then_some(met)
+        };
+        Some([first, same(&lines[1])?, same(&lines[2])?])
+    }
+
+    /// What of the radiance is mirrored and refracted; None if the line goes on as if nothing were there.
+    fn shares(&mut self, line: &Line, met: &Meeting, wavelength: f64) -> Option<Pair> {
+        let finish = &self.scene.finishes[met.finish? as usize];
+        let here = self.incidence(line, met, wavelength);
+        if matches!(finish, Finish::Interface) && here.n1 == here.n2 {
+            return None;
+        }
+        Some(smooth_shares(finish, &here).0)
+    }
+
+    fn incidence(&mut self, line: &Line, met: &Meeting, wavelength: f64) -> Incidence {
+        Incidence {
+            cosine: (-line.d.dot(met.normal)).min(1.0),
+            wavelength,
+            n1: self.fillings.at(self.scene, met.before.top(), wavelength).n,
+            n2: self.fillings.at(self.scene, met.after.top(), wavelength).n,
+        }
+    }
+
+    /// Three lines beyond a smooth surface; None if one of them cannot go there.
+    fn turned(
+        &mut self,
+        lines: &[Line; 3],
+        met: &[Meeting; 3],
+        transmitted: bool,
+        wavelength: f64,
+    ) -> Option<[Line; 3]> {
+        let mut result = *lines;
+        for (line, met) in result.iter_mut().zip(met) {
+            let here = self.incidence(line, met, wavelength);
+            let finish = &self.scene.finishes[met.finish? as usize];
+            let (smooth, _, across) = smooth_shares(finish, &here);
+            if smooth[usize::from(transmitted)] <= 0.0 {
+                return None;
+            }
+            *line = Line {
+                o: met.point,
+                d: if transmitted {
+                    met.refracted(line.d, here.cosine, here.n1 / here.n2, across)
+                } else {
+                    met.mirrored(line.d, here.cosine)
+                },
+                inside: if transmitted { met.after } else { met.before },
+                leaving: met.leaving,
+            };
+        }
+        Some(result)
+    }
+
+    /// The lines from a place along known ways.
+    fn follow(&mut self, at: Pair, ways: &[bool], wavelength: f64) -> Option<[Line; 3]> {
+        let mut lines = self.lines(at);
+        let (mut done, mut meetings) = (0, 0);
+        while done < ways.len() {
+            meetings += 1;
+            if meetings > MOST_MEETINGS {
+                return None;
+            }
+            let met = self.meet(&lines)?;
+            if self.shares(&lines[0], &met[0], wavelength).is_some() {
+                lines = self.turned(&lines, &met, ways[done], wavelength)?;
+                done += 1;
+            } else {
+                let before = lines;
+                for ((line, met), before) in lines.iter_mut().zip(met).zip(before) {
+                    *line = Line {
+                        o: met.point,
+                        d: before.d,
+                        inside: met.after,
+                        leaving: met.leaving,
+                    };
+                }
+            }
+        }
+        Some(lines)
+    }
+
+    /// Looks for images of a source near to a start.
+    #[allow(clippy::too_many_arguments, reason = "what a start is")]
+    fn aim(
+        &mut self,
+        target: &Target,
+        at: Pair,
+        chain: &Chain,
+        reach: f64,
+        wavelength: f64,
+        number: usize,
+        found: &mut Vec<Found>,
+    ) {
+        let Some(inverse) = passing(&chain.lines, target.middle).inverse() else {
+            return;
+        };
+        let middle = passing(&chain.lines, target.middle);
+        if middle.along + target.radius <= 0.0 || middle.along - target.radius > 2.0 * reach {
+            return;
+        }
+        let norm = inverse.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
+        let step = times(&inverse, middle.off);
+        if step[0].hypot(step[1]) > NEAR + norm * target.radius {
+            return;
+        }
+        // Whatever is far larger than a pixel is no small image.
+        if widths(&spread_on_screen(&inverse, &middle.axes, &target.spread)).1 > 4.0 * WIDEST {
+            return;
+        }
+        let distance = |point: &Vec3| {
+            let passing = passing(&chain.lines, *point);
+            passing.inverse().map_or(f64::INFINITY, |inverse| {
+                let step = times(&inverse, passing.off);
+                step[0].hypot(step[1])
+            })
+        };
+        let nearest = (0..target.points.len())
+            .map(|k| (distance(&target.points[k]), k))
+            .fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a });
+        if nearest.0 > NEAR {
+            return;
+        }
+        for k in [nearest.1, number % target.points.len()] {
+            let Some((place, inverse, axes)) = self.approach(target.points[k], at, &chain.ways, target, wavelength)
+            else {
+                continue;
+            };
+            let whole = spread_on_screen(&inverse, &axes, &target.spread);
+            let part = spread_on_screen(&inverse, &axes, &target.about[k]);
+            let apart = determinant(&part).max(0.0).sqrt() < APART.sqrt() * determinant(&whole).max(0.0).sqrt();
+            for spread in [Some(whole), apart.then_some(part)].into_iter().flatten() {
+                if let Some(glint) = image(place, &spread) {
+                    found.push(Found {
+                        glint,
+                        source: target.source,
+                        ways: chain.ways.clone(),
+                    });
+                }
+            }
+        }
+    }
+
+    /// The place from which a chain meets a point, and how places there follow from offsets.
+    fn approach(
+        &mut self,
+        point: Vec3,
+        start: Pair,
+        ways: &[bool],
+        target: &Target,
+        wavelength: f64,
+    ) -> Option<(Pair, Square, [Vec3; 2])> {
+        let (mut at, mut last) = (start, start);
+        let close = 1e-3 * (target.spread[0][0] + target.spread[1][1] + target.spread[2][2]).sqrt();
+        for _ in 0..STEPS {
+            let Some(lines) = self.follow(at, ways, wavelength) else {
+                // Beyond an edge: half way back.
+                let back = [(at[0] + last[0]) / 2.0, (at[1] + last[1]) / 2.0];
+                at = back;
+                continue;
+            };
+            let passing = passing(&lines, point);
+            let inverse = passing.inverse()?;
+            let mut step = times(&inverse, passing.off);
+            if passing.off[0].hypot(passing.off[1]) < close {
+                return (passing.along > 0.0).then_some(([at[0] - step[0], at[1] - step[1]], inverse, passing.axes));
+            }
+            let length = step[0].hypot(step[1]);
+            if length > 1.0 {
+                step = step.map(|x| x / length);
+            }
+            last = at;
+            at = [at[0] - step[0], at[1] - step[1]];
+            let grid = [self.view.columns, self.view.rows].map(f64::from);
+            if (0..2).any(|k| !(-1.0..=grid[k] + 1.0).contains(&at[k])) {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+impl Passing {
+    /// Places by offsets; None where offsets do not follow places.
+    fn inverse(&self) -> Option<Square> {
+        let [[a, b], [c, d]] = self.change;
+        let determinant = a * d - b * c;
+        let inverse = [[d / determinant, -b / determinant], [-c / determinant, a / determinant]];
+        inverse.iter().flatten().all(|x| x.is_finite()).then_some(inverse)
+    }
+}
+
+fn passing(lines: &[Line; 3], point: Vec3) -> Passing {
+    let d = lines[0].d;
+    let axes = across(d);
+    let off = lines.each_ref().map(|line| {
+        let to = point - line.o;
+        let beside = line.d * to.dot(line.d) - to;
+        axes.map(|axis| beside.dot(axis))
+    });
+    let change = |k: usize| [(off[1][k] - off[0][k]) / BESIDE, (off[2][k] - off[0][k]) / BESIDE];
+    Passing {
+        off: off[0],
+        change: [change(0), change(1)],
+        along: (point - lines[0].o).dot(d),
+        axes,
+    }
+}
+
+fn times(m: &Square, v: Pair) -> Pair {
+    [m[0][0] * v[0] + m[0][1] * v[1], m[1][0] * v[0] + m[1][1] * v[1]]
+}
+
+fn determinant(m: &Square) -> f64 {
+    m[0][0] * m[1][1] - m[0][1] * m[1][0]
+}
+
+/// The covariance in pixels that one in space comes to.
+fn spread_on_screen(inverse: &Square, axes: &[Vec3; 2], spread: &Spread) -> Square {
+    let row = |v: Vec3| spread.map(|r| r[0] * v.x + r[1] * v.y + r[2] * v.z);
+    let flat = axes.map(|a| {
+        let s = row(a);
+        axes.map(|b| s[0] * b.x + s[1] * b.y + s[2] * b.z)
+    });
+    let half = inverse.map(|r| {
+        [
+            r[0] * flat[0][0] + r[1] * flat[1][0],
+            r[0] * flat[0][1] + r[1] * flat[1][1],
+        ]
+    });
+    half.map(|r| inverse.map(|s| r[0] * s[0] + r[1] * s[1]))
+}
+
+/// The larger and the lesser width of an image of this covariance.
+fn widths(spread: &Square) -> (f64, f64) {
+    let [[a, b], [_, d]] = *spread;
+    let (mean, half) = ((a + d) / 2.0, ((a - d) / 2.0).hypot(b));
+    let lesser = if mean + half > 0.0 {
+        determinant(spread).max(0.0) / (mean + half)
+    } else {
+        0.0
+    };
+    (WIDTH * (mean + half).max(0.0).sqrt(), WIDTH * lesser.sqrt())
+}
+
+/// An image at a place, of a covariance in pixels; None if it is large.
+fn image(place: Pair, spread: &Square) -> Option<Glint> {
+    let (larger, lesser) = widths(spread);
+    if lesser >= WIDEST {
+        return None;
+    }
+    let [[a, b], [_, d]] = *spread;
+    // Of the two forms of the axis, the one without cancellation.
+    let half = ((a - d) / 2.0).hypot(b);
+    let axis = if a >= d {
+        [half + (a - d) / 2.0, b]
+    } else {
+        [b, half + (d - a) / 2.0]
+    };
+    let length = axis[0].hypot(axis[1]);
+    let [x, y] = if length > 0.0 {
+        axis.map(|v| v / length)
+    } else {
+        [1.0, 0.0]
+    };
+    let [s, t] = [larger, lesser].map(|width| width.clamp(NARROWEST, WIDEST));
+    Glint::new(place, [[x * s, y * s], [-y * t, x * t]])
+}
+
+/// Points of a source that can be seen; None if it cannot.
+fn target(lit: &Lit<'_>, number: usize) -> Option<Target> {
+    let source = &lit.scene.sources[number];
+    lit.lanterns[number].as_ref()?;
+    let mut batch = RayBatch::default();
+    source.emit(number as u64, 0..POINTS as u64, POINTS as u64, SEED, &[], &mut batch);
+    let points: Vec<Vec3> = (0..batch.len)
+        .filter(|i| batch.usable(*i))
+        .map(|i| batch.position(i))
+        .collect();
+    let (middle, spread) = moments(points.iter())?;
+    let radius = points.iter().map(|p| (*p - middle).length()).fold(0.0, f64::max);
+    if radius == 0.0 {
+        return None;
+    }
+    let about = points.iter().map(|point| {
+        let mut others: Vec<&Vec3> = points.iter().collect();
+        others.sort_by(|a, b| (**a - *point).length().total_cmp(&(**b - *point).length()));
+        Some(moments(others.into_iter().take(TOGETHER))?.1)
+    });
+    Some(Target {
+        source: number,
+        about: about.collect::<Option<_>>()?,
+        points,
+        middle,
+        radius,
+        spread,
+    })
+}
+
+/// Mean and covariance of points.
+fn moments<'p>(points: impl Iterator<Item = &'p Vec3> + Clone) -> Option<(Vec3, Spread)> {
+    let n = points.clone().count() as f64;
+    let zero = Vec3::new(0.0, 0.0, 0.0);
+    let mean = points.clone().fold(zero, |sum, p| sum + *p) * (1.0 / n);
+    let mut spread = [[0.0; 3]; 3];
+    for point in points {
+        let off = *point - mean;
+        let off = [off.x, off.y, off.z];
+        for (row, a) in spread.iter_mut().zip(off) {
+            for (cell, b) in row.iter_mut().zip(off) {
+                *cell += a * b / n;
+            }
+        }
+    }
+    (n > 0.0).then_some((mean, spread))
+}
