@@ -153,6 +153,11 @@ def look_at_scene(
             f"{paths:,} lines of sight per pixel, in {passes.done} independent passes",
             *passes.notes(how.until, image),
         ]
+        if small.pixels():
+            told.append(
+                f"sources are small against a pixel in {small.pixels():,} of them, directly or in lenses and mirrors: as many "
+                "lines of sight again look there"
+            )
         if survey is not None and survey.patches()[0]:
             told.append(comparison_note(gathered, [look(FIRST_CHECK + i, None)[0] for i in range(CHECKS)]))
         values, error = passes.total(image)

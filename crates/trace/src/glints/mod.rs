@@ -107,24 +107,24 @@ impl Glints {
         let starts = (STARTS / pixels.max(1)).clamp(1, MOST_STARTS);
         let found: Vec<Vec<Found>> = (0..pixels)
             .into_par_iter()
-            .map_init(|| search.clone(), |search, pixel| search.from_pixel(pixel, starts))
+            .map_init(|| search.clone(), |search, pixel| search.search_from(pixel, starts))
             .collect();
-        let mut lists: Vec<Vec<Found>> = vec![Vec::new(); pixels];
+        let mut images: Vec<Vec<Found>> = vec![Vec::new(); pixels];
         for image in found.into_iter().flatten() {
             for pixel in touched(view, &image.glint) {
-                let list = &mut lists[pixel];
+                let here = &mut images[pixel];
                 let known = |other: &Found| {
                     other.source == image.source
                         && other.ways == image.ways
                         && other.glint.distance2(image.glint.centre) < SAME * SAME
                 };
-                if list.len() < MOST && !list.iter().any(known) {
-                    list.push(image.clone());
+                if here.len() < MOST && !here.iter().any(known) {
+                    here.push(image.clone());
                 }
             }
         }
-        for (pixel, list) in lists.iter().enumerate() {
-            for image in list {
+        for (pixel, here) in images.iter().enumerate() {
+            for image in here {
                 result.of[image.source] = true;
                 result.images.push(image.glint);
             }

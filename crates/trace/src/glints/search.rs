@@ -99,6 +99,7 @@ struct Passing {
 /// What is needed to look for images.
 #[derive(Clone)]
 pub struct Search<'a> {
+    lit: &'a Lit<'a>,
     scene: &'a Scene,
     view: &'a View,
     most_events: u32,
@@ -111,7 +112,7 @@ pub struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// None if there is nothing to look for.
-    pub fn new(lit: &Lit<'a>, view: &'a View, most_events: u32) -> Option<Self> {
+    pub fn new(lit: &'a Lit<'a>, view: &'a View, most_events: u32) -> Option<Self> {
         let eye = place(lit.scene, view.eye, (view.target - view.eye).normalized()).ok()?;
         let targets: Vec<Target> = (0..lit.scene.sources.len())
             .filter_map(|number| target(lit, number))
@@ -124,6 +125,7 @@ impl<'a> Search<'a> {
             lit.lines[lit.lines.partition_point(|line| line.0 < share).min(n - 1)].1
         });
         (!targets.is_empty()).then(|| Self {
+            lit,
             scene: lit.scene,
             view,
             most_events,
@@ -136,7 +138,7 @@ impl<'a> Search<'a> {
 
     /// Images that are found from starts in a pixel, wherever they are.
     #[allow(clippy::cast_possible_truncation, reason = "a small number")]
-    pub fn from_pixel(&mut self, pixel: usize, starts: usize) -> Vec<Found> {
+    pub fn search_from(&mut self, pixel: usize, starts: usize) -> Vec<Found> {
         let columns = self.view.columns as usize;
         let corner = [(pixel % columns) as f64, (pixel / columns) as f64];
         let mut found = Vec::new();
@@ -144,7 +146,7 @@ impl<'a> Search<'a> {
             let point = lattice_point(start as u32, &[0.5; DIMENSIONS]);
             let wavelength = self.wavelengths[(pixel + start) % self.wavelengths.len()];
             let number = pixel * starts + start;
-            self.from_place(
+            self.start(
                 [corner[0] + point[0], corner[1] + point[1]],
                 wavelength,
                 number,
@@ -154,7 +156,7 @@ impl<'a> Search<'a> {
         found
     }
 
-    fn from_place(&mut self, at: Pair, wavelength: f64, number: usize, found: &mut Vec<Found>) {
+    fn start(&mut self, at: Pair, wavelength: f64, number: usize, found: &mut Vec<Found>) {
         let mut chains = vec![Chain {
             lines: self.lines(at),
             weight: 1.0,
@@ -211,10 +213,10 @@ impl<'a> Search<'a> {
 
     /// What three lines meet; None if it is nothing, or not the same.
     fn meet(&self, lines: &[Line; 3]) -> Option<[Meeting; 3]> {
-        let meet = |line: &Line| meet_one(self.scene, line.o, line.d, &line.leaving, f64::INFINITY, line.inside);
-        let first = meet(&lines[0]).ok()??;
+        let next = |line: &Line| meet_one(self.scene, line.o, line.d, &line.leaving, f64::INFINITY, line.inside);
+        let first = next(&lines[0]).ok()??;
         let same = |line: &Line| {
-            let met = meet(line).ok()??;
+            let met = next(line).ok()??;
             (met.face == first.face && met.finish == first.finish && met.after == first.after).then_some(met)
         };
         Some([first, same(&lines[1])?, same(&lines[2])?])
@@ -338,6 +340,9 @@ impl<'a> Search<'a> {
         if nearest.0 > NEAR {
             return;
         }
+        if self.shows(target, &chain.lines[0], reach) {
+            return;
+        }
         for k in [nearest.1, number % target.points.len()] {
             let Some((place, inverse, axes)) = self.approach(target.points[k], at, &chain.ways, target, wavelength)
             else {
@@ -358,6 +363,15 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// Whether a line meets the source itself: it is not small there, as glass shows the whole sky in little.
+    fn shows(&self, target: &Target, line: &Line, reach: f64) -> bool {
+        let (mut met, lit) = (false, self.lit);
+        if let Some(lantern) = &lit.lanterns[target.source] {
+            lantern.along(&lit.scene.sources[target.source], line.o, line.d, reach, |_| met = true);
+        }
+        met
+    }
+
     /// The place from which a chain meets a point, and how places there follow from offsets.
     fn approach(
         &mut self,
@@ -372,8 +386,7 @@ impl<'a> Search<'a> {
         for _ in 0..STEPS {
             let Some(lines) = self.follow(at, ways, wavelength) else {
                 // Beyond an edge: half way back.
-                let back = [(at[0] + last[0]) / 2.0, (at[1] + last[1]) / 2.0];
-                at = back;
+                at = [f64::midpoint(at[0], last[0]), f64::midpoint(at[1], last[1])];
                 continue;
             };
             let passing = passing(&lines, point);
@@ -451,7 +464,7 @@ fn spread_on_screen(inverse: &Square, axes: &[Vec3; 2], spread: &Spread) -> Squa
 /// The larger and the lesser width of an image of this covariance.
 fn widths(spread: &Square) -> (f64, f64) {
     let [[a, b], [_, d]] = *spread;
-    let (mean, half) = ((a + d) / 2.0, ((a - d) / 2.0).hypot(b));
+    let (mean, half) = (f64::midpoint(a, d), ((a - d) / 2.0).hypot(b));
     let lesser = if mean + half > 0.0 {
         determinant(spread).max(0.0) / (mean + half)
     } else {
