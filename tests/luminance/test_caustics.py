@@ -104,8 +104,8 @@ def test_both_routes_go_on_until_the_error_is_reached() -> None:
     scene = et.Scene(**ball_over_paper())
 
     def error(lmap: LuminanceMap) -> float:
-        lit = lmap.values > 0
-        return float(np.median(lmap.standard_error[lit] / lmap.values[lit]))
+        assert lmap.relative_error is not None
+        return lmap.relative_error.flux_weighted
 
     (first,) = et.luminance_map(scene, rays_per_pixel=16)
     wanted = 0.4 * error(first)

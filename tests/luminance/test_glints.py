@@ -1,4 +1,4 @@
-"""Lamps far smaller than a pixel, seen directly, in a mirror and in glass: closed forms, and the same place from close by."""
+"""Lamps far smaller than a pixel, seen directly, in a mirror and in glass: closed forms, and the same from close by."""
 
 from __future__ import annotations
 

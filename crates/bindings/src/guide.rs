@@ -23,7 +23,7 @@ impl Guide {
 
 #[pymethods]
 impl Guide {
-    /// From arrivals at the faces of a scene, as `trace_batches` tells them: (n, 7).
+    /// From arrivals at the faces of a scene, as `trace_batches` tells them: (n, 8).
     #[new]
     #[allow(
         clippy::cast_possible_truncation,
@@ -31,14 +31,15 @@ impl Guide {
         reason = "a number that is no face has no tree"
     )]
     fn new(py: Python<'_>, scene: &Scene, arrivals: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
-        if arrivals.shape()[1] != 7 {
-            return Err(PyValueError::new_err("arrivals of shape (n, 7) are needed"));
+        if arrivals.shape()[1] != 8 {
+            return Err(PyValueError::new_err("arrivals of shape (n, 8) are needed"));
         }
-        let rows = arrivals.as_slice()?.chunks_exact(7);
+        let rows = arrivals.as_slice()?.chunks_exact(8);
         let arrivals = rows.map(|row| Arrival {
             point: Vec3::new(row[0], row[1], row[2]),
             towards: Vec3::new(row[3], row[4], row[5]),
             face: row[6] as u32,
+            family: row[7] as u32,
         });
         let arrivals = arrivals.collect();
         let faces = scene.core().roles.len();

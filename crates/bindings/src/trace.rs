@@ -121,13 +121,13 @@ fn record_array<'py>(py: Python<'py>, records: &[Record]) -> PyResult<Bound<'py,
     PyArray1::from_iter(py, rows).reshape([records.len(), 8])
 }
 
-/// Rows of point, direction to where the light came from, and the number of the face.
+/// Rows of point, direction to where the light came from, the number of the face, and that of the family.
 fn arrival_rows<'py>(py: Python<'py>, arrivals: &[Arrival]) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let rows = arrivals.iter().flat_map(|a| {
         let (p, k) = (a.point, a.towards);
-        [p.x, p.y, p.z, k.x, k.y, k.z, f64::from(a.face)]
+        [p.x, p.y, p.z, k.x, k.y, k.z, f64::from(a.face), f64::from(a.family)]
     });
-    PyArray1::from_iter(py, rows).reshape([arrivals.len(), 7])
+    PyArray1::from_iter(py, rows).reshape([arrivals.len(), 8])
 }
 
 /// Why rays are lost, in the order of a ledger.

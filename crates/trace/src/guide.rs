@@ -4,6 +4,10 @@
 //! at the diffuse surface from there, say where to look: as in `[Jensen1995]`, a direction is drawn from a density about those
 //! in which the nearest of them arrived. Half of the directions are drawn so, half by the cosine law: whatever the rays
 //! tell, no light is lost, and none weighs more than twice of what it would without them.
+//!
+//! Light comes in families: what a ball focuses and what it mirrors arrive at one place from different sides, one of them
+//! hundreds of times more often. Each family has arrivals of its own to go by, and a share of the directions by the root
+//! of their number, so that a rare one is not left to chance.
 
 use std::f64::consts::PI;
 
@@ -22,6 +26,12 @@ const NARROWEST: f64 = 2.5e-9;
 /// How far around its arrivals a density holds, in units of their extent.
 const MARGIN: f64 = 0.5;
 
+/// Families of arrivals at one face, at most; the rest are taken as one more.
+const FAMILIES: usize = 6;
+
+/// Arrivals that a family has at least.
+const FEWEST: usize = 8;
+
 /// Share of the directions that are drawn from the density, where there is one.
 pub const SHARE: f64 = 0.5;
 
@@ -34,13 +44,33 @@ pub struct Arrival {
     pub point: Vec3,
     /// Unit vector to where it came from.
     pub towards: Vec3,
+    /// Its source and the smooth surfaces on its way, see [`family`].
+    pub family: u32,
+}
+
+/// The family of light beyond one more smooth surface.
+#[inline]
+#[must_use]
+pub const fn family(before: u32, face: u32, transmitted: bool) -> u32 {
+    before
+        .wrapping_add(1)
+        .wrapping_mul(0x9E37_79B1)
+        .wrapping_add(2 * face + transmitted as u32)
+}
+
+/// The arrivals of all families near to a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Near<'a> {
+    guide: &'a Guide,
+    leaves: [Option<(f64, &'a Leaf)>; FAMILIES + 1],
+    total: f64,
 }
 
 /// Densities of directions, face by face and place by place.
 #[derive(Clone, Debug)]
 pub struct Guide {
-    /// The tree of each face that light arrives at.
-    roots: Vec<Option<usize>>,
+    /// For each face that light arrives at: the trees of its families, and their shares.
+    roots: Vec<Vec<(f64, usize)>>,
     nodes: Vec<Node>,
     towards: Vec<Vec3>,
 }
@@ -74,16 +104,27 @@ impl Guide {
     /// From arrivals at the faces of a scene, in any order that is always the same.
     #[must_use]
     pub fn new(faces: usize, mut arrivals: Vec<Arrival>) -> Self {
-        arrivals.sort_by_key(|arrival| arrival.face);
+        arrivals.sort_by_key(|arrival| (arrival.face, arrival.family));
         let mut guide = Self {
-            roots: vec![None; faces],
+            roots: vec![Vec::new(); faces],
             nodes: Vec::new(),
             towards: Vec::with_capacity(arrivals.len()),
         };
         for same in arrivals.chunk_by_mut(|a, b| a.face == b.face) {
-            if let Some(root) = guide.roots.get_mut(same[0].face as usize) {
-                *root = Some(guide.nodes.len());
-                guide.grow(same);
+            let face = same[0].face as usize;
+            if face >= faces {
+                continue;
+            }
+            let families = same.chunk_by(|a, b| a.family == b.family);
+            let mut counts: Vec<(usize, u32)> = families.map(|f| (f.len(), f[0].family)).collect();
+            counts.sort_by(|a, b| b.cmp(a));
+            let large = counts.iter().take(FAMILIES).filter(|(n, _)| *n >= FEWEST);
+            let own: Vec<u32> = large.map(|(_, family)| *family).collect();
+            let rank = |a: &Arrival| own.iter().position(|f| *f == a.family).unwrap_or(own.len());
+            same.sort_by_key(rank);
+            for together in same.chunk_by_mut(|a, b| rank(a) == rank(b)) {
+                guide.roots[face].push(((together.len() as f64).sqrt(), guide.nodes.len()));
+                guide.grow(together);
             }
         }
         guide
@@ -148,8 +189,24 @@ impl Guide {
 
     /// The arrivals near to a point of a face; None if there are none.
     #[must_use]
-    pub fn near(&self, face: u32, point: Vec3) -> Option<&Leaf> {
-        let mut node = (*self.roots.get(face as usize)?)?;
+    pub fn near(&self, face: u32, point: Vec3) -> Option<Near<'_>> {
+        let mut near = Near {
+            guide: self,
+            leaves: [None; FAMILIES + 1],
+            total: 0.0,
+        };
+        for (slot, (share, root)) in near.leaves.iter_mut().zip(self.roots.get(face as usize)?) {
+            if let Some(leaf) = self.leaf(*root, point) {
+                *slot = Some((*share, leaf));
+                near.total += share;
+            }
+        }
+        (near.total > 0.0).then_some(near)
+    }
+
+    /// The arrivals of a tree near to a point.
+    fn leaf(&self, root: usize, point: Vec3) -> Option<&Leaf> {
+        let mut node = root;
         let place = coordinates(point);
         loop {
             match &self.nodes[node] {
@@ -162,12 +219,11 @@ impl Guide {
         }
     }
 
-    /// Density of a direction \[1/sr\].
+    /// Density of a direction about the arrivals of a leaf \[1/sr\].
     ///
     /// About each arrival (1 + 2s)/4π · (1 + s(1 − cos))⁻², with s the sharpness: it has far tails, so that light between
     /// the arrivals is not missed.
-    #[must_use]
-    pub fn density(&self, leaf: &Leaf, d: Vec3) -> f64 {
+    fn density(&self, leaf: &Leaf, d: Vec3) -> f64 {
         let s = leaf.sharpness;
         let near = &self.towards[leaf.first..leaf.first + leaf.count];
         let sum: f64 = near
@@ -180,20 +236,48 @@ impl Guide {
         sum * (1.0 + 2.0 * s) / (4.0 * PI * leaf.count as f64)
     }
 
-    /// A direction from three numbers.
-    #[must_use]
+    /// A direction about one of the arrivals of a leaf, from three numbers.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "below the number of arrivals"
     )]
-    pub fn draw(&self, leaf: &Leaf, [which, height, turn]: [f64; 3]) -> Vec3 {
+    fn draw(&self, leaf: &Leaf, [which, height, turn]: [f64; 3]) -> Vec3 {
         let s = leaf.sharpness;
         let which = ((which * leaf.count as f64) as usize).min(leaf.count - 1);
         // The share below 1 − cos = t is t/(1 + s t) · (1 + 2s)/2.
         let x = 2.0 * height / (1.0 + 2.0 * s);
         let t = (x / (1.0 - s * x)).clamp(0.0, 2.0);
         about(self.towards[leaf.first + which], 1.0 - t, turn)
+    }
+}
+
+impl Near<'_> {
+    /// Density of a direction \[1/sr\].
+    #[must_use]
+    pub fn density(&self, d: Vec3) -> f64 {
+        let each = self.leaves.iter().flatten();
+        each.map(|(share, leaf)| share * self.guide.density(leaf, d))
+            .sum::<f64>()
+            / self.total
+    }
+
+    /// A direction from three numbers.
+    #[must_use]
+    pub fn draw(&self, [which, height, turn]: [f64; 3]) -> Vec3 {
+        let mut number = which * self.total;
+        let mut last = None;
+        for (share, leaf) in self.leaves.iter().flatten() {
+            last = Some((number / share, leaf));
+            if number < *share {
+                break;
+            }
+            number -= share;
+        }
+        // What is left of a number that has decided is again spread evenly.
+        last.map_or(Vec3::new(0.0, 0.0, 1.0), |(number, leaf)| {
+            self.guide.draw(leaf, [number.clamp(0.0, 1.0), height, turn])
+        })
     }
 }
 
@@ -209,7 +293,12 @@ mod tests {
             Arrival {
                 face: 1,
                 point: Vec3::new(5.0 * a, 3.0 * b, 0.0),
-                towards: about(Vec3::new(0.6, 0.0, 0.8), 1.0 - 0.01 * c, d),
+                towards: if i % 20 == 0 {
+                    about(Vec3::new(-0.8, 0.0, 0.6), 1.0 - 0.001 * c, d)
+                } else {
+                    about(Vec3::new(0.6, 0.0, 0.8), 1.0 - 0.01 * c, d)
+                },
+                family: u32::from(i % 20 == 0),
             }
         });
         Guide::new(3, arrivals.collect())
@@ -220,16 +309,17 @@ mod tests {
         let guide = guide();
         assert!(guide.near(0, Vec3::new(2.0, 1.0, 0.0)).is_none());
         assert!(guide.near(1, Vec3::new(2.0, 9.0, 0.0)).is_none());
-        let leaf = guide.near(1, Vec3::new(2.0, 1.0, 0.0)).expect("inside");
+        let near = guide.near(1, Vec3::new(2.0, 1.0, 0.0)).expect("inside");
+        assert_eq!(near.leaves.iter().flatten().count(), 2);
         // The mean of f/p over directions is ∫ f dω, for f with a closed form: 1, and a cap about another axis.
         let axis = Vec3::new(0.0, 0.6, 0.8);
         let (n, mut sums) = (1_000_000_u32, [0.0; 4]);
         let stream = Stream::new(5, 6);
         for i in 0..n {
             let [a, b, c, _] = stream.uniforms(u64::from(i), 0);
-            let d = guide.draw(leaf, [a, b, c]);
+            let d = near.draw([a, b, c]);
             assert!((d.length() - 1.0).abs() < 1e-12);
-            let p = guide.density(leaf, d);
+            let p = near.density(d);
             let cap = if d.dot(axis) > 0.7 { 1.0 } else { 0.0 };
             for (k, f) in [(0, 1.0), (2, cap)] {
                 sums[k] += f / p;
@@ -266,10 +356,11 @@ mod tests {
             face: 0,
             point: Vec3::new(1.0, 2.0, 3.0),
             towards: Vec3::new(0.0, 0.0, 1.0),
+            family: 0,
         };
         let guide = Guide::new(1, vec![one; 1000]);
-        let leaf = guide.near(0, one.point).expect("there");
-        let [x, y] = [guide.density(leaf, one.towards), guide.density(leaf, -one.towards)];
+        let near = guide.near(0, one.point).expect("there");
+        let [x, y] = [near.density(one.towards), near.density(-one.towards)];
         assert!(x > 1e6 && y > 0.0 && x.is_finite());
     }
 }

@@ -108,7 +108,10 @@ def luminance(
     ] = None,
     until: Annotated[
         float | None,
-        typer.Option("--until", help="Of a scene: follow more until this median relative error is reached, e.g. 0.01."),
+        typer.Option(
+            "--until",
+            help="Of a scene: follow more until this error, weighted by flux, is reached, e.g. 0.01.",
+        ),
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Of a scene (1).", min=0, show_default=False)] = None,
     forward_rays: Annotated[

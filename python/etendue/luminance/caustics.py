@@ -147,19 +147,21 @@ class Plan:
         For the passes that are made in any case; 0: lines of sight look for all light.
     guide : _core.Guide or None
         Directions in which lines of sight go on from diffuse surfaces.
+    glints : sequence of _core.Glints
+        For each view, where in its pixels lines of sight look for small sources.
     beforehand : int
         Rays of the pilot.
     """
 
     rays: int
     guide: _core.Guide | None
+    glints: Sequence[_core.Glints]
     beforehand: int
 
 
 def plan(
     record: Mapping[str, Any],
     views: Sequence[_core._View],
-    glints: Sequence[_core.Glints],
     seed: int,
     most_events: int,
     lines: int,
@@ -189,14 +191,15 @@ def plan(
     done = batches * batch
     found = np.concatenate(arrivals)
     guide = _core.Guide(core, found) if len(found) else None
+    glints = [_core.Glints(core, view, most_events, threads) for view in views]
     if rays is not None:
-        return Plan(rays, guide, done)
+        return Plan(rays, guide, glints, done)
     cost = max(segments / done / LINE, 0.25)
     wanted = [
         _rays(core, view, total, done, seed, most_events, lines, (guide, small), threads, cost)
         for view, total, small in zip(views, sums, glints, strict=True)
     ]
-    return Plan(max(wanted), guide, done)
+    return Plan(max(wanted), guide, glints, done)
 
 
 def _rays(
@@ -253,6 +256,9 @@ class LightImages:
             {**record, "detectors": [{"kind": "image", "view": view, **portion} for view in views]}
         )
         self._plan = plan
+        self._split = (
+            "" if shared is not None else " (all of it: with gather, lines of sight leave it to rays forwards)"
+        )
         self._how = seed, most_events, threads
         self._dealing = Dealing.of(record["sources"], plan.rays)
         # Luminance, its variance and the rays of each view, over all runs.
@@ -283,7 +289,7 @@ class LightImages:
         rays = self._plan.rays * self.runs
         note = (
             f"{rays:,} rays forwards, and {self._plan.beforehand:,} beforehand, for light that smooth surfaces or beams "
-            "send to diffuse ones"
+            f"send to diffuse ones{self._split}"
         )
         values, variance, count = self._sums[number]
         return Forward(values / self.runs, np.sqrt(variance) / self.runs, count.astype(np.int64), note)

@@ -156,7 +156,7 @@ def luminance_map(
         256 if None. Of scatter events: so many are followed for what the events leave out, sources that are seen directly,
         in mirrors or through lenses, and diffuse surfaces seen so; none if None.
     until : float, optional
-        Of a scene: more passes are made until the median relative error of the pixels with light is below it, by both
+        Of a scene: more passes are made until the sampling error, weighted by flux (`RelativeError`), is below it, by both
         routes together, up to 64 times `rays_per_pixel`. What light fields do not know of themselves does not count here,
         but in the map's errors.
     seed : int, optional

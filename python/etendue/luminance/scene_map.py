@@ -20,6 +20,7 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, checked_threads
+from etendue.quantities.relative_error import RelativeError
 from etendue.scene import Compiled, Scene, compile_scene
 from etendue.scene.placement import Placement
 from etendue.scene.sources.from_files import Field, Rays
@@ -112,8 +113,7 @@ def look_at_scene(
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
     core = _core.Scene({**compiled.record, "detectors": []})
     survey = _core.Survey(core, how.seed, MOST_EVENTS, how.threads) if how.gather else None
-    glints = [_core.Glints(core, view, MOST_EVENTS, how.threads) for view in views]
-    forward = _forward(core, compiled, views, glints, how, wanted=scattered is None)
+    forward = _forward(core, compiled, views, how, wanted=scattered is None)
     images = forward.images
     notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=scattered is not None or images is not None)]
     notes += [] if survey is None else survey_notes(survey)
@@ -121,8 +121,8 @@ def look_at_scene(
     left: Left = "scattered" if scattered is not None else "caustics" if images is not None else "nothing"
     origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
     maps, done = [], 0
-    for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, glints, strict=True)):
-        passes, gathered = _Passes(screen.shape), []
+    for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, forward.plan.glints, strict=True)):
+        passes, gathered = _Passes(screen.shape, screen.cosine(observer)), []
 
         def look(
             number: int, known: _core.Survey | None, view: _core._View = view, small: _core.Glints = small
@@ -155,8 +155,8 @@ def look_at_scene(
         ]
         if small.pixels():
             told.append(
-                f"sources are small against a pixel in {small.pixels():,} of them, directly or in lenses and mirrors: as many "
-                "lines of sight again look there"
+                f"lamps are small against the pixel in {small.pixels():,} of them, directly, in mirrors or through lenses: "
+                "as many lines of sight again look there"
             )
         if survey is not None and survey.patches()[0]:
             told.append(comparison_note(gathered, [look(FIRST_CHECK + i, None)[0] for i in range(CHECKS)]))
@@ -212,7 +212,6 @@ def _forward(
     core: _core.Scene,
     compiled: Compiled,
     views: list[_core._View],
-    glints: list[_core.Glints],
     how: Looking,
     *,
     wanted: bool,
@@ -220,10 +219,11 @@ def _forward(
     """Rays forwards as the scene asks for them, or the user; none where lines of sight find all light well."""
     possible = core.may_focus()
     if not possible or how.forward_rays == 0:
-        return _Forward(Plan(0, None, 0), None, None, possible)
+        glints = [_core.Glints(core, view, MOST_EVENTS, how.threads) for view in views]
+        return _Forward(Plan(0, None, glints, 0), None, None, possible)
     lines = how.paths * how.passes
     asked = None if how.forward_rays is None and wanted else int(how.forward_rays or 0)
-    found = plan(compiled.record, views, glints, how.seed, MOST_EVENTS, lines, asked, how.threads)
+    found = plan(compiled.record, views, how.seed, MOST_EVENTS, lines, asked, how.threads)
     images, shared = None, None
     if found.rays and wanted:
         # Where lines of sight end at patches, these do not tell what they hold of each source.
@@ -235,8 +235,9 @@ def _forward(
 class _Passes:
     """Mean and spread of independent passes, updated pass by pass (Welford): no difference of large numbers."""
 
-    def __init__(self, shape: tuple[int, int]) -> None:
+    def __init__(self, shape: tuple[int, int], area: Array) -> None:
         self.done = 0
+        self._area = area
         self._all = _Spread(shape)
         self._chance = _Spread(shape)
         self._lucky = np.zeros(shape, dtype=np.int64)
@@ -272,10 +273,9 @@ class _Passes:
         return values, np.sqrt(variance + (self._deviation**2 if known else 0.0))
 
     def relative_error(self, image: Forward | None) -> float:
-        """Median of the sampling error over the value, of pixels with light; 0 if there are none."""
-        values, error = self.total(image, known=False)
-        lit = values > 0.0
-        return float(np.median(error[lit] / values[lit])) if lit.any() else 0.0
+        """Sampling error over the luminance, weighted by flux (`RelativeError`); 0 if there is no light."""
+        found = RelativeError.of(*self.total(image, known=False), self._area)
+        return 0.0 if found is None else found.flux_weighted
 
     def wanted(self, until: float, most: int, image: Forward | None) -> int:
         """Passes that should be made to reach a relative error: as many as its fall with 1/√n asks for, twice at most."""
@@ -286,16 +286,16 @@ class _Passes:
 
     def notes(self, until: float | None, image: Forward | None) -> list[str]:
         """How sure the map is."""
-        values, error = self.total(image)
-        lit = values > 0.0
+        values, _ = self.total(image)
         notes = [] if (self._all.mean > 0.0).any() else ["no line of sight met light"]
-        if not lit.any():
+        if not (values > 0.0).any():
             return notes
+        reached = self.relative_error(image)
         notes.append(
-            f"median relative standard error {np.median(error[lit] / values[lit]):.2%} of the pixels with light; "
-            f"that of lines of sight has {self.done - 1} degrees of freedom"
+            f"sampling error {reached:.2%} of the luminance, weighted by flux; that of lines of sight has "
+            f"{self.done - 1} degrees of freedom"
         )
-        if until is not None and self.relative_error(image) >= until:
+        if until is not None and reached >= until:
             notes.append(f"stopped before {until:.2%} was reached, at {MOST_TIMES} times rays_per_pixel")
         rare = (self._lucky > 0) & (self._lucky < self.done / 2)
         if rare.any():

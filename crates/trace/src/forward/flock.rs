@@ -26,6 +26,8 @@ pub struct Rider {
     /// Luminance of the source where it started, over the flux of all sources \[1/(mm² sr)\], if a detector asks for it; ∞ if
     /// lines of sight cannot meet it.
     pub brightness: f64,
+    /// Which source it came from and through which smooth surfaces, as a number that few others share.
+    pub family: u32,
     /// How often the kept events can be thinned before those of this ray are dropped.
     pub depth: u32,
 }

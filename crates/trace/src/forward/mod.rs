@@ -242,6 +242,7 @@ impl<'a> Walk<'a> {
                 scattered: false,
                 unseen: !source.is_visible(),
                 brightness: brightness.map_or(f64::INFINITY, |b| b.at(births.position(i), births.direction(i))),
+                family: number as u32,
                 depth: if keeps { depth(run.seed, ray) } else { 0 },
             }
         }));

@@ -55,6 +55,7 @@ impl Walk<'_> {
                         face: meeting.face,
                         point: meeting.point,
                         towards: -d,
+                        family: rider.family,
                     });
                 }
                 Detector::Exitance(patches) => {

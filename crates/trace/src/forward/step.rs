@@ -7,6 +7,7 @@ use etendue_optics::finish::{Finish, Incidence, Lobe, part_of, pick};
 use etendue_optics::source::surface::about;
 
 use crate::detector::Detector;
+use crate::guide::family;
 use crate::inside::Inside;
 use crate::ledger::Fate;
 use crate::meeting::{Loss, Meeting, meet};
@@ -99,7 +100,10 @@ impl Walk<'_> {
         };
         // Smooth surfaces before the first diffuse one; an interface of equal media is none.
         let nothing = matches!(finish, Finish::Interface) && light.n1 == light.n2;
-        rider.unseen |= lobe.is_specular() && !rider.scattered && !nothing;
+        if lobe.is_specular() && !rider.scattered && !nothing {
+            rider.unseen = true;
+            rider.family = family(rider.family, meeting.face, lobe.is_transmission());
+        }
         rider.scattered |= !lobe.is_specular();
         let d = match lobe {
             Lobe::SpecularReflection => meeting.mirrored(d, light.cosine),

@@ -38,6 +38,9 @@ const TOGETHER: usize = 8;
 /// Parts of a source are images by themselves if their area on the screen is so much smaller than its own.
 const APART: f64 = 1.0 / 400.0;
 
+/// How far behind a surface a point may lie that is on it, in units of the distance: far above rounding.
+const HIDDEN: f64 = 1e-3;
+
 /// Steps to an image.
 const STEPS: usize = 20;
 
@@ -393,7 +396,10 @@ impl<'a> Search<'a> {
             let inverse = passing.inverse()?;
             let mut step = times(&inverse, passing.off);
             if passing.off[0].hypot(passing.off[1]) < close {
-                return (passing.along > 0.0).then_some(([at[0] - step[0], at[1] - step[1]], inverse, passing.axes));
+                // Another surface may stand before it.
+                let reach = self.meet(&lines).map_or(f64::INFINITY, |met| met[0].t);
+                let there = passing.along > 0.0 && passing.along <= reach * (1.0 + HIDDEN);
+                return there.then_some(([at[0] - step[0], at[1] - step[1]], inverse, passing.axes));
             }
             let length = step[0].hypot(step[1]);
             if length > 1.0 {

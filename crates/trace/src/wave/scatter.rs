@@ -10,7 +10,7 @@ use etendue_optics::source::surface::about;
 
 use super::{Branch, Connection, Seen, Wave};
 use crate::exitance::Place;
-use crate::guide::{Guide, Leaf, SHARE};
+use crate::guide::{Near, SHARE};
 use crate::meeting::{Meeting, transmittance};
 use crate::reverse::Left;
 use crate::sharing::density;
@@ -23,7 +23,7 @@ struct Spread<'a> {
     /// Shares of those that go on in front of the surface and behind it, by the cosine law.
     chances: [f64; 2],
     /// Directions that light is known to come from.
-    guide: Option<(&'a Guide, &'a Leaf)>,
+    guide: Option<Near<'a>>,
 }
 
 impl Spread<'_> {
@@ -31,9 +31,9 @@ impl Spread<'_> {
     #[inline]
     fn density(&self, d: Vec3, through: bool, cosine: f64) -> f64 {
         let even = self.chances[usize::from(through)] * cosine * FRAC_1_PI;
-        self.guide.map_or(even, |(guide, leaf)| {
-            (1.0 - SHARE) * even + SHARE * guide.density(leaf, d)
-        })
+        self.guide
+            .as_ref()
+            .map_or(even, |near| (1.0 - SHARE) * even + SHARE * near.density(d))
     }
 }
 
@@ -107,12 +107,12 @@ impl Wave<'_> {
         let through = chances[1] > 0.0 && numbers.draw() >= chances[0];
         // What the eye sees directly is left to rays traced forwards; the rest is looked for where they came from.
         let guide = self.method.guide.filter(|_| !branch.direct);
-        let guide = guide.and_then(|guide| Some((guide, guide.near(meeting.face, meeting.point)?)));
+        let guide = guide.and_then(|guide| guide.near(meeting.face, meeting.point));
         let spread = Spread { chances, guide };
-        let guided = guide.and_then(|(guide, leaf)| {
+        let guided = guide.and_then(|near| {
             let numbers = &mut self.paths[branch.path as usize].numbers;
             let number = numbers.draw() / SHARE;
-            (number < 1.0).then(|| guide.draw(leaf, [number, height, turn]))
+            (number < 1.0).then(|| near.draw([number, height, turn]))
         });
         self.reach_out(&branch, meeting, finish, n, &spread, all);
 
