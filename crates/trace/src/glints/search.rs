@@ -118,6 +118,8 @@ impl<'a> Search<'a> {
     pub fn new(lit: &'a Lit<'a>, view: &'a View, most_events: u32) -> Option<Self> {
         let eye = place(lit.scene, view.eye, (view.target - view.eye).normalized()).ok()?;
         let targets: Vec<Target> = (0..lit.scene.sources.len())
+            // A source that stands around the eye is a surround, not a lamp: glass shows all of it in little.
+            .filter(|number| !lit.scene.sources[*number].bounds().contains(view.eye))
             .filter_map(|number| target(lit, number))
             .collect();
         let n = lit.lines.len();
