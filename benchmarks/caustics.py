@@ -76,9 +76,9 @@ def right(keys: dict[str, Any], rays: float, lines: int) -> tuple[np.ndarray, np
         1e6 * _core.look_at_scene(core, view, lines // PASSES, 1 << 41, MOST_EVENTS, "scattered", i, i + 1)[0]
         for i in range(PASSES)
     ]
-    return image.values + np.mean(looks, axis=0), np.hypot(
-        image.standard_error, np.std(looks, axis=0, ddof=1) / np.sqrt(PASSES)
-    )
+    error = np.std(looks, axis=0, ddof=1) / np.sqrt(PASSES)
+    # Where no ray arrived, the image states none.
+    return image.values + np.mean(looks, axis=0), np.hypot(np.nan_to_num(image.standard_error), error)
 
 
 def main(seeds: int, rays_per_pixel: int, rays: float, lines: int) -> None:
