@@ -11,6 +11,7 @@ __all__ = [
     "Dealing",
     "FarField",
     "FieldRays",
+    "Glints",
     "Guide",
     "LightField",
     "RayTable",
