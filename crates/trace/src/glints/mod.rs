@@ -14,7 +14,7 @@ use etendue_math::trig::sin_cos_turns;
 use rayon::prelude::*;
 
 use crate::reverse::Lit;
-use search::Search;
+use search::{Search, Sight};
 
 /// Starts of the search over all pixels: more per pixel where these are few.
 const STARTS: usize = 1 << 15;
@@ -105,20 +105,22 @@ impl Glints {
         };
         let pixels = view.pixels();
         let starts = (STARTS / pixels.max(1)).clamp(1, MOST_STARTS);
-        let found: Vec<Vec<Found>> = (0..pixels)
+        let found: Vec<(Vec<Found>, Vec<Sight>)> = (0..pixels)
             .into_par_iter()
             .map_init(|| search.clone(), |search, pixel| search.search_from(pixel, starts))
             .collect();
         let mut images: Vec<Vec<Found>> = vec![Vec::new(); pixels];
-        for image in found.into_iter().flatten() {
+        for image in found.iter().flat_map(|(images, _)| images) {
             for pixel in touched(view, &image.glint) {
+                // In the midst of a large image lines that are spread evenly have no noise, and need no others.
+                let large = |sight: &Sight| sight.0 == image.source && sight.1 == image.ways;
                 let here = &mut images[pixel];
                 let known = |other: &Found| {
                     other.source == image.source
                         && other.ways == image.ways
                         && other.glint.distance2(image.glint.centre) < SAME * SAME
                 };
-                if here.len() < MOST && !here.iter().any(known) {
+                if here.len() < MOST && !here.iter().any(known) && !found[pixel].1.iter().any(large) {
                     here.push(image.clone());
                 }
             }

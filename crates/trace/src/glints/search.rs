@@ -5,6 +5,7 @@
 //! paths `[Jakob2012]`, but with differences in the place of derivatives, which asks nothing of the surfaces.
 
 use etendue_geometry::RayBatch;
+use etendue_geometry::assembly::TIE;
 use etendue_geometry::lines::Leaving;
 use etendue_lightfield::View;
 use etendue_math::Vec3;
@@ -74,6 +75,9 @@ struct Target {
     about: Vec<Spread>,
 }
 
+/// A source, and at each smooth surface on the way to it whether light is transmitted.
+pub type Sight = (usize, Vec<bool>);
+
 /// A line of sight on its way.
 #[derive(Clone, Copy)]
 struct Line {
@@ -141,12 +145,12 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Images that are found from starts in a pixel, wherever they are.
+    /// Images that are found from starts in a pixel, wherever they are, and what most of the starts see without a search.
     #[allow(clippy::cast_possible_truncation, reason = "a small number")]
-    pub fn search_from(&mut self, pixel: usize, starts: usize) -> Vec<Found> {
+    pub fn search_from(&mut self, pixel: usize, starts: usize) -> (Vec<Found>, Vec<Sight>) {
         let columns = self.view.columns as usize;
         let corner = [(pixel % columns) as f64, (pixel / columns) as f64];
-        let mut found = Vec::new();
+        let (mut found, mut seen) = (Vec::new(), Vec::new());
         for start in 0..starts {
             let point = lattice_point(start as u32, &[0.5; DIMENSIONS]);
             let wavelength = self.wavelengths[(pixel + start) % self.wavelengths.len()];
@@ -156,12 +160,19 @@ impl<'a> Search<'a> {
                 wavelength,
                 number,
                 &mut found,
+                &mut seen,
             );
         }
-        found
+        seen.sort_unstable();
+        let most = seen
+            .chunk_by(PartialEq::eq)
+            .filter(|same| 2 * same.len() > starts)
+            .map(|same| same[0].clone());
+        let most = most.collect();
+        (found, most)
     }
 
-    fn start(&mut self, at: Pair, wavelength: f64, number: usize, found: &mut Vec<Found>) {
+    fn start(&mut self, at: Pair, wavelength: f64, number: usize, found: &mut Vec<Found>, seen: &mut Vec<Sight>) {
         let mut chains = vec![Chain {
             lines: self.lines(at),
             weight: 1.0,
@@ -175,6 +186,9 @@ impl<'a> Search<'a> {
                 let reach = met.as_ref().map_or(f64::INFINITY, |met| met[0].t);
                 let targets = self.targets.clone();
                 for target in targets.iter() {
+                    if self.sees(target.source, &chain.lines[0], reach) {
+                        seen.push((target.source, chain.ways.clone()));
+                    }
                     self.aim(target, at, &chain, reach, wavelength, number, found);
                 }
                 meetings += 1;
@@ -204,6 +218,17 @@ impl<'a> Search<'a> {
                 break;
             }
         }
+    }
+
+    /// Whether a line meets a source before anything else.
+    fn sees(&self, source: usize, line: &Line, reach: f64) -> bool {
+        let mut met = false;
+        if let Some(lantern) = &self.lit.lanterns[source] {
+            lantern.along(&self.scene.sources[source], line.o, line.d, reach * (1.0 + TIE), |_| {
+                met = true
+            });
+        }
+        met
     }
 
     /// The lines of sight through a place and beside it.
