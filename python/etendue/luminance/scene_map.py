@@ -156,8 +156,8 @@ def look_at_scene(
         if small.pixels():
             told.append(
                 f"lamps are small against the pixel in {small.pixels():,} of them, directly, in mirrors or through lenses: "
-                "as many lines of sight again look there; what the search for them missed is left to chance, and a pixel that "
-                "no line of sight lit states no error"
+                "as many lines of sight again look there; what the search for them missed is left to chance, and a pixel "
+                "that no line of sight lit states no error"
             )
         if survey is not None and survey.patches()[0]:
             told.append(comparison_note(gathered, [look(FIRST_CHECK + i, None)[0] for i in range(CHECKS)]))
