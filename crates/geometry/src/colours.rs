@@ -1,12 +1,12 @@
 //! The flux of a ray set by colour, in one pass.
 
 use std::collections::BTreeMap;
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use etendue_math::special::ln;
-use etendue_sampling::ordered;
 
 use crate::batch::RayBatch;
+use crate::pass::{Sums, over_all_rays};
 use crate::source::RaySource;
 
 /// Bins per unit of the logarithm: they are 0.2 % wide, 0.9 nm at 450 nm. Whatever a file holds, there are not more bins than
@@ -52,10 +52,9 @@ pub struct Colours {
     pub unknown: (f64, u64),
 }
 
-impl Colours {
-    /// Adds the rays of a block.
+impl Sums for Colours {
     #[allow(clippy::cast_possible_truncation, reason = "a logarithm is small")]
-    pub fn add_block(&mut self, batch: &RayBatch) {
+    fn add_block(&mut self, batch: &RayBatch) {
         for i in (0..batch.len).filter(|&i| batch.usable(i)) {
             let flux = batch.flux[i];
             let colour = batch.colour.get(i).copied().unwrap_or(0.0);
@@ -77,8 +76,7 @@ impl Colours {
         }
     }
 
-    /// Adds another pass' sums to this one's.
-    pub fn merge(&mut self, other: &Self) {
+    fn merge(&mut self, other: &Self) {
         self.unknown.0 += other.unknown.0;
         self.unknown.1 += other.unknown.1;
         for (key, bin) in &other.bins {
@@ -88,25 +86,11 @@ impl Colours {
                 .or_insert(*bin);
         }
     }
-
-    fn of_range(source: &impl RaySource, range: Range<u64>) -> Self {
-        let mut colours = Self::default();
-        source.for_each_block(range, |_, batch| colours.add_block(batch));
-        colours
-    }
 }
 
 /// One pass over a whole source. Ends early, with the sums so far, if `progress` breaks.
 pub fn colours(source: &impl RaySource, threads: usize, progress: impl FnMut(u64) -> ControlFlow<()>) -> Colours {
-    let mut total = Colours::default();
-    ordered::run(
-        threads,
-        source.len(),
-        |range| Colours::of_range(source, range),
-        |part| total.merge(&part),
-        progress,
-    );
-    total
+    over_all_rays(source, threads, progress)
 }
 
 #[cfg(test)]

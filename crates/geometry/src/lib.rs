@@ -16,6 +16,7 @@ pub mod colours;
 pub mod face;
 pub mod lines;
 pub mod mesh;
+mod pass;
 pub mod scan;
 pub mod shape;
 pub mod source;

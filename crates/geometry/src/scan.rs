@@ -1,10 +1,9 @@
 //! The statistics of a ray set in one pass.
 
-use std::ops::{ControlFlow, Range};
-
-use etendue_sampling::ordered;
+use std::ops::ControlFlow;
 
 use crate::batch::RayBatch;
+use crate::pass::{Sums, over_all_rays};
 use crate::source::RaySource;
 use crate::tally::Tally;
 
@@ -44,9 +43,8 @@ impl Default for Scan {
     }
 }
 
-impl Scan {
-    /// Adds the rays of a block.
-    pub fn add_block(&mut self, batch: &RayBatch) {
+impl Sums for Scan {
+    fn add_block(&mut self, batch: &RayBatch) {
         self.tally.add_block(batch);
         for i in (0..batch.len).filter(|&i| batch.usable(i)) {
             let (x, k, w) = (batch.position(i), batch.direction(i), batch.flux[i]);
@@ -69,8 +67,7 @@ impl Scan {
         }
     }
 
-    /// Adds another scan's sums to this one's.
-    pub fn merge(&mut self, other: &Self) {
+    fn merge(&mut self, other: &Self) {
         self.tally.merge(&other.tally);
         self.zero_flux += other.zero_flux;
         for (range, o) in
@@ -85,12 +82,6 @@ impl Scan {
         add(&mut self.weighted_outer, &other.weighted_outer);
         add(&mut self.focus_rhs, &other.focus_rhs);
     }
-
-    fn of_range(source: &impl RaySource, range: Range<u64>) -> Self {
-        let mut scan = Self::default();
-        source.for_each_block(range, |_, batch| scan.add_block(batch));
-        scan
-    }
 }
 
 fn widen(range: &mut [f64; 2], value: f64) {
@@ -100,15 +91,7 @@ fn widen(range: &mut [f64; 2], value: f64) {
 
 /// Scans a whole source. Ends early, with the sums so far, if `progress` breaks.
 pub fn scan(source: &impl RaySource, threads: usize, progress: impl FnMut(u64) -> ControlFlow<()>) -> Scan {
-    let mut total = Scan::default();
-    ordered::run(
-        threads,
-        source.len(),
-        |range| Scan::of_range(source, range),
-        |part| total.merge(&part),
-        progress,
-    );
-    total
+    over_all_rays(source, threads, progress)
 }
 
 #[cfg(test)]
