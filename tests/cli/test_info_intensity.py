@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from pathlib import Path
@@ -10,7 +11,9 @@ import etendue as et
 import pytest
 from etendue.cli import main
 from oracles.intensity import lid
-from oracles.luminaire_files import emitter, gldf_of, tm33
+from oracles.luminaire_files import archive, emitter, gldf_of, product, tm33
+
+from cli.outcome import Run
 
 
 def test_intensity_files(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -35,3 +38,22 @@ def test_intensity_files(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     facts = json.loads(run("--json", "a.ies", "c.xml"))
     assert facts[0]["flux"] == pytest.approx(led.flux, rel=1e-5)
     assert "there are 2 of this emitter" in facts[1]["complaints"][0]["found"]
+
+
+def test_one_of_several_photometries(run: Run) -> None:
+    led = lid("none")
+    for name, factor in (("p", 1), ("q", 2)):
+        et.write_intensity(f"{name}.ies", dataclasses.replace(led, values=factor * led.values))
+    files = {f"f-{name}": ("ldc/ies", "localFileName", f"{name}.ies") for name in "pq"}
+    members: dict[str, bytes | str] = {f"ldc/{name}.ies": Path(f"{name}.ies").read_bytes() for name in "pq"}
+    xml = product(files, {name: f"f-{name}" for name in "pq"})
+    Path("two.gldf").write_bytes(archive({"product.xml": xml, **members}))
+    (facts,) = run("info", "--json", "--photometry", "q", "two.gldf").json
+    assert facts["flux"] == pytest.approx(2 * led.flux, rel=1e-5)
+    several = run("info", "two.gldf")
+    assert several.status == 1
+    assert "--photometry" in several.err
+    et.write_rays("led.tm25ray", et.RingSource(rays=100, seed=1))
+    refused = run("info", "led.tm25ray", "--photometry", "q")
+    assert refused.status == 1
+    assert "--photometry is for intensity files" in refused.err

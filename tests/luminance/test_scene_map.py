@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pytest
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.lightfield import fit_cache
 from etendue.luminance.scene_map import Looking, look_at_scene, with_fields
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.scene import compile_scene
@@ -405,11 +406,13 @@ def test_error_bars_hold() -> None:
     assert abs(ratio - 1) < LARGEST_Z * math.sqrt(2 / (23 * pixels) + 2 / (24 * 15 * pixels)) * 1.2
 
 
-def test_rays_are_fitted_before_they_are_looked_at(tmp_path: Path) -> None:
+def test_rays_are_fitted_before_they_are_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(fit_cache.FOLDER_VARIABLE, str(tmp_path / "kept"))
     rings = et.RingSource(rays=300_000, seed=3)
     rays = et.RaySet.merge([et.RaySet(b.position, b.direction, b.flux) for b in rings.batches()])
     et.write_rays(tmp_path / "rings.tm25ray", rays)
-    for given in ({"file": tmp_path / "rings.tm25ray"}, {"rays": rays}):
+    # The same rays as a file and in memory: the second map finds the field of the first.
+    for given in ({"file": tmp_path / "rings.tm25ray"}, {"rays": et.read_rays(tmp_path / "rings.tm25ray")}):
         scene = et.Scene(sources=[{"name": "led", "kind": "rays", "flux": 300, "at": [0, 0, 5], **given}])
         (lmap,) = et.luminance_map(scene, [et.Observer(0, 0, 1000)], et.Screen(12, 12, 4, 4), rays_per_pixel=64)
         assert any("light field" in note for note in lmap.notes)

@@ -284,3 +284,72 @@ def test_meshes_that_cannot_be_used() -> None:
     ):
         with pytest.raises(SceneError, match=words):
             compile_scene(Scene(surfaces=[{**thing, "finish": "mirror"}]))
+
+
+SLANTED = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn 0 0.6 0.8\n"
+PLY_ROWS = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+PLY_HEAD = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+STL_TRIANGLE = """solid a
+facet normal 0 .6 .8
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endloop
+endfacet
+endsolid
+"""
+PLY_NORMALS = "property float nx\nproperty float ny\nproperty float nz\n"
+
+
+def one_triangle(normals: bool) -> dict[str, Any]:
+    """A glTF tree of one triangle in a buffer of its own."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0.6, 0.8], [0, 0, 1]], dtype="<f4").tobytes()
+    accessor = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": 'a "NORMAL": b'}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0} | ({"NORMAL": 1} if normals else {})}]}],
+        "accessors": [accessor, accessor | {"byteOffset": 36}],
+        "bufferViews": [{"buffer": 0, "byteLength": 72}],
+        "buffers": [
+            {"byteLength": 72, "uri": "data:application/octet-stream;base64," + base64.b64encode(points).decode()}
+        ],
+    }
+
+
+def binary_gltf(tree: dict[str, Any]) -> bytes:
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
+
+
+@pytest.mark.parametrize(
+    ("raw", "stated"),
+    [
+        (SLANTED + "f 1//1 2//2 3//1\n", True),
+        (SLANTED + "vt 0 0\nf -3/1/-2 -2/1/-1 -1/1/-2\n", True),
+        (SLANTED + "f 1 2 3\n", False),
+        (SLANTED + "vt 0 0\nf 1/1 2/1 3/1\n", False),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", False),
+        (PLY_HEAD + PLY_NORMALS + PLY_ROWS + "0 0 0 0 0 1\n1 0 0 0 .6 .8\n0 1 0 0 0 1\n3 0 1 2\n", True),
+        (PLY_HEAD + PLY_ROWS + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", False),
+        # Normals of faces are those of facets.
+        (PLY_HEAD + PLY_ROWS.replace("end_", PLY_NORMALS + "end_") + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 0 0 1\n", False),
+        (json.dumps(one_triangle(normals=True), indent=1), True),
+        (json.dumps(one_triangle(normals=False)), False),
+        (binary_gltf(one_triangle(normals=True)), True),
+        (binary_gltf(one_triangle(normals=False)), False),
+        (STL_TRIANGLE, False),
+    ],
+)  # fmt: skip
+def test_vertex_normals_that_are_not_used_are_told(raw: str | bytes, stated: bool, tmp_path: Path) -> None:
+    (tmp_path / "sheet").write_bytes(raw.encode() if isinstance(raw, str) else raw)
+    for given, instead in (({}, "triangles are flat; crease_angle = 30 makes"), ({"crease_angle": 40}, "= 40 makes")):
+        shape = {"kind": "mesh", "file": str(tmp_path / "sheet"), **given}
+        scene = Scene(surfaces=[{"shape": shape, "finish": "mirror"}])
+        notes = [note for note in compile_scene(scene).notes if "the file's vertex normals are not used" in note]
+        assert len(notes) == stated
+        assert all(instead in note for note in notes)

@@ -1,4 +1,4 @@
-"""``etendue info``: what is in a ray or intensity file, and what is wrong with it; a light field; what a trace found."""
+"""``etendue info``: what is in a ray or intensity file, and what is wrong with it; a light field; a trace; a map."""
 
 from __future__ import annotations
 
@@ -11,36 +11,47 @@ import typer
 from etendue.cli.bodies import describe_bodies, print_bodies
 from etendue.cli.field import describe_field, print_field
 from etendue.cli.intensity import print_intensity, summary
+from etendue.cli.maps import describe_map, print_map_file
 from etendue.cli.terminal import complain, print_json, progress_bar, say
 from etendue.cli.trace import print_result
-from etendue.errors import EtendueError
+from etendue.errors import ArgumentError, EtendueError
 from etendue.formats.intensity import detect_intensity_format, read_intensity
+from etendue.formats.maps import is_map_file, read_any_map
+from etendue.formats.maps.map_format import AnyMap
 from etendue.formats.rays import detect_format, read_rays
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import is_field_file
+from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
+from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.ray_set import RaySet
 from etendue.scene.mesh_files import step_bodies
 from etendue.scene.step_files import StepBody
 from etendue.tracing.result import TraceResult
 from etendue.tracing.storage import is_result_file
 
-Found = dict[str, Any] | LightField | TraceResult | Intensity | list[StepBody]
+Found = dict[str, Any] | LightField | TraceResult | Intensity | AnyMap | list[StepBody]
 
 
 def info(
     files: Annotated[
         list[Path],
-        typer.Argument(help="Ray and intensity files of any format, light fields, results of traces, STEP files."),
+        typer.Argument(
+            help="Ray and intensity files of any format, light fields, results of traces, maps, STEP files."
+        ),
     ],
+    photometry: Annotated[
+        str | None,
+        typer.Option("--photometry", help="Which one of intensity files that hold several (TM-33, GLDF)."),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Format, rays, flux by header and by sum, bounding box, virtual focus, spectrum, complaints; field, trace, bodies."""
+    """Format, rays, flux by header and by sum, bounding box, virtual focus, spectrum, complaints; other files."""
     described: list[Found] = []
     failed = False
     for file in files:
         try:
-            described.append(_opened(file))
+            described.append(_opened(file, photometry))
         except (EtendueError, OSError) as error:
             failed = True
             reason = error.strerror if isinstance(error, OSError) else error
@@ -62,6 +73,9 @@ def info(
             elif isinstance(facts, TraceResult):
                 say(f"{file}: result of a trace, {file.stat().st_size / 1000:,.1f} kB")
                 print_result(facts)
+            elif isinstance(facts, LuminanceMap | IlluminanceMap):
+                say(f"{file}: map of {facts.quantity}, {file.stat().st_size / 1000:,.1f} kB")
+                print_map_file(facts)
             elif isinstance(facts, list):
                 say(f"{file}: STEP, {len(facts)} {'body' if len(facts) == 1 else 'bodies'}")
                 print_bodies(facts)
@@ -71,13 +85,17 @@ def info(
         raise typer.Exit(1)
 
 
-def _opened(path: Path) -> Found:
+def _opened(path: Path, photometry: str | None) -> Found:
+    if detect_intensity_format(path) is not None:
+        return read_intensity(path, photometry)
+    if photometry is not None:
+        raise ArgumentError(f"{path}: --photometry is for intensity files, and this is none.")
     if is_field_file(path):
         return LightField.load(path)
-    if detect_intensity_format(path) is not None:
-        return read_intensity(path)
     if is_result_file(path):
         return TraceResult.load(path)
+    if is_map_file(path):
+        return read_any_map(path)
     bodies = step_bodies(path)
     return describe(path) if bodies is None else bodies
 
@@ -88,6 +106,8 @@ def _facts(path: Path, found: Found) -> dict[str, Any]:
     if isinstance(found, Intensity):
         told = {"complaints": [complaint.to_dict() for complaint in found.complaints]}
         return {"file": path, "bytes": path.stat().st_size} | summary(found) | told
+    if isinstance(found, LuminanceMap | IlluminanceMap):
+        return {"file": path, "format": "map", "bytes": path.stat().st_size} | describe_map(found)
     if isinstance(found, list):
         return {"file": path, "format": "STEP", "bytes": path.stat().st_size} | describe_bodies(found)
     if isinstance(found, TraceResult):

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from etendue.errors import FormatError
 from etendue.quantities.memory import require_memory
 from etendue.scene.mesh_limits import LARGEST_FILE, check_mesh, require_mesh_memory
+from etendue.scene.stated_normals import states_normals
 from etendue.scene.step_files import StepBody, read_step
 from etendue.units import MM_PER_LENGTH_UNIT
 
@@ -89,9 +90,12 @@ class StoredMesh:
         [mm]
     triangles : array of int, shape (m, 3)
     normals : array, shape (n, 3), or None
-        At the vertices, where the file states them or tells the true surface.
+        At the vertices, where the file tells the true surface.
     chord_error : float or None
         Largest distance between the triangles and the true surfaces [mm], where the file tells these.
+    unread_normals : bool
+        Whether the file states normals at its vertices besides, which are not read: exporters write what shades well, not
+        what the surface is.
 
     Examples
     --------
@@ -103,6 +107,7 @@ class StoredMesh:
     triangles: Triangles
     normals: Array | None = None
     chord_error: float | None = None
+    unread_normals: bool = False
 
 
 def read_mesh(path: Path, unit: str | None, tolerance: float | None = None, body: str | None = None) -> StoredMesh:
@@ -152,7 +157,7 @@ def read_mesh(path: Path, unit: str | None, tolerance: float | None = None, body
     else:
         vertices, triangles = _load(path, form, raw)
         mm = MM_PER_LENGTH_UNIT[unit] if unit is not None else form.mm or 1.0
-        mesh = StoredMesh(vertices * mm, triangles)
+        mesh = StoredMesh(vertices * mm, triangles, unread_normals=states_normals(form.name, raw))
     require_mesh_memory(path, len(mesh.triangles))
     if not len(mesh.triangles):
         raise FormatError(path, "whole file", "there are no triangles", "Export the body as a triangle mesh.")

@@ -21,8 +21,8 @@ Array = npt.NDArray[np.float64]
 Triangles = npt.NDArray[np.int64]
 
 SHARE = 5e-4
-"""Largest distance between a surface and its triangles, as a part of the longest side of the box around the body: unless a
-tolerance is asked for."""
+"""Distance between a surface and its triangles that is asked for, as a part of the longest side of the box around the body:
+unless a tolerance is given."""
 
 TURN = 0.05
 """[rad] By which the normal may turn along a triangle, unless a tolerance is asked for: 126 sides to a full circle."""
@@ -95,7 +95,8 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
     raw : bytes
         What the file holds.
     tolerance : float, optional
-        Largest distance between surfaces and triangles [mm]. None: `SHARE` of the size of the smallest body that is asked
+        Distance between surfaces and triangles [mm] that is asked for; the reader may exceed it here and there, and
+        `StepBody.chord_error` tells what came out. None: `SHARE` of the size of the smallest body that is asked
         for, and triangles along which normals turn by less than `TURN`.
     name : str, optional
         Of the body that is asked for; None: all.

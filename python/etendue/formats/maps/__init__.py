@@ -7,7 +7,7 @@ from pathlib import Path
 
 from etendue.errors import FormatError, UnknownNameError
 from etendue.formats.encodings import in_utf8, refuse_unmarked
-from etendue.formats.input import as_path, require_readable
+from etendue.formats.input import as_path, is_stream, require_readable
 from etendue.formats.maps import csv, exr, hdr, npz, tiff
 from etendue.formats.maps.map_format import AnyMap, MapFormat
 from etendue.formats.output import atomic_output
@@ -61,7 +61,7 @@ def read_map(path: str | os.PathLike[str]) -> LuminanceMap:
     ...     read_map(Path(folder) / "map.npz").values.tolist(), lost
     ([[3.0, nan]], ())
     """
-    lmap = _read(as_path(path))
+    lmap = read_any_map(path)
     if not isinstance(lmap, LuminanceMap):
         raise FormatError(path, "header", f"this is a map of {lmap.quantity}", "Read it with read_illuminance_map.")
     return lmap
@@ -95,23 +95,76 @@ def read_illuminance_map(path: str | os.PathLike[str]) -> IlluminanceMap:
     ...     read_illuminance_map(Path(folder) / "desk.csv").centre, lost
     ((1.0, 2.0, 3.0), ())
     """
-    lmap = _read(as_path(path))
+    lmap = read_any_map(path)
     if not isinstance(lmap, IlluminanceMap):
         raise FormatError(path, "header", f"this is a map of {lmap.quantity}", "Read it with read_map.")
     return lmap
 
 
-def _read(path: Path) -> AnyMap:
+def is_map_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a file begins as a map does: a picture format that holds maps, an .npz or a table that étendue wrote.
+
+    A pipe is none: looking at its beginning would take that away from whoever reads it.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be opened.
+    FormatError
+        If it is a text that is not in the encoding that its mark announces.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "rays.txt"
+    ...     _ = path.write_text("x y z")
+    ...     is_map_file(path)
+    False
+    """
+    path = as_path(path)
+    if is_stream(path):
+        return False
+    with in_utf8(path) as readable:
+        head = _head(readable)
+    found = next((form for form in MAP_FORMATS.values() if form.sniff(head)), None)
+    # Any ZIP archive begins as an .npz does; a map's first member is its header.
+    return found is not None and (found is not npz.FORMAT or npz.FIRST_MEMBER in head)
+
+
+def read_any_map(path: str | os.PathLike[str]) -> AnyMap:
+    """Read a map of luminance or of illuminance, whichever the file holds.
+
+    Raises
+    ------
+    FormatError, OSError
+        As `read_map`.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from etendue.quantities.observer import Screen
+    >>> desk = IlluminanceMap([[500.0]], [[5.0]], [[900]], Screen(20, 10, 1, 1, "xy"))
+    >>> with TemporaryDirectory() as folder:
+    ...     lost = desk.save(Path(folder) / "desk.npz")
+    ...     read_any_map(Path(folder) / "desk.npz").quantity
+    'illuminance'
+    """
+    path = as_path(path)
     require_readable(path)
     with in_utf8(path) as readable:
-        with readable.open("rb") as stream:
-            head = stream.read(SNIFFED_BYTES)
+        head = _head(readable)
         for candidate in MAP_FORMATS.values():
             if candidate.sniff(head):
                 return candidate.read(readable)
     refuse_unmarked(path, head)
     found = f"no map format begins with {head[:8]!r}" if head else "the file is empty"
     raise FormatError(path, "first bytes", found, f"étendue reads the maps it wrote: {', '.join(MAP_EXTENSIONS)}.")
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as stream:
+        return stream.read(SNIFFED_BYTES)
 
 
 def save_map(lmap: AnyMap, path: str | os.PathLike[str]) -> tuple[str, ...]:

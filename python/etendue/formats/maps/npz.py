@@ -24,6 +24,10 @@ MOST_BYTES = 24 * MAX_PIXELS + MOST_HEADER_BYTES + (1 << 20)
 """Of the archive of the largest map, were nothing of it to shrink."""
 
 
+FIRST_MEMBER = b"header.npy"
+"""Name of the member that `write` puts first, within the first 64 bytes of the file."""
+
+
 def write(lmap: AnyMap, path: Path) -> tuple[str, ...]:
     """Write arrays ``values``, ``standard_error``, ``rays`` and the JSON text ``header``; nothing is lost."""
     arrays = {name: getattr(lmap, name).astype(dtype) for name, dtype in ARRAYS.items()}

@@ -79,7 +79,8 @@ class Mesh(Shape):
         normals turn by less than 0.05 rad along a triangle.
     crease_angle : number, optional
         [°] Neighbours whose normals differ by less are one smooth surface, with interpolated normals; 0: flat triangles.
-        Without it, triangles of STEP files have the normals of the true surfaces, all others are flat.
+        Without it, triangles of STEP files have the normals of the true surfaces, all others are flat: vertex normals that
+        an OBJ, PLY or glTF file states are not used, and the notes say so.
 
     Examples
     --------
@@ -145,7 +146,9 @@ class Mesh(Shape):
         )
 
     def _stated(self, stored: StoredMesh) -> tuple[str, ...]:
-        """How far the triangles of a file are from its surfaces."""
+        """How far the triangles of a file are from its surfaces, and what else it says of these that is not used."""
+        if stored.unread_normals:
+            return (f"the file's vertex normals are not used: {self._normals_instead()}",)
         if not stored.chord_error:
             return ()
         kind = "flat" if self.crease_angle == 0.0 else "with interpolated normals"
@@ -155,6 +158,13 @@ class Mesh(Shape):
             "them (chord error); a smaller 'tolerance' brings them nearer"
         )
         return (note,)
+
+    def _normals_instead(self) -> str:
+        if self.crease_angle is None:
+            return f"triangles are flat; crease_angle = {SMOOTH:g} makes smooth normals from them"
+        if self.crease_angle == 0.0:
+            return "triangles are flat, as crease_angle = 0 asks for"
+        return f"crease_angle = {self.crease_angle:g} makes normals from the triangles"
 
     def _facets(self, vertices: Array, triangles: npt.NDArray[np.int64]) -> tuple[str, ...]:
         """What flat triangles do where a curved surface is meant."""
