@@ -6,6 +6,7 @@ import tracemalloc
 from pathlib import Path
 
 import etendue as et
+from etendue.cli.terminal import count
 from etendue.lightfield.surfaces import Disk
 
 from cli.outcome import Run
@@ -20,8 +21,8 @@ ABSURD: dict[str, tuple[str, tuple[object, ...]]] = {
     "planes": ("1,000,000,000 cells", ("intensity", "led.tm25ray", "--c-planes", 10**9, "-o", "a.ies")),
     "steps": ("180,000,001 cells", ("intensity", "led.tm25ray", "--gamma-step", "1e-6", "-o", "a.ies")),
     "rows": ('"desk": rows: is 1000000000', ("trace", "rows.toml", "--rays", 1000)),
-    "rays": ("rays is 1e+30", ("trace", "lamp.toml", "--rays", "1e30")),
-    "sample": ("a.ray: cannot write: 280,000,000,000,000 bytes", ("sample", "led.h5", "-n", 10**13, "-o", "a.ray")),
+    "rays": ("rays is 1000000000000000000", ("trace", "lamp.toml", "--rays", "1e18")),
+    "sample": ("a.ray: cannot write: 280,000,000,000,000 bytes", ("sample", "led.h5", "-n", "1e13", "-o", "a.ray")),
     "pixel": (
         "more than 67,108,864 pixels",
         ("patches", "led.tm25ray", "--surface", "disk:radius=9", "--pixel", "1e-6", "-o", "a"),
@@ -46,3 +47,22 @@ def test_absurd_sizes_are_refused_with_the_size(run: Run, tmp_path: Path) -> Non
         assert (status, expected in err) == (1, True), (name, err)
         assert peak < 50e6, (name, peak)
     assert sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+def test_every_count_of_rays_may_be_a_power_of_ten(run: Run, tmp_path: Path) -> None:
+    """And digits stay exact where a float would round."""
+    rays = et.RingSource(rays=5000, seed=2)
+    et.write_rays(tmp_path / "led.tm25ray", rays)
+    et.LightField.fit(rays, Disk(radius=30), depths=(2, 2, 2, 2)).save(tmp_path / "led.h5")
+    et.Scene(sources=[LAMP]).save(tmp_path / "lamp.toml")
+    for words in (
+        ("sample", "led.h5", "-n", "2e3", "-o", "a.tm25ray"),
+        ("convert", "led.tm25ray", "b.tm25ray", "--subset", "2e3"),
+        ("trace", "lamp.toml", "--rays", "2e3"),
+    ):
+        outcome = run(*words)
+        assert outcome.status == 0, outcome.err
+        assert "2,000 rays" in outcome.out
+    view = ("--observer", "0,0", "--distance", "200", "--size", "6,6", "--pixels", "1,1", "-o", "a.npz")
+    assert run("luminance", "lamp.toml", *view, "--rays-per-pixel", "2e1").status == 0
+    assert count()(str(2**53 + 1)) == 2**53 + 1

@@ -171,3 +171,27 @@ def test_pictures_of_names_that_look_like_formulas(scene: Path, extension: str, 
         et.plot.plot_intensity(led, tmp_path / f"led{extension}", title=HOSTILE)
         et.plot.draw_scene(Scene.load(scene), tmp_path / f"scene{extension}")
     assert (tmp_path / f"scene{extension}").stat().st_size > 1000
+
+
+def test_an_error_that_nobody_foresaw(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its traceback is shown line by line, with its cause; what text of a file says in it is not obeyed."""
+
+    def fail(*_: object, **__: object) -> None:
+        try:
+            {}["\x1b[31m"]
+        except KeyError as cause:
+            error = RuntimeError(HOSTILE)
+            error.add_note(HOSTILE)
+            raise error from cause
+
+    monkeypatch.setattr("etendue.cli.sample.LightField.load", fail)
+    outcome = run("sample", "x.h5", "-n", 9, "-o", "x.tm25ray")
+    assert outcome.status == 70
+    assert_harmless(outcome)
+    lines = outcome.err.splitlines()
+    assert lines.count("Traceback (most recent call last):") == 2
+    assert f"RuntimeError: {SHOWN}" in lines
+    assert f"  {SHOWN}" in lines
+    cause = next(n for n, line in enumerate(lines) if line.startswith("KeyError"))
+    assert lines.index(f"RuntimeError: {SHOWN}") > cause
+    assert lines[-1].startswith("error: this is a mistake in etendue")

@@ -26,7 +26,15 @@ from etendue.cli import (
 )
 from etendue.cli.guard import guarded
 from etendue.cli.stopping import Stop, stoppable
-from etendue.cli.terminal import INTERRUPTED, complain, complain_of, complain_of_usage, spell_out_unknown_letters
+from etendue.cli.terminal import (
+    INTERRUPTED,
+    MISTAKE,
+    complain,
+    complain_of,
+    complain_of_mistake,
+    complain_of_usage,
+    spell_out_unknown_letters,
+)
 from etendue.errors import EtendueError, SceneWarning
 from etendue.formats.input import WaitingWarning
 from etendue.quantities.provenance import version
@@ -79,6 +87,7 @@ def _show_warning(message: Warning | str, *_where: object, **_more: object) -> N
 def main() -> None:
     """Run the program; the exit status is 0, 1 for an error of the data, 2 for one of usage.
 
+    It is 70 for a mistake of the program itself, whose traceback is shown.
     After Ctrl-C it is 130, after SIGTERM 143, after SIGHUP 129; all three end it in the same clean way.
     """
     # Complaints about files are printed by the verbs, once and in full.
@@ -102,10 +111,11 @@ def _status(stop: Stop) -> int:
         return 1
     except (KeyboardInterrupt, typer.Abort):
         status = INTERRUPTED
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - what nobody foresaw is shown here, so that no text in it acts on a terminal
         # The parser's own errors know how to show themselves, with the nearest name.
         if not hasattr(error, "show"):
-            raise
+            complain_of_mistake(error)
+            return MISTAKE
         complain_of_usage(cast(typer.BadParameter, error))
         return int(getattr(error, "exit_code", 2))
     # The parser returns this status for Ctrl-C as well; a trace has said what it kept.

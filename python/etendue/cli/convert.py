@@ -8,7 +8,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from etendue.cli.terminal import check_folder, complain, one_of, print_json, progress_bar, say
+from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, progress_bar, say
 from etendue.formats.rays import RAY_FORMATS, read_rays, write_rays
 from etendue.lightfield.light_field import LightField
 from etendue.quantities.ray_set import RaySet
@@ -35,7 +35,10 @@ def convert(
             "Without it: that of --flux, or of the inputs; lm if these differ.",
         ),
     ] = None,
-    subset: Annotated[int | None, typer.Option("--subset", help="Write this many rays, drawn at random.")] = None,
+    subset: Annotated[
+        int | None,
+        typer.Option("--subset", help="Write this many rays, drawn at random.", parser=count(0), metavar="NUMBER"),
+    ] = None,
     seed: Annotated[int, typer.Option("--seed", help="Seed of --subset.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from etendue.cli.terminal import check_outputs, output, print_json, progress_bar, say
+from etendue.cli.terminal import check_outputs, count, output, print_json, progress_bar, say
 from etendue.luminance.estimate import DEFAULT_ACCEPTANCE, luminance_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
@@ -58,7 +58,9 @@ def demo(
     picture: Annotated[Path, typer.Option("-o", "--output", help="The picture to write, .png")] = Path(
         "etendue-demo.png"
     ),
-    rays: Annotated[int, typer.Option("--rays", help="Rays to draw.", min=100_000)] = 200_000_000,
+    rays: Annotated[
+        int, typer.Option("--rays", help="Rays to draw, 1e5 or more.", parser=count(100_000), metavar="NUMBER")
+    ] = 200_000_000,
     seed: Annotated[int, typer.Option("--seed", help="Seed of the rays.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:

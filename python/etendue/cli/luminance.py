@@ -14,7 +14,17 @@ import typer
 
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.field import complaints_of, read_source, surface_option
-from etendue.cli.terminal import check_outputs, complain, numbers, one_of, print_json, progress_bar, say, whole_numbers
+from etendue.cli.terminal import (
+    check_outputs,
+    complain,
+    count,
+    numbers,
+    one_of,
+    print_json,
+    progress_bar,
+    say,
+    whole_numbers,
+)
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.lightfield.light_field import LightField
@@ -102,7 +112,8 @@ def luminance(
         typer.Option(
             "--rays-per-pixel",
             help="Lines of sight per pixel of a scene (256); of scatter events, for what they leave out (none).",
-            min=1,
+            parser=count(),
+            metavar="NUMBER",
             show_default=False,
         ),
     ] = None,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.terminal import check_folder, complain, one_of, print_json, progress_bar, say
+from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, progress_bar, say
 from etendue.errors import ArgumentError
 from etendue.formats.rays import RAY_FORMATS, write_rays
 from etendue.lightfield.light_field import LightField
@@ -15,7 +15,9 @@ from etendue.lightfield.light_field import LightField
 
 def sample(
     file: Annotated[Path, typer.Argument(help="A light field written by étendue.")],
-    rays: Annotated[int, typer.Option("-n", "--rays", help="Number of rays.", min=1)],
+    rays: Annotated[
+        int, typer.Option("-n", "--rays", help="Number of rays, e.g. 1e8.", parser=count(), metavar="NUMBER")
+    ],
     output: Annotated[list[Path], typer.Option("-o", "--output", help="Ray file to write; several get the same rays.")],
     format: Annotated[
         str | None, typer.Option("--format", help="Format to write; from the extension of the output if not given.")

@@ -7,7 +7,8 @@ import io
 import json
 import math
 import sys
-from collections.abc import Iterable, Iterator
+import traceback
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,14 @@ errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False, emo
 """Complaints and progress, on standard error."""
 
 
+LARGEST_COUNT = 2**63 - 1
+"""Of anything that is counted, since files and tables count in 64 bits."""
+
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells have it (128 + SIGINT)."""
+
+MISTAKE = 70
+"""Exit status after an error that nobody foresaw (EX_SOFTWARE of sysexits.h)."""
 
 
 def complain(message: str) -> None:
@@ -52,6 +59,25 @@ def complain_of(error: Exception) -> None:
     complain(f"error: {first}")
     for line in more:
         complain(f"  {line}")
+
+
+def complain_of_mistake(error: BaseException) -> None:
+    """Print the traceback of an error that nobody foresaw to standard error; texts of files in it are shown as such."""
+    seen: list[BaseException] = []
+    link: BaseException | None = error
+    while link is not None and link not in seen:
+        seen.append(link)
+        link = link.__cause__ or (None if link.__suppress_context__ else link.__context__)
+    for link in reversed(seen):
+        complain("Traceback (most recent call last):")
+        for frame in traceback.extract_tb(link.__traceback__):
+            complain(f'  File "{frame.filename}", line {frame.lineno}, in {frame.name}')
+            if frame.line:
+                complain(f"    {frame.line}")
+        complain(f"{type(link).__qualname__}: {link}")
+        for note in getattr(link, "__notes__", ()):
+            complain(f"  {note}")
+    complain("error: this is a mistake in etendue, not in what it was given; please report the lines above")
 
 
 def complain_of_usage(error: typer.BadParameter) -> None:
@@ -141,6 +167,48 @@ def whole_numbers(text: str, count: int, option: str, example: str) -> tuple[int
     if not all(value.is_integer() for value in values):
         raise typer.BadParameter(f"{text!r}: give {count} whole numbers, e.g. {option} {example}")
     return tuple(int(value) for value in values)
+
+
+def count(fewest: int = 1) -> Callable[[str | int], int]:
+    """The `parser` of an option that counts something: digits, or a power of ten as in ``1e8``.
+
+    Parameters
+    ----------
+    fewest : int
+        The most is 2^63 - 1.
+
+    Returns
+    -------
+    callable
+        From the text to the number. Raises `typer.BadParameter` for a fraction, or a number out of that range.
+
+    Examples
+    --------
+    >>> count()("1e8"), count()("12345678901234567")
+    (100000000, 12345678901234567)
+    """
+
+    def parse(text: str | int) -> int:
+        try:
+            # Digits stand for themselves, however many; a float has only sixteen of them.
+            value = int(text)
+        except ValueError:
+            value = _from_float(text)
+        if not fewest <= value <= LARGEST_COUNT:
+            raise typer.BadParameter(f"{text!r}: give a whole number from {fewest} to 2^63 - 1")
+        return value
+
+    return parse
+
+
+def _from_float(text: str | int) -> int:
+    try:
+        rounded = float(text)
+    except ValueError:
+        rounded = math.nan
+    if not rounded.is_integer():
+        raise typer.BadParameter(f"{text!r}: give a whole number, e.g. 20000 or 1e8")
+    return int(rounded)
 
 
 def one_of(value: str, known: Iterable[str], option: str) -> str:

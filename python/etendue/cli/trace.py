@@ -13,7 +13,7 @@ import typer
 
 from etendue.cli.guard import require_apart
 from etendue.cli.intensity import peak_line
-from etendue.cli.terminal import INTERRUPTED, check_folder, complain, print_json, progress_bar, say
+from etendue.cli.terminal import INTERRUPTED, check_folder, complain, count, print_json, progress_bar, say
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
@@ -78,9 +78,13 @@ def trace(
         ),
     ] = None,
     rays: Annotated[
-        str | None,
+        int | None,
         typer.Option(
-            "--rays", help="Rays of all sources, e.g. 1e8 (1e7; of ray files alone: all).", show_default=False
+            "--rays",
+            help="Rays of all sources, e.g. 1e8 (1e7; of ray files alone: all).",
+            parser=count(),
+            metavar="NUMBER",
+            show_default=False,
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", help="0 to 2^64 - 1.", min=0)] = 1,
@@ -105,8 +109,9 @@ def trace(
         check_folder(path)
     scene = Scene.load(file)
     started = None if resume is None else TraceResult.load(resume)
-    count = _number_of_rays(rays, started)
-    rounds = trace_rounds(scene, count, seed, until=until, most_events=most_events, threads=threads, resume=started)
+    if rays is None and started is not None:
+        rays = started.rays_asked
+    rounds = trace_rounds(scene, rays, seed, until=until, most_events=most_events, threads=threads, resume=started)
     writers = _writers(outputs, rounds.plan)
     require_apart([file, *scene.read_files()], [*outputs, *(path for path, _, _ in writers)])
     result: TraceResult | None = started
@@ -155,19 +160,6 @@ def _how_to_go_on(outputs: list[Path]) -> str:
         if word != "--resume" and not word.startswith("--resume=") and words[max(i - 1, 0)] != "--resume":
             kept.append(word)
     return f"to go on: {shlex.join(['etendue', *kept, '--resume', str(results[0])])}"
-
-
-def _number_of_rays(text: str | None, started: TraceResult | None) -> float | None:
-    """Rays that the option names; of a result that is gone on from, unless it names others."""
-    if text is None:
-        return None if started is None else started.rays_asked
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not value.is_integer():
-        raise typer.BadParameter(f"{text!r}: give a whole number, e.g. --rays 1e8")
-    return value
 
 
 def _writers(outputs: list[Path], plan: Plan) -> list[tuple[Path, str, Write]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from etendue.errors import FormatError
 from etendue.formats.intensity.eulumdat_writer import write
-from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_lines
+from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_lines, scaled
 from etendue.formats.intensity.symmetry import Array, unfolded
 from etendue.formats.rays.ray_format import Head, file_provenance
 from etendue.quantities.intensity import Intensity, Symmetry
@@ -120,9 +120,7 @@ class _Reader:
             found = f"found {flux:g} lm, but the table is in candela per kilolumen of it"
             raise FormatError(self.path, "line 29, flux of the lamps", found, "State the flux of the lamp set there.")
         c, values = self._whole_circle(c, values, ISYM[isym])
-        values = values * (flux / LUMENS_PER_KILOLUMEN)
-        if not np.isfinite(values).all():
-            raise FormatError(self.path, "intensities", "multiplied by the flux they are no numbers", DAMAGED)
+        values = scaled(self.path, "intensities", values, flux / LUMENS_PER_KILOLUMEN)
         result = Intensity(
             c,
             gamma,

@@ -11,12 +11,16 @@ import numpy as np
 
 from etendue.errors import FormatError
 from etendue.formats.encodings import decoded
+from etendue.formats.intensity.symmetry import Array
 from etendue.formats.rays.ray_format import Head
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.measured import measured, measured_peak
 
 MOST_BYTES = 1 << 27
 """Largest file that is read: a table of 0.1° by 0.1° over the whole sphere has half as much."""
+
+LARGEST_INTENSITY = 1e35
+"""cd or W/sr: the sun has 3e27 cd. What is larger is a slip, and sums and squares of it may leave the numbers."""
 
 DAMAGED = "The file is damaged or cut short; ask for it again."
 
@@ -89,6 +93,24 @@ def number(word: str) -> float | None:
         return None
     value = float(word.replace("d", "e").replace("D", "e"))
     return value if np.isfinite(value) else None
+
+
+def scaled(path: Path, place: str, values: Array, factor: float) -> Array:
+    """The intensities of a file [cd or W/sr]: its table times the factor that it states.
+
+    Raises
+    ------
+    FormatError
+        If one is larger than that of any source.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        intensities = values * factor
+    if not (np.abs(intensities) <= LARGEST_INTENSITY).all():
+        found = (
+            f"{np.abs(values).max():g}, times the factor {factor:g} that the file states, is more than any source has"
+        )
+        raise FormatError(path, place, found, DAMAGED)
+    return intensities
 
 
 def decimal(value: float, digits: int) -> str:

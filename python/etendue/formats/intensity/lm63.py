@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import math
 import re
 from pathlib import Path
 from typing import Any, Literal
@@ -12,7 +13,14 @@ import numpy as np
 
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.intensity.goniometer import Kind, in_c_gamma
-from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_lines
+from etendue.formats.intensity.intensity_format import (
+    DAMAGED,
+    LARGEST_INTENSITY,
+    IntensityFormat,
+    number,
+    read_lines,
+    scaled,
+)
 from etendue.formats.intensity.lm63_writer import write
 from etendue.formats.intensity.opening import opening_facts
 from etendue.formats.intensity.symmetry import Array, from_sector
@@ -23,6 +31,9 @@ from etendue.units import INTENSITY_UNIT, WATTS_PER_FILE_UNIT, FluxUnit
 
 PHOTOMETRIC_TYPES: dict[int, Literal["A", "B", "C"]] = {1: "C", 2: "B", 3: "A"}
 EDITIONS = (1986, 1991, 1995, 2002, 2019)
+LARGEST_LENGTH = 1e6
+"""Metres or feet; millimetres that a file calls metres are less."""
+
 ORIENTATION = (
     "C planes are the file's own: in IES files C0 lies along the luminaire's length; nothing was turned or mirrored"
 )
@@ -221,9 +232,7 @@ class _Reader:
         values = self.words.numbers(n_c * n_gamma, "candela values").reshape(n_c, n_gamma)
         self._check_end()
         unit, per_unit = self._unit()
-        values = values * factor * per_unit
-        if not np.isfinite(values).all():
-            raise FormatError(self.path, "candela values", "multiplied by their factors they are no numbers", DAMAGED)
+        values = scaled(self.path, "candela values", values, factor * per_unit)
         if (values < 0.0).any():
             self.complain("warning", "candela values", f"{int((values < 0.0).sum())} are below 0", "LM-63 5.15")
         notes: tuple[str, ...] = (ORIENTATION,)
@@ -234,8 +243,10 @@ class _Reader:
         facts |= {new: text for key, text in reversed(self.keywords) if (new := FACT_BY_KEYWORD.get(key)) and text}
         facts |= {"keywords": tuple(self.keywords), "lamps": abs(lamps), "input_power": watts}
         facts |= self._stated_flux(per_unit)
-        facts |= opening_facts(width, length, height, "feet" if units == 1 else "m", self.version)
-        if lumens > 0.0 and unit == "lm":
+        facts |= self._opening((width, length, height), "feet" if units == 1 else "m")
+        if lumens > LARGEST_INTENSITY:
+            self.complain("warning", "lumens per lamp", f"found {lumens:g}, which no lamp has; it was not kept")
+        elif lumens > 0.0 and unit == "lm":
             facts["lamp_flux"] = abs(lamps) * lumens
         result = Intensity(
             c,
@@ -270,7 +281,16 @@ class _Reader:
                 raise FormatError(
                     self.path, name, f"found {factor:g}", "It multiplies every candela value; mend the file."
                 )
-        return float(np.prod(list(factors.values())))
+        return math.prod(factors.values())
+
+    def _opening(self, lengths: tuple[float, float, float], unit: str) -> dict[str, Any]:
+        """Shape and extents of the luminous opening, from width, length and height, unless a slip made them endless."""
+        longest = max(map(abs, lengths))
+        if longest > LARGEST_LENGTH:
+            found = f"one length is {longest:g} {unit}, which no luminaire has; sizes were not kept"
+            self.complain("warning", "luminous opening", found)
+            return {}
+        return opening_facts(*lengths, unit, self.version)
 
     def _check_end(self) -> None:
         words = self.words

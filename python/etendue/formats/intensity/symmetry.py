@@ -40,6 +40,8 @@ def unfolded(c: Array, values: Array, symmetry: Symmetry) -> tuple[Array, Array]
         return np.zeros(1), values[:1]
     images = {"C0-C180": [c, -c], "C90-C270": [c, 180.0 - c], "both": [c, -c, 180.0 - c, 180.0 + c]}.get(symmetry, [c])
     angles = np.mod(np.concatenate(images), 360.0)
+    # What is below 0 by less than the last digit of 360 becomes 360 itself.
+    angles[angles == 360.0] = 0.0
     whole, first = np.unique(angles, return_index=True)
     return whole, np.concatenate([values] * len(images))[first]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError, UnsupportedFormatError
 from etendue.formats.intensity.goniometer import in_c_gamma
-from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_bytes
+from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_bytes, scaled
 from etendue.formats.intensity.symmetry import Array, from_sector, sum_of
 from etendue.formats.rays.ray_format import Head, file_provenance
 from etendue.formats.xml_tree import Element, parse_xml
@@ -215,9 +215,7 @@ class _Reader:
         factor = 1.0 if table.first("Multiplier") is None else self._value(table, "Multiplier")
         if not factor > 0.0:
             raise FormatError(self.path, f"{table.place}, Multiplier", f"found {factor:g}", DAMAGED)
-        values = values * factor
-        if not np.isfinite(values).all():
-            raise FormatError(self.path, table.place, "multiplied by their factor the values are no numbers", DAMAGED)
+        values = scaled(self.path, table.place, values, factor)
         if (values < 0.0).any():
             self.complain("warning", table.place, f"{int((values < 0.0).sum())} intensities are below 0")
         c, gamma, values, notes = self._in_c_gamma(table, horizontal, vertical, values, INTENSITY_UNIT[unit])
