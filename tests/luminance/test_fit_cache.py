@@ -70,6 +70,18 @@ def test_the_map_is_the_same_from_a_fit_from_memory_from_disk_and_without_a_cach
 
 
 @pytest.mark.usefixtures("folder")
+def test_a_recalled_field_tells_the_notes_of_the_rays_as_they_are_now(fits: list[int]) -> None:
+    rays = led()
+    for notes in (("measured with a dirty window",), (), ("a first draft", "no second one")):
+        told = seen(rays.replace(notes=notes))
+        assert len(fits) == 1
+        whole = seen(rays.replace(notes=notes), cache=False)
+        fits.pop()
+        assert told.notes == whole.notes
+        assert told.notes[len(told.notes) - len(notes) :] == notes
+
+
+@pytest.mark.usefixtures("folder")
 def test_another_ray_surface_unit_or_program_is_another_fit(fits: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     rays = led()
     seen(rays)

@@ -24,6 +24,7 @@ import platformdirs
 
 from etendue import _core
 from etendue.errors import FormatError
+from etendue.lightfield.fitting import notes_of_rays
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import as_stored, save_field
 from etendue.lightfield.surfaces import Surface
@@ -101,17 +102,20 @@ def fit_or_recall(
     if not cache or _folder() is None:
         return as_stored(LightField.fit(rays, surface, threads=threads, progress=progress))
     name = _name(rays, surface, threads)
-    field = _recall(name)
+    field, told = _recall(name), notes_of_rays(rays)
     if field is None:
         field = as_stored(LightField.fit(rays, surface, threads=threads, progress=progress))
+        field = field.replace(notes=field.notes[: len(field.notes) - len(told)])
         _keep_on_disk(name, field)
     with _lock:
         _memory[name] = field
         _memory.move_to_end(name)
         while len(_memory) > MOST_IN_MEMORY:
             _memory.popitem(last=False)
-    # The same rays may come from another file, or by other steps; and the field's name says nothing of their colours.
+    # The same rays may come from another file, or by other steps; and the field's name says nothing of their colours and
+    # notes.
     return field.replace(
+        notes=(*field.notes, *told),
         provenance=rays.provenance.then(f"light field on {field.surface.spec}"),
         spectrum=rays.total_spectrum(threads=threads),
     )

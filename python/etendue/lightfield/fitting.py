@@ -84,16 +84,16 @@ def fit_light_field(
         counts = fold(counts, symmetry)
     field = fit_counts(rays, counts, plan, seed, threads)
     spectrum = rays.total_spectrum(threads=threads)
-    return field.replace(notes=(*notes, *field.notes, *_unknown_colours(rays), *rays.notes), spectrum=spectrum)
+    return field.replace(notes=(*notes, *field.notes, *notes_of_rays(rays)), spectrum=spectrum)
 
 
-def _unknown_colours(rays: RayStream) -> tuple[str, ...]:
-    """What is to be said of rays that state no wavelength though others do."""
+def notes_of_rays(rays: RayStream) -> tuple[str, ...]:
+    """What a field says of its rays, last of all: how many have no wavelength, and their own notes."""
     colours = rays.colours() if isinstance(rays, RaySet) else None
     if colours is None or not colours.unknown_rays:
-        return ()
+        return rays.notes
     told = f"{colours.unknown_rays:,} rays with {colours.unknown_share:.3%} of the flux state no wavelength"
-    return (f"{told}; the spectrum of the field is that of the others",)
+    return (f"{told}; the spectrum of the field is that of the others", *rays.notes)
 
 
 def default_bits(rays: int) -> int:
