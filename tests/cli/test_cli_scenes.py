@@ -82,6 +82,20 @@ def test_copies_of_rays_are_told(run: Run, tmp_path: Path) -> None:
     assert run("info", "few.h5", "--json").json[0]["effective_rays"] == pytest.approx(200)
 
 
+def test_an_error_that_was_not_reached_is_told(run: Run, tmp_path: Path) -> None:
+    """A set of 200 rays given out 100 times each is no surer than the 200 are."""
+    rng = np.random.default_rng(1)
+    lamp = et.RaySet(rng.random((200, 3)), rng.normal(size=(200, 3)) * 0.2 + [0, 0, 1], np.ones(200))
+    et.write_rays(tmp_path / "led.ray", lamp, format="zemax")
+    source = '[[sources]]\nkind = "rays"\nfile = "led.ray"\n[[detectors]]\nkind = "intensity"\n'
+    (tmp_path / "few.toml").write_text(source, encoding="utf-8")
+    _, _, err = run("trace", "few.toml", "--rays", "20000", "--until", "0.001")
+    assert "--until 0.001 was not reached: " in err
+    assert "copies of the rays of a set" in err
+    _, _, err = run("trace", "few.toml", "--rays", "20000", "--until", "0.9")
+    assert "--until" not in err
+
+
 def test_an_interruption_leaves_a_valid_result(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*arguments: Any, **options: Any) -> Any:
         rounds = et.trace_rounds(*arguments, **options)

@@ -137,6 +137,9 @@ def trace(
     if interrupted:
         complain(f"stopped; what was written is the valid result of {result.rays_done:,} of {result.rays_asked:,} rays")
         complain(_how_to_go_on(outputs))
+    elif until is not None and not result.relative_error < until:
+        copies = " More of them do not help where they are copies of the rays of a set." if _copied(result.plan) else ""
+        complain(f"--until {until:g} was not reached: {result.relative_error:.3g} with all rays of --rays.{copies}")
     if json:
         print_json({"file": file, **result.to_dict(), "outputs": written, "losses": losses, "interrupted": interrupted})
     else:
@@ -147,6 +150,11 @@ def trace(
             say(f"  {path}")
     if interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _copied(plan: Plan) -> bool:
+    """Whether a source gives out rays of a set more than once."""
+    return plan.dealing.strata > 1
 
 
 def _how_to_go_on(outputs: list[Path]) -> str:
