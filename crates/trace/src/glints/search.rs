@@ -225,7 +225,7 @@ impl<'a> Search<'a> {
         let mut met = false;
         if let Some(lantern) = &self.lit.lanterns[source] {
             lantern.along(&self.scene.sources[source], line.o, line.d, reach * (1.0 + TIE), |_| {
-                met = true
+                met = true;
             });
         }
         met
