@@ -298,15 +298,11 @@ def test_a_trace_may_go_on_in_its_own_file(run: Run, tmp_path: Path) -> None:
 # --- inputs that are no files ----------------------------------------------------------------------------------------
 
 
-def fed(path: Path, data: bytes, after: float = 0.0) -> threading.Thread:
+def fed(path: Path, data: bytes) -> threading.Thread:
     """A thread that writes to a pipe."""
     os.mkfifo(path)
 
-    def write() -> None:
-        time.sleep(after)
-        path.write_bytes(data)
-
-    thread = threading.Thread(target=write, daemon=True)
+    thread = threading.Thread(target=path.write_bytes, args=(data,), daemon=True)
     thread.start()
     return thread
 
@@ -333,11 +329,14 @@ def test_a_pipe_in_python_keeps_its_name(rays: Path, tmp_path: Path) -> None:
 
 
 def test_a_pipe_without_a_writer_says_what_it_waits_for(rays: Path, tmp_path: Path) -> None:
-    fed(tmp_path / "pipe", rays.read_bytes(), after=4)
+    os.mkfifo(tmp_path / "pipe")
     process = started(tmp_path, "convert", "pipe", "a.csv")
+    assert process.stderr is not None
+    # However long the program takes to start, it is fed only after it has said that it waits.
+    assert "pipe: waiting for something to be written to this pipe" in process.stderr.readline()
+    (tmp_path / "pipe").write_bytes(rays.read_bytes())
     _, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
-    assert "pipe: waiting for something to be written to this pipe" in err
     os.mkfifo(tmp_path / "silent")
     process = started(tmp_path, "convert", "silent", "b.csv")
     assert process.stderr is not None

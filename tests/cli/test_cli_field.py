@@ -370,7 +370,7 @@ def test_intensity_of_a_field(run: Run, folder: Path, tmp_path: Path) -> None:
         (["fit", "{}/dome.h5", "-o", "a.h5"], 1, "dome.h5"),
         (["sample", "{}/dome.h5", "-o", "a.dat"], 2, "--rays"),
         (["sample", "{}/dome.h5", "-n", "0", "-o", "a.tm25ray"], 2, "-n"),
-        (["sample", "{}/dome.h5", "-n", "1e6", "-o", "a.tm25ray"], 2, "-n"),
+        (["sample", "{}/dome.h5", "-n", "1.5e0", "-o", "a.tm25ray"], 2, "-n"),
         (["sample", "{}/dome.h5", "-n", "5", "-o", "a.tm25ray", "--format", "tm52"], 2, "'tm25'"),
         (["sample", "{}/dome.h5", "-n", "5", "-o", "a.xyz"], 1, "belongs to no ray format"),
         (["sample", "{}/dome.h5", "-n", "5", "-o", "a.csv", "-o", "b.ray"], 1, "belongs to several formats: "),
