@@ -289,9 +289,9 @@ def _pairs(
     """Each observer with his screen."""
     scene = source.scene if isinstance(source, ScatterEvents) else source
     if observer is None:
-        if screen is not None or not isinstance(scene, Scene):
+        if screen is not None or not isinstance(source, Scene | ScatterEvents):
             raise ArgumentError("give an observer.")
-        if not scene.observers:
+        if not isinstance(scene, Scene) or not scene.observers:
             raise ArgumentError("the scene has no observers; give one.")
         return [(keys.observer(), keys.screen.screen()) for keys in scene.observers]
     observers = [observer] if isinstance(observer, Observer) else list(observer)
