@@ -30,6 +30,9 @@ const NEAR: f64 = 3.0;
 /// Surfaces met by all chains from one start, at most: light that is caught in a solid has no end.
 const MOST_MEETINGS: usize = 128;
 
+/// Surfaces met in all from one start, by chains and while they are bent: among thousands of prisms a search has no end.
+const WORK: usize = 256;
+
 /// Points of each source that are looked for.
 const POINTS: usize = 64;
 
@@ -115,6 +118,8 @@ pub struct Search<'a> {
     /// What the eye is in and on.
     eye: (Inside, Leaving),
     fillings: Fillings,
+    /// Surfaces that may still be met from the present start.
+    left: usize,
 }
 
 impl<'a> Search<'a> {
@@ -142,6 +147,7 @@ impl<'a> Search<'a> {
             wavelengths: wavelengths.collect(),
             eye,
             fillings: Fillings::new(lit.scene),
+            left: 0,
         })
     }
 
@@ -179,6 +185,7 @@ impl<'a> Search<'a> {
             ways: Vec::new(),
         }];
         let mut meetings = 0;
+        self.left = WORK;
         while let Some(mut chain) = chains.pop() {
             let mut events = chain.ways.len();
             loop {
@@ -242,7 +249,8 @@ impl<'a> Search<'a> {
     }
 
     /// What three lines meet; None if it is nothing, or not the same.
-    fn meet(&self, lines: &[Line; 3]) -> Option<[Meeting; 3]> {
+    fn meet(&mut self, lines: &[Line; 3]) -> Option<[Meeting; 3]> {
+        self.left = self.left.checked_sub(1)?;
         let next = |line: &Line| meet_one(self.scene, line.o, line.d, &line.leaving, f64::INFINITY, line.inside);
         let first = next(&lines[0]).ok()??;
         let same = |line: &Line| {
