@@ -92,6 +92,7 @@ pub struct Glints {
 
 impl Glints {
     /// Looks for the images of the sources of a scene. Runs on the threads of the current pool; the same for any number.
+    /// Once `lit` is stopped, the rest is left out.
     #[must_use]
     pub fn find(lit: &Lit<'_>, view: &View, most_events: u32) -> Self {
         let sources = lit.scene.sources.len();
@@ -107,7 +108,15 @@ impl Glints {
         let starts = (STARTS / pixels.max(1)).clamp(1, MOST_STARTS);
         let found: Vec<(Vec<Found>, Vec<Sight>)> = (0..pixels)
             .into_par_iter()
-            .map_init(|| search.clone(), |search, pixel| search.search_from(pixel, starts))
+            .map_init(
+                || search.clone(),
+                |search, pixel| {
+                    if lit.is_stopped() {
+                        return Default::default();
+                    }
+                    search.search_from(pixel, starts)
+                },
+            )
             .collect();
         let mut images: Vec<Vec<Found>> = vec![Vec::new(); pixels];
         for image in found.iter().flat_map(|(images, _)| images) {

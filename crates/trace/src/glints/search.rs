@@ -189,14 +189,18 @@ impl<'a> Search<'a> {
         while let Some(mut chain) = chains.pop() {
             let mut events = chain.ways.len();
             loop {
+                if self.left == 0 {
+                    return;
+                }
                 let met = self.meet(&chain.lines);
                 let reach = met.as_ref().map_or(f64::INFINITY, |met| met[0].t);
                 let targets = self.targets.clone();
                 for target in targets.iter() {
-                    if self.sees(target.source, &chain.lines[0], reach) {
+                    if self.shows(target, &chain.lines[0], reach) {
                         seen.push((target.source, chain.ways.clone()));
+                    } else {
+                        self.aim(target, at, &chain, reach, wavelength, number, found);
                     }
-                    self.aim(target, at, &chain, reach, wavelength, number, found);
                 }
                 meetings += 1;
                 events += 1;
@@ -225,17 +229,6 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-    }
-
-    /// Whether a line meets a source before anything else.
-    fn sees(&self, source: usize, line: &Line, reach: f64) -> bool {
-        let mut met = false;
-        if let Some(lantern) = &self.lit.lanterns[source] {
-            lantern.along(&self.scene.sources[source], line.o, line.d, reach * (1.0 + TIE), |_| {
-                met = true;
-            });
-        }
-        met
     }
 
     /// The lines of sight through a place and beside it.
@@ -349,10 +342,10 @@ impl<'a> Search<'a> {
         number: usize,
         found: &mut Vec<Found>,
     ) {
-        let Some(inverse) = passing(&chain.lines, target.middle).inverse() else {
+        let middle = passing(&chain.lines, target.middle);
+        let Some(inverse) = middle.inverse() else {
             return;
         };
-        let middle = passing(&chain.lines, target.middle);
         if middle.along + target.radius <= 0.0 || middle.along - target.radius > 2.0 * reach {
             return;
         }
@@ -376,9 +369,6 @@ impl<'a> Search<'a> {
             .map(|k| (distance(&target.points[k]), k))
             .fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a });
         if nearest.0 > NEAR {
-            return;
-        }
-        if self.shows(target, &chain.lines[0], reach) {
             return;
         }
         for k in [nearest.1, number % target.points.len()] {
@@ -405,7 +395,15 @@ impl<'a> Search<'a> {
     fn shows(&self, target: &Target, line: &Line, reach: f64) -> bool {
         let (mut met, lit) = (false, self.lit);
         if let Some(lantern) = &lit.lanterns[target.source] {
-            lantern.along(&lit.scene.sources[target.source], line.o, line.d, reach, |_| met = true);
+            lantern.along(
+                &lit.scene.sources[target.source],
+                line.o,
+                line.d,
+                reach * (1.0 + TIE),
+                |_| {
+                    met = true;
+                },
+            );
         }
         met
     }
@@ -431,6 +429,9 @@ impl<'a> Search<'a> {
             let inverse = passing.inverse()?;
             let mut step = times(&inverse, passing.off);
             if passing.off[0].hypot(passing.off[1]) < close {
+                if self.left == 0 {
+                    return None;
+                }
                 // Another surface may stand before it.
                 let reach = self.meet(&lines).map_or(f64::INFINITY, |met| met[0].t);
                 let there = passing.along > 0.0 && passing.along <= reach * (1.0 + HIDDEN);
