@@ -8,6 +8,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import pytest
+from etendue.lightfield.field_rays import FieldRays
 from etendue.luminance.framing import centre_of_light, framed, light_towards
 from oracles.light_fields import make_field
 from scipy import stats
@@ -106,6 +107,20 @@ def test_a_screen_that_misses_light_says_so(method: str) -> None:
     screen = et.Screen(float(advised[1]), float(advised[1]), 8, 8)
     whole = et.luminance_map(lamp(50_000), et.Observer(20, 35, 2000, target=(x, y, z)), screen, method="cone")
     assert not any("the screen shows" in note for note in whole.notes)
+
+
+def test_a_map_that_shows_the_whole_field_asks_no_rays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its intensity is that of the field towards the observer, which is a sum over the surface; drawn rays take 50 times as
+    long."""
+    field = make_field(et.Disk(radius=1.3, z=-0.2, centre=(0.5, 1 / 7)))
+    observer = et.Observer(20, 35, 2000, target=(0.5, 0, 0))
+    drawn = []
+    monkeypatch.setattr(et.LightField, "sample", lambda _, n: drawn.append(n) or FieldRays(field, n).ray_set())
+    et.luminance_map(field, observer, et.Screen(4, 4, 16, 16))
+    assert drawn == []
+    part = et.luminance_map(field, observer, et.Screen(1, 1, 16, 16))
+    assert len(drawn) == 1
+    assert any("the screen shows" in note for note in part.notes)
 
 
 def test_from_behind_it_is_dark() -> None:

@@ -29,15 +29,14 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.lightfield.light_field import LightField
 from etendue.luminance.estimate import METHODS, Acceptance, luminance_map
-from etendue.luminance.framing import centre_of_light, framed, probe
+from etendue.luminance.framing import centre_of_light, framed_screens, probe
 from etendue.luminance.opening import SCENE_EXTENSION
 from etendue.luminance.scene_map import DEFAULT_RAYS_PER_PIXEL
 from etendue.plot.map_picture import SCALES, plot_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import PLANES, Observer, Screen
 from etendue.quantities.ray_set import RaySet
-from etendue.scene import Scene, compile_scene
-from etendue.scene.framing import framed_screen
+from etendue.scene import Scene
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.tracing.result import TraceResult
 from etendue.tracing.storage import is_result_file
@@ -317,17 +316,15 @@ def _views(
     """Observers of the target with their screens: of the stated size, or framed to what each sees of the source."""
     columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
     to_frame = size is None and plane == "view"
-    some = probe(source) if to_frame and isinstance(source, RaySet | LightField) else None
     if target is not None:
         x, y, z = numbers(target, 3, "--target", "0,0,0")
+    elif to_frame and isinstance(source, RaySet | LightField):
+        x, y, z = centre_of_light(probe(source))
     else:
-        x, y, z = (0.0, 0.0, 0.0) if some is None else centre_of_light(some)
+        x, y, z = 0.0, 0.0, 0.0
     observers = [dataclasses.replace(observer, target=(x, y, z)) for observer in observers]
-    if some is not None:
-        return observers, [framed(some, observer, columns, rows) for observer in observers]
-    if to_frame and isinstance(source, Scene):
-        compiled = compile_scene(source)
-        return observers, [framed_screen(compiled, observer, columns, rows) for observer in observers]
+    if to_frame and source is not None:
+        return observers, framed_screens(source, observers, columns, rows)
     if size is None:
         raise typer.BadParameter("give the screen's width and height in mm, e.g. --size 25,25", param_hint="--size")
     width, height = numbers(size, 2, "--size", "25,25")

@@ -16,7 +16,7 @@ from etendue.lightfield.probe import check_near_field
 from etendue.lightfield.surfaces import Surface
 from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
 from etendue.luminance.cone import ConeEstimate, ConeView, check_acceptance, cone_estimates
-from etendue.luminance.framing import framed, missed_notes, probe
+from etendue.luminance.framing import framed_screens, missed_notes, probe, shows_whole
 from etendue.luminance.looking import look_at_field
 from etendue.luminance.opening import open_source
 from etendue.luminance.scatter_map import look_at_events
@@ -25,8 +25,7 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.memory import require_memory
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally
-from etendue.scene import Scene, compile_scene
-from etendue.scene.framing import framed_screen
+from etendue.scene import Scene
 from etendue.scene.scatter_events import ScatterEvents
 
 Method = Literal["auto", "cone", "lightfield"]
@@ -296,27 +295,20 @@ def _pairs(
         return [(keys.observer(), keys.screen.screen()) for keys in scene.observers]
     observers = [observer] if isinstance(observer, Observer) else list(observer)
     if screen is None:
-        screen = _framed(scene, observers)
+        if scene is None:
+            raise ArgumentError("the scene of these events is not known; give a screen.")
+        screen = framed_screens(scene, observers)
     screens = [screen] * len(observers) if isinstance(screen, Screen) else list(screen)
     if len(observers) != len(screens) or not observers:
         raise ArgumentError(f"{len(observers)} observers and {len(screens)} screens; give one screen, or one for each.")
     return list(zip(observers, screens, strict=True))
 
 
-def _framed(source: RayStream | LightField | Scene | None, observers: list[Observer]) -> list[Screen]:
-    """A screen for each observer on which what he sees of the source is shown."""
-    if source is None:
-        raise ArgumentError("the scene of these events is not known; give a screen.")
-    if isinstance(source, Scene):
-        compiled = compile_scene(source)
-        return [framed_screen(compiled, observer) for observer in observers]
-    some = probe(source)
-    return [framed(some, observer) for observer in observers]
-
-
 def _with_missed(source: RayStream | LightField, maps: list[LuminanceMap]) -> list[LuminanceMap]:
     """The maps, with a note where a screen misses much of the light."""
     if not source.total_flux > 0.0:
+        return maps
+    if isinstance(source, LightField) and all(shows_whole(source, lmap) for lmap in maps):
         return maps
     some = probe(source)
     notes = [missed_notes(some, lmap.observer, lmap.screen) for lmap in maps]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -10,9 +11,12 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.probe import probe_rays
+from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
+from etendue.scene import Scene, compile_scene
+from etendue.scene.framing import framed_screen
 
 Array = npt.NDArray[np.float64]
 
@@ -31,6 +35,12 @@ SHOWN = 0.995
 MARGIN = 1.1
 """How much larger than that the screen is."""
 
+POINTS = 48
+"""Points along each coordinate of a part over which the intensity of a field towards an observer is summed."""
+
+CLOSE = 0.03
+"""Share of it below which a map need not be looked at more closely: quadrature, and observers that are near."""
+
 MOST_MISSED = 0.1
 """Share of the light towards the observer that a screen may miss without a note."""
 
@@ -44,6 +54,7 @@ class Light:
     right, up : array, shape (n,)
         Along the axes of the screen, from the observer's target [mm].
     flux : array, shape (n,)
+        [flux unit of the rays]
     cone : float
         Half-angle [°] within which they head for him.
     """
@@ -122,6 +133,38 @@ def framed(rays: RaySet, observer: Observer, columns: int = 128, rows: int = 128
     side = max(2.0 * MARGIN * max(reach[0] / columns, reach[1] / rows), np.finfo(np.float64).tiny)
     pixel = _rounded_up(side * columns) / columns
     return Screen(pixel * columns, pixel * rows, columns, rows)
+
+
+def framed_screens(
+    source: RayStream | LightField | Scene, observers: Sequence[Observer], columns: int = 128, rows: int = 128
+) -> list[Screen]:
+    """A screen for each observer, about his target, on which he sees the whole scene, or all light but strays.
+
+    Raises
+    ------
+    ArgumentError
+        As `framed`, or `etendue.scene.framing.framed_screen`.
+    SceneError
+        If the scene has mistakes.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> [screen.width for screen in framed_screens(et.RingSource(rays=200_000), [et.Observer(0, 0, 1000)])]
+    [63.0]
+    """
+    if isinstance(source, Scene):
+        compiled = compile_scene(source)
+        return [framed_screen(compiled, observer, columns, rows) for observer in observers]
+    some = probe(source)
+    return [framed(some, observer, columns, rows) for observer in observers]
+
+
+def shows_whole(field: LightField, lmap: LuminanceMap) -> bool:
+    """Whether the map has the intensity of the field towards its observer, as far as he is away: then nothing is missed."""
+    towards = lmap.observer.position - np.asarray(lmap.observer.target)
+    intensity = float(field.core.intensity(np.ascontiguousarray(towards[None, :]), POINTS)[0])
+    return lmap.intensity > (1.0 - CLOSE) * intensity
 
 
 def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
