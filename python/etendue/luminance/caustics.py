@@ -162,6 +162,7 @@ class Plan:
 def plan(
     record: Mapping[str, Any],
     views: Sequence[_core._View],
+    glints: Sequence[_core.Glints],
     seed: int,
     most_events: int,
     lines: int,
@@ -191,7 +192,6 @@ def plan(
     done = batches * batch
     found = np.concatenate(arrivals)
     guide = _core.Guide(core, found) if len(found) else None
-    glints = [_core.Glints(core, view, most_events, threads) for view in views]
     if rays is not None:
         return Plan(rays, guide, glints, done)
     cost = max(segments / done / LINE, 0.25)

@@ -168,7 +168,7 @@ def shows_whole(field: LightField, lmap: LuminanceMap) -> bool:
 
 
 def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
-    """The point to look at: the one that the lines of the rays come closest to, or the middle of where they start.
+    """The point to look at [mm]: the one that the lines of the rays come closest to, or the middle of where they start.
 
     Rounded to a hundredth of the distance at which the lines pass it.
 

@@ -219,12 +219,12 @@ def _forward(
 ) -> _Forward:
     """Rays forwards as the scene asks for them, or the user; none where lines of sight find all light well."""
     possible = core.may_focus()
+    glints = [_core.Glints(core, view, MOST_EVENTS, how.threads) for view in views]
     if not possible or how.forward_rays == 0:
-        glints = [_core.Glints(core, view, MOST_EVENTS, how.threads) for view in views]
         return _Forward(Plan(0, None, glints, 0), None, None, possible)
     lines = how.paths * how.passes
     asked = None if how.forward_rays is None and wanted else int(how.forward_rays or 0)
-    found = plan(compiled.record, views, how.seed, MOST_EVENTS, lines, asked, how.threads)
+    found = plan(compiled.record, views, glints, how.seed, MOST_EVENTS, lines, asked, how.threads)
     images, shared = None, None
     if found.rays and wanted:
         # Where lines of sight end at patches, these do not tell what they hold of each source.
