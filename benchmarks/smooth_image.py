@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from etendue.lightfield.smoothing import smooth_counts
+from etendue.denoising.smoothing import smooth_counts
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from oracles.images import IMAGES, Array, ncc, nrmse, oracle_gaussian

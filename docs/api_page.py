@@ -19,8 +19,8 @@ GROUPS = {
         "cache_content", "clear_cache", "GriddedSource", "threshold_sweep",
     ),
     "Luminance": (
-        "luminance_map", "Observer", "Screen", "LuminanceMap", "read_map", "combine_maps", "compare", "Region",
-        "cross_section", "filter_map", "denoise_map",
+        "luminance_map", "Cone", "FromField", "PathTracing", "Observer", "Screen", "LuminanceMap", "read_map",
+        "combine_maps", "compare", "Region", "cross_section", "filter_map", "denoise_map",
     ),
     "Scenes": (
         "scene", "Scene", "trace", "trace_rounds", "TraceResult", "ScatterEvents", "IlluminanceMap",

@@ -47,7 +47,7 @@ def fields(rays: et.RaySet, *, full: bool) -> dict[str, et.LightField]:
 
 
 def seen_by_fields(rays: et.RaySet, screen: et.Screen, *, full: bool) -> Maps:
-    """Maps of the light fields, and how well each foretells rays that were held out."""
+    """Maps of the light fields, and how well each predicts rays that were held out."""
     found: Maps = {}
     for name, field in fields(rays, full=full).items():
         report = field.report

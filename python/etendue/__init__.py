@@ -24,7 +24,7 @@ from etendue.errors import (
 )
 from etendue.formats.input import WaitingWarning
 from etendue.formats.intensity import read_intensity, write_intensity
-from etendue.formats.maps import read_illuminance_map, read_map
+from etendue.formats.maps import read_illuminance_map, read_map, save_map
 from etendue.formats.rays import read_rays, write_rays
 from etendue.formats.rays.ray_index import RayIndex
 from etendue.goniophotometry.far_field import intensity_distribution
@@ -39,6 +39,7 @@ from etendue.luminance.comparison import Region, compare, cross_section
 from etendue.luminance.denoising import denoise_map
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
+from etendue.luminance.methods import Cone, FromField, PathTracing
 from etendue.plot import (
     draw_scene,
     plot_characteristic,
@@ -52,6 +53,7 @@ from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.pixel_map import MapOutlets, PixelMap
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.report import ChangedFileWarning, RayFileWarning
 from etendue.quantities.spectrum import Spectrum
@@ -68,11 +70,13 @@ __all__ = [
     "ArgumentError",
     "Box",
     "ChangedFileWarning",
+    "Cone",
     "Cylinder",
     "Disk",
     "Dome",
     "EtendueError",
     "FormatError",
+    "FromField",
     "GriddedSource",
     "Hemisphere",
     "IlluminanceMap",
@@ -82,6 +86,7 @@ __all__ = [
     "MemoryLimitError",
     "Observer",
     "OutputError",
+    "PathTracing",
     "Plane",
     "RayFileWarning",
     "RayIndex",
@@ -130,6 +135,9 @@ __all__ = [
     "write_intensity",
     "write_rays",
 ]
+
+# Maps are quantities, which cannot import the files and pictures above them.
+PixelMap.outlets = MapOutlets(save=save_map, plot=plot_map)
 
 
 def __getattr__(name: str) -> Any:

@@ -149,29 +149,23 @@ WITHOUT_EXAMPLE = {
     "etendue.plot.scene_parts.View": "a part of a SceneLayout",
     "etendue.formats": "formats live on files: docs/how-to.md writes and reads them, the tests take them apart",
     "etendue.lightfield.etendue_density": "what LightField is made of, which shows it",
-    "etendue.lightfield.autofocus.SurfaceChoice": "what choose_surface returns, shown in its example",
-    "etendue.lightfield.autofocus.SurfaceScore": "a row of it",
+    "etendue.lightfield.selection.bounding": "a step of choose_surface",
+    "etendue.lightfield.selection.scorer": "a step of choose_surface",
+    "etendue.lightfield.selection.search.SurfaceChoice": "what choose_surface returns, shown in its example",
+    "etendue.lightfield.selection.search.SurfaceScore": "a row of it",
     "etendue.lightfield.calibration": "how LightField.fit finds its error bars; docs/theory.md explains it",
     "etendue.lightfield.candidate": "how LightField.fit chooses a base measure; docs/theory.md explains it",
     "etendue.lightfield.characteristic.CharacteristicCurve": "a part of what diagnose returns",
     "etendue.lightfield.counting": "count_rays shows what the others hold",
     "etendue.lightfield.diagnostics": "diagnose shows what the others hold",
-    "etendue.lightfield.directional": "a step of smooth_counts",
-    "etendue.lightfield.enclosures": "a step of choose_surface",
     "etendue.lightfield.fitting": "LightField.fit is the door",
-    "etendue.lightfield.fourier_plane": "a step of smooth_counts",
     "etendue.lightfield.gridded.fitting": "GriddedSource.fit is the door",
     "etendue.lightfield.gridded.pixels.Cells": "likewise",
     "etendue.lightfield.gridded.pixels.Pixelation": "what its kinds share; each has an example",
     "etendue.lightfield.gridded.sampling": "GriddedSource.sample is the door",
     "etendue.lightfield.gridded.summing": "GriddedSource.intensity is the door",
-    "etendue.lightfield.image_errors": "a step of smooth_counts",
-    "etendue.lightfield.image_estimates": "likewise",
-    "etendue.lightfield.image_mixture": "likewise",
-    "etendue.lightfield.jury": "a step of choose_surface",
-    "etendue.lightfield.learning": "diagnose is the door",
-    "etendue.lightfield.shifted_trees": "a step of smooth_counts",
-    "etendue.lightfield.smoothing": "smooth_counts shows what the others hold",
+    "etendue.lightfield.forecast": "diagnose is the door",
+    "etendue.denoising": "smooth_counts shows what the others hold",
     "etendue.lightfield.storage": "LightField.save and load are the doors; docs/formats/light-fields.md reads a file",
     "etendue.lightfield.surfaces.Surface": "what its kinds share; each has an example",
     "etendue.lightfield.symmetry.proven_symmetry": "what LightField.fit does with symmetry='auto'",
@@ -192,6 +186,7 @@ WITHOUT_EXAMPLE = {
     "etendue.tracing.sums": "what TraceResult is made of",
     "etendue.luminance.acceptance": "what luminance_map does with acceptance='auto'; its notes show the result",
     "etendue.luminance.cone": "what luminance_map does with method='cone'",
+    "etendue.luminance.cone_map": "luminance_map is the door",
     "etendue.luminance.comparison.MapStatistics": "a part of what compare returns, shown in its example",
     "etendue.luminance.comparison.Comparison": "what compare returns, shown in its example",
     "etendue.luminance.comparison.CrossSection": "what cross_section returns, shown in its example",
@@ -211,6 +206,7 @@ WITHOUT_EXAMPLE = {
     "etendue.scene.shapes.shape.Shape": "likewise",
     "etendue.scene.sources.source.Source": "likewise",
     "etendue.luminance.gathering.survey_notes": "words about what the core found",
+    "etendue.quantities.pixel_map": "LuminanceMap and IlluminanceMap show it",
     "etendue.quantities.observer.observer_from_dict": "for readers of files",
     "etendue.quantities.provenance.version": "the version, whatever it is",
     "etendue.quantities.ray_merge.merged": "RaySet.merge is the door",
@@ -223,6 +219,9 @@ WITHOUT_EXAMPLE = {
     "etendue.quantities.ray_stream": "what ray sets and sources share; RaySet and RingSource show it",
     "etendue.quantities.report.RayFileWarning": "a category of warnings",
     "etendue.quantities.report.ChangedFileWarning": "a category of warnings",
+    "etendue.luminance.methods.Method": "what Cone, FromField and PathTracing share, which show it",
+    "etendue.luminance.methods.SourceKind": "a row of a table; tests/luminance/test_methods.py shows it",
+    "etendue.luminance.methods.Spelling": "how messages name options; tests/luminance/test_methods.py shows both",
     "etendue.quantities.node_choice.Choice": "what choose_nodes returns",
     "etendue.tracing.far_fields.far_field_nodes": "a step of trace_rounds, which shows it",
     "etendue.formats.input": "about files that change and pipes that wait; its tests show it",
@@ -335,6 +334,13 @@ def test_no_crate_is_unsafe_prints_or_opens_files() -> None:
             )
         for word in words:
             assert not re.search(word, code), f"{path.relative_to(ROOT)}: {word}"
+
+
+def test_every_kind_of_bsdf_is_in_the_list_of_their_tests() -> None:
+    folder = CRATES / "optics" / "src" / "bsdf"
+    kinds = {path.stem for path in folder.glob("*.rs")} - {"mod", "contract", "tests"}
+    assert len(kinds) > 3
+    assert set(re.findall(r'::named\("(\w+)"\)', (folder / "mod.rs").read_text())) == kinds
 
 
 @pytest.mark.parametrize(

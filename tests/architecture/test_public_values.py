@@ -43,12 +43,15 @@ def illuminance() -> et.IlluminanceMap:
 
 MAKERS: dict[str, Callable[[], Any]] = {
     **{type(surface).__name__: lambda surface=surface: surface for surface in SURFACES.values()},
+    "Cone": lambda: et.Cone(acceptance="auto"),
+    "FromField": lambda: et.FromField(surface=et.Disk(radius=30), samples=4),
     "GriddedSource": lambda: et.GriddedSource.fit(rays(), et.Disk(radius=30), pixel=20, threshold=5),
     "IlluminanceMap": illuminance,
     "Intensity": lambda: et.intensity_distribution(rays()),
     "LightField": lambda: make_field(SURFACES["dome"]),
     "LuminanceMap": make_map,
     "Observer": lambda: et.Observer(30, 10, 500, target=(1, 2, 3)),
+    "PathTracing": lambda: et.PathTracing(rays_per_pixel=64, until=0.01, seed=3, forward_rays=1e6, gather=True),
     "RayIndex": lambda: et.RayIndex.build(rays()),
     "RaySet": rays,
     "Region": lambda: et.Region(left=-1, right=0, bottom=-2, top=2),

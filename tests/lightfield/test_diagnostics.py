@@ -14,13 +14,20 @@ import numpy.typing as npt
 import pytest
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.lightfield import learning
 from etendue.lightfield.candidate import Score
 from etendue.lightfield.characteristic import CharacteristicCurve, characteristic_curve
 from etendue.lightfield.diagnostics import diagnose
 from etendue.lightfield.etendue_density import FitReport, PartField
 from etendue.lightfield.expected_loss import loss_of_gamma
-from etendue.lightfield.learning import EXPONENTS, REFITS, LearningCurve, law_of_gains, learning_curve
+from etendue.lightfield.forecast import (
+    EXPONENTS,
+    LAW_HOLDS,
+    REFITS,
+    LearningCurve,
+    _gains,
+    law_of_gains,
+    learning_curve,
+)
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Hemisphere, Plane, Surface
 from etendue.plot.characteristic_picture import plot_characteristic
@@ -249,7 +256,7 @@ def test_forecasts_hold_as_often_as_they_say() -> None:
     for _ in range(trials):
         exponent, loss = rng.choice(EXPONENTS), 0.01 * rng.uniform(0.7, 1.4)
         exact = gains_of(loss, exponent)
-        noise = covariance + np.diag((learning.LAW_HOLDS * exact) ** 2)
+        noise = covariance + np.diag((LAW_HOLDS * exact) ** 2)
         curve = law_of_gains(RUNGS, exact + np.linalg.cholesky(noise) @ rng.normal(size=2), covariance, 10_000)
         truths = {
             "exponent": (curve.exponent, exponent),
@@ -308,47 +315,47 @@ def trial() -> Trial:
 
 
 @pytest.fixture(scope="module")
-def learnt(trial: Trial) -> LearningCurve:
+def curve(trial: Trial) -> LearningCurve:
     return learning_curve(trial.field(trial.N), trial.rays(trial.N), threads=1)
 
 
-def test_forecasts_come_true(trial: Trial, learnt: LearningCurve) -> None:
+def test_forecasts_come_true(trial: Trial, curve: LearningCurve) -> None:
     """The field really fitted to 4 and 16 times the rays; and to as many as are said to halve its error."""
     scores = {m: trial.score(m * trial.N) for m in (1, 4, 16, 128)}
     for m in (4, 16):
-        forecast = learnt.gain(m)
+        forecast = curve.gain(m)
         true = scores[m] - scores[1]
         # Twice the interval of 68 % on a logarithmic scale: 95 %.
         assert forecast.value * (forecast.low / forecast.value) ** 2 < true, (m, forecast, true)
         assert true < forecast.value * (forecast.high / forecast.value) ** 2, (m, forecast, true)
     # What endless rays would reach: the score of 128 times as many, and the little that the law adds.
-    end = scores[128] + learnt.loss(128 * trial.N).value
-    halved = trial.score(round(learnt.factor(0.5).value * trial.N))
+    end = scores[128] + curve.loss(128 * trial.N).value
+    halved = trial.score(round(curve.factor(0.5).value * trial.N))
     share = math.sqrt((end - halved) / (end - scores[1]))
-    low, high = (learnt.factor(0.5).value / f for f in (learnt.factor(0.5).high, learnt.factor(0.5).low))
+    low, high = (curve.factor(0.5).value / f for f in (curve.factor(0.5).high, curve.factor(0.5).low))
     assert 0.5 * low**0.5 < share < 0.5 * high**0.5, share
 
 
-def test_gains_are_differences_of_scores_on_the_other_half(trial: Trial, learnt: LearningCurve) -> None:
-    np.testing.assert_allclose(learnt.rays, trial.N * np.array([1, 2, 4]) / 8)
-    assert (learnt.gains > 5 * learnt.gain_errors).all()
-    assert learnt.field_rays == trial.N
+def test_gains_are_differences_of_scores_on_the_other_half(trial: Trial, curve: LearningCurve) -> None:
+    np.testing.assert_allclose(curve.rays, trial.N * np.array([1, 2, 4]) / 8)
+    assert (curve.gains > 5 * curve.gain_errors).all()
+    assert curve.field_rays == trial.N
     # The errors are those of means over 10 000 rays.
-    assert (learnt.gain_errors < 0.02).all()
+    assert (curve.gain_errors < 0.02).all()
 
 
 def test_gains_are_weighed_by_flux() -> None:
     """Equal weights: mean and covariance of the mean; a ray without flux changes nothing."""
     rng = np.random.default_rng(2)
     values, weights = rng.normal(size=(2, 3, 50)), np.full(50, 0.7)
-    gains, covariance = learning._gains([[Score(v, weights) for v in half] for half in values])
+    gains, covariance = _gains([[Score(v, weights) for v in half] for half in values])
     steps = np.diff(np.concatenate(values, axis=1), axis=0)
     np.testing.assert_allclose(gains, steps.mean(axis=1), rtol=1e-12)
     np.testing.assert_allclose(covariance, np.cov(steps, ddof=0) / 100, rtol=1e-12)
     values[:, 1, 7], weights[7] = 1e3, 0.0
     kept = np.arange(50) != 7
-    alone = learning._gains([[Score(v[kept], weights[kept]) for v in half] for half in values])
-    for one, other in zip(learning._gains([[Score(v, weights) for v in half] for half in values]), alone, strict=True):
+    alone = _gains([[Score(v[kept], weights[kept]) for v in half] for half in values])
+    for one, other in zip(_gains([[Score(v, weights) for v in half] for half in values]), alone, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
@@ -377,7 +384,7 @@ def test_rays_of_unequal_flux_are_judged_by_their_flux() -> None:
 
 
 def test_a_symmetry_tells_of_twice_the_rays(trial: Trial) -> None:
-    """Of a source that is even in x, half the rays folded foretell fresh rays at least as well as all rays unfolded."""
+    """Of a source that is even in x, half the rays folded predict fresh rays at least as well as all rays unfolded."""
     surface, depths = Hemisphere(radius=1.264), (3, 3, 2, 2)
     rays = trial.rays(48_000)
     sign = np.where(np.random.default_rng(3).random(48_000) < 0.5, -1.0, 1.0)[:, None] * [1, 0, 0] + [0, 1, 1]

@@ -13,7 +13,8 @@ import pytest
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield import fit_cache
-from etendue.luminance.scene_map import Looking, look_at_scene, with_fields
+from etendue.luminance.methods import PathTracing
+from etendue.luminance.scene_map import look_at_scene, with_fields
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.scene import compile_scene
 from oracles.luminaires import corner
@@ -391,7 +392,7 @@ def test_more_passes_until_the_error_is_reached() -> None:
 
 @pytest.mark.parametrize(("rays", "passes", "paths"), [(1, 4, 1), (5, 5, 1), (16, 16, 1), (17, 16, 2), (256, 16, 16)])
 def test_lines_of_sight_come_in_passes(rays: int, passes: int, paths: int) -> None:
-    how = Looking(rays)
+    how = PathTracing(rays_per_pixel=rays)
     assert (how.passes, how.paths) == (passes, paths)
 
 
@@ -456,7 +457,7 @@ def test_options_belong_to_their_sources() -> None:
     with pytest.raises(ArgumentError, match="no observers"):
         et.luminance_map(et.Scene(sources=[sky()]))
     with pytest.raises(ArgumentError, match="no source"):
-        look_at_scene(et.Scene(), [(eye, screen)], Looking())
+        look_at_scene(et.Scene(), [(eye, screen)], PathTracing())
     with pytest.raises(ArgumentError, match="give an observer"):
         et.luminance_map(scene, screen=screen)
 

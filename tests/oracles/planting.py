@@ -16,8 +16,9 @@ from typing import Any
 import etendue as et
 import pytest
 from etendue import _core
+from etendue.denoising import smoothing
 from etendue.goniophotometry import far_field
-from etendue.lightfield import fitting, smoothing
+from etendue.lightfield import fitting
 from etendue.lightfield.gridded import fitting as gridded
 from etendue.luminance import caustics
 

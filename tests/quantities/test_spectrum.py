@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -20,6 +21,15 @@ CIE_018 = {
     550: 0.99495, 555: 1.0, 560: 0.995, 600: 0.631, 650: 0.107, 700: 4.102e-3, 780: 1.499e-5, 830: 4.518e-7,
 }  # fmt: skip
 """V(λ) as printed in table 1 of CIE 018:2019 (and 015:2018), copied by hand."""
+
+
+def test_every_row_of_the_table_is_that_of_another_library() -> None:
+    with np.printoptions(), warnings.catch_warnings(action="ignore"):
+        import colour
+
+    table = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]
+    assert table.wavelengths.tolist() == list(range(360, 831))
+    assert photopic_efficiency(table.wavelengths).tolist() == table.values.tolist()
 
 
 @st.composite

@@ -282,8 +282,18 @@ def test_thinning_keeps_the_mean_and_tells_its_error() -> None:
     assert len(set(shares)) > 1
     arrived = np.array(found)
     assert abs(arrived.mean() - 2.0) < LARGEST_Z * arrived.std(ddof=1) / math.sqrt(400)
-    # L = ρ E/π with E = 2 Φ/A.
-    truth = 2.0 / (4 * math.pi * 25) * 0.5 / math.pi * 1e6
+    # L = ρ E/π. What the wall scatters arrives evenly on it, Φ/A; straight from the lamp comes Φ cos θ/4πr². Mean
+    # over the lines of sight through the middles of small squares of the pixel.
+    side = (np.arange(200) + 0.5) / 200 * 9 - 4.5
+    lines = np.stack([*np.meshgrid(side, side), np.full((200, 200), -3.0)], axis=-1)
+    lines /= np.linalg.norm(lines, axis=-1, keepdims=True)
+    start = np.array([0.0, 0.0, 3.0])
+    along = lines @ start
+    seen = start + lines * (np.sqrt(along**2 + 25 - 9) - along)[..., None]
+    away = seen - np.array([1.0, 2.0, 0.0])
+    distance = np.linalg.norm(away, axis=-1)
+    direct = np.sum(away * seen, axis=-1) / (5 * distance) / (4 * math.pi * distance**2)
+    truth = (direct.mean() + 1 / (4 * math.pi * 25)) * 0.5 / math.pi * 1e6
     values = np.array([m.values[0, 0] for m in maps])
     stated = np.array([m.standard_error[0, 0] for m in maps])
     assert abs(values.mean() - truth) < LARGEST_Z * values.std(ddof=1) / 20

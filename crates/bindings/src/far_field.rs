@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use etendue_math::Vec3;
-use etendue_trace::far_field::Nodes;
+use etendue_trace::detector::FarFieldNodes;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -11,12 +11,12 @@ use pyo3::prelude::*;
 /// Nodes of a far field: rows of γ, and the nodes C of each row \[rad\].
 #[pyclass(frozen, module = "etendue._core")]
 pub struct FarField {
-    nodes: Arc<Nodes>,
+    nodes: Arc<FarFieldNodes>,
 }
 
 impl FarField {
     /// The core's nodes.
-    pub fn nodes(&self) -> Arc<Nodes> {
+    pub fn nodes(&self) -> Arc<FarFieldNodes> {
         Arc::clone(&self.nodes)
     }
 }
@@ -25,7 +25,8 @@ impl FarField {
 impl FarField {
     #[new]
     fn new(gamma: Vec<f64>, c: Vec<Vec<f64>>) -> PyResult<Self> {
-        let nodes = Nodes::new(gamma, c).ok_or_else(|| PyValueError::new_err("these are no nodes of a far field"))?;
+        let nodes =
+            FarFieldNodes::new(gamma, c).ok_or_else(|| PyValueError::new_err("these are no nodes of a far field"))?;
         Ok(Self { nodes: Arc::new(nodes) })
     }
 

@@ -2,7 +2,7 @@
 
 use etendue_sampling::ordered::inside;
 use etendue_trace::glints;
-use etendue_trace::reverse::Lit;
+use etendue_trace::lit_scene::LitScene;
 use pyo3::prelude::*;
 
 use crate::run::stoppable;
@@ -30,7 +30,7 @@ impl Glints {
     fn new(py: Python<'_>, scene: &Scene, view: View, most_events: u32, threads: Option<usize>) -> PyResult<Self> {
         let view = view.core();
         let core = stoppable(py, |stop| {
-            let lit = Lit::new(scene.core(), scene.lanterns()).until(stop);
+            let lit = LitScene::new(scene.core(), scene.light_samplers()).until(stop);
             inside(threads.unwrap_or(0), || glints::Glints::find(&lit, &view, most_events))
         })?;
         Ok(Self { core })

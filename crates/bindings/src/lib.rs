@@ -6,6 +6,7 @@
 mod cone;
 mod counts;
 mod dealing;
+mod detector;
 mod far_field;
 mod field;
 mod glints;
@@ -15,6 +16,7 @@ mod ray_index;
 mod run;
 mod scan;
 mod scene;
+mod scene_values;
 mod source;
 mod stored;
 mod subset;

@@ -1,8 +1,8 @@
 //! The light of diffuse surfaces, known beforehand.
 
 use etendue_sampling::ordered::inside;
-use etendue_trace::exitance;
-use etendue_trace::reverse::Lit;
+use etendue_trace::exitance::ExitanceSurvey;
+use etendue_trace::lit_scene::LitScene;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -12,12 +12,12 @@ use crate::scene::Scene;
 /// The diffuse surfaces of a scene as patches, and which of them can be used to end lines of sight.
 #[pyclass(frozen, module = "etendue._core")]
 pub struct Survey {
-    core: exitance::Survey,
+    core: ExitanceSurvey,
 }
 
 impl Survey {
     /// What it is to the tracer.
-    pub fn core(&self) -> &exitance::Survey {
+    pub fn core(&self) -> &ExitanceSurvey {
         &self.core
     }
 }
@@ -32,8 +32,8 @@ impl Survey {
             return Err(PyValueError::new_err("ray sets have to be fitted before a survey"));
         }
         let core = stoppable(py, |stop| {
-            let lit = Lit::new(scene.core(), scene.lanterns()).until(stop);
-            inside(threads.unwrap_or(0), || exitance::Survey::new(&lit, seed, most_events))
+            let lit = LitScene::new(scene.core(), scene.light_samplers()).until(stop);
+            inside(threads.unwrap_or(0), || ExitanceSurvey::new(&lit, seed, most_events))
         })?;
         Ok(Self { core })
     }

@@ -3,20 +3,24 @@
 use std::ops::Range;
 
 use etendue_geometry::RaySource;
-use etendue_geometry::lines::Leaving;
+use etendue_geometry::origin_faces::OriginFaces;
 use etendue_math::Vec3;
 use etendue_sampling::ordered::{BATCH, inside};
+use etendue_trace::batches::trace_on;
+use etendue_trace::camera_connection;
 use etendue_trace::dealing::Dealing as CoreDealing;
 use etendue_trace::detector::Detector;
-use etendue_trace::eye;
-use etendue_trace::forward::{Run, trace_on, trails};
+use etendue_trace::events::{DEEPEST, EventReservoir, WORDS};
+use etendue_trace::forward::batch::trails;
+use etendue_trace::forward::run::Run;
 use etendue_trace::guide::Arrival;
-use etendue_trace::harvest::{Cell, Harvest, Mark, Open, Record, Tally};
-use etendue_trace::kept::{DEEPEST, Kept, WORDS};
-use etendue_trace::ledger::{Entry, Ledger};
-use etendue_trace::meeting::Loss;
-use etendue_trace::reverse::{Left, Lit, Method, Pixel};
-use etendue_trace::sharing::Sharing;
+use etendue_trace::ledger::{Entry, Ledger, Loss};
+use etendue_trace::lit_scene::LitScene;
+use etendue_trace::mis::MisBalance;
+use etendue_trace::records::{Cell, CollectedRay, Contribution};
+use etendue_trace::reverse::method::{LeftOut, Method, Pixel};
+use etendue_trace::reverse::render::render;
+use etendue_trace::tallies::{Open, Tally, TraceSums};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -103,7 +107,7 @@ type OpenRows<'py> = (
 );
 
 fn begun(tallies: &[OpenRows<'_>]) -> PyResult<Open> {
-    let each = |(cells, units, sums): &OpenRows<'_>| -> PyResult<Vec<Mark>> {
+    let each = |(cells, units, sums): &OpenRows<'_>| -> PyResult<Vec<Contribution>> {
         let (cells, units, sums) = (cells.as_slice()?, units.as_slice()?, sums.as_slice()?);
         let marks = cells.iter().zip(units).zip(sums).map(|((c, u), s)| (*c, *u, *s));
         Ok(marks.collect())
@@ -112,7 +116,7 @@ fn begun(tallies: &[OpenRows<'_>]) -> PyResult<Open> {
 }
 
 /// Rows of position, direction, flux, wavelength.
-fn record_array<'py>(py: Python<'py>, records: &[Record]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+fn record_array<'py>(py: Python<'py>, records: &[CollectedRay]) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let rows = records.iter().flat_map(|r| {
         let [x, y, z] = r.position;
         let [kx, ky, kz] = r.direction;
@@ -169,52 +173,52 @@ pub fn trace_batches<'py>(
     let sets: Vec<Source<'_>> = opened.iter().map(Opened::core).collect::<PyResult<_>>()?;
     let sets: Vec<&dyn RaySource> = sets.iter().map(|s| s as &dyn RaySource).collect();
     // Made ready only where they are asked for: that takes a while for light fields.
-    let lanterns = if scene.core().detectors.iter().any(Detector::shares) {
-        scene.lanterns()
+    let light_samplers = if Detector::wants_of(scene.detectors()).brightness {
+        scene.light_samplers()
     } else {
         &[]
     };
     let core = scene.core();
     let batches: Range<u64> = first..last;
     let begun = begun(open_units.as_deref().unwrap_or_default())?;
-    let harvest: Harvest = stoppable(py, |stop| {
+    let sums: TraceSums = stoppable(py, |stop| {
         let run = Run {
             rays,
             seed,
             most_events,
             sets: &sets,
-            lanterns,
+            light_samplers,
             stop: Some(stop),
         };
-        let work = || trace_on(core, &run, batches.clone(), begun.clone());
+        let work = || trace_on(core, scene.detectors(), &run, batches.clone(), begun.clone());
         inside(threads.unwrap_or(0), work)
     })?;
     opened.iter().try_for_each(Opened::check)?;
     let strata = CoreDealing::of(core, rays, &sets).strata();
     let dict = PyDict::new(py);
-    dict.set_item("ledger", ledger_dict(py, &harvest.ledger)?)?;
+    dict.set_item("ledger", ledger_dict(py, &sums.ledger)?)?;
     let cells = PyList::empty(py);
-    for detector in &harvest.tallies {
+    for detector in &sums.tallies {
         cells.append(tally_arrays(py, detector, strata)?)?;
     }
     dict.set_item("cells", cells)?;
-    dict.set_item("births", tally_arrays(py, &harvest.births, strata)?)?;
-    let tallies = harvest.tallies.iter().chain([&harvest.births]);
+    dict.set_item("births", tally_arrays(py, &sums.births, strata)?)?;
+    let tallies = sums.tallies.iter().chain([&sums.births]);
     let open: Vec<OpenArrays<'_>> = tallies.map(|tally| open_arrays(py, tally)).collect();
     dict.set_item("open_units", open)?;
     let records = PyList::empty(py);
-    for detector in &harvest.records {
+    for detector in &sums.records {
         records.append(record_array(py, detector)?)?;
     }
     dict.set_item("records", records)?;
     let events = PyList::empty(py);
-    for detector in &harvest.events {
+    for detector in &sums.events {
         events.append(event_rows(py, detector)?)?;
     }
     dict.set_item("events", events)?;
-    dict.set_item("arrivals", arrival_rows(py, &harvest.arrivals)?)?;
-    dict.set_item("rays", harvest.rays)?;
-    dict.set_item("imbalance", harvest.imbalance)?;
+    dict.set_item("arrivals", arrival_rows(py, &sums.arrivals)?)?;
+    dict.set_item("rays", sums.rays)?;
+    dict.set_item("imbalance", sums.imbalance)?;
     Ok(dict)
 }
 
@@ -242,9 +246,9 @@ pub fn look_at_scene<'py>(
 ) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
     let view = view.core();
     let left = match left {
-        "nothing" => Left::Nothing,
-        "caustics" => shared.map_or(Left::Caustics, |rays| Left::Shared(Sharing { rays })),
-        "scattered" => Left::Scattered,
+        "nothing" => LeftOut::Nothing,
+        "caustics" => shared.map_or(LeftOut::Caustics, |rays| LeftOut::Shared(MisBalance { rays })),
+        "scattered" => LeftOut::Scattered,
         other => return Err(PyValueError::new_err(format!("nothing is called {other}"))),
     };
     let method = Method {
@@ -256,9 +260,11 @@ pub fn look_at_scene<'py>(
         glints: glints.map(Glints::core),
     };
     let pixels = stoppable(py, |stop| {
-        let lit = Lit::new(scene.core(), scene.lanterns()).until(stop);
+        let lit = LitScene::new(scene.core(), scene.light_samplers()).until(stop);
         let survey = survey.map(Survey::core);
-        inside(threads.unwrap_or(0), || lit.look(&view, &method, survey, first..last))
+        inside(threads.unwrap_or(0), || {
+            render(&lit, &view, &method, survey, first..last)
+        })
     })?;
     let shape = [view.rows as usize, view.columns as usize];
     let array = |pick: fn(&Pixel) -> f64| PyArray1::from_iter(py, pixels.iter().map(pick)).reshape(shape);
@@ -294,7 +300,7 @@ pub fn trace_trails<'py>(
             most_events,
             sets: &sets,
             stop: Some(stop),
-            lanterns: &[],
+            light_samplers: &[],
         };
         trails(core, &run, far)
     })?;
@@ -333,8 +339,8 @@ pub fn scene_crossings<'py>(
             let range = [0.0, f64::INFINITY];
             scene
                 .core()
-                .assembly
-                .crossings(o, d, range, &Leaving::default(), |face, crossing| {
+                .face_set
+                .crossings(o, d, range, &OriginFaces::default(), |face, crossing| {
                     lines.push(line);
                     faces.push(face);
                     distances.push(crossing.t);
@@ -351,12 +357,12 @@ pub fn scene_crossings<'py>(
 /// Rows of scatter events, and how often they were thinned.
 type Events<'py> = (Bound<'py, PyArray2<u64>>, u32);
 
-fn event_rows<'py>(py: Python<'py>, kept: &Kept) -> PyResult<Events<'py>> {
-    let mut words = Vec::with_capacity(kept.count() * WORDS);
-    kept.rows().for_each(|row| words.extend_from_slice(row));
+fn event_rows<'py>(py: Python<'py>, reservoir: &EventReservoir) -> PyResult<Events<'py>> {
+    let mut words = Vec::with_capacity(reservoir.count() * WORDS);
+    reservoir.rows().for_each(|row| words.extend_from_slice(row));
     Ok((
-        PyArray1::from_vec(py, words).reshape([kept.count(), WORDS])?,
-        kept.level(),
+        PyArray1::from_vec(py, words).reshape([reservoir.count(), WORDS])?,
+        reservoir.level(),
     ))
 }
 
@@ -384,7 +390,7 @@ pub fn look_at_events<'py>(
     let (core, view, rows) = (scene.core(), view.core(), events.as_slice()?);
     let cells = stoppable(py, |stop| {
         inside(threads.unwrap_or(0), || {
-            eye::look_at_events(core, rows, &view, Some(stop))
+            camera_connection::look_at_events(core, rows, &view, Some(stop))
         })
     })?;
     let cells = cells.ok_or_else(|| PyValueError::new_err("the events are of another scene"))?;

@@ -22,7 +22,7 @@ impl View {
     /// The core's view.
     pub fn core(&self) -> CoreView {
         CoreView {
-            eye: self.eye.into(),
+            observer: self.eye.into(),
             target: self.target.into(),
             right: self.right.into(),
             up: self.up.into(),

@@ -8,7 +8,7 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use etendue_geometry::mesh::{Found, LEAVING, Mesh, NO_TRIANGLE, Rays};
+use etendue_geometry::mesh::{Found, MOST_ORIGIN_TRIANGLES, Mesh, NO_TRIANGLE, Rays};
 use etendue_math::Vec3;
 
 const REPEATS: usize = 7;
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rays = floats("rays.f64")?;
     let count = rays.len() / 6;
     let row = |i: usize| &rays[i * count..(i + 1) * count];
-    let leaving = vec![[NO_TRIANGLE; LEAVING]; count];
+    let leaving = vec![[NO_TRIANGLE; MOST_ORIGIN_TRIANGLES]; count];
     let (mut t, mut triangle) = (vec![0.0; count], vec![NO_TRIANGLE; count]);
     let (mut u, mut v) = (vec![0.0; count], vec![0.0; count]);
     let mut best = f64::INFINITY;

@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 
 use etendue_math::special::ln;
 
-use crate::batch::RayBatch;
 use crate::pass::{Sums, over_all_rays};
+use crate::ray_batch::RayBatch;
 use crate::source::RaySource;
 
 /// Bins per unit of the logarithm: they are 0.2 % wide, 0.9 nm at 450 nm. Whatever a file holds, there are not more bins than

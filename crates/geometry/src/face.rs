@@ -29,7 +29,7 @@ pub struct Face {
 
 /// A point of a face: what a ray that arrives there needs to know.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Foot {
+pub struct SurfacePoint {
     /// The point, on the surface to within a rounding error \[mm\].
     pub point: Vec3,
     /// Unit normal of the surface, on the side that the face calls its front.
@@ -80,11 +80,11 @@ impl Face {
 
     /// Calls `visit` for each crossing of the line o + t d with `from` ≤ t ≤ `to`, in no order.
     ///
-    /// `leaving`: the parts of the shape (triangles of a mesh) on which the line starts; none if it starts elsewhere.
+    /// `origin_parts`: the parts of the shape (triangles of a mesh) on which the line starts; none if it starts elsewhere.
     #[inline]
-    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], leaving: &[u32], mut visit: impl FnMut(Crossing)) {
+    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], origin_parts: &[u32], mut visit: impl FnMut(Crossing)) {
         let (p, k) = (self.frame.point_to_local(o), self.frame.direction_to_local(d));
-        self.shape.crossings(p, k, range, leaving, |crossing| {
+        self.shape.crossings(p, k, range, origin_parts, |crossing| {
             if self.trims.is_empty() || self.keeps(p + k * crossing.t, ROUNDING * (size(p) + crossing.t.abs())) {
                 visit(crossing);
             }
@@ -144,17 +144,17 @@ impl Face {
     /// The first crossing of the line o + t d at 0 < t < `reach`.
     #[inline]
     #[must_use]
-    pub fn first(&self, o: Vec3, d: Vec3, reach: f64, leaving: &[u32]) -> Option<Crossing> {
+    pub fn first(&self, o: Vec3, d: Vec3, reach: f64, origin_parts: &[u32]) -> Option<Crossing> {
         if let (Shape::Mesh(mesh), true) = (&self.shape, self.trims.is_empty()) {
             let (p, k) = (self.frame.point_to_local(o), self.frame.direction_to_local(d));
-            return mesh.nearest(p, k, reach, leaving).map(|hit| Crossing {
+            return mesh.nearest(p, k, reach, origin_parts).map(|hit| Crossing {
                 t: hit.t,
                 part: hit.triangle,
                 uv: [hit.u, hit.v],
             });
         }
         let mut found: Option<Crossing> = None;
-        self.crossings(o, d, [0.0, reach], leaving, |crossing| {
+        self.crossings(o, d, [0.0, reach], origin_parts, |crossing| {
             if crossing.t > 0.0 && crossing.t < found.map_or(reach, |f| f.t) {
                 found = Some(crossing);
             }
@@ -165,11 +165,11 @@ impl Face {
     /// The point where the line o + t d crosses the face, settled on it, and the normal there.
     #[inline]
     #[must_use]
-    pub fn foot(&self, o: Vec3, d: Vec3, crossing: &Crossing) -> Foot {
+    pub fn surface_point(&self, o: Vec3, d: Vec3, crossing: &Crossing) -> SurfacePoint {
         if let Shape::Flat(_) = self.shape {
             // Down to the plane along its normal, without a detour through the coordinates of the shape.
             let (p, n) = (o + d * crossing.t, self.frame.z);
-            return Foot {
+            return SurfacePoint {
                 point: p - n * (p - self.frame.origin).dot(n),
                 normal: if self.flipped { -n } else { n },
             };
@@ -177,7 +177,7 @@ impl Face {
         let p = self.frame.point_to_local(o) + self.frame.direction_to_local(d) * crossing.t;
         let (p, n) = self.shape.settle(p, crossing.part);
         let n = self.frame.direction_to_world(n);
-        Foot {
+        SurfacePoint {
             point: self.frame.point_to_world(p),
             normal: if self.flipped { -n } else { n },
         }

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use etendue_sampling::ordered;
 
-use crate::batch::RayBatch;
+use crate::ray_batch::RayBatch;
 use crate::source::RaySource;
 
 /// What is summed over rays, part by part.

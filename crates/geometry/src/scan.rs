@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use crate::batch::RayBatch;
 use crate::pass::{Sums, over_all_rays};
+use crate::ray_batch::RayBatch;
 use crate::source::RaySource;
 use crate::tally::Tally;
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::batch::{BLOCK, RayBatch};
+use crate::ray_batch::{BLOCK, RayBatch};
 
 /// A finite sequence of rays, addressed by index, that any thread may read anywhere.
 pub trait RaySource: Sync {

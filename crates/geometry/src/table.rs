@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::batch::RayBatch;
+use crate::ray_batch::RayBatch;
 use crate::source::RaySource;
 use crate::stored::StoredBytes;
 
@@ -168,7 +168,7 @@ impl<'a> RayTable<'a> {
         }
     }
 
-    /// Puts rays of several ranges, together at most [`BLOCK`](crate::batch::BLOCK), one after another into `batch`,
+    /// Puts rays of several ranges, together at most [`BLOCK`](crate::ray_batch::BLOCK), one after another into `batch`,
     /// settled.
     pub fn gather(&self, ranges: impl Iterator<Item = Range<u64>>, batch: &mut RayBatch) {
         batch.len = 0;

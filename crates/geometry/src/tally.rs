@@ -1,6 +1,6 @@
 //! The flux account of a pass over rays.
 
-use crate::batch::{Defect, RayBatch};
+use crate::ray_batch::{Defect, RayBatch};
 
 /// What a pass has seen: counted in every pass, because the scale of relative fluxes and the complaints rest on it.
 #[derive(Clone, Debug, Default)]

@@ -125,7 +125,7 @@ pub fn cone_sums(
     let work = |range: Range<u64>| {
         let mut part = Tally::default();
         let mut hits: Vec<Vec<Hit>> = prepared.iter().map(|_| Vec::new()).collect();
-        let mut cosine = vec![0.0; etendue_geometry::batch::BLOCK];
+        let mut cosine = vec![0.0; etendue_geometry::ray_batch::BLOCK];
         source.for_each_block(range, |_, batch| {
             part.add_block(batch);
             for (cone, found) in prepared.iter().zip(&mut hits) {
@@ -194,7 +194,7 @@ mod tests {
 
     fn cone() -> Cone {
         let view = View {
-            eye: Vec3::new(20.0, -10.0, 80.0),
+            observer: Vec3::new(20.0, -10.0, 80.0),
             target: Vec3::new(0.5, 0.0, 0.0),
             right: Vec3::new(1.0, 0.0, 0.0),
             up: Vec3::new(0.0, 1.0, 0.0),

@@ -6,7 +6,7 @@
 
 use std::ops::{ControlFlow, Range};
 
-use etendue_geometry::batch::BLOCK;
+use etendue_geometry::ray_batch::BLOCK;
 use etendue_geometry::{RayBatch, RaySource, Tally};
 use etendue_sampling::ordered;
 use etendue_sampling::philox::Stream;

@@ -5,7 +5,7 @@
 //! in these coordinates are equal étendues: dU = dA dp dq = π A ds₁ ds₂ da db. Theory eq. 37.
 
 use etendue_geometry::RayBatch;
-use etendue_geometry::batch::BLOCK;
+use etendue_geometry::ray_batch::BLOCK;
 use etendue_math::{Frame, Vec3};
 use etendue_sampling::warp::{disk_to_square, square_to_disk};
 use multiversion::multiversion;

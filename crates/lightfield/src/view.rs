@@ -6,7 +6,7 @@ use etendue_math::Vec3;
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     /// Where the observer stands.
-    pub eye: Vec3,
+    pub observer: Vec3,
     /// Centre of the grid.
     pub target: Vec3,
     /// Unit vector along the rows, to the right.
@@ -59,7 +59,7 @@ impl View {
     pub fn through(&self, place: [f64; 2]) -> Vec3 {
         let u = (place[0] / f64::from(self.columns) - 0.5) * self.width;
         let v = (0.5 - place[1] / f64::from(self.rows)) * self.height;
-        (self.target + self.right * u + self.up * v - self.eye).normalized()
+        (self.target + self.right * u + self.up * v - self.observer).normalized()
     }
 
     /// The unit vector from the centre of a pixel to the observer.
@@ -69,7 +69,7 @@ impl View {
         let (row, column) = (pixel / self.columns, pixel % self.columns);
         let u = ((f64::from(column) + 0.5) / f64::from(self.columns) - 0.5) * self.width;
         let v = (0.5 - (f64::from(row) + 0.5) / f64::from(self.rows)) * self.height;
-        (self.eye - self.target - self.right * u - self.up * v).normalized()
+        (self.observer - self.target - self.right * u - self.up * v).normalized()
     }
 
     /// Unit vector from the target to the observer, and the largest angle \[rad\] between it and the line from any point
@@ -78,10 +78,10 @@ impl View {
     /// Points of a plane that are seen within an angle of a given line form a convex set, so a corner is the extreme.
     #[must_use]
     pub fn field(&self) -> (Vec3, f64) {
-        let axis = (self.eye - self.target).normalized();
+        let axis = (self.observer - self.target).normalized();
         let half = |sx: f64, sy: f64| {
             let corner = self.right * (sx * self.width / 2.0) + self.up * (sy * self.height / 2.0);
-            (self.eye - self.target - corner)
+            (self.observer - self.target - corner)
                 .normalized()
                 .dot(axis)
                 .clamp(-1.0, 1.0)
@@ -98,7 +98,7 @@ mod tests {
 
     fn view() -> View {
         View {
-            eye: Vec3::new(30.0, -20.0, 100.0),
+            observer: Vec3::new(30.0, -20.0, 100.0),
             target: Vec3::new(1.0, 2.0, 3.0),
             right: Vec3::new(1.0, 0.0, 0.0),
             up: Vec3::new(0.0, 1.0, 0.0),
@@ -115,7 +115,7 @@ mod tests {
         let v = view();
         for pixel in 0..42 {
             let k = v.to_eye(pixel);
-            let centre = v.eye - k * ((v.eye - v.target).dot(v.normal) / k.dot(v.normal));
+            let centre = v.observer - k * ((v.observer - v.target).dot(v.normal) / k.dot(v.normal));
             for t in [-50.0, 0.0, 20.0, 300.0] {
                 assert_eq!(v.pixel(centre + k * t, k), Some(pixel));
             }

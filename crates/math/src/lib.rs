@@ -1,7 +1,11 @@
 //! Numbers and vectors: f64, no I/O, no state.
 //!
 //! `vector`: points and directions. `frame`: where something stands and how it is turned. `interval`: bounds of a function.
-//! `trig` and `special`: sine, cosine, arc tangent, exponential, logarithm and ln Γ that give the same bits on every platform.
+//! `polynomial`: by Horner's rule. `trig` and `special`: sine, cosine, arc tangent, exponential, logarithm and ln Γ that give the
+//! same bits on every platform.
+
+#[macro_use]
+mod polynomial;
 
 pub mod frame;
 pub mod interval;

@@ -42,7 +42,7 @@ pub struct Medium {
 
 /// A medium at one wavelength.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Filling {
+pub struct OpticalConstants {
     /// Refractive index.
     pub n: f64,
     /// Napierian absorption coefficient \[1/mm\].
@@ -52,8 +52,8 @@ pub struct Filling {
 impl Medium {
     /// The medium at a wavelength \[nm\].
     #[must_use]
-    pub fn at(&self, wavelength: f64) -> Filling {
-        Filling {
+    pub fn at(&self, wavelength: f64) -> OpticalConstants {
+        OpticalConstants {
             n: self.index.at(wavelength),
             absorption: self.absorption.at(wavelength),
         }

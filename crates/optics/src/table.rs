@@ -124,22 +124,45 @@ impl Table {
         }
     }
 
+    /// Its value, if it is the same everywhere.
+    #[must_use]
+    pub fn constant_value(&self) -> Option<f64> {
+        let first = self.values[0];
+        self.values.iter().all(|value| *value == first).then_some(first)
+    }
+
+    /// Whether it is not the same at all angles.
+    #[must_use]
+    pub fn depends_on_angle(&self) -> bool {
+        let columns = self.wavelength.len();
+        self.values.windows(columns + 1).any(|pair| pair[0] != pair[columns])
+    }
+
+    /// All angles \[rad\] and wavelengths \[nm\] at which one of some tables has nodes.
+    #[must_use]
+    pub fn breakpoints(tables: &[Self]) -> [Vec<f64>; 2] {
+        let collect = |pick: fn(&Self) -> &[f64]| tables.iter().flat_map(|t| pick(t).to_vec()).collect();
+        [collect(|t| &t.angle), collect(|t| &t.wavelength)]
+    }
+
+    /// Whether tables are shares of one whole: none is negative anywhere, and together they are 1 at most.
+    #[must_use]
+    pub fn are_shares(tables: &[Self]) -> bool {
+        // Sums of bilinear functions are extreme at the nodes of any of them.
+        let [angles, wavelengths] = Self::breakpoints(tables);
+        let sum = |angle: f64, wavelength| tables.iter().map(|t| t.at(angle.cos(), wavelength)).sum::<f64>();
+        tables.iter().all(|t| t.values.iter().all(|value| *value >= 0.0))
+            && angles.iter().all(|angle| {
+                wavelengths
+                    .iter()
+                    .all(|wavelength| sum(*angle, *wavelength) <= 1.0 + 1e-9)
+            })
+    }
+
     /// Whether it is 0 everywhere.
     #[must_use]
     pub fn is_zero(&self) -> bool {
         self.values.iter().all(|v| *v == 0.0)
-    }
-
-    /// Its nodes: angles \[rad\] and wavelengths \[nm\].
-    #[must_use]
-    pub fn nodes(&self) -> (&[f64], &[f64]) {
-        (&self.angle, &self.wavelength)
-    }
-
-    /// Its smallest value.
-    #[must_use]
-    pub fn least(&self) -> f64 {
-        self.values.iter().copied().fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -160,6 +183,20 @@ mod tests {
         assert!((at(0.5, 600.0) - (0.5 * 4.0 + 0.5 * 4.0)).abs() < 1e-12);
         assert_eq!(at(1.4, 900.0), 0.0);
         assert_eq!(at(0.0, 300.0), 1.0);
+    }
+
+    #[test]
+    fn shares_of_one_whole_are_known_at_all_nodes() {
+        let part = |a, b| Table::new(vec![0.0, 1.5], vec![500.0], vec![a, b]).expect("sound");
+        let kink = Table::new(vec![0.0, 0.7, 1.5], vec![500.0], vec![0.1, 0.6, 0.1]).expect("sound");
+        assert!(Table::are_shares(&[part(0.5, 0.5), part(0.4, 0.5)]));
+        assert!(!Table::are_shares(&[part(0.5, 0.5), part(0.4, 0.6)]));
+        assert!(!Table::are_shares(&[part(0.5, 0.5), kink.clone()]));
+        assert!(!Table::are_shares(&[part(-0.1, 0.5), part(0.4, 0.4)]));
+        assert!(kink.depends_on_angle() && kink.constant_value().is_none());
+        let colours = Table::new(vec![0.0, 1.0], vec![400.0, 500.0], vec![0.1, 0.2, 0.1, 0.2]).expect("sound");
+        assert!(!colours.depends_on_angle() && colours.constant_value().is_none());
+        assert_eq!(part(0.3, 0.3).constant_value(), Some(0.3));
     }
 
     #[test]

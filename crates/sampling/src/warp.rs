@@ -2,6 +2,16 @@
 
 use etendue_math::trig::{atan_eighths, sin_cos_turns};
 
+/// The greatest number below 1.
+const LAST: f64 = 1.0 - f64::EPSILON / 2.0;
+
+/// What is left of a number that decided for a share by being less than it: a number from 0 to 1 again, less than 1.
+#[inline(always)]
+#[must_use]
+pub fn part_of(number: f64, share: f64) -> f64 {
+    (number / share).min(LAST)
+}
+
 /// A point uniform in area on the annulus `inner ≤ r ≤ outer`, from `(u, v)` in the unit square: density 1/(π(R²−r²)).
 #[inline(always)]
 #[must_use]

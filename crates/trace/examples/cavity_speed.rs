@@ -5,18 +5,20 @@
 
 #![allow(clippy::print_stdout, reason = "a program that reports what it measured")]
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use etendue_geometry::Face;
 use etendue_geometry::shape::{Flat, Outline, Quadric, Shape};
 use etendue_math::{Frame, Vec3};
-use etendue_optics::finish::Finish;
+use etendue_optics::bsdf::{Bsdf, Lambertian};
 use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_sampling::ordered::{BATCH, inside};
-use etendue_trace::forward::{Run, trace};
-use etendue_trace::scene::{Part, Scene};
+use etendue_trace::batches::trace;
+use etendue_trace::forward::run::Run;
+use etendue_trace::scene::{Scene, SceneFace};
 
 const RADIUS: f64 = 21.5;
 const HEIGHT: f64 = 21.4;
@@ -39,8 +41,8 @@ fn disk(radius: f64) -> Shape {
     })
 }
 
-fn part(shape: Shape, frame: Frame, finish: usize) -> Part {
-    Part {
+fn part(shape: Shape, frame: Frame, finish: usize) -> SceneFace {
+    SceneFace {
         face: Face {
             shape,
             frame,
@@ -53,8 +55,10 @@ fn part(shape: Shape, frame: Frame, finish: usize) -> Part {
 }
 
 fn scene() -> Result<Scene, String> {
-    let shares = |reflectance: f64| [0.0, 0.0, reflectance, 0.0].map(Table::constant);
-    let finishes = [0.984, 0.0].map(|r| Finish::scatter(shares(r)).expect("at most 1"));
+    let finishes = [0.984, 0.0].map(|reflectance| {
+        Arc::new(Lambertian::new(Table::constant(reflectance), Table::constant(0.0)).expect("at most 1"))
+            as Arc<dyn Bsdf>
+    });
     let wall = Shape::Quadric(Quadric {
         r2: 1.0,
         z2: 0.0,
@@ -93,18 +97,18 @@ fn main() -> Result<(), String> {
         most_events: 100_000,
         sets: &[],
         stop: None,
-        lanterns: &[],
+        light_samplers: &[],
     };
     for threads in [1, 2] {
         let begin = Instant::now();
-        let harvest = inside(threads, || trace(&scene, &run, 0..rays.div_ceil(BATCH)));
+        let sums = inside(threads, || trace(&scene, &[], &run, 0..rays.div_ceil(BATCH)));
         let seconds = begin.elapsed().as_secs_f64();
-        let [emitted, _] = harvest.ledger.balance();
+        let [emitted, _] = sums.ledger.balance();
         println!(
             "{threads} threads: {:.1} M segments/s, {:.2} segments per ray, exit fraction {:.4}",
-            harvest.ledger.segments as f64 / seconds * 1e-6,
-            harvest.ledger.segments as f64 / rays as f64,
-            harvest.ledger.escaped.flux() / emitted.flux(),
+            sums.ledger.segments as f64 / seconds * 1e-6,
+            sums.ledger.segments as f64 / rays as f64,
+            sums.ledger.escaped.flux() / emitted.flux(),
         );
     }
     Ok(())

@@ -1,8 +1,8 @@
 //! The light that diffuse surfaces send out, patch by patch, from rays traced forwards.
 //!
-//! A path from the eye that goes from one diffuse surface to another may end there if the luminance of the second one is
+//! A path from the observer that goes from one diffuse surface to another may end there if the luminance of the second one is
 //! known: *final gathering*, `[Jensen1996]`. What is known is a mean over a small patch of the surface, by the rays that
-//! arrive on it. The first surface that the eye sees is never looked up, so that patches are not seen: they enter integrals
+//! arrive on it. The first surface that the observer sees is never looked up, so that patches are not seen: they enter integrals
 //! over all that the surface faces. A patch is of no use where light is blocked from a part of it, since the mean is that of
 //! the whole; a survey finds those, and paths that meet them go on. So do paths that are too near to a patch to take it for
 //! smooth.
@@ -14,14 +14,15 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use etendue_geometry::Face;
-use etendue_geometry::shape::chart::{BINS, Chart};
+use etendue_geometry::shape::chart::BINS;
 use etendue_geometry::shape::sample::AreaSampler;
-use etendue_math::Vec3;
 use etendue_sampling::ordered::BATCH;
 
-use crate::detector::Detector;
-use crate::forward::{Run, trace};
-use crate::reverse::Lit;
+use crate::batches::trace;
+use crate::detector::{Detector, Exitance};
+use crate::exitance_cells::{ExitanceCells, FacePoint};
+use crate::forward::run::Run;
+use crate::lit_scene::LitScene;
 use crate::scene::{Act, Role, Scene};
 
 /// Batches of rays from which the sizes of patches are chosen.
@@ -45,75 +46,10 @@ const SURVEY: u64 = 0x5355_5256;
 /// More rays than any map takes: the run whose batches are dealt to the passes.
 const RUN: u64 = 1 << 44;
 
-/// The diffuse surfaces of a scene, cut into patches with a front and a back.
-#[derive(Clone, Debug)]
-pub struct Patches {
-    /// For each face that is cut: its chart, and the first of its bins.
-    faces: Vec<Option<(Chart, u32)>>,
-    bins: u32,
-    wavelengths: Vec<f64>,
-}
-
-impl Patches {
-    /// Cuts each face into patches of the given area, if it has one.
-    #[allow(clippy::cast_possible_truncation, reason = "limited by the number of rays")]
-    fn cut(scene: &Scene, wavelengths: Vec<f64>, areas: &[Option<f64>]) -> Self {
-        let mut bins = 0;
-        let cut = |(face, area): (&Face, &Option<f64>)| {
-            let chart = Chart::new(&face.shape, (*area)?)?;
-            let first = bins;
-            bins += chart.areas().len() as u32 * BINS;
-            Some((chart, first))
-        };
-        Self {
-            faces: scene.assembly.faces().iter().zip(areas).map(cut).collect(),
-            bins,
-            wavelengths,
-        }
-    }
-
-    /// Number of cells: of each side of each bin, two for each wavelength.
-    #[must_use]
-    pub fn cells(&self) -> usize {
-        4 * self.bins as usize * self.wavelengths.len()
-    }
-
-    /// The side of the bin that a point of a face lies in.
-    fn side(&self, scene: &Scene, place: Place) -> Option<u32> {
-        let (chart, first) = self.faces.get(place.face as usize)?.as_ref()?;
-        let face = &scene.assembly.faces()[place.face as usize];
-        let bin = first + chart.bin(face.frame.point_to_local(place.point), place.part);
-        Some(2 * bin + u32::from(place.front))
-    }
-
-    /// The cell of light of a wavelength that leaves a point of a face; light that the reverse tracer may leave to the light
-    /// image has cells of its own.
-    #[must_use]
-    #[allow(clippy::cast_possible_truncation, reason = "a cell has a number below 2^32")]
-    pub fn cell(&self, scene: &Scene, place: Place, wavelength: f64, unseen: bool) -> Option<u32> {
-        let line = self.wavelengths.iter().position(|w| *w == wavelength)?;
-        let cell = self.side(scene, place)? * self.wavelengths.len() as u32 + line as u32;
-        Some(2 * cell + u32::from(unseen))
-    }
-}
-
-/// A point of a face, and the side of it that light leaves.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    /// The face.
-    pub face: u32,
-    /// Its part.
-    pub part: u32,
-    /// Whether it is the face's front.
-    pub front: bool,
-    /// \[mm\].
-    pub point: Vec3,
-}
-
 /// Patches, and which of them can be used.
 #[derive(Clone, Debug)]
-pub struct Survey {
-    patches: Arc<Patches>,
+pub struct ExitanceSurvey {
+    patches: Arc<ExitanceCells>,
     /// For each side of each patch: the area \[mm²\], and the distance from which it can be used \[mm\]; ∞ if it cannot.
     sides: Vec<[f64; 2]>,
     seed: u64,
@@ -122,56 +58,50 @@ pub struct Survey {
 
 /// The luminance of the patches, by the rays of one pass.
 #[derive(Clone, Debug)]
-pub struct Exitance<'a> {
-    survey: &'a Survey,
+pub struct ExitanceCache<'a> {
+    survey: &'a ExitanceSurvey,
     /// Of each side of each patch, for each wavelength: without the light that may be left to the light image, and of all.
     luminance: Vec<[f64; 2]>,
 }
 
-/// The scene with patches to collect light on.
-fn with(scene: &Scene, patches: &Arc<Patches>) -> Scene {
-    let mut scene = scene.clone();
-    scene.detectors.push(Detector::Exitance(Arc::clone(patches)));
-    scene
-}
-
-impl Survey {
+impl ExitanceSurvey {
     /// Cuts the diffuse surfaces of a scene by the light that falls on them, and finds the patches that light reaches
     /// everywhere.
     ///
-    /// A face is cut if it has a finite area and nothing is cut off it. Runs on the threads of the current pool; the same
+    /// A face is cut if it has a finite area, nothing is cut off it, and its light has the same luminance in all directions. Runs on the threads of the current pool; the same
     /// for any number.
     #[must_use]
-    pub fn new(lit: &Lit<'_>, seed: u64, most_events: u32) -> Self {
+    pub fn new(lit: &LitScene<'_>, seed: u64, most_events: u32) -> Self {
         let (scene, seed) = (lit.scene, seed ^ SURVEY);
         let wavelengths: Vec<f64> = lit.lines.iter().map(|line| line.1).collect();
         let own = |(face, role): (&Face, &Role)| {
             let Act::Optical(finish) = role.act else { return None };
-            let cut = scene.finishes[finish as usize].is_diffuse() && face.trims.is_empty();
+            let facts = scene.finishes[finish as usize].facts();
+            let cut = facts.is_diffuse() && facts.lambertian && face.trims.is_empty();
             cut.then(|| AreaSampler::new(&face.shape).map(|sampler| sampler.area()))?
         };
-        let areas: Vec<Option<f64>> = scene.assembly.faces().iter().zip(&scene.roles).map(own).collect();
-        let count = |patches: &Arc<Patches>, batches: Range<u64>| -> Vec<u64> {
+        let areas: Vec<Option<f64>> = scene.face_set.faces().iter().zip(&scene.roles).map(own).collect();
+        let count = |patches: &Arc<ExitanceCells>, batches: Range<u64>| -> Vec<u64> {
             // Where nothing is cut there is nothing to look for.
             if patches.bins == 0 {
                 return Vec::new();
             }
-            let scene = with(scene, patches);
+            let detectors = [Detector::Exitance(Exitance(Arc::clone(patches)))];
             let run = Run {
                 rays: RUN,
                 seed,
                 most_events,
                 sets: &[],
                 stop: lit.stop,
-                lanterns: &[],
+                light_samplers: &[],
             };
-            let harvest = trace(&scene, &run, batches);
-            let cells = &harvest.tallies[scene.detectors.len() - 1].cells;
+            let sums = trace(scene, &detectors, &run, batches);
+            let cells = &sums.tallies[0].cells;
             let sides = cells.chunks(2 * wavelengths.len());
             sides.map(|lines| lines.iter().map(|cell| cell.rays).sum()).collect()
         };
         // Scouts: how much light falls on each face.
-        let whole = Arc::new(Patches::cut(scene, wavelengths.clone(), &areas));
+        let whole = Arc::new(ExitanceCells::cut(scene.face_set.faces(), wavelengths.clone(), &areas));
         let found = count(&whole, 0..SCOUTS);
         let pieces: Vec<Option<f64>> = whole
             .faces
@@ -188,7 +118,7 @@ impl Survey {
                 (hits > 0.0).then_some((*area)? / (hits / (FILL * f64::from(BINS))).max(1.0))
             })
             .collect();
-        let patches = Arc::new(Patches::cut(scene, wavelengths.clone(), &pieces));
+        let patches = Arc::new(ExitanceCells::cut(scene.face_set.faces(), wavelengths.clone(), &pieces));
         let found = count(&patches, SCOUTS..SCOUTS + SURVEYORS);
         let mut sides = Vec::new();
         for (chart, first) in patches.faces.iter().flatten() {
@@ -212,8 +142,8 @@ impl Survey {
     }
 
     /// The side of the patch that a point of a face lies in.
-    fn side(&self, scene: &Scene, place: Place) -> Option<usize> {
-        let side = self.patches.side(scene, place)? as usize;
+    fn side(&self, scene: &Scene, place: FacePoint) -> Option<usize> {
+        let side = self.patches.side(scene.face_set.faces(), place)? as usize;
         Some(side / (2 * BINS as usize) * 2 + side % 2)
     }
 
@@ -232,19 +162,19 @@ impl Survey {
 
     /// What the patches send out, by the rays of a pass.
     #[must_use]
-    pub fn exitance(&self, lit: &Lit<'_>, pass: u32) -> Exitance<'_> {
-        let scene = with(lit.scene, &self.patches);
+    pub fn exitance(&self, lit: &LitScene<'_>, pass: u32) -> ExitanceCache<'_> {
+        let detectors = [Detector::Exitance(Exitance(Arc::clone(&self.patches)))];
         let run = Run {
             rays: RUN,
             seed: self.seed,
             most_events: self.most_events,
             sets: &[],
             stop: lit.stop,
-            lanterns: &[],
+            light_samplers: &[],
         };
         let first = SCOUTS + SURVEYORS + u64::from(pass) * EACH;
-        let harvest = trace(&scene, &run, first..first + EACH);
-        let cells = &harvest.tallies[scene.detectors.len() - 1].cells;
+        let sums = trace(lit.scene, &detectors, &run, first..first + EACH);
+        let cells = &sums.tallies[0].cells;
         // The rays stand for the whole run.
         let scale = RUN as f64 / (EACH * BATCH) as f64;
         let lines = lit.lines.len();
@@ -263,19 +193,19 @@ impl Survey {
             found[0] += pair[0].sum * unit;
             found[1] += (pair[0].sum + pair[1].sum) * unit;
         }
-        Exitance {
+        ExitanceCache {
             survey: self,
             luminance,
         }
     }
 }
 
-impl Exitance<'_> {
+impl ExitanceCache<'_> {
     /// The luminance of a point of a face at one of the wavelengths, seen from a distance: of all light, or without that
     /// which is left to the light image; None if it is not known.
     #[inline]
     #[must_use]
-    pub fn at(&self, scene: &Scene, place: Place, distance: f64, line: usize, all: bool) -> Option<f64> {
+    pub fn at(&self, scene: &Scene, place: FacePoint, distance: f64, line: usize, all: bool) -> Option<f64> {
         let side = self.survey.side(scene, place)?;
         let lines = self.survey.patches.wavelengths.len();
         (distance > self.survey.sides[side][1]).then(|| self.luminance[side * lines + line][usize::from(all)])

@@ -1,7 +1,35 @@
 //! The flux ledger: every ray has one fate, and all fates together carry what was emitted.
 
-use crate::meeting::Loss;
 use crate::scene::Scene;
+
+/// Why a ray was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    /// It left a solid that it was not in, or entered one that it was in: the solid is open, or its normals do not agree.
+    Contradiction,
+    /// It is in more than four solids at once.
+    TooDeep,
+    /// It has no direction or no position any more, or came without.
+    NotFinite,
+    /// A medium has no refractive index at its wavelength.
+    NoIndex,
+}
+
+impl Loss {
+    /// Every reason, in order.
+    pub const ALL: [Self; 4] = [Self::Contradiction, Self::TooDeep, Self::NotFinite, Self::NoIndex];
+
+    /// Its name for people.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Contradiction => "contradiction",
+            Self::TooDeep => "more than four solids at once",
+            Self::NotFinite => "not finite",
+            Self::NoIndex => "no refractive index",
+        }
+    }
+}
 
 /// Flux and number of rays. The sum is kept with what rounding takes from it (Neumaier), so that accounts of any length
 /// close to rounding.

@@ -1,34 +1,42 @@
 //! Light through optics: from sources to detectors.
 //!
-//! `scene`: faces with their optical properties, solids with their media, sources, detectors. `start`: where a ray starts;
-//! `inside`: which solids it is in; `meeting`: which of the faces that it meets decides what becomes of it.
+//! `scene`: faces with their optical properties, solids with their media, sources. `ray_start`: where a ray starts;
+//! `solid_stack`: which solids it is in; `interaction`: which of the faces that it meets decides what becomes of it;
+//! `scatter`: what the surface
+//! does to it, forwards and backwards; `medium_cache`: refractive index and absorption on its way; `transmittance`: what gets from one point to another.
 //!
-//! `forward`: from the sources to the detectors; `dealing`: which source gives out which ray, and which rays are copies of
-//! one; `detector`: what takes note of light, `far_field`: of what leaves; `ledger`: the flux account;
-//! `harvest`: what batches amount to. `eye`: diffuse scatters connected to an observer; `kept`: those that are kept for later,
-//! thinned to a number of them.
+//! `forward`: from the sources to the detectors; `batches`: batches of a run, merged in their order; `dealing`: which source
+//! gives out which ray, and which rays are copies of one; `detector`: what records light, `records`: what it records; `ray_state`: what a ray carries;
+//! `ledger`: the flux account; `tallies`: what batches amount to. `events`: scatter events that are kept for later, thinned to a
+//! number of them; `camera_connection`: scatter events connected to an observer.
 //!
-//! `reverse`: from the eye to the sources; `wave`: a block of its paths; `exitance`: the light of diffuse surfaces, known
-//! beforehand, at which paths may end; `guide`: where they go on from diffuse
-//! surfaces; `glints`: where in a pixel they look for small images of sources; `sharing`: light that both directions find. `lists`: what rays of a block are sorted
-//! into.
+//! `reverse`: from the observer to the sources; `lit_scene`: a scene with what its sources need to be seen; `exitance_cells` and
+//! `exitance`: the light of diffuse surfaces, known beforehand, at which paths may end; `guide`: where they go on from diffuse
+//! surfaces; `glints`: where in a pixel they look for small images of sources; `mis`: light that both directions find.
+//! `buckets`: what rays of a block are sorted into.
 
+pub mod batches;
+mod buckets;
+pub mod camera_connection;
 pub mod dealing;
 pub mod detector;
+pub mod events;
 pub mod exitance;
-pub mod eye;
-pub mod far_field;
+pub mod exitance_cells;
 pub mod forward;
 pub mod glints;
 pub mod guide;
-pub mod harvest;
-pub mod inside;
-pub mod kept;
+pub mod interaction;
 pub mod ledger;
-mod lists;
-pub mod meeting;
+pub mod lit_scene;
+pub mod medium_cache;
+pub mod mis;
+mod ray_start;
+pub mod ray_state;
+pub mod records;
 pub mod reverse;
+pub mod scatter;
 pub mod scene;
-pub mod sharing;
-mod start;
-mod wave;
+pub mod solid_stack;
+pub mod tallies;
+pub mod transmittance;

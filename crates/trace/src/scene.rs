@@ -1,16 +1,19 @@
-//! What is traced: faces with their optical properties, solids with their media, sources, detectors.
+//! What is traced: faces with their optical properties, solids with their media, sources.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use etendue_geometry::Face;
-use etendue_geometry::assembly::Assembly;
+use etendue_geometry::FaceSet;
 use etendue_geometry::bounds::Bounds;
-use etendue_optics::finish::Finish;
+use etendue_geometry::shape::ROUNDING;
+use etendue_optics::bsdf::{Bsdf, Facts};
 use etendue_optics::medium::Medium;
 use etendue_optics::source::Source;
 
-use crate::detector::Detector;
-use crate::start::START;
+/// A ray starts on a face if it starts no farther from it than this, in units of |x| + |y| + |z|: what rounding does to points
+/// that come through several frames.
+pub const START: f64 = 64.0 * ROUNDING;
 
 /// What a face does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,26 +37,24 @@ pub struct Role {
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Every face: those of the scene, then those of its detectors.
-    pub assembly: Assembly,
+    pub face_set: FaceSet,
     /// One for each face.
     pub roles: Vec<Role>,
     /// Optical properties.
-    pub finishes: Vec<Finish>,
+    pub finishes: Vec<Arc<dyn Bsdf>>,
     /// Media; the first one fills the surroundings.
     pub media: Vec<Medium>,
     /// The medium of each solid.
     pub solids: Vec<u32>,
     /// What emits.
     pub sources: Vec<Source>,
-    /// What collects.
-    pub detectors: Vec<Detector>,
     /// For each source, the faces that its rays may start on, and those of the solids that they may start in.
     pub near: Vec<Vec<u32>>,
 }
 
 /// A face and what it does, as a scene is made of.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct SceneFace {
     /// The face.
     pub face: Face,
     /// The solid it bounds, numbered from 0; None for a sheet.
@@ -64,9 +65,9 @@ pub struct Part {
 
 /// The faces that rays of a source may start on or in, by the boxes around them.
 #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
-fn near(source: &Source, assembly: &Assembly, roles: &[Role]) -> Vec<u32> {
+fn near(source: &Source, face_set: &FaceSet, roles: &[Role]) -> Vec<u32> {
     let around = source.bounds();
-    // A ray starts on a sheet if it starts no farther from it than rounding may have moved it (see `start`).
+    // A ray starts on a sheet if it starts no farther from it than rounding may have moved it (see `ray_start`).
     let reach = 4.0
         * START
         * [around.lo, around.hi]
@@ -75,11 +76,11 @@ fn near(source: &Source, assembly: &Assembly, roles: &[Role]) -> Vec<u32> {
             .sum::<f64>();
     // A box around each solid.
     let mut solids: HashMap<u16, Bounds> = HashMap::new();
-    for (role, bounds) in roles.iter().zip(assembly.bounds()) {
+    for (role, bounds) in roles.iter().zip(face_set.bounds()) {
         let all = solids.entry(role.solid).or_insert(Bounds::EMPTY);
         *all = all.union(*bounds);
     }
-    let each = roles.iter().zip(assembly.faces()).zip(0..);
+    let each = roles.iter().zip(face_set.faces()).zip(0..);
     each.filter(|((role, face), _)| {
         if role.solid == 0 {
             !around.is_finite() || face.may_touch(around.widened(reach))
@@ -92,17 +93,17 @@ fn near(source: &Source, assembly: &Assembly, roles: &[Role]) -> Vec<u32> {
 }
 
 impl Scene {
-    /// A scene from its parts.
+    /// A scene from its parts. `detectors`: the face on which each detector stands, if it stands on one.
     ///
     /// # Errors
     /// Says what refers to something that does not exist, or what there is too much of.
     pub fn new(
-        parts: Vec<Part>,
-        finishes: Vec<Finish>,
+        parts: Vec<SceneFace>,
+        finishes: Vec<Arc<dyn Bsdf>>,
         media: Vec<Medium>,
         solids: Vec<u32>,
         sources: Vec<Source>,
-        detectors: Vec<Detector>,
+        detectors: Vec<Option<Face>>,
     ) -> Result<Self, String> {
         if media.is_empty() {
             return Err("a scene needs at least the medium of its surroundings".into());
@@ -129,8 +130,8 @@ impl Scene {
             });
             faces.push(part.face);
         }
-        for (number, detector) in detectors.iter().enumerate() {
-            if let Some(face) = detector.face() {
+        for (number, face) in detectors.into_iter().enumerate() {
+            if let Some(face) = face {
                 #[allow(clippy::cast_possible_truncation, reason = "checked above")]
                 roles.push(Role {
                     solid: 0,
@@ -139,16 +140,15 @@ impl Scene {
                 faces.push(face);
             }
         }
-        let assembly = Assembly::new(faces);
-        let near = sources.iter().map(|source| near(source, &assembly, &roles)).collect();
+        let face_set = FaceSet::new(faces);
+        let near = sources.iter().map(|source| near(source, &face_set, &roles)).collect();
         Ok(Self {
-            assembly,
+            face_set,
             roles,
             finishes,
             media,
             solids,
             sources,
-            detectors,
             near,
         })
     }
@@ -157,12 +157,13 @@ impl Scene {
     /// surfaces, or from a source that cannot be seen.
     #[must_use]
     pub fn may_focus(&self) -> bool {
-        let any = |test: fn(&Finish) -> bool| {
+        let any = |test: fn(&Facts) -> bool| {
+            let is = |finish: u32| test(self.finishes[finish as usize].facts());
             self.roles
                 .iter()
-                .any(|role| matches!(role.act, Act::Optical(finish) if test(&self.finishes[finish as usize])))
+                .any(|role| matches!(role.act, Act::Optical(finish) if is(finish)))
         };
-        any(Finish::is_diffuse) && (any(Finish::is_smooth) || !self.sources.iter().all(Source::is_visible))
+        any(Facts::is_diffuse) && (any(Facts::is_specular) || !self.sources.iter().all(Source::is_visible))
     }
 
     /// The medium that fills the space of a solid, 0 being the surroundings.

@@ -1,16 +1,18 @@
 //! Étendue is conserved: the Jacobian determinant of (x, y, p, q) through lenses is 1, p and q being direction cosines in air.
 
+use std::sync::Arc;
+
 use etendue_geometry::Face;
-use etendue_geometry::lines::Leaving;
+use etendue_geometry::origin_faces::OriginFaces;
 use etendue_geometry::shape::{Asphere, Quadric, Shape};
 use etendue_math::{Frame, Vec3};
-use etendue_optics::finish::Finish;
+use etendue_optics::bsdf::Interface;
 use etendue_optics::fresnel::fresnel;
 use etendue_optics::medium::{Index, Medium};
 use etendue_optics::table::Curve;
-use etendue_trace::inside::Inside;
-use etendue_trace::meeting::meet_one;
-use etendue_trace::scene::{Part, Scene};
+use etendue_trace::interaction::first_interaction;
+use etendue_trace::scene::{Scene, SceneFace};
+use etendue_trace::solid_stack::SolidStack;
 
 /// A tilted biconvex lens of glass with an asphere and a conic, and behind it a ball: nothing is on a common axis.
 fn lenses() -> Scene {
@@ -20,7 +22,7 @@ fn lenses() -> Scene {
         y: Vec3::new(0.0, 1.0, 0.0),
         z: Vec3::new(tilt.sin(), 0.0, tilt.cos()),
     };
-    let part = |shape, frame, solid, flipped| Part {
+    let part = |shape, frame, solid, flipped| SceneFace {
         face: Face {
             shape,
             frame,
@@ -65,7 +67,7 @@ fn lenses() -> Scene {
             part(Shape::Quadric(edge), lens, 0, false),
             part(Shape::Quadric(ball), tilted(Vec3::new(0.5, 0.3, 12.0), 0.0), 1, false),
         ],
-        vec![Finish::Interface],
+        vec![Arc::new(Interface)],
         vec![medium(1.0), medium(1.52), medium(1.8)],
         vec![1, 2],
         vec![],
@@ -77,21 +79,21 @@ fn lenses() -> Scene {
 /// From the plane z = −5 to the plane z = 30, always through the interfaces; None if a ray is totally reflected or misses.
 fn through(scene: &Scene, [x, y, p, q]: [f64; 4]) -> Option<([f64; 4], u32)> {
     let (mut o, mut d) = (Vec3::new(x, y, -5.0), Vec3::new(p, q, (1.0 - p * p - q * q).sqrt()));
-    let (mut leaving, mut inside, mut met) = (Leaving::default(), Inside::default(), 0);
-    while let Some(meeting) = meet_one(scene, o, d, &leaving, f64::INFINITY, inside).ok()? {
-        let index = |inside: Inside| scene.media[scene.medium(inside.top())].at(555.0).n;
-        let (n1, n2) = (index(meeting.before), index(meeting.after));
-        let cosine = -d.dot(meeting.normal);
+    let (mut origin_faces, mut stack, mut met) = (OriginFaces::default(), SolidStack::default(), 0);
+    while let Some(interaction) = first_interaction(scene, o, d, &origin_faces, f64::INFINITY, stack).ok()? {
+        let index = |stack: SolidStack| scene.media[scene.medium(stack.top())].at(555.0).n;
+        let (n1, n2) = (index(interaction.before), index(interaction.after));
+        let cosine = -d.dot(interaction.normal);
         let f = fresnel(cosine, n1, n2);
         if f.cosine == 0.0 {
             return None;
         }
-        d = meeting.refracted(d, cosine, n1 / n2, f.cosine);
-        (o, leaving, inside) = (meeting.point, meeting.leaving, meeting.after);
+        d = interaction.refracted(d, cosine, n1 / n2, f.cosine);
+        (o, origin_faces, stack) = (interaction.point, interaction.origin_faces, interaction.after);
         met += 1;
     }
     let t = (30.0 - o.z) / d.z;
-    (inside == Inside::default() && d.z > 0.0).then_some(([o.x + t * d.x, o.y + t * d.y, d.x, d.y], met))
+    (stack == SolidStack::default() && d.z > 0.0).then_some(([o.x + t * d.x, o.y + t * d.y, d.x, d.y], met))
 }
 
 /// Determinant by elimination with pivots.

@@ -7,19 +7,19 @@ use etendue_geometry::Face;
 use etendue_geometry::shape::{Flat, Outline, Quadric, Shape};
 use etendue_lightfield::View;
 use etendue_math::{Frame, Vec3};
-use etendue_optics::finish::Finish;
+use etendue_optics::bsdf::{Bsdf, Interface, Mixture};
 use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_sampling::ordered::inside;
-use etendue_trace::detector::{Detector, Portion};
-use etendue_trace::eye::look_at_events;
-use etendue_trace::far_field::Nodes;
-use etendue_trace::forward::{Run, trace};
-use etendue_trace::harvest::Harvest;
-use etendue_trace::kept::{Row, depth, depth_of, ray_of};
-use etendue_trace::meeting::Loss;
-use etendue_trace::scene::{Part, Scene};
+use etendue_trace::batches::trace;
+use etendue_trace::camera_connection::look_at_events;
+use etendue_trace::detector::{Detector, Events, FarFieldNodes, Illuminance, Image, Intensity, Portion};
+use etendue_trace::events::{Row, depth, depth_of, ray_of};
+use etendue_trace::forward::run::Run;
+use etendue_trace::ledger::Loss;
+use etendue_trace::scene::{Scene, SceneFace};
+use etendue_trace::tallies::TraceSums;
 
 const ALL_R: [f64; 2] = [0.0, f64::INFINITY];
 const ALL_Z: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
@@ -63,8 +63,8 @@ fn sphere(radius: f64, z: [f64; 2]) -> Shape {
     })
 }
 
-fn part(shape: Shape, frame: Frame, solid: Option<usize>, finish: usize) -> Part {
-    Part {
+fn part(shape: Shape, frame: Frame, solid: Option<usize>, finish: usize) -> SceneFace {
+    SceneFace {
         face: Face {
             shape,
             frame,
@@ -83,8 +83,9 @@ fn medium(n: f64, absorption: f64) -> Medium {
     }
 }
 
-fn scatter(shares: [f64; 4]) -> Finish {
-    Finish::scatter(shares.map(Table::constant)).expect("at most 1")
+fn scatter([mirrored, refracted, back, through]: [f64; 4]) -> Arc<dyn Bsdf> {
+    let tables = |shares: [f64; 2]| shares.map(Table::constant);
+    Mixture::of_shares(tables([mirrored, refracted]), tables([back, through])).expect("at most 1")
 }
 
 fn lamp(shape: Shape, frame: Frame, flux: f64) -> Source {
@@ -96,20 +97,38 @@ fn lamp(shape: Shape, frame: Frame, flux: f64) -> Source {
     }
 }
 
-fn run(scene: &Scene, rays: u64, threads: usize) -> Harvest {
+/// A scene, and what records light in it.
+type Setup = (Scene, Vec<Detector>);
+
+fn with_detectors(
+    parts: Vec<SceneFace>,
+    finishes: Vec<Arc<dyn Bsdf>>,
+    media: Vec<Medium>,
+    solids: Vec<u32>,
+    sources: Vec<Source>,
+    detectors: Vec<Detector>,
+) -> Result<Setup, String> {
+    let standing = detectors.iter().map(|detector| detector.face()).collect();
+    Ok((
+        Scene::new(parts, finishes, media, solids, sources, standing)?,
+        detectors,
+    ))
+}
+
+fn run((scene, detectors): &Setup, rays: u64, threads: usize) -> TraceSums {
     let run = Run {
         rays,
         seed: 7,
         most_events: 10_000,
         sets: &[],
         stop: None,
-        lanterns: &[],
+        light_samplers: &[],
     };
-    inside(threads, || trace(scene, &run, 0..rays.div_ceil(1 << 16)))
+    inside(threads, || trace(scene, detectors, &run, 0..rays.div_ceil(1 << 16)))
 }
 
 const VIEW: View = View {
-    eye: Vec3::new(3.0, -40.0, 60.0),
+    observer: Vec3::new(3.0, -40.0, 60.0),
     target: Vec3::new(0.0, 0.0, 0.0),
     right: Vec3::new(1.0, 0.0, 0.0),
     up: Vec3::new(0.0, 1.0, 0.0),
@@ -126,32 +145,32 @@ fn far_field(planes: u32, steps: u32) -> Detector {
     let row: Vec<f64> = (0..planes)
         .map(|i| 2.0 * PI * f64::from(i) / f64::from(planes))
         .collect();
-    Detector::Intensity(Arc::new(
-        Nodes::new(gamma, vec![row; steps as usize + 1]).expect("sound"),
-    ))
+    Detector::Intensity(Intensity(Arc::new(
+        FarFieldNodes::new(gamma, vec![row; steps as usize + 1]).expect("sound"),
+    )))
 }
 
 /// A ball lens, an open mirror, a wall that scatters and transmits, two lamps; nothing symmetric.
-fn mixed(watched: bool) -> Scene {
+fn mixed(watched: bool) -> Setup {
     let mut detectors = vec![far_field(8, 9)];
     if watched {
-        detectors.push(Detector::Image {
+        detectors.push(Detector::Image(Image {
             view: VIEW,
             portion: Portion::Whole,
-        });
+        }));
     }
     mixed_with(detectors)
 }
 
-fn mixed_with(detectors: Vec<Detector>) -> Scene {
-    Scene::new(
+fn mixed_with(detectors: Vec<Detector>) -> Setup {
+    with_detectors(
         vec![
             part(sphere(2.0, ALL_Z), turned(Vec3::new(1.0, 0.5, 4.0)), Some(0), 0),
             part(sphere(9.0, [-9.0, -2.0]), turned(Vec3::new(0.0, 1.0, 3.0)), None, 1),
             part(disk(6.0), turned(Vec3::new(-3.0, 0.0, 12.0)), None, 2),
         ],
         vec![
-            Finish::Interface,
+            Arc::new(Interface),
             scatter([0.6, 0.0, 0.3, 0.0]),
             scatter([0.1, 0.2, 0.3, 0.25]),
         ],
@@ -168,18 +187,18 @@ fn mixed_with(detectors: Vec<Detector>) -> Scene {
 
 #[test]
 fn every_ray_has_one_fate_and_the_ledger_closes() {
-    let harvest = run(&mixed(false), 300_000, 2);
-    let [emitted, fates] = harvest.ledger.balance();
+    let sums = run(&mixed(false), 300_000, 2);
+    let [emitted, fates] = sums.ledger.balance();
     assert_eq!((emitted.rays, fates.rays), (300_000, 300_000));
     assert!((emitted.flux() - 4.7).abs() < 1e-12 && (fates.flux() - 4.7).abs() < 1e-12);
-    assert!(harvest.imbalance < 1e-12);
-    assert!(harvest.ledger.lost.iter().all(|entry| entry.rays == 0));
-    let in_glass = harvest.ledger.in_medium[1].flux();
-    assert!(in_glass > 0.05 && harvest.ledger.on_face[2].flux() > 0.05);
+    assert!(sums.imbalance < 1e-12);
+    assert!(sums.ledger.lost.iter().all(|entry| entry.rays == 0));
+    let in_glass = sums.ledger.in_medium[1].flux();
+    assert!(in_glass > 0.05 && sums.ledger.on_face[2].flux() > 0.05);
     // What escapes is what the far field holds: shared by its nodes, and once more in the cell of all rays.
-    let (all, nodes) = harvest.tallies[0].cells.split_last().expect("cells");
+    let (all, nodes) = sums.tallies[0].cells.split_last().expect("cells");
     let far: f64 = nodes.iter().map(|cell| cell.sum).sum();
-    let escaped = harvest.ledger.escaped;
+    let escaped = sums.ledger.escaped;
     // Plain sums of 10^5 terms: their rounding.
     assert!((far / escaped.flux() - 1.0).abs() < 1e-11 && (all.sum / escaped.flux() - 1.0).abs() < 1e-11);
     assert_eq!(all.rays, escaped.rays);
@@ -188,13 +207,13 @@ fn every_ray_has_one_fate_and_the_ledger_closes() {
 #[test]
 fn one_two_and_seven_threads_give_the_same_bits() {
     let bits = |threads| {
-        let harvest = run(&mixed(true), 200_000, threads);
-        let cells = harvest
+        let sums = run(&mixed(true), 200_000, threads);
+        let cells = sums
             .tallies
             .iter()
             .flat_map(|tally| &tally.cells)
             .flat_map(|c| [c.sum.to_bits(), c.squares.to_bits(), c.rays]);
-        (harvest.ledger, cells.collect::<Vec<u64>>())
+        (sums.ledger, cells.collect::<Vec<u64>>())
     };
     let one = bits(1);
     assert_eq!(one, bits(2));
@@ -202,38 +221,38 @@ fn one_two_and_seven_threads_give_the_same_bits() {
 }
 
 /// Events of all faces, a number at most, beside a light image.
-fn kept(most: usize) -> Scene {
+fn kept(most: usize) -> Setup {
     mixed_with(vec![
-        Detector::Image {
+        Detector::Image(Image {
             view: VIEW,
             portion: Portion::Whole,
-        },
-        Detector::Events { most, faces: None },
+        }),
+        Detector::Events(Events { most, faces: None }),
     ])
 }
 
-fn rows_of(harvest: &Harvest) -> Vec<Row> {
-    harvest.events[1].rows().copied().collect()
+fn rows_of(sums: &TraceSums) -> Vec<Row> {
+    sums.events[1].rows().copied().collect()
 }
 
 #[test]
 fn events_looked_at_later_are_the_light_image() {
     let scene = kept(1 << 24);
-    let harvest = run(&scene, 200_000, 2);
-    let rows = rows_of(&harvest);
-    assert!(rows.len() > 30_000 && harvest.events[1].level() == 0);
+    let sums = run(&scene, 200_000, 2);
+    let rows = rows_of(&sums);
+    assert!(rows.len() > 30_000 && sums.events[1].level() == 0);
     assert!(rows.windows(2).all(|two| ray_of(&two[0]) <= ray_of(&two[1])));
     let flat: Vec<u64> = rows.iter().flatten().copied().collect();
-    let later = look_at_events(&scene, &flat, &VIEW, None).expect("of this scene");
+    let later = look_at_events(&scene.0, &flat, &VIEW, None).expect("of this scene");
     let lit = later.iter().filter(|cell| cell.rays > 0).count();
     assert!(lit > 20, "{lit}");
-    for (a, b) in later.iter().zip(&harvest.tallies[0].cells) {
+    for (a, b) in later.iter().zip(&sums.tallies[0].cells) {
         assert_eq!(a.rays, b.rays);
         assert!((a.sum - b.sum).abs() <= 1e-12 * b.sum && (a.squares - b.squares).abs() <= 1e-12 * b.squares);
     }
     for threads in [1, 7] {
         assert_eq!(
-            inside(threads, || look_at_events(&scene, &flat, &VIEW, None)),
+            inside(threads, || look_at_events(&scene.0, &flat, &VIEW, None)),
             Some(later.clone())
         );
     }
@@ -241,7 +260,7 @@ fn events_looked_at_later_are_the_light_image() {
     for (word, value) in [(9, 77), (11, 1), (13, 2 << 48), (6, f64::NAN.to_bits())] {
         let mut other = flat.clone();
         other[word] = value;
-        assert_eq!(look_at_events(&scene, &other, &VIEW, None), None);
+        assert_eq!(look_at_events(&scene.0, &other, &VIEW, None), None);
     }
 }
 
@@ -288,7 +307,7 @@ fn a_sphere_absorbs_what_its_walls_do_not_reflect_and_a_port_lets_out_the_rest()
     // V6: of the light that first meets the wall, the port of area fraction f lets out ρ f/(1 − ρ (1 − f)).
     let (rho, rim) = (0.9, -1.8);
     let fraction = (2.0 + rim) / 4.0;
-    let scene = Scene::new(
+    let scene = with_detectors(
         vec![part(sphere(2.0, [rim, 2.0]), turned(Vec3::new(5.0, 1.0, 2.0)), None, 0)],
         vec![scatter([0.0, 0.0, rho, 0.0])],
         vec![medium(1.0, 0.0)],
@@ -307,9 +326,9 @@ fn a_sphere_absorbs_what_its_walls_do_not_reflect_and_a_port_lets_out_the_rest()
 
 #[test]
 fn an_open_solid_loses_rays_and_says_where() {
-    let scene = Scene::new(
+    let scene = with_detectors(
         vec![part(sphere(2.0, [-2.0, 1.0]), straight(0.0), Some(0), 0)],
-        vec![Finish::Interface],
+        vec![Arc::new(Interface)],
         vec![medium(1.0, 0.0), medium(1.5, 0.0)],
         vec![1],
         vec![lamp(disk(0.5), straight(-9.0), 1.0)],
@@ -319,9 +338,9 @@ fn an_open_solid_loses_rays_and_says_where() {
     let ledger = run(&scene, 20_000, 1).ledger;
     let lost = ledger.lost[Loss::Contradiction as usize];
     assert!(ledger.lost_at[Loss::Contradiction as usize].is_none() || lost.rays > 0);
-    let from_above = Scene::new(
+    let from_above = with_detectors(
         vec![part(sphere(2.0, [-2.0, 1.0]), straight(0.0), Some(0), 0)],
-        vec![Finish::Interface],
+        vec![Arc::new(Interface)],
         vec![medium(1.0, 0.0), medium(1.5, 0.0)],
         vec![1],
         vec![Source {
@@ -356,9 +375,9 @@ fn a_lens_cemented_on_a_dome_of_the_same_glass_is_one_body() {
             parts.push(part(sphere(1.0, ALL_Z), straight(0.0), Some(1), 0));
             solids.push(1);
         }
-        Scene::new(
+        with_detectors(
             parts,
-            vec![Finish::Interface],
+            vec![Arc::new(Interface)],
             vec![medium(1.0, 0.0), glass.clone()],
             solids,
             vec![lamp(disk(0.3), turned(Vec3::new(0.1, 0.2, 0.3)), 1.0)],
@@ -389,25 +408,25 @@ fn illuminance_falls_with_the_square_of_the_distance_and_the_cosines() {
         x: -plate.x,
         ..plate
     };
-    let scene = Scene::new(
+    let scene = with_detectors(
         vec![],
         vec![],
         vec![medium(1.0, 0.0)],
         vec![],
         vec![lamp(disk(0.01), straight(0.0), 2.0)],
-        vec![Detector::Illuminance {
+        vec![Detector::Illuminance(Illuminance {
             frame: facing,
             width: 8.0,
             height: 6.0,
             columns: 4,
             rows: 3,
-        }],
+        })],
     )
     .expect("sound");
-    let harvest = run(&scene, 3_000_000, 2);
+    let sums = run(&scene, 3_000_000, 2);
     let (cw, ch) = (2.0, 2.0);
     let mut chi2 = 0.0;
-    for (index, cell) in (0_u32..).zip(&harvest.tallies[0].cells) {
+    for (index, cell) in (0_u32..).zip(&sums.tallies[0].cells) {
         let (row, column) = (f64::from(index / 4), f64::from(index % 4));
         // The midpoint rule on 10 × 10 points of the cell.
         let mut expected = 0.0;
@@ -423,4 +442,27 @@ fn illuminance_falls_with_the_square_of_the_distance_and_the_cosines() {
     }
     // 12 degrees of freedom, 1e-4 point: 39.1.
     assert!(chi2 < 39.1, "{chi2}");
+}
+
+#[test]
+fn a_face_without_its_detector_is_passed_and_changes_nothing() {
+    let plate = |at: f64| {
+        Detector::Illuminance(Illuminance {
+            frame: straight(at),
+            width: 30.0,
+            height: 30.0,
+            columns: 2,
+            rows: 2,
+        })
+    };
+    let (scene, detectors) = mixed_with(vec![plate(-20.0), plate(20.0)]);
+    let found = run(&(scene.clone(), detectors), 100_000, 2);
+    assert!(
+        found
+            .tallies
+            .iter()
+            .any(|tally| tally.cells.iter().any(|cell| cell.rays > 0))
+    );
+    let without = run(&(scene, vec![]), 100_000, 2);
+    assert!(without.tallies.is_empty() && without.ledger == found.ledger);
 }

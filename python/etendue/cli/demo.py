@@ -13,7 +13,8 @@ import typer
 from rich.table import Table
 
 from etendue.cli.terminal import check_outputs, count, output, print_json, progress_bar, say
-from etendue.luminance.estimate import DEFAULT_ACCEPTANCE, luminance_map
+from etendue.luminance.estimate import luminance_map
+from etendue.luminance.methods import Cone
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.sources.ring_source import RingSource
@@ -68,9 +69,10 @@ def demo(
     check_outputs([picture], (".png",))
     source = RingSource(rays=rays, seed=seed)
     observer, screen = Observer(theta=0, phi=0, distance=150), Screen(70, 70, 64, 64)
+    method = Cone()
     start = time.perf_counter()
     with progress_bar("rays", len(source)) as progress:
-        lmap = luminance_map(source, observer, screen, method="cone", progress=progress)
+        lmap = luminance_map(source, observer, screen, method=method, progress=progress)
     seconds = time.perf_counter() - start
     results = zone_results(source, lmap)
     lmap.plot(picture, title="Three Lambertian rings, 300 / 200 / 100 lm", scale="log")
@@ -88,7 +90,7 @@ def demo(
         )
         return
     say(f"Three Lambertian rings (300, 200, 100 lm; radii 10, 20, 30 mm), {len(source):,} rays in {seconds:.1f} s,")
-    say(f"seen face on from {observer.distance:g} mm within {DEFAULT_ACCEPTANCE}°:")
+    say(f"seen face on from {observer.distance:g} mm within {method.acceptance}°:")
     table = Table(
         "ring", "truth Φ/(πA)", "estimate", "standard error", "deviation", "rays seen", box=None, pad_edge=False
     )

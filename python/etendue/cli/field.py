@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -28,24 +27,20 @@ def surface_option(text: str) -> Surface | Literal["auto"]:
     return "auto" if text.strip() == "auto" else parse_surface(text)
 
 
-def read_source(
-    path: Path, flux: str | None, unit: str | None, for_rays: Mapping[str, str | None] | None = None
-) -> RaySet | LightField:
+def read_source(path: Path, flux: str | None, unit: str | None) -> RaySet | LightField:
     """The light field, or the rays with flux and unit as the options state; which of them, the file's content tells.
 
     Raises
     ------
     typer.BadParameter
-        If the file is a light field, and one of the options `for_rays`, or flux, was given.
+        If the file is a light field, and a flux was given.
     UnitError
         If the unit is another one and the spectrum is not known.
     """
     if not is_field_file(path):
         return in_unit(with_flux(read_rays(path), flux), unit)
-    given = {"--flux": flux} | dict(for_rays or {})
-    needless = [option for option, value in given.items() if value is not None]
-    if needless:
-        raise typer.BadParameter(f"{', '.join(needless)}: for ray files; {path} is a light field")
+    if flux is not None:
+        raise typer.BadParameter(f"--flux: for ray files; {path} is a light field")
     return in_unit(LightField.load(path), unit)
 
 

@@ -14,7 +14,7 @@ from etendue.cli.terminal import check_outputs, complain, print_json, progress_b
 from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.formats.rays import read_rays
 from etendue.lightfield.diagnostics import Diagnostics, diagnose
-from etendue.lightfield.learning import REFITS
+from etendue.lightfield.forecast import REFITS
 from etendue.lightfield.light_field import LightField
 from etendue.plot.characteristic_picture import plot_characteristic
 from etendue.quantities.ray_set import RaySet

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Mapping
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -28,18 +28,31 @@ from etendue.cli.terminal import (
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.lightfield.light_field import LightField
-from etendue.luminance.estimate import METHODS, Acceptance, luminance_map
+from etendue.luminance.estimate import Acceptance, luminance_map
 from etendue.luminance.framing import centre_of_light, framed_screens, probe
+from etendue.luminance.methods import (
+    METHOD_NAMES,
+    AnyMethod,
+    PathTracing,
+    Spelling,
+    choose_method,
+    kind_of_source,
+    mismatch,
+)
 from etendue.luminance.opening import SCENE_EXTENSION
-from etendue.luminance.scene_map import DEFAULT_RAYS_PER_PIXEL
 from etendue.plot.map_picture import SCALES, plot_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import PLANES, Observer, Screen
 from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import Progress
 from etendue.scene import Scene
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.tracing.result import TraceResult
 from etendue.tracing.storage import is_result_file
+
+Source = RaySet | LightField | Scene | ScatterEvents
+
+SPELLING = Spelling(option=lambda name: f"--{name.replace('_', '-')}", method=lambda kind: f"--method {kind.NAME}")
 
 
 def luminance(
@@ -85,7 +98,7 @@ def luminance(
         str,
         typer.Option(
             "--method",
-            help="auto, cone or lightfield; auto: the light field, or the cone for an index or an acceptance.",
+            help="auto, cone, lightfield or pathtracing; auto: the one that has the options, or suits the file.",
         ),
     ] = "auto",
     acceptance: Annotated[
@@ -157,21 +170,23 @@ def luminance(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Luminance maps with a standard error per pixel, from rays, a light field, a scene or a trace, for many observers."""
-    one_of(method, METHODS, "--method")
+    one_of(method, METHOD_NAMES, "--method")
     one_of(plane, PLANES, "--plane")
     one_of(scale, SCALES, "--scale")
+    stated = {
+        "acceptance": None if acceptance is None else _acceptance(acceptance),
+        "surface": None if surface is None else surface_option(surface),
+        "samples": samples,
+        "rays_per_pixel": rays_per_pixel,
+        "until": until,
+        "seed": seed,
+        "forward_rays": forward_rays,
+        "gather": gather or None,
+    }
     scene = Scene.load(file) if file.suffix.lower() == SCENE_EXTENSION else None
     kept = _kept(file, detector)
     looked = kept if isinstance(kept, ScatterEvents) else scene
     own = looked.scene if isinstance(looked, ScatterEvents) else scene
-    for_rays = {"--method": "cone" if method == "cone" else None, "--acceptance": acceptance, "--surface": surface}
-    for_scenes = {
-        "--rays-per-pixel": rays_per_pixel,
-        "--until": until,
-        "--seed": seed,
-        "--forward-rays": forward_rays,
-        "--gather": gather or None,
-    }
     own_observers = own is not None and observer is None and size is None
     if own is not None and own_observers:
         who = [(keys.name, keys.observer()) for keys in own.observers]
@@ -180,62 +195,33 @@ def luminance(
     else:
         who = [("", Observer(theta, phi, distance)) for theta, phi in _angles(observer)]
     targets = _targets(output, who)
-    cone = None if acceptance is None else _acceptance(acceptance)
-    carrier = "auto" if surface is None else surface_option(surface)
-    source: RaySet | LightField | None = None
-    if looked is not None:
-        for_others = {
-            "--method": None if method == "auto" else method,
-            "--acceptance": acceptance,
-            "--surface": surface,
-            "--samples": samples,
-            "--flux": flux,
-            "--unit": unit,
-        }
-        what = "is a scene" if kept is None else "holds scatter events"
-        _refuse(for_others, f"for rays and light fields; {file} {what}")
+    if looked is None:
+        source: Source = (
+            in_unit(with_flux(kept, flux), unit) if isinstance(kept, RaySet) else read_source(file, flux, unit)
+        )
     else:
-        _refuse(for_scenes, f"for scenes; {file} is none")
-        if isinstance(kept, RaySet):
-            source = in_unit(with_flux(kept, flux), unit)
-        else:
-            source = read_source(file, flux, unit, for_rays)
+        what = "holds scatter events" if isinstance(looked, ScatterEvents) else "is a scene"
+        _refuse({"--flux": flux, "--unit": unit}, f"for rays and light fields; {file} {what}")
+        source = looked
+    how = _method(source, method, stated)
     observers = [one for _, one in who]
     if own is not None and own_observers:
         screens = [keys.screen.screen() for keys in own.observers]
     else:
-        observers, screens = _views(own or source, observers, target, size, pixels, plane)
-    if looked is not None:
-        with progress_bar(*_work(looked, screens, rays_per_pixel)) as progress:
-            maps = luminance_map(
-                looked,
-                observers,
-                screens,
-                rays_per_pixel=rays_per_pixel,
-                until=until,
-                seed=seed,
-                forward_rays=forward_rays,
-                gather=gather,
-                cache=cache,
-                threads=threads,
-                progress=progress,
-            )
-    elif source is not None:
-        with progress_bar("rays", len(source)) if isinstance(source, RaySet) else nullcontext() as progress:
-            maps = luminance_map(
-                source,
-                observers,
-                screens,
-                method="cone" if method == "cone" else "lightfield" if method == "lightfield" else "auto",
-                acceptance=cone,
-                surface=carrier,
-                samples=samples,
-                cache=cache,
-                threads=threads,
-                progress=progress,
-            )
+        framed = source if isinstance(source, RaySet | LightField) else own
+        observers, screens = _views(framed, observers, target, size, pixels, plane)
+    with _progress(source, screens, how) as progress:
+        maps = luminance_map(
+            source,
+            observers,
+            screens,
+            method="auto" if how is None else how,
+            cache=cache,
+            threads=threads,
+            progress=progress,
+        )
     losses = [note for lmap, paths in zip(maps, targets, strict=True) for note in write_map(lmap, paths, scale)]
-    complaints = [] if source is None else complaints_of(source)
+    complaints = complaints_of(source) if isinstance(source, RaySet) else []
     if json:
         summaries = [summary(lmap) | {"outputs": paths} for lmap, paths in zip(maps, targets, strict=True)]
         print_json({"file": file, "maps": summaries, "complaints": complaints, "notes": losses})
@@ -273,12 +259,30 @@ def _kept(file: Path, detector: str | None) -> ScatterEvents | RaySet | None:
     return found[detector] if detector is not None else next(iter(found.values()))
 
 
-def _work(looked: Scene | ScatterEvents, screens: list[Screen], rays_per_pixel: int | None) -> tuple[str, int]:
-    """What there is to do for maps, and how much of it."""
-    if isinstance(looked, ScatterEvents) and rays_per_pixel is None:
-        return "scatter events", len(looked) * len(screens)
-    each = DEFAULT_RAYS_PER_PIXEL if rays_per_pixel is None else rays_per_pixel
-    return "lines of sight", each * sum(screen.columns * screen.rows for screen in screens)
+def _method(source: Source, method: str, options: Mapping[str, object]) -> AnyMethod | None:
+    """The method with those of its options that are stated.
+
+    Raises
+    ------
+    typer.BadParameter
+        If options, method and file do not go together.
+    """
+    stated = {name: value for name, value in options.items() if value is not None}
+    kind = kind_of_source(source)
+    complaint = mismatch(method, stated, kind, SPELLING)
+    if complaint is not None:
+        raise typer.BadParameter(complaint)
+    return choose_method(method, stated, kind)
+
+
+def _progress(source: Source, screens: list[Screen], how: AnyMethod | None) -> AbstractContextManager[Progress | None]:
+    """A progress bar of what there is to do for maps."""
+    if isinstance(how, PathTracing):
+        pixels = sum(screen.columns * screen.rows for screen in screens)
+        return progress_bar("lines of sight", how.rays_per_pixel * pixels)
+    if isinstance(source, ScatterEvents):
+        return progress_bar("scatter events", len(source) * len(screens))
+    return progress_bar("rays", len(source)) if isinstance(source, RaySet) else nullcontext()
 
 
 def _targets(output: list[Path], who: list[tuple[str, Observer]]) -> list[list[Path]]:

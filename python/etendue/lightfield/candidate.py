@@ -1,4 +1,4 @@
-"""One way to explain the counts: a base measure and a tree for each part; and how well it foretells held-out rays."""
+"""One way to explain the counts: a base measure and a tree for each part; and how well it predicts held-out rays."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from etendue import _core
+from etendue.denoising.shifted_trees import LATTICE
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
 from etendue.lightfield.etendue_density import PartField, core_part
 from etendue.lightfield.nodes import node_values
-from etendue.lightfield.shifted_trees import LATTICE
 from etendue.lightfield.symmetry import order, sum_of_images
 from etendue.lightfield.trees import POSITIONS, Base, Tree, grow_averaged, log_evidence
 
@@ -139,7 +139,7 @@ def score_densities(counts: EtendueCounts, luminance: FloatArray) -> Score:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Score:
-    """How well held-out rays were foretold.
+    """How well held-out rays were predicted.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
-from etendue.lightfield.probe import LOOKED_AT, even_density, probe_rays
+from etendue.lightfield.pilot_sample import LOOKED_AT, even_density, pilot_sample
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 
@@ -212,7 +212,7 @@ def count_rays(
         unmet_rays=raw["unmet_rays"],
         unmet_flux=raw["unmet_flux"] * scale,
         tally=tally,
-        even=even_density(probe_rays(rays, LOOKED_AT)),
+        even=even_density(pilot_sample(rays, LOOKED_AT)),
     )
 
 

@@ -15,7 +15,7 @@ from etendue.lightfield.characteristic import CharacteristicCurve, characteristi
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.etendue_density import FitReport, PartField
 from etendue.lightfield.expected_loss import loss_of_gamma
-from etendue.lightfield.learning import Forecast, LearningCurve, learning_curve
+from etendue.lightfield.forecast import Forecast, LearningCurve, learning_curve
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.trees import Base
 from etendue.quantities.ray_stream import RayStream, checked_threads
@@ -40,7 +40,7 @@ class UncertainSpot:
     luminance, standard_error : float
         There [cd/m² or W/(m² sr)].
     share : float
-        Of the loss of score that the error bars foretell, in the box: an eighth of the part along each coordinate.
+        Of the loss of score that the error bars predict, in the box: an eighth of the part along each coordinate.
     """
 
     part: str
@@ -66,7 +66,7 @@ class Diagnostics:
     report : FitReport
         Of the fit.
     expected_error : float
-        Relative error of luminance at a ray as the error bars foretell it: √(2 · expected loss of score).
+        Relative error of luminance at a ray as the error bars predict it: √(2 · expected loss of score).
     curve : CharacteristicCurve
     spots : tuple of UncertainSpot
         The worst first.
@@ -160,7 +160,7 @@ def diagnose(
     threads : int, optional
         All cores if None.
     progress : callable, optional
-        Called with the number of fits done, of `etendue.lightfield.learning.REFITS`.
+        Called with the number of fits done, of `etendue.lightfield.forecast.REFITS`.
 
     Raises
     ------

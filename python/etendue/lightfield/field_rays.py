@@ -102,7 +102,7 @@ class FieldRays(RayStream):
         return self._core
 
     def accept_tally(self, tally: Tally) -> float:
-        """Nothing is learnt from a pass: the flux is known."""
+        """Nothing is found by a pass: the flux is known."""
         del tally
         return 1.0
 

@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 
 from etendue.errors import ArgumentError
-from etendue.lightfield.autofocus import choose_surface
 from etendue.lightfield.calibration import calibrate
 from etendue.lightfield.candidate import (
     Candidate,
@@ -23,7 +22,8 @@ from etendue.lightfield.candidate import (
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, count_rays
 from etendue.lightfield.etendue_density import EtendueDensity, FitReport
 from etendue.lightfield.expected_loss import loss_of_gamma
-from etendue.lightfield.probe import check_near_field, probe_rays
+from etendue.lightfield.pilot_sample import check_near_field, pilot_sample
+from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry
 from etendue.lightfield.trees import POSITIONS, Base, Tree
@@ -32,7 +32,7 @@ from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 
 Depths = tuple[int, int, int, int]
 
-PROBE = 1 << 20
+PILOT_RAYS = 1 << 20
 """Rays on which the shape of the grid and the concentrations are chosen."""
 
 FINEST = 8
@@ -108,13 +108,13 @@ def fine_depths(rays: int, depths: Depths) -> tuple[int, int]:
 
 
 def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: int, threads: int | None) -> Plan:
-    """Choose, on some of the rays, what foretells held-out rays best: the shape of the grid unless it is given.
+    """Choose, on some of the rays, what predicts held-out rays best: the shape of the grid unless it is given.
 
     From the even shape the search goes on as long as the score rises, on the base measure that is the better one there.
     The grids compared have a quarter of the cells of the one to be filled: what is gained by finer cells along one axis
     and lost by coarser ones along another shows in them, too.
     """
-    some = probe_rays(rays, PROBE)
+    some = pilot_sample(rays, PILOT_RAYS)
     bits = default_bits(len(rays))
     lends = (0,) if depths else SHAPES
     options = {lend: depths or _depths(min(bits, 20) - 2, lend) for lend in lends}

@@ -135,14 +135,14 @@ class LightField(EtendueDensity):
 
         Every ray is counted in the cell of étendue that it crosses on the surface. An optional Pólya tree over the cells
         then averages over all ways to merge them, each with its posterior probability. Whatever is open is chosen by how
-        well held-out rays are foretold; the field itself rests on all rays.
+        well held-out rays are predicted; the field itself rests on all rays.
 
         Parameters
         ----------
         rays : RayStream
             Any number of rays, of equal or unequal flux.
         surface : Surface or "auto"
-            Where the light is carried to, along the rays; ``"auto"``: the surface that foretells held-out rays best.
+            Where the light is carried to, along the rays; ``"auto"``: the surface that predicts held-out rays best.
         symmetry : str
             A symmetry of the source about the surface's axis, which multiplies its rays: ``"none"``, ``"mirror-x"``,
             ``"mirror-y"``, ``"mirror-xy"``, ``"c2"``, ``"c4"``, or ``"auto"``: one of them if the rays bear it out.

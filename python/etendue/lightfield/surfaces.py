@@ -13,13 +13,13 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.lightfield.probe import probe_rays
+from etendue.lightfield.pilot_sample import pilot_sample
 from etendue.quantities.ray_stream import RayStream
 
 FloatArray = npt.NDArray[np.float64]
 Shape = Literal["rectangle", "disk", "hemisphere", "tube"]
 
-PROBE = 1 << 18
+PILOT_RAYS = 1 << 18
 """Rays looked at to size a surface that was given without its dimensions."""
 
 STRAY = 1e-4
@@ -216,7 +216,7 @@ class Plane(Surface):
         """The smallest rectangle that the rays' lines cross, but for strays far off."""
         if not self.open_dimensions:
             return self
-        position, direction = _probe(rays)
+        position, direction = _places_and_directions(rays)
         up = direction[:, 2] > 0
         if not up.any():
             raise ArgumentError("Plane: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
@@ -266,7 +266,7 @@ class Disk(Surface):
         """The smallest disk that the rays' lines cross, but for strays far off."""
         if not self.open_dimensions:
             return self
-        position, direction = _probe(rays)
+        position, direction = _places_and_directions(rays)
         up = direction[:, 2] > 0
         if not up.any():
             raise ArgumentError("Disk: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
@@ -410,7 +410,7 @@ class Cylinder(Surface):
         """The smallest cylinder about the rays' start points, but for strays far off."""
         if not self.open_dimensions:
             return self
-        position, _ = _probe(rays)
+        position, _ = _places_and_directions(rays)
         low, high = _span(position[:, 2], None)
         bottom = low if self.bottom is None else self.bottom
         top = high if self.top is None else self.top
@@ -475,7 +475,7 @@ class Box(Surface):
         """The smallest box about the rays' start points, but for strays far off."""
         if not self.open_dimensions:
             return self
-        position, _ = _probe(rays)
+        position, _ = _places_and_directions(rays)
         spans = [_span(v, c) for v, c in zip(position.T, self.centre or (None, None, None), strict=True)]
         extent = max(high - low for low, high in spans)
         width, height, depth = (max(high - low, SLACK * extent) * (1 + SLACK) for low, high in spans)
@@ -597,9 +597,9 @@ def _value(text: str, key: str, value: str) -> float | bool | tuple[float, ...]:
     return numbers[0]
 
 
-def _probe(rays: RayStream) -> tuple[FloatArray, FloatArray]:
+def _places_and_directions(rays: RayStream) -> tuple[FloatArray, FloatArray]:
     """Positions [mm] and directions of some of the rays."""
-    some = probe_rays(rays, PROBE)
+    some = pilot_sample(rays, PILOT_RAYS)
     return some.position, some.direction
 
 
@@ -627,7 +627,7 @@ def _reach(distances: FloatArray) -> float:
 
 def _impact(rays: RayStream, centre: tuple[float, float, float]) -> float:
     """The radius of the sphere about `centre` that the rays' lines meet: their distance from the centre."""
-    position, direction = _probe(rays)
+    position, direction = _places_and_directions(rays)
     offset = position - np.asarray(centre)
     return _reach(np.linalg.norm(np.cross(offset, direction), axis=1))
 

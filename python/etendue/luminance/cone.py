@@ -33,13 +33,6 @@ def cone_solid_angle(acceptance: float) -> float:
     return 4.0 * math.pi * math.sin(math.radians(acceptance) / 2.0) ** 2
 
 
-def check_acceptance(acceptance: float) -> float:
-    """The half-angle if it is one; `ArgumentError` if it is not in 0° < α ≤ 90°."""
-    if not 0.0 < acceptance <= 90.0:
-        raise ArgumentError(f"acceptance is {acceptance}°; give a half-angle above 0° and at most 90°.")
-    return float(acceptance)
-
-
 CELL_BYTES = 72
 """Bytes for a pixel and acceptance: three sums of the core, and the estimate with its error that is made of them."""
 

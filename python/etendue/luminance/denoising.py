@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from etendue.denoising.smoothing import smooth_counts
 from etendue.errors import ArgumentError
-from etendue.lightfield.smoothing import smooth_counts
 from etendue.quantities.luminance_map import LuminanceMap
 
 Array = npt.NDArray[np.float64]
@@ -18,8 +18,8 @@ def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None
     The flux of each pixel is a sample of a Poisson process over the pixels, whose étendue is the base measure. The map
     is a mixture of three estimates of that process (`smooth_counts`, theory section 12): optional Pólya trees, which
     average over all ways to halve the map again and again; a filter that follows edges and lines at any angle; and
-    shrunk rings of waves, which are as good as the best linear filter of fixed shape. Each pixel's shares are those with
-    which estimates from half of the rays foretell the other half best.
+    shrunk rings of frequencies, which are as good as the best linear filter of fixed shape. Each pixel's shares are those
+    with which estimates from half of the rays predict the other half best.
 
     Parameters
     ----------

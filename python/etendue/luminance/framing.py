@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.probe import probe_rays
+from etendue.lightfield.pilot_sample import pilot_sample
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
@@ -73,7 +73,7 @@ class Light:
 
 def probe(source: RayStream | LightField) -> RaySet:
     """Some rays of a source, or rays drawn from a field."""
-    return source.sample(PROBED) if isinstance(source, LightField) else probe_rays(source, PROBED)
+    return source.sample(PROBED) if isinstance(source, LightField) else pilot_sample(source, PROBED)
 
 
 def light_towards(rays: RaySet, observer: Observer, screen: Screen) -> Light:

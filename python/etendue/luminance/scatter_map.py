@@ -10,10 +10,11 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.luminance.caustics import Forward
-from etendue.luminance.scene_map import Looking, look_at_scene
+from etendue.luminance.methods import PathTracing
+from etendue.luminance.scene_map import look_at_scene
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
-from etendue.quantities.ray_stream import Progress
+from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene.scatter_events import EVENT, RAY, ScatterEvents
 from etendue.units import MM2_PER_M2
 
@@ -24,14 +25,15 @@ STRETCH = 1 << 21
 def look_at_events(
     events: ScatterEvents,
     pairs: Sequence[tuple[Observer, Screen]],
-    how: Looking,
+    how: PathTracing | None = None,
     progress: Progress | None = None,
     *,
-    whole: bool = False,
+    cache: bool = True,
+    threads: int | None = None,
 ) -> list[LuminanceMap]:
     """The maps of scatter events for observers with their screens; see `luminance_map`.
 
-    `whole`: with what lines of sight find besides, as `how` says.
+    `how`: with what lines of sight find besides; None: without.
 
     Raises
     ------
@@ -41,8 +43,9 @@ def look_at_events(
     SceneError
         If files that the scene names are missing.
     """
+    threads = checked_threads(threads)
     views = [screen.core_view(observer) for observer, screen in pairs]
-    if whole and events.surfaces:
+    if how is not None and events.surfaces:
         raise ArgumentError(
             f"the scatter events of {events.name!r} are those of {', '.join(events.surfaces)} only, and lines of sight "
             "would pass over all scattered light: keep those of all surfaces, or leave rays_per_pixel out."
@@ -53,19 +56,19 @@ def look_at_events(
         sums = np.zeros(width), np.zeros(width), np.zeros(width, np.uint64)
         for stratum, words in _stretches(events):
             try:
-                found = _core.look_at_events(core, words, view, how.threads)
+                found = _core.look_at_events(core, words, view, threads)
             except ValueError as error:
                 raise ArgumentError(f"the scatter events of {events.name!r}: {error}.") from error
             for total, part in zip(sums, found, strict=True):
                 total[stratum] += part
             done += len(words)
-            if progress is not None and not whole:
+            if progress is not None and how is None:
                 progress(done)
         shape = (view["rows"], view["columns"])
         note = f"{len(events):,} scatter events of {events.rays:,} rays, for light that comes from diffuse surfaces directly"
         seen.append(Forward.of(sums, shape, events.dealing, events.rays, events.scale, note))
-    if whole and events.scene is not None:
-        maps = look_at_scene(events.scene, pairs, how, progress, seen)
+    if how is not None and events.scene is not None:
+        maps = look_at_scene(events.scene, pairs, how, progress, seen, cache=cache, threads=threads)
         return [lmap.replace(notes=(*lmap.notes, *events.notes)) for lmap in maps]
     return [_map(events, image, *pair) for image, pair in zip(seen, pairs, strict=True)]
 

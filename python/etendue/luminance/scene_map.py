@@ -15,6 +15,7 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.luminance.caustics import Forward, LightImages, Plan, at_least_nearby, plan
 from etendue.luminance.gathering import CHECKS, FIRST_CHECK, blocks, comparison_note, survey_notes
+from etendue.luminance.methods import PathTracing
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
@@ -31,68 +32,22 @@ Array = npt.NDArray[np.float64]
 Left = Literal["nothing", "caustics", "scattered"]
 """Light that lines of sight leave to rays traced forwards."""
 
-DEFAULT_RAYS_PER_PIXEL = 256
-MOST_RAYS_PER_PIXEL = 1 << 24
-MOST_SEED = (1 << 64) - 1
-
-PASSES = 16
-"""Independent passes of a map, from whose spread the standard error of each pixel comes."""
-
-FEWEST_PASSES = 4
-
 MOST_TIMES = 64
 """How many times `rays_per_pixel` are followed at most to reach `until`."""
 
 MOST_EVENTS = 10_000
 """Surfaces that a line of sight may meet."""
 
-MOST_FORWARD_RAYS = 1 << 50
-
-
-@dataclasses.dataclass(frozen=True)
-class Looking:
-    """How maps of a scene are computed; the parameters are those of `luminance_map`."""
-
-    rays_per_pixel: int = DEFAULT_RAYS_PER_PIXEL
-    until: float | None = None
-    seed: int = 1
-    forward_rays: float | None = None
-    gather: bool = False
-    cache: bool = True
-    threads: int | None = None
-
-    def __post_init__(self) -> None:
-        n = self.rays_per_pixel
-        if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_RAYS_PER_PIXEL:
-            raise ArgumentError(f"rays_per_pixel is {n!r}; give a whole number from 1 to {MOST_RAYS_PER_PIXEL:,}.")
-        if self.until is not None and not (math.isfinite(self.until) and self.until > 0.0):
-            raise ArgumentError(f"until is {self.until!r}; give the relative error to be reached, e.g. 0.01.")
-        if not (isinstance(self.seed, int) and 0 <= self.seed <= MOST_SEED):
-            raise ArgumentError(f"seed is {self.seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
-        rays = self.forward_rays
-        if rays is not None and not (0 <= rays <= MOST_FORWARD_RAYS and int(rays) == rays):
-            raise ArgumentError(
-                f"forward_rays is {rays!r}; give a whole number up to {MOST_FORWARD_RAYS:,}, 0 for none, or leave it out."
-            )
-        checked_threads(self.threads)
-
-    @property
-    def passes(self) -> int:
-        """Passes that are made in any case."""
-        return min(PASSES, max(FEWEST_PASSES, self.rays_per_pixel))
-
-    @property
-    def paths(self) -> int:
-        """Lines of sight per pixel and pass."""
-        return -(-self.rays_per_pixel // self.passes)
-
 
 def look_at_scene(
     scene: Scene,
     pairs: Sequence[tuple[Observer, Screen]],
-    how: Looking,
+    how: PathTracing,
     progress: Progress | None = None,
     scattered: Sequence[Forward] | None = None,
+    *,
+    cache: bool = True,
+    threads: int | None = None,
 ) -> list[LuminanceMap]:
     """The maps of a scene for observers with their screens; see `luminance_map`.
 
@@ -106,14 +61,15 @@ def look_at_scene(
     ArgumentError
         If it has no sources, or a screen has no apparent area.
     """
+    threads = checked_threads(threads)
     views = [screen.core_view(observer) for observer, screen in pairs]
-    seeable, notes = with_fields(scene, how.threads, cache=how.cache)
+    seeable, notes = with_fields(scene, threads, cache=cache)
     compiled = compile_scene(seeable)
     if not compiled.record["sources"]:
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
     core = _core.Scene({**compiled.record, "detectors": []})
-    survey = _core.Survey(core, how.seed, MOST_EVENTS, how.threads) if how.gather else None
-    forward = _forward(core, compiled, views, how, wanted=scattered is None)
+    survey = _core.Survey(core, how.seed, MOST_EVENTS, threads) if how.gather else None
+    forward = _forward(core, compiled, views, how, threads, wanted=scattered is None)
     images = forward.images
     notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=scattered is not None or images is not None)]
     notes += [] if survey is None else survey_notes(survey)
@@ -129,7 +85,7 @@ def look_at_scene(
         ) -> list[Array]:
             guides = forward.shared, forward.plan.guide, small
             return _core.look_at_scene(
-                core, view, how.paths, how.seed, MOST_EVENTS, left, number, number + 1, how.threads, known, *guides
+                core, view, how.paths, how.seed, MOST_EVENTS, left, number, number + 1, threads, known, *guides
             )
 
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
@@ -192,7 +148,7 @@ class _Forward:
     shared: float | None
     possible: bool
 
-    def notes(self, how: Looking) -> list[str]:
+    def notes(self, how: PathTracing) -> list[str]:
         """What is left to lines of sight, that these find by chance only."""
         if not self.possible or self.images is not None:
             return []
@@ -213,23 +169,24 @@ def _forward(
     core: _core.Scene,
     compiled: Compiled,
     views: list[_core._View],
-    how: Looking,
+    how: PathTracing,
+    threads: int | None,
     *,
     wanted: bool,
 ) -> _Forward:
     """Rays forwards as the scene asks for them, or the user; none where lines of sight find all light well."""
     possible = core.may_focus()
-    glints = [_core.Glints(core, view, MOST_EVENTS, how.threads) for view in views]
+    glints = [_core.Glints(core, view, MOST_EVENTS, threads) for view in views]
     if not possible or how.forward_rays == 0:
         return _Forward(Plan(0, None, glints, 0), None, None, possible)
     lines = how.paths * how.passes
     asked = None if how.forward_rays is None and wanted else int(how.forward_rays or 0)
-    found = plan(compiled.record, views, glints, how.seed, MOST_EVENTS, lines, asked, how.threads)
+    found = plan(compiled.record, views, glints, how.seed, MOST_EVENTS, lines, asked, threads)
     images, shared = None, None
     if found.rays and wanted:
         # Where lines of sight end at patches, these do not tell what they hold of each source.
         shared = None if how.gather else found.rays / lines
-        images = LightImages(compiled.record, views, found, shared, how.seed, MOST_EVENTS, how.threads)
+        images = LightImages(compiled.record, views, found, shared, how.seed, MOST_EVENTS, threads)
     return _Forward(found, images, shared, possible)
 
 

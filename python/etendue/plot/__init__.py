@@ -9,7 +9,6 @@ from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
 from etendue.plot.scene_picture import draw_scene
 from etendue.plot.threshold_picture import plot_threshold_sweep
-from etendue.quantities.luminance_map import PLOT_MAP
 
 __all__ = [
     "draw_scene",
@@ -20,5 +19,3 @@ __all__ = [
     "plot_map",
     "plot_threshold_sweep",
 ]
-
-PLOT_MAP[:] = [plot_map]

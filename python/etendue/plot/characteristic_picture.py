@@ -12,7 +12,7 @@ import numpy as np
 
 from etendue.lightfield.characteristic import CharacteristicCurve
 from etendue.lightfield.diagnostics import Diagnostics, UncertainSpot
-from etendue.lightfield.learning import LearningCurve
+from etendue.lightfield.forecast import LearningCurve
 from etendue.plot import style
 from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT, FluxUnit
 

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
-import os
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.luminance_map import PLOT_MAP, SAVE_MAP
+from etendue.errors import ArgumentError
 from etendue.quantities.observer import Screen
+from etendue.quantities.pixel_map import MapValues, PixelMap
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.relative_error import RelativeError
-from etendue.units import FLUX_UNITS, ILLUMINANCE_NAME, ILLUMINANCE_UNIT, MM2_PER_M2, FluxUnit
+from etendue.units import ILLUMINANCE_NAME, ILLUMINANCE_UNIT, MM2_PER_M2, FluxUnit
 
-Array = npt.NDArray[np.float64]
 Point = tuple[float, float, float]
 
 ROUNDING = 1e-9
 """By which axes that were computed may miss being orthonormal."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class IlluminanceMap:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class IlluminanceMap(PixelMap):
     """Illuminance of every cell of a rectangle, with its standard error, for light that arrives on its front.
 
     Parameters
@@ -63,8 +60,8 @@ class IlluminanceMap:
     ([500.0, 0.0, 0.0], (0.0, 0.0, 1.0))
     """
 
-    values: Array
-    standard_error: Array
+    values: MapValues
+    standard_error: MapValues
     rays: npt.NDArray[np.int64]
     screen: Screen
     centre: Point = (0.0, 0.0, 0.0)
@@ -74,25 +71,12 @@ class IlluminanceMap:
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
     notes: tuple[str, ...] = ()
 
-    def __repr__(self) -> str:
-        """Size, brightest cell and origin."""
-        brightest = np.max(self.values, initial=0.0, where=np.isfinite(self.values))
-        rows, columns = self.screen.shape
-        size = f"{columns} × {rows} cells"
-        return f"<IlluminanceMap of {size} up to {brightest:.4g} {self.unit} from {self.provenance.source}>"
+    UNITS: ClassVar = ILLUMINANCE_UNIT
+    QUANTITIES: ClassVar = ILLUMINANCE_NAME
+    PIXELS: ClassVar = "cells"
 
     def __post_init__(self) -> None:
-        if self.flux_unit not in FLUX_UNITS:
-            raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)
-        for name, dtype in (("values", np.float64), ("standard_error", np.float64), ("rays", np.int64)):
-            with np.errstate(invalid="ignore"):  # signalling NaN of damaged files
-                array = np.array(getattr(self, name), dtype=dtype)
-            if array.shape != self.screen.shape:
-                raise ArgumentError(
-                    f"IlluminanceMap: {name} has shape {array.shape}, the grid has (rows, columns) = {self.screen.shape}."
-                )
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        super().__post_init__()
         for name in ("centre", "right", "up"):
             point = tuple(float(c) for c in getattr(self, name))
             if len(point) != 3 or not np.isfinite(point).all():
@@ -103,27 +87,17 @@ class IlluminanceMap:
             raise ArgumentError(f"IlluminanceMap: {self.right} and {self.up} are no unit vectors at right angles.")
 
     @property
-    def unit(self) -> str:
-        """``"lx"`` or ``"W/m²"``."""
-        return ILLUMINANCE_UNIT[self.flux_unit]
-
-    @property
-    def quantity(self) -> str:
-        """``"illuminance"`` or ``"irradiance"``."""
-        return ILLUMINANCE_NAME[self.flux_unit]
-
-    @property
     def normal(self) -> Point:
         """Unit vector on the front: right × up."""
         x, y, z = np.cross(self.right, self.up).tolist()
         return x, y, z
 
     @property
-    def points(self) -> Array:
+    def points(self) -> MapValues:
         """Centres of the cells [mm], shape (rows, columns, 3)."""
         across = self.screen.x[None, :, None] * np.array(self.right)
         upwards = self.screen.y[:, None, None] * np.array(self.up)
-        points: Array = np.array(self.centre) + across + upwards
+        points: MapValues = np.array(self.centre) + across + upwards
         return points
 
     @property
@@ -146,52 +120,10 @@ class IlluminanceMap:
         """Least over mean illuminance of the cells (U₀ of the trade); NaN if it is dark."""
         return float(self.values.min()) / self.mean if self.mean > 0.0 else float("nan")
 
-    def replace(self, **changes: Any) -> IlluminanceMap:
-        """A copy with some fields changed (`dataclasses.replace`)."""
-        return dataclasses.replace(self, **changes)
-
-    def save(self, path: str | os.PathLike[str]) -> tuple[str, ...]:
-        """Write the map; the format follows the extension: .exr .tif .npz .csv, and .png for a picture.
-
-        Returns
-        -------
-        tuple of str
-            What the format could not express, one sentence each; empty when it holds everything.
-        """
-        return SAVE_MAP[0](self, Path(path))
-
-    def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
-        """Draw the map in false colour; see `etendue.plot.plot_map` for the options."""
-        return PLOT_MAP[0](self, path, **options)
-
-    def header(self) -> dict[str, Any]:
-        """Everything but the arrays, as plain data for file headers."""
-        return {
-            "quantity": self.quantity,
-            "unit": self.unit,
-            "flux_unit": self.flux_unit,
-            "screen": dataclasses.asdict(self.screen),
-            "centre": list(self.centre),
-            "right": list(self.right),
-            "up": list(self.up),
-            "provenance": self.provenance.to_dict(),
-            "notes": list(self.notes),
-        }
+    def _geometry(self) -> dict[str, Any]:
+        axes = {name: list(getattr(self, name)) for name in ("centre", "right", "up")}
+        return {"screen": dataclasses.asdict(self.screen), **axes}
 
     @classmethod
-    def from_header(
-        cls, header: dict[str, Any], values: Array, standard_error: Array, rays: npt.NDArray[np.int64]
-    ) -> IlluminanceMap:
-        """Inverse of `header`, for readers."""
-        return cls(
-            values,
-            standard_error,
-            rays,
-            Screen(**header["screen"]),
-            header["centre"],
-            header["right"],
-            header["up"],
-            header["flux_unit"],
-            Provenance.from_dict(header["provenance"]),
-            tuple(header["notes"]),
-        )
+    def _geometry_from(cls, header: dict[str, Any]) -> dict[str, Any]:
+        return {"screen": Screen(**header["screen"]), **{name: header[name] for name in ("centre", "right", "up")}}

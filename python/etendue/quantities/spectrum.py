@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import warnings
+import importlib.resources
 
 import numpy as np
 import numpy.typing as npt
@@ -133,9 +133,7 @@ def photopic_efficiency(wavelength: npt.ArrayLike) -> FloatArray:
 
 @functools.cache
 def _photopic_table() -> tuple[FloatArray, FloatArray]:
-    # Importing colour changes numpy's print options and the warning filters of the whole process: put them back.
-    with np.printoptions(), warnings.catch_warnings():
-        import colour  # noqa: PLC0415 - takes a second to import and is needed only to turn watts into lumens
-
-    table = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]
-    return np.asarray(table.wavelengths, dtype=np.float64), np.asarray(table.values, dtype=np.float64)
+    table = importlib.resources.files("etendue.quantities").joinpath("photopic_efficiency.csv")
+    with table.open(encoding="utf-8") as lines:
+        wavelength, value = np.loadtxt(lines, delimiter=",", unpack=True)
+    return wavelength, value

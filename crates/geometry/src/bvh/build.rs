@@ -6,11 +6,9 @@
 
 use etendue_math::Vec3;
 
-use super::{Bvh, LEAF, Node, WIDTH};
+use super::probe::WIDTH;
+use super::tree::{Bvh, DEPTH, LEAF, Node};
 use crate::bounds::Bounds;
-
-/// The largest depth of a tree: sets are halved once anything else might lead deeper.
-pub(super) const DEPTH: usize = 48;
 
 const BINS: usize = 16;
 
@@ -31,8 +29,18 @@ struct Item {
     primitive: u32,
 }
 
-/// See [`Bvh::new`].
-pub(super) fn build(bounds: &[Bounds], leaf: usize) -> Option<Bvh> {
+impl Bvh {
+    /// A tree over primitives with these bounds, at most `leaf` (1 or more) of them in a leaf.
+    ///
+    /// Bounds that are infinite or NaN on a side are never culled there; empty ones are culled always. None if there
+    /// are 2³¹ primitives or more.
+    #[must_use]
+    pub fn new(bounds: &[Bounds], leaf: usize) -> Option<Self> {
+        build(bounds, leaf)
+    }
+}
+
+fn build(bounds: &[Bounds], leaf: usize) -> Option<Bvh> {
     let count = u32::try_from(bounds.len()).ok().filter(|n| *n < LEAF)?;
     let mut items: Vec<Item> = bounds
         .iter()

@@ -22,7 +22,8 @@
 
 use etendue_math::Vec3;
 
-use super::WIDTH;
+/// Boxes that a ray is tried on at once: the children of a node.
+pub(super) const WIDTH: usize = 8;
 
 /// The part by which origin and reciprocals are moved outward: twice the rounding to f32, so that something is left for
 /// what f64 has lost, here by moving the start and in the tests of the primitives by finding t (a few 2⁻⁵³).

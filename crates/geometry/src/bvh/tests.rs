@@ -1,6 +1,9 @@
+use etendue_math::Vec3;
 use etendue_sampling::philox::Stream;
 
+use super::tree::{DEPTH, LEAF};
 use super::*;
+use crate::bounds::Bounds;
 
 /// Primitives visited along a ray, in order.
 fn visited(tree: &Bvh, o: Vec3, d: Vec3, t_lo: f64, t_max: f64) -> Vec<u32> {
@@ -160,7 +163,7 @@ fn a_tree_holds_every_primitive_once_whatever_the_boxes() {
                         .map(|(c, _)| (*c as usize, depth + 1)),
                 );
             }
-            assert!(deepest <= build::DEPTH, "{deepest}");
+            assert!(deepest <= DEPTH, "{deepest}");
         }
     }
 }

@@ -10,6 +10,8 @@
 
 use etendue_math::Vec3;
 
+use crate::bounds::Bounds;
+
 /// The part of its longest side by which a triangle's box is widened, so that the box holds all hits that are accepted.
 ///
 /// Let s be that side and ε = 2⁻⁵³. Where the origin lies in the sheared triangle, its coordinates are at most 2 s (the
@@ -111,6 +113,12 @@ impl Shear {
     }
 }
 
+/// The longest side of the box around a triangle.
+pub(super) fn longest_side(corners: [Vec3; 3]) -> f64 {
+    let sides = Bounds::of(corners).sides();
+    sides.x.max(sides.y).max(sides.z)
+}
+
 impl Block {
     pub(super) fn new(triangles: &[(u32, [Vec3; 3])]) -> Self {
         let mut block = Self {
@@ -123,7 +131,7 @@ impl Block {
             for (rows, p) in block.corners.iter_mut().zip(corners) {
                 (rows[0][lane], rows[1][lane], rows[2][lane]) = (p.x, p.y, p.z);
             }
-            let side = super::longest_side(*corners);
+            let side = longest_side(*corners);
             block.thin = block.thin.max(THIN * side * side);
         }
         block

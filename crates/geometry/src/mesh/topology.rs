@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::Mesh;
+use super::triangle_mesh::Mesh;
 
 impl Mesh {
     /// The edges at which the surface is not closed: all that do not belong to exactly two triangles, which pass along

@@ -3,7 +3,7 @@
 use etendue_math::{Interval, Vec3};
 
 use super::roots::{Bounded, zeros};
-use super::{ROUNDING, size, step_down};
+use super::rounding::{ROUNDING, size, step_down};
 
 /// z = c r²/(1 + √(1 − (1 + k) c² r²)) + A₄ r⁴ + A₆ r⁶ + …, kept where r lies in a range.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,7 +97,7 @@ impl Asphere {
     }
 
     /// Calls `visit` for each distance in `range` at which the line crosses the surface.
-    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], leaving: bool, mut visit: impl FnMut(f64)) {
+    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], starts_on: bool, mut visit: impl FnMut(f64)) {
         // The stretch of the line inside the cylinder and between the planes that hold the surface.
         let error = ROUNDING * (size(o) + range[0].abs());
         let (mut lo, mut hi) = (range[0], range[1]);
@@ -126,10 +126,10 @@ impl Asphere {
             let (a, b) = ((low - o.z) / d.z, (high - o.z) / d.z);
             (lo, hi) = (lo.max(a.min(b)), hi.min(a.max(b)));
         }
-        if leaving {
+        if starts_on {
             lo = lo.max(0.0);
         }
-        let known = leaving && lo == 0.0;
+        let known = starts_on && lo == 0.0;
         if lo >= hi {
             return;
         }
@@ -203,9 +203,9 @@ mod tests {
     use super::*;
     use crate::shape::Quadric;
 
-    fn crossings(surface: &Asphere, o: Vec3, d: Vec3, leaving: bool) -> Vec<f64> {
+    fn crossings(surface: &Asphere, o: Vec3, d: Vec3, starts_on: bool) -> Vec<f64> {
         let mut found = Vec::new();
-        surface.crossings(o, d, [0.0, f64::INFINITY], leaving, |t| found.push(t));
+        surface.crossings(o, d, [0.0, f64::INFINITY], starts_on, |t| found.push(t));
         found.sort_by(f64::total_cmp);
         found
     }

@@ -2,7 +2,7 @@
 
 use etendue_math::Vec3;
 
-use super::{ROUNDING, size};
+use super::rounding::{ROUNDING, size};
 
 /// Which piece of the plane.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,9 +39,9 @@ pub struct Flat {
 
 /// Where the line meets the plane: t, x, y, and how far off (x, y) may be. t is +∞ if it does not.
 #[inline(always)]
-fn on_plane(o: Vec3, d: Vec3, leaving: bool) -> (f64, f64, f64, f64) {
+fn on_plane(o: Vec3, d: Vec3, starts_on: bool) -> (f64, f64, f64, f64) {
     let t = -o.z / d.z;
-    let t = if leaving | (d.z == 0.0) { f64::INFINITY } else { t };
+    let t = if starts_on | (d.z == 0.0) { f64::INFINITY } else { t };
     (t, o.x + t * d.x, o.y + t * d.y, ROUNDING * (size(o) + t.abs()))
 }
 
@@ -64,8 +64,8 @@ impl Annulus {
     /// Distance to it, +∞ if it is missed. The bounds are NaN-safe: a comparison with NaN fails.
     #[inline(always)]
     #[must_use]
-    pub fn crossing(&self, o: Vec3, d: Vec3, leaving: bool) -> f64 {
-        let (t, x, y, error) = on_plane(o, d, leaving);
+    pub fn crossing(&self, o: Vec3, d: Vec3, starts_on: bool) -> f64 {
+        let (t, x, y, error) = on_plane(o, d, starts_on);
         let r2 = x * x + y * y;
         let (least, most) = (self.inner - error, self.outer + error);
         if (r2 <= most * most) & ((least <= 0.0) | (r2 >= least * least)) {
@@ -87,8 +87,8 @@ impl Rectangle {
     /// Distance to it, +∞ if it is missed.
     #[inline(always)]
     #[must_use]
-    pub fn crossing(&self, o: Vec3, d: Vec3, leaving: bool) -> f64 {
-        let (t, x, y, error) = on_plane(o, d, leaving);
+    pub fn crossing(&self, o: Vec3, d: Vec3, starts_on: bool) -> f64 {
+        let (t, x, y, error) = on_plane(o, d, starts_on);
         if (x.abs() <= self.half[0] + error) & (y.abs() <= self.half[1] + error) {
             t
         } else {
@@ -101,19 +101,19 @@ impl Flat {
     /// The distance at which the line crosses the piece; +∞ if it does not.
     #[inline(always)]
     #[must_use]
-    pub fn crossing(&self, o: Vec3, d: Vec3, leaving: bool) -> f64 {
+    pub fn crossing(&self, o: Vec3, d: Vec3, starts_on: bool) -> f64 {
         match &self.outline {
-            Outline::Whole => on_plane(o, d, leaving).0,
+            Outline::Whole => on_plane(o, d, starts_on).0,
             Outline::Rectangle { width, height } => {
                 let half = [0.5 * width, 0.5 * height];
-                Rectangle { half }.crossing(o, d, leaving)
+                Rectangle { half }.crossing(o, d, starts_on)
             }
             Outline::Annulus { inner, outer } => {
                 let (inner, outer) = (*inner, *outer);
-                Annulus { inner, outer }.crossing(o, d, leaving)
+                Annulus { inner, outer }.crossing(o, d, starts_on)
             }
             Outline::Polygon { vertices } => {
-                let (t, x, y, error) = on_plane(o, d, leaving);
+                let (t, x, y, error) = on_plane(o, d, starts_on);
                 if t.is_finite() && within(vertices, x, y, error) {
                     t
                 } else {
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn neighbours_that_share_an_edge_leave_no_gap() {
-        // Lines aimed at points computed on the common edge x = 1/3 meet at least one of two rectangles.
+        // Rays aimed at points computed on the common edge x = 1/3 meet at least one of two rectangles.
         let half = 0.5 / 3.0;
         let piece = Rectangle { half: [half, 1.0] };
         for i in 0..10_000 {

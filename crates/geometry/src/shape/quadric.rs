@@ -2,7 +2,7 @@
 
 use etendue_math::Vec3;
 
-use super::{ROUNDING, size, step_down};
+use super::rounding::{ROUNDING, size, step_down};
 
 /// The surface F = r2 (x² + y²) + z2 z² + z1 z + z0 = 0, kept where z and √(x² + y²) lie in given ranges.
 ///
@@ -34,21 +34,21 @@ impl Quadric {
     /// The two distances at which the line crosses the surface; +∞ in place of a crossing that is none.
     #[inline(always)]
     #[must_use]
-    pub fn crossings(&self, o: Vec3, d: Vec3, leaving: bool) -> [f64; 2] {
+    pub fn crossings(&self, o: Vec3, d: Vec3, starts_on: bool) -> [f64; 2] {
         // From the point nearest the origin, so that a start point far away costs no digits; but a line that leaves the
         // surface knows that F = 0 at its start, and the equation without its constant has the other crossing only.
-        let shift = if leaving { 0.0 } else { -o.dot(d) };
+        let shift = if starts_on { 0.0 } else { -o.dot(d) };
         let p = o + d * shift;
         let a = self.r2 * (d.x * d.x + d.y * d.y) + self.z2 * d.z * d.z;
         let half_b = self.r2 * (p.x * d.x + p.y * d.y) + (self.z2 * p.z + 0.5 * self.z1) * d.z;
-        let c = if leaving { 0.0 } else { self.value(p) };
+        let c = if starts_on { 0.0 } else { self.value(p) };
         let discriminant = half_b * half_b - a * c;
         let root = discriminant.max(0.0).sqrt();
         let q = -(half_b + root.copysign(half_b));
         // a = 0 and q = 0 give ±∞ or NaN, which no range contains.
         let met = discriminant >= 0.0;
         let first = self.kept(o, d, shift + q / a, met);
-        let second = self.kept(o, d, shift + c / q, met & !leaving);
+        let second = self.kept(o, d, shift + c / q, met & !starts_on);
         [first, second]
     }
 
@@ -80,6 +80,71 @@ impl Quadric {
         let gradient = Vec3::new(2.0 * self.r2 * p.x, 2.0 * self.r2 * p.y, 2.0 * self.z2 * p.z + self.z1);
         (self.value(p), gradient)
     }
+}
+
+/// r² of a quadric at z.
+pub(super) fn squared_radius(q: &Quadric, z: f64) -> f64 {
+    -((q.z2 * z + q.z1) * z + q.z0) / q.r2
+}
+
+/// The largest √(x² + y²) of a quadric and its range of z; None if it has no end or no points.
+pub(super) fn reach(q: &Quadric) -> Option<(f64, [f64; 2])> {
+    let ranges = ranges_of_z(q)?;
+    let z = [ranges.first()?[0], ranges.last()?[1]];
+    // r² is of second order in z: largest at an end, or where its slope is 0.
+    let flat = -0.5 * q.z1 / q.z2;
+    let places = ranges
+        .iter()
+        .flatten()
+        .copied()
+        .chain(ranges.iter().map(|r| flat.max(r[0]).min(r[1])));
+    let most = places.map(|z| squared_radius(q, z)).fold(0.0, f64::max).sqrt();
+    Some((most.min(q.r[1]), z))
+}
+
+/// Where, on the z axis, `lowest` ≤ r² ≤ `highest`: between the zeros of two functions of second order.
+pub(super) fn ranges_of_z(q: &Quadric) -> Option<Vec<[f64; 2]>> {
+    let zeros = |level: f64| -> Vec<f64> {
+        let (a, b, c) = (q.z2, q.z1, q.z0 + q.r2 * level);
+        if a == 0.0 {
+            return if b == 0.0 { vec![] } else { vec![-c / b] };
+        }
+        let discriminant = b * b - 4.0 * a * c;
+        if discriminant < 0.0 {
+            return vec![];
+        }
+        let m = -0.5 * (b + discriminant.sqrt().copysign(b));
+        if m == 0.0 { vec![0.0] } else { vec![m / a, c / m] }
+    };
+    let lowest = q.r[0] * q.r[0];
+    let mut cuts = zeros(lowest);
+    if q.r[1].is_finite() {
+        cuts.extend(zeros(q.r[1] * q.r[1]));
+    }
+    cuts.retain(|z| *z > q.z[0] && *z < q.z[1]);
+    cuts.extend(q.z);
+    cuts.sort_by(f64::total_cmp);
+    let mut ranges = Vec::new();
+    for pair in cuts.windows(2) {
+        let [from, to] = [pair[0], pair[1]];
+        let middle = if from.is_finite() && to.is_finite() {
+            0.5 * (from + to)
+        } else if from.is_finite() {
+            from + from.abs() + 1.0
+        } else if to.is_finite() {
+            to - to.abs() - 1.0
+        } else {
+            0.0
+        };
+        let g = squared_radius(q, middle);
+        if to > from && g >= lowest && g > 0.0 && g <= q.r[1] * q.r[1] {
+            if !(from.is_finite() && to.is_finite()) {
+                return None;
+            }
+            ranges.push([from, to]);
+        }
+    }
+    Some(ranges)
 }
 
 #[cfg(test)]

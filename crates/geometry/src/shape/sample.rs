@@ -9,7 +9,11 @@ use etendue_sampling::alias::Alias;
 
 use crate::mesh::Mesh;
 
-use super::{Asphere, Flat, Outline, Quadric, Shape, Torus};
+use super::asphere::Asphere;
+use super::flat::{Flat, Outline};
+use super::quadric::{Quadric, ranges_of_z, squared_radius};
+use super::surface::Shape;
+use super::torus::Torus;
 
 /// Stretches into which the outline of a body of rotation is cut.
 const STRETCHES: usize = 256;
@@ -124,7 +128,7 @@ impl Outlined {
     /// The ranges of s that belong to the surface.
     pub(super) fn ranges(&self) -> Option<Vec<[f64; 2]>> {
         match self {
-            Self::Quadric(q) => quadric_ranges(q),
+            Self::Quadric(q) => ranges_of_z(q),
             Self::Asphere(a) => {
                 let [inner, outer] = a.radii();
                 Some(vec![[inner * inner, outer * outer]])
@@ -132,71 +136,6 @@ impl Outlined {
             Self::Torus(_) => Some(vec![[0.0, 2.0 * PI]]),
         }
     }
-}
-
-/// r² of a quadric at z.
-fn squared_radius(q: &Quadric, z: f64) -> f64 {
-    -((q.z2 * z + q.z1) * z + q.z0) / q.r2
-}
-
-/// The largest √(x² + y²) of a quadric and its range of z; None if it has no end or no points.
-pub(super) fn reach(q: &Quadric) -> Option<(f64, [f64; 2])> {
-    let ranges = quadric_ranges(q)?;
-    let z = [ranges.first()?[0], ranges.last()?[1]];
-    // r² is of second order in z: largest at an end, or where its slope is 0.
-    let flat = -0.5 * q.z1 / q.z2;
-    let places = ranges
-        .iter()
-        .flatten()
-        .copied()
-        .chain(ranges.iter().map(|r| flat.max(r[0]).min(r[1])));
-    let most = places.map(|z| squared_radius(q, z)).fold(0.0, f64::max).sqrt();
-    Some((most.min(q.r[1]), z))
-}
-
-/// Where, on the z axis, `lowest` ≤ r² ≤ `highest`: between the zeros of two functions of second order.
-fn quadric_ranges(q: &Quadric) -> Option<Vec<[f64; 2]>> {
-    let zeros = |level: f64| -> Vec<f64> {
-        let (a, b, c) = (q.z2, q.z1, q.z0 + q.r2 * level);
-        if a == 0.0 {
-            return if b == 0.0 { vec![] } else { vec![-c / b] };
-        }
-        let discriminant = b * b - 4.0 * a * c;
-        if discriminant < 0.0 {
-            return vec![];
-        }
-        let m = -0.5 * (b + discriminant.sqrt().copysign(b));
-        if m == 0.0 { vec![0.0] } else { vec![m / a, c / m] }
-    };
-    let lowest = q.r[0] * q.r[0];
-    let mut cuts = zeros(lowest);
-    if q.r[1].is_finite() {
-        cuts.extend(zeros(q.r[1] * q.r[1]));
-    }
-    cuts.retain(|z| *z > q.z[0] && *z < q.z[1]);
-    cuts.extend(q.z);
-    cuts.sort_by(f64::total_cmp);
-    let mut ranges = Vec::new();
-    for pair in cuts.windows(2) {
-        let [from, to] = [pair[0], pair[1]];
-        let middle = if from.is_finite() && to.is_finite() {
-            0.5 * (from + to)
-        } else if from.is_finite() {
-            from + from.abs() + 1.0
-        } else if to.is_finite() {
-            to - to.abs() - 1.0
-        } else {
-            0.0
-        };
-        let g = squared_radius(q, middle);
-        if to > from && g >= lowest && g > 0.0 && g <= q.r[1] * q.r[1] {
-            if !(from.is_finite() && to.is_finite()) {
-                return None;
-            }
-            ranges.push([from, to]);
-        }
-    }
-    Some(ranges)
 }
 
 impl AreaSampler {

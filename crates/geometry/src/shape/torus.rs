@@ -3,7 +3,7 @@
 use etendue_math::{Interval, Vec3};
 
 use super::roots::{Bounded, zeros};
-use super::{ROUNDING, size, step_down};
+use super::rounding::{ROUNDING, size, step_down};
 
 /// A tube of radius `minor` whose centre line is a circle of radius `major` about the z axis, in the plane z = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +50,7 @@ impl Bounded for Along {
 
 impl Torus {
     /// Calls `visit` for each distance in `range` at which the line crosses the surface.
-    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], leaving: bool, mut visit: impl FnMut(f64)) {
+    pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], starts_on: bool, mut visit: impl FnMut(f64)) {
         // From the point nearest the origin; beyond the ball that holds the torus there is nothing.
         let middle = -o.dot(d);
         let near = o + d * middle;
@@ -60,20 +60,20 @@ impl Torus {
             return;
         }
         let half = half.sqrt();
-        let origin = if leaving { 0.0 } else { middle };
+        let origin = if starts_on { 0.0 } else { middle };
         let p = o + d * origin;
         let (lo, hi) = (
             range[0].max(middle - half) - origin,
             range[1].min(middle + half) - origin,
         );
-        let lo = if leaving { lo.max(0.0) } else { lo };
+        let lo = if starts_on { lo.max(0.0) } else { lo };
         let (pd, w) = (
             p.dot(d),
             p.dot(p) + (self.major + self.minor) * (self.major - self.minor),
         );
         let k = 4.0 * self.major * self.major;
         let along = Along([
-            if leaving {
+            if starts_on {
                 0.0
             } else {
                 w * w - k * (p.x * p.x + p.y * p.y)
@@ -83,7 +83,7 @@ impl Torus {
             4.0 * pd,
             1.0,
         ]);
-        zeros(&along, lo, hi, leaving && lo == 0.0, &mut |s| visit(origin + s));
+        zeros(&along, lo, hi, starts_on && lo == 0.0, &mut |s| visit(origin + s));
     }
 
     /// The point of the surface next to `p`, and the unit normal there.

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 
 use etendue_sampling::ordered;
 
+use super::factor::Factor;
+use super::light_field::{PartField, Reading};
 use super::tent::Tent;
-use super::{Factor, PartField, Reading};
 
 /// ∫ factor · tent over each cell, for the tents of the cell and of its neighbours; the second axis of both fastest.
 struct Overlaps {
@@ -169,7 +170,7 @@ impl PartField {
 
 #[cfg(test)]
 mod tests {
-    use crate::field::tests::rough;
+    use crate::field::light_field::tests::rough;
 
     /// Averages of `f` over each cell by Gauss's two-point rule on pieces between kinks: exact for products of linears.
     fn quadrature(cells: [usize; 4], fine: usize, f: impl Fn([f64; 4]) -> f64) -> Vec<f64> {

@@ -7,8 +7,8 @@ use etendue_geometry::{RayBatch, RaySource};
 use etendue_sampling::alias::Alias;
 use etendue_sampling::philox::Stream;
 
-use super::LightField;
 use super::factor::UnderTents;
+use super::light_field::LightField;
 use super::tent::under_tent;
 
 /// The purpose under which rays are drawn from a field (see [`Stream::new`]).
@@ -141,8 +141,8 @@ impl RaySource for FieldRays<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::light_field::tests::rough;
     use crate::field::tent::cell_of;
-    use crate::field::tests::rough;
 
     #[test]
     fn rays_have_the_density_of_the_luminance() {

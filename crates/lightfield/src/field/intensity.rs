@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 
-use super::{LightField, PartField, stopped};
+use super::light_field::{LightField, PartField, stopped};
 
 /// I(k) = Σ ∫ L(x, k) (n·k) dA over the parts, for each direction: a midpoint rule of `side`² points on every part.
 ///

@@ -5,11 +5,11 @@ use std::sync::atomic::AtomicBool;
 use rayon::prelude::*;
 
 use etendue_geometry::RayBatch;
-use etendue_geometry::batch::BLOCK;
+use etendue_geometry::ray_batch::BLOCK;
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 
-use super::{LightField, Reading, stopped};
+use super::light_field::{LightField, Reading, stopped};
 use crate::surface::{Coordinates, carry};
 use crate::view::View;
 
@@ -78,7 +78,7 @@ fn aim(view: &View, first: usize, points: &[[f64; 2]], count: usize, batch: &mut
             let u = ((column + du) / f64::from(view.columns) - 0.5) * view.width;
             let v = (0.5 - (row + dv) / f64::from(view.rows)) * view.height;
             let point = view.target + view.right * u + view.up * v;
-            let k = (view.eye - point).normalized();
+            let k = (view.observer - point).normalized();
             for (axis, (x, k)) in [(point.x, k.x), (point.y, k.y), (point.z, k.z)].into_iter().enumerate() {
                 batch.position[axis][i] = x;
                 batch.direction[axis][i] = k;
@@ -146,11 +146,11 @@ const fn gcd(a: u32, b: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::tests::rough;
+    use crate::field::light_field::tests::rough;
 
     fn view() -> View {
         View {
-            eye: Vec3::new(300.0, 200.0, 900.0),
+            observer: Vec3::new(300.0, 200.0, 900.0),
             target: Vec3::new(0.3, -0.2, 0.7),
             right: Vec3::new(1.0, 0.0, 0.0),
             up: Vec3::new(0.0, 1.0, 0.0),
@@ -194,7 +194,7 @@ mod tests {
             let u = ((17.0 + du) / 40.0 - 0.5) * 4.0;
             let w = (0.5 - (15.0 + dv) / 30.0) * 3.0;
             let point = v.target + v.right * u + v.up * w;
-            sum += field.luminance(point, (v.eye - point).normalized()).value / 16.0;
+            sum += field.luminance(point, (v.observer - point).normalized()).value / 16.0;
         }
         assert!((coarse[pixel].value / sum - 1.0).abs() < 1e-12 && sum > 0.0);
     }

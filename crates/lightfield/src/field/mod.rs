@@ -1,164 +1,16 @@
 //! A light field: luminance at any point of a carrier surface, in any direction.
 //!
 //! On each part of the surface L(z) = level · `B_s(s₁`, s₂) · `B_d(a`, b) · r(z): two factors that are bilinear on fine grids
-//! and a ratio that is linear in each of the four coordinates between the centres of its cells. Read-out (`PartField::at`)
+//! and a ratio that is linear in each of the four coordinates between the centres of its cells. Read-out (`PartField::at`, in `light_field`)
 //! and sampling (`draw`) are of one and the same function. Theory eq. 38.
 
 pub mod cells;
 pub mod draw;
 pub mod factor;
 pub mod intensity;
+mod light_field;
 pub mod look;
 pub mod tent;
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
-use etendue_math::Vec3;
-
-use crate::surface::Part;
 pub use factor::Factor;
-use tent::Tent;
-
-/// The light that leaves one part.
-#[derive(Clone, Debug)]
-pub struct PartField {
-    /// The chart.
-    pub part: Part,
-    /// Cells of the ratio along each coordinate.
-    pub cells: [usize; 4],
-    /// Ratio and its standard deviation at each cell's centre, last coordinate fastest.
-    pub ratio: Vec<[f32; 2]>,
-    /// `B_s`.
-    pub space: Factor,
-    /// `B_d`.
-    pub direction: Factor,
-    /// Luminance where all factors and the ratio are 1.
-    pub level: f64,
-}
-
-/// Luminance with its standard deviation.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reading {
-    /// The mean.
-    pub value: f64,
-    /// Its standard deviation: cells side by side err together, so that those of the tents add up.
-    pub deviation: f64,
-}
-
-impl PartField {
-    /// The luminance at (s₁, s₂, a, b).
-    #[inline]
-    #[must_use]
-    pub fn at(&self, place: [f64; 2], direction: [f64; 2]) -> Reading {
-        let wraps = self.part.wraps();
-        let [n1, n2, n3, n4] = self.cells;
-        let (x, y) = (Tent::at(place[0], n1, wraps), Tent::at(place[1], n2, false));
-        let (u, v) = (Tent::at(direction[0], n3, false), Tent::at(direction[1], n4, false));
-        let mut sum = [0.0; 2];
-        let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
-        let aims = pairs.map(|(k, l)| (u.cells[k] * n4 + v.cells[l], u.weights[k] * v.weights[l]));
-        for (i, j) in pairs {
-            let layer = &self.ratio[(x.cells[i] * n2 + y.cells[j]) * (n3 * n4)..][..n3 * n4];
-            let near = x.weights[i] * y.weights[j];
-            for (cell, weight) in aims {
-                for (s, c) in sum.iter_mut().zip(layer[cell]) {
-                    *s += near * weight * f64::from(c);
-                }
-            }
-        }
-        let [mean, deviation] = sum;
-        let base = self.level * self.space.at(place) * self.direction.at(direction);
-        Reading {
-            value: base * mean,
-            deviation: base * deviation,
-        }
-    }
-}
-
-/// The light of a source: the fields of the parts of its carrier surface.
-#[derive(Clone, Debug)]
-pub struct LightField {
-    /// In the order in which rays were offered to them.
-    pub parts: Vec<PartField>,
-}
-
-impl LightField {
-    /// The luminance along a line: what leaves each part that the line leaves adds up.
-    ///
-    /// A ray was counted on one part only, the first that its line leaves; so the sum counts no light twice.
-    #[inline]
-    #[must_use]
-    pub fn luminance(&self, point: Vec3, direction: Vec3) -> Reading {
-        let mut sum = Reading::default();
-        for field in &self.parts {
-            let crossing = field.part.cross(point, direction);
-            if crossing.met {
-                let reading = field.at(crossing.place, crossing.direction);
-                sum.value += reading.value;
-                sum.deviation += reading.deviation;
-            }
-        }
-        sum
-    }
-}
-
-/// Whether somebody has set the flag that ends long work.
-fn stopped(stop: Option<&AtomicBool>) -> bool {
-    stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
-}
-
-#[cfg(test)]
-pub(crate) mod tests {
-    use super::*;
-    use crate::surface::tests::{lattice, zoo};
-
-    /// One part of each shape with a rough ratio and rough factors, on grids of different sizes.
-    pub(crate) fn rough(kind: usize) -> PartField {
-        let part = zoo()[kind];
-        let cells = [4, 2, 4, 2];
-        let ratio = (0..64_u16)
-            .map(|i| [f32::from(i * i % 13) * 0.3, f32::from(i % 5) * 0.1])
-            .collect();
-        let values = |n: u16, m: u16| (0..n * n).map(|i| f64::from(i * m % 7) * 0.5 + 0.1).collect();
-        PartField {
-            part,
-            cells,
-            ratio,
-            space: Factor::new(8, values(8, 5), part.wraps()).expect("sound"),
-            direction: Factor::new(4, values(4, 3), false).expect("sound"),
-            level: 2.0,
-        }
-    }
-
-    #[test]
-    fn at_the_centres_it_is_the_product_of_factors_and_ratio() {
-        let mut field = rough(0);
-        (field.space, field.direction) = (Factor::one(), Factor::one());
-        for (index, expected) in field.ratio.iter().enumerate() {
-            let cell = [index / 16, index / 8 % 2, index / 2 % 4, index % 2];
-            let at: [f64; 4] = std::array::from_fn(|k| (cell[k] as f64 + 0.5) / field.cells[k] as f64);
-            let reading = field.at([at[0], at[1]], [at[2], at[3]]);
-            assert!((reading.value - 2.0 * f64::from(expected[0])).abs() < 1e-12);
-            assert!((reading.deviation - 2.0 * f64::from(expected[1])).abs() < 1e-12);
-        }
-        let rough = rough(0);
-        for [s1, s2, a, b] in lattice(100) {
-            let plain = field.at([s1, s2], [a, b]).value;
-            let product = plain * rough.space.at([s1, s2]) * rough.direction.at([a, b]);
-            assert!((rough.at([s1, s2], [a, b]).value - product).abs() < 1e-12);
-        }
-    }
-
-    #[test]
-    fn luminance_is_constant_along_a_line() {
-        let field = LightField {
-            parts: (0..4).map(rough).collect(),
-        };
-        for ([s1, s2, a, b], kind) in lattice(400).zip((0..4).cycle()) {
-            let (x, k) = field.parts[kind].part.ray([s1, s2], [a, b]);
-            let here = field.luminance(x + k * 1e-3, k);
-            assert!(here.value > 0.0);
-            assert!((field.luminance(x + k * 500.0, k).value / here.value - 1.0).abs() < 1e-6);
-        }
-    }
-}
+pub use light_field::{LightField, PartField, Reading};

@@ -71,8 +71,8 @@ pub fn add_log_bayes(c: f64, trial: &Trial<'_>, out: &mut [f64]) {
 pub fn join(terms: &mut [f64], whole: &[f64], log_r: &mut [f64]) {
     let n = whole.len();
     let log_stop = ln(1.0 - SPLIT);
-    let mut top = [f64::NEG_INFINITY; super::CHUNK];
-    let mut sum = [0.0; super::CHUNK];
+    let mut top = [f64::NEG_INFINITY; super::data::CHUNK];
+    let mut sum = [0.0; super::data::CHUNK];
     let (top, sum) = (&mut top[..n], &mut sum[..n]);
     for split in terms.chunks_exact(n) {
         for (t, v) in top.iter_mut().zip(split) {

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::array::Array;
 use super::base::{SplitTerms, Splits};
+use super::data::{CHUNK, Data};
 use super::grid::{Grid, Level};
 use super::kernel::{Flow, Trial, add_flow, add_log_bayes, add_log_gamma, join, log_gamma, whole_term};
-use super::{CHUNK, Data};
 
 /// What the upward sweep leaves behind; arrays over the boxes of each layer.
 pub(super) struct Evidence {

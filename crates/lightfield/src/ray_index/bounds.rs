@@ -76,8 +76,8 @@ fn size(x: Vec3) -> f64 {
 /// A cone as the index asks about it: in the axes of its screen.
 pub struct Sight {
     view: View,
-    /// From the target to the eye, along right, up and normal.
-    eye: [f64; 3],
+    /// From the target to the observer, along right, up and normal.
+    observer: [f64; 3],
     half: [f64; 2],
     half_pixel: [f64; 2],
     /// Sine and cosine of the widest acceptance.
@@ -96,7 +96,7 @@ impl Sight {
         let widest = cone.acceptances.iter().fold(0.0, |a: f64, b| a.max(*b)) + ANGLE_ROUNDING;
         Self {
             view: *view,
-            eye: along(view, view.eye - view.target),
+            observer: along(view, view.observer - view.target),
             half: [view.width / 2.0, view.height / 2.0],
             half_pixel: [
                 view.width / f64::from(view.columns) / 2.0,
@@ -108,7 +108,7 @@ impl Sight {
         }
     }
 
-    /// Whether a direction within `radius` \[rad\] of `axis` may head for the eye from anywhere on the screen.
+    /// Whether a direction within `radius` \[rad\] of `axis` may head for the observer from anywhere on the screen.
     #[must_use]
     pub fn may_meet(&self, axis: Vec3, radius: f64) -> bool {
         let angle = self.axis.dot(axis).clamp(-1.0, 1.0).acos();
@@ -124,7 +124,7 @@ impl Sight {
             x: along(&self.view, frame.x),
             y: along(&self.view, frame.y),
             z: along(&self.view, frame.z),
-            slack: ROUNDING * (size(frame.origin) + size(self.view.target) + size(self.view.eye)),
+            slack: ROUNDING * (size(frame.origin) + size(self.view.target) + size(self.view.observer)),
         }
     }
 }
@@ -147,8 +147,8 @@ impl SightedCell<'_> {
     /// Whether the cone may see a line within `bounds`. It may say yes in vain, and never no where the answer is yes;
     /// every comparison is put so that NaN says yes.
     ///
-    /// The lines cross the screen within a rectangle. Between the line from its middle to the eye and the one from any
-    /// other point there is an angle of at most arcsin(half the diagonal/distance of the eye); between the middle of the
+    /// The lines cross the screen within a rectangle. Between the line from its middle to the observer and the one from any
+    /// other point there is an angle of at most arcsin(half the diagonal/distance of the observer); between the middle of the
     /// directions and any other one a chord of at most the length of half the box' diagonal. A ray can be seen only if the
     /// two middles are no farther apart than the acceptance and both angles together.
     #[must_use]
@@ -195,8 +195,8 @@ impl SightedCell<'_> {
             middle[axis] = f64::midpoint(low, high);
             diagonal += (f64::midpoint(high, -low) + self.sight.half_pixel[axis]).powi(2);
         }
-        let eye = self.sight.eye;
-        let line = [eye[0] - middle[0], eye[1] - middle[1], eye[2]];
+        let observer = self.sight.observer;
+        let line = [observer[0] - middle[0], observer[1] - middle[1], observer[2]];
         let distance2 = dot(line, line);
         let sine2 = diagonal / distance2;
         let (p, q) = (f64::midpoint(p0, p1), f64::midpoint(q0, q1));

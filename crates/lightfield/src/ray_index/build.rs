@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::ops::{ControlFlow, Range};
 
-use etendue_geometry::batch::BLOCK;
+use etendue_geometry::ray_batch::BLOCK;
 use etendue_geometry::table::{Layout, RayTable};
 use etendue_geometry::{RayBatch, RaySource, Tally};
 use etendue_math::Vec3;
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::bounds::{Bounds, bounds_of, coordinate_error, line_coordinates};
 use super::cells::{Cells, spread};
-use super::{DRAWN, LEAF};
+use super::leaf::{DRAWN, LEAF, leaves};
 
 /// Rays that are sorted at once: what a thread holds of a cell in memory, some 150 MB with their keys. A cell with more is
 /// sorted in pieces. A multiple of [`LEAF`].
@@ -186,8 +186,8 @@ pub fn arrange(
     if !fit {
         return None;
     }
-    let leaves: u64 = super::leaves(starts).sum();
-    let mut bounds = vec![Bounds::default(); usize::try_from(leaves).ok()?];
+    let count: u64 = leaves(starts).sum();
+    let mut bounds = vec![Bounds::default(); usize::try_from(count).ok()?];
     // The pool lends the calling thread to a function that may be called twice in principle, hence the cell.
     let state = RefCell::new((&mut *records, bounds.as_mut_slice(), &mut progress));
     let whole = ordered::beside(threads, |pool| {

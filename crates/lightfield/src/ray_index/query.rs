@@ -8,9 +8,9 @@ use etendue_math::Vec3;
 use etendue_sampling::ordered;
 use rayon::prelude::*;
 
-use super::LEAF;
 use super::bounds::{Bounds, Sight};
 use super::cells::Cells;
+use super::leaf::{LEAF, leaves};
 use crate::cone::{Cone, Sums, cone_sums};
 
 /// Cells that a thread looks into at a time.
@@ -35,7 +35,7 @@ impl<'a> RayIndex<'a> {
             && starts[0] == 0
             && starts.windows(2).all(|pair| pair[0] <= pair[1])
             && starts[cells.count()] == rays.len()
-            && super::leaves(starts).sum::<u64>() == bounds.len() as u64;
+            && leaves(starts).sum::<u64>() == bounds.len() as u64;
         fits.then_some(Self {
             rays,
             cells,
@@ -51,7 +51,7 @@ impl<'a> RayIndex<'a> {
         let sight = Sight::new(cone);
         let mut first = 0;
         let cells: Vec<Cell> = (0..)
-            .zip(self.starts.windows(2).zip(super::leaves(self.starts)))
+            .zip(self.starts.windows(2).zip(leaves(self.starts)))
             .filter(|(_, (_, leaves))| *leaves > 0)
             .map(|(number, (pair, leaves))| {
                 #[allow(clippy::cast_possible_truncation, reason = "there are as many boxes in a slice")]

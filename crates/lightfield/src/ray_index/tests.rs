@@ -142,7 +142,7 @@ fn cones() -> Vec<Cone> {
                     let target = Vec3::new(0.5, -0.25, 0.3);
                     cones.push(Cone {
                         view: View {
-                            eye: target + towards * distance,
+                            observer: target + towards * distance,
                             target,
                             right,
                             up: normal.cross(right),
@@ -202,7 +202,7 @@ fn looks_at_few_rays_where_few_can_be_seen() {
     let built = Built::of(&bytes, DRAWN, 32, Vec3::new(0.0, 0.0, 0.0), 0);
     for distance in [20.0, 5000.0] {
         let mut cone = cones().swap_remove(0);
-        cone.view.eye = cone.view.target + cone.view.normal * distance;
+        cone.view.observer = cone.view.target + cone.view.normal * distance;
         let looked: u64 = built.index().candidates(&cone, 1).iter().map(|r| r.end - r.start).sum();
         assert!(looked > 0 && looked < 30_000, "{looked} of 400 000 at {distance} mm");
     }
@@ -213,7 +213,7 @@ fn a_beam_is_told_apart_by_position_alone() {
     let bytes = beam(100_000);
     let built = Built::of(&bytes, DRAWN, 8, Vec3::new(0.0, 0.0, 0.0), 2);
     let mut cone = cones().swap_remove(0);
-    cone.view.eye = cone.view.target + Vec3::new(0.1, 0.2, 1.0) * 200.0;
+    cone.view.observer = cone.view.target + Vec3::new(0.1, 0.2, 1.0) * 200.0;
     cone.view.width = 0.8;
     let table = RayTable::new(&bytes, DRAWN).expect("whole records");
     let (expected, _) = cone_sums(&table, std::slice::from_ref(&cone), 1, go);

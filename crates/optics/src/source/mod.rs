@@ -1,6 +1,5 @@
 //! Sources: what emits rays, where it stands, how much flux it has and of which wavelengths.
 
-pub mod lit;
 pub mod numbers;
 mod point;
 mod rings;
@@ -18,7 +17,6 @@ use etendue_lightfield::field::draw::{FieldRays, Sampler};
 use etendue_math::{Frame, Vec3};
 use etendue_sampling::philox::{Pairs, Stream, fill_fours};
 
-pub use lit::{Beacon, Lantern, Lit};
 pub use numbers::Numbers;
 pub use point::PointSource;
 pub use rings::{Ring, RingSource};
@@ -46,7 +44,7 @@ pub enum Emitter {
         /// Whether its rays have the colours that their records state, if these state any.
         coloured: bool,
         /// Spectra, if the colour of a ray is the number of one of them, counted from 1; none if it is a wavelength.
-        spectra: Vec<Lines>,
+        spectra: Vec<SpectralLines>,
     },
     /// A light field, drawn from.
     Field(Arc<Sampler>),
@@ -67,18 +65,18 @@ impl Emitter {
 }
 
 /// Wavelengths \[nm\], and the share of the flux up to each of them; the last one is 1.
-pub type Lines = Vec<(f64, f64)>;
+pub type SpectralLines = Vec<(f64, f64)>;
 
 /// The wavelength that a number between 0 and 1 picks.
 #[inline]
-fn line(lines: &Lines, number: f64) -> f64 {
+fn line(lines: &SpectralLines, number: f64) -> f64 {
     let place = lines.partition_point(|(_, share)| *share < number);
     lines[place.min(lines.len() - 1)].0
 }
 
 /// The wavelengths of rays `range` of a stream that have nothing but a spectrum in common: each from its address.
 #[must_use]
-pub fn draw_wavelengths(lines: &Lines, seed: u64, range: Range<u64>) -> Vec<f64> {
+pub fn draw_wavelengths(lines: &SpectralLines, seed: u64, range: Range<u64>) -> Vec<f64> {
     let stream = Stream::new(seed, PURPOSE_COLOUR);
     range.map(|index| line(lines, stream.uniforms(index, 0)[0])).collect()
 }
@@ -93,7 +91,7 @@ pub struct Source {
     /// \[flux unit\].
     pub flux: f64,
     /// Of the light whose colour no record tells.
-    pub spectrum: Lines,
+    pub spectrum: SpectralLines,
 }
 
 impl Source {
@@ -153,7 +151,7 @@ impl Source {
         clippy::cast_sign_loss,
         reason = "numbers of spectra are small; others are in no list"
     )]
-    fn name_wavelengths(&self, spectra: &[Lines], source: u64, first: u64, seed: u64, colours: &mut [f64]) {
+    fn name_wavelengths(&self, spectra: &[SpectralLines], source: u64, first: u64, seed: u64, colours: &mut [f64]) {
         for (index, colour) in (first..).zip(colours) {
             let stated = *colour > 0.0 && colour.is_finite();
             let spectrum = || spectra.get((*colour as usize).wrapping_sub(1));

@@ -1,25 +1,25 @@
-//! Small images of sources: chains of smooth surfaces from the eye, bent until they end on a point of the source.
+//! Small images of sources: chains of smooth surfaces from the observer, bent until they end on a point of the source.
 //!
 //! From starts in every pixel all chains are followed. Two more lines beside each tell how it moves with the place in the
 //! pixel; by Newton's method that place is found from which it meets a point of the source. As for manifolds of specular
 //! paths `[Jakob2012]`, but with differences in the place of derivatives, which asks nothing of the surfaces.
 
 use etendue_geometry::RayBatch;
-use etendue_geometry::assembly::TIE;
-use etendue_geometry::lines::Leaving;
+use etendue_geometry::hits::TIE;
+use etendue_geometry::origin_faces::OriginFaces;
 use etendue_lightfield::View;
 use etendue_math::Vec3;
-use etendue_optics::finish::{Finish, Incidence};
 use etendue_optics::source::surface::across;
 use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
 
-use super::{Found, Glint};
-use crate::inside::Inside;
-use crate::meeting::{Fillings, Meeting, meet_one, smooth_shares};
-use crate::reverse::Lit;
+use super::image::{Found, Glint};
+use crate::interaction::{Interaction, first_interaction};
+use crate::lit_scene::LitScene;
+use crate::medium_cache::MediumCache;
+use crate::ray_start::place;
+use crate::scatter::{SPLIT, SurfaceEvent};
 use crate::scene::Scene;
-use crate::start::place;
-use crate::wave::SPLIT;
+use crate::solid_stack::SolidStack;
 
 /// How far beside a line its neighbours start, in pixels: far above rounding, far below what surfaces do.
 const BESIDE: f64 = 1e-4;
@@ -86,8 +86,8 @@ pub type Sight = (usize, Vec<bool>);
 struct Line {
     o: Vec3,
     d: Vec3,
-    inside: Inside,
-    leaving: Leaving,
+    stack: SolidStack,
+    origin_faces: OriginFaces,
 }
 
 /// A chain of smooth surfaces from a start: the line there and those beside it.
@@ -109,26 +109,26 @@ struct Passing {
 /// What is needed to look for images.
 #[derive(Clone)]
 pub struct Search<'a> {
-    lit: &'a Lit<'a>,
+    lit: &'a LitScene<'a>,
     scene: &'a Scene,
     view: &'a View,
     most_events: u32,
     targets: std::sync::Arc<Vec<Target>>,
     wavelengths: Vec<f64>,
-    /// What the eye is in and on.
-    eye: (Inside, Leaving),
-    fillings: Fillings,
+    /// What the observer is in and on.
+    observer: (SolidStack, OriginFaces),
+    media: MediumCache,
     /// Surfaces that may still be met from the present start.
     left: usize,
 }
 
 impl<'a> Search<'a> {
     /// None if there is nothing to look for.
-    pub fn new(lit: &'a Lit<'a>, view: &'a View, most_events: u32) -> Option<Self> {
-        let eye = place(lit.scene, view.eye, (view.target - view.eye).normalized()).ok()?;
+    pub fn new(lit: &'a LitScene<'a>, view: &'a View, most_events: u32) -> Option<Self> {
+        let observer = place(lit.scene, view.observer, (view.target - view.observer).normalized()).ok()?;
         let targets: Vec<Target> = (0..lit.scene.sources.len())
-            // A source that stands around the eye is a surround, not a lamp: glass shows all of it in little.
-            .filter(|number| !lit.scene.sources[*number].bounds().contains(view.eye))
+            // A source that stands around the observer is a surround, not a lamp: glass shows all of it in little.
+            .filter(|number| !lit.scene.sources[*number].bounds().contains(view.observer))
             .filter_map(|number| target(lit, number))
             .collect();
         let n = lit.lines.len();
@@ -145,8 +145,8 @@ impl<'a> Search<'a> {
             most_events,
             targets: std::sync::Arc::new(targets),
             wavelengths: wavelengths.collect(),
-            eye,
-            fillings: Fillings::new(lit.scene),
+            observer,
+            media: MediumCache::new(lit.scene),
             left: 0,
         })
     }
@@ -184,7 +184,7 @@ impl<'a> Search<'a> {
             weight: 1.0,
             ways: Vec::new(),
         }];
-        let mut meetings = 0;
+        let mut interactions = 0;
         self.left = WORK;
         while let Some(mut chain) = chains.pop() {
             let mut events = chain.ways.len();
@@ -202,18 +202,18 @@ impl<'a> Search<'a> {
                         self.aim(target, at, &chain, reach, wavelength, number, found);
                     }
                 }
-                meetings += 1;
+                interactions += 1;
                 events += 1;
                 let Some(met) = met else { break };
-                if meetings >= MOST_MEETINGS || events > self.most_events as usize {
+                if interactions >= MOST_MEETINGS || events > self.most_events as usize {
                     return;
                 }
                 let Some(shares) = self.shares(&chain.lines[0], &met[0], wavelength) else {
                     chain.lines = met.map(|met| Line {
                         o: met.point,
                         d: chain.lines[0].d,
-                        inside: met.after,
-                        leaving: met.leaving,
+                        stack: met.after,
+                        origin_faces: met.origin_faces,
                     });
                     continue;
                 };
@@ -234,17 +234,26 @@ impl<'a> Search<'a> {
     /// The lines of sight through a place and beside it.
     fn lines(&self, at: Pair) -> [Line; 3] {
         [[0.0, 0.0], [BESIDE, 0.0], [0.0, BESIDE]].map(|off| Line {
-            o: self.view.eye,
+            o: self.view.observer,
             d: self.view.through([at[0] + off[0], at[1] + off[1]]),
-            inside: self.eye.0,
-            leaving: self.eye.1,
+            stack: self.observer.0,
+            origin_faces: self.observer.1,
         })
     }
 
     /// What three lines meet; None if it is nothing, or not the same.
-    fn meet(&mut self, lines: &[Line; 3]) -> Option<[Meeting; 3]> {
+    fn meet(&mut self, lines: &[Line; 3]) -> Option<[Interaction; 3]> {
         self.left = self.left.checked_sub(1)?;
-        let next = |line: &Line| meet_one(self.scene, line.o, line.d, &line.leaving, f64::INFINITY, line.inside);
+        let next = |line: &Line| {
+            first_interaction(
+                self.scene,
+                line.o,
+                line.d,
+                &line.origin_faces,
+                f64::INFINITY,
+                line.stack,
+            )
+        };
         let first = next(&lines[0]).ok()??;
         let same = |line: &Line| {
             let met = next(line).ok()??;
@@ -254,49 +263,36 @@ impl<'a> Search<'a> {
     }
 
     /// What of the radiance is mirrored and refracted; None if the line goes on as if nothing were there.
-    fn shares(&mut self, line: &Line, met: &Meeting, wavelength: f64) -> Option<Pair> {
-        let finish = &self.scene.finishes[met.finish? as usize];
-        let here = self.incidence(line, met, wavelength);
-        if matches!(finish, Finish::Interface) && here.n1 == here.n2 {
-            return None;
-        }
-        Some(smooth_shares(finish, &here).0)
-    }
-
-    fn incidence(&mut self, line: &Line, met: &Meeting, wavelength: f64) -> Incidence {
-        Incidence {
-            cosine: (-line.d.dot(met.normal)).min(1.0),
-            wavelength,
-            n1: self.fillings.at(self.scene, met.before.top(), wavelength).n,
-            n2: self.fillings.at(self.scene, met.after.top(), wavelength).n,
-        }
+    fn shares(&mut self, line: &Line, met: &Interaction, wavelength: f64) -> Option<Pair> {
+        let event = SurfaceEvent::new(self.scene, met, line.d, wavelength, &mut self.media);
+        Some(event.ok()??.seen().0)
     }
 
     /// Three lines beyond a smooth surface; None if one of them cannot go there.
     fn turned(
         &mut self,
         lines: &[Line; 3],
-        met: &[Meeting; 3],
+        met: &[Interaction; 3],
         transmitted: bool,
         wavelength: f64,
     ) -> Option<[Line; 3]> {
         let mut result = *lines;
         for (line, met) in result.iter_mut().zip(met) {
-            let here = self.incidence(line, met, wavelength);
-            let finish = &self.scene.finishes[met.finish? as usize];
-            let (smooth, _, across) = smooth_shares(finish, &here);
+            let event = SurfaceEvent::new(self.scene, met, line.d, wavelength, &mut self.media).ok()??;
+            let (smooth, shares) = event.seen();
             if smooth[usize::from(transmitted)] <= 0.0 {
                 return None;
             }
+            let (d, stack) = if transmitted {
+                event.refracted(shares.refraction)
+            } else {
+                event.mirrored()
+            };
             *line = Line {
                 o: met.point,
-                d: if transmitted {
-                    met.refracted(line.d, here.cosine, here.n1 / here.n2, across)
-                } else {
-                    met.mirrored(line.d, here.cosine)
-                },
-                inside: if transmitted { met.after } else { met.before },
-                leaving: met.leaving,
+                d,
+                stack,
+                origin_faces: met.origin_faces,
             };
         }
         Some(result)
@@ -305,10 +301,10 @@ impl<'a> Search<'a> {
     /// The lines from a place along known ways.
     fn follow(&mut self, at: Pair, ways: &[bool], wavelength: f64) -> Option<[Line; 3]> {
         let mut lines = self.lines(at);
-        let (mut done, mut meetings) = (0, 0);
+        let (mut done, mut interactions) = (0, 0);
         while done < ways.len() {
-            meetings += 1;
-            if meetings > MOST_MEETINGS {
+            interactions += 1;
+            if interactions > MOST_MEETINGS {
                 return None;
             }
             let met = self.meet(&lines)?;
@@ -321,8 +317,8 @@ impl<'a> Search<'a> {
                     *line = Line {
                         o: met.point,
                         d: before.d,
-                        inside: met.after,
-                        leaving: met.leaving,
+                        stack: met.after,
+                        origin_faces: met.origin_faces,
                     };
                 }
             }
@@ -394,8 +390,8 @@ impl<'a> Search<'a> {
     /// Whether a line meets the source itself: it is not small there, as glass shows the whole sky in little.
     fn shows(&self, target: &Target, line: &Line, reach: f64) -> bool {
         let (mut met, lit) = (false, self.lit);
-        if let Some(lantern) = &lit.lanterns[target.source] {
-            lantern.along(
+        if let Some(sampler) = &lit.light_samplers[target.source] {
+            sampler.along(
                 &lit.scene.sources[target.source],
                 line.o,
                 line.d,
@@ -540,9 +536,9 @@ fn image(place: Pair, spread: &Square) -> Option<Glint> {
 }
 
 /// Points of a source that can be seen; None if it cannot.
-fn target(lit: &Lit<'_>, number: usize) -> Option<Target> {
+fn target(lit: &LitScene<'_>, number: usize) -> Option<Target> {
     let source = &lit.scene.sources[number];
-    lit.lanterns[number].as_ref()?;
+    lit.light_samplers[number].as_ref()?;
     let mut batch = RayBatch::default();
     source.emit(number as u64, 0..POINTS as u64, POINTS as u64, SEED, &[], &mut batch);
     let points: Vec<Vec3> = (0..batch.len)

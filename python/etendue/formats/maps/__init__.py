@@ -12,7 +12,7 @@ from etendue.formats.maps import csv, exr, hdr, npz, tiff
 from etendue.formats.maps.map_format import AnyMap, MapFormat
 from etendue.formats.output import atomic_output
 from etendue.quantities.illuminance_map import IlluminanceMap
-from etendue.quantities.luminance_map import SAVE_MAP, LuminanceMap
+from etendue.quantities.luminance_map import LuminanceMap
 
 MAP_FORMATS: dict[str, MapFormat] = {module.FORMAT.name: module.FORMAT for module in (exr, hdr, tiff, npz, csv)}
 """Every format by name."""
@@ -201,6 +201,3 @@ def save_map(lmap: AnyMap, path: str | os.PathLike[str]) -> tuple[str, ...]:
             with atomic_output(path) as temporary:
                 return candidate.write(lmap, temporary)
     raise UnknownNameError("extension of a map file", extension, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
-
-
-SAVE_MAP[:] = [save_map]

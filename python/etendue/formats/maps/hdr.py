@@ -12,7 +12,8 @@ from etendue.errors import ArgumentError, FormatError
 from etendue.formats.maps import rgbe
 from etendue.formats.maps.header import FOREIGN, MapHeader, header_text
 from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, check_room, parsing
-from etendue.quantities.luminance_map import LuminanceMap, MapValues
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.pixel_map import MapValues
 from etendue.units import RADIANCE_WHITE_EFFICACY, FluxUnit
 
 MAGIC = b"#?RADIANCE\n"

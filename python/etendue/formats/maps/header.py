@@ -16,8 +16,9 @@ from etendue.errors import FormatError
 from etendue.formats.maps.map_format import DAMAGED, AnyMap, parsing
 from etendue.formats.strict_json import strict_json
 from etendue.quantities.illuminance_map import IlluminanceMap
-from etendue.quantities.luminance_map import LuminanceMap, MapValues
+from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import MAX_PIXELS
+from etendue.quantities.pixel_map import MapValues
 from etendue.units import FLUX_UNITS, ILLUMINANCE_NAME
 
 MOST_HEADER_BYTES = 1 << 22

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.formats.maps.map_format import AnyMap
-from etendue.quantities.luminance_map import MapValues
+from etendue.quantities.pixel_map import MapValues
 
 UNKNOWN_RAYS = 2**32 - 1
 """Stands for "number of rays unknown" (-1 in a `LuminanceMap`) in a channel that has no negative numbers."""

@@ -27,10 +27,10 @@ RAYS_PER_CELL = 2048
 DRAWN = np.dtype([("position", "<f8", 3), ("direction", "<f8", 3), ("flux", "<f8")])
 """Records of rays that have none because they are drawn on demand."""
 
-PROBES = 64
+PIECES = 64
 """Places along a stream at which rays are looked at to find where they come from."""
 
-PROBE_RAYS = 1024
+PILOT_RAYS = 1024
 """Rays looked at there."""
 
 SINGULAR = 1e-6
@@ -172,10 +172,10 @@ def where_from(rays: RayStream) -> Point:
     closest together; another point makes an index slower and no less right.
     """
     source, total = rays.core_source(), len(rays)
-    count = min(PROBES, -(-total // PROBE_RAYS))
-    places = [round(i * max(total - PROBE_RAYS, 0) / max(count - 1, 1)) for i in range(count)]
-    probes = [_core.read_rays(source, at, min(at + PROBE_RAYS, total)) for at in places]
-    position, direction, flux = (np.concatenate(parts) for parts in zip(*probes, strict=True))
+    count = min(PIECES, -(-total // PILOT_RAYS))
+    places = [round(i * max(total - PILOT_RAYS, 0) / max(count - 1, 1)) for i in range(count)]
+    pieces = [_core.read_rays(source, at, min(at + PILOT_RAYS, total)) for at in places]
+    position, direction, flux = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     weight = flux if flux.any() else np.any(direction != 0.0, axis=1).astype(np.float64)
     if not weight.any():
         return (0.0, 0.0, 0.0)

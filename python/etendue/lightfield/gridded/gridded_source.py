@@ -20,7 +20,7 @@ from etendue.lightfield.gridded.pixelated import PixelatedSurface
 from etendue.lightfield.gridded.pixels import Array
 from etendue.lightfield.gridded.sampling import RECORD, sampled_records
 from etendue.lightfield.gridded.summing import summed_intensity
-from etendue.lightfield.probe import check_near_field
+from etendue.lightfield.pilot_sample import check_near_field
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.patches import Patches

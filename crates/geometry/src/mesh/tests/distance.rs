@@ -1,6 +1,9 @@
 //! The distance of a hit, against the plane's equation in twice the precision.
 
-use super::*;
+use etendue_math::Vec3;
+
+use super::super::block::longest_side;
+use super::meshes::{rays, soup};
 
 /// A number in double-double, exact to about 2⁻¹⁰⁰: the oracle of the next test.
 #[derive(Clone, Copy)]

@@ -6,8 +6,9 @@ use etendue_math::Vec3;
 
 use crate::mesh::Mesh;
 
+use super::flat::{Flat, Outline};
 use super::sample::{Outlined, integral, triangulate, twice_area};
-use super::{Flat, Outline, Shape};
+use super::surface::Shape;
 
 /// Bins of a patch, in four rows of four.
 pub const BINS: u32 = 16;

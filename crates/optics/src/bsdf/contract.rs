@@ -1,0 +1,322 @@
+//! What every BSDF answers, and in which terms.
+//!
+//! **Frame.** Directions are unit vectors in the frame of the surface, +z being the normal of its front. They point *away*
+//! from the surface: `incident` to where light comes from, `scattered` to where it goes. Light meets the front if
+//! `incident.z > 0`, and it is reflected if both heights have the same sign.
+//!
+//! **Measure.** [`evaluate`](Bsdf::evaluate) is f in 1/sr: flux Φ from `incident` leaves with the intensity Φ f |cos θₛ|
+//! `[Nicodemus1977]`. The cosine is never part of f. Light that leaves in a single direction, mirrored or refracted, has no
+//! f: it is *specular*, and the other is *diffuse* (regular and diffuse in the terms of the CIE). A BSDF says which of its
+//! components exist: [`facts`](Bsdf::facts).
+//!
+//! **Drawing.** [`sample`](Bsdf::sample) draws what becomes of a ray with the shares of its flux as probabilities, so that a
+//! ray that goes on keeps its flux. So the density of scattered directions, [`pdf`](Bsdf::pdf), is f |cos θₛ|, and its integral
+//! the diffuse share; what is missing to 1 is mirrored, refracted or absorbed. None of the methods knows a weight.
+//!
+//! **Backwards.** Who follows light from the eye knows where it goes and asks where it came from.
+//! [`seen`](Bsdf::seen) says how much of the radiance behind a mirrored or refracted line of sight is seen;
+//! [`incoming`](Bsdf::incoming), [`draw_incoming`](Bsdf::draw_incoming) and [`incoming_pdf`](Bsdf::incoming_pdf) propose
+//! directions that diffuse light may come from. Whoever takes one weighs it by f |cos θᵢ| over its density.
+
+use std::f64::consts::FRAC_1_PI;
+use std::fmt::Debug;
+
+use etendue_math::Vec3;
+use etendue_math::trig::sin_cos_turns;
+use etendue_sampling::warp::part_of;
+
+/// What lies on both sides of a surface, for light of one wavelength.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Media {
+    /// In vacuum \[nm\].
+    pub wavelength: f64,
+    /// Refractive index in front.
+    pub front: f64,
+    /// Refractive index behind.
+    pub back: f64,
+}
+
+impl Media {
+    /// The indices on the side of a direction and on the other one.
+    #[inline(always)]
+    #[must_use]
+    pub fn seen_from(&self, direction: Vec3) -> [f64; 2] {
+        if direction.z > 0.0 {
+            [self.front, self.back]
+        } else {
+            [self.back, self.front]
+        }
+    }
+}
+
+/// A component of the light that leaves a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Component {
+    /// Mirrored (`false`), or refracted by Snell's law, which is straight on between equal media (`true`).
+    Specular(bool),
+    /// Scattered back (`false`), or to the other side (`true`).
+    Diffuse(bool),
+}
+
+impl Component {
+    /// In the order in which they are drawn.
+    pub const ALL: [Self; 4] = [
+        Self::Specular(false),
+        Self::Specular(true),
+        Self::Diffuse(false),
+        Self::Diffuse(true),
+    ];
+
+    /// Whether the light goes on in a single direction.
+    #[must_use]
+    pub const fn is_specular(self) -> bool {
+        matches!(self, Self::Specular(_))
+    }
+
+    /// Whether the light passes to the other side.
+    #[must_use]
+    pub const fn is_transmitted(self) -> bool {
+        matches!(self, Self::Specular(true) | Self::Diffuse(true))
+    }
+}
+
+/// Shares of the arriving flux that leave, reflected and transmitted; what they lack to 1 is absorbed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Shares {
+    /// In a single direction.
+    pub specular: [f64; 2],
+    /// In all directions of a side: the directional-hemispherical shares.
+    pub diffuse: [f64; 2],
+    /// Cosine of the angle of refraction: 0 if the light is totally reflected.
+    pub refraction: f64,
+}
+
+impl Shares {
+    /// Of all components together.
+    #[inline]
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        self.specular[0] + self.specular[1] + self.diffuse[0] + self.diffuse[1]
+    }
+
+    /// In the order of [`Component::ALL`].
+    #[inline(always)]
+    #[must_use]
+    pub const fn in_order(&self) -> [f64; 4] {
+        [self.specular[0], self.specular[1], self.diffuse[0], self.diffuse[1]]
+    }
+
+    /// The component that a number from 0 to 1 picks by the shares; None: absorbed. What is left of the number when that is
+    /// known is again spread evenly from 0 to 1.
+    #[inline]
+    #[must_use]
+    pub fn pick(&self, number: f64) -> Option<(Component, f64)> {
+        let shares = self.in_order();
+        let mut sum = 0.0;
+        for (share, component) in shares.iter().zip(Component::ALL) {
+            if number < sum + share {
+                return Some((component, part_of(number - sum, *share)));
+            }
+            sum += share;
+        }
+        // Shares that should add up to 1 may fall short of it by rounding.
+        (sum >= 1.0 - 1e-12).then(|| {
+            let last = shares.iter().rposition(|share| *share > 0.0).unwrap_or(0);
+            (Component::ALL[last], 0.5)
+        })
+    }
+}
+
+/// What holds for a BSDF at all angles and wavelengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facts {
+    /// Whether light may be mirrored, and refracted.
+    pub specular: [bool; 2],
+    /// Whether light may be scattered back, and to the other side.
+    pub diffuse: [bool; 2],
+    /// Whether scattered light leaves each side with the same luminance in all directions, wherever it came from (Lambert).
+    pub lambertian: bool,
+    /// Whether light that comes back along its way has the same shares and f/n², n being the index where it leaves
+    /// (Helmholtz), between any two media.
+    pub reciprocal: bool,
+    /// The shares, in the order of [`Component::ALL`], if they are the same at all angles and wavelengths, total reflection
+    /// apart.
+    pub constant: Option<[f64; 4]>,
+    /// Whether it is an interface of the media on both sides, with Fresnel's shares.
+    pub fresnel: bool,
+}
+
+impl Facts {
+    /// Whether any light is scattered.
+    #[must_use]
+    pub const fn is_diffuse(&self) -> bool {
+        self.diffuse[0] || self.diffuse[1]
+    }
+
+    /// Whether any light is mirrored or refracted.
+    #[must_use]
+    pub const fn is_specular(&self) -> bool {
+        self.specular[0] || self.specular[1]
+    }
+}
+
+/// What is drawn of a ray at a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drawn {
+    /// It is absorbed.
+    Absorbed,
+    /// It is mirrored.
+    Mirrored,
+    /// It is refracted; the cosine of the angle of refraction.
+    Refracted(f64),
+    /// It is scattered in a direction.
+    Scattered(Vec3),
+}
+
+/// Optical properties of a surface: the bidirectional scattering distribution function and the specular components beside it.
+pub trait Bsdf: Debug + Send + Sync {
+    /// What holds at all angles and wavelengths.
+    fn facts(&self) -> &Facts;
+
+    /// The shares of light from `incident`.
+    fn shares(&self, incident: Vec3, media: &Media) -> Shares;
+
+    /// f \[1/sr\] of the diffuse components; 0 for directions that it never scatters to.
+    fn evaluate(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64;
+
+    /// A direction of diffuse light on one side, from two numbers from 0 to 1: with density f |cos θₛ| over its share, which is
+    /// not 0.
+    fn draw(&self, incident: Vec3, transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3;
+
+    /// Whether light passes as if nothing were there.
+    fn is_nothing(&self, _media: &Media) -> bool {
+        false
+    }
+
+    /// Angles \[rad\] and wavelengths \[nm\] between which the shares are bilinear and beyond which they do not change; None if
+    /// they are not of that kind.
+    fn breakpoints(&self) -> Option<[Vec<f64>; 2]> {
+        None
+    }
+
+    /// Density \[1/sr\] of scattered directions.
+    #[inline]
+    fn pdf(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {
+        self.evaluate(incident, scattered, media) * scattered.z.abs()
+    }
+
+    /// What becomes of a ray, from two numbers from 0 to 1: the first decides between the components and, with what is left of
+    /// it, how far from the normal light is scattered.
+    #[inline]
+    fn sample(&self, incident: Vec3, media: &Media, numbers: [f64; 2]) -> Drawn {
+        let shares = self.shares(incident, media);
+        match shares.pick(numbers[0]) {
+            None => Drawn::Absorbed,
+            Some((Component::Specular(false), _)) => Drawn::Mirrored,
+            Some((Component::Specular(true), _)) => Drawn::Refracted(shares.refraction),
+            Some((Component::Diffuse(transmitted), rest)) => {
+                Drawn::Scattered(self.draw(incident, transmitted, media, [rest, numbers[1]]))
+            }
+        }
+    }
+
+    /// Shares of the radiance along the mirrored and the refracted line that is seen by who looks along −`towards`; and the
+    /// shares of light from `towards`.
+    ///
+    /// Light that is transmitted to the eye arrives on the other side, at the angle of refraction, and its radiance grows by
+    /// (n₁/n₂)² on its way from a medium of index n₂ into one of n₁.
+    #[inline]
+    fn seen(&self, towards: Vec3, media: &Media) -> ([f64; 2], Shares) {
+        let shares = self.shares(towards, media);
+        let [mirrored, mut refracted] = shares.specular;
+        if refracted > 0.0 {
+            let [n1, n2] = media.seen_from(towards);
+            let ratio = n1 / n2;
+            if !self.facts().reciprocal {
+                let height = -shares.refraction.copysign(towards.z);
+                let there = Vec3::new(-ratio * towards.x, -ratio * towards.y, height);
+                refracted = self.shares(there, media).specular[1];
+            }
+            refracted *= ratio * ratio;
+        }
+        ([mirrored, refracted], shares)
+    }
+
+    /// How much diffuse light that leaves along `scattered` may have come from its own side and from the other one, whatever its
+    /// direction there: not 0 where there may be any.
+    fn incoming(&self, scattered: Vec3, media: &Media) -> [f64; 2];
+
+    /// A direction that light may have come from, on the side of `scattered` or on the other one.
+    #[inline]
+    fn draw_incoming(&self, scattered: Vec3, transmitted: bool, _media: &Media, numbers: [f64; 2]) -> Vec3 {
+        by_cosine((scattered.z > 0.0) != transmitted, numbers)
+    }
+
+    /// Density \[1/sr\] of [`draw_incoming`](Bsdf::draw_incoming) on the side of `incident`.
+    #[inline]
+    fn incoming_pdf(&self, incident: Vec3, _scattered: Vec3, _media: &Media) -> f64 {
+        incident.z.abs() * FRAC_1_PI
+    }
+}
+
+/// A direction in front of a surface or behind it with density |cos θ|/π, from two numbers.
+#[inline(always)]
+#[must_use]
+pub fn by_cosine(front: bool, [height, turn]: [f64; 2]) -> Vec3 {
+    let cosine = (1.0 - height).sqrt();
+    let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
+    let (s, c) = sin_cos_turns(turn);
+    Vec3::new(sine * c, sine * s, if front { cosine } else { -cosine })
+}
+
+/// Some of a kind, for the tests of all kinds.
+#[cfg(test)]
+pub trait Examples: Bsdf + Sized + 'static {
+    /// With all that they can be: constant, dependent on angle, black.
+    fn examples() -> Vec<Self>;
+
+    /// The same, by the name of their file and their number.
+    fn named(file: &str) -> Vec<(String, std::sync::Arc<dyn Bsdf>)> {
+        let each = Self::examples().into_iter().enumerate();
+        each.map(|(number, bsdf)| (format!("{file} {number}"), std::sync::Arc::new(bsdf) as _))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn components_are_picked_by_their_shares_and_the_rest_is_absorbed() {
+        let shares = Shares {
+            specular: [0.1, 0.2],
+            diffuse: [0.3, 0.15],
+            refraction: 1.0,
+        };
+        let n = 100_000;
+        let (mut counts, mut rests) = ([0; 5], [0.0; 5]);
+        for k in 0..n {
+            let picked = shares.pick((f64::from(k) + 0.5) / f64::from(n));
+            let place = picked.map_or(4, |(c, _)| Component::ALL.iter().position(|m| *m == c).expect("known"));
+            rests[place] += picked.map_or(0.0, |(_, rest)| rest);
+            assert!(picked.is_none_or(|(_, rest)| (0.0..1.0).contains(&rest)));
+            counts[place] += 1;
+        }
+        assert_eq!(counts, [10_000, 20_000, 30_000, 15_000, 25_000]);
+        // What is left of the number is even in each of them.
+        for (rest, count) in rests.iter().zip(counts).take(4) {
+            assert!((rest / f64::from(count) - 0.5).abs() < 1e-4, "{rest}");
+        }
+    }
+
+    #[test]
+    fn shares_of_1_leave_no_number_unused() {
+        let shares = Shares {
+            specular: [0.1, 0.2],
+            diffuse: [0.3, 0.4 - 1e-16],
+            refraction: 1.0,
+        };
+        assert!(shares.pick(1.0 - f64::EPSILON / 2.0).is_some());
+    }
+}

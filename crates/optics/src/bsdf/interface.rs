@@ -1,0 +1,60 @@
+//! A smooth interface of two media: Fresnel's equations.
+
+use etendue_math::Vec3;
+
+use super::contract::{Bsdf, Facts, Media, Shares};
+use crate::fresnel::fresnel;
+
+/// A smooth interface of the media on both sides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interface;
+
+const FACTS: Facts = Facts {
+    specular: [true; 2],
+    diffuse: [false; 2],
+    lambertian: true,
+    reciprocal: true,
+    constant: None,
+    fresnel: true,
+};
+
+impl Bsdf for Interface {
+    fn facts(&self) -> &Facts {
+        &FACTS
+    }
+
+    #[inline]
+    fn shares(&self, incident: Vec3, media: &Media) -> Shares {
+        let [n1, n2] = media.seen_from(incident);
+        let f = fresnel(incident.z.abs(), n1, n2);
+        Shares {
+            specular: [f.reflectance, 1.0 - f.reflectance],
+            diffuse: [0.0; 2],
+            refraction: f.cosine,
+        }
+    }
+
+    fn evaluate(&self, _incident: Vec3, _scattered: Vec3, _media: &Media) -> f64 {
+        0.0
+    }
+
+    fn draw(&self, incident: Vec3, transmitted: bool, _media: &Media, _numbers: [f64; 2]) -> Vec3 {
+        // Never asked for: its diffuse shares are 0.
+        if transmitted { -incident } else { incident }
+    }
+
+    fn is_nothing(&self, media: &Media) -> bool {
+        media.front == media.back
+    }
+
+    fn incoming(&self, _scattered: Vec3, _media: &Media) -> [f64; 2] {
+        [0.0; 2]
+    }
+}
+
+#[cfg(test)]
+impl super::contract::Examples for Interface {
+    fn examples() -> Vec<Self> {
+        vec![Self]
+    }
+}

@@ -1,0 +1,243 @@
+//! Several BSDFs at once, each with its part: diffuse + specular paint, a coat with holes.
+
+use std::sync::Arc;
+
+use etendue_math::Vec3;
+use etendue_sampling::warp::part_of;
+
+use super::contract::{Bsdf, Facts, Media, Shares};
+use super::lambertian::Lambertian;
+use super::mirror::Mirror;
+use crate::table::Table;
+
+/// A sum of BSDFs, each times a weight.
+#[derive(Clone, Debug)]
+pub struct Mixture {
+    members: Vec<(f64, Arc<dyn Bsdf>)>,
+    facts: Facts,
+}
+
+/// What shares may exceed 1 by, for rounding.
+const SLACK: f64 = 1e-9;
+
+impl Mixture {
+    /// None if a weight is negative or not finite, or if more light may leave than arrives: that is known if the weights are 1
+    /// together at most, or if the shares of all members are tables.
+    #[must_use]
+    pub fn new(members: Vec<(f64, Arc<dyn Bsdf>)>) -> Option<Self> {
+        if !members.iter().all(|(weight, _)| *weight >= 0.0 && weight.is_finite()) {
+            return None;
+        }
+        let each: Vec<(f64, Facts)> = members.iter().map(|(weight, bsdf)| (*weight, *bsdf.facts())).collect();
+        let any = |pick: fn(&Facts) -> [bool; 2]| {
+            std::array::from_fn(|side| each.iter().any(|(weight, facts)| *weight > 0.0 && pick(facts)[side]))
+        };
+        let constant = each.iter().try_fold([0.0; 4], |mut sum, (weight, facts)| {
+            for (sum, share) in sum.iter_mut().zip(facts.constant?) {
+                *sum += weight * share;
+            }
+            Some(sum)
+        });
+        let facts = Facts {
+            specular: any(|facts| facts.specular),
+            diffuse: any(|facts| facts.diffuse),
+            lambertian: each.iter().all(|(_, facts)| facts.lambertian),
+            reciprocal: each.iter().all(|(_, facts)| facts.reciprocal),
+            constant,
+            fresnel: false,
+        };
+        let mixture = Self { members, facts };
+        mixture.is_sound().then_some(mixture)
+    }
+
+    /// Of mirrored and refracted, scattered and through-scattered light by their shares; None if a share is negative or they exceed 1 together.
+    #[must_use]
+    pub fn of_shares(specular: [Table; 2], diffuse: [Table; 2]) -> Option<Arc<dyn Bsdf>> {
+        let has = |tables: &[Table; 2]| !tables.iter().all(Table::is_zero);
+        let both = has(&specular) && has(&diffuse);
+        let mirror = has(&specular);
+        let [r, t] = specular;
+        let specular = Mirror::new(r, t)?;
+        let [r, t] = diffuse;
+        let diffuse = Lambertian::new(r, t)?;
+        Some(if both {
+            let members: [Arc<dyn Bsdf>; 2] = [Arc::new(specular), Arc::new(diffuse)];
+            Arc::new(Self::new(members.map(|member| (1.0, member)).to_vec())?)
+        } else if mirror {
+            Arc::new(specular)
+        } else {
+            Arc::new(diffuse)
+        })
+    }
+
+    fn is_sound(&self) -> bool {
+        if self.members.iter().map(|(weight, _)| weight).sum::<f64>() <= 1.0 + SLACK {
+            return true;
+        }
+        // Sums of bilinear functions are extreme at the breakpoints of any of them.
+        self.breakpoints().is_some_and(|[angles, wavelengths]| {
+            angles.iter().all(|angle| {
+                wavelengths.iter().all(|wavelength| {
+                    let media = Media {
+                        wavelength: *wavelength,
+                        front: 1.0,
+                        back: 1.0,
+                    };
+                    let incident = Vec3::new(angle.sin(), 0.0, angle.cos());
+                    self.shares(incident, &media).total() <= 1.0 + SLACK
+                })
+            })
+        })
+    }
+}
+
+impl Bsdf for Mixture {
+    fn facts(&self) -> &Facts {
+        &self.facts
+    }
+
+    #[inline]
+    fn shares(&self, incident: Vec3, media: &Media) -> Shares {
+        if let (Some([mirrored, 0.0, back, through]), cosine) = (self.facts.constant, incident.z.abs()) {
+            return Shares {
+                specular: [mirrored, 0.0],
+                diffuse: [back, through],
+                refraction: cosine,
+            };
+        }
+        let mut all = Shares {
+            refraction: incident.z.abs(),
+            ..Shares::default()
+        };
+        for (weight, bsdf) in &self.members {
+            let own = bsdf.shares(incident, media);
+            for side in 0..2 {
+                all.specular[side] += weight * own.specular[side];
+                all.diffuse[side] += weight * own.diffuse[side];
+            }
+            if own.specular[1] > 0.0 {
+                all.refraction = own.refraction;
+            }
+        }
+        all
+    }
+
+    fn evaluate(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {
+        let own = |(weight, bsdf): &(f64, Arc<dyn Bsdf>)| weight * bsdf.evaluate(incident, scattered, media);
+        self.members.iter().map(own).sum()
+    }
+
+    fn draw(&self, incident: Vec3, transmitted: bool, media: &Media, [which, turn]: [f64; 2]) -> Vec3 {
+        let side = usize::from(transmitted);
+        let share = |(weight, bsdf): &(f64, Arc<dyn Bsdf>)| weight * bsdf.shares(incident, media).diffuse[side];
+        let (member, rest) = pick(&self.members, share, which);
+        member.draw(incident, transmitted, media, [rest, turn])
+    }
+
+    fn is_nothing(&self, media: &Media) -> bool {
+        let counts = |member: &&(f64, Arc<dyn Bsdf>)| member.0 > 0.0;
+        let whole = self.members.iter().map(|(weight, _)| weight).sum::<f64>() == 1.0;
+        whole
+            && self
+                .members
+                .iter()
+                .filter(counts)
+                .all(|(_, bsdf)| bsdf.is_nothing(media))
+    }
+
+    fn breakpoints(&self) -> Option<[Vec<f64>; 2]> {
+        let mut all = [Vec::new(), Vec::new()];
+        for (_, bsdf) in &self.members {
+            for (all, own) in all.iter_mut().zip(bsdf.breakpoints()?) {
+                all.extend(own);
+            }
+        }
+        Some(all)
+    }
+
+    fn incoming(&self, scattered: Vec3, media: &Media) -> [f64; 2] {
+        let mut all = [0.0; 2];
+        for (weight, bsdf) in &self.members {
+            let own = bsdf.incoming(scattered, media);
+            all = [all[0] + weight * own[0], all[1] + weight * own[1]];
+        }
+        all
+    }
+
+    fn draw_incoming(&self, scattered: Vec3, transmitted: bool, media: &Media, [which, turn]: [f64; 2]) -> Vec3 {
+        let side = usize::from(transmitted);
+        let share = |(weight, bsdf): &(f64, Arc<dyn Bsdf>)| weight * bsdf.incoming(scattered, media)[side];
+        let (member, rest) = pick(&self.members, share, which);
+        member.draw_incoming(scattered, transmitted, media, [rest, turn])
+    }
+
+    fn incoming_pdf(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {
+        let side = usize::from((incident.z > 0.0) != (scattered.z > 0.0));
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (weight, bsdf) in &self.members {
+            let share = weight * bsdf.incoming(scattered, media)[side];
+            if share > 0.0 {
+                sum += share * bsdf.incoming_pdf(incident, scattered, media);
+                total += share;
+            }
+        }
+        if total > 0.0 { sum / total } else { 0.0 }
+    }
+}
+
+/// The member that a number from 0 to 1 picks by shares, and what is left of the number.
+fn pick(
+    members: &[(f64, Arc<dyn Bsdf>)],
+    share: impl Fn(&(f64, Arc<dyn Bsdf>)) -> f64,
+    number: f64,
+) -> (&dyn Bsdf, f64) {
+    let shares = members.iter().map(&share);
+    let possible = || members.iter().zip(shares.clone()).filter(|(_, share)| *share > 0.0);
+    if let (Some((only, _)), 1) = (possible().next(), possible().count()) {
+        return (&*only.1, number);
+    }
+    let mut left = number * possible().map(|(_, share)| share).sum::<f64>();
+    let mut last = (&*members[0].1, number);
+    for (member, share) in possible() {
+        last = (&*member.1, part_of(left, share));
+        if left < share {
+            break;
+        }
+        left -= share;
+    }
+    last
+}
+
+#[cfg(test)]
+impl super::contract::Examples for Mixture {
+    fn examples() -> Vec<Self> {
+        use super::interface::Interface;
+
+        let table = |a: f64, b: f64| Table::new(vec![0.0, 1.5], vec![500.0], vec![a, b]).expect("sound");
+        let mirror = |r, t| Arc::new(Mirror::new(r, t).expect("at most 1")) as Arc<dyn Bsdf>;
+        let diffuse = |r, t| Arc::new(Lambertian::new(r, t).expect("at most 1")) as Arc<dyn Bsdf>;
+        let constant = Table::constant;
+        [
+            // Diffuse + specular, of constant shares and of tables; three diffuse ones; a scattering film on glass with gaps.
+            vec![
+                (1.0, mirror(constant(0.05), constant(0.0))),
+                (1.0, diffuse(constant(0.9), constant(0.0))),
+            ],
+            vec![
+                (1.0, mirror(table(0.1, 0.6), table(0.1, 0.0))),
+                (1.0, diffuse(table(0.5, 0.2), table(0.3, 0.1))),
+            ],
+            vec![
+                (0.5, diffuse(constant(0.9), constant(0.0))),
+                (0.2, diffuse(constant(0.1), constant(0.9))),
+                (0.3, diffuse(table(0.5, 0.2), table(0.3, 0.1))),
+            ],
+            vec![
+                (0.4, Arc::new(Interface) as Arc<dyn Bsdf>),
+                (0.6, diffuse(constant(0.3), constant(0.6))),
+            ],
+        ]
+        .map(|members| Self::new(members).expect("at most 1"))
+        .to_vec()
+    }
+}

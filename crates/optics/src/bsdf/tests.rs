@@ -1,0 +1,425 @@
+//! What holds for every kind of BSDF, tested for all of them.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use etendue_math::Vec3;
+use etendue_sampling::philox::Stream;
+
+use super::contract::{Bsdf, Drawn, Examples, Media};
+use super::interface::Interface;
+use super::kinds;
+use super::lambertian::Lambertian;
+use super::mirror::Mirror;
+use super::mixture::Mixture;
+
+/// Equal media, and others: less in front, more in front.
+const MEDIA: [Media; 3] = [
+    Media {
+        wavelength: 555.0,
+        front: 1.0,
+        back: 1.0,
+    },
+    Media {
+        wavelength: 450.0,
+        front: 1.0,
+        back: 1.5,
+    },
+    Media {
+        wavelength: 700.0,
+        front: 1.6,
+        back: 1.1,
+    },
+];
+
+/// Heights of directions in front of a surface and behind it: along the normal, between, grazing.
+const HEIGHTS: [f64; 10] = [1.0, -1.0, 0.9, -0.8, 0.5, -0.4, 0.1, -0.05, 1e-6, -1e-6];
+
+fn direction(height: f64, turn: f64) -> Vec3 {
+    let across = ((1.0 - height) * (1.0 + height)).sqrt();
+    let (s, c) = (2.0 * PI * turn).sin_cos();
+    Vec3::new(across * c, across * s, height)
+}
+
+/// Every example in all media, with all directions.
+fn every(mut check: impl FnMut(&str, &dyn Bsdf, &Media, Vec3)) {
+    let mut count = 0;
+    for (name, bsdf) in kinds().iter().flatten() {
+        for media in &MEDIA {
+            for (number, height) in HEIGHTS.into_iter().enumerate() {
+                check(name, &**bsdf, media, direction(height, 0.137 * number as f64));
+                count += 1;
+            }
+        }
+    }
+    assert!(count >= 4 * MEDIA.len() * HEIGHTS.len());
+}
+
+/// Cells of a hemisphere: bands of height, sectors of azimuth.
+const BANDS: usize = 6;
+const SECTORS: usize = 8;
+
+/// The mean of a function over a cell, times the solid angle of the cell.
+fn integral(front: bool, band: usize, sector: usize, fine: usize, f: impl Fn(Vec3) -> f64) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..fine {
+        for k in 0..fine {
+            let part = |n: usize| (n as f64 + 0.5) / fine as f64;
+            let height = (band as f64 + part(i)) / BANDS as f64;
+            let turn = (sector as f64 + part(k)) / SECTORS as f64;
+            sum += f(direction(if front { height } else { -height }, turn));
+        }
+    }
+    sum * 2.0 * PI / ((BANDS * SECTORS * fine * fine) as f64)
+}
+
+/// The integrals over all cells, those of the front first.
+fn integrals(fine: usize, f: impl Fn(Vec3) -> f64) -> Vec<f64> {
+    let cells = (0..2 * BANDS * SECTORS).map(|cell| {
+        let (side, rest) = (cell / (BANDS * SECTORS), cell % (BANDS * SECTORS));
+        integral(side == 0, rest / SECTORS, rest % SECTORS, fine, &f)
+    });
+    cells.collect()
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "small numbers that are not negative"
+)]
+fn cell_of(d: Vec3) -> usize {
+    let band = ((d.z.abs() * BANDS as f64) as usize).min(BANDS - 1);
+    let turn = (d.y.atan2(d.x) / (2.0 * PI)).rem_euclid(1.0);
+    let sector = ((turn * SECTORS as f64) as usize).min(SECTORS - 1);
+    (if d.z > 0.0 { 0 } else { BANDS * SECTORS }) + band * SECTORS + sector
+}
+
+/// χ² of counts against their expectations, as a normal deviate (Wilson and Hilferty), cells of less than 8 taken together.
+///
+/// Counts where nothing is expected are an infinite one.
+fn deviate(counts: &[u64], expected: &[f64]) -> f64 {
+    assert_eq!(counts.len(), expected.len());
+    let (mut sum, mut cells, mut few) = (0.0, 0, (0.0, 0.0));
+    for (count, mean) in counts.iter().zip(expected) {
+        if *mean < 1e-9 && *count > 0 {
+            return f64::INFINITY;
+        }
+        if *mean < 8.0 {
+            few = (few.0 + *count as f64, few.1 + mean);
+        } else {
+            sum += (*count as f64 - mean).powi(2) / mean;
+            cells += 1;
+        }
+    }
+    if few.1 >= 1.0 {
+        sum += (few.0 - few.1) * (few.0 - few.1) / few.1;
+        cells += 1;
+    }
+    if cells < 2 {
+        return 0.0;
+    }
+    let free = f64::from(cells - 1);
+    let spread = 2.0 / (9.0 * free);
+    ((sum / free).cbrt() - (1.0 - spread)) / spread.sqrt()
+}
+
+/// One in 2·10⁵ deviates is above: one in a few hundred runs of all tests here.
+const CRITICAL: f64 = 4.42;
+
+const DRAWN: u64 = 20_000;
+
+#[test]
+fn samples_have_their_shares_and_density() {
+    let mut stream = 0;
+    every(|name, bsdf, media, incident| {
+        stream += 1;
+        let numbers = Stream::new(11, stream);
+        let mut expected = integrals(12, |d| bsdf.pdf(incident, d, media));
+        let shares = bsdf.shares(incident, media);
+        expected.extend([1.0 - shares.total(), shares.specular[0], shares.specular[1]]);
+        let others = expected.len() - 3;
+        let mut counts = vec![0_u64; expected.len()];
+        for i in 0..DRAWN {
+            let [a, b, ..] = numbers.uniforms(i, 0);
+            let cell = match bsdf.sample(incident, media, [a, b]) {
+                Drawn::Absorbed => others,
+                Drawn::Mirrored => others + 1,
+                Drawn::Refracted(cosine) => {
+                    assert!(cosine > 0.0 && cosine == shares.refraction, "{name}");
+                    others + 2
+                }
+                Drawn::Scattered(d) => {
+                    assert!((d.length() - 1.0).abs() < 1e-12, "{name}: {d:?}");
+                    assert!(
+                        bsdf.pdf(incident, d, media) > 0.0,
+                        "{name}: drawn where the density is 0, {d:?}"
+                    );
+                    cell_of(d)
+                }
+            };
+            counts[cell] += 1;
+        }
+        let expected: Vec<f64> = expected.iter().map(|p| p.max(0.0) * DRAWN as f64).collect();
+        let z = deviate(&counts, &expected);
+        assert!(z < CRITICAL, "{name}, {media:?}, {incident:?}: {z}");
+    });
+}
+
+#[test]
+fn a_density_that_is_wrong_is_seen() {
+    // The test above, with a share of 3 % moved from one side of the normal to the other.
+    let bsdf = Lambertian::examples().remove(0);
+    let incident = direction(0.5, 0.1);
+    let mut expected = integrals(12, |d| bsdf.pdf(incident, d, &MEDIA[0]));
+    for (cell, p) in expected.iter_mut().enumerate() {
+        *p *= if cell % SECTORS < SECTORS / 2 { 1.06 } else { 0.94 } * DRAWN as f64;
+    }
+    let numbers = Stream::new(11, 1);
+    let mut counts = vec![0; expected.len()];
+    for i in 0..DRAWN {
+        let [a, b, ..] = numbers.uniforms(i, 0);
+        if let Drawn::Scattered(d) = bsdf.sample(incident, &MEDIA[0], [a, b]) {
+            counts[cell_of(d)] += 1;
+        }
+    }
+    assert!(deviate(&counts, &expected) > CRITICAL);
+}
+
+#[test]
+fn the_density_integrates_to_the_shares_and_energy_is_kept() {
+    every(|name, bsdf, media, incident| {
+        let shares = bsdf.shares(incident, media);
+        let parts = integrals(24, |d| bsdf.pdf(incident, d, media));
+        let (front, back) = parts.split_at(BANDS * SECTORS);
+        let [front, back]: [f64; 2] = [front, back].map(|side| side.iter().sum());
+        let found = if incident.z > 0.0 { [front, back] } else { [back, front] };
+        for side in 0..2 {
+            assert!(
+                (found[side] - shares.diffuse[side]).abs() < 1e-6,
+                "{name}, {media:?}, {incident:?}: {found:?} of {shares:?}"
+            );
+        }
+        assert!(
+            shares.in_order().iter().all(|share| *share >= 0.0) && shares.total() <= 1.0 + 1e-9,
+            "{name}"
+        );
+    });
+}
+
+#[test]
+fn facts_are_true() {
+    let mut some = [false; 4];
+    for (name, bsdf) in kinds().iter().flatten() {
+        let facts = bsdf.facts();
+        let mut met = [false; 4];
+        let mut kept = true;
+        for media in &MEDIA {
+            for height in HEIGHTS {
+                let incident = direction(height, 0.3);
+                let shares = bsdf.shares(incident, media);
+                for (met, share) in met.iter_mut().zip(shares.in_order()) {
+                    *met |= share > 0.0;
+                }
+                // Total reflection is no matter of the BSDF.
+                let constant = facts.constant.unwrap_or_default();
+                let total = shares.specular[1] == 0.0 && constant[1] > 0.0;
+                kept &= total || shares.in_order() == constant;
+                let one = bsdf.evaluate(incident, direction(0.3, 0.1), media);
+                let other = bsdf.evaluate(incident, direction(0.9, 0.7), media);
+                assert!(!facts.lambertian || one == other, "{name}");
+            }
+        }
+        // A mirror of a glass may reflect by total reflection alone.
+        let stated = [facts.specular, facts.diffuse].concat();
+        assert!(
+            (0..4).all(|k| stated[k] == met[k] || (k == 0 && stated[1])),
+            "{name}: {stated:?}, {met:?}"
+        );
+        assert!(facts.constant.is_none() || kept, "{name}");
+        for (k, fact) in [
+            facts.is_specular(),
+            facts.is_diffuse(),
+            facts.reciprocal,
+            !facts.reciprocal,
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            some[k] |= fact;
+        }
+    }
+    assert_eq!(some, [true; 4]);
+}
+
+/// The largest relative difference between f/n² there and back, and between the refracted shares there and back.
+fn irreciprocity(bsdf: &dyn Bsdf) -> f64 {
+    let mut worst: f64 = 0.0;
+    let difference = |a: f64, b: f64| {
+        if a == b {
+            0.0
+        } else {
+            (a - b).abs() / a.abs().max(b.abs())
+        }
+    };
+    for media in &MEDIA {
+        let n2 = |d: Vec3| media.seen_from(d)[0].powi(2);
+        for (a, b) in HEIGHTS.iter().flat_map(|a| HEIGHTS.iter().map(move |b| (*a, *b))) {
+            let (a, b) = (direction(a, 0.1), direction(b, 0.45));
+            let [there, back] = [(a, b), (b, a)].map(|(from, to)| bsdf.evaluate(from, to, media) / n2(to));
+            worst = worst.max(difference(there, back));
+        }
+        for height in HEIGHTS.into_iter().filter(|h| h.abs() > 0.01) {
+            let towards = direction(height, 0.0);
+            let shares = bsdf.shares(towards, media);
+            if shares.refraction > 0.0 && shares.specular[1] > 0.0 {
+                let there = direction(-shares.refraction.copysign(height), 0.5);
+                let back = bsdf.shares(there, media);
+                worst = worst.max(difference(shares.specular[1], back.specular[1]));
+            }
+        }
+    }
+    worst
+}
+
+#[test]
+fn light_goes_back_as_it_came_or_the_exception_is_declared() {
+    for (name, bsdf) in kinds().iter().flatten() {
+        let worst = irreciprocity(&**bsdf);
+        if bsdf.facts().reciprocal {
+            assert!(worst < 1e-9, "{name}: {worst}");
+        } else {
+            assert!(
+                worst > 1e-3,
+                "{name} declares an exception that it does not make: {worst}"
+            );
+        }
+    }
+}
+
+#[test]
+fn in_a_furnace_one_sees_what_would_be_absorbed_missing() {
+    // Surroundings of luminance n² on both sides. Who looks at a surface sees n² of his side times 1 − what it absorbs of light
+    // from his eye, by Kirchhoff's law, which holds where light goes back as it came.
+    let mut looked = 0;
+    every(|name, bsdf, media, towards| {
+        let n2 = |d: Vec3| media.seen_from(d)[0].powi(2);
+        let (seen, shares) = bsdf.seen(towards, media);
+        let scattered = integrals(12, |k| bsdf.evaluate(k, towards, media) * k.z.abs() * n2(k));
+        let all = seen[0] * n2(towards) + seen[1] * n2(-towards) + scattered.iter().sum::<f64>();
+        if bsdf.facts().reciprocal {
+            looked += 1;
+            assert!(
+                (all / n2(towards) - shares.total()).abs() < 1e-6,
+                "{name}, {media:?}, {towards:?}: {all}"
+            );
+        } else {
+            assert!(all.is_finite() && all >= 0.0, "{name}");
+        }
+    });
+    assert!(looked > 100);
+}
+
+#[test]
+fn refracted_radiance_of_an_exception_is_that_of_light_from_there() {
+    let part = |a, b| crate::table::Table::new(vec![0.0, 1.5], vec![500.0], vec![a, b]).expect("sound");
+    let bsdf = Mirror::new(part(0.0, 0.0), part(0.9, 0.1)).expect("at most 1");
+    let media = MEDIA[1];
+    // Seen from the air at 40°; the light comes through glass at 25.37°, where the table says 0.9 − 0.8 · θ/1.5.
+    let (seen, _) = bsdf.seen(direction(40_f64.to_radians().cos(), 0.2), &media);
+    let inside = (40_f64.to_radians().sin() / 1.5).asin();
+    assert!((seen[1] - (0.9 - 0.8 * inside / 1.5) / 2.25).abs() < 1e-12);
+}
+
+#[test]
+fn directions_that_light_may_come_from_are_drawn_with_their_density_and_none_is_left_out() {
+    let mut stream = 0;
+    every(|name, bsdf, media, scattered| {
+        stream += 1;
+        let chances = bsdf.incoming(scattered, media);
+        let whole = |d: Vec3| {
+            let transmitted = (d.z > 0.0) != (scattered.z > 0.0);
+            let chance = chances[usize::from(transmitted)];
+            if chance > 0.0 {
+                bsdf.incoming_pdf(d, scattered, media)
+            } else {
+                0.0
+            }
+        };
+        let expected = integrals(12, whole);
+        for (side, chance) in chances.into_iter().enumerate().filter(|(_, chance)| *chance > 0.0) {
+            let front = (scattered.z > 0.0) == (side == 0);
+            let half = if front {
+                0..BANDS * SECTORS
+            } else {
+                BANDS * SECTORS..2 * BANDS * SECTORS
+            };
+            let sum: f64 = expected[half.clone()].iter().sum();
+            assert!((sum - 1.0).abs() < 1e-6 && chance.is_finite(), "{name}: {sum}");
+            let numbers = Stream::new(12, stream);
+            let mut counts = vec![0; BANDS * SECTORS];
+            for i in 0..DRAWN {
+                let [a, b, ..] = numbers.uniforms(i, 0);
+                let d = bsdf.draw_incoming(scattered, side == 1, media, [a, b]);
+                assert!(
+                    (d.length() - 1.0).abs() < 1e-12 && (d.z > 0.0) == front,
+                    "{name}: {d:?}"
+                );
+                counts[cell_of(d) - half.start] += 1;
+            }
+            let expected: Vec<f64> = expected[half].iter().map(|p| p * DRAWN as f64).collect();
+            let z = deviate(&counts, &expected);
+            assert!(z < CRITICAL, "{name}, {media:?}, {scattered:?}: {z}");
+        }
+        for height in HEIGHTS {
+            let k = direction(height, 0.6);
+            assert!(
+                bsdf.evaluate(k, scattered, media) == 0.0 || whole(k) > 0.0,
+                "{name}, {k:?} is left out"
+            );
+        }
+    });
+}
+
+#[test]
+fn at_grazing_incidence_everything_is_finite_and_on_its_side() {
+    for (name, bsdf) in kinds().iter().flatten() {
+        for media in &MEDIA {
+            for height in [1e-3, 1e-9, 1e-15, f64::MIN_POSITIVE].into_iter().flat_map(|h| [h, -h]) {
+                let incident = direction(height, 0.2);
+                let shares = bsdf.shares(incident, media);
+                assert!(
+                    shares.in_order().iter().all(|s| s.is_finite() && *s >= 0.0),
+                    "{name}: {shares:?}"
+                );
+                assert!(
+                    shares.total() <= 1.0 + 1e-9 && (0.0..=1.0).contains(&shares.refraction),
+                    "{name}: {shares:?}"
+                );
+                assert!(bsdf.seen(incident, media).0.iter().all(|s| s.is_finite()), "{name}");
+                for side in [false, true] {
+                    if shares.diffuse[usize::from(side)] > 0.0 {
+                        for numbers in [[0.0, 0.0], [0.5, 0.9], [1.0 - f64::EPSILON / 2.0, 0.3]] {
+                            let d = bsdf.draw(incident, side, media, numbers);
+                            assert!((d.z > 0.0) == ((incident.z > 0.0) != side), "{name}: {d:?}");
+                            let f = bsdf.evaluate(incident, d, media);
+                            assert!(f.is_finite() && f > 0.0, "{name}: {f}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_mixture_that_sends_out_more_than_it_gets_is_refused() {
+    let table = |a: f64, b: f64| crate::table::Table::new(vec![0.0, 1.5], vec![500.0], vec![a, b]).expect("sound");
+    let zero = || crate::table::Table::constant(0.0);
+    let mirror = |a, b| Arc::new(Mirror::new(table(a, b), zero()).expect("at most 1")) as Arc<dyn Bsdf>;
+    let diffuse = |a, b| Arc::new(Lambertian::new(table(a, b), zero()).expect("at most 1")) as Arc<dyn Bsdf>;
+    assert!(Mixture::new(vec![(1.0, mirror(0.1, 0.6)), (1.0, diffuse(0.9, 0.4))]).is_some());
+    assert!(Mixture::new(vec![(1.0, mirror(0.1, 0.6)), (1.0, diffuse(0.9, 0.41))]).is_none());
+    assert!(Mixture::new(vec![(-0.1, mirror(0.1, 0.6))]).is_none());
+    assert!(Mixture::new(vec![(0.5, Arc::new(Interface)), (0.6, diffuse(0.1, 0.1))]).is_none());
+    assert!(Mixture::new(vec![(0.5, Arc::new(Interface)), (0.5, diffuse(1.0, 1.0))]).is_some());
+}

@@ -1,0 +1,255 @@
+//! Sources as they are seen: their luminance along a line, and points on them to connect to.
+
+use etendue_lightfield::field::LightField;
+use etendue_lightfield::leave::Sights;
+use etendue_math::Vec3;
+use etendue_sampling::alias::Alias;
+
+use crate::source::{Emitter, Numbers, Source};
+
+/// The share of samples that is spread evenly over a light field's surface, whatever shines there: cells are read between
+/// their centres, so that light reaches into cells that hold none.
+const EVEN: f64 = 0.1;
+
+/// Light that a line meets on a source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SourceHit {
+    /// Distance along the line \[mm\].
+    pub t: f64,
+    /// Luminance \[flux unit/(mm² sr)\].
+    pub luminance: f64,
+    /// Its standard deviation, for sources that know one.
+    pub deviation: f64,
+    /// Cosine of the angle of emission.
+    pub cosine: f64,
+    /// Density, by area, with which [`LightSample::pick`] picks this point \[1/mm²\].
+    pub density: f64,
+}
+
+/// A point of a source that a connection is made to.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// In world coordinates.
+    pub point: Vec3,
+    /// What of the source's flux the connection carries, if nothing is in between: L cos θ/(density · distance²) for a
+    /// surface, I/distance² for a point \[flux unit/mm²\], per unit of area at right angles to it.
+    pub irradiance: f64,
+    /// The same for its standard deviation.
+    pub deviation: f64,
+    /// Density of the direction by solid angle \[1/sr\]; ∞ for a point, which no other way can find.
+    pub density: f64,
+}
+
+/// A source made ready to be looked at.
+#[derive(Clone, Debug)]
+pub struct LightSampler {
+    /// For light fields: from the field's flux to the source's.
+    scale: f64,
+    /// For light fields: each part's share of the picks and its cells.
+    parts: Vec<PlaceTable>,
+}
+
+#[derive(Clone, Debug)]
+struct PlaceTable {
+    /// Of all picks.
+    share: f64,
+    cells: [usize; 2],
+    /// Of the picks of the part.
+    shares: Vec<f64>,
+    table: Alias,
+}
+
+impl LightSampler {
+    /// What has to be worked out once; None for rays, which have no luminance, and dark fields.
+    #[must_use]
+    pub fn new(source: &Source) -> Option<Self> {
+        let Emitter::Field(sampler) = &source.emitter else {
+            return (!matches!(source.emitter, Emitter::Rays { .. })).then_some(Self {
+                scale: 1.0,
+                parts: vec![],
+            });
+        };
+        let field = sampler.field();
+        let fluxes: Vec<f64> = field
+            .parts
+            .iter()
+            .map(etendue_lightfield::field::PartField::flux)
+            .collect();
+        let total: f64 = fluxes.iter().sum();
+        let parts = field.parts.iter().zip(&fluxes).map(|(part, flux)| {
+            let [n1, n2, n3, n4] = part.cells;
+            let means = part.cell_means(1);
+            let light: Vec<f64> = means
+                .chunks(n3 * n4)
+                .map(|cell| cell.iter().map(|r| r.value).sum())
+                .collect();
+            let sum: f64 = light.iter().sum();
+            let even = 1.0 / light.len() as f64;
+            let shares: Vec<f64> = light
+                .iter()
+                .map(|l| {
+                    if sum > 0.0 {
+                        (1.0 - EVEN) * l / sum + EVEN * even
+                    } else {
+                        even
+                    }
+                })
+                .collect();
+            Some(PlaceTable {
+                share: flux / total,
+                cells: [n1, n2],
+                table: Alias::new(&shares)?,
+                shares,
+            })
+        });
+        Some(Self {
+            scale: source.flux / total,
+            parts: parts.collect::<Option<Vec<_>>>()?,
+        })
+    }
+
+    /// Marks the lines of sight on which light of the source may arrive; others keep their marks.
+    pub fn mark(&self, source: &Source, sights: Sights<'_>, marks: &mut [bool]) {
+        match &source.emitter {
+            Emitter::Field(sampler) => {
+                for part in &sampler.field().parts {
+                    part.part.mark(&source.frame, sights, marks);
+                }
+            }
+            Emitter::Surface(_) => marks.fill(true),
+            Emitter::Rays { .. } | Emitter::Point(_) | Emitter::Beam(_) => {}
+        }
+    }
+
+    /// Calls `visit` for the light that travels along −`d` to `o` from points of the source at 0 < t ≤ `reach`.
+    pub fn along(&self, source: &Source, o: Vec3, d: Vec3, reach: f64, mut visit: impl FnMut(SourceHit)) {
+        let (p, k) = (source.frame.point_to_local(o), source.frame.direction_to_local(d));
+        match &source.emitter {
+            Emitter::Surface(surface) => {
+                let (shape, flipped) = surface.shape();
+                shape.crossings(p, k, [0.0, reach], &[], |crossing| {
+                    let (_, normal) = shape.settle(p + k * crossing.t, crossing.part);
+                    let cosine = if flipped { k.dot(normal) } else { -k.dot(normal) };
+                    if crossing.t > 0.0 && cosine > 0.0 {
+                        visit(SourceHit {
+                            t: crossing.t,
+                            luminance: surface.luminance(cosine) * source.flux,
+                            deviation: 0.0,
+                            cosine,
+                            density: 1.0 / surface.area(),
+                        });
+                    }
+                });
+            }
+            Emitter::Field(sampler) => {
+                for (part, table) in sampler.field().parts.iter().zip(&self.parts) {
+                    let Some((back, cosine)) = part.part.leaves(p, -k) else {
+                        continue;
+                    };
+                    if !(-reach..0.0).contains(&back) {
+                        continue;
+                    }
+                    let crossing = part.part.cross(p, -k);
+                    if crossing.met {
+                        let reading = part.at(crossing.place, crossing.direction);
+                        visit(SourceHit {
+                            t: -back,
+                            luminance: reading.value * self.scale,
+                            deviation: reading.deviation * self.scale,
+                            cosine,
+                            density: table.density(crossing.place) / part.part.area(),
+                        });
+                    }
+                }
+            }
+            Emitter::Rays { .. } | Emitter::Point(_) | Emitter::Beam(_) => {}
+        }
+    }
+
+    /// A point of the source to connect `x` to; None if it sends no light there, or cannot be connected to.
+    #[must_use]
+    pub fn pick(&self, source: &Source, x: Vec3, numbers: &mut Numbers) -> Option<LightSample> {
+        let p = source.frame.point_to_local(x);
+        match &source.emitter {
+            Emitter::Surface(surface) => {
+                if surface.turns_away_from(p) {
+                    return None;
+                }
+                let (point, normal) = surface.draw_point(numbers);
+                let (distance2, cosine) = towards(point, normal, p)?;
+                Some(LightSample {
+                    point: source.frame.point_to_world(point),
+                    irradiance: source.flux * surface.luminance(cosine) * cosine * surface.area() / distance2,
+                    deviation: 0.0,
+                    density: distance2 / (cosine * surface.area()),
+                })
+            }
+            Emitter::Field(sampler) => self.pick_field(sampler.field(), source, p, numbers),
+            Emitter::Point(point) => {
+                let distance2 = p.dot(p);
+                let irradiance = source.flux * point.intensity(p * (1.0 / distance2.sqrt())) / distance2;
+                (irradiance > 0.0 && irradiance.is_finite()).then_some(LightSample {
+                    point: source.frame.origin,
+                    irradiance,
+                    deviation: 0.0,
+                    density: f64::INFINITY,
+                })
+            }
+            Emitter::Rays { .. } | Emitter::Beam(_) => None,
+        }
+    }
+
+    fn pick_field(&self, field: &LightField, source: &Source, p: Vec3, numbers: &mut Numbers) -> Option<LightSample> {
+        let mut number = numbers.draw();
+        let last = self.parts.len() - 1;
+        let index = self.parts.iter().position(|table| {
+            number -= table.share;
+            number < 0.0
+        });
+        let index = index.unwrap_or(last);
+        let (part, table) = (&field.parts[index], &self.parts[index]);
+        let cell = table.table.pick(numbers.draw());
+        let [n1, n2] = table.cells;
+        let place = [
+            ((cell / n2) as f64 + numbers.draw()) / n1 as f64,
+            ((cell % n2) as f64 + numbers.draw()) / n2 as f64,
+        ];
+        let (point, normal) = part.part.ray(place, [0.5, 0.5]);
+        let (distance2, cosine) = towards(point, normal, p)?;
+        let crossing = part.part.cross(point, (p - point) * (1.0 / distance2.sqrt()));
+        if !crossing.met {
+            return None;
+        }
+        let reading = part.at(crossing.place, crossing.direction);
+        let density = table.density(place) / part.part.area();
+        let weight = self.scale * cosine / (distance2 * density);
+        Some(LightSample {
+            point: source.frame.point_to_world(point),
+            irradiance: reading.value * weight,
+            deviation: reading.deviation * weight,
+            density: density * distance2 / cosine,
+        })
+    }
+}
+
+/// Square of the distance to `p` and cosine of the angle of emission; None behind the surface.
+fn towards(point: Vec3, normal: Vec3, p: Vec3) -> Option<(f64, f64)> {
+    let away = p - point;
+    let distance2 = away.dot(away);
+    let cosine = away.dot(normal) / distance2.sqrt();
+    (cosine > 0.0 && distance2 > 0.0).then_some((distance2, cosine))
+}
+
+impl PlaceTable {
+    /// Density of a place by its share of the area, times that of the part.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "places lie in 0..1"
+    )]
+    fn density(&self, place: [f64; 2]) -> f64 {
+        let [n1, n2] = self.cells;
+        let at = |x: f64, n: usize| ((x * n as f64) as usize).min(n - 1);
+        self.share * self.shares[at(place[0], n1) * n2 + at(place[1], n2)] * (n1 * n2) as f64
+    }
+}

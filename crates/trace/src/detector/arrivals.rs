@@ -1,0 +1,29 @@
+//! Light that smooth surfaces send to the first diffuse one, of sources that can be seen: where it arrives, and from where.
+
+use super::kind::{Kind, Recorded, Scatter, Wants};
+use crate::guide::Arrival;
+
+/// Keeps such arrivals.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrivals;
+
+impl Kind for Arrivals {
+    fn wants(&self) -> Wants {
+        Wants {
+            brightness: true,
+            ..Wants::SCATTERS
+        }
+    }
+
+    fn scatter(&self, scatter: &mut Scatter<'_>, out: &mut Recorded) {
+        let state = scatter.light.state;
+        if state.unseen && !state.scattered && state.brightness.is_finite() {
+            out.arrivals.push(Arrival {
+                face: scatter.interaction.face,
+                point: scatter.interaction.point,
+                towards: -scatter.light.direction,
+                family: state.family,
+            });
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! Rays that leave the scene: a look at the far field before it is known which nodes suit it.
+
+use etendue_math::Vec3;
+
+use super::kind::{Kind, Light, Recorded, Wants};
+
+/// Keeps every ray that escapes, with its direction alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Escapes;
+
+impl Kind for Escapes {
+    fn wants(&self) -> Wants {
+        Wants::ESCAPES
+    }
+
+    fn escape(&self, light: &Light<'_>, out: &mut Recorded) {
+        out.rays.push(light.at(Vec3::default()));
+    }
+}

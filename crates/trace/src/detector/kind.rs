@@ -1,0 +1,150 @@
+//! What a detector is asked and told.
+
+use etendue_geometry::Face;
+use etendue_math::Vec3;
+
+use crate::events::{EventReservoir, ScatterEvent};
+use crate::guide::Arrival;
+use crate::interaction::Interaction;
+use crate::medium_cache::MediumCache;
+use crate::ray_state::RayState;
+use crate::records::{CollectedRay, Contribution};
+use crate::scene::Scene;
+
+/// What a detector has to be told of, besides rays that pass its face.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wants {
+    /// Light that leaves the scene.
+    pub escapes: bool,
+    /// Light that meets diffuse surfaces.
+    pub scatters: bool,
+    /// How bright the source of each ray is.
+    pub brightness: bool,
+}
+
+impl Wants {
+    /// Light that leaves the scene.
+    pub const ESCAPES: Self = Self {
+        escapes: true,
+        scatters: false,
+        brightness: false,
+    };
+
+    /// Light that meets diffuse surfaces.
+    pub const SCATTERS: Self = Self {
+        escapes: false,
+        scatters: true,
+        brightness: false,
+    };
+
+    /// What either wants.
+    #[must_use]
+    pub const fn or(self, other: Self) -> Self {
+        Self {
+            escapes: self.escapes || other.escapes,
+            scatters: self.scatters || other.scatters,
+            brightness: self.brightness || other.brightness,
+        }
+    }
+}
+
+/// A ray where it is told of.
+#[derive(Clone, Copy, Debug)]
+pub struct Light<'a> {
+    /// Where it goes.
+    pub direction: Vec3,
+    /// What it carries.
+    pub state: &'a RayState,
+}
+
+impl Light<'_> {
+    /// The ray as it is kept, at a point \[mm\].
+    #[must_use]
+    pub fn at(&self, point: Vec3) -> CollectedRay {
+        let d = self.direction;
+        CollectedRay {
+            position: [point.x, point.y, point.z],
+            direction: [d.x, d.y, d.z],
+            flux: self.state.flux,
+            wavelength: self.state.wavelength,
+        }
+    }
+}
+
+/// Light that meets a diffuse surface.
+pub struct Scatter<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its media.
+    pub media: &'a mut MediumCache,
+    /// Where the light meets the surface.
+    pub interaction: &'a Interaction,
+    /// Shares of its flux that the surface scatters back and to the other side.
+    pub shares: [f64; 2],
+    /// What an observer needs to know of it.
+    pub event: ScatterEvent,
+    /// The ray.
+    pub light: Light<'a>,
+}
+
+/// What a detector has recorded of a batch.
+#[derive(Clone, Debug, Default)]
+pub struct Recorded {
+    /// Contributions to its cells, by ray.
+    pub contributions: Vec<Contribution>,
+    /// Rays.
+    pub rays: Vec<CollectedRay>,
+    /// Scatter events.
+    pub events: EventReservoir,
+    /// Light that smooth surfaces sent to diffuse ones.
+    pub arrivals: Vec<Arrival>,
+}
+
+impl Recorded {
+    /// Nothing yet, of one of `batches` batches that have room for so many scatter events together.
+    #[must_use]
+    pub fn of_batch(most_events: usize, batches: u64) -> Self {
+        Self {
+            events: EventReservoir::of_batch(most_events, batches),
+            ..Self::default()
+        }
+    }
+
+    /// What a ray contributes to a cell.
+    #[inline]
+    pub fn contribute(&mut self, cell: u32, state: &RayState, amount: f64) {
+        self.contributions.push((cell, state.ray, amount));
+    }
+}
+
+/// A kind of detector. Whatever it is told of, light goes on as if it were not there.
+pub trait Kind {
+    /// The face that rays pass, if it stands on one.
+    fn face(&self) -> Option<Face> {
+        None
+    }
+
+    /// Number of cells that flux is summed in.
+    fn cells(&self) -> usize {
+        0
+    }
+
+    /// Scatter events that it holds at most.
+    fn most_events(&self) -> usize {
+        0
+    }
+
+    /// What it has to be told of.
+    fn wants(&self) -> Wants {
+        Wants::default()
+    }
+
+    /// A ray passes its face at a point \[mm\].
+    fn passing(&self, _light: &Light<'_>, _point: Vec3, _out: &mut Recorded) {}
+
+    /// A ray leaves the scene.
+    fn escape(&self, _light: &Light<'_>, _out: &mut Recorded) {}
+
+    /// A ray meets a diffuse surface.
+    fn scatter(&self, _scatter: &mut Scatter<'_>, _out: &mut Recorded) {}
+}

@@ -1,0 +1,20 @@
+//! A ray collecting surface.
+
+use etendue_geometry::Face;
+use etendue_math::Vec3;
+
+use super::kind::{Kind, Light, Recorded};
+
+/// Keeps every ray that passes its face, from either side.
+#[derive(Clone, Debug)]
+pub struct Rays(pub Face);
+
+impl Kind for Rays {
+    fn face(&self) -> Option<Face> {
+        Some(self.0.clone())
+    }
+
+    fn passing(&self, light: &Light<'_>, point: Vec3, out: &mut Recorded) {
+        out.rays.push(light.at(point));
+    }
+}

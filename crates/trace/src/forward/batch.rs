@@ -1,0 +1,289 @@
+//! One batch of a run: rays of all sources, block by block, followed to their ends.
+
+use etendue_geometry::RayBatch;
+use etendue_geometry::hits::Hits;
+use etendue_geometry::origin_faces::NONE;
+use etendue_geometry::ray_batch::BLOCK;
+use etendue_math::Vec3;
+use etendue_sampling::ordered::BATCH;
+use etendue_sampling::philox::{Pairs, fill_pairs};
+
+use super::block_trace::BlockTrace;
+use super::lambertian_sheet::{LambertianSheet, SheetRays, lambertian_sheets};
+use super::queue::RayQueue;
+use super::run::Run;
+use super::sorter::Sorter;
+use crate::dealing::Dealing;
+use crate::detector::Detector;
+use crate::events::depth;
+use crate::ledger::{Fate, Loss};
+use crate::medium_cache::MediumCache;
+use crate::mis::SourceLuminance;
+use crate::ray_start::start_near;
+use crate::ray_state::RayState;
+use crate::scene::Scene;
+use crate::tallies::BatchSums;
+
+/// The purpose under which the events of traced rays are drawn (see [`Pairs::new`]).
+const PURPOSE_TRACE: u32 = 0x5452_4143;
+
+/// A block of rays that are followed to their ends.
+struct BatchTrace<'a> {
+    block: BlockTrace<'a>,
+    dealing: &'a Dealing,
+    pairs: Pairs,
+    /// The number of the block's first ray in the run.
+    first: u64,
+    /// Those on their way, and those that go on from there.
+    now: RayQueue,
+    next: RayQueue,
+    hits: Hits,
+    sorter: Sorter,
+    /// Rays whose random numbers are wanted, and the numbers.
+    addresses: Vec<u64>,
+    numbers: [Vec<f64>; 2],
+    /// Those of the rays that meet a face which are not absorbed.
+    going: Vec<u32>,
+    sheet_rays: SheetRays,
+    /// Fluxes of the rays that leave the scene.
+    fluxes: Vec<f64>,
+}
+
+/// Traces one batch of a run.
+#[must_use]
+pub fn trace_batch(scene: &Scene, detectors: &[Detector], run: &Run<'_>, dealing: &Dealing, batch: u64) -> BatchSums {
+    let mut trace = BatchTrace::new(scene, detectors, run, dealing);
+    trace.batch(batch);
+    let copied = trace.block.out.detectors.iter_mut().flat_map(|d| &mut d.contributions);
+    dealing.units(batch, copied.map(|(_, ray, _)| ray));
+    dealing.units(batch, trace.block.out.copies.iter_mut().map(|(_, ray, _)| ray));
+    // Copies follow each other: one mark for all of them.
+    trace.block.out.copies.dedup_by(|next, first| {
+        let same = (next.0, next.1) == (first.0, first.1);
+        if same {
+            first.2 += next.2;
+        }
+        same
+    });
+    trace.block.out
+}
+
+/// The points at which the first rays of a run (a batch at most) start, turn and end, for drawings; a ray that escapes ends
+/// `far` from its last turn.
+#[must_use]
+pub fn trails(scene: &Scene, run: &Run<'_>, far: f64) -> Vec<Vec<Vec3>> {
+    let dealing = Dealing::of(scene, run.rays, run.sets);
+    let mut trace = BatchTrace::new(scene, &[], run, &dealing);
+    trace.block.trails = Some(Vec::new());
+    trace.sorter = Sorter::new(scene, Vec::new());
+    trace.block.far = far;
+    trace.batch(0);
+    trace.block.trails.unwrap_or_default()
+}
+
+impl<'a> BatchTrace<'a> {
+    fn new(scene: &'a Scene, detectors: &'a [Detector], run: &'a Run<'a>, dealing: &'a Dealing) -> Self {
+        let wants = Detector::wants_of(detectors);
+        Self {
+            block: BlockTrace {
+                scene,
+                detectors,
+                wants,
+                run,
+                media: MediumCache::new(scene),
+                states: Vec::with_capacity(BLOCK),
+                trails: None,
+                far: 0.0,
+                out: BatchSums::new(scene, detectors, run.rays.div_ceil(BATCH)),
+            },
+            dealing,
+            pairs: Pairs::new(run.seed, PURPOSE_TRACE),
+            first: 0,
+            now: RayQueue::default(),
+            next: RayQueue::default(),
+            hits: Hits::default(),
+            sorter: Sorter::new(scene, lambertian_sheets(scene, wants)),
+            addresses: Vec::new(),
+            numbers: Default::default(),
+            going: Vec::new(),
+            sheet_rays: SheetRays::default(),
+            fluxes: Vec::new(),
+        }
+    }
+
+    /// Traces one batch.
+    fn batch(&mut self, batch: u64) {
+        let (scene, run) = (self.block.scene, self.block.run);
+        let mut births = RayBatch::default();
+        self.first = batch * BATCH;
+        for (number, range) in self.dealing.batch(batch).into_iter().enumerate() {
+            let source = &scene.sources[number];
+            let count = self.dealing.count(number);
+            let mut start = range.start;
+            while start < range.end {
+                let stop = (start + BLOCK as u64).min(range.end);
+                source.emit(number as u64, start..stop, count, run.seed, run.sets, &mut births);
+                self.count(&births, number);
+                self.begin(&births, number, start);
+                self.finish();
+                for recorded in &mut self.block.out.detectors {
+                    recorded.events.settle();
+                }
+                self.first += stop - start;
+                start = stop;
+            }
+        }
+    }
+
+    /// Counts the rays that a source gave out.
+    #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 sources")]
+    fn count(&mut self, births: &RayBatch, number: usize) {
+        let (fluxes, all) = (&births.flux[..births.len], self.block.scene.sources.len());
+        if self.dealing.stratum_of(number) > 0 {
+            for cell in [number, all] {
+                let marks = (self.first..).zip(fluxes).map(|(ray, flux)| (cell as u32, ray, *flux));
+                self.block.out.copies.extend(marks);
+            }
+            return;
+        }
+        let sums = fluxes
+            .iter()
+            .fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
+        for cell in [number, all] {
+            let cell = &mut self.block.out.born[cell];
+            cell.sum += sums.0;
+            cell.squares += sums.1;
+            cell.rays += births.len as u64;
+        }
+    }
+
+    /// Takes in the rays that a source gave out, from its ray `start` on.
+    #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+    fn begin(&mut self, births: &RayBatch, number: usize, start: u64) {
+        let (scene, run) = (self.block.scene, self.block.run);
+        let (source, near) = (&scene.sources[number], &scene.near[number]);
+        let total = scene.sources.iter().map(|s| s.flux).sum();
+        let sampler = run.light_samplers.get(number).and_then(Option::as_ref);
+        let brightness = self
+            .block
+            .wants
+            .brightness
+            .then(|| SourceLuminance::new(source, sampler, total));
+        let keeps = self.block.detectors.iter().any(|detector| detector.most_events() > 0);
+        let n = births.len;
+        self.block.out.ledger.emitted[number].add_all(&births.flux[..n]);
+        self.block.states.clear();
+        self.block.states.extend((0..n).map(|i| {
+            let ray = self.first + i as u64;
+            RayState {
+                flux: births.flux[i],
+                wavelength: match births.colour.get(i) {
+                    Some(stated) => *stated,
+                    None => source.wavelength(run.seed, number as u64, start + i as u64),
+                },
+                ray,
+                scattered: false,
+                unseen: !source.is_visible(),
+                brightness: brightness.map_or(f64::INFINITY, |b| b.at(births.position(i), births.direction(i))),
+                family: number as u32,
+                depth: if keeps { depth(run.seed, ray) } else { 0 },
+            }
+        }));
+        self.now.clear();
+        if near.is_empty() && self.block.trails.is_none() && (0..n).all(|i| births.usable(i)) {
+            let [o, d] = [&births.position, &births.direction].map(|lists| lists.each_ref().map(|list| &list[..n]));
+            self.now.extend(o, d, 0..n as u32, NONE, (0..n).map(|_| NONE));
+            return;
+        }
+        for i in 0..n {
+            let RayState { ray, flux, .. } = self.block.states[i];
+            if !births.usable(i) {
+                self.block.out.ledger.book(Fate::Lost(Loss::NotFinite, NONE), flux);
+                continue;
+            }
+            let (o, d) = (births.position(i), births.direction(i));
+            match start_near(scene, o, d, near) {
+                Ok((stack, origin_faces)) => {
+                    self.block.mark(ray, o);
+                    self.now.push(i as u32, (o, d, origin_faces), stack);
+                }
+                Err((loss, face)) => self.block.out.ledger.book(Fate::Lost(loss, face), flux),
+            }
+        }
+    }
+
+    /// Follows all rays of the block to their ends. At any time all of them have had the same number of events.
+    fn finish(&mut self) {
+        // Lent out, so that what is done with one ray can use all else.
+        let (mut now, mut next) = (std::mem::take(&mut self.now), std::mem::take(&mut self.next));
+        let (mut hits, mut sorter) = (std::mem::take(&mut self.hits), std::mem::take(&mut self.sorter));
+        let mut event = 0;
+        while !now.is_empty() && !self.block.run.is_stopped() {
+            self.block.scene.face_set.nearest(&now.lines, &mut hits);
+            self.block.out.ledger.segments += now.len() as u64;
+            let last = event + 1 >= self.block.run.most_events;
+            sorter.sort(&now, &hits, last);
+            self.let_go(&now, sorter.gone());
+            next.clear();
+            for (sheet, which) in sorter.bounced() {
+                self.draw(&now, which, event);
+                self.bounce(sheet, which, &now, &hits, &mut next);
+            }
+            self.draw(&now, sorter.single(), event);
+            for (k, i) in sorter.single().iter().enumerate() {
+                let numbers = self.numbers.each_ref().map(|list| list[k]);
+                self.block.step(&now, &hits, *i as usize, numbers, event, &mut next);
+            }
+            std::mem::swap(&mut now, &mut next);
+            event += 1;
+        }
+        (self.now, self.next, self.hits, self.sorter) = (now, next, hits, sorter);
+    }
+
+    /// Two random numbers for each of some rays.
+    fn draw(&mut self, now: &RayQueue, which: &[u32], event: u32) {
+        let address = |i: &u32| self.first + u64::from(now.who[*i as usize]);
+        self.addresses.clear();
+        self.addresses.extend(which.iter().map(address));
+        fill_pairs(self.pairs, &self.addresses, event, &mut self.numbers);
+    }
+
+    /// Rays leave the scene.
+    fn let_go(&mut self, now: &RayQueue, which: &[u32]) {
+        self.fluxes.clear();
+        let flux = |i: &u32| self.block.states[now.who[*i as usize] as usize].flux;
+        self.fluxes.extend(which.iter().map(flux));
+        self.block.out.ledger.escaped.add_all(&self.fluxes);
+        if self.block.trails.is_none() && !self.block.wants.escapes {
+            return;
+        }
+        for i in which {
+            let i = *i as usize;
+            let state = self.block.states[now.who[i] as usize];
+            let (o, d) = (now.lines.origin(i), now.lines.direction(i));
+            self.block.mark(state.ray, o + d * self.block.far);
+            self.block.escape(d, &state);
+        }
+    }
+
+    /// Rays that meet one face go on together, or are absorbed.
+    fn bounce(&mut self, sheet: LambertianSheet, which: &[u32], now: &RayQueue, hits: &Hits, next: &mut RayQueue) {
+        let account = &mut self.block.out.ledger.on_face[sheet.face as usize];
+        let [numbers, turns] = &mut self.numbers;
+        self.going.clear();
+        for (k, i) in which.iter().enumerate() {
+            if sheet.absorbs(numbers[k]) {
+                account.add(self.block.states[now.who[*i as usize] as usize].flux);
+            } else {
+                // No later than where it is: the numbers move up.
+                let place = self.going.len();
+                (numbers[place], turns[place]) = (numbers[k], turns[k]);
+                self.going.push(*i);
+            }
+        }
+        self.sheet_rays.gather(now, hits, &self.going);
+        let face = &self.block.scene.face_set.faces()[sheet.face as usize];
+        self.sheet_rays.bounce(face, sheet, &self.numbers);
+        self.sheet_rays.go_on(sheet.face, next);
+    }
+}

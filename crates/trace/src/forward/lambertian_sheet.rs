@@ -1,0 +1,226 @@
+//! Many rays at once off one sheet that mirrors and scatters alike in all directions and colours: walls and reflectors.
+//!
+//! What [`scatter`](crate::scatter) comes to for such a sheet, to the same bits, without branches and several rays at a time.
+
+use etendue_geometry::Face;
+use etendue_geometry::hits::Hits;
+use etendue_geometry::surface_points::{Vectors, fill, gather, surface_points};
+use etendue_math::Vec3;
+use etendue_optics::fresnel::reflect;
+use etendue_optics::source::surface::about;
+use etendue_sampling::warp::part_of;
+use multiversion::multiversion;
+
+use super::queue::RayQueue;
+use crate::detector::Wants;
+use crate::scene::{Act, Scene};
+
+/// How a sheet that many rays are bounced off at once shares out light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LambertianSheet {
+    /// Its number.
+    pub face: u32,
+    mirrored: f64,
+    scattered: f64,
+}
+
+/// The faces of a scene that rays are bounced off many at a time.
+#[must_use]
+pub fn lambertian_sheets(scene: &Scene, wants: Wants) -> Vec<LambertianSheet> {
+    // Detectors of scattered light and absorbing surroundings want to know of every scatter by itself.
+    if wants.scatters || scene.media[0].absorption.range() != [0.0, 0.0] {
+        return Vec::new();
+    }
+    let faces = scene.face_set.faces().iter().zip(&scene.roles).zip(0..);
+    faces
+        .filter_map(|((face, role), index)| {
+            let Act::Optical(finish) = role.act else { return None };
+            let known = scene.finishes[finish as usize].facts();
+            let [mirrored, through, scattered, behind] = known.constant?;
+            let sheet = role.solid == 0 && known.lambertian && through == 0.0 && behind == 0.0;
+            (sheet && !face.shape.is_smooth()).then_some(LambertianSheet {
+                face: index,
+                mirrored,
+                scattered,
+            })
+        })
+        .collect()
+}
+
+impl LambertianSheet {
+    /// Whether the light that this number stands for is absorbed.
+    #[inline(always)]
+    #[must_use]
+    pub fn absorbs(self, number: f64) -> bool {
+        number >= self.mirrored + self.scattered
+    }
+}
+
+/// Rays of a block that meet one face, gathered. Structure of arrays.
+#[derive(Clone, Debug, Default)]
+pub struct SheetRays {
+    who: Vec<u32>,
+    part: Vec<u32>,
+    o: Vectors,
+    d: Vectors,
+    t: Vec<f64>,
+    normal: Vectors,
+}
+
+impl SheetRays {
+    /// Gathers some rays of a queue.
+    pub fn gather(&mut self, queue: &RayQueue, hits: &Hits, which: &[u32]) {
+        let indices = || which.iter().map(|i| *i as usize);
+        fill(&mut self.who, indices().map(|i| queue.who[i]));
+        fill(&mut self.part, indices().map(|i| hits.part[i].0));
+        fill(&mut self.t, indices().map(|i| hits.t[i]));
+        gather(&mut self.o, &queue.lines.origin, which);
+        gather(&mut self.d, &queue.lines.direction, which);
+    }
+
+    /// Turns the lines to the face into those from there.
+    pub fn bounce(&mut self, face: &Face, sheet: LambertianSheet, numbers: &[Vec<f64>; 2]) {
+        surface_points(face, &mut self.o, &self.d, &self.t, &self.part, &mut self.normal);
+        turn(sheet, numbers, &self.normal, &mut self.d);
+    }
+
+    /// Adds the rays to a queue.
+    pub fn go_on(&self, face: u32, queue: &mut RayQueue) {
+        let [o, d] = [&self.o, &self.d].map(|lists| lists.each_ref().map(|list| &list[..]));
+        queue.extend(o, d, self.who.iter().copied(), face, self.part.iter().copied());
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn turn(sheet: LambertianSheet, numbers: &[Vec<f64>; 2], normals: &Vectors, directions: &mut Vectors) {
+    let n = directions[0].len();
+    let [dx, dy, dz] = directions.each_mut().map(|v| &mut v[..n]);
+    let [nx, ny, nz] = normals.each_ref().map(|v| &v[..n]);
+    let [lobe, turn] = numbers.each_ref().map(|v| &v[..n]);
+    for k in 0..n {
+        let (d, normal) = (Vec3::new(dx[k], dy[k], dz[k]), Vec3::new(nx[k], ny[k], nz[k]));
+        let height_in = d.dot(normal);
+        let sign = if height_in < 0.0 { 1.0 } else { -1.0 };
+        let height = part_of(lobe[k] - sheet.mirrored, sheet.scattered);
+        let mirrored = reflect(d, normal * sign, -height_in * sign);
+        // About the normal of the front, on the side that the light came from.
+        let scattered = about(normal, (1.0 - height).sqrt() * sign, turn[k]);
+        let mirror = lobe[k] < sheet.mirrored;
+        dx[k] = if mirror { mirrored.x } else { scattered.x };
+        dy[k] = if mirror { mirrored.y } else { scattered.y };
+        dz[k] = if mirror { mirrored.z } else { scattered.z };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use etendue_geometry::origin_faces::OriginFaces;
+    use etendue_geometry::shape::{Flat, Outline, Quadric, Shape};
+    use etendue_math::Frame;
+    use etendue_optics::bsdf::{Component, Mixture};
+    use etendue_optics::medium::{Index, Medium};
+    use etendue_optics::table::{Curve, Table};
+    use etendue_sampling::philox::Stream;
+
+    use crate::interaction::meet;
+    use crate::medium_cache::MediumCache;
+    use crate::scatter::SurfaceEvent;
+    use crate::scene::SceneFace;
+    use crate::solid_stack::SolidStack;
+
+    /// A sheet that stands askew.
+    fn sheet(shape: Shape) -> Scene {
+        let [mirrored, scattered, none] = [0.3, 0.45, 0.0].map(Table::constant);
+        let bsdf = Mixture::of_shares([mirrored, none.clone()], [scattered, none]).expect("at most 1");
+        let face = Face {
+            shape,
+            frame: Frame {
+                origin: Vec3::new(1.0, -2.0, 0.5),
+                x: Vec3::new(0.6, 0.8, 0.0),
+                y: Vec3::new(0.0, 0.0, 1.0),
+                z: Vec3::new(0.8, -0.6, 0.0),
+            },
+            trims: vec![],
+            flipped: false,
+        };
+        let air = Medium {
+            index: Index::Table(Curve::constant(1.0)),
+            absorption: Curve::constant(0.0),
+        };
+        let face = SceneFace {
+            face,
+            solid: None,
+            finish: 0,
+        };
+        Scene::new(vec![face], vec![bsdf], vec![air], vec![], vec![], vec![]).expect("sound")
+    }
+
+    #[test]
+    fn many_at_once_come_to_what_the_surface_event_comes_to() {
+        let disk = Shape::Flat(Flat {
+            outline: Outline::Annulus {
+                inner: 0.0,
+                outer: 50.0,
+            },
+        });
+        let ball = Shape::Quadric(Quadric {
+            r2: 1.0,
+            z2: 1.0,
+            z1: 0.0,
+            z0: -25.0,
+            z: [f64::NEG_INFINITY, f64::INFINITY],
+            r: [0.0, f64::INFINITY],
+        });
+        for shape in [disk, ball] {
+            let scene = sheet(shape);
+            let found = lambertian_sheets(&scene, Wants::default());
+            assert_eq!(found.len(), 1);
+            let (stream, rays) = (Stream::new(8, 9), 4000_u32);
+            let mut queue = RayQueue::default();
+            let mut numbers = [Vec::new(), Vec::new()];
+            for i in 0..rays {
+                let [a, b, c, d] = stream.uniforms(u64::from(i), 0);
+                // From points in a ball and outside of it, on both sides of a disk, to points about the middle.
+                let z = Vec3::new(0.0, 0.0, 1.0);
+                let middle = Vec3::new(1.0, -2.0, 0.5);
+                let o = middle + about(z, 2.0 * a - 1.0, b) * if i % 2 == 0 { 9.0 } else { 3.0 };
+                let to = middle + about(z, 2.0 * c - 1.0, d) * 2.0;
+                queue.push(
+                    i,
+                    (o, (to - o).normalized(), OriginFaces::default()),
+                    SolidStack::default(),
+                );
+                let [lobe, turn, ..] = stream.uniforms(u64::from(i), 1);
+                numbers[0].push(lobe * 0.75);
+                numbers[1].push(turn);
+            }
+            let mut hits = Hits::default();
+            scene.face_set.nearest(&queue.lines, &mut hits);
+            let which: Vec<u32> = (0..rays).filter(|i| hits.face[*i as usize] == 0).collect();
+            let mut gathered = SheetRays::default();
+            gathered.gather(&queue, &hits, &which);
+            let own = numbers
+                .each_ref()
+                .map(|list| which.iter().map(|i| list[*i as usize]).collect::<Vec<f64>>());
+            gathered.bounce(&scene.face_set.faces()[0], found[0], &own);
+            let mut media = MediumCache::new(&scene);
+            let mut counts = [0; 4];
+            for (k, i) in which.iter().enumerate() {
+                let place = *i as usize;
+                let met = meet(&scene, &queue.lines, &hits, place, SolidStack::default(), |_, _, _| {}).expect("sound");
+                let along = queue.lines.direction(place);
+                let event = SurfaceEvent::new(&scene, &met, along, 555.0, &mut media)
+                    .expect("air")
+                    .expect("a surface");
+                let (component, d, _) = event.sample([own[0][k], own[1][k]]).expect("not absorbed");
+                let [point, direction] = [&gathered.o, &gathered.d].map(|v| Vec3::new(v[0][k], v[1][k], v[2][k]));
+                assert_eq!((point, direction), (met.point, d), "{component:?}, front {}", met.front);
+                counts[usize::from(component.is_specular()) + 2 * usize::from(met.front)] += 1;
+                assert!(component == Component::Specular(false) || component == Component::Diffuse(false));
+            }
+            assert!(counts.iter().all(|count| *count > 100), "{counts:?}");
+        }
+    }
+}

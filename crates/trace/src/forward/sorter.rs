@@ -1,0 +1,92 @@
+//! Rays sorted by what comes next.
+
+use etendue_geometry::hits::Hits;
+
+use super::lambertian_sheet::LambertianSheet;
+use super::queue::RayQueue;
+use crate::buckets::Buckets;
+use crate::scene::Scene;
+use crate::solid_stack::SolidStack;
+
+/// Sorts the rays of a queue by what comes next.
+#[derive(Default)]
+pub struct Sorter {
+    /// For each face, and for none, the number of the list of most rays that meet it: [`GONE`], [`SINGLE`], or from [`FIRST`] on
+    /// for faces off which many are bounced at once.
+    list_of: Vec<usize>,
+    lambertian_sheets: Vec<LambertianSheet>,
+    lists: Buckets,
+    /// For each ray whether it may be at more than one face.
+    tied: Vec<bool>,
+    /// Whether rays that leave each solid's medium cannot be absorbed on their way; the surroundings first.
+    clear: Vec<bool>,
+}
+
+/// The list of rays that leave the scene.
+const GONE: usize = 0;
+
+/// The list of rays that are worked on one by one.
+const SINGLE: usize = 1;
+
+/// The list of the first bouncer.
+const FIRST: usize = 2;
+
+impl Sorter {
+    /// Of a scene, and those of its faces off which many rays are bounced at once.
+    #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^16 solids")]
+    pub fn new(scene: &Scene, lambertian_sheets: Vec<LambertianSheet>) -> Self {
+        let solids = 0..=scene.solids.len();
+        let clear = |solid: usize| scene.media[scene.medium(solid as u16)].absorption.range() == [0.0, 0.0];
+        let clear: Vec<bool> = solids.map(clear).collect();
+        let mut list_of = vec![SINGLE; scene.roles.len() + 1];
+        list_of[scene.roles.len()] = if clear[0] { GONE } else { SINGLE };
+        for (list, sheet) in (FIRST..).zip(&lambertian_sheets) {
+            list_of[sheet.face as usize] = list;
+        }
+        Self {
+            list_of,
+            lists: Buckets::new(FIRST + lambertian_sheets.len()),
+            lambertian_sheets,
+            tied: Vec::new(),
+            clear,
+        }
+    }
+
+    /// Sorts the rays of a queue. Rays that have had all the events that they may have (`ended`) are not bounced, nor those in
+    /// a solid or at more than one face.
+    pub fn sort(&mut self, queue: &RayQueue, hits: &Hits, ended: bool) {
+        self.lists.clear();
+        hits.ties(&queue.lines, &mut self.tied);
+        let faces = self.list_of.len() - 1;
+        for i in 0..queue.len() {
+            let face = (hits.face[i] as usize).min(faces);
+            let mut list = self.list_of[face];
+            // Few rays are special: their branch costs nothing, and none is on the way of the others.
+            let nested = queue.stack[i] != SolidStack::default();
+            if nested | ended | self.tied[i] {
+                let leaves = face == faces && self.clear[usize::from(queue.stack[i].top())];
+                list = if leaves { GONE } else { SINGLE };
+            }
+            self.lists.push(list, i);
+        }
+        self.lists.join_short(FIRST, SINGLE);
+    }
+
+    /// Places of the rays that meet nothing and cannot be absorbed on their way.
+    pub fn gone(&self) -> &[u32] {
+        self.lists.get(GONE)
+    }
+
+    /// Places of the rays that are worked on one by one.
+    pub fn single(&self) -> &[u32] {
+        self.lists.get(SINGLE)
+    }
+
+    /// Places of the rays that are bounced, face by face.
+    pub fn bounced(&self) -> impl Iterator<Item = (LambertianSheet, &[u32])> {
+        let sheet = |list: usize| self.lambertian_sheets.get(list.checked_sub(FIRST)?);
+        self.lists
+            .used()
+            .filter_map(move |(list, places)| Some((*sheet(list)?, places)))
+    }
+}

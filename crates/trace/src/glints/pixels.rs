@@ -1,0 +1,124 @@
+//! The small images of sources in the pixels of a view.
+
+use etendue_lightfield::View;
+use rayon::prelude::*;
+
+use super::image::{Found, Glint};
+use super::search::{Search, Sight};
+use crate::lit_scene::LitScene;
+
+/// Starts of the search over all pixels: more per pixel where these are few.
+const STARTS: usize = 1 << 15;
+
+/// Starts in one pixel, at most.
+const MOST_STARTS: usize = 16;
+
+/// Images in one pixel, at most.
+const MOST: usize = 32;
+
+/// How near to each other two images of one source through the same surfaces are one, in units of their width.
+const SAME: f64 = 0.25;
+
+/// How far beyond its width an image is looked for in other pixels.
+const REACH: f64 = 3.0;
+
+/// The small images of sources in the pixels of a view.
+#[derive(Clone, Debug, Default)]
+pub struct Glints {
+    images: Vec<Glint>,
+    /// Where those of each pixel begin.
+    begins: Vec<usize>,
+    /// For each source whether it has any.
+    of: Vec<bool>,
+}
+
+impl Glints {
+    /// Looks for the images of the sources of a scene. Runs on the threads of the current pool; the same for any number.
+    /// Once `lit` is stopped, the rest is left out.
+    #[must_use]
+    pub fn find(lit: &LitScene<'_>, view: &View, most_events: u32) -> Self {
+        let sources = lit.scene.sources.len();
+        let mut result = Self {
+            images: Vec::new(),
+            begins: vec![0; view.pixels() + 1],
+            of: vec![false; sources],
+        };
+        let Some(search) = Search::new(lit, view, most_events) else {
+            return result;
+        };
+        let pixels = view.pixels();
+        let starts = (STARTS / pixels.max(1)).clamp(1, MOST_STARTS);
+        let found: Vec<(Vec<Found>, Vec<Sight>)> = (0..pixels)
+            .into_par_iter()
+            .map_init(
+                || search.clone(),
+                |search, pixel| {
+                    if lit.is_stopped() {
+                        return Default::default();
+                    }
+                    search.search_from(pixel, starts)
+                },
+            )
+            .collect();
+        let mut images: Vec<Vec<Found>> = vec![Vec::new(); pixels];
+        for image in found.iter().flat_map(|(images, _)| images) {
+            for pixel in touched(view, &image.glint) {
+                // In the midst of a large image lines that are spread evenly have no noise, and need no others.
+                let large = |sight: &Sight| sight.0 == image.source && sight.1 == image.ways;
+                let here = &mut images[pixel];
+                let known = |other: &Found| {
+                    other.source == image.source
+                        && other.ways == image.ways
+                        && other.glint.distance2(image.glint.centre) < SAME * SAME
+                };
+                if here.len() < MOST && !here.iter().any(known) && !found[pixel].1.iter().any(large) {
+                    here.push(image.clone());
+                }
+            }
+        }
+        for (pixel, here) in images.iter().enumerate() {
+            for image in here {
+                result.of[image.source] = true;
+                result.images.push(image.glint);
+            }
+            result.begins[pixel + 1] = result.images.len();
+        }
+        result
+    }
+
+    /// Number of pixels that have images.
+    #[must_use]
+    pub fn pixels(&self) -> usize {
+        self.begins.windows(2).filter(|pair| pair[0] < pair[1]).count()
+    }
+
+    /// Whether a source has small images.
+    #[must_use]
+    pub fn has(&self, source: usize) -> bool {
+        self.of[source]
+    }
+
+    /// The images in a pixel.
+    #[must_use]
+    pub fn of_pixel(&self, pixel: usize) -> &[Glint] {
+        &self.images[self.begins[pixel]..self.begins[pixel + 1]]
+    }
+}
+
+/// The pixels that an image reaches into.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the grid"
+)]
+fn touched<'a>(view: &'a View, image: &Glint) -> impl Iterator<Item = usize> + use<'a> {
+    let [columns, rows] = [view.columns, view.rows].map(|n| n as usize);
+    let range = |k: usize, n: usize| {
+        let half = REACH * image.axes[0][k].hypot(image.axes[1][k]);
+        let low = (image.centre[k] - half).floor().clamp(0.0, n as f64) as usize;
+        let high = (image.centre[k] + half).ceil().clamp(0.0, n as f64) as usize;
+        low..high
+    };
+    let across = range(0, columns);
+    range(1, rows).flat_map(move |row| across.clone().map(move |column| row * columns + column))
+}

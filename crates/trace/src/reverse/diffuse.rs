@@ -1,0 +1,196 @@
+//! What a path does at a diffuse surface: it ends if the light there is known; else it goes on in one direction, and points
+//! of the sources are connected to.
+
+use etendue_geometry::hits::{Hits, TIE};
+use etendue_math::Vec3;
+
+use super::method::LeftOut;
+use super::path_block::{Branch, Connection, PathBlock, Seen};
+use crate::exitance_cells::FacePoint;
+use crate::guide::{Near, SHARE};
+use crate::mis::density;
+use crate::scatter::{Incoming, SurfaceEvent};
+use crate::transmittance::transmittance;
+
+/// Sources up to this number are all connected to at the first diffuse scatter; of more, one is drawn by its flux.
+const FEW: usize = 8;
+
+/// How the directions are spread in which paths go on from a diffuse surface.
+struct Spread<'a> {
+    /// Shares of those that go on on this side of the surface and on the other one, as its BSDF draws them.
+    chances: [f64; 2],
+    /// Directions that light is known to come from.
+    guide: Option<Near<'a>>,
+}
+
+impl Spread<'_> {
+    /// Density \[1/sr\] of a direction to where light comes from.
+    #[inline]
+    fn density(&self, k: Vec3, light: &Incoming) -> f64 {
+        let drawn = self.chances[usize::from(light.transmitted)] * light.density;
+        self.guide
+            .as_ref()
+            .map_or(drawn, |near| (1.0 - SHARE) * drawn + SHARE * near.density(k))
+    }
+}
+
+impl PathBlock<'_> {
+    /// Takes what a diffuse surface is known to send back along the branch; false if that is not known.
+    pub(super) fn end(&mut self, branch: &Branch, event: &SurfaceEvent<'_>) -> bool {
+        let (interaction, facts) = (event.interaction(), event.bsdf().facts());
+        if branch.scatters == 0 || self.known.is_empty() || !(facts.is_diffuse() && facts.lambertian) {
+            return false;
+        }
+        let path = &mut self.paths[branch.path as usize];
+        let place = FacePoint {
+            face: interaction.face,
+            part: interaction.part,
+            front: interaction.front,
+            point: interaction.point,
+        };
+        // What light that came through smooth surfaces does from here on is left to the light image, if there is one.
+        let all = !(self.method.left == LeftOut::Caustics && branch.direct);
+        let light = self.known[path.pass].at(self.lit.scene, place, branch.travelled, path.line, all);
+        if let Some(light) = light {
+            path.sum[0] += branch.weight * light;
+        }
+        light.is_some()
+    }
+
+    /// A diffuse scatter: connections to sources, and one direction that is drawn. `boost` makes up for the chance that
+    /// it came to this.
+    pub(super) fn scatter(&mut self, branch: &Branch, event: &SurfaceEvent<'_>, boost: f64) {
+        if self.method.left == LeftOut::Scattered && branch.direct && branch.scatters == 0 {
+            return;
+        }
+        let (interaction, sides) = (event.interaction(), event.incoming());
+        let total = sides[0] + sides[1];
+        if total <= 0.0 {
+            return;
+        }
+        let chances = sides.map(|side| side / total);
+        let all = branch.scatters == 0 && self.lit.scene.sources.len() <= FEW;
+        let mut branch = Branch {
+            weight: branch.weight * boost,
+            ..*branch
+        };
+        if branch.scatters == 0 && branch.direct {
+            let d = event.direction();
+            branch.density = density(self.view, d, branch.travelled, d.dot(interaction.side));
+        }
+        // The direction has the first numbers, which are the most evenly spread; a side is drawn only where there are two.
+        let numbers = &mut self.paths[branch.path as usize].numbers;
+        let (turn, height) = (numbers.draw(), numbers.draw());
+        let through = chances[1] > 0.0 && numbers.draw() >= chances[0];
+        // What the observer sees directly is left to rays traced forwards; the rest is looked for where they came from.
+        let guide = self.method.guide.filter(|_| !branch.direct);
+        let guide = guide.and_then(|guide| guide.near(interaction.face, interaction.point));
+        let spread = Spread { chances, guide };
+        let guided = guide.and_then(|near| {
+            let numbers = &mut self.paths[branch.path as usize].numbers;
+            let number = numbers.draw() / SHARE;
+            (number < 1.0).then(|| near.draw([number, height, turn]))
+        });
+        self.reach_out(&branch, event, &spread, all);
+
+        let k = guided.unwrap_or_else(|| event.draw_incoming(through, [height, turn]));
+        let light = event.from(k);
+        let density = spread.density(k, &light);
+        let share = light.f * light.cosine / density;
+        if share > 0.0 {
+            let next = Branch {
+                stack: light.stack,
+                weight: branch.weight * share,
+                seen: Seen::Diffuse { density, all },
+                drawn: false,
+                travelled: 0.0,
+                scatters: branch.scatters + 1,
+                ..branch
+            };
+            self.push(interaction, k, next);
+        }
+    }
+
+    /// Notes connections of a diffuse scatter to the sources.
+    fn reach_out(&mut self, branch: &Branch, event: &SurfaceEvent<'_>, spread: &Spread<'_>, all: bool) {
+        let (scene, interaction) = (self.lit.scene, event.interaction());
+        let path = &mut self.paths[branch.path as usize];
+        let (_, _, colour) = &self.lit.lines[path.line];
+        let which = if all {
+            0..scene.sources.len()
+        } else {
+            let number = path.numbers.draw();
+            let last = scene.sources.len().saturating_sub(1);
+            let pick = self.lit.shares.partition_point(|s| *s < number).min(last);
+            pick..scene.sources.len().min(pick + 1)
+        };
+        for number in which {
+            let Some(sampler) = &self.lit.light_samplers[number] else {
+                continue;
+            };
+            let before = if number == 0 { 0.0 } else { self.lit.shares[number - 1] };
+            let picked = if all { 1.0 } else { self.lit.shares[number] - before };
+            let source = &scene.sources[number];
+            let Some(beacon) = sampler.pick(source, interaction.point, &mut path.numbers) else {
+                continue;
+            };
+            let k = (beacon.point - interaction.point).normalized();
+            let light = event.from(k);
+            if light.f * light.cosine * beacon.irradiance <= 0.0 {
+                continue;
+            }
+            let mut share = branch.weight * colour[number] * light.f * light.cosine / picked;
+            if beacon.density.is_finite() {
+                let mine = picked * beacon.density;
+                share *= mine / (mine + spread.density(k, &light));
+            }
+            self.shadows.push(interaction.point, k, interaction.origin_faces);
+            self.connections.push(Connection {
+                path: branch.path,
+                light: [share * beacon.irradiance, share * beacon.deviation],
+                stack: light.stack,
+                to: beacon.point,
+            });
+        }
+    }
+
+    /// Looks at the connections of the block: light counts that nothing stands in the way of.
+    pub(super) fn connect(&mut self, hits: &mut Hits) {
+        let scene = self.lit.scene;
+        if self.connections.is_empty() {
+            return;
+        }
+        scene.face_set.nearest(&self.shadows, hits);
+        for (i, connection) in self.connections.iter().enumerate() {
+            let (o, wavelength) = (
+                self.shadows.origin(i),
+                self.lit.lines[self.paths[connection.path as usize].line].1,
+            );
+            let distance = (connection.to - o).length();
+            let absorption = self.media.at(scene, connection.stack.top(), wavelength).absorption;
+            // What lies within rounding of the end is the surface that the end lies on.
+            let free = if hits.t[i] >= distance * (1.0 - TIE) {
+                if absorption == 0.0 {
+                    1.0
+                } else {
+                    (-absorption * distance).exp()
+                }
+            } else {
+                let origin_faces = self.shadows.origin_faces(i);
+                transmittance(
+                    scene,
+                    o,
+                    connection.to,
+                    origin_faces,
+                    connection.stack,
+                    &mut self.media,
+                    wavelength,
+                )
+            };
+            let sum = &mut self.paths[connection.path as usize].sum;
+            *sum = [sum[0] + free * connection.light[0], sum[1] + free * connection.light[1]];
+        }
+        self.connections.clear();
+        self.shadows.clear();
+    }
+}

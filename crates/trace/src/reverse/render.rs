@@ -1,0 +1,219 @@
+//! From the observer to the sources.
+//!
+//! A path starts at the observer, through a point of the pixel. While it meets smooth surfaces only, all its branches are followed:
+//! that part of the image has no noise but that of the places within the pixel and of sources that err. At a diffuse surface
+//! one direction is drawn, and points of the sources are connected to; a direction that both could find is shared out
+//! between them by the balance heuristic `[Veach1995]`.
+//!
+//! Radiance grows by (n₁/n₂)² on its way from a medium of index n₂ into one of n₁.
+
+use std::ops::Range;
+
+use etendue_lightfield::View;
+use etendue_optics::source::Numbers;
+use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
+use etendue_sampling::philox::Stream;
+use rayon::prelude::*;
+
+use super::method::{Method, Pixel};
+use super::path_block::{BLOCK, Branch, Path, PathBlock, Seen};
+use super::smooth::Splitter;
+use crate::exitance::{ExitanceCache, ExitanceSurvey};
+use crate::glints;
+use crate::lit_scene::LitScene;
+
+/// The purposes under which shifts of lattices and events of paths are drawn (see [`Stream::new`]).
+const PURPOSE_SHIFT: u64 = 0x5348_4946;
+const PURPOSE_PATH: u64 = 0x5041_5448;
+
+/// What is added to a purpose for the paths that look for small images of sources.
+const AIMED: u64 = 1 << 32;
+
+/// The map of `view`: for each pixel the sums over passes `passes`. Passes are independent of each other. With a survey,
+/// paths end at diffuse surfaces whose light is known.
+///
+/// Runs on the threads of the current pool; the same bits for any number.
+#[must_use]
+pub fn render(
+    lit: &LitScene<'_>,
+    view: &View,
+    method: &Method<'_>,
+    survey: Option<&ExitanceSurvey>,
+    passes: Range<u32>,
+) -> Vec<Pixel> {
+    let known: Vec<ExitanceCache<'_>> = survey
+        .iter()
+        .filter(|survey| survey.patches() > 0)
+        .flat_map(|survey| passes.clone().map(|pass| survey.exitance(lit, pass)))
+        .collect();
+    let mut pixels = vec![Pixel::default(); view.pixels()];
+    let each = (passes.len() * method.paths as usize).max(1);
+    let chunk = (4 * BLOCK / each).clamp(1, 1 << 12);
+    pixels.par_chunks_mut(chunk).enumerate().for_each(|(number, pixels)| {
+        Renderer::new(lit, view, method, &known).paint(number * chunk, passes.clone(), pixels);
+    });
+    pixels
+}
+
+/// A block of paths, and room for what its steps need.
+struct Renderer<'a> {
+    block: PathBlock<'a>,
+    splitter: Splitter,
+}
+
+impl<'a> Renderer<'a> {
+    fn new(lit: &'a LitScene<'a>, view: &'a View, method: &'a Method<'a>, known: &'a [ExitanceCache<'a>]) -> Self {
+        Self {
+            block: PathBlock::new(lit, view, method, known),
+            splitter: Splitter::new(lit.scene),
+        }
+    }
+
+    /// Adds the passes to pixels from number `first` on.
+    fn paint(&mut self, first: usize, passes: Range<u32>, pixels: &mut [Pixel]) {
+        let paths = self.block.method.paths as usize;
+        let share = 1.0 / f64::from(self.block.method.paths);
+        let mut cells = vec![[0.0; 5]; pixels.len() * passes.len()];
+        // All cells, then once more those with small images of sources.
+        let mut tasks: Vec<(usize, bool)> = (0..cells.len()).map(|cell| (cell, false)).collect();
+        if let Some(glints) = self.block.method.glints {
+            let has = |cell: &usize| !glints.of_pixel(first + cell / passes.len()).is_empty();
+            tasks.extend((0..cells.len()).filter(has).map(|cell| (cell, true)));
+        }
+        let total = tasks.len() * paths;
+        let mut shift = (usize::MAX, [0.0; DIMENSIONS]);
+        let mut begin = 0;
+        while begin < total && !self.block.lit.is_stopped() {
+            let end = (begin + BLOCK).min(total);
+            self.block.paths.clear();
+            for flat in begin..end {
+                let (task, index) = (flat / paths, flat % paths);
+                let (cell, aimed) = tasks[task];
+                let pixel = (first + cell / passes.len()) as u64;
+                #[allow(clippy::cast_possible_truncation, reason = "a number of passes")]
+                let pass = (cell % passes.len()) as u32;
+                let pass = [passes.start + pass, pass];
+                if shift.0 != task {
+                    shift = (task, self.shift(pixel, pass[0], aimed));
+                }
+                #[allow(clippy::cast_possible_truncation, reason = "a number of paths")]
+                self.aim(pixel, pass, index as u32, aimed, &shift.1);
+            }
+            self.follow();
+            for (flat, path) in (begin..end).zip(&self.block.paths) {
+                let cell = &mut cells[tasks[flat / paths].0];
+                let [smooth, diffuse] = path.met.map(|met| if met { 1.0 } else { 0.0 });
+                for (sum, value) in cell
+                    .iter_mut()
+                    .zip([path.sum[0], path.sum[1], path.chance, smooth, diffuse])
+                {
+                    *sum += value * share;
+                }
+            }
+            begin = end;
+        }
+        for (pixel, means) in pixels.iter_mut().zip(cells.chunks(passes.len().max(1))) {
+            for [mean, deviation, chance, smooth, diffuse] in means {
+                pixel.sum += mean;
+                pixel.chance += chance;
+                pixel.deviation += deviation;
+                pixel.met = [pixel.met[0] + smooth, pixel.met[1] + diffuse];
+            }
+        }
+    }
+
+    /// How the lattice of a pixel is moved in a pass.
+    fn shift(&self, pixel: u64, pass: u32, aimed: bool) -> [f64; DIMENSIONS] {
+        let shifts = Stream::new(self.block.method.seed, PURPOSE_SHIFT + if aimed { AIMED } else { 0 });
+        let mut shift = [0.0; DIMENSIONS];
+        for (block, four) in (0_u64..).zip(shift.chunks_mut(4)) {
+            four.copy_from_slice(&shifts.uniforms(pixel, u64::from(pass) << 8 | block));
+        }
+        shift
+    }
+
+    /// A path from the observer through a point of a pixel.
+    fn aim(&mut self, pixel: u64, [pass, made]: [u32; 2], index: u32, aimed: bool, shift: &[f64; DIMENSIONS]) {
+        let view = self.block.view;
+        let stream = Stream::new(self.block.method.seed, PURPOSE_PATH + if aimed { AIMED } else { 0 });
+        let address = ((pixel << 24 | u64::from(pass)) << 20).wrapping_add(u64::from(index));
+        #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+        let path = self.block.paths.len() as u32;
+        // Made where it stays: it is large.
+        self.block.paths.push(Path {
+            numbers: Numbers::after(lattice_point(index, shift), stream, address),
+            line: 0,
+            pass: made as usize,
+            sum: [0.0; 2],
+            chance: 0.0,
+            met: [false; 2],
+            aimed,
+            share: 1.0,
+        });
+        let Path {
+            numbers, line, share, ..
+        } = &mut self.block.paths[path as usize];
+        let columns = u64::from(view.columns);
+        let corner = [(pixel % columns) as f64, (pixel / columns) as f64];
+        #[allow(clippy::cast_possible_truncation, reason = "a number of a pixel")]
+        let images = self
+            .block
+            .method
+            .glints
+            .map_or(&[][..], |glints| glints.of_pixel(pixel as usize));
+        let (du, dv) = (numbers.draw(), numbers.draw());
+        let place = if aimed {
+            glints::draw(images, [numbers.draw(), du, dv])
+        } else {
+            [corner[0] + du, corner[1] + dv]
+        };
+        if !images.is_empty() {
+            *share = 1.0 / (1.0 + glints::density(images, place));
+        }
+        let d = view.through(place);
+        let lines = &self.block.lit.lines;
+        if lines.len() > 1 {
+            let number = numbers.draw();
+            *line = lines.partition_point(|l| l.0 < number).min(lines.len() - 1);
+        }
+        // What is drawn about an image may lie in another pixel.
+        let here = !aimed || (0..2).all(|k| (corner[k]..corner[k] + 1.0).contains(&place[k]));
+        if let (Some((stack, origin_faces)), true) = (self.block.observer, here) {
+            self.block.lines.push(view.observer, d, origin_faces);
+            self.block.branches.push(Branch {
+                path,
+                stack,
+                weight: 1.0,
+                seen: Seen::Smooth,
+                travelled: 0.0,
+                events: 0,
+                scatters: 0,
+                drawn: false,
+                direct: true,
+                density: 0.0,
+            });
+        }
+    }
+
+    /// Follows all branches of the block to their ends.
+    fn follow(&mut self) {
+        while !self.block.branches.is_empty() {
+            if self.block.lit.is_stopped() {
+                self.block.lines.clear();
+                self.block.branches.clear();
+                return;
+            }
+            let mut hits = std::mem::take(&mut self.block.hits);
+            self.block.lit.scene.face_set.nearest(&self.block.lines, &mut hits);
+            self.block.gather(&hits);
+            self.splitter.advance(&mut self.block, &hits);
+            self.block.connect(&mut hits);
+            self.block.hits = hits;
+            std::mem::swap(&mut self.block.lines, &mut self.block.next_lines);
+            std::mem::swap(&mut self.block.branches, &mut self.block.next);
+            self.block.next_lines.clear();
+            self.block.next.clear();
+        }
+        self.block.lines.clear();
+    }
+}

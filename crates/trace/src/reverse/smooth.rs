@@ -1,0 +1,280 @@
+//! Interfaces of solids that many branches meet at once: each of them goes on mirrored and refracted, or on one of both ways.
+//!
+//! What `interaction` and [`PathBlock::surface`] come to there, without branches and several lines at a time.
+
+use etendue_geometry::hits::Hits;
+use etendue_geometry::origin_faces::NONE;
+use etendue_geometry::ray_block::RayBlock;
+use etendue_geometry::surface_points::{Vectors, fill, gather, surface_points};
+use etendue_math::Vec3;
+use etendue_optics::fresnel::{fresnel, reflect, refract};
+use multiversion::multiversion;
+
+use super::path_block::{Branch, PathBlock, Seen};
+use crate::buckets::Buckets;
+use crate::medium_cache::MediumCache;
+use crate::scatter::SPLIT;
+use crate::scene::{Act, Scene};
+use crate::solid_stack::SolidStack;
+
+/// Sorts branches by the faces that they meet.
+struct Sorter {
+    /// For each face whether it is an interface of a solid that branches are split at many at a time.
+    splits: Vec<bool>,
+    /// Places of the branches that are, by the number of their face and 1.
+    lists: Buckets,
+    tied: Vec<bool>,
+}
+
+/// The list of branches that are worked on one by one.
+const SINGLE: usize = 0;
+
+impl Sorter {
+    fn new(scene: &Scene) -> Self {
+        let roles = scene.roles.iter().zip(scene.face_set.faces());
+        let splits = roles.map(|(role, face)| {
+            let interface = |f: u32| scene.finishes[f as usize].facts().fresnel;
+            role.solid != 0 && !face.shape.is_smooth() && matches!(role.act, Act::Optical(f) if interface(f))
+        });
+        Self {
+            splits: splits.collect(),
+            lists: Buckets::new(scene.roles.len() + 1),
+            tied: Vec::new(),
+        }
+    }
+
+    /// Sorts branches; those that meet nothing are left out.
+    fn sort(&mut self, branches: &[Branch], lines: &RayBlock, hits: &Hits, most_events: u32) {
+        self.lists.clear();
+        hits.ties(lines, &mut self.tied);
+        for (i, branch) in branches.iter().enumerate() {
+            let face = hits.face[i];
+            if face == NONE {
+                continue;
+            }
+            let split = self.splits[face as usize] && !self.tied[i] && branch.events < most_events;
+            self.lists.push(if split { face as usize + 1 } else { SINGLE }, i);
+        }
+        self.lists.join_short(SINGLE + 1, SINGLE);
+    }
+}
+
+/// What lies on both sides of an interface, for a line that crosses it.
+#[derive(Clone, Copy)]
+struct Sides {
+    before: SolidStack,
+    after: SolidStack,
+    n: [f64; 2],
+    /// 1 if the line enters the solid, −1 if it leaves it.
+    sign: f64,
+    /// Absorption coefficient of the medium that it comes through \[1/mm\].
+    absorption: f64,
+}
+
+impl Sides {
+    /// None if the face is hidden there, or the line goes on as if nothing were there, or cannot.
+    fn new(scene: &Scene, solid: u16, before: SolidStack, wavelength: f64, media: &mut MediumCache) -> Option<Self> {
+        let after = before.crossed(solid)?;
+        let [here, there] = [before, after].map(|stack| media.at(scene, stack.top(), wavelength));
+        let meets = solid >= before.top().min(after.top()) && here.n > 0.0 && there.n > 0.0 && here.n != there.n;
+        meets.then_some(Self {
+            before,
+            after,
+            n: [here.n, there.n],
+            sign: if before.contains(solid) { -1.0 } else { 1.0 },
+            absorption: here.absorption,
+        })
+    }
+}
+
+/// Branches that meet one face, gathered, and what becomes of them. Structure of arrays.
+#[derive(Default)]
+struct SplitScratch {
+    which: Vec<u32>,
+    sides: Vec<Sides>,
+    sign: Vec<f64>,
+    n: [Vec<f64>; 2],
+    t: Vec<f64>,
+    part: Vec<u32>,
+    points: Vectors,
+    normals: Vectors,
+    /// Where they come along and where they are mirrored to.
+    mirrored: Vectors,
+    refracted: Vectors,
+    /// Shares of the radiance that go on mirrored and refracted; NaN where the normal contradicts what the line is in.
+    shares: [Vec<f64>; 2],
+    /// Those of them that go on.
+    going: Vec<u32>,
+    sorted: [Vectors; 2],
+}
+
+/// Takes branches to their next events, those that meet one interface together.
+pub struct Splitter {
+    sorter: Sorter,
+    scratch: SplitScratch,
+}
+
+impl Splitter {
+    /// For a scene.
+    pub fn new(scene: &Scene) -> Self {
+        Self {
+            sorter: Sorter::new(scene),
+            scratch: SplitScratch::default(),
+        }
+    }
+
+    /// Takes all branches to their next events.
+    pub(super) fn advance(&mut self, block: &mut PathBlock<'_>, hits: &Hits) {
+        let Self { sorter, scratch } = self;
+        sorter.sort(&block.branches, &block.lines, hits, block.method.most_events);
+        for (list, which) in sorter.lists.used().filter(|(list, _)| *list != SINGLE) {
+            block.split(list - 1, which, hits, scratch);
+        }
+        for i in sorter.lists.get(SINGLE) {
+            block.step(hits, *i as usize);
+        }
+    }
+}
+
+impl PathBlock<'_> {
+    /// Splits branches at an interface of a solid.
+    fn split(&mut self, number: usize, which: &[u32], hits: &Hits, scratch: &mut SplitScratch) {
+        self.look_around(self.lit.scene.roles[number].solid, which, hits, scratch);
+        let indices = || scratch.which.iter().map(|i| *i as usize);
+        fill(&mut scratch.t, indices().map(|i| hits.t[i]));
+        fill(&mut scratch.part, indices().map(|i| hits.part[i].0));
+        fill(&mut scratch.sign, scratch.sides.iter().map(|sides| sides.sign));
+        for (side, list) in scratch.n.iter_mut().enumerate() {
+            fill(list, scratch.sides.iter().map(|sides| sides.n[side]));
+        }
+        gather(&mut scratch.points, &self.lines.origin, &scratch.which);
+        gather(&mut scratch.mirrored, &self.lines.direction, &scratch.which);
+        let surface = &self.lit.scene.face_set.faces()[number];
+        surface_points(
+            surface,
+            &mut scratch.points,
+            &scratch.mirrored,
+            &scratch.t,
+            &scratch.part,
+            &mut scratch.normals,
+        );
+        refract_all(scratch);
+        for (k, i) in scratch.which.iter().enumerate() {
+            if scratch.shares[0][k].is_nan() {
+                self.step(hits, *i as usize);
+                continue;
+            }
+            let branch = &mut self.branches[*i as usize];
+            if branch.seen == Seen::Smooth {
+                self.paths[branch.path as usize].met[0] = true;
+            }
+            branch.events += 1;
+            branch.travelled += scratch.t[k];
+            branch.direct &= branch.scatters > 0;
+            let Sides { n, absorption, .. } = scratch.sides[k];
+            if absorption > 0.0 {
+                branch.weight *= (-absorption * scratch.t[k]).exp();
+            }
+            if branch.seen != Seen::Smooth {
+                branch.seen = Seen::Caustic;
+            }
+            if branch.seen != Seen::Smooth || branch.weight <= SPLIT {
+                // One of both ways is drawn by its share of the flux; radiance carries its factor (n₁/n₂)² besides.
+                branch.drawn = true;
+                let number = self.paths[branch.path as usize].numbers.draw();
+                let mirrored = number < scratch.shares[0][k];
+                let ratio = n[0] / n[1];
+                scratch.shares[0][k] = if mirrored { 1.0 } else { 0.0 };
+                scratch.shares[1][k] = if mirrored { 0.0 } else { ratio * ratio };
+            }
+        }
+        for (transmitted, directions) in [(false, &scratch.mirrored), (true, &scratch.refracted)] {
+            let shares = &scratch.shares[usize::from(transmitted)];
+            scratch.going.clear();
+            for (k, i) in scratch.which.iter().enumerate() {
+                let mut branch = self.branches[*i as usize];
+                branch.weight *= shares[k];
+                branch.stack = if transmitted {
+                    scratch.sides[k].after
+                } else {
+                    scratch.sides[k].before
+                };
+                if branch.weight > 0.0 {
+                    #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+                    scratch.going.push(k as u32);
+                    self.next.push(branch);
+                }
+            }
+            let [points, ways] = &mut scratch.sorted;
+            gather(points, &scratch.points, &scratch.going);
+            gather(ways, directions, &scratch.going);
+            let [o, d] = [points, ways].map(|lists| lists.each_ref().map(|list| &list[..]));
+            #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
+            let face = number as u32;
+            self.next_lines
+                .extend(o, d, face, scratch.going.iter().map(|k| scratch.part[*k as usize]));
+        }
+    }
+
+    /// Finds what lies on both sides of a face of a solid for each of some branches; those for which it is no interface are
+    /// worked on by themselves.
+    fn look_around(&mut self, solid: u16, which: &[u32], hits: &Hits, scratch: &mut SplitScratch) {
+        let scene = self.lit.scene;
+        scratch.which.clear();
+        scratch.sides.clear();
+        // Nearly all come from one or two sides.
+        let mut seen: Vec<(SolidStack, f64, Option<Sides>)> = Vec::new();
+        for i in which {
+            let branch = &self.branches[*i as usize];
+            let (stack, wavelength) = (branch.stack, self.wavelength(branch.path));
+            let known = seen.iter().find(|known| known.0 == stack && known.1 == wavelength);
+            let sides = if let Some((.., sides)) = known {
+                *sides
+            } else {
+                let sides = Sides::new(scene, solid, stack, wavelength, &mut self.media);
+                seen.push((stack, wavelength, sides));
+                sides
+            };
+            if let Some(sides) = sides {
+                scratch.which.push(*i);
+                scratch.sides.push(sides);
+            } else {
+                self.step(hits, *i as usize);
+            }
+        }
+    }
+}
+
+/// Directions and shares of what is mirrored and refracted.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn refract_all(scratch: &mut SplitScratch) {
+    let n = scratch.t.len();
+    for list in scratch.refracted.iter_mut().chain(&mut scratch.shares) {
+        list.resize(n, 0.0);
+    }
+    let [dx, dy, dz] = scratch.mirrored.each_mut().map(|v| &mut v[..n]);
+    let [rx, ry, rz] = scratch.refracted.each_mut().map(|v| &mut v[..n]);
+    let [back, through] = scratch.shares.each_mut().map(|v| &mut v[..n]);
+    let [nx, ny, nz] = scratch.normals.each_ref().map(|v| &v[..n]);
+    let [n1, n2] = scratch.n.each_ref().map(|v| &v[..n]);
+    let sign = &scratch.sign[..n];
+    for k in 0..n {
+        let d = Vec3::new(dx[k], dy[k], dz[k]);
+        let side = Vec3::new(nx[k], ny[k], nz[k]) * sign[k];
+        let height = -d.dot(side);
+        let cosine = if height < 1.0 { height } else { 1.0 };
+        let ratio = n1[k] / n2[k];
+        let f = fresnel(cosine, n1[k], n2[k]);
+        let mirrored = reflect(d, side, cosine);
+        let refracted = refract(d, side, cosine, ratio, f.cosine);
+        (dx[k], dy[k], dz[k]) = (mirrored.x, mirrored.y, mirrored.z);
+        (rx[k], ry[k], rz[k]) = (refracted.x, refracted.y, refracted.z);
+        let agrees = (height > 0.0) | ((height == 0.0) & (sign[k] < 0.0));
+        back[k] = if agrees { f.reflectance } else { f64::NAN };
+        through[k] = if agrees {
+            (1.0 - f.reflectance) * (ratio * ratio)
+        } else {
+            f64::NAN
+        };
+    }
+}

@@ -1,0 +1,173 @@
+//! One branch meets what it meets: sources on its way, and the surface behind them.
+
+use etendue_geometry::hits::{Hits, TIE};
+use etendue_geometry::surface_points::fill;
+use etendue_lightfield::leave::Sights;
+
+use super::method::LeftOut;
+use super::path_block::{Branch, PathBlock, Seen};
+use crate::interaction::meet;
+use crate::scatter::{SPLIT, SurfaceEvent};
+
+/// Diffuse scatters before a path may be ended by chance.
+const SURE: u32 = 3;
+
+impl PathBlock<'_> {
+    pub(super) fn step(&mut self, hits: &Hits, i: usize) {
+        let scene = self.lit.scene;
+        let d = self.lines.direction(i);
+        let mut branch = self.branches[i];
+        let wavelength = self.wavelength(branch.path);
+        let absorption = self.media.at(scene, branch.stack.top(), wavelength).absorption;
+        let Ok(mut interaction) = meet(scene, &self.lines, hits, i, branch.stack, |_, _, _| {}) else {
+            return;
+        };
+        interaction.limit_interpolation(branch.events);
+        branch.events += 1;
+        branch.travelled += interaction.t;
+        if absorption > 0.0 {
+            branch.weight *= (-absorption * interaction.t).exp();
+        }
+        if branch.events > self.method.most_events || branch.weight == 0.0 {
+            return;
+        }
+        match SurfaceEvent::new(scene, &interaction, d, wavelength, &mut self.media) {
+            Err(_) => {}
+            Ok(Some(event)) => self.meet(&branch, &event),
+            Ok(None) => {
+                branch.stack = interaction.after;
+                self.push(&interaction, d, branch);
+            }
+        }
+    }
+
+    /// Adds the light of sources that branches meet before anything else.
+    pub(super) fn gather(&mut self, hits: &Hits) {
+        let scene = self.lit.scene;
+        // A source that lies on the surface behind it is in front of it.
+        fill(&mut self.reach, hits.t.iter().map(|t| t * (1.0 + TIE)));
+        let mut before = 0.0;
+        for (number, source) in scene.sources.iter().enumerate() {
+            let share = self.lit.shares[number] - before;
+            before = self.lit.shares[number];
+            let Some(sampler) = &self.lit.light_samplers[number] else {
+                continue;
+            };
+            self.marks.clear();
+            self.marks.resize(self.branches.len(), false);
+            let sights = Sights {
+                origin: self.lines.origin.each_ref().map(Vec::as_slice),
+                direction: self.lines.direction.each_ref().map(Vec::as_slice),
+                reach: &self.reach,
+            };
+            sampler.mark(source, sights, &mut self.marks);
+            for (i, branch) in self.branches.iter().enumerate().filter(|(i, _)| self.marks[*i]) {
+                let caustic = branch.seen == Seen::Caustic && branch.direct;
+                if caustic && self.method.left == LeftOut::Caustics {
+                    continue;
+                }
+                let (o, d) = (self.lines.origin(i), self.lines.direction(i));
+                let path = &mut self.paths[branch.path as usize];
+                let small = branch.seen == Seen::Smooth && self.method.glints.is_some_and(|g| g.has(number));
+                if path.aimed && !small {
+                    continue;
+                }
+                let shared = if small { path.share } else { 1.0 };
+                let (_, wavelength, colour) = &self.lit.lines[path.line];
+                let (sum, chance, media) = (&mut path.sum, &mut path.chance, &mut self.media);
+                let rare = branch.drawn && !branch.direct;
+                sampler.along(source, o, d, self.reach[i], |hit| {
+                    let mut weight = branch.weight * shared * colour[number];
+                    let absorption = media.at(scene, branch.stack.top(), *wavelength).absorption;
+                    if absorption > 0.0 {
+                        weight *= (-absorption * hit.t).exp();
+                    }
+                    if let (true, LeftOut::Shared(balance)) = (caustic, self.method.left) {
+                        weight *= 1.0 - balance.forwards(branch.density, hit.luminance / self.lit.flux);
+                    }
+                    if let Seen::Diffuse { density, all } = branch.seen {
+                        let distance = branch.travelled + hit.t;
+                        let picked = if all { 1.0 } else { share };
+                        let other = picked * hit.density * distance * distance / hit.cosine;
+                        weight *= density / (density + other);
+                    }
+                    sum[0] += weight * hit.luminance;
+                    sum[1] += weight * hit.deviation;
+                    if rare {
+                        *chance += weight * hit.luminance;
+                    }
+                });
+            }
+        }
+    }
+
+    /// Branches at a surface.
+    fn meet(&mut self, branch: &Branch, event: &SurfaceEvent<'_>) {
+        let (smooth, shares) = event.seen();
+        let seen = if branch.seen == Seen::Smooth {
+            Seen::Smooth
+        } else {
+            Seen::Caustic
+        };
+        let go = |block: &mut Self, transmitted: bool, weight: f64, drawn: bool| {
+            let (d, stack) = if transmitted {
+                event.refracted(shares.refraction)
+            } else {
+                event.mirrored()
+            };
+            let branch = Branch {
+                stack,
+                weight,
+                seen,
+                drawn: branch.drawn || drawn,
+                direct: branch.direct && branch.scatters > 0,
+                ..*branch
+            };
+            block.push(event.interaction(), d, branch);
+        };
+        let is_diffuse = event.bsdf().facts().is_diffuse();
+        if branch.seen == Seen::Smooth {
+            let met = &mut self.paths[branch.path as usize].met;
+            met[0] |= smooth != [0.0; 2];
+            met[1] |= branch.direct && is_diffuse;
+        }
+        let aimed = self.paths[branch.path as usize].aimed;
+        let diffuse = !aimed && is_diffuse && !self.end(branch, event);
+        // Chains of smooth surfaces branch; everything else is drawn.
+        if branch.seen == Seen::Smooth && branch.weight > SPLIT {
+            for (transmitted, share) in [(false, smooth[0]), (true, smooth[1])] {
+                if share > 0.0 {
+                    go(self, transmitted, branch.weight * share, false);
+                }
+            }
+            if diffuse {
+                self.scatter(branch, event, 1.0);
+            }
+            return;
+        }
+        // What goes on is drawn by the shares of the flux; radiance carries its factor (n₁/n₂)² besides. Whatever the diffuse
+        // share is from here, light may be scattered to here from elsewhere.
+        let scattered = if diffuse {
+            (shares.diffuse[0] + shares.diffuse[1]).max(0.05)
+        } else {
+            0.0
+        };
+        let [mirrored, refracted] = shares.specular;
+        let total = mirrored + refracted + scattered;
+        let mortal = branch.scatters > SURE || branch.weight <= SPLIT;
+        let alive = if mortal { total.min(1.0) } else { 1.0 };
+        let number = self.paths[branch.path as usize].numbers.draw();
+        if total <= 0.0 || number >= alive {
+            return;
+        }
+        let number = number * total / alive;
+        let boost = total / alive;
+        if number < mirrored {
+            go(self, false, branch.weight * boost, true);
+        } else if number < mirrored + refracted {
+            go(self, true, branch.weight * smooth[1] / refracted * boost, true);
+        } else if diffuse {
+            self.scatter(branch, event, boost / scattered);
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! The surface event: what becomes of light at a surface that it meets. Rays from the sources and lines of sight both ask here.
+
+use etendue_math::Vec3;
+use etendue_optics::bsdf::{Bsdf, Component, Drawn, Media, Shares};
+use etendue_optics::source::surface::across;
+
+use crate::interaction::Interaction;
+use crate::ledger::Loss;
+use crate::medium_cache::MediumCache;
+use crate::scene::Scene;
+use crate::solid_stack::SolidStack;
+
+/// Chains of smooth surfaces are followed on every branch down to this weight; below, one branch is drawn.
+pub const SPLIT: f64 = 1e-4;
+
+/// A surface at one of its points: its axes, its BSDF, and the media on both sides.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface<'a> {
+    bsdf: &'a dyn Bsdf,
+    media: Media,
+    /// The third is the normal of the front.
+    axes: [Vec3; 3],
+}
+
+impl<'a> Surface<'a> {
+    /// With the unit normal of the front.
+    #[inline(always)]
+    #[must_use]
+    pub fn new(bsdf: &'a dyn Bsdf, media: Media, normal: Vec3) -> Self {
+        Self {
+            bsdf,
+            media,
+            axes: axes(normal),
+        }
+    }
+
+    /// f \[1/sr\] for light that comes from one direction and goes to another, both pointing away from the surface.
+    #[inline]
+    #[must_use]
+    pub fn evaluate(&self, incident: Vec3, scattered: Vec3) -> f64 {
+        let [incident, scattered] = [incident, scattered].map(|v| local(&self.axes, v));
+        self.bsdf.evaluate(incident, scattered, &self.media)
+    }
+}
+
+#[inline(always)]
+fn axes(normal: Vec3) -> [Vec3; 3] {
+    let [x, y] = across(normal);
+    [x, y, normal]
+}
+
+/// Components of a unit vector along axes.
+#[inline(always)]
+fn local(axes: &[Vec3; 3], v: Vec3) -> Vec3 {
+    let [x, y, z] = axes.map(|axis| axis.dot(v));
+    Vec3::new(x, y, z.clamp(-1.0, 1.0))
+}
+
+/// Light, or a line of sight, at a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceEvent<'a> {
+    surface: Surface<'a>,
+    interaction: &'a Interaction,
+    /// Along which it came.
+    d: Vec3,
+    /// To where it came from, about the interpolated normal: what is mirrored and refracted goes by it.
+    towards: Vec3,
+    /// As `towards`, about the normal of the surface itself. Diffuse light is spread about it, so that none starts behind it.
+    outward: Vec3,
+}
+
+impl<'a> SurfaceEvent<'a> {
+    /// What meets a surface along `d`; None if it goes on as if nothing were there.
+    ///
+    /// # Errors
+    /// If a medium has no refractive index at this wavelength.
+    #[inline]
+    pub fn new(
+        scene: &'a Scene,
+        interaction: &'a Interaction,
+        d: Vec3,
+        wavelength: f64,
+        media: &mut MediumCache,
+    ) -> Result<Option<Self>, Loss> {
+        let Some(finish) = interaction.finish else {
+            return Ok(None);
+        };
+        let media = media.both(
+            scene,
+            [interaction.before, interaction.after],
+            interaction.front,
+            wavelength,
+        )?;
+        let bsdf = &*scene.finishes[finish as usize];
+        if bsdf.is_nothing(&media) {
+            return Ok(None);
+        }
+        let front = |normal: Vec3| if interaction.front { normal } else { -normal };
+        let surface = Surface::new(bsdf, media, front(interaction.side));
+        let outward = local(&surface.axes, -d);
+        let towards = if interaction.normal == interaction.side {
+            outward
+        } else {
+            local(&axes(front(interaction.normal)), -d)
+        };
+        Ok(Some(Self {
+            surface,
+            interaction,
+            d,
+            towards,
+            outward,
+        }))
+    }
+
+    /// The optical properties.
+    #[inline]
+    #[must_use]
+    pub fn bsdf(&self) -> &'a dyn Bsdf {
+        self.surface.bsdf
+    }
+
+    /// Where.
+    #[inline]
+    #[must_use]
+    pub const fn interaction(&self) -> &'a Interaction {
+        self.interaction
+    }
+
+    /// Along which it came.
+    #[inline]
+    #[must_use]
+    pub const fn direction(&self) -> Vec3 {
+        self.d
+    }
+
+    /// Shares of the light that arrives.
+    #[inline]
+    #[must_use]
+    pub fn shares(&self) -> Shares {
+        self.surface.bsdf.shares(self.towards, &self.surface.media)
+    }
+
+    /// What becomes of a ray, from two numbers: the component, its direction and the solids that it is in; None if it is absorbed.
+    #[inline]
+    #[must_use]
+    pub fn sample(&self, numbers: [f64; 2]) -> Option<(Component, Vec3, SolidStack)> {
+        let (component, (d, stack)) = match self.surface.bsdf.sample(self.towards, &self.surface.media, numbers) {
+            Drawn::Absorbed => return None,
+            Drawn::Mirrored => (Component::Specular(false), self.mirrored()),
+            Drawn::Refracted(cosine) => (Component::Specular(true), self.refracted(cosine)),
+            Drawn::Scattered(direction) => {
+                let transmitted = (direction.z > 0.0) != self.interaction.front;
+                (Component::Diffuse(transmitted), self.scattered(direction))
+            }
+        };
+        Some((component, d, stack))
+    }
+
+    /// Shares of the radiance along the mirrored and the refracted line that are seen, and shares of light that arrives (see
+    /// [`Bsdf::seen`]).
+    #[inline]
+    #[must_use]
+    pub fn seen(&self) -> ([f64; 2], Shares) {
+        self.surface.bsdf.seen(self.towards, &self.surface.media)
+    }
+
+    /// The direction after it is mirrored, and the solids there.
+    #[inline]
+    #[must_use]
+    pub fn mirrored(&self) -> (Vec3, SolidStack) {
+        (
+            self.interaction.mirrored(self.d, self.towards.z.abs()),
+            self.interaction.before,
+        )
+    }
+
+    /// The direction after it is refracted at an angle with this cosine, and the solids there.
+    #[inline]
+    #[must_use]
+    pub fn refracted(&self, cosine: f64) -> (Vec3, SolidStack) {
+        let [n1, n2] = self.surface.media.seen_from(self.towards);
+        let d = self
+            .interaction
+            .refracted(self.d, self.towards.z.abs(), n1 / n2, cosine);
+        (d, self.interaction.after)
+    }
+
+    /// A direction of diffuse light out of the frame of the surface, and the solids there.
+    #[inline]
+    #[must_use]
+    pub fn scattered(&self, direction: Vec3) -> (Vec3, SolidStack) {
+        let [x, y, z] = self.surface.axes;
+        let stack = if (direction.z > 0.0) == self.interaction.front {
+            self.interaction.before
+        } else {
+            self.interaction.after
+        };
+        (x * direction.x + y * direction.y + z * direction.z, stack)
+    }
+
+    /// How much diffuse light that goes where the line of sight came from may have come from its side and from the other one
+    /// (see [`Bsdf::incoming`]).
+    #[inline]
+    #[must_use]
+    pub fn incoming(&self) -> [f64; 2] {
+        self.surface.bsdf.incoming(self.outward, &self.surface.media)
+    }
+
+    /// A direction that such light may have come from, on one of the sides, in space.
+    #[inline]
+    #[must_use]
+    pub fn draw_incoming(&self, transmitted: bool, numbers: [f64; 2]) -> Vec3 {
+        let bsdf = self.surface.bsdf;
+        let k = bsdf.draw_incoming(self.outward, transmitted, &self.surface.media, numbers);
+        self.scattered(k).0
+    }
+
+    /// Light that comes from `k`, away from the surface, and goes where the line of sight came from.
+    #[inline]
+    #[must_use]
+    pub fn from(&self, k: Vec3) -> Incoming {
+        let incident = local(&self.surface.axes, k);
+        let transmitted = (incident.z > 0.0) != self.interaction.front;
+        let (bsdf, media) = (self.surface.bsdf, &self.surface.media);
+        Incoming {
+            transmitted,
+            f: bsdf.evaluate(incident, self.outward, media),
+            cosine: incident.z.abs(),
+            density: bsdf.incoming_pdf(incident, self.outward, media),
+            stack: if transmitted {
+                self.interaction.after
+            } else {
+                self.interaction.before
+            },
+        }
+    }
+}
+
+/// Diffuse light of one direction that is seen at a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Incoming {
+    /// Whether it comes from the other side.
+    pub transmitted: bool,
+    /// \[1/sr\].
+    pub f: f64,
+    /// Of the angle of incidence.
+    pub cosine: f64,
+    /// Density \[1/sr\] with which this direction is drawn on its side.
+    pub density: f64,
+    /// The solids that it comes through.
+    pub stack: SolidStack,
+}

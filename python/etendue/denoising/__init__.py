@@ -1,0 +1,1 @@
+"""Smoothing of counted images, with error bars: no light field is needed for it."""

@@ -1,0 +1,124 @@
+"""A pilot sample: some of a set's rays, enough to size a surface or to choose a grid."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.errors import ArgumentError
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import RayStream
+
+STRETCH = 4096
+"""Rays that are read in one piece."""
+
+LOOKED_AT = 1 << 14
+"""Rays whose lines tell how large the source is."""
+
+FEWEST = 25
+"""Rays below which no comparison means anything."""
+
+SINGLE = 4e-7
+"""Distance between lines, against that of their start points and coordinates, which single precision can make of nothing:
+some roundings of 6e-8."""
+
+SMALLEST = 1e-6
+"""Radius [mm] below which no source is that emits light: a thousandth of a wavelength or so."""
+
+ALMOST_ALL = 0.999
+"""Share of the lines that must pass the point; the others are strays."""
+
+
+def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
+    """Up to `at_most` rays that carry flux, from stretches spread evenly over the set, in its own scale of flux.
+
+    Raises
+    ------
+    ArgumentError
+        If the rays have no position or carry no flux.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> len(pilot_sample(et.RingSource(rays=100_000), 16_384)), len(pilot_sample(et.RingSource(rays=1000), 16_384))
+    (16384, 1000)
+    """
+    if not rays.has_position:
+        raise ArgumentError("these rays have no positions (a far-field set), so no surface can carry them.")
+    source, n = rays.core_source(), len(rays)
+    pieces = max(at_most // STRETCH, 2)
+    starts = range(0, n, STRETCH)
+    if len(starts) > pieces:
+        starts = range(0, n - STRETCH + 1, (n - STRETCH) // (pieces - 1))
+    parts = [_core.read_rays(source, start, min(start + STRETCH, n)) for start in starts[:pieces]]
+    if parts:
+        position, direction, flux = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        carry = flux > 0
+        if carry.any():
+            return RaySet(position[carry], direction[carry], flux[carry], flux_unit=rays.flux_unit)
+    raise ArgumentError("these rays carry no flux, so no light field can be fitted to them.")
+
+
+def selected_rays(rays: RaySet, which: npt.NDArray[np.bool_]) -> RaySet:
+    """Some of the rays of a set in memory, without their colours.
+
+    Examples
+    --------
+    >>> rays = RaySet([[0, 0, 0], [1, 0, 0]], [[0, 0, 1], [0, 0, 1]], [1.0, 2.0])
+    >>> selected_rays(rays, np.array([False, True])).flux.tolist()
+    [2.0]
+    """
+    return RaySet(rays.position[which], rays.direction[which], rays.flux[which], flux_unit=rays.flux_unit)
+
+
+def check_near_field(rays: RayStream) -> None:
+    """Refuse rays whose lines all pass one point: they tell an intensity distribution, and no luminance.
+
+    Such are files of a point source, and far-field data written as rays that start at one point or on a sphere about it.
+
+    Raises
+    ------
+    ArgumentError
+        If so, or if the rays have no position or carry no flux.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> check_near_field(et.RingSource(rays=1000))
+    """
+    some = pilot_sample(rays, LOOKED_AT)
+    focus = some.virtual_focus
+    if len(some) < FEWEST or not focus.determined:
+        return
+    point = np.array(focus.point)
+    away = some.position - point
+    off = float(np.quantile(np.linalg.norm(np.cross(away, some.direction), axis=1), ALMOST_ALL))
+    reach = float(np.abs(away).max() + np.abs(some.position).max())
+    if off > max(SINGLE * reach, SMALLEST):
+        return
+    place = ", ".join(f"{x:.4g}" for x in point + 0.0)
+    raise ArgumentError(
+        f"{rays.provenance.source}: the lines of its rays pass one point, ({place}) mm, to within {off:.1g} mm: the set "
+        "has no near field, and a point has no finite luminance. Its intensity distribution is what it tells (etendue "
+        "intensity); in a scene that can be the intensity of a source. For luminance ask for a ray file with positions."
+    )
+
+
+def even_density(rays: RaySet) -> float:
+    """The density in étendue that is the same on all lines through a ball which all rays pass [1/(mm² sr)]: 1/(4 π² R²).
+
+    The ball is the smallest about the virtual focus of the rays. The density depends on the rays alone, so that fields on
+    different surfaces can be compared by what they say of rays that do not meet one of them.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> cross = et.RaySet([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], [[0, 0, 1]] * 2 + [[0.6, 0, 0.8]] * 2, [1] * 4)
+    >>> round(even_density(cross) * 4 * np.pi**2, 3)
+    1.0
+    """
+    away = rays.position - np.array(rays.virtual_focus.point)
+    radius = float(np.linalg.norm(np.cross(away, rays.direction), axis=1).max())
+    least = SINGLE * float(np.abs(rays.position).max()) + SMALLEST
+    return 1.0 / (4.0 * np.pi**2 * max(radius, least) ** 2)

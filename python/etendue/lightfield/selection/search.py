@@ -1,0 +1,282 @@
+"""Which carrier surface suits a ray set: the meaning of ``surface="auto"``."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from etendue.errors import ArgumentError
+from etendue.lightfield.pilot_sample import FEWEST, even_density, pilot_sample
+from etendue.lightfield.selection.line_search import golden_section, round_numbers_near
+from etendue.lightfield.selection.scorer import HeldOutScore, SurfaceScorer
+from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
+from etendue.lightfield.selection.trial_surfaces import FLATS, TrialSurfaces
+from etendue.lightfield.surfaces import SLACK, Box, Disk, Dome, Plane, Surface
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import RayStream, checked_threads
+
+
+@dataclasses.dataclass(frozen=True)
+class SurfaceScore:
+    """One surface that was tried.
+
+    Parameters
+    ----------
+    surface : Surface
+        With all its dimensions.
+    score, score_error : float
+        Mean ln of the density in étendue [1/(mm² sr)] at held-out rays, and its standard error.
+    lag, lag_error : float
+        By how much the score lies below that of the chosen surface, and the standard error of the difference.
+    unmet : float
+        Share of the flux that does not meet the surface.
+    """
+
+    surface: Surface
+    score: float
+    score_error: float
+    lag: float
+    lag_error: float
+    unmet: float
+
+
+@dataclasses.dataclass(frozen=True)
+class SurfaceChoice:
+    """The carrier surface that suits a ray set, and why.
+
+    Parameters
+    ----------
+    surface : Surface
+        With all its dimensions.
+    table : tuple of SurfaceScore
+        The best surface of each kind, the best score first.
+    depths : tuple of float, or None
+        The depths tried that come next to the chosen one, below and above, and are worse for sure [mm]; what lies between
+        cannot be told from it. The lowest and highest that were tried, if none is worse; None if no depth was sought.
+    notes : tuple of str
+        The choice in words.
+    """
+
+    surface: Surface
+    table: tuple[SurfaceScore, ...]
+    depths: tuple[float, float] | None
+    notes: tuple[str, ...]
+
+
+def choose_surface(
+    rays: RayStream, *, seed: int = 1, threads: int | None = None, settings: SelectionSettings = DEFAULT
+) -> SurfaceChoice:
+    """The surface on which the light field predicts held-out rays best; of several as good, the simplest.
+
+    Luminance is the same all along a ray, so any surface that all rays meet can carry the field, and which one it is, is a
+    matter of how few rays tell it: one on which place and direction have sharp edges of their own, and no room is wasted.
+    Tried are, the simplest first,
+
+    - a rectangle and a disk, at the depth at which the source is sharpest, if no more than half the light heads
+      towards −Z;
+    - a hemisphere that all rays come out of, about the centre of the smallest ball that their lines pass, or of the
+      sphere on which they start, whichever is the smaller;
+    - a dome about the same centre: a window at the depth of the rectangle, and a hemisphere for what does not pass it;
+    - a sphere about it;
+    - a cylinder about Z: the smallest that all lines meet, or about their start points;
+    - a box about their start points.
+
+    A field of up to 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and scored on
+    the others; see `SurfaceScorer`. A surface replaces a simpler one if it leads by three standard errors of the difference.
+    None is chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off.
+
+    Parameters
+    ----------
+    rays : RayStream
+        With positions.
+    seed : int
+        Of which rays are held out.
+    threads : int, optional
+        All cores if None. The choice is the same for any number.
+    settings : SelectionSettings
+        How many rays are used, on which grids, and what counts as better.
+
+    Raises
+    ------
+    ArgumentError
+        If the rays have no position, carry no flux, or fewer than 25 do.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> choice = choose_surface(et.RingSource(rays=20_000))
+    >>> choice.surface.NAME, choice.surface.z, round(choice.surface.radius, 1)
+    ('disk', 0.0, 30.0)
+    """
+    threads = checked_threads(threads)
+    some = pilot_sample(rays, settings.compared_rays)
+    if len(some) < FEWEST:
+        raise ArgumentError(
+            f"{len(some)} rays with flux are too few to choose a surface by; state one, such as surface='sphere'."
+        )
+    return _Search(some, seed, threads, settings).choice()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Scored:
+    """A surface and its score."""
+
+    surface: Surface
+    held_out: HeldOutScore
+
+    @property
+    def mean(self) -> float:
+        return self.held_out.score.mean
+
+
+class _Search:
+    """The surfaces that are tried, and the two scorers: one with some of the rays for the search, one with all."""
+
+    def __init__(self, rays: RaySet, seed: int, threads: int | None, settings: SelectionSettings) -> None:
+        self.settings = settings
+        self.trials = TrialSurfaces(rays, seed, settings)
+        even = even_density(rays)
+        self.scorer = SurfaceScorer.of(rays, even, seed, threads, settings.one_fold_from, settings)
+        few = pilot_sample(rays, settings.search_rays)
+        self.coarse_scorer = SurfaceScorer.of(few, even, seed, threads, settings.search_one_fold_from, settings)
+        self.less = 0 if len(rays) >= settings.fine_grids_from else 1
+        self.most_unmet = settings.most_unmet + 1.0 - float(self.trials.rays.flux.sum() / rays.flux.sum())
+
+    def choice(self) -> SurfaceChoice:
+        """Try all kinds, then take the simplest that none beats."""
+        kinds: list[Sequence[Surface]] = []
+        depths = None
+        trials, flux = self.trials, self.trials.rays.flux
+        backwards = float(flux[~trials.up].sum() / flux.sum())
+        if backwards <= self.settings.most_backwards and np.count_nonzero(trials.up) >= FEWEST:
+            z, depths = self.depth()
+            flats = trials.flats(z)
+            kinds += [[s for s in flats if isinstance(s, kind)] for kind in (Plane, Disk)]
+            kinds += [trials.hemispheres(z), trials.domes(z)]
+        kinds += filter(None, [trials.spheres(), trials.cylinders(), [Box().sized_for(trials.rays)]])
+        finalists = self.finals([self.best(kind) for kind in kinds])
+        able = [f for f in finalists if f.held_out.unmet <= self.most_unmet]
+        winner = able[0]
+        for challenger in able[1:]:
+            if challenger.held_out.leads(winner.held_out, self.settings):
+                winner = challenger
+        table = _table(finalists, winner)
+        return SurfaceChoice(winner.surface, table, depths, tuple(self.notes(winner, table, depths)))
+
+    def best(self, kind: Sequence[Surface]) -> Surface:
+        """Of surfaces of one kind the best; of those that meet enough of the flux, if there are any."""
+        scores = self.coarse_scorer.score_all([(surface.parts(), self.settings.coarse_grid) for surface in kind])
+        tried = [_Scored(surface, score) for surface, score in zip(kind, scores, strict=True)]
+        able = [t for t in tried if t.held_out.unmet <= self.most_unmet]
+        return max(able or tried, key=lambda t: t.mean).surface
+
+    def finals(self, surfaces: list[Surface]) -> list[_Scored]:
+        """The surfaces scored with all rays, each on the grid that suits it; finer ones unless it is hopeless."""
+        finer = dict(self.settings.kind_grids)
+
+        def scored(pairs: list[tuple[Surface, Grid]]) -> dict[tuple[Surface, Grid], HeldOutScore]:
+            grids = [(surface.parts(), (place - self.less, turn - self.less)) for surface, (place, turn) in pairs]
+            return dict(zip(pairs, self.scorer.score_all(grids), strict=True))
+
+        seen = scored([(surface, grid) for surface in surfaces for grid in finer])
+        best = {s: max(finer, key=lambda grid: seen[s, grid].score.mean) for s in surfaces}
+        enough = max(score.score.mean for score in seen.values()) - self.settings.hopeless_lag
+        hopeful = [(s, grid) for s, grid in best.items() if seen[s, grid].score.mean > enough]
+        seen |= scored([(s, fine) for s, grid in hopeful for fine in finer[grid]])
+        return [
+            _Scored(s, max((v for (t, _), v in seen.items() if t == s), key=lambda v: v.score.mean)) for s in surfaces
+        ]
+
+    # --- depth ---------------------------------------------------------------------------------------------------------
+
+    def depth(self) -> tuple[float, tuple[float, float]]:
+        """The simplest of the depths that are as good as any, and those next to it that are not [mm].
+
+        Nested rectangles, which fit any source well enough, tell with some of the rays where it is about. There the
+        rectangle or disk decides that suits the source best: its own edge is what tells depths apart best.
+        """
+        settings, trials = self.settings, self.trials
+        about, steps = self.about()
+        flats = {f: trials.flat(*f, about, trials.few) for f in FLATS}
+        kind, within = max(
+            flats, key=lambda f: self.coarse_scorer.score(flats[f].parts(), settings.coarse_grid).score.mean
+        )
+        seen: dict[float, HeldOutScore] = {}
+        grid = (settings.depth_grid[0] - self.less, settings.depth_grid[1] - self.less)
+
+        def score(z: float) -> float:
+            seen[z] = self.scorer.score(trials.flat(kind, within, z, trials.few).parts(), grid)
+            return seen[z].score.mean
+
+        window, tolerance = settings.depth_window * steps, settings.depth_tolerance * steps
+        golden_section(score, about - window, about + window, tolerance)
+        sharpest = max(seen, key=lambda z: seen[z].score.mean)
+        simple = round_numbers_near(sharpest, window, tolerance)
+        if np.ptp(trials.position[:, 2]) <= SLACK * trials.radius:
+            simple.insert(0, float(trials.position[0, 2]))
+        for z in simple:
+            score(z)
+            if not seen[sharpest].leads(seen[z], settings):
+                break
+        else:
+            z = sharpest
+        alike = [z for z, held_out in seen.items() if not seen[sharpest].leads(held_out, settings)]
+        below, above = [z for z in seen if z < min(alike)], [z for z in seen if z > max(alike)]
+        return z, (max(below, default=min(alike)), min(above, default=max(alike)))
+
+    def about(self) -> tuple[float, float]:
+        """About where the source is sharpest, and the length of two steps [mm]: by some rays, over the whole range."""
+        settings, trials = self.settings, self.trials
+        near = np.arange(-1.0, 1.0 + settings.depth_step, settings.depth_step)
+        far = 2.0 ** np.arange(1, settings.depth_doublings + 1)
+        places = trials.centre[2] + trials.radius * np.concatenate([-far[::-1], near, far])
+        scores = self.coarse_scorer.score_all([(trials.nested(z), settings.coarse_grid) for z in places])
+        at = int(np.clip(np.argmax([held_out.score.mean for held_out in scores]), 1, len(places) - 2))
+        low, high = float(places[at - 1]), float(places[at + 1])
+
+        def score(z: float) -> float:
+            return self.coarse_scorer.score(trials.nested(z), settings.coarse_grid).score.mean
+
+        return golden_section(score, low, high, settings.depth_window * (high - low)), high - low
+
+    # --- in words --------------------------------------------------------------------------------------------------------
+
+    def compared(self, row: SurfaceScore) -> str:
+        """A surface that was not chosen: how well it predicts against the chosen one, and why it was not if it is better."""
+        told = f"{row.surface.NAME} {-row.lag:+.4f} ± {row.lag_error:.4f}".replace("-", "−")
+        if row.unmet > self.most_unmet:
+            return f"{told}, but {row.unmet:.2%} of the flux does not meet it"
+        return told if row.lag > 0.0 else f"{told}, not for sure better and less simple"
+
+    def notes(
+        self, winner: _Scored, table: tuple[SurfaceScore, ...], depths: tuple[float, float] | None
+    ) -> Iterator[str]:
+        """What the user should know of the choice."""
+        others = ", ".join(self.compared(row) for row in table if row.surface != winner.surface)
+        yield (
+            f"carrier surface {winner.surface.spec}: of those that take up the light, the simplest that none surpasses "
+            f"for sure in predicting rays held out of the fit ({len(self.scorer.flux):,} rays, the same for all; ln "
+            f"likelihood per ray against it: {others})"
+        )
+        if depths is not None and isinstance(winner.surface, Plane | Disk | Dome):
+            yield f"depths between {depths[0]:.6g} and {depths[1]:.6g} mm cannot be told from that of {winner.surface.spec}"
+        mean = np.average(self.trials.direction, weights=self.trials.rays.flux, axis=0)
+        aslant = self.settings.aslant
+        if np.linalg.norm(mean) > aslant and mean[2] < aslant * np.linalg.norm(mean):
+            x, y, z = mean / np.linalg.norm(mean)
+            yield (
+                f"the light heads towards ({x:.2f}, {y:.2f}, {z:.2f}) on average; planes, disks, hemispheres and domes "
+                "shine towards +Z: turn the rays with rays.rotated(axis, angle) if one of these would suit the source"
+            )
+
+
+def _table(finalists: list[_Scored], winner: _Scored) -> tuple[SurfaceScore, ...]:
+    """One row for each kind."""
+    rows = []
+    for tried in sorted(finalists, key=lambda t: -t.mean):
+        score = tried.held_out.score
+        lag, lag_error = winner.held_out.score.lead(score)
+        rows.append(SurfaceScore(tried.surface, score.mean, score.error, lag, lag_error, tried.held_out.unmet))
+    return tuple(rows)

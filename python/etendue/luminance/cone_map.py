@@ -1,0 +1,80 @@
+"""Maps by the cone: the rays that head for the observers, at a stated acceptance or at that of least error."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from etendue.formats.rays.ray_index import RayIndex
+from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
+from etendue.luminance.cone import ConeEstimate, ConeView, cone_estimates
+from etendue.luminance.methods import Cone
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.ray_stream import Progress, RayStream, Tally
+
+
+def look_through_cone(
+    rays: RayStream,
+    pairs: list[tuple[Observer, Screen]],
+    how: Cone,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[LuminanceMap]:
+    """The maps of rays that head for the observers; see `luminance_map`."""
+    if how.acceptance == "auto":
+        return _automatic(rays, pairs, threads, progress)
+    angle = float(how.acceptance)
+    estimates, tally = cone_estimates(rays, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
+    return [_map(rays, estimate, 0, tally, None) for estimate in estimates]
+
+
+def _automatic(
+    rays: RayStream, pairs: list[tuple[Observer, Screen]], threads: int | None, progress: Progress | None
+) -> list[LuminanceMap]:
+    """Compare the acceptances of the ladder; a second pass only for maps with more pixels than the comparison had."""
+    ladder = [ConeView(o, comparison_screen(s), LADDER) for o, s in pairs]
+    compared, tally = cone_estimates(rays, ladder, threads, progress)
+    choices = [choose_acceptance(e, s) for e, (_, s) in zip(compared, pairs, strict=True)]
+    fine = [i for i, (e, (_, s)) in enumerate(zip(compared, pairs, strict=True)) if e.view.screen != s]
+    views = [ConeView(*pairs[i], (choices[i].acceptance,)) for i in fine]
+    refined = dict(zip(fine, cone_estimates(rays, views, threads, progress)[0] if fine else [], strict=True))
+    return [
+        _map(rays, refined[i], 0, tally, choice) if i in refined else _map(rays, estimate, choice.index, tally, choice)
+        for i, (estimate, choice) in enumerate(zip(compared, choices, strict=True))
+    ]
+
+
+def _map(
+    rays: RayStream, estimate: ConeEstimate, index: int, tally: Tally, choice: AcceptanceChoice | None
+) -> LuminanceMap:
+    counts = estimate.rays[index]
+    dead = counts == 0
+    values = np.where(dead, np.nan, estimate.luminance[index])
+    error = np.where(dead, np.nan, np.sqrt(estimate.variance[index]))
+    angle = estimate.view.acceptances[index]
+    notes = [
+        f"{counts.sum():,} of {tally.rays:,} rays head for the observer within {angle:.4g}° through the screen",
+        f"{int(dead.sum()):,} of {dead.size:,} pixels are dead (no ray): NaN",
+    ]
+    if isinstance(rays, RayIndex):
+        notes.append(f"by the index: {estimate.looked:,} rays were looked at, and no other can be seen")
+    notes.append(
+        "standard errors hold the noise of the rays alone; what the cone blurs, over the angle and by parallax at the edges "
+        "of the source, is not in them"
+    )
+    if tally.unusable:
+        notes.append(f"{tally.unusable:,} rays cannot be used and were left out; see the ray set's complaints")
+    if choice is not None:
+        notes.append(choice.reason)
+    notes += rays.notes
+    method = "cone" if choice is None else "cone, automatic acceptance"
+    return LuminanceMap(
+        values=values,
+        standard_error=error,
+        rays=counts,
+        observer=estimate.view.observer,
+        screen=estimate.view.screen,
+        flux_unit=rays.flux_unit,
+        provenance=rays.provenance.then(f"luminance by {method}, acceptance {angle:.6g}°"),
+        notes=tuple(notes),
+    )

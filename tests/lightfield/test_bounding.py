@@ -1,0 +1,110 @@
+"""Where a source is and how large, from its lines alone: lamps of known shape that shine all round."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from etendue.lightfield.selection.bounding import ball_centre, cylinder_of_lines, near_rays, start_centre
+from oracles.bodies import Block, Body, Globe, Rod
+from scipy.optimize import minimize
+
+Array = npt.NDArray[np.float64]
+
+BODIES = [Globe(), Block(), Rod()]
+NAMES = [type(body).__name__.lower() for body in BODIES]
+
+
+def lines(body: Body, n: int = 20_000) -> tuple[Array, Array]:
+    """Lines of a lamp with start points anywhere on them."""
+    position, direction = body.rays(n, seed=1)
+    return position + direction * np.random.default_rng(2).uniform(-9, 9, (n, 1)), direction
+
+
+def distances(position: Array, direction: Array, centre: Array) -> Array:
+    return np.linalg.norm(np.cross(position - centre, direction), axis=1)
+
+
+@pytest.mark.parametrize("body", BODIES, ids=NAMES)
+def test_lamps_of_the_tests_have_the_flux_they_state(body: Body) -> None:
+    """∫ L dU over all lines through a sphere about the lamp, by Monte Carlo; the rays have the density L / Φ."""
+    rng = np.random.default_rng(7)
+    n, around = 400_000, 4.0
+    normal, turn = rng.normal(size=(2, n, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    direction = normal + turn / np.linalg.norm(turn, axis=1)[:, None]
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    luminance = body.luminance(points=around * normal + body.middle, directions=direction)
+    etendue = 4 * np.pi**2 * around**2 * 1e-6
+    flux, error = luminance.mean() * etendue, luminance.std() * etendue / np.sqrt(n)
+    assert abs(flux - body.total_flux) < 4 * error
+    position, direction = body.rays(50_000, seed=3)
+    seen = body.luminance(points=position + 3.0 * direction, directions=direction)
+    # E[1 / L] over rays is the étendue of the lamp over its flux: π times its area, for a convex one.
+    inverse = 1 / seen
+    area = inverse.mean() * body.total_flux / np.pi * 1e6
+    known = {"globe": 4 * np.pi * 2.5**2, "block": 8 * (1.5 * 0.6 + 0.6 * 2.2 + 2.2 * 1.5), "rod": 2.2 * np.pi * 5.7}
+    error = area * inverse.std() / inverse.mean() / np.sqrt(50_000)
+    assert abs(area - known[type(body).__name__.lower()]) < 4 * error
+
+
+@pytest.mark.parametrize("body", BODIES, ids=NAMES)
+def test_the_smallest_ball_is_that_of_an_optimiser(body: Body) -> None:
+    """min over c, t of t, subject to |distance of line i from c|² ≤ t, by sequential quadratic programming."""
+    position, direction = lines(body, 3000)
+    centre = ball_centre(position, direction, np.zeros(3), 1)
+    found = distances(position, direction, centre).max()
+
+    def room(unknown: Array) -> Array:
+        return unknown[3] - distances(position, direction, unknown[:3]) ** 2
+
+    best = minimize(lambda u: u[3], [*body.middle, 9.0], constraints={"type": "ineq", "fun": room}, method="SLSQP")
+    assert best.success
+    assert np.sqrt(best.x[3]) - 1e-6 < found < np.sqrt(best.x[3]) * 1.005
+
+
+def test_a_ball_in_two_dimensions() -> None:
+    rng = np.random.default_rng(3)
+    turn, reach = rng.random(5000) * 2 * np.pi, 1.4 * np.sqrt(rng.random(5000))
+    along = np.stack([-np.sin(turn), np.cos(turn)], axis=1)
+    position = np.array([3.0, -2.0]) + reach[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1) + 4 * along
+    assert ball_centre(position, along, np.zeros(2), 1) == pytest.approx([3.0, -2.0], abs=0.01)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.002, 0.02])
+def test_strays_are_those_beyond_a_gap(share: float) -> None:
+    rod = Rod()
+    position, direction = lines(rod)
+    strays = int(share * len(position))
+    position[:strays] += np.random.default_rng(4).normal(size=(strays, 3)) * 500
+    far = distances(position, direction, np.array(rod.middle)) > 10
+    near = near_rays(position, direction, np.array(rod.middle))
+    assert not (near & far).any()
+    assert near[~far].all()
+    assert far.sum() >= 0.9 * strays
+
+
+def test_start_points_on_a_sphere_show_its_centre_and_others_none() -> None:
+    position, _ = Globe().rays(500, seed=1)
+    centre = start_centre(position)
+    assert centre is not None
+    assert centre == pytest.approx(Globe().middle, abs=1e-12)
+    assert start_centre(lines(Globe(), 500)[0]) is None
+    upper = position[position[:, 2] > 3.5]
+    assert start_centre(upper) == pytest.approx(Globe().middle, abs=1e-12)
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0, 0.0), (5.0, -9.0, 30.0)])
+def test_a_cylinder_of_lines_is_the_rod(start: tuple[float, float, float]) -> None:
+    rod = Rod()
+    found = cylinder_of_lines(*lines(rod), np.array(start), 1)
+    assert found is not None
+    assert found.radius == pytest.approx(rod.radius, rel=0.005)
+    ends = rod.middle[2] - rod.height / 2, rod.middle[2] + rod.height / 2
+    assert (found.bottom, found.top) == pytest.approx(ends, abs=0.01)
+    assert found.centre == pytest.approx(rod.middle[:2], abs=0.01)
+
+
+def test_lines_along_z_have_no_cylinder() -> None:
+    place = np.random.default_rng(5).uniform(-1, 1, (500, 3))
+    assert cylinder_of_lines(place, np.tile([0.0, 0.0, 1.0], (500, 1)), np.zeros(3), 1) is None

@@ -1,0 +1,34 @@
+"""A pytest plugin for runs with several workers (``pytest -n auto``).
+
+Tests that share a fixture of their module run on one worker, which makes it once; all others go to whichever worker is
+free. Workers share the cores: each has as many threads as its part, also where a test leaves the number to the core.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import pytest
+
+THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
+"""Environment variables that say how many threads there are: of the core, and of libraries that numpy may use."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep tests together that share a fixture of their module."""
+    for item in items:
+        module = item.nodeid.partition("::")[0]
+        definitions = getattr(item, "_fixtureinfo", None)
+        known = definitions.name2fixturedefs.values() if definitions else ()
+        if any(found[-1].scope == "module" and found[-1].baseid == module for found in known):
+            item.add_marker(pytest.mark.xdist_group(module))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes(specs: list[Any]) -> None:
+    """Let workers share the cores: each has as many threads as its part."""
+    threads = max(1, (os.cpu_count() or 1) // len(specs))
+    for variable in THREADS:
+        os.environ.setdefault(variable, str(threads))
