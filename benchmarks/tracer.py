@@ -107,7 +107,7 @@ def forward(scene: _core.Scene, rays: int, threads: int | None) -> tuple[float, 
     """Segments per second and exit fraction."""
     batches = -(-rays // _core.batch_size())
     start = time.perf_counter()
-    ledger = _core.trace_batches(scene, rays, 1, 1_000_000, 0, batches, threads)["ledger"]
+    ledger = _core.work_unit(scene, rays, 1, 1_000_000, 0, batches, threads)["ledger"]
     seconds = time.perf_counter() - start
     return ledger["segments"] / seconds, ledger["escaped"][0][0] / (4 * FLUX)
 
@@ -326,7 +326,7 @@ def job_patches(rays: int) -> None:
         gridded = et.GriddedSource.fit(et.RingSource(rays=2_000_000), et.Disk(radius=30), pixel=pixel, threshold=5.0)
         source = {"kind": "gridded", "gridded": gridded, "draws": rays}
         core = _core.Scene(compile_scene(et.Scene(sources=[source], solids=[LENS])).record)
-        seconds = best(lambda core=core: _core.trace_batches(core, rays, 1, 1000, 0, batches), 5)
+        seconds = best(lambda core=core: _core.work_unit(core, rays, 1, 1000, 0, batches), 5)
         first = first or seconds
         each = f"{seconds / rays * 1e9:.0f} ns a ray"
         row(f"rays of {len(gridded.patches):,} patches through a lens", each, f"{seconds / first:.2f} × the first")

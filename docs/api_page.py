@@ -23,8 +23,8 @@ GROUPS = {
         "combine_maps", "compare", "Region", "cross_section", "filter_map", "denoise_map",
     ),
     "Scenes": (
-        "scene", "Scene", "trace", "trace_rounds", "TraceResult", "ScatterEvents", "IlluminanceMap",
-        "read_illuminance_map",
+        "scene", "Scene", "trace", "trace_rounds", "trace_work", "TraceWork", "TraceResult", "ScatterEvents",
+        "IlluminanceMap", "read_illuminance_map",
     ),
     "Intensity and spectra": ("intensity_distribution", "Intensity", "read_intensity", "write_intensity", "Spectrum"),
     "Pictures": (

@@ -59,7 +59,7 @@ from etendue.quantities.report import ChangedFileWarning, RayFileWarning
 from etendue.quantities.spectrum import Spectrum
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.sources.ring_source import RingSource
-from etendue.tracing import TraceResult, trace, trace_rounds
+from etendue.tracing import TraceResult, TraceWork, trace, trace_rounds, trace_work
 from etendue.tracing.ledger import TraceWarning
 
 if TYPE_CHECKING:
@@ -102,6 +102,7 @@ __all__ = [
     "Sphere",
     "TraceResult",
     "TraceWarning",
+    "TraceWork",
     "UnitError",
     "UnknownNameError",
     "UnsupportedFormatError",
@@ -132,6 +133,7 @@ __all__ = [
     "threshold_sweep",
     "trace",
     "trace_rounds",
+    "trace_work",
     "write_intensity",
     "write_rays",
 ]

@@ -43,8 +43,8 @@ __all__ = [
     "scan_colours",
     "scene_crossings",
     "select_subset",
-    "trace_batches",
     "trace_trails",
+    "work_unit",
 ]
 
 _Floats: TypeAlias = npt.NDArray[np.float64]
@@ -122,13 +122,16 @@ class _Ledger(TypedDict):
     lost_at: list[int | None]
     segments: int
 
-_Open: TypeAlias = tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint64], _Floats]
+_Numbers: TypeAlias = npt.NDArray[np.uint64]
+_Cells: TypeAlias = tuple[_Floats, _Floats, _Numbers]
+_Units: TypeAlias = tuple[npt.NDArray[np.uint32], _Numbers, _Floats]
+_CellTally: TypeAlias = tuple[_Cells, _Units]
 
-class _Harvest(TypedDict):
+class _WorkSums(TypedDict):
+    batches: tuple[int, int]
     ledger: _Ledger
-    cells: list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]]
-    births: tuple[_Floats, _Floats, npt.NDArray[np.uint64]]
-    open_units: list[_Open]
+    tallies: list[_CellTally]
+    emitted: _CellTally
     records: list[_Floats]
     events: list[tuple[npt.NDArray[np.uint64], int]]
     arrivals: _Floats
@@ -269,7 +272,6 @@ class Survey:
     def patches(self) -> tuple[int, float]:
         """Number of patches, and the share of them that can be used."""
 
-_Sums: TypeAlias = tuple[_Floats, _Floats, npt.NDArray[np.uint64]]
 _Source: TypeAlias = RayTable | RingSource | FieldRays
 
 def read_rays(source: _Source, start: int, stop: int) -> tuple[_Floats, _Floats, _Floats]:
@@ -294,7 +296,7 @@ def cone_sums(
     cones: Sequence[_Cone],
     threads: int | None = None,
     progress: _Progress | None = None,
-) -> tuple[list[_Sums], _Tally]:
+) -> tuple[list[_Cells], _Tally]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the tally."""
 
 def index_leaf() -> int:
@@ -334,7 +336,7 @@ def index_sums(
     cones: Sequence[_Cone],
     threads: int | None = None,
     progress: _Progress | None = None,
-) -> list[tuple[_Sums, int]]:
+) -> list[tuple[_Cells, int]]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the rays looked at."""
 
 def count_rays(
@@ -408,30 +410,30 @@ class Dealing:
     def units(self, rays: npt.NDArray[np.uint64]) -> list[npt.NDArray[np.uint64]]:
         """The unit of each ray and its stratum, by the rays' numbers in the run."""
 
+    def join(self, open: _Units, copies: _Units, done: int) -> tuple[npt.NDArray[np.uint32], _Numbers, _Cells, _Units]:
+        """Adds units of rays with copies to open ones, when `done` rays are given out.
+
+        Cell, stratum and (Σ w, Σ w², units) of what grows, each cell of a stratum once; and the units of which more copies
+        may come.
+        """
+
 def losses() -> list[str]:
     """Why rays are lost, in the order of a ledger."""
 
 def batch_size() -> int:
     """Rays of a batch."""
 
-def trace_batches(
-    scene: Scene,
-    rays: int,
-    seed: int,
-    most_events: int,
-    first: int,
-    last: int,
-    threads: int | None = None,
-    open_units: Sequence[_Open] | None = None,
-) -> _Harvest:
-    """Traces batches ``first..last`` of a run of `rays` rays, the earlier ones of which left units open.
+def work_unit(
+    scene: Scene, rays: int, seed: int, most_events: int, first: int, last: int, threads: int | None = None
+) -> _WorkSums:
+    """Traces batches ``first..last`` of a run of `rays` rays.
 
-    Of the ledger each entry is (flux, rays), by source, face, medium or reason. Cells of each detector are (Σ w, Σ w², units
-    that contributed), shape (strata, cells); births are the same of the flux of each source, and of all of them at the end.
-    Open units are cell, unit and Σ w of each detector and, at the end, of the sources, where more copies of a ray may come;
-    records are rows of position [mm], direction, flux, wavelength [nm], shape (n, 8); events are rows of
-    scatter events, shape (n, 15), and how often they were thinned; arrivals are rows of point, unit vector to where light
-    came from, and number of the face, shape (n, 7).
+    Of the ledger each entry is (flux, rays), by source, face, medium or reason. Tallies are of each detector: (Σ w, Σ w²,
+    rays that contributed) of its cells, by rays without copies, and (cell, unit, Σ w) of rays with copies; `emitted` is the
+    same of the flux of each source, and of all of them at the end. Records are rows of position [mm], direction, flux,
+    wavelength [nm], shape (n, 8); events are rows of scatter events, shape (n, 15), and how often they were thinned;
+    arrivals are rows of point, unit vector to where light came from, number of the face, and that of the family,
+    shape (n, 8).
     """
 
 def look_at_scene(

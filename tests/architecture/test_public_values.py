@@ -61,6 +61,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "Screen": lambda: et.Screen(2, 1, 8, 4),
     "Spectrum": lambda: et.Spectrum([450.0, 650.0], [1.0, 0.5]),
     "TraceResult": result,
+    "TraceWork": lambda: et.trace_work(scene(), rays=5000, seed=2),
 }
 """A value of each public class."""
 

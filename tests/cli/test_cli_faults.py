@@ -109,7 +109,7 @@ def test_a_long_verb_stops_within_a_moment(verb: str, tmp_path: Path) -> None:
     (tmp_path / "lamp.toml").write_text(SPHERE + DETECTOR)
     look = ("--observer", "0,0", "--distance", "20", "--size", "10,10", "--pixels", "64,64")
     module, name, arguments = {
-        "trace": ("etendue._core", "trace_batches", ("lamp.toml", "--most-events", "100000000", "-o", "a.h5")),
+        "trace": ("etendue._core", "work_unit", ("lamp.toml", "--most-events", "100000000", "-o", "a.h5")),
         "luminance": (
             "etendue._core",
             "look_at_scene",

@@ -188,6 +188,9 @@ def test_luminance_of_a_scene_for_another_observer(run: Run, tmp_path: Path) -> 
     ],
 )
 def test_options_that_do_not_apply_are_refused(arguments: list[str], text: str, run: Run) -> None:
+    et.write_rays(
+        "other.ray", et.RaySet(np.zeros((2, 3)), np.array([[0.1, 0.2, 1.0], [0.0, 0.1, 1.0]]), np.ones(2)), "lighttools"
+    )
     status, out, err = run("luminance", *arguments)
     assert status == 2
     assert text in out + err

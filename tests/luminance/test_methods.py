@@ -265,9 +265,9 @@ def test_misspelt_keywords_and_methods() -> None:
         *((et.FromField, {"samples": bad}) for bad in (0, 1 << 20, 2.5, True)),
         *((et.FromField, {"surface": bad}) for bad in ("plane", None, 3)),
         *((et.PathTracing, {"rays_per_pixel": bad}) for bad in (0, 1 << 30, 2.5, True)),
-        *((et.PathTracing, {"until": bad}) for bad in (0.0, -1.0, float("nan"))),
-        *((et.PathTracing, {"seed": bad}) for bad in (-1, 1 << 64, 0.5)),
-        *((et.PathTracing, {"forward_rays": bad}) for bad in (-1, 1 << 51, 2.5)),
+        *((et.PathTracing, {"until": bad}) for bad in (0.0, -1.0, float("nan"), "0.01")),
+        *((et.PathTracing, {"seed": bad}) for bad in (-1, 1 << 64, 0.5, True)),
+        *((et.PathTracing, {"forward_rays": bad}) for bad in (-1, 1 << 51, 2.5, "many", float("nan"))),
     ],
 )
 def test_values_out_of_their_domain(make: Any, wrong: dict[str, Any]) -> None:

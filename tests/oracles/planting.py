@@ -45,23 +45,25 @@ def _gathered(sums: list[Any], factor: float, arguments: Arguments) -> tuple[lis
     return (sums, False) if known is None else _passes(sums, factor, arguments)
 
 
-def _cells(harvest: Any, factor: float, arguments: Arguments) -> tuple[Any, bool]:
-    cells = [_sums(cells, factor, arguments) for cells in harvest["cells"]]
-    return {**harvest, "cells": [sums for sums, _ in cells]}, any(lit for _, lit in cells)
+def _tallies(traced: Any, factor: float, arguments: Arguments) -> tuple[Any, bool]:
+    tallies = [
+        (_sums(own, factor, arguments)[0], (*copies[:2], copies[2] * factor)) for own, copies in traced["tallies"]
+    ]
+    return {**traced, "tallies": tallies}, any(own[0].any() or len(copies[2]) for own, copies in tallies)
 
 
-def _collected(harvest: Any, factor: float, _: Arguments) -> tuple[Any, bool]:
+def _collected(traced: Any, factor: float, _: Arguments) -> tuple[Any, bool]:
     scale = [1.0] * 6 + [factor, 1.0]
-    records = [rows * scale for rows in harvest["records"]]
-    return {**harvest, "records": records}, any(rows.size for rows in records)
+    records = [rows * scale for rows in traced["records"]]
+    return {**traced, "records": records}, any(rows.size for rows in records)
 
 
-def _account(harvest: Any, factor: float, _: Arguments) -> tuple[Any, bool]:
+def _account(traced: Any, factor: float, _: Arguments) -> tuple[Any, bool]:
     """All entries but what was emitted, which is known beforehand."""
-    ledger = harvest["ledger"]
+    ledger = traced["ledger"]
     ends = {name: ledger[name] for name in ("escaped", "on_face", "in_medium")}
     off = {name: (flux * factor, rays) for name, (flux, rays) in ends.items()}
-    return {**harvest, "ledger": {**ledger, **off}}, any(flux.any() for flux, _ in ends.values())
+    return {**traced, "ledger": {**ledger, **off}}, any(flux.any() for flux, _ in ends.values())
 
 
 def _cone(found: tuple[list[Any], Any], factor: float, arguments: Arguments) -> tuple[tuple[list[Any], Any], bool]:
@@ -96,9 +98,9 @@ ESTIMATES: dict[str, tuple[tuple[Any, str, Spoil], ...]] = {
     "lines-of-sight": ((_core, "look_at_scene", _passes),),
     "gathered-lines": ((_core, "look_at_scene", _gathered),),
     "forward-light": ((caustics.LightImages, "seen", _values),),
-    "traced-cells": ((_core, "trace_batches", _cells),),
-    "traced-rays": ((_core, "trace_batches", _collected),),
-    "flux-account": ((_core, "trace_batches", _account),),
+    "traced-cells": ((_core, "work_unit", _tallies),),
+    "traced-rays": ((_core, "work_unit", _collected),),
+    "flux-account": ((_core, "work_unit", _account),),
     "scatter-events": ((_core, "look_at_events", _sums),),
     "cone": ((_core, "cone_sums", _cone), (_core, "index_sums", _indexed)),
     "light-field": ((fitting, "fit_counts", _field),),

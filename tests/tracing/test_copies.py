@@ -13,7 +13,8 @@ import numpy.typing as npt
 import pytest
 from etendue import _core
 from etendue.tracing.result import TraceResult
-from etendue.tracing.running import ROUND
+from etendue.tracing.work import BATCHES
+from oracles.results import bits
 from oracles.verdicts import SIGNIFICANCE, assert_covers
 from scipy.stats import t
 
@@ -99,7 +100,7 @@ def test_until_is_not_reached_by_copies() -> None:
     scene = et.Scene(
         sources=[{"kind": "rays", "rays": lopsided(500, 3)}, {"kind": "point", "flux": 1}], detectors=[GRID]
     )
-    result = et.trace(scene, 3 * ROUND * _core.batch_size(), until=0.02)
+    result = et.trace(scene, 3 * BATCHES * _core.batch_size(), until=0.02)
     assert result.complete
     assert result.relative_error > 0.05
 
@@ -160,16 +161,10 @@ def room(*lamps: et.RaySet, most: int = 10**6, **more: Any) -> et.Scene:
     return et.Scene(**(keys | more))
 
 
-def bits(result: TraceResult) -> list[Any]:
-    sums = result.sums
-    arrays = [a for cells in (*sums.cells, sums.births, *sums.open_units) for a in cells]
-    return [*(a.tobytes() for a in arrays), *(held.array().tobytes() for held in sums.scattered)]
-
-
 def test_the_same_bits_for_threads_and_after_stops(tmp_path: Path) -> None:
     """Three rays and five, whose copies are on their way at the end of every batch and round."""
     scene = room(lopsided(3, 1), lopsided(5, 2), detectors=[d for d in room(most=10**5).detectors if d.name != "rcs"])
-    n = (ROUND + 1.25) * _core.batch_size()
+    n = (BATCHES + 1.25) * _core.batch_size()
     whole = et.trace(scene, n, 3, threads=2)
     first = next(et.trace_rounds(scene, n, 3, threads=7))
     assert sum(len(cell) for cell, _, _ in first.sums.open_units) > 20

@@ -14,10 +14,11 @@ from etendue import _core
 from etendue.errors import ArgumentError, FormatError, SceneWarning, UnknownNameError
 from etendue.tracing import TraceWarning
 from etendue.tracing.result import TraceResult
-from etendue.tracing.running import ROUND
+from etendue.tracing.work import BATCHES
+from oracles.results import bits
 from oracles.verdicts import LARGEST_Z
 
-ONE_ROUND = ROUND * _core.batch_size()
+ONE_ROUND = BATCHES * _core.batch_size()
 
 
 def luminaire(**more: Any) -> et.Scene:
@@ -46,18 +47,6 @@ def luminaire(**more: Any) -> et.Scene:
         "observers": [{"name": "side", "theta": 80, "phi": 190, "distance": 200, "target": [9, 0, 5], "screen": screen}],
     }  # fmt: skip
     return et.Scene(**(keys | more))
-
-
-def bits(result: TraceResult) -> list[Any]:
-    """Everything that a result holds, as bytes."""
-    sums = result.sums
-    arrays = [a for entry in sums.ledger.values() for a in entry] + [a for cells in sums.cells for a in cells]
-    arrays += [*sums.births, *(a for opened in sums.open_units for a in opened)]
-    return [
-        sums.batches, sums.rays, sums.segments, sums.imbalance, sums.lost_at,
-        *(a.tobytes() for a in arrays), *(held.array().tobytes() for held in sums.collected),
-        *((held.level, held.array().tobytes()) for held in sums.scattered),
-    ]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -14,13 +14,13 @@ from etendue import _core
 from etendue.errors import ArgumentError, FormatError, SceneError, UnknownNameError
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.scene.scatter_events import EVENT
-from etendue.tracing.running import ROUND
+from etendue.tracing.work import BATCHES
 from oracles.verdicts import LARGEST_Z, SIGNIFICANCE, assert_agree
 from scipy.stats import chi2, kurtosis
 
 Array = npt.NDArray[np.float64]
 NO_FACE = (1 << 32) - 1
-ONE_ROUND = ROUND * _core.batch_size()
+ONE_ROUND = BATCHES * _core.batch_size()
 
 
 def view(name: str, theta: float, phi: float, **more: Any) -> dict[str, Any]:

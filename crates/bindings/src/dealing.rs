@@ -2,9 +2,13 @@
 
 use etendue_sampling::ordered::BATCH;
 use etendue_trace::dealing::Dealing as CoreDealing;
+use etendue_trace::records::Contribution;
+use etendue_trace::tallies::{Joined, join};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+use crate::trace::{CellArrays, UnitArrays, cell_arrays, unit_arrays};
 
 /// The rays of a run, dealt to its sources.
 #[pyclass(frozen, module = "etendue._core")]
@@ -52,4 +56,44 @@ impl Dealing {
         let strata: Vec<u64> = units.iter().map(|unit| self.0.stratum(*unit) as u64).collect();
         Ok([PyArray1::from_vec(py, units), PyArray1::from_vec(py, strata)])
     }
+
+    /// Adds units of rays with copies to open ones, when `done` rays are given out: what cells of strata grow by, and the
+    /// units of which more copies may come.
+    #[allow(clippy::needless_pass_by_value, reason = "Python hands them over")]
+    fn join<'py>(
+        &self,
+        py: Python<'py>,
+        open: UnitRows<'py>,
+        copies: UnitRows<'py>,
+        done: u64,
+    ) -> PyResult<JoinedArrays<'py>> {
+        let Joined { cells, open } = join(&self.0, &units(&open)?, &units(&copies)?, done);
+        Ok((
+            PyArray1::from_iter(py, cells.iter().map(|grown| grown.0)),
+            PyArray1::from_iter(py, cells.iter().map(|grown| grown.1 as u64)),
+            cell_arrays(py, cells.iter().map(|grown| &grown.2)),
+            unit_arrays(py, &open),
+        ))
+    }
+}
+
+/// Units of rays with copies as Python hands them over: cell, unit, sum.
+type UnitRows<'py> = (
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, u64>,
+    PyReadonlyArray1<'py, f64>,
+);
+
+/// Cell, stratum, what it grows by; open units.
+type JoinedArrays<'py> = (
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u64>>,
+    CellArrays<'py>,
+    UnitArrays<'py>,
+);
+
+fn units((cells, units, sums): &UnitRows<'_>) -> PyResult<Vec<Contribution>> {
+    let (cells, units, sums) = (cells.as_slice()?, units.as_slice()?, sums.as_slice()?);
+    let rows = cells.iter().zip(units).zip(sums).map(|((c, u), s)| (*c, *u, *s));
+    Ok(rows.collect())
 }

@@ -23,7 +23,7 @@ impl Guide {
 
 #[pymethods]
 impl Guide {
-    /// From arrivals at the faces of a scene, as `trace_batches` tells them: (n, 8).
+    /// From arrivals at the faces of a scene, as `work_unit` tells them: (n, 8).
     #[new]
     #[allow(
         clippy::cast_possible_truncation,

@@ -61,7 +61,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(subset::deal_parts, module)?)?;
     module.add_function(wrap_pyfunction!(trace::losses, module)?)?;
     module.add_function(wrap_pyfunction!(trace::batch_size, module)?)?;
-    module.add_function(wrap_pyfunction!(trace::trace_batches, module)?)?;
+    module.add_function(wrap_pyfunction!(trace::work_unit, module)?)?;
     module.add_function(wrap_pyfunction!(trace::look_at_scene, module)?)?;
     module.add_function(wrap_pyfunction!(trace::look_at_events, module)?)?;
     module.add_function(wrap_pyfunction!(trace::deepest, module)?)?;

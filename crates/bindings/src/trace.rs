@@ -6,9 +6,7 @@ use etendue_geometry::RaySource;
 use etendue_geometry::origin_faces::OriginFaces;
 use etendue_math::Vec3;
 use etendue_sampling::ordered::{BATCH, inside};
-use etendue_trace::batches::trace_on;
 use etendue_trace::camera_connection;
-use etendue_trace::dealing::Dealing as CoreDealing;
 use etendue_trace::detector::Detector;
 use etendue_trace::events::{DEEPEST, EventReservoir, WORDS};
 use etendue_trace::forward::batch::trails;
@@ -20,8 +18,9 @@ use etendue_trace::mis::MisBalance;
 use etendue_trace::records::{Cell, CollectedRay, Contribution};
 use etendue_trace::reverse::method::{LeftOut, Method, Pixel};
 use etendue_trace::reverse::render::render;
-use etendue_trace::tallies::{Open, Tally, TraceSums};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use etendue_trace::tallies::{Tally, TraceSums};
+use etendue_trace::work_unit::work_unit as core_work_unit;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -57,62 +56,41 @@ fn ledger_dict<'py>(py: Python<'py>, ledger: &Ledger) -> PyResult<Bound<'py, PyD
 }
 
 /// Σ w, Σ w² and number of rays of each cell.
-type CellArrays<'py> = (
+pub type CellArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<u64>>,
 );
 
-fn cell_arrays<'py>(py: Python<'py>, cells: &[Cell]) -> CellArrays<'py> {
+pub fn cell_arrays<'a, 'py>(
+    py: Python<'py>,
+    cells: impl ExactSizeIterator<Item = &'a Cell> + Clone,
+) -> CellArrays<'py> {
     (
-        PyArray1::from_iter(py, cells.iter().map(|c| c.sum)),
-        PyArray1::from_iter(py, cells.iter().map(|c| c.squares)),
-        PyArray1::from_iter(py, cells.iter().map(|c| c.rays)),
+        PyArray1::from_iter(py, cells.clone().map(|c| c.sum)),
+        PyArray1::from_iter(py, cells.clone().map(|c| c.squares)),
+        PyArray1::from_iter(py, cells.map(|c| c.rays)),
     )
 }
 
-/// As [`CellArrays`], shape (strata, cells).
-type TallyArrays<'py> = (
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<u64>>,
-);
-
-fn tally_arrays<'py>(py: Python<'py>, tally: &Tally, strata: usize) -> PyResult<TallyArrays<'py>> {
-    let shape = [strata, tally.cells.len() / strata];
-    let (sum, squares, rays) = cell_arrays(py, &tally.cells);
-    Ok((sum.reshape(shape)?, squares.reshape(shape)?, rays.reshape(shape)?))
-}
-
-/// Cell, unit and sum of each open unit of a tally.
-type OpenArrays<'py> = (
+/// Cell, unit and sum of each unit of rays with copies, in the order of cells and units.
+pub type UnitArrays<'py> = (
     Bound<'py, PyArray1<u32>>,
     Bound<'py, PyArray1<u64>>,
     Bound<'py, PyArray1<f64>>,
 );
 
-fn open_arrays<'py>(py: Python<'py>, tally: &Tally) -> OpenArrays<'py> {
+pub fn unit_arrays<'py>(py: Python<'py>, units: &[Contribution]) -> UnitArrays<'py> {
     (
-        PyArray1::from_iter(py, tally.open.iter().map(|mark| mark.0)),
-        PyArray1::from_iter(py, tally.open.iter().map(|mark| mark.1)),
-        PyArray1::from_iter(py, tally.open.iter().map(|mark| mark.2)),
+        PyArray1::from_iter(py, units.iter().map(|unit| unit.0)),
+        PyArray1::from_iter(py, units.iter().map(|unit| unit.1)),
+        PyArray1::from_iter(py, units.iter().map(|unit| unit.2)),
     )
 }
 
-/// Open units as Python hands them over, in the order of their cells and units.
-type OpenRows<'py> = (
-    PyReadonlyArray1<'py, u32>,
-    PyReadonlyArray1<'py, u64>,
-    PyReadonlyArray1<'py, f64>,
-);
-
-fn begun(tallies: &[OpenRows<'_>]) -> PyResult<Open> {
-    let each = |(cells, units, sums): &OpenRows<'_>| -> PyResult<Vec<Contribution>> {
-        let (cells, units, sums) = (cells.as_slice()?, units.as_slice()?, sums.as_slice()?);
-        let marks = cells.iter().zip(units).zip(sums).map(|((c, u), s)| (*c, *u, *s));
-        Ok(marks.collect())
-    };
-    tallies.iter().map(each).collect()
+/// The cells of a tally, and its units of rays with copies.
+fn tally_arrays<'py>(py: Python<'py>, tally: &Tally) -> (CellArrays<'py>, UnitArrays<'py>) {
+    (cell_arrays(py, tally.cells.iter()), unit_arrays(py, &tally.copies))
 }
 
 /// Rows of position, direction, flux, wavelength.
@@ -151,11 +129,11 @@ fn open<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Vec<Opened<'py>>> {
     scene.sets().iter().map(|s| Opened::new(s.bind(py))).collect()
 }
 
-/// Traces batches `first..last` of a run of `rays` rays, the earlier ones of which left units `open`.
+/// Traces batches `first..last` of a run of `rays` rays: a work unit.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
-#[pyo3(signature = (scene, rays, seed, most_events, first, last, threads=None, open_units=None))]
-pub fn trace_batches<'py>(
+#[pyo3(signature = (scene, rays, seed, most_events, first, last, threads=None))]
+pub fn work_unit<'py>(
     py: Python<'py>,
     scene: &Scene,
     rays: u64,
@@ -164,7 +142,6 @@ pub fn trace_batches<'py>(
     first: u64,
     last: u64,
     threads: Option<usize>,
-    open_units: Option<Vec<OpenRows<'py>>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     if first > last || last > rays.div_ceil(BATCH) {
         return Err(PyValueError::new_err(format!("batches {first}..{last} of {rays} rays")));
@@ -180,7 +157,6 @@ pub fn trace_batches<'py>(
     };
     let core = scene.core();
     let batches: Range<u64> = first..last;
-    let begun = begun(open_units.as_deref().unwrap_or_default())?;
     let sums: TraceSums = stoppable(py, |stop| {
         let run = Run {
             rays,
@@ -190,22 +166,16 @@ pub fn trace_batches<'py>(
             light_samplers,
             stop: Some(stop),
         };
-        let work = || trace_on(core, scene.detectors(), &run, batches.clone(), begun.clone());
+        let work = || core_work_unit(core, scene.detectors(), &run, batches.clone());
         inside(threads.unwrap_or(0), work)
     })?;
     opened.iter().try_for_each(Opened::check)?;
-    let strata = CoreDealing::of(core, rays, &sets).strata();
     let dict = PyDict::new(py);
+    dict.set_item("batches", (first, last))?;
     dict.set_item("ledger", ledger_dict(py, &sums.ledger)?)?;
-    let cells = PyList::empty(py);
-    for detector in &sums.tallies {
-        cells.append(tally_arrays(py, detector, strata)?)?;
-    }
-    dict.set_item("cells", cells)?;
-    dict.set_item("births", tally_arrays(py, &sums.births, strata)?)?;
-    let tallies = sums.tallies.iter().chain([&sums.births]);
-    let open: Vec<OpenArrays<'_>> = tallies.map(|tally| open_arrays(py, tally)).collect();
-    dict.set_item("open_units", open)?;
+    let tallies: Vec<_> = sums.tallies.iter().map(|tally| tally_arrays(py, tally)).collect();
+    dict.set_item("tallies", tallies)?;
+    dict.set_item("emitted", tally_arrays(py, &sums.emitted))?;
     let records = PyList::empty(py);
     for detector in &sums.records {
         records.append(record_array(py, detector)?)?;
@@ -394,5 +364,5 @@ pub fn look_at_events<'py>(
         })
     })?;
     let cells = cells.ok_or_else(|| PyValueError::new_err("the events are of another scene"))?;
-    Ok(cell_arrays(py, &cells))
+    Ok(cell_arrays(py, cells.iter()))
 }

@@ -16,9 +16,9 @@ use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_sampling::ordered::{BATCH, inside};
-use etendue_trace::batches::trace;
 use etendue_trace::forward::run::Run;
 use etendue_trace::scene::{Scene, SceneFace};
+use etendue_trace::work_unit::work_unit;
 
 const RADIUS: f64 = 21.5;
 const HEIGHT: f64 = 21.4;
@@ -101,7 +101,7 @@ fn main() -> Result<(), String> {
     };
     for threads in [1, 2] {
         let begin = Instant::now();
-        let sums = inside(threads, || trace(&scene, &[], &run, 0..rays.div_ceil(BATCH)));
+        let sums = inside(threads, || work_unit(&scene, &[], &run, 0..rays.div_ceil(BATCH)));
         let seconds = begin.elapsed().as_secs_f64();
         let [emitted, _] = sums.ledger.balance();
         println!(

@@ -18,12 +18,12 @@ use etendue_geometry::shape::chart::BINS;
 use etendue_geometry::shape::sample::AreaSampler;
 use etendue_sampling::ordered::BATCH;
 
-use crate::batches::trace;
 use crate::detector::{Detector, Exitance};
 use crate::exitance_cells::{ExitanceCells, FacePoint};
 use crate::forward::run::Run;
 use crate::lit_scene::LitScene;
 use crate::scene::{Act, Role, Scene};
+use crate::work_unit::work_unit;
 
 /// Batches of rays from which the sizes of patches are chosen.
 const SCOUTS: u64 = 1;
@@ -95,7 +95,7 @@ impl ExitanceSurvey {
                 stop: lit.stop,
                 light_samplers: &[],
             };
-            let sums = trace(scene, &detectors, &run, batches);
+            let sums = work_unit(scene, &detectors, &run, batches);
             let cells = &sums.tallies[0].cells;
             let sides = cells.chunks(2 * wavelengths.len());
             sides.map(|lines| lines.iter().map(|cell| cell.rays).sum()).collect()
@@ -173,7 +173,7 @@ impl ExitanceSurvey {
             light_samplers: &[],
         };
         let first = SCOUTS + SURVEYORS + u64::from(pass) * EACH;
-        let sums = trace(lit.scene, &detectors, &run, first..first + EACH);
+        let sums = work_unit(lit.scene, &detectors, &run, first..first + EACH);
         let cells = &sums.tallies[0].cells;
         // The rays stand for the whole run.
         let scale = RUN as f64 / (EACH * BATCH) as f64;

@@ -2,10 +2,11 @@
 //!
 //! `scene`: faces with their optical properties, solids with their media, sources. `ray_start`: where a ray starts;
 //! `solid_stack`: which solids it is in; `interaction`: which of the faces that it meets decides what becomes of it;
-//! `scatter`: what the surface
-//! does to it, forwards and backwards; `medium_cache`: refractive index and absorption on its way; `transmittance`: what gets from one point to another.
+//! `scatter`: what the
+//! surface does to it, forwards and backwards; `medium_cache`: refractive index and absorption on its way; `transmittance`:
+//! what gets from one point to another.
 //!
-//! `forward`: from the sources to the detectors; `batches`: batches of a run, merged in their order; `dealing`: which source
+//! `forward`: from the sources to the detectors; `work_unit`: some batches of a run, and what they amount to; `dealing`: which source
 //! gives out which ray, and which rays are copies of one; `detector`: what records light, `records`: what it records; `ray_state`: what a ray carries;
 //! `ledger`: the flux account; `tallies`: what batches amount to. `events`: scatter events that are kept for later, thinned to a
 //! number of them; `camera_connection`: scatter events connected to an observer.
@@ -15,7 +16,6 @@
 //! surfaces; `glints`: where in a pixel they look for small images of sources; `mis`: light that both directions find.
 //! `buckets`: what rays of a block are sorted into.
 
-pub mod batches;
 mod buckets;
 pub mod camera_connection;
 pub mod dealing;
@@ -40,3 +40,4 @@ pub mod scene;
 pub mod solid_stack;
 pub mod tallies;
 pub mod transmittance;
+pub mod work_unit;

@@ -1,6 +1,4 @@
-//! What a trace amounts to: of one batch, and of many in their order.
-
-use etendue_sampling::ordered::BATCH;
+//! What a trace amounts to: of one batch, and of the batches of a work unit in their order.
 
 use crate::dealing::Dealing;
 use crate::detector::{Detector, Recorded};
@@ -10,70 +8,110 @@ use crate::ledger::Ledger;
 use crate::records::{Cell, CollectedRay, Contribution};
 use crate::scene::Scene;
 
-/// Cells, and what they have of units of which more rays may come.
+/// Sums of cells over the batches of a work unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tally {
-    /// The cells of each stratum, one after the other.
+    /// Of rays of their own.
     pub cells: Vec<Cell>,
-    /// Number of cells of a stratum.
-    width: usize,
-    /// Sums of open units, by cell and unit.
-    pub open: Vec<Contribution>,
+    /// Of rays with copies: what each unit (see [`Dealing`]) adds to a cell, in the order of cells and units.
+    pub copies: Vec<Contribution>,
 }
 
 impl Tally {
-    /// Empty cells of a number of strata, with sums of units that are open.
+    /// Empty cells.
     #[must_use]
-    pub fn new(width: usize, strata: usize, open: Vec<Contribution>) -> Self {
+    pub fn new(cells: usize) -> Self {
         Self {
-            cells: vec![Cell::default(); width * strata],
-            width,
-            open,
+            cells: vec![Cell::default(); cells],
+            copies: Vec::new(),
         }
     }
 
-    /// Adds the contributions of a batch. Those of one unit to one cell belong together: they are not independent. Where a
-    /// unit adds v to its sum w, Σ w² grows by (w + v)² − w², so that it is right at any time.
-    ///
-    /// `ahead`: as of [`Dealing::ahead`], after the batch.
-    pub fn add(&mut self, mut marks: Vec<Contribution>, dealing: &Dealing, ahead: &[u64]) {
-        marks.sort_by_key(|(cell, unit, _)| (*cell, *unit));
-        let before = std::mem::take(&mut self.open);
-        let mut earlier = before.iter().peekable();
-        for same in marks.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+    /// Adds the contributions of a batch. Those of one ray to one cell belong together: they are not independent.
+    pub fn add(&mut self, mut contributions: Vec<Contribution>, dealing: &Dealing) {
+        contributions.sort_by_key(|(cell, unit, _)| (*cell, *unit));
+        for same in contributions.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             let (number, unit, _) = same[0];
             let sum: f64 = same.iter().map(|(_, _, w)| w).sum();
-            let stratum = dealing.stratum(unit);
-            let mut held = None;
-            if stratum > 0 {
-                while let Some(mark) = earlier.next_if(|mark| (mark.0, mark.1) <= (number, unit)) {
-                    if (mark.0, mark.1) == (number, unit) {
-                        held = Some(mark.2);
-                    } else {
-                        self.keep(*mark, dealing, ahead);
-                    }
-                }
-                self.keep((number, unit, held.unwrap_or(0.0) + sum), dealing, ahead);
+            if dealing.stratum(unit) > 0 {
+                self.copies.push((number, unit, sum));
+                continue;
             }
-            let cell = &mut self.cells[stratum * self.width + number as usize];
+            let cell = &mut self.cells[number as usize];
             cell.sum += sum;
-            cell.squares += sum * (2.0 * held.unwrap_or(0.0) + sum);
-            cell.rays += u64::from(held.is_none());
-        }
-        for mark in earlier {
-            self.keep(*mark, dealing, ahead);
+            cell.squares += sum * sum;
+            cell.rays += 1;
         }
     }
 
-    /// Keeps the sum of a unit while more of its rays may come.
-    fn keep(&mut self, mark: Contribution, dealing: &Dealing, ahead: &[u64]) {
-        if ahead.get(dealing.stratum(mark.1)).is_some_and(|first| mark.1 >= *first) {
-            self.open.push(mark);
-        }
+    /// Brings what batches have of the same unit together, when all of them are added.
+    fn settle(&mut self) {
+        // Stable: sums are formed in the order of the batches.
+        self.copies.sort_by_key(|(cell, unit, _)| (*cell, *unit));
+        self.copies.dedup_by(|next, first| {
+            let same = (next.0, next.1) == (first.0, first.1);
+            if same {
+                first.2 += next.2;
+            }
+            same
+        });
     }
 }
 
-/// What a number of batches amount to.
+/// What a work unit's copies of rays add to a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Joined {
+    /// Cell, stratum, and what it grows by.
+    pub cells: Vec<(u32, usize, Cell)>,
+    /// Sums of the units of which more copies may come, by cell and unit.
+    pub open: Vec<Contribution>,
+}
+
+/// Adds the copies of a work unit to a run, whose earlier work units left sums of units `open`, and which has now given out
+/// `done` rays; both lists are in the order of cells and units.
+///
+/// Where a unit adds v to its sum w, Σ w² grows by (w + v)² − w², so that it is right at any time.
+#[must_use]
+pub fn join(dealing: &Dealing, open: &[Contribution], copies: &[Contribution], done: u64) -> Joined {
+    let ahead = dealing.ahead(done);
+    let mut joined = Joined::default();
+    let mut keep = |unit: Contribution, stratum: usize| {
+        if ahead.get(stratum).is_some_and(|first| unit.1 >= *first) {
+            joined.open.push(unit);
+        }
+    };
+    let mut earlier = open.iter().peekable();
+    for &(number, unit, sum) in copies {
+        let mut held = None;
+        while let Some(other) = earlier.next_if(|other| (other.0, other.1) <= (number, unit)) {
+            if (other.0, other.1) == (number, unit) {
+                held = Some(other.2);
+            } else {
+                keep(*other, dealing.stratum(other.1));
+            }
+        }
+        let (stratum, before) = (dealing.stratum(unit), held.unwrap_or(0.0));
+        keep((number, unit, before + sum), stratum);
+        if joined
+            .cells
+            .last()
+            .is_none_or(|last| (last.0, last.1) != (number, stratum))
+        {
+            joined.cells.push((number, stratum, Cell::default()));
+        }
+        if let Some((_, _, cell)) = joined.cells.last_mut() {
+            cell.sum += sum;
+            cell.squares += sum * (2.0 * before + sum);
+            cell.rays += u64::from(held.is_none());
+        }
+    }
+    for other in earlier {
+        keep(*other, dealing.stratum(other.1));
+    }
+    joined
+}
+
+/// What a work unit amounts to.
 #[derive(Clone, Debug)]
 pub struct TraceSums {
     /// The flux account.
@@ -81,7 +119,7 @@ pub struct TraceSums {
     /// Cells of each detector that has some.
     pub tallies: Vec<Tally>,
     /// Flux that each source gave out, and all of them together: what shows how many equal rays theirs are as good as.
-    pub births: Tally,
+    pub emitted: Tally,
     /// Rays of each collecting surface.
     pub records: Vec<Vec<CollectedRay>>,
     /// Scatter events of each detector of them.
@@ -101,7 +139,7 @@ pub struct BatchSums {
     /// What each detector recorded.
     pub detectors: Vec<Recorded>,
     /// Flux that each source gave out as rays of their own, and all of them together.
-    pub born: Vec<Cell>,
+    pub own: Vec<Cell>,
     /// Flux that sources gave out as copies of rays, and all of them together.
     pub copies: Vec<Contribution>,
 }
@@ -116,25 +154,20 @@ impl BatchSums {
                 .iter()
                 .map(|d| Recorded::of_batch(d.most_events(), batches))
                 .collect(),
-            born: vec![Cell::default(); scene.sources.len() + 1],
+            own: vec![Cell::default(); scene.sources.len() + 1],
             copies: Vec::new(),
         }
     }
 }
 
-/// Sums of open units, where a run goes on: of each detector, and at the end of the sources.
-pub type Open = Vec<Vec<Contribution>>;
-
 impl TraceSums {
-    /// Nothing yet of a run that goes on where these units are open; empty at its start.
+    /// Nothing yet.
     #[must_use]
-    pub fn new(scene: &Scene, detectors: &[Detector], dealing: &Dealing, open: Open) -> Self {
-        let mut open = open.into_iter();
-        let mut tally = |width| Tally::new(width, dealing.strata(), open.next().unwrap_or_default());
+    pub fn new(scene: &Scene, detectors: &[Detector]) -> Self {
         Self {
             ledger: Ledger::new(scene),
-            tallies: detectors.iter().map(|d| tally(d.cells())).collect(),
-            births: tally(scene.sources.len() + 1),
+            tallies: detectors.iter().map(|d| Tally::new(d.cells())).collect(),
+            emitted: Tally::new(scene.sources.len() + 1),
             records: vec![Vec::new(); detectors.len()],
             events: detectors.iter().map(|d| EventReservoir::new(d.most_events())).collect(),
             arrivals: Vec::new(),
@@ -143,26 +176,103 @@ impl TraceSums {
         }
     }
 
-    /// Adds the next batch, which is number `batch` of the run.
-    pub fn add(&mut self, part: BatchSums, dealing: &Dealing, batch: u64) {
+    /// The sums of batches, in their order.
+    #[must_use]
+    pub fn of(scene: &Scene, detectors: &[Detector], dealing: &Dealing, batches: Vec<BatchSums>) -> Self {
+        let mut sums = Self::new(scene, detectors);
+        for batch in batches {
+            sums.add(batch, dealing);
+        }
+        sums.tallies.iter_mut().for_each(Tally::settle);
+        sums.emitted.settle();
+        sums
+    }
+
+    fn add(&mut self, part: BatchSums, dealing: &Dealing) {
         let [emitted, fates] = part.ledger.balance();
         let scale = if emitted.flux() > 0.0 { emitted.flux() } else { 1.0 };
         let lost = if emitted.rays == fates.rays { 0.0 } else { f64::INFINITY };
         self.imbalance = self.imbalance.max((emitted.flux() - fates.flux()).abs() / scale + lost);
         self.rays += emitted.rays;
         self.ledger.merge(&part.ledger);
-        let ahead = dealing.ahead(batch * BATCH + emitted.rays);
         for (number, recorded) in part.detectors.into_iter().enumerate() {
-            self.tallies[number].add(recorded.contributions, dealing, &ahead);
+            self.tallies[number].add(recorded.contributions, dealing);
             self.events[number].add(recorded.events);
             self.records[number].extend(recorded.rays);
             self.arrivals.extend(recorded.arrivals);
         }
-        for (cell, born) in self.births.cells.iter_mut().zip(part.born) {
-            cell.sum += born.sum;
-            cell.squares += born.squares;
-            cell.rays += born.rays;
+        for (cell, own) in self.emitted.cells.iter_mut().zip(part.own) {
+            cell.sum += own.sum;
+            cell.squares += own.squares;
+            cell.rays += own.rays;
         }
-        self.births.add(part.copies, dealing, &ahead);
+        self.emitted.add(part.copies, dealing);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use etendue_sampling::ordered::BATCH;
+    use etendue_sampling::philox::Stream;
+
+    use super::*;
+
+    /// However a run is cut into work units: Σ w² is that of whole units, and none is open at the end.
+    #[test]
+    fn copies_that_go_on_from_one_work_unit_to_the_next_are_one_contribution() {
+        let rays = 5 * BATCH + 1234;
+        // A lamp of its own, a set of 1000 rays given out many times, one of 7 that two sources share.
+        let sets = [None, Some((0, 1000)), Some((1, 7)), Some((1, 7))];
+        let dealing = Dealing::new(&[0.3, 1.7, 0.05, 0.11], &sets, rays);
+        let stream = Stream::new(5, 1);
+        let contributions = |batch: u64| -> Vec<Contribution> {
+            let numbers = batch * BATCH..((batch + 1) * BATCH).min(rays);
+            let mut list: Vec<Contribution> = numbers
+                .filter(|ray| stream.word(*ray) % 4 == 0)
+                .map(|ray| ((stream.word(ray) >> 8) as u32 % 3, ray, (stream.word(ray) >> 40) as f64))
+                .collect();
+            dealing.units(batch, list.iter_mut().map(|(_, ray, _)| ray));
+            list
+        };
+        let mut whole: BTreeMap<(u32, u64), f64> = BTreeMap::new();
+        for (cell, unit, w) in (0..6).flat_map(contributions) {
+            *whole.entry((cell, unit)).or_default() += w;
+        }
+        let mut expected = vec![Cell::default(); 9];
+        for ((cell, unit), w) in whole {
+            let held = &mut expected[dealing.stratum(unit) * 3 + cell as usize];
+            held.sum += w;
+            held.squares += w * w;
+            held.rays += 1;
+        }
+        for cuts in [&[0, 6][..], &[0, 1, 2, 3, 4, 5, 6], &[0, 2, 5, 6]] {
+            let (mut found, mut open) = (vec![Cell::default(); 9], Vec::new());
+            for pair in cuts.windows(2) {
+                let mut tally = Tally::new(3);
+                (pair[0]..pair[1]).for_each(|batch| tally.add(contributions(batch), &dealing));
+                tally.settle();
+                let joined = join(&dealing, &open, &tally.copies, (pair[1] * BATCH).min(rays));
+                open = joined.open;
+                let own = tally.cells.iter().enumerate().map(|(cell, sums)| (cell, *sums));
+                let copied = joined
+                    .cells
+                    .iter()
+                    .map(|(cell, stratum, sums)| (stratum * 3 + *cell as usize, *sums));
+                for (place, sums) in own.chain(copied) {
+                    found[place].sum += sums.sum;
+                    found[place].squares += sums.squares;
+                    found[place].rays += sums.rays;
+                }
+                assert_eq!(open.is_empty(), pair[1] == 6);
+            }
+            for (found, expected) in found.iter().zip(&expected) {
+                assert_eq!(found.rays, expected.rays);
+                // Whole numbers below 2⁵³ add up exactly; their squares do not.
+                assert_eq!(found.sum, expected.sum);
+                assert!((found.squares / expected.squares - 1.0).abs() < 1e-12);
+            }
+        }
     }
 }

@@ -12,7 +12,6 @@ use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_sampling::ordered::inside;
-use etendue_trace::batches::trace;
 use etendue_trace::camera_connection::look_at_events;
 use etendue_trace::detector::{Detector, Events, FarFieldNodes, Illuminance, Image, Intensity, Portion};
 use etendue_trace::events::{Row, depth, depth_of, ray_of};
@@ -20,6 +19,7 @@ use etendue_trace::forward::run::Run;
 use etendue_trace::ledger::Loss;
 use etendue_trace::scene::{Scene, SceneFace};
 use etendue_trace::tallies::TraceSums;
+use etendue_trace::work_unit::work_unit;
 
 const ALL_R: [f64; 2] = [0.0, f64::INFINITY];
 const ALL_Z: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
@@ -124,7 +124,7 @@ fn run((scene, detectors): &Setup, rays: u64, threads: usize) -> TraceSums {
         stop: None,
         light_samplers: &[],
     };
-    inside(threads, || trace(scene, detectors, &run, 0..rays.div_ceil(1 << 16)))
+    inside(threads, || work_unit(scene, detectors, &run, 0..rays.div_ceil(1 << 16)))
 }
 
 const VIEW: View = View {

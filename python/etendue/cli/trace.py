@@ -23,7 +23,8 @@ from etendue.quantities.measured import measured
 from etendue.scene import Scene
 from etendue.tracing.plan import Plan
 from etendue.tracing.result import TraceResult
-from etendue.tracing.running import MOST_EVENTS, trace_rounds
+from etendue.tracing.running import trace_rounds
+from etendue.tracing.work import MOST_EVENTS
 
 RESULT_EXTENSIONS = (".h5", ".hdf5")
 RAY_EXTENSIONS = tuple(e for f in RAY_FORMATS for e in f.extensions if e not in MAP_EXTENSIONS)

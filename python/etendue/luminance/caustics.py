@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.scene.dealing import CellSums, Dealing, added
+from etendue.scene.dealing import CellSums, Dealing, Units
 
 Array = npt.NDArray[np.float64]
 
@@ -178,14 +178,15 @@ def plan(
     pixels = max(view["columns"] * view["rows"] for view in views)
     images = [{"kind": "image", "view": view, "complement": True, "shared": float(pixels)} for view in views]
     core = _core.Scene({**record, "detectors": [*images, {"kind": "arrivals"}]})
+    dealing = Dealing.of(record["sources"], RUN)
     batch, batches, segments, arrivals = _core.batch_size(), 0, 0, []
     sums = [np.zeros((3, view["columns"] * view["rows"])) for view in views]
     while batches < MOST_BATCHES and segments < MOST_SEGMENTS:
-        harvest = _core.trace_batches(core, RUN, seed, most_events, batches, batches + 1, threads)
-        found_cells = (np.array([part.sum(axis=0) for part in cells]) for cells in harvest["cells"])
-        sums = [total + cells for total, cells in zip(sums, found_cells, strict=False)]
-        arrivals.append(harvest["arrivals"])
-        segments += harvest["ledger"]["segments"]
+        traced = _core.work_unit(core, RUN, seed, most_events, batches, batches + 1, threads)
+        cells = (dealing.added(*dealing.nothing(tally), tally, RUN)[0] for tally in traced["tallies"])
+        sums = [total + [part.sum(axis=0) for part in found] for total, found in zip(sums, cells, strict=False)]
+        arrivals.append(traced["arrivals"])
+        segments += traced["ledger"]["segments"]
         batches += 1
         if min(sum(map(len, arrivals)), *(total[2].sum() for total in sums)) >= ENOUGH:
             break
@@ -272,14 +273,15 @@ class LightImages:
         batches = -(-rays // _core.batch_size())
         while self.runs < runs:
             own = (seed + self.runs * GOLDEN) % (1 << 64)
-            sums: list[CellSums] = []
-            begun = None
+            sums: list[tuple[CellSums, Units]] = []
             for first in range(0, batches, ROUND):
                 last = min(first + ROUND, batches)
-                harvest = _core.trace_batches(self._core, rays, own, most_events, first, last, threads, begun)
-                cells, begun = harvest["cells"], harvest["open_units"]
-                sums = [added(*pair) for pair in zip(sums, cells, strict=True)] if sums else cells
-            for total, found in zip(self._sums, sums, strict=True):
+                traced = _core.work_unit(self._core, rays, own, most_events, first, last, threads)
+                sums = sums or [self._dealing.nothing(tally) for tally in traced["tallies"]]
+                done = min(last * _core.batch_size(), rays)
+                before = zip(sums, traced["tallies"], strict=True)
+                sums = [self._dealing.added(*held, tally, done) for held, tally in before]
+            for total, (found, _) in zip(self._sums, sums, strict=True):
                 image = Forward.of(found, total.shape[1:], self._dealing, rays, 1.0, "")
                 np.add(total, [image.values, image.error**2, image.rays], out=total)
             self.runs += 1

@@ -200,12 +200,14 @@ class PathTracing(Method):
         n: Any = self.rays_per_pixel
         if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_RAYS_PER_PIXEL:
             raise ArgumentError(f"rays_per_pixel is {n!r}; give a whole number from 1 to {MOST_RAYS_PER_PIXEL:,}.")
-        if self.until is not None and not (math.isfinite(self.until) and self.until > 0.0):
+        least: Any = self.until
+        if least is not None and not (isinstance(least, numbers.Real) and 0.0 < float(least) < math.inf):
             raise ArgumentError(f"until is {self.until!r}; give the relative error to be reached, e.g. 0.01.")
-        if not (isinstance(self.seed, int) and 0 <= self.seed <= MOST_SEED):
+        if isinstance(self.seed, bool) or not (isinstance(self.seed, int) and 0 <= self.seed <= MOST_SEED):
             raise ArgumentError(f"seed is {self.seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
-        rays = self.forward_rays
-        if rays is not None and not (0 <= rays <= MOST_FORWARD_RAYS and int(rays) == rays):
+        rays: Any = self.forward_rays
+        whole = isinstance(rays, numbers.Real) and 0 <= float(rays) <= MOST_FORWARD_RAYS and float(rays).is_integer()
+        if rays is not None and not whole:
             raise ArgumentError(
                 f"forward_rays is {rays!r}; give a whole number up to {MOST_FORWARD_RAYS:,}, 0 for none, or leave it out."
             )

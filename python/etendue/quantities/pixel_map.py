@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import os
 from collections.abc import Callable, Mapping
@@ -34,7 +35,7 @@ class MapOutlets(NamedTuple):
     plot: Callable[..., Any]
 
 
-class PixelMap:
+class PixelMap(abc.ABC):
     """A map on a screen: frozen, with its error and its origin.
 
     A kind of map is a dataclass that has these fields and those of its geometry, and says how both are called.
@@ -153,11 +154,11 @@ class PixelMap:
         }
         return cls(**fields)
 
+    @abc.abstractmethod
     def _geometry(self) -> dict[str, Any]:
         """Where the screen is, as plain data."""
-        raise NotImplementedError
 
     @classmethod
+    @abc.abstractmethod
     def _geometry_from(cls, header: dict[str, Any]) -> dict[str, Any]:
         """Inverse of `_geometry`: fields by name."""
-        raise NotImplementedError

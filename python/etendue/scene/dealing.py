@@ -18,16 +18,11 @@ CellSums = tuple[Array, Array, Counts]
 """Σ w, Σ w² and number of units of each cell, shape (strata, cells)."""
 
 
-def added(a: CellSums, b: CellSums) -> CellSums:
-    """The sums of both.
+Units = tuple[npt.NDArray[np.uint32], Counts, Array]
+"""Rays with copies: cell, unit and Σ w, in the order of cells and units."""
 
-    Examples
-    --------
-    >>> one = np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1), np.uint64)
-    >>> added(one, one)[2].tolist()
-    [[2]]
-    """
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+Tally = tuple[tuple[Array, Array, Counts], Units]
+"""Of a work unit: Σ w, Σ w² and number of the rays without copies, shape (cells,), and what those with copies add."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,6 +85,55 @@ class Dealing:
     def done(self, rays: int) -> npt.NDArray[np.int64]:
         """Units of each stratum among the first `rays` rays, shape (strata,)."""
         return np.array(self.core.done(rays), dtype=np.int64)
+
+    def nothing(self, tally: Tally) -> tuple[CellSums, Units]:
+        """Sums of as many cells as a tally has, before anything is added, and no open units."""
+        shape = self.strata, len(tally[0][0])
+        none = np.zeros(0, np.uint32), np.zeros(0, np.uint64), np.zeros(0)
+        return (np.zeros(shape), np.zeros(shape), np.zeros(shape, np.uint64)), none
+
+    def added(self, sums: CellSums, begun: Units, tally: Tally, rays: int) -> tuple[CellSums, Units]:
+        """Sums with those of the next work unit.
+
+        Parameters
+        ----------
+        sums : (Σ w, Σ w², units)
+            So far, shape (strata, cells).
+        begun : (cell, unit, Σ w)
+            Units of which more copies may come.
+        tally : Tally
+            Of the work unit.
+        rays : int
+            Given out in all, the work unit included.
+
+        Returns
+        -------
+        sums, begun
+            New arrays.
+
+        Examples
+        --------
+        Three rays, each given out twice, which contribute 1 each time: two of them are done, of the third more may come.
+
+        >>> dealing = Dealing((1.0,), ((0, 3),), 6)
+        >>> own = np.zeros(1), np.zeros(1), np.zeros(1, np.uint64)
+        >>> copies = np.zeros(3, np.uint32), np.arange(6, 9, dtype=np.uint64), np.array([2.0, 2.0, 1.0])
+        >>> sums, begun = dealing.added(*dealing.nothing((own, copies)), (own, copies), rays=5)
+        >>> [part[1].tolist() for part in sums], begun[2].tolist()
+        ([[5.0], [9.0], [3]], [1.0])
+        """
+        own, copies = tally
+        sum_, squares, count = sums[0].copy(), sums[1].copy(), sums[2].copy()
+        sum_[0] += own[0]
+        squares[0] += own[1]
+        count[0] += own[2]
+        if self.strata > 1:
+            cell, stratum, grown, begun = self.core.join(begun, copies, rays)
+            # Each cell of a stratum comes once.
+            sum_[stratum, cell] += grown[0]
+            squares[stratum, cell] += grown[1]
+            count[stratum, cell] += grown[2]
+        return (sum_, squares, count), begun
 
     def variance(self, cells: CellSums, rays: int) -> Array:
         """Variance of Σ w of each cell over the first `rays` rays, shape (cells,).

@@ -150,7 +150,7 @@ class TraceResult:
 
     @cached_property
     def _effective(self) -> list[float]:
-        sum_, squares, _ = (row.sum(axis=0) for row in self.sums.births)
+        sum_, squares, _ = (row.sum(axis=0) for row in self.sums.sources)
         return [float(s * s / q) if q > 0.0 else 0.0 for s, q in zip(sum_, squares, strict=True)]
 
     def _copies_told(self) -> Iterator[str]:

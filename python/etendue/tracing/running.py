@@ -8,21 +8,13 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-from etendue import _core
 from etendue.errors import ArgumentError
-from etendue.quantities.memory import require_memory
 from etendue.quantities.ray_stream import Progress, checked_threads
-from etendue.scene import Scene, compile_scene
-from etendue.tracing.far_fields import far_field_nodes
+from etendue.scene import Scene
 from etendue.tracing.ledger import NOTEWORTHY, TraceWarning
-from etendue.tracing.plan import DEFAULT_RAYS, Plan, make_plan
+from etendue.tracing.plan import DEFAULT_RAYS
 from etendue.tracing.result import TraceResult
-from etendue.tracing.sums import Sums
-
-ROUND = 16
-"""Batches of a round. Fixed, and counted from the first batch: sums are formed per round, and their bits depend on it."""
-
-MOST_EVENTS = 10_000
+from etendue.tracing.work import BATCHES, MOST_EVENTS, TraceWork, trace_work
 
 Resume = TraceResult | str | os.PathLike[str] | None
 
@@ -144,43 +136,24 @@ def trace_rounds(
     threads = checked_threads(threads)
     if until is not None and not (math.isfinite(until) and until > 0.0):
         raise ArgumentError(f"until is {until!r}; give the relative error to be reached, e.g. 0.01.")
-    if isinstance(scene, str | os.PathLike):
-        scene = Scene.load(scene)
-    compiled = compile_scene(scene)
-    core = _core.Scene(compiled.record)
     start = None
     if resume is not None:
         start = resume if isinstance(resume, TraceResult) else TraceResult.load(Path(resume))
-    plan = make_plan(
-        scene,
-        compiled,
-        rays,
-        seed,
-        most_events,
-        lambda count: far_field_nodes(core, compiled, count, seed, most_events, threads),
-        None if start is None else start.plan,
-    )
-    if start is not None:
-        plan.check_same(start.plan)
-    if until is not None and not any(detection.cells for detection in plan.detections):
+    before = None if start is None else start.plan
+    work = trace_work(scene, rays, seed, most_events=most_events, threads=threads, before=before)
+    if before is not None:
+        work.plan.check_same(before)
+    if until is not None and not any(detection.cells for detection in work.plan.detections):
         raise ArgumentError("until: the scene has no detector with cells (intensity, illuminance, image) to judge by.")
-    cells = sum(detection.cells for detection in plan.detections)
-    held = f"{scene.name or 'the scene'}: detectors with {cells:,} cells"
-    require_memory(CELL_BYTES * cells * plan.dealing.strata, held)
-    return Rounds(core.with_far_fields([nodes.core() for nodes in plan.far_fields]), plan, start, until, threads)
-
-
-CELL_BYTES = 90
-"""Of a cell of a detector in memory while it is counted in: 87 were measured, of illuminance."""
+    return Rounds(work, start, until, threads)
 
 
 class Rounds(Iterator[TraceResult]):
-    """The rounds of a trace, each of which is worked on when its result is asked for; see `trace_rounds`.
+    """The rounds of a trace, each a work unit that is worked on when its result is asked for; see `trace_rounds`.
 
     Parameters
     ----------
-    core : _core.Scene
-    plan : Plan
+    work : TraceWork
         What is traced.
     start : TraceResult, optional
         Where to go on; it comes first.
@@ -188,15 +161,13 @@ class Rounds(Iterator[TraceResult]):
         As of `trace`.
     """
 
-    def __init__(
-        self, core: _core.Scene, plan: Plan, start: TraceResult | None, until: float | None, threads: int | None
-    ) -> None:
-        self.plan = plan
-        self._core = core
+    def __init__(self, work: TraceWork, start: TraceResult | None, until: float | None, threads: int | None) -> None:
+        self.plan = work.plan
+        self._work = work
         self._until = until
         self._threads = threads
         # Names and notes are those of here, the sums those of there.
-        self._start = None if start is None else TraceResult(plan, start.sums)
+        self._start = None if start is None else TraceResult(work.plan, start.sums)
         self._last: TraceResult | None = None
 
     def __next__(self) -> TraceResult:
@@ -207,13 +178,7 @@ class Rounds(Iterator[TraceResult]):
             return self._start
         if last is not None and (last.complete or (self._until is not None and last.relative_error < self._until)):
             raise StopIteration
-        plan, sums = self.plan, None if last is None else last.sums
-        first = 0 if sums is None else sums.batches
-        end = min(first + ROUND, -(-plan.rays // _core.batch_size()))
-        begun = None if sums is None else sums.open_units
-        how = (plan.rays, plan.seed, plan.most_events, first, end, self._threads)
-        harvest = _core.trace_batches(self._core, *how, begun)
-        most = tuple(detection.most_events for detection in plan.detections)
-        result = TraceResult(plan, Sums.first(harvest, end, most) if sums is None else sums.then(harvest, end))
+        number = 0 if last is None else last.sums.batches // BATCHES
+        result = self._work.join([self._work(number, self._threads)], last)
         self._last = result
         return result

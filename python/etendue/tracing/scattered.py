@@ -1,4 +1,4 @@
-"""Scatter events that the rounds of a trace add up to, thinned to a number of them."""
+"""Scatter events that the work units of a trace add up to, thinned to a number of them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEPTH = np.uint64(56)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Scattered:
-    """The first `count` events of a spool to which later rounds append.
+    """The first `count` events of a spool to which later work units append.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Scattered:
 
     @classmethod
     def nothing(cls, most: int) -> Scattered:
-        """Before the first round."""
+        """Before the first work unit."""
         return cls(Spool(EVENT), 0, 0, most)
 
     def array(self) -> Rows:
@@ -52,7 +52,7 @@ class Scattered:
         return self.spool.array(self.count)
 
     def then(self, words: npt.NDArray[np.uint64], level: int) -> Scattered:
-        """With the events of the next round, shape (m, 15), which were thinned to `level` already."""
+        """With the events of the next work unit, shape (m, 15), which were thinned to `level` already."""
         new = np.ascontiguousarray(words).view(EVENT).reshape(-1)
         level = max(level, self.level)
         if level > self.level or self.count + len(new) > self.most:
@@ -64,7 +64,7 @@ class Scattered:
                 level += 1
         new = _deep(new, level)
         if level > self.level:
-            # In a spool of its own: results of earlier rounds keep theirs.
+            # In a spool of its own: results of earlier work units keep theirs.
             thinned = Scattered(Spool(EVENT), 0, level, self.most)
             for old in self.stretches():
                 thinned.spool.append(_deep(old, level))

@@ -22,14 +22,14 @@ from etendue.formats.output import atomic_output, require_room
 from etendue.formats.strict_json import strict_json
 from etendue.quantities.memory import require_memory
 from etendue.quantities.spool import MEMORY_LIMIT, Spool
-from etendue.scene.dealing import CellSums, Dealing
+from etendue.scene.dealing import CellSums, Dealing, Units
 from etendue.scene.scatter_events import EVENT
 from etendue.scene.scene import Scene
 from etendue.scene.toml import read_toml
 from etendue.tracing.detections import check_cells, detection_from_dict
 from etendue.tracing.plan import Plan
 from etendue.tracing.scattered import STRETCH, Scattered
-from etendue.tracing.sums import ENTRIES, RECORD, Collected, Open, Sums
+from etendue.tracing.sums import ENTRIES, RECORD, Collected, Sums
 from etendue.units import FLUX_UNITS
 
 FORMAT = "etendue trace result"
@@ -151,10 +151,10 @@ def _write(file: Any, plan: Plan, sums: Sums, folder: Path) -> None:
         _put_array(detector, "records", held.array().view("<f8").reshape(-1, 8))
         if plan.detections[i].most_events:
             _put_events(detector, events)
-    _put_cells(group.create_group("births"), sums.births, sums.open_units[-1])
+    _put_cells(group.create_group("births"), sums.sources, sums.open_units[-1])
 
 
-def _put_cells(group: Any, cells: CellSums, begun: Open) -> None:
+def _put_cells(group: Any, cells: CellSums, begun: Units) -> None:
     """Sums of cells, and what they have of rays of which more copies may come."""
     arrays: dict[str, npt.NDArray[Any]] = dict(zip(("sum", "squares", "rays", *OPEN), (*cells, *begun), strict=True))
     for name, array in arrays.items():
@@ -264,7 +264,7 @@ def _sums(group: Node, plan: Plan) -> Sums:
         ledger=entries,
         lost_at=tuple(None if at < 0 else at for at in lost_at),
         cells=tuple(cells),
-        births=_cells(births, plan.dealing.strata, len(plan.source_names) + 1),
+        sources=_cells(births, plan.dealing.strata, len(plan.source_names) + 1),
         open_units=tuple(begun),
         collected=tuple(collected),
         scattered=tuple(scattered),
@@ -276,7 +276,7 @@ def _cells(group: Node, strata: int, cells: int) -> CellSums:
     return sum_, squares, _row(group, "rays", "<u8", strata, cells)
 
 
-def _open(group: Node) -> Open:
+def _open(group: Node) -> Units:
     length = group.dataset("open_cell", np.dtype(OPEN["open_cell"]), 1).shape[0]
     cell, unit, sum_ = (_row(group, name, dtype, length) for name, dtype in OPEN.items())
     return cell, unit, sum_

@@ -182,11 +182,16 @@ pub trait Bsdf: Debug + Send + Sync {
     fn shares(&self, incident: Vec3, media: &Media) -> Shares;
 
     /// f \[1/sr\] of the diffuse components; 0 for directions that it never scatters to.
-    fn evaluate(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64;
+    fn evaluate(&self, _incident: Vec3, _scattered: Vec3, _media: &Media) -> f64 {
+        0.0
+    }
 
     /// A direction of diffuse light on one side, from two numbers from 0 to 1: with density f |cos θₛ| over its share, which is
     /// not 0.
-    fn draw(&self, incident: Vec3, transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3;
+    #[inline]
+    fn draw(&self, incident: Vec3, transmitted: bool, _media: &Media, numbers: [f64; 2]) -> Vec3 {
+        by_cosine((incident.z > 0.0) != transmitted, numbers)
+    }
 
     /// Whether light passes as if nothing were there.
     fn is_nothing(&self, _media: &Media) -> bool {
@@ -244,7 +249,9 @@ pub trait Bsdf: Debug + Send + Sync {
 
     /// How much diffuse light that leaves along `scattered` may have come from its own side and from the other one, whatever its
     /// direction there: not 0 where there may be any.
-    fn incoming(&self, scattered: Vec3, media: &Media) -> [f64; 2];
+    fn incoming(&self, _scattered: Vec3, _media: &Media) -> [f64; 2] {
+        [0.0; 2]
+    }
 
     /// A direction that light may have come from, on the side of `scattered` or on the other one.
     #[inline]

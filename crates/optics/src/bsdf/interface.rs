@@ -34,21 +34,8 @@ impl Bsdf for Interface {
         }
     }
 
-    fn evaluate(&self, _incident: Vec3, _scattered: Vec3, _media: &Media) -> f64 {
-        0.0
-    }
-
-    fn draw(&self, incident: Vec3, transmitted: bool, _media: &Media, _numbers: [f64; 2]) -> Vec3 {
-        // Never asked for: its diffuse shares are 0.
-        if transmitted { -incident } else { incident }
-    }
-
     fn is_nothing(&self, media: &Media) -> bool {
         media.front == media.back
-    }
-
-    fn incoming(&self, _scattered: Vec3, _media: &Media) -> [f64; 2] {
-        [0.0; 2]
     }
 }
 

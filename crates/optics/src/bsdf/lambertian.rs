@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Facts, Media, Shares, by_cosine};
+use super::contract::{Bsdf, Facts, Media, Shares};
 use crate::table::Table;
 
 /// Cosines of the angle of incidence at which is asked how much light may come from a side.
@@ -57,11 +57,6 @@ impl Bsdf for Lambertian {
     fn evaluate(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {
         let transmitted = (incident.z > 0.0) != (scattered.z > 0.0);
         self.tables[usize::from(transmitted)].at(incident.z.abs(), media.wavelength) * FRAC_1_PI
-    }
-
-    #[inline]
-    fn draw(&self, incident: Vec3, transmitted: bool, _media: &Media, numbers: [f64; 2]) -> Vec3 {
-        by_cosine((incident.z > 0.0) != transmitted, numbers)
     }
 
     fn breakpoints(&self) -> Option<[Vec<f64>; 2]> {

@@ -18,9 +18,10 @@ impl Kind for Arrivals {
     fn scatter(&self, scatter: &mut Scatter<'_>, out: &mut Recorded) {
         let state = scatter.light.state;
         if state.unseen && !state.scattered && state.brightness.is_finite() {
+            let at = scatter.met.interaction();
             out.arrivals.push(Arrival {
-                face: scatter.interaction.face,
-                point: scatter.interaction.point,
+                face: at.face,
+                point: at.point,
                 towards: -scatter.light.direction,
                 family: state.family,
             });

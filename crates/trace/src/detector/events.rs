@@ -21,7 +21,7 @@ impl Kind for Events {
     }
 
     fn scatter(&self, scatter: &mut Scatter<'_>, out: &mut Recorded) {
-        let face = scatter.interaction.face as usize;
+        let face = scatter.met.interaction().face as usize;
         if self.faces.as_ref().is_none_or(|faces| faces.get(face) == Some(&true)) {
             out.events.push(&scatter.event, scatter.light.state.depth);
         }

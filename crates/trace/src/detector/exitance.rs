@@ -19,8 +19,8 @@ impl Kind for Exitance {
     }
 
     fn scatter(&self, scatter: &mut Scatter<'_>, out: &mut Recorded) {
-        let (scene, at, state) = (scatter.scene, scatter.interaction, scatter.light.state);
-        for (through, share) in [false, true].into_iter().zip(scatter.shares) {
+        let (scene, at, state) = (scatter.scene, scatter.met.interaction(), scatter.light.state);
+        for (through, share) in [false, true].into_iter().zip(scatter.met.shares().diffuse) {
             let place = FacePoint {
                 face: at.face,
                 part: at.part,

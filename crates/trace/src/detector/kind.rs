@@ -5,10 +5,10 @@ use etendue_math::Vec3;
 
 use crate::events::{EventReservoir, ScatterEvent};
 use crate::guide::Arrival;
-use crate::interaction::Interaction;
 use crate::medium_cache::MediumCache;
 use crate::ray_state::RayState;
 use crate::records::{CollectedRay, Contribution};
+use crate::scatter::SurfaceEvent;
 use crate::scene::Scene;
 
 /// What a detector has to be told of, besides rays that pass its face.
@@ -77,10 +77,8 @@ pub struct Scatter<'a> {
     pub scene: &'a Scene,
     /// Its media.
     pub media: &'a mut MediumCache,
-    /// Where the light meets the surface.
-    pub interaction: &'a Interaction,
-    /// Shares of its flux that the surface scatters back and to the other side.
-    pub shares: [f64; 2],
+    /// The surface, and what becomes of the light there.
+    pub met: &'a SurfaceEvent<'a>,
     /// What an observer needs to know of it.
     pub event: ScatterEvent,
     /// The ray.

@@ -57,7 +57,7 @@ pub fn trace_batch(scene: &Scene, detectors: &[Detector], run: &Run<'_>, dealing
     let copied = trace.block.out.detectors.iter_mut().flat_map(|d| &mut d.contributions);
     dealing.units(batch, copied.map(|(_, ray, _)| ray));
     dealing.units(batch, trace.block.out.copies.iter_mut().map(|(_, ray, _)| ray));
-    // Copies follow each other: one mark for all of them.
+    // Copies follow each other: one contribution for all of them.
     trace.block.out.copies.dedup_by(|next, first| {
         let same = (next.0, next.1) == (first.0, first.1);
         if same {
@@ -114,7 +114,7 @@ impl<'a> BatchTrace<'a> {
     /// Traces one batch.
     fn batch(&mut self, batch: u64) {
         let (scene, run) = (self.block.scene, self.block.run);
-        let mut births = RayBatch::default();
+        let mut emitted = RayBatch::default();
         self.first = batch * BATCH;
         for (number, range) in self.dealing.batch(batch).into_iter().enumerate() {
             let source = &scene.sources[number];
@@ -122,9 +122,9 @@ impl<'a> BatchTrace<'a> {
             let mut start = range.start;
             while start < range.end {
                 let stop = (start + BLOCK as u64).min(range.end);
-                source.emit(number as u64, start..stop, count, run.seed, run.sets, &mut births);
-                self.count(&births, number);
-                self.begin(&births, number, start);
+                source.emit(number as u64, start..stop, count, run.seed, run.sets, &mut emitted);
+                self.count(&emitted, number);
+                self.begin(&emitted, number, start);
                 self.finish();
                 for recorded in &mut self.block.out.detectors {
                     recorded.events.settle();
@@ -137,12 +137,12 @@ impl<'a> BatchTrace<'a> {
 
     /// Counts the rays that a source gave out.
     #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 sources")]
-    fn count(&mut self, births: &RayBatch, number: usize) {
-        let (fluxes, all) = (&births.flux[..births.len], self.block.scene.sources.len());
+    fn count(&mut self, emitted: &RayBatch, number: usize) {
+        let (fluxes, all) = (&emitted.flux[..emitted.len], self.block.scene.sources.len());
         if self.dealing.stratum_of(number) > 0 {
             for cell in [number, all] {
-                let marks = (self.first..).zip(fluxes).map(|(ray, flux)| (cell as u32, ray, *flux));
-                self.block.out.copies.extend(marks);
+                let each = (self.first..).zip(fluxes).map(|(ray, flux)| (cell as u32, ray, *flux));
+                self.block.out.copies.extend(each);
             }
             return;
         }
@@ -150,16 +150,16 @@ impl<'a> BatchTrace<'a> {
             .iter()
             .fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
         for cell in [number, all] {
-            let cell = &mut self.block.out.born[cell];
+            let cell = &mut self.block.out.own[cell];
             cell.sum += sums.0;
             cell.squares += sums.1;
-            cell.rays += births.len as u64;
+            cell.rays += emitted.len as u64;
         }
     }
 
     /// Takes in the rays that a source gave out, from its ray `start` on.
     #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
-    fn begin(&mut self, births: &RayBatch, number: usize, start: u64) {
+    fn begin(&mut self, emitted: &RayBatch, number: usize, start: u64) {
         let (scene, run) = (self.block.scene, self.block.run);
         let (source, near) = (&scene.sources[number], &scene.near[number]);
         let total = scene.sources.iter().map(|s| s.flux).sum();
@@ -170,38 +170,38 @@ impl<'a> BatchTrace<'a> {
             .brightness
             .then(|| SourceLuminance::new(source, sampler, total));
         let keeps = self.block.detectors.iter().any(|detector| detector.most_events() > 0);
-        let n = births.len;
-        self.block.out.ledger.emitted[number].add_all(&births.flux[..n]);
+        let n = emitted.len;
+        self.block.out.ledger.emitted[number].add_all(&emitted.flux[..n]);
         self.block.states.clear();
         self.block.states.extend((0..n).map(|i| {
             let ray = self.first + i as u64;
             RayState {
-                flux: births.flux[i],
-                wavelength: match births.colour.get(i) {
+                flux: emitted.flux[i],
+                wavelength: match emitted.colour.get(i) {
                     Some(stated) => *stated,
                     None => source.wavelength(run.seed, number as u64, start + i as u64),
                 },
                 ray,
                 scattered: false,
                 unseen: !source.is_visible(),
-                brightness: brightness.map_or(f64::INFINITY, |b| b.at(births.position(i), births.direction(i))),
+                brightness: brightness.map_or(f64::INFINITY, |b| b.at(emitted.position(i), emitted.direction(i))),
                 family: number as u32,
                 depth: if keeps { depth(run.seed, ray) } else { 0 },
             }
         }));
         self.now.clear();
-        if near.is_empty() && self.block.trails.is_none() && (0..n).all(|i| births.usable(i)) {
-            let [o, d] = [&births.position, &births.direction].map(|lists| lists.each_ref().map(|list| &list[..n]));
+        if near.is_empty() && self.block.trails.is_none() && (0..n).all(|i| emitted.usable(i)) {
+            let [o, d] = [&emitted.position, &emitted.direction].map(|lists| lists.each_ref().map(|list| &list[..n]));
             self.now.extend(o, d, 0..n as u32, NONE, (0..n).map(|_| NONE));
             return;
         }
         for i in 0..n {
             let RayState { ray, flux, .. } = self.block.states[i];
-            if !births.usable(i) {
+            if !emitted.usable(i) {
                 self.block.out.ledger.book(Fate::Lost(Loss::NotFinite, NONE), flux);
                 continue;
             }
-            let (o, d) = (births.position(i), births.direction(i));
+            let (o, d) = (emitted.position(i), emitted.direction(i));
             match start_near(scene, o, d, near) {
                 Ok((stack, origin_faces)) => {
                     self.block.mark(ray, o);

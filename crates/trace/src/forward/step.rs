@@ -110,8 +110,7 @@ impl BlockTrace<'_> {
         let mut scatter = Scatter {
             scene: self.scene,
             media: &mut self.media,
-            interaction,
-            shares: met.shares().diffuse,
+            met,
             event: ScatterEvent::new(interaction, d, [state.flux, state.wavelength], state.ray),
             light: Light { direction: d, state },
         };
