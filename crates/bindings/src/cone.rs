@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::run::interruptible;
-use crate::scan::tally_dict;
+use crate::scan::account_dict;
 use crate::source::with_source;
 use crate::view::View;
 
@@ -62,5 +62,5 @@ pub fn cone_sums<'py>(
         })
     })?;
     let arrays = sums.into_iter().zip(&cones).map(|(sum, cone)| cone.arrays(py, sum));
-    Ok((arrays.collect::<PyResult<_>>()?, tally_dict(py, &tally)?))
+    Ok((arrays.collect::<PyResult<_>>()?, account_dict(py, &tally)?))
 }

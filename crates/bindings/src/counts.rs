@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::run::interruptible;
-use crate::scan::tally_dict;
+use crate::scan::account_dict;
 use crate::source::with_source;
 use crate::surface::Part;
 
@@ -77,6 +77,6 @@ pub fn count_rays<'py>(
     result.set_item("kept", PyArray1::from_vec(py, coordinates).reshape([n, 4])?)?;
     result.set_item("unmet_rays", counts.unmet_rays)?;
     result.set_item("unmet_flux", counts.unmet_flux)?;
-    result.set_item("tally", tally_dict(py, &counts.tally)?)?;
+    result.set_item("tally", account_dict(py, &counts.tally)?)?;
     Ok(result)
 }

@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 
 use crate::cone::{Cone, SumArrays};
 use crate::run::interruptible;
-use crate::scan::tally_dict;
+use crate::scan::account_dict;
 use crate::source::{Opened, RayTable, Records, Source, with_source};
 
 fn grid(side: u32) -> PyResult<Cells> {
@@ -40,7 +40,7 @@ pub fn index_count<'py>(
             core_count(source, cells, threads, tick)
         })
     })?;
-    Ok((PyArray1::from_vec(py, counts), tally_dict(py, &tally)?))
+    Ok((PyArray1::from_vec(py, counts), account_dict(py, &tally)?))
 }
 
 /// Second pass: the records of the usable rays into `out`, each cell's from its place in `starts` on. False if they are

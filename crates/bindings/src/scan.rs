@@ -1,6 +1,6 @@
 //! The statistics of a ray set.
 
-use etendue_geometry::Tally;
+use etendue_geometry::PassAccount;
 use etendue_geometry::colours::{Bin, Colours, colours as core_colours};
 use etendue_geometry::scan::{Scan, scan as core_scan};
 use numpy::PyArray1;
@@ -11,7 +11,7 @@ use crate::run::interruptible;
 use crate::source::with_source;
 
 /// A tally as a dictionary.
-pub fn tally_dict<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {
+pub fn account_dict<'py>(py: Python<'py>, tally: &PassAccount) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("rays", tally.rays)?;
     dict.set_item("defects", tally.defects)?;
@@ -41,7 +41,7 @@ pub fn scan<'py>(
     moments.set_item("weighted_direction", scan.weighted_direction)?;
     moments.set_item("weighted_outer", scan.weighted_outer)?;
     moments.set_item("focus_rhs", scan.focus_rhs)?;
-    Ok((tally_dict(py, &scan.tally)?, moments))
+    Ok((account_dict(py, &scan.tally)?, moments))
 }
 
 /// One pass over a source whose records tell the colours of their rays, as a dictionary: ``flux``, ``mean``, ``low`` and

@@ -1,6 +1,6 @@
 //! Carrier surfaces and the coordinates of rays on them.
 
-use etendue_lightfield::surface::{Part as CorePart, Shape};
+use etendue_lightfield::surface::{CarrierPart, Shape};
 use etendue_math::{Frame, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -20,7 +20,7 @@ pub struct Part {
 
 impl Part {
     /// The core's chart.
-    pub fn core(&self) -> PyResult<CorePart> {
+    pub fn core(&self) -> PyResult<CarrierPart> {
         let [a, b] = self.size;
         let shape = match self.shape.as_str() {
             "rectangle" => Shape::Rectangle { width: a, height: b },
@@ -35,7 +35,7 @@ impl Part {
             y: self.y.into(),
             z: self.z.into(),
         };
-        Ok(CorePart { frame, shape })
+        Ok(CarrierPart { frame, shape })
     }
 }
 

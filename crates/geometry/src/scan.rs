@@ -3,15 +3,15 @@
 use std::ops::ControlFlow;
 
 use crate::pass::{Sums, over_all_rays};
+use crate::pass_account::PassAccount;
 use crate::ray_batch::RayBatch;
 use crate::source::RaySource;
-use crate::tally::Tally;
 
 /// What a ray set amounts to. Sums run over the usable rays, in file order by batches.
 #[derive(Clone, Debug)]
 pub struct Scan {
     /// The flux account.
-    pub tally: Tally,
+    pub tally: PassAccount,
     /// Usable rays that carry no flux.
     pub zero_flux: u64,
     /// Smallest and largest flux of a usable ray.
@@ -31,7 +31,7 @@ pub struct Scan {
 impl Default for Scan {
     fn default() -> Self {
         Self {
-            tally: Tally::default(),
+            tally: PassAccount::default(),
             zero_flux: 0,
             flux_range: [f64::INFINITY, f64::NEG_INFINITY],
             bounds: [[f64::INFINITY, f64::NEG_INFINITY]; 3],

@@ -6,7 +6,7 @@
 
 use std::ops::{ControlFlow, Range};
 
-use etendue_geometry::{RayBatch, RaySource, Tally};
+use etendue_geometry::{PassAccount, RayBatch, RaySource};
 use etendue_sampling::ordered;
 use multiversion::multiversion;
 
@@ -115,15 +115,15 @@ pub fn cone_sums(
     cones: &[Cone],
     threads: usize,
     progress: impl FnMut(u64) -> ControlFlow<()>,
-) -> (Vec<Sums>, Tally) {
+) -> (Vec<Sums>, PassAccount) {
     let prepared: Vec<Prepared> = cones.iter().map(Prepared::new).collect();
     let mut sums: Vec<Sums> = cones
         .iter()
         .map(|c| Sums::new(c.view.pixels() * c.acceptances.len()))
         .collect();
-    let mut tally = Tally::default();
+    let mut tally = PassAccount::default();
     let work = |range: Range<u64>| {
-        let mut part = Tally::default();
+        let mut part = PassAccount::default();
         let mut hits: Vec<Vec<Hit>> = prepared.iter().map(|_| Vec::new()).collect();
         let mut cosine = vec![0.0; etendue_geometry::ray_batch::BLOCK];
         source.for_each_block(range, |_, batch| {
@@ -134,7 +134,7 @@ pub fn cone_sums(
         });
         (part, hits)
     };
-    let merge = |(part, hits): (Tally, Vec<Vec<Hit>>)| {
+    let merge = |(part, hits): (PassAccount, Vec<Vec<Hit>>)| {
         tally.merge(&part);
         for ((sum, found), cone) in sums.iter_mut().zip(hits).zip(&prepared) {
             let pixels = cone.view.pixels();

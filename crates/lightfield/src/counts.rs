@@ -7,12 +7,12 @@
 use std::ops::{ControlFlow, Range};
 
 use etendue_geometry::ray_batch::BLOCK;
-use etendue_geometry::{RayBatch, RaySource, Tally};
+use etendue_geometry::{PassAccount, RayBatch, RaySource};
 use etendue_sampling::ordered;
 use etendue_sampling::philox::Stream;
 use multiversion::multiversion;
 
-use crate::surface::{Coordinates, Part, carry};
+use crate::surface::{CarrierPart, Coordinates, carry};
 
 /// The purpose under which rays are held out (see [`Stream::new`]).
 pub const PURPOSE_HOLD_OUT: u64 = 0x484F_4C44;
@@ -24,7 +24,7 @@ pub const CHANCES: u32 = 1 << 16;
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The charts, in the order in which rays are offered to them.
-    pub parts: Vec<Part>,
+    pub parts: Vec<CarrierPart>,
     /// Halvings of each of the four coordinates.
     pub depths: [u32; 4],
     /// Halvings of each coordinate of the fine grids: over the place, over the direction.
@@ -88,7 +88,7 @@ impl Sums {
 
 /// A held-out ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Kept {
+pub struct HeldOutRay {
     /// Number of its part.
     pub part: u32,
     /// s₁, s₂, a, b.
@@ -109,22 +109,22 @@ pub struct Counts {
     /// The one weight that all rays have, if they have.
     pub weight: Option<f64>,
     /// Held-out rays with their coordinates, in ray order.
-    pub kept: Vec<Kept>,
+    pub kept: Vec<HeldOutRay>,
     /// Rays with flux that no part meets.
     pub unmet_rays: u64,
     /// Their flux.
     pub unmet_flux: f64,
     /// The flux account of all rays.
-    pub tally: Tally,
+    pub tally: PassAccount,
 }
 
 /// What one batch has found.
 #[derive(Default)]
 struct Found {
-    tally: Tally,
+    tally: PassAccount,
     cells: [Vec<u32>; 3],
     weights: Vec<f64>,
-    kept: Vec<Kept>,
+    kept: Vec<HeldOutRay>,
     unmet_rays: u64,
     unmet_flux: f64,
 }
@@ -176,7 +176,7 @@ impl Found {
             self.weights.push(weight);
             if u32::from(chances[i]) < plan.kept {
                 let coordinates = [s1[i], s2[i], a[i], b[i]];
-                self.kept.push(Kept {
+                self.kept.push(HeldOutRay {
                     part,
                     coordinates,
                     weight,
@@ -248,7 +248,7 @@ pub fn count(
         kept: Vec::new(),
         unmet_rays: 0,
         unmet_flux: 0.0,
-        tally: Tally::default(),
+        tally: PassAccount::default(),
     };
     let mut equal = true;
     let work = |range: Range<u64>| {

@@ -3,7 +3,7 @@
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
-use crate::surface::{Part, Shape};
+use crate::surface::{CarrierPart, Shape};
 
 /// Distance along a line at which it leaves a part, and the cosine of its angle with the normal there; the distance is NaN if
 /// it does not.
@@ -94,7 +94,7 @@ pub struct Sights<'a> {
     pub reach: &'a [f64],
 }
 
-impl Part {
+impl CarrierPart {
     /// How far from `position` the line along `direction` leaves the part, and the cosine of its angle with the normal there;
     /// None if it does not.
     #[inline]
@@ -111,7 +111,7 @@ impl Part {
     }
 
     /// Marks the lines of sight that meet the part's emitting side at 0 < t ≤ `reach`, the part standing in `frame`; others
-    /// keep their marks. Rounding may decide otherwise than [`Part::leaves`] at the very rim.
+    /// keep their marks. Rounding may decide otherwise than [`CarrierPart::leaves`] at the very rim.
     pub fn mark(&self, frame: &Frame, sights: Sights<'_>, marks: &mut [bool]) {
         let own = &self.frame;
         let placed = Frame {

@@ -41,7 +41,7 @@ pub enum Shape {
 
 /// One chart of a carrier surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
+pub struct CarrierPart {
     /// Where the part stands.
     pub frame: Frame,
     /// What it is.
@@ -50,7 +50,7 @@ pub struct Part {
 
 /// Where a line leaves a part: place and direction, each coordinate from 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Crossing {
+pub struct Departure {
     /// Whether the line leaves the part at all; the rest means nothing if not.
     pub met: bool,
     /// Chart coordinates (s₁, s₂).
@@ -61,12 +61,12 @@ pub struct Crossing {
 
 /// A line crosses the part outwards at local point `n` of normal direction; p and q are its local direction cosines.
 #[inline(always)]
-fn crossing(inside: bool, place: (f64, f64), p: f64, q: f64) -> Crossing {
+fn departure(inside: bool, place: (f64, f64), p: f64, q: f64) -> Departure {
     let (s1, s2) = place;
     let (a, b) = disk_to_square(p, q);
     let met = inside & (0.0..=1.0).contains(&s1) & (0.0..=1.0).contains(&s2);
     // Rounding may carry a grazing direction out of the square by some 1e-16.
-    Crossing {
+    Departure {
         met,
         place: [s1, s2],
         direction: [a.clamp(0.0, 1.0), b.clamp(0.0, 1.0)],
@@ -74,17 +74,17 @@ fn crossing(inside: bool, place: (f64, f64), p: f64, q: f64) -> Crossing {
 }
 
 #[inline(always)]
-fn cross_rectangle(width: f64, height: f64, o: Vec3, d: Vec3) -> Crossing {
+fn cross_rectangle(width: f64, height: f64, o: Vec3, d: Vec3) -> Departure {
     let t = -o.z / d.z;
     let place = ((o.x + t * d.x) / width + 0.5, (o.y + t * d.y) / height + 0.5);
-    crossing(d.z > 0.0, place, d.x, d.y)
+    departure(d.z > 0.0, place, d.x, d.y)
 }
 
 #[inline(always)]
-fn cross_disk(radius: f64, o: Vec3, d: Vec3) -> Crossing {
+fn cross_disk(radius: f64, o: Vec3, d: Vec3) -> Departure {
     let t = -o.z / d.z;
     let (x, y) = ((o.x + t * d.x) / radius, (o.y + t * d.y) / radius);
-    crossing(
+    departure(
         (d.z > 0.0) & (x * x + y * y <= 1.0),
         clamped(disk_to_square(x, y)),
         d.x,
@@ -99,7 +99,7 @@ fn clamped((u, v): (f64, f64)) -> (f64, f64) {
 }
 
 #[inline(always)]
-fn cross_hemisphere(radius: f64, o: Vec3, d: Vec3) -> Crossing {
+fn cross_hemisphere(radius: f64, o: Vec3, d: Vec3) -> Departure {
     // From the point nearest the centre, so that a start point far away costs no digits.
     let near = o + d * -o.dot(d);
     let half_chord = radius * radius - near.dot(near);
@@ -110,11 +110,11 @@ fn cross_hemisphere(radius: f64, o: Vec3, d: Vec3) -> Crossing {
     let shear = (d.x * n.x + d.y * n.y) * lift + d.z;
     let inside = (half_chord > 0.0) & (n.z >= 0.0);
     let place = clamped(disk_to_square(n.x * azimuthal, n.y * azimuthal));
-    crossing(inside, place, d.x - n.x * shear, d.y - n.y * shear)
+    departure(inside, place, d.x - n.x * shear, d.y - n.y * shear)
 }
 
 #[inline(always)]
-fn cross_tube(radius: f64, height: f64, o: Vec3, d: Vec3) -> Crossing {
+fn cross_tube(radius: f64, height: f64, o: Vec3, d: Vec3) -> Departure {
     let across = d.x * d.x + d.y * d.y;
     let t = -(o.x * d.x + o.y * d.y) / across;
     let (x, y) = (o.x + t * d.x, o.y + t * d.y);
@@ -123,7 +123,7 @@ fn cross_tube(radius: f64, height: f64, o: Vec3, d: Vec3) -> Crossing {
     let (x, y) = ((o.x + t_out * d.x) / radius, (o.y + t_out * d.y) / radius);
     let z = o.z + t_out * d.z;
     let inside = (across > 0.0) & (half_chord > 0.0);
-    crossing(inside, (turns(x, y), z / height + 0.5), d.y * x - d.x * y, d.z)
+    departure(inside, (turns(x, y), z / height + 0.5), d.y * x - d.x * y, d.z)
 }
 
 /// Azimuth of (x, y) as a fraction of a turn from −x over −y, +x and +y: the seam lies at −x.
@@ -143,7 +143,7 @@ fn turns(x: f64, y: f64) -> f64 {
     (from_x + 0.5).clamp(0.0, 1.0)
 }
 
-impl Part {
+impl CarrierPart {
     /// Area \[mm²\].
     #[must_use]
     pub fn area(&self) -> f64 {
@@ -181,7 +181,7 @@ impl Part {
     /// Where the line through `position` along `direction` leaves the part.
     #[inline]
     #[must_use]
-    pub fn cross(&self, position: Vec3, direction: Vec3) -> Crossing {
+    pub fn cross(&self, position: Vec3, direction: Vec3) -> Departure {
         let (o, d) = self.localise(position, direction);
         match self.shape {
             Shape::Rectangle { width, height } => cross_rectangle(width, height, o, d),
@@ -261,7 +261,7 @@ impl Default for Coordinates {
 }
 
 /// Finds for each ray of the block the first part that its line leaves, with the coordinates there.
-pub fn carry(parts: &[Part], batch: &RayBatch, out: &mut Coordinates) {
+pub fn carry(parts: &[CarrierPart], batch: &RayBatch, out: &mut Coordinates) {
     let n = batch.len;
     out.part[..n].fill(Coordinates::NONE);
     for (index, part) in (0_u32..).zip(parts) {
@@ -275,30 +275,30 @@ pub fn carry(parts: &[Part], batch: &RayBatch, out: &mut Coordinates) {
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn carry_rectangle(part: &Part, size: (f64, f64), index: u32, batch: &RayBatch, out: &mut Coordinates) {
+fn carry_rectangle(part: &CarrierPart, size: (f64, f64), index: u32, batch: &RayBatch, out: &mut Coordinates) {
     carry_part(part, |o, d| cross_rectangle(size.0, size.1, o, d), index, batch, out);
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn carry_disk(part: &Part, radius: f64, index: u32, batch: &RayBatch, out: &mut Coordinates) {
+fn carry_disk(part: &CarrierPart, radius: f64, index: u32, batch: &RayBatch, out: &mut Coordinates) {
     carry_part(part, |o, d| cross_disk(radius, o, d), index, batch, out);
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn carry_hemisphere(part: &Part, radius: f64, index: u32, batch: &RayBatch, out: &mut Coordinates) {
+fn carry_hemisphere(part: &CarrierPart, radius: f64, index: u32, batch: &RayBatch, out: &mut Coordinates) {
     carry_part(part, |o, d| cross_hemisphere(radius, o, d), index, batch, out);
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn carry_tube(part: &Part, size: (f64, f64), index: u32, batch: &RayBatch, out: &mut Coordinates) {
+fn carry_tube(part: &CarrierPart, size: (f64, f64), index: u32, batch: &RayBatch, out: &mut Coordinates) {
     carry_part(part, |o, d| cross_tube(size.0, size.1, o, d), index, batch, out);
 }
 
 /// The loop that is compiled once per shape and instruction set. A ray that has its part already keeps it.
 #[inline(always)]
 fn carry_part(
-    part: &Part,
-    cross: impl Fn(Vec3, Vec3) -> Crossing,
+    part: &CarrierPart,
+    cross: impl Fn(Vec3, Vec3) -> Departure,
     index: u32,
     batch: &RayBatch,
     out: &mut Coordinates,
@@ -325,7 +325,7 @@ pub(crate) mod tests {
     use super::*;
 
     /// One part of each shape, moved and turned, none in a special position.
-    pub(crate) fn zoo() -> Vec<Part> {
+    pub(crate) fn zoo() -> Vec<CarrierPart> {
         let frame = Frame {
             origin: Vec3::new(0.3, -0.2, 0.7),
             x: Vec3::new(0.36, 0.48, -0.8),
@@ -344,7 +344,7 @@ pub(crate) mod tests {
                 height: 2.2,
             },
         ]
-        .map(|shape| Part { frame, shape })
+        .map(|shape| CarrierPart { frame, shape })
         .to_vec()
     }
 
@@ -432,8 +432,8 @@ pub(crate) mod tests {
             y: Vec3::new(0.0, 1.0, 0.0),
             z: Vec3::new(0.0, 0.0, 1.0),
         };
-        let dome =
-            [Shape::Disk { radius: 1.0 }, Shape::Hemisphere { radius: 1.0 }].map(|shape| Part { frame: flat, shape });
+        let dome = [Shape::Disk { radius: 1.0 }, Shape::Hemisphere { radius: 1.0 }]
+            .map(|shape| CarrierPart { frame: flat, shape });
         let rays = [
             ([0.2, 0.1, 5.0], [0.0, 0.0, 1.0], 0),
             ([-2.0, 0.0, 0.5], [1.0, 0.0, 0.0], 1),

@@ -100,7 +100,7 @@ impl Interaction {
 /// # Errors
 /// The reason and the face, if the ray is lost.
 #[inline(always)]
-pub fn meet(
+pub fn interaction_of(
     scene: &Scene,
     lines: &RayBlock,
     hits: &Hits,
@@ -112,7 +112,7 @@ pub fn meet(
     let nearest = (hits.face[i], hits.crossing(i));
     if hits.tied(i, o) {
         let group = tied(scene, o, d, &lines.origin_faces(i), nearest);
-        resolve(scene, o, d, &group, stack, detected)
+        decide_together(scene, o, d, &group, stack, detected)
     } else {
         single_face(scene, o, d, nearest, stack, detected)
     }
@@ -189,7 +189,7 @@ pub fn first_interaction(
     let ignore = |_, _, _| {};
     if second - crossing.t <= TIE * length {
         let group = tied(scene, o, d, origin_faces, (face, crossing));
-        resolve(scene, o, d, &group, stack, ignore).map(Some)
+        decide_together(scene, o, d, &group, stack, ignore).map(Some)
     } else {
         single_face(scene, o, d, (face, crossing), stack, ignore).map(Some)
     }
@@ -227,7 +227,7 @@ pub fn tied(scene: &Scene, o: Vec3, d: Vec3, origin_faces: &OriginFaces, nearest
 }
 
 #[cold]
-fn resolve(
+fn decide_together(
     scene: &Scene,
     o: Vec3,
     d: Vec3,

@@ -6,13 +6,13 @@ use etendue_math::Vec3;
 
 use super::factor::Factor;
 use super::tent::Tent;
-use crate::surface::Part;
+use crate::surface::CarrierPart;
 
 /// The light that leaves one part.
 #[derive(Clone, Debug)]
 pub struct PartField {
     /// The chart.
-    pub part: Part,
+    pub part: CarrierPart,
     /// Cells of the ratio along each coordinate.
     pub cells: [usize; 4],
     /// Ratio and its standard deviation at each cell's centre, last coordinate fastest.

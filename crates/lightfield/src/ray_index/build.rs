@@ -5,7 +5,7 @@ use std::ops::{ControlFlow, Range};
 
 use etendue_geometry::ray_batch::BLOCK;
 use etendue_geometry::table::{Layout, RayTable};
-use etendue_geometry::{RayBatch, RaySource, Tally};
+use etendue_geometry::{PassAccount, RayBatch, RaySource};
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 use rayon::prelude::*;
@@ -27,11 +27,11 @@ pub fn count(
     cells: Cells,
     threads: usize,
     progress: impl FnMut(u64) -> ControlFlow<()>,
-) -> (Vec<u64>, Tally) {
+) -> (Vec<u64>, PassAccount) {
     let mut counts = vec![0; cells.count()];
-    let mut tally = Tally::default();
+    let mut tally = PassAccount::default();
     let work = |range: Range<u64>| {
-        let mut part = Tally::default();
+        let mut part = PassAccount::default();
         let mut found = vec![0_u32; cells.count()];
         source.for_each_block(range, |_, batch| {
             part.add_block(batch);
@@ -41,7 +41,7 @@ pub fn count(
         });
         (part, found)
     };
-    let merge = |(part, found): (Tally, Vec<u32>)| {
+    let merge = |(part, found): (PassAccount, Vec<u32>)| {
         tally.merge(&part);
         counts
             .iter_mut()

@@ -124,7 +124,7 @@ mod tests {
     use etendue_optics::table::{Curve, Table};
     use etendue_sampling::philox::Stream;
 
-    use crate::interaction::meet;
+    use crate::interaction::interaction_of;
     use crate::medium_cache::MediumCache;
     use crate::scatter::SurfaceEvent;
     use crate::scene::SceneFace;
@@ -209,7 +209,8 @@ mod tests {
             let mut counts = [0; 4];
             for (k, i) in which.iter().enumerate() {
                 let place = *i as usize;
-                let met = meet(&scene, &queue.lines, &hits, place, SolidStack::default(), |_, _, _| {}).expect("sound");
+                let met = interaction_of(&scene, &queue.lines, &hits, place, SolidStack::default(), |_, _, _| {})
+                    .expect("sound");
                 let along = queue.lines.direction(place);
                 let event = SurfaceEvent::new(&scene, &met, along, 555.0, &mut media)
                     .expect("air")

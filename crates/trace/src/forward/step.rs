@@ -10,7 +10,7 @@ use super::queue::RayQueue;
 use crate::detector::{Light, Scatter};
 use crate::events::ScatterEvent;
 use crate::guide::family;
-use crate::interaction::meet;
+use crate::interaction::interaction_of;
 use crate::ledger::Fate;
 use crate::ray_state::RayState;
 use crate::scatter::SurfaceEvent;
@@ -73,7 +73,7 @@ impl BlockTrace<'_> {
             return Err(Fate::Escaped);
         }
         let (detectors, out) = (self.detectors, &mut self.out.detectors);
-        let mut interaction = meet(scene, &now.lines, hits, i, stack, |detector, point, _| {
+        let mut interaction = interaction_of(scene, &now.lines, hits, i, stack, |detector, point, _| {
             // A detector's face may be there without it, as in a survey.
             let number = detector as usize;
             if let Some(detector) = detectors.get(number) {

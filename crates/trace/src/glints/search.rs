@@ -192,7 +192,7 @@ impl<'a> Search<'a> {
                 if self.left == 0 {
                     return;
                 }
-                let met = self.meet(&chain.lines);
+                let met = self.interactions(&chain.lines);
                 let reach = met.as_ref().map_or(f64::INFINITY, |met| met[0].t);
                 let targets = self.targets.clone();
                 for target in targets.iter() {
@@ -242,7 +242,7 @@ impl<'a> Search<'a> {
     }
 
     /// What three lines meet; None if it is nothing, or not the same.
-    fn meet(&mut self, lines: &[Line; 3]) -> Option<[Interaction; 3]> {
+    fn interactions(&mut self, lines: &[Line; 3]) -> Option<[Interaction; 3]> {
         self.left = self.left.checked_sub(1)?;
         let next = |line: &Line| {
             first_interaction(
@@ -307,7 +307,7 @@ impl<'a> Search<'a> {
             if interactions > MOST_MEETINGS {
                 return None;
             }
-            let met = self.meet(&lines)?;
+            let met = self.interactions(&lines)?;
             if self.shares(&lines[0], &met[0], wavelength).is_some() {
                 lines = self.turned(&lines, &met, ways[done], wavelength)?;
                 done += 1;
@@ -429,7 +429,7 @@ impl<'a> Search<'a> {
                     return None;
                 }
                 // Another surface may stand before it.
-                let reach = self.meet(&lines).map_or(f64::INFINITY, |met| met[0].t);
+                let reach = self.interactions(&lines).map_or(f64::INFINITY, |met| met[0].t);
                 let there = passing.along > 0.0 && passing.along <= reach * (1.0 + HIDDEN);
                 return there.then_some(([at[0] - step[0], at[1] - step[1]], inverse, passing.axes));
             }

@@ -6,7 +6,7 @@ use etendue_lightfield::leave::Sights;
 
 use super::method::LeftOut;
 use super::path_block::{Branch, PathBlock, Seen};
-use crate::interaction::meet;
+use crate::interaction::interaction_of;
 use crate::scatter::{SPLIT, SurfaceEvent};
 
 /// Diffuse scatters before a path may be ended by chance.
@@ -19,7 +19,7 @@ impl PathBlock<'_> {
         let mut branch = self.branches[i];
         let wavelength = self.wavelength(branch.path);
         let absorption = self.media.at(scene, branch.stack.top(), wavelength).absorption;
-        let Ok(mut interaction) = meet(scene, &self.lines, hits, i, branch.stack, |_, _, _| {}) else {
+        let Ok(mut interaction) = interaction_of(scene, &self.lines, hits, i, branch.stack, |_, _, _| {}) else {
             return;
         };
         interaction.limit_interpolation(branch.events);
@@ -33,7 +33,7 @@ impl PathBlock<'_> {
         }
         match SurfaceEvent::new(scene, &interaction, d, wavelength, &mut self.media) {
             Err(_) => {}
-            Ok(Some(event)) => self.meet(&branch, &event),
+            Ok(Some(event)) => self.surface_event(&branch, &event),
             Ok(None) => {
                 branch.stack = interaction.after;
                 self.push(&interaction, d, branch);
@@ -102,7 +102,7 @@ impl PathBlock<'_> {
     }
 
     /// Branches at a surface.
-    fn meet(&mut self, branch: &Branch, event: &SurfaceEvent<'_>) {
+    fn surface_event(&mut self, branch: &Branch, event: &SurfaceEvent<'_>) {
         let (smooth, shares) = event.seen();
         let seen = if branch.seen == Seen::Smooth {
             Seen::Smooth

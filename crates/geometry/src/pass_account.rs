@@ -4,7 +4,7 @@ use crate::ray_batch::{Defect, RayBatch};
 
 /// What a pass has seen: counted in every pass, because the scale of relative fluxes and the complaints rest on it.
 #[derive(Clone, Debug, Default)]
-pub struct Tally {
+pub struct PassAccount {
     /// Rays looked at.
     pub rays: u64,
     /// Rays that cannot be used, by [`Defect`].
@@ -17,7 +17,7 @@ pub struct Tally {
     pub norm_error: f64,
 }
 
-impl Tally {
+impl PassAccount {
     /// Adds the rays of a block.
     pub fn add_block(&mut self, batch: &RayBatch) {
         self.rays += batch.len as u64;
