@@ -230,8 +230,14 @@ mod tests {
         let contributions = |batch: u64| -> Vec<Contribution> {
             let numbers = batch * BATCH..((batch + 1) * BATCH).min(rays);
             let mut list: Vec<Contribution> = numbers
-                .filter(|ray| stream.word(*ray) % 4 == 0)
-                .map(|ray| ((stream.word(ray) >> 8) as u32 % 3, ray, (stream.word(ray) >> 40) as f64))
+                .filter(|ray| stream.word(*ray).is_multiple_of(4))
+                .map(|ray| {
+                    (
+                        u32::from(stream.word(ray).to_le_bytes()[1] % 3),
+                        ray,
+                        (stream.word(ray) >> 40) as f64,
+                    )
+                })
                 .collect();
             dealing.units(batch, list.iter_mut().map(|(_, ray, _)| ray));
             list
