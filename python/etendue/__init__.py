@@ -1,7 +1,7 @@
 """What a luminaire looks like before it exists: luminance maps from ray files, with an error bar in every pixel.
 
 >>> import etendue as et
->>> rays = et.RingSource(rays=200_000)                   # or et.read_rays("led.tm25ray")
+>>> rays = et.RingSource(rays=20_000)                    # or et.read_rays("led.tm25ray")
 >>> lmap = et.luminance_map(rays, et.Observer(theta=30, phi=0, distance=1000), et.Screen(80, 80, 16, 16))
 >>> lmap.values.shape, lmap.unit
 ((16, 16), 'cd/m²')

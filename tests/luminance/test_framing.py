@@ -97,15 +97,15 @@ def test_a_scene_needs_no_screen_and_no_object(tmp_path: Path) -> None:
 @pytest.mark.parametrize("method", ["cone", "lightfield"])
 def test_a_screen_that_misses_light_says_so(method: str) -> None:
     observer = et.Observer(20, 35, 2000, target=(4, 3, 7))
-    how = {"acceptance": 10} if method == "cone" else {"surface": et.Box(24, 6, 1, centre=(9, 3, 6.9)), "cache": False}
-    lmap = et.luminance_map(lamp(50_000), observer, et.Screen(6, 6, 8, 8), method=method, **how)
+    how = et.Cone(acceptance=10) if method == "cone" else et.FromField(surface=et.Disk(12, z=6.9, centre=(9, 3)))
+    lmap = et.luminance_map(lamp(20_000), observer, et.Screen(6, 6, 8, 8), method=how)
     (note,) = [note for note in lmap.notes if note.startswith("the screen shows")]
     share = float(re.search(r"shows ([\d.]+)%", note)[1])
     assert share == pytest.approx(75, abs=7)
     advised = re.search(r"one of ([\d.]+) × [\d.]+ mm about the target ([\d.,]+) shows", note)
     x, y, z = map(float, advised[2].split(","))
     screen = et.Screen(float(advised[1]), float(advised[1]), 8, 8)
-    whole = et.luminance_map(lamp(50_000), et.Observer(20, 35, 2000, target=(x, y, z)), screen, method="cone")
+    whole = et.luminance_map(lamp(20_000), et.Observer(20, 35, 2000, target=(x, y, z)), screen, method="cone")
     assert not any("the screen shows" in note for note in whole.notes)
 
 
