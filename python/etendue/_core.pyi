@@ -124,7 +124,7 @@ class _Ledger(TypedDict):
 
 _Open: TypeAlias = tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint64], _Floats]
 
-class _Harvest(TypedDict):
+class _Tallies(TypedDict):
     ledger: _Ledger
     cells: list[tuple[_Floats, _Floats, npt.NDArray[np.uint64]]]
     births: tuple[_Floats, _Floats, npt.NDArray[np.uint64]]
@@ -423,7 +423,7 @@ def trace_batches(
     last: int,
     threads: int | None = None,
     open_units: Sequence[_Open] | None = None,
-) -> _Harvest:
+) -> _Tallies:
     """Traces batches ``first..last`` of a run of `rays` rays, the earlier ones of which left units open.
 
     Of the ledger each entry is (flux, rays), by source, face, medium or reason. Cells of each detector are (Σ w, Σ w², units

@@ -45,23 +45,23 @@ def _gathered(sums: list[Any], factor: float, arguments: Arguments) -> tuple[lis
     return (sums, False) if known is None else _passes(sums, factor, arguments)
 
 
-def _cells(harvest: Any, factor: float, arguments: Arguments) -> tuple[Any, bool]:
-    cells = [_sums(cells, factor, arguments) for cells in harvest["cells"]]
-    return {**harvest, "cells": [sums for sums, _ in cells]}, any(lit for _, lit in cells)
+def _cells(tallies: Any, factor: float, arguments: Arguments) -> tuple[Any, bool]:
+    cells = [_sums(cells, factor, arguments) for cells in tallies["cells"]]
+    return {**tallies, "cells": [sums for sums, _ in cells]}, any(lit for _, lit in cells)
 
 
-def _collected(harvest: Any, factor: float, _: Arguments) -> tuple[Any, bool]:
+def _collected(tallies: Any, factor: float, _: Arguments) -> tuple[Any, bool]:
     scale = [1.0] * 6 + [factor, 1.0]
-    records = [rows * scale for rows in harvest["records"]]
-    return {**harvest, "records": records}, any(rows.size for rows in records)
+    records = [rows * scale for rows in tallies["records"]]
+    return {**tallies, "records": records}, any(rows.size for rows in records)
 
 
-def _account(harvest: Any, factor: float, _: Arguments) -> tuple[Any, bool]:
+def _account(tallies: Any, factor: float, _: Arguments) -> tuple[Any, bool]:
     """All entries but what was emitted, which is known beforehand."""
-    ledger = harvest["ledger"]
+    ledger = tallies["ledger"]
     ends = {name: ledger[name] for name in ("escaped", "on_face", "in_medium")}
     off = {name: (flux * factor, rays) for name, (flux, rays) in ends.items()}
-    return {**harvest, "ledger": {**ledger, **off}}, any(flux.any() for flux, _ in ends.values())
+    return {**tallies, "ledger": {**ledger, **off}}, any(flux.any() for flux, _ in ends.values())
 
 
 def _cone(found: tuple[list[Any], Any], factor: float, arguments: Arguments) -> tuple[tuple[list[Any], Any], bool]:

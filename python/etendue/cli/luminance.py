@@ -184,8 +184,8 @@ def luminance(
         "gather": gather or None,
     }
     scene = Scene.load(file) if file.suffix.lower() == SCENE_EXTENSION else None
-    kept = _kept(file, detector)
-    looked = kept if isinstance(kept, ScatterEvents) else scene
+    detected = _detected(file, detector)
+    looked = detected if isinstance(detected, ScatterEvents) else scene
     own = looked.scene if isinstance(looked, ScatterEvents) else scene
     own_observers = own is not None and observer is None and size is None
     if own is not None and own_observers:
@@ -197,7 +197,7 @@ def luminance(
     targets = _targets(output, who)
     if looked is None:
         source: Source = (
-            in_unit(with_flux(kept, flux), unit) if isinstance(kept, RaySet) else read_source(file, flux, unit)
+            in_unit(with_flux(detected, flux), unit) if isinstance(detected, RaySet) else read_source(file, flux, unit)
         )
     else:
         what = "holds scatter events" if isinstance(looked, ScatterEvents) else "is a scene"
@@ -234,8 +234,8 @@ def luminance(
             say(f"  {path}")
 
 
-def _kept(file: Path, detector: str | None) -> ScatterEvents | RaySet | None:
-    """What a detector of a trace kept that can be looked at; None if the file is no result of a trace.
+def _detected(file: Path, detector: str | None) -> ScatterEvents | RaySet | None:
+    """What a detector of a trace collected that can be looked at; None if the file is no result of a trace.
 
     Raises
     ------

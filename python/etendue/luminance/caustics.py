@@ -181,11 +181,11 @@ def plan(
     batch, batches, segments, arrivals = _core.batch_size(), 0, 0, []
     sums = [np.zeros((3, view["columns"] * view["rows"])) for view in views]
     while batches < MOST_BATCHES and segments < MOST_SEGMENTS:
-        harvest = _core.trace_batches(core, RUN, seed, most_events, batches, batches + 1, threads)
-        found_cells = (np.array([part.sum(axis=0) for part in cells]) for cells in harvest["cells"])
+        tallies = _core.trace_batches(core, RUN, seed, most_events, batches, batches + 1, threads)
+        found_cells = (np.array([part.sum(axis=0) for part in cells]) for cells in tallies["cells"])
         sums = [total + cells for total, cells in zip(sums, found_cells, strict=False)]
-        arrivals.append(harvest["arrivals"])
-        segments += harvest["ledger"]["segments"]
+        arrivals.append(tallies["arrivals"])
+        segments += tallies["ledger"]["segments"]
         batches += 1
         if min(sum(map(len, arrivals)), *(total[2].sum() for total in sums)) >= ENOUGH:
             break
@@ -276,8 +276,8 @@ class LightImages:
             begun = None
             for first in range(0, batches, ROUND):
                 last = min(first + ROUND, batches)
-                harvest = _core.trace_batches(self._core, rays, own, most_events, first, last, threads, begun)
-                cells, begun = harvest["cells"], harvest["open_units"]
+                tallies = _core.trace_batches(self._core, rays, own, most_events, first, last, threads, begun)
+                cells, begun = tallies["cells"], tallies["open_units"]
                 sums = [added(*pair) for pair in zip(sums, cells, strict=True)] if sums else cells
             for total, found in zip(self._sums, sums, strict=True):
                 image = Forward.of(found, total.shape[1:], self._dealing, rays, 1.0, "")

@@ -151,13 +151,13 @@ class RingSource(RayStream):
         x = (np.arange(columns) + 0.5) * (screen.width / columns) - screen.width / 2
         within = (0.5 - (np.arange(subdivision) + 0.5) / subdivision) * (screen.height / screen.rows)
         right, up, _ = screen.axes(observer)
-        eye, target = observer.position, np.asarray(observer.target)
+        viewpoint, target = observer.position, np.asarray(observer.target)
         rows = []
         for centre in screen.y:
             points = target + x[None, :, None] * right + (centre + within)[:, None, None] * up
-            sight = points - eye
-            along = -eye[2] / np.where(sight[..., 2] < 0, sight[..., 2], np.nan)
-            seen = self.luminance(eye[0] + along * sight[..., 0], eye[1] + along * sight[..., 1])
+            sight = points - viewpoint
+            along = -viewpoint[2] / np.where(sight[..., 2] < 0, sight[..., 2], np.nan)
+            seen = self.luminance(viewpoint[0] + along * sight[..., 0], viewpoint[1] + along * sight[..., 1])
             rows.append(seen.reshape(subdivision, screen.columns, subdivision).mean(axis=(0, 2)))
         return np.array(rows)
 

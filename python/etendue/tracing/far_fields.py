@@ -35,10 +35,10 @@ def far_field_nodes(
     """
     size = _core.batch_size()
     number = min(rays, _distinct(compiled.record["sources"]), size * min(MOST_BATCHES, max(1, rays // (SHARE * size))))
-    harvest = _core.trace_batches(core, number, seed ^ OTHER_SEED, most_events, 0, -(-number // size), threads)
+    tallies = _core.trace_batches(core, number, seed ^ OTHER_SEED, most_events, 0, -(-number // size), threads)
     detectors = compiled.record["detectors"]
     looks = [i for i, record in enumerate(detectors) if record["kind"] == "intensity"]
-    rows = harvest["records"][looks[0]]
+    rows = tallies["records"][looks[0]]
     direction, flux = np.ascontiguousarray(rows[:, 3:6]), np.ascontiguousarray(rows[:, 6])
     meant = len(rows) * (rays / number)
     return [choose_nodes(direction, flux, meant, detectors[i]["c_planes"], detectors[i]["gamma_step"]) for i in looks]

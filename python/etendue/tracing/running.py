@@ -212,8 +212,8 @@ class Rounds(Iterator[TraceResult]):
         end = min(first + ROUND, -(-plan.rays // _core.batch_size()))
         begun = None if sums is None else sums.open_units
         how = (plan.rays, plan.seed, plan.most_events, first, end, self._threads)
-        harvest = _core.trace_batches(self._core, *how, begun)
+        tallies = _core.trace_batches(self._core, *how, begun)
         most = tuple(detection.most_events for detection in plan.detections)
-        result = TraceResult(plan, Sums.first(harvest, end, most) if sums is None else sums.then(harvest, end))
+        result = TraceResult(plan, Sums.first(tallies, end, most) if sums is None else sums.then(tallies, end))
         self._last = result
         return result

@@ -89,40 +89,40 @@ class Sums:
     scattered: tuple[Scattered, ...]
 
     @classmethod
-    def first(cls, harvest: _core._Harvest, batches: int, most: tuple[int, ...]) -> Sums:
+    def first(cls, tallies: _core._Tallies, batches: int, most: tuple[int, ...]) -> Sums:
         """Those of the first round; each detector keeps so many scatter events at most."""
         return cls(
             batches,
-            harvest["rays"],
-            harvest["ledger"]["segments"],
-            harvest["imbalance"],
-            _entries(harvest),
-            tuple(harvest["ledger"]["lost_at"]),
-            tuple(harvest["cells"]),
-            harvest["births"],
-            tuple(harvest["open_units"]),
-            tuple(Collected(Spool(RECORD), 0).then(rows) for rows in harvest["records"]),
-            tuple(Scattered.nothing(n).then(*events) for n, events in zip(most, harvest["events"], strict=True)),
+            tallies["rays"],
+            tallies["ledger"]["segments"],
+            tallies["imbalance"],
+            _entries(tallies),
+            tuple(tallies["ledger"]["lost_at"]),
+            tuple(tallies["cells"]),
+            tallies["births"],
+            tuple(tallies["open_units"]),
+            tuple(Collected(Spool(RECORD), 0).then(rows) for rows in tallies["records"]),
+            tuple(Scattered.nothing(n).then(*events) for n, events in zip(most, tallies["events"], strict=True)),
         )
 
-    def then(self, harvest: _core._Harvest, batches: int) -> Sums:
+    def then(self, tallies: _core._Tallies, batches: int) -> Sums:
         """With those of the next round, after which so many batches are done."""
-        entries = _entries(harvest)
+        entries = _entries(tallies)
         return Sums(
             batches,
-            self.rays + harvest["rays"],
-            self.segments + harvest["ledger"]["segments"],
-            max(self.imbalance, harvest["imbalance"]),
+            self.rays + tallies["rays"],
+            self.segments + tallies["ledger"]["segments"],
+            max(self.imbalance, tallies["imbalance"]),
             {name: (flux + entries[name][0], rays + entries[name][1]) for name, (flux, rays) in self.ledger.items()},
-            tuple(a if a is not None else b for a, b in zip(self.lost_at, harvest["ledger"]["lost_at"], strict=True)),
-            tuple(added(a, b) for a, b in zip(self.cells, harvest["cells"], strict=True)),
-            added(self.births, harvest["births"]),
-            tuple(harvest["open_units"]),
-            tuple(held.then(rows) for held, rows in zip(self.collected, harvest["records"], strict=True)),
-            tuple(held.then(*events) for held, events in zip(self.scattered, harvest["events"], strict=True)),
+            tuple(a if a is not None else b for a, b in zip(self.lost_at, tallies["ledger"]["lost_at"], strict=True)),
+            tuple(added(a, b) for a, b in zip(self.cells, tallies["cells"], strict=True)),
+            added(self.births, tallies["births"]),
+            tuple(tallies["open_units"]),
+            tuple(held.then(rows) for held, rows in zip(self.collected, tallies["records"], strict=True)),
+            tuple(held.then(*events) for held, events in zip(self.scattered, tallies["events"], strict=True)),
         )
 
 
-def _entries(harvest: _core._Harvest) -> dict[str, tuple[Array, Counts]]:
-    ledger: Mapping[str, Any] = harvest["ledger"]
+def _entries(tallies: _core._Tallies) -> dict[str, tuple[Array, Counts]]:
+    ledger: Mapping[str, Any] = tallies["ledger"]
     return {name: ledger[name] for name in ENTRIES}
