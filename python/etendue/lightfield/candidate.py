@@ -83,11 +83,6 @@ class Candidate:
     trees: tuple[Tree, ...]
 
     @property
-    def base_name(self) -> str:
-        """``"product"`` if any part has such a base."""
-        return "product" if any(base.name == "product" for base in self.bases) else "uniform"
-
-    @property
     def log_evidence(self) -> float:
         """Against the base measures, summed over the parts."""
         return sum(tree.log_evidence for tree in self.trees)
