@@ -154,7 +154,7 @@ def test_a_report_holds_the_diagnostics(run: Run, folder: Path, tmp_path: Path) 
     outcome = run("fit", folder / "led.tm25ray", "-o", "a.h5", *GRID, "--report", "r.png", "--json")
     facts = outcome.json["diagnostics"]
     expected = diagnose(api_field(folder), et.read_rays(folder / "led.tm25ray")).to_dict()
-    assert facts["learning"] == json.loads(json.dumps(expected["learning"]))
+    assert facts["forecast"] == json.loads(json.dumps(expected["forecast"]))
     assert facts["characteristic_curve"]["flux"] == expected["characteristic_curve"]["flux"]
     assert (tmp_path / "r.png").read_bytes().startswith(b"\x89PNG")
     people = run("fit", folder / "led.tm25ray", "-o", "a.h5", *GRID, "--report", "r.pdf")

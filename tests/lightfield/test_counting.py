@@ -65,13 +65,13 @@ def test_parts_share_the_rays_and_nothing_is_lost() -> None:
     counts = count_rays(rays, et.Dome(radius=1.5, window=0.8), (2, 2, 2, 2))
     assert sum(counts.part_flux) + counts.unmet_flux == pytest.approx(rays.total_flux, rel=1e-12)
     assert all(flux > 0 for flux in counts.part_flux)
-    assert counts.kept.coordinates.shape == (len(counts.kept.part), 4)
+    assert counts.some_held_out.coordinates.shape == (len(counts.some_held_out.part), 4)
 
 
 def test_kept_rays_are_held_out_rays() -> None:
     rays = rays_of(50_000)
     counts = count_rays(rays, et.Disk(radius=2), (2, 2, 2, 2), held_out=0.1)
-    kept, _ = np.histogramdd(counts.kept.coordinates, bins=(4,) * 4, range=[(0, 1)] * 4)
+    kept, _ = np.histogramdd(counts.some_held_out.coordinates, bins=(4,) * 4, range=[(0, 1)] * 4)
     np.testing.assert_array_equal(kept, counts["held out"][0].grid.weight)
 
 

@@ -23,10 +23,10 @@ from etendue.lightfield.forecast import (
     EXPONENTS,
     LAW_HOLDS,
     REFITS,
-    LearningCurve,
+    Forecast,
     _gains,
     law_of_gains,
-    learning_curve,
+    make_forecast,
 )
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Hemisphere, Plane, Surface
@@ -315,11 +315,11 @@ def trial() -> Trial:
 
 
 @pytest.fixture(scope="module")
-def curve(trial: Trial) -> LearningCurve:
-    return learning_curve(trial.field(trial.N), trial.rays(trial.N), threads=1)
+def curve(trial: Trial) -> Forecast:
+    return make_forecast(trial.field(trial.N), trial.rays(trial.N), threads=1)
 
 
-def test_forecasts_come_true(trial: Trial, curve: LearningCurve) -> None:
+def test_forecasts_come_true(trial: Trial, curve: Forecast) -> None:
     """The field really fitted to 4 and 16 times the rays; and to as many as are said to halve its error."""
     scores = {m: trial.score(m * trial.N) for m in (1, 4, 16, 128)}
     for m in (4, 16):
@@ -336,7 +336,7 @@ def test_forecasts_come_true(trial: Trial, curve: LearningCurve) -> None:
     assert 0.5 * low**0.5 < share < 0.5 * high**0.5, share
 
 
-def test_gains_are_differences_of_scores_on_the_other_half(trial: Trial, curve: LearningCurve) -> None:
+def test_gains_are_differences_of_scores_on_the_other_half(trial: Trial, curve: Forecast) -> None:
     np.testing.assert_allclose(curve.rays, trial.N * np.array([1, 2, 4]) / 8)
     assert (curve.gains > 5 * curve.gain_errors).all()
     assert curve.field_rays == trial.N
@@ -360,7 +360,7 @@ def test_gains_are_weighed_by_flux() -> None:
 
 
 def plain_field(surface: Surface, depths: tuple[int, ...], rays: int) -> LightField:
-    """What a learning curve needs of a field: surface, grid, base measure and concentration."""
+    """What a forecast needs of a field: surface, grid, base measure and concentration."""
     report = dataclasses.replace(REPORT, rays=rays)
     return field_of(surface, part(np.ones([1 << d for d in depths])), report=report)
 
@@ -373,7 +373,7 @@ def test_rays_of_unequal_flux_are_judged_by_their_flux() -> None:
     kept = ~heavy | (np.random.default_rng(2).random(n) < 0.5)
     plane = Plane(z=0, width=23, height=23, centre=(0.9, -0.5))
     equal, unequal = (
-        learning_curve(plain_field(plane, (3, 3, 2, 2), len(rays)), rays)
+        make_forecast(plain_field(plane, (3, 3, 2, 2), len(rays)), rays)
         for rays in (et.RaySet(x, k, np.ones(n)), et.RaySet(x[kept], k[kept], np.where(heavy, 2.0, 1.0)[kept]))
     )
     # Σ(w)²/Σ(w²) is 2/3 of n: as many equal rays would gain more from each doubling by that to the power of -β.
@@ -403,19 +403,19 @@ def test_a_symmetry_tells_of_twice_the_rays(trial: Trial) -> None:
     assert (folded - few).mean() > least * (folded - few).std()
     assert (folded - alone).mean() > -least * (folded - alone).std()
     mirrored, plain = fields[0].replace(report=dataclasses.replace(fields[0].report, symmetry="mirror-x")), fields[0]
-    curve = learning_curve(mirrored, even(16_000))
-    np.testing.assert_array_equal(diagnose(mirrored, even(16_000)).learning.gains, curve.gains)
-    assert (curve.gains < learning_curve(plain, even(16_000)).gains).all()
+    curve = make_forecast(mirrored, even(16_000))
+    np.testing.assert_array_equal(diagnose(mirrored, even(16_000)).forecast.gains, curve.gains)
+    assert (curve.gains < make_forecast(plain, even(16_000)).gains).all()
 
 
 def test_progress_threads_and_seed(trial: Trial) -> None:
     rays = trial.rays(5000)
     field = plain_field(trial.surface, (2, 2, 2, 2), 5000)
     seen: list[int] = []
-    first = learning_curve(field, rays, threads=1, progress=seen.append)
+    first = make_forecast(field, rays, threads=1, progress=seen.append)
     assert seen == list(range(1, REFITS + 1))
-    np.testing.assert_array_equal(learning_curve(field, rays, threads=2).gains, first.gains)
-    assert (learning_curve(field, rays, seed=2).gains != first.gains).all()
+    np.testing.assert_array_equal(make_forecast(field, rays, threads=2).gains, first.gains)
+    assert (make_forecast(field, rays, seed=2).gains != first.gains).all()
 
 
 def test_what_cannot_be_diagnosed_is_refused(trial: Trial) -> None:
@@ -442,25 +442,28 @@ def test_what_cannot_be_diagnosed_is_refused(trial: Trial) -> None:
 def test_diagnostics_are_plain_data_and_a_few_lines() -> None:
     field = field_of(PLANE, part(ramp(16).reshape(2, 2, 2, 2), 1e-3, 0.02))
     found = dataclasses.replace(
-        diagnose(field), learning=law_of_gains(RUNGS, gains_of(0.02, 0.5), np.eye(2) * 1e-10, 10_000)
+        diagnose(field), forecast=law_of_gains(RUNGS, gains_of(0.02, 0.5), np.eye(2) * 1e-10, 10_000)
     )
     data = json.loads(json.dumps(found.to_dict()))
     assert data["lead_over_histogram"] == 0.5
     assert data["characteristic_curve"]["flux"][-1] == found.curve.flux[-1]
-    assert data["learning"]["rays_factor_to_halve_error"]["value"] == found.learning.factor(0.5).value  # type: ignore[union-attr]
+    assert data["forecast"]["rays_factor_to_halve_error"]["value"] == found.forecast.factor(0.5).value  # type: ignore[union-attr]
+    assert data["learning"] == data["forecast"]
+    with pytest.warns(DeprecationWarning, match="now called forecast"):
+        assert found.learning is found.forecast
     assert len(data["least_certain"]) == 12
     lines = found.summary()
     for piece in ("-2.0000 ± 0.0100", "+0.5000", "20 effective", "times the rays", "least certain: (", "θ = "):
         assert piece in lines
     assert "times the rays" not in diagnose(field).summary()
-    assert diagnose(field).to_dict()["learning"] is None
+    assert diagnose(field).to_dict()["forecast"] is None
 
 
 @pytest.mark.parametrize("name", ["plane", "dome with a window", "cylinder"])
 def test_the_picture_shows_what_was_found_and_repeats_its_bytes(name: str, tmp_path: Path) -> None:
     field = make_field(SURFACES[name], flux_unit="W" if name == "cylinder" else "lm")
     law = law_of_gains(RUNGS, gains_of(0.02, 0.5), np.eye(2) * 1e-10, 10_000)
-    found = dataclasses.replace(diagnose(field), learning=law)
+    found = dataclasses.replace(diagnose(field), forecast=law)
     figure = plot_characteristic(found)
     if name == "plane":
         for file in ("a.png", "b.png"):

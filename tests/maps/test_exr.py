@@ -65,3 +65,23 @@ def test_exr_with_changed_pixels_is_refused(tmp_path: Path) -> None:
     resave_exr(path, {}, {"Y": np.ones((4, 3), np.float16)})
     with pytest.raises(FormatError, match="channel 'Y'"):
         read_map(path)
+
+
+def test_exr_with_many_channels_is_refused(tmp_path: Path) -> None:
+    """The library unpacks every channel, and a few bytes of a file may be a channel of zeros."""
+    path = tmp_path / "map.exr"
+    save_map(make_map(), path)
+    resave_exr(path, {}, {f"c{number:02}": np.zeros((4, 3), np.float32) for number in range(10)})
+    with pytest.raises(FormatError, match=r"channels: 13 channels, expected Y, rays, standard_error"):
+        read_map(path)
+
+
+def test_exr_with_damaged_pixels_says_why_and_prints_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "map.exr"
+    save_map(make_map((37, 11)), path)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(FormatError, match=r"map\.exr: pixels: .*[Uu]nable to"):
+        read_map(path)
+    assert capsys.readouterr().out == ""

@@ -101,7 +101,7 @@ def test_finishes_are_told_by_what_they_mostly_do() -> None:
     assert kinds["dome.dome"] == "interface"
     assert kinds["sink.top"] == "absorber"
     assert kinds["reflector"] == "mirror"
-    assert kinds["shade"] == "scatterer"
+    assert kinds["shade"] == "diffuse"
     assert kinds["pane"] == "transparent"
     assert set(kinds.values()) == set(FINISH_KINDS) == set(FINISH_LINES)
 

@@ -11,6 +11,7 @@ import etendue as et
 import pytest
 from etendue.errors import SceneError
 from etendue.scene import Scene, compile_scene
+from etendue.scene.toml import to_toml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -118,6 +119,22 @@ def test_any_text_and_number_survives(name: str, radius: float, key: str) -> Non
         solids=[{"shape": {"kind": "ball", "radius": radius}}],
     )
     assert Scene.from_dict(tomllib.loads(scene.to_toml())) == scene
+
+
+def test_vectors_stand_on_one_line_whatever_texts_hold() -> None:
+    """Only line breaks between values are taken out, none that a text or a row of tables has."""
+    data = {
+        "texts": ["a]", "}", "[,", "x,\n]", "[\n"],
+        "rows": [[1.0, 2.5], [1e22, 1e-300], []],
+        "solids": [{"at": [0.0, 0.0, 7.0]}, {"name": "}"}],
+        "sources": [{"name": "}"}, {"name": "b"}],
+        "q.r": {"\x7f": [float("inf"), -3]},
+    }
+    text = to_toml(data)
+    assert tomllib.loads(text) == data
+    assert "at = [0, 0, 7]\n" in text
+    assert '    { name = "}" },\n    { name = "b" },\n' in text
+    assert "rows = [[1, 2.5], [1e+22, 1e-300], []]\n" in text
 
 
 def test_the_schema_is_json_and_knows_every_kind() -> None:

@@ -10,6 +10,7 @@ import typer
 
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.field import FIELD_EXTENSIONS, describe_field, print_field, surface_option
+from etendue.cli.options import Flux, Json, Threads, Unit
 from etendue.cli.terminal import check_outputs, complain, print_json, progress_bar, say, whole_numbers
 from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.formats.rays import read_rays
@@ -40,18 +41,14 @@ def fit(
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", help="Decides which rays are held out.")] = 1,
-    threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)] = None,
-    flux: Annotated[
-        str | None, typer.Option("--flux", help="Total flux that overrides the ray file's: 337, 337lm.")
-    ] = None,
-    unit: Annotated[
-        str | None, typer.Option("--unit", help="lm or W: convert through the ray file's spectrum.")
-    ] = None,
+    threads: Threads = None,
+    flux: Flux = None,
+    unit: Unit = None,
     report: Annotated[
         Path | None,
         typer.Option("--report", help="Picture of the diagnostics, .png or .pdf; takes about as long as the fit."),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
 ) -> None:
     """Estimate the luminance of every point in every direction from all rays of a file, with error bars."""
     check_outputs([output], FIELD_EXTENSIONS)

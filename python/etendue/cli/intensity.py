@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from etendue.cli.field import complaints_of, read_source
+from etendue.cli.options import Flux, Json, Unit
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, progress_bar, say
 from etendue.errors import UnsupportedFormatError
 from etendue.formats.intensity import (
@@ -49,12 +50,8 @@ def intensity(
             show_default=False,
         ),
     ] = None,
-    flux: Annotated[
-        str | None, typer.Option("--flux", help="Total flux that overrides the ray file's: 337, 337lm.")
-    ] = None,
-    unit: Annotated[
-        str | None, typer.Option("--unit", help="lm or W: convert through the ray file's spectrum.")
-    ] = None,
+    flux: Flux = None,
+    unit: Unit = None,
     photometry: Annotated[
         str | None,
         typer.Option("--photometry", help="Which one of an intensity file that holds several (TM-33, GLDF)."),
@@ -64,7 +61,7 @@ def intensity(
     ] = 0.0,
     mirror: Annotated[bool, typer.Option("--mirror", help="C becomes -C (before --rotate).")] = False,
     kind: Annotated[str, typer.Option("--kind", help="Picture: polar or cartesian.")] = "polar",
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
 ) -> None:
     """Far-field intensity of rays, of a light field or of an intensity file: in figures, as a file, as a picture."""
     outputs = output or []

@@ -14,6 +14,7 @@ import typer
 
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.field import complaints_of, read_source, surface_option
+from etendue.cli.options import Flux, Json, Threads, Unit
 from etendue.cli.terminal import (
     check_outputs,
     complain,
@@ -158,16 +159,14 @@ def luminance(
             "--detector", help="Of the result of a trace: the detector whose scatter events or rays are shown."
         ),
     ] = None,
-    flux: Annotated[
-        str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")
-    ] = None,
-    unit: Annotated[str | None, typer.Option("--unit", help="lm or W: convert through the file's spectrum.")] = None,
+    flux: Flux = None,
+    unit: Unit = None,
     scale: Annotated[str, typer.Option("--scale", help="Colours of a picture: linear or log.")] = "linear",
     cache: Annotated[
         bool, typer.Option("--cache/--no-cache", help="Take light fields from those fitted before (etendue cache).")
     ] = True,
-    threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    threads: Threads = None,
+    json: Json = False,
 ) -> None:
     """Luminance maps with a standard error per pixel, from rays, a light field, a scene or a trace, for many observers."""
     one_of(method, METHOD_NAMES, "--method")
@@ -184,8 +183,8 @@ def luminance(
         "gather": gather or None,
     }
     scene = Scene.load(file) if file.suffix.lower() == SCENE_EXTENSION else None
-    kept = _kept(file, detector)
-    looked = kept if isinstance(kept, ScatterEvents) else scene
+    detected = _detected(file, detector)
+    looked = detected if isinstance(detected, ScatterEvents) else scene
     own = looked.scene if isinstance(looked, ScatterEvents) else scene
     own_observers = own is not None and observer is None and size is None
     if own is not None and own_observers:
@@ -197,7 +196,7 @@ def luminance(
     targets = _targets(output, who)
     if looked is None:
         source: Source = (
-            in_unit(with_flux(kept, flux), unit) if isinstance(kept, RaySet) else read_source(file, flux, unit)
+            in_unit(with_flux(detected, flux), unit) if isinstance(detected, RaySet) else read_source(file, flux, unit)
         )
     else:
         what = "holds scatter events" if isinstance(looked, ScatterEvents) else "is a scene"
@@ -234,8 +233,8 @@ def luminance(
             say(f"  {path}")
 
 
-def _kept(file: Path, detector: str | None) -> ScatterEvents | RaySet | None:
-    """What a detector of a trace kept that can be looked at; None if the file is no result of a trace.
+def _detected(file: Path, detector: str | None) -> ScatterEvents | RaySet | None:
+    """What a detector of a trace collected that can be looked at; None if the file is no result of a trace.
 
     Raises
     ------

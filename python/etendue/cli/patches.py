@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from etendue.cli.convert import in_unit, with_flux
+from etendue.cli.options import Flux, Json, Unit
 from etendue.cli.terminal import complain, one_of, print_json, progress_bar, say
 from etendue.formats.output import atomic_output
 from etendue.formats.patch_folder import PATCH_FORMATS, check_patch_folder
@@ -40,13 +41,9 @@ def patches(
         bool, typer.Option("--sweep", help="Also judge nine thresholds and this one: sweep.csv and sweep.png.")
     ] = False,
     seed: Annotated[int, typer.Option("--seed", help="Chooses the rays that --sweep keeps back.")] = 1,
-    flux: Annotated[
-        str | None, typer.Option("--flux", help="Total flux that overrides the ray file's: 337, 337lm.")
-    ] = None,
-    unit: Annotated[
-        str | None, typer.Option("--unit", help="lm or W: convert through the ray file's spectrum.")
-    ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    flux: Flux = None,
+    unit: Unit = None,
+    json: Json = False,
 ) -> None:
     """Sample a ray file into patches, each with an intensity distribution of its own: thesis 3.2 and 3.3."""
     one_of(format, PATCH_FORMATS, "--format")

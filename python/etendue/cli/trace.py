@@ -13,6 +13,7 @@ import typer
 
 from etendue.cli.guard import require_apart
 from etendue.cli.intensity import peak_line
+from etendue.cli.options import Json, Threads
 from etendue.cli.terminal import INTERRUPTED, check_folder, complain, count, print_json, progress_bar, say
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
@@ -101,8 +102,8 @@ def trace(
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Result (.h5) of the same scene, rays and seed to go on from.")
     ] = None,
-    threads: Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    threads: Threads = None,
+    json: Json = False,
 ) -> None:
     """Trace light through a scene: flux ledger, incident rays, intensity, illuminance. Ctrl-C keeps what was done."""
     outputs = output or []

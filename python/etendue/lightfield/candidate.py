@@ -83,11 +83,6 @@ class Candidate:
     trees: tuple[Tree, ...]
 
     @property
-    def base_name(self) -> str:
-        """``"product"`` if any part has such a base."""
-        return "product" if any(base.name == "product" for base in self.bases) else "uniform"
-
-    @property
     def log_evidence(self) -> float:
         """Against the base measures, summed over the parts."""
         return sum(tree.log_evidence for tree in self.trees)
@@ -108,27 +103,27 @@ class Candidate:
         core = _core.LightField(
             [core_part(chart.core(), part) for chart, part in zip(charts, self.fields(counts), strict=True)]
         )
-        kept = counts.kept
-        density = np.zeros(len(kept.part))
+        rays = counts.some_held_out
+        density = np.zeros(len(rays.part))
         for index, chart in enumerate(charts):
-            mine = kept.part == index
-            x, k = _core.rays_of_part(chart.core(), np.ascontiguousarray(kept.coordinates[mine]))
+            mine = rays.part == index
+            x, k = _core.rays_of_part(chart.core(), np.ascontiguousarray(rays.coordinates[mine]))
             # What other parts send along the same line counts too: luminance is theirs together.
             density[mine] = core.luminance(x, k)[0]
         return score_densities(counts, density)
 
 
 def score_densities(counts: EtendueCounts, luminance: FloatArray) -> Score:
-    """The score of a field that has these luminances at the rays that were kept [flux unit/(mm² sr)].
+    """The score of a field that has these luminances at some held-out rays [flux unit/(mm² sr)].
 
     The density of a ray is (1 - u) L/Φ + u e, with u the share of the flux that does not meet the surface and e the even
     density over all lines through the source (`even_density`). It adds up to one over all lines whatever the surface is.
-    Held-out rays that do not meet the surface count with u e: so many as there are among as many rays as were kept.
+    Held-out rays that do not meet the surface count with u e, in the share that they have of all rays.
     """
     met = sum(counts.part_flux)
     unmet = max(counts.unmet_flux / (met + counts.unmet_flux), MIXED_IN)
     values = np.log((1.0 - unmet) * luminance / met + unmet * counts.even)
-    weights = counts.kept.weight
+    weights = counts.some_held_out.weight
     if counts.unmet_rays and len(values):
         outside = max(round(len(values) * counts.unmet_rays / (counts.rays - counts.unmet_rays)), 1)
         share = float(weights.sum()) * counts.unmet_flux / met

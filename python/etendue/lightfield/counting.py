@@ -60,7 +60,7 @@ class PartCounts:
 
 
 @dataclasses.dataclass(frozen=True)
-class KeptRays:
+class HeldOutRays:
     """Held-out rays with their exact coordinates.
 
     Parameters
@@ -89,7 +89,7 @@ class EtendueCounts:
         Halvings of s₁, s₂, a and b.
     folds : dict
         Per fold the counts of each part.
-    kept : KeptRays
+    some_held_out : HeldOutRays
         Some of the held-out rays.
     flux_per_weight : float
         [flux unit] per unit of the sums.
@@ -108,7 +108,7 @@ class EtendueCounts:
     surface: Surface
     depths: tuple[int, int, int, int]
     folds: dict[Fold, tuple[PartCounts, ...]]
-    kept: KeptRays
+    some_held_out: HeldOutRays
     flux_per_weight: float
     rays: int
     unmet_rays: int
@@ -206,7 +206,7 @@ def count_rays(
         surface=surface,
         depths=depths,
         folds=folds,
-        kept=KeptRays(raw["kept_part"], raw["kept"], raw["kept_weight"]),
+        some_held_out=HeldOutRays(raw["kept_part"], raw["kept"], raw["kept_weight"]),
         flux_per_weight=scale * (1.0 if raw["weight"] is None else raw["weight"]),
         rays=tally.rays - tally.unusable,
         unmet_rays=raw["unmet_rays"],

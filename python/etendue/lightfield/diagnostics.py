@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -15,7 +16,7 @@ from etendue.lightfield.characteristic import CharacteristicCurve, characteristi
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.etendue_density import FitReport, PartField
 from etendue.lightfield.expected_loss import loss_of_gamma
-from etendue.lightfield.forecast import Forecast, LearningCurve, learning_curve
+from etendue.lightfield.forecast import Forecast, Predicted, make_forecast
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.trees import Base
 from etendue.quantities.ray_stream import RayStream, checked_threads
@@ -70,7 +71,7 @@ class Diagnostics:
     curve : CharacteristicCurve
     spots : tuple of UncertainSpot
         The worst first.
-    learning : LearningCurve or None
+    forecast : Forecast or None
         None if no rays were given.
     source : str
         Where the rays came from.
@@ -83,8 +84,14 @@ class Diagnostics:
     expected_error: float
     curve: CharacteristicCurve
     spots: tuple[UncertainSpot, ...]
-    learning: LearningCurve | None
+    forecast: Forecast | None
     source: str
+
+    @property
+    def learning(self) -> Forecast | None:
+        """The old name of `forecast`."""
+        warnings.warn("Diagnostics.learning is now called forecast.", DeprecationWarning, stacklevel=2)
+        return self.forecast
 
     @property
     def lead(self) -> float:
@@ -103,8 +110,8 @@ class Diagnostics:
             f"half of the flux in {half:.4g} mm² sr, 99 % in {most:.4g} of {curve.total_etendue:.4g} mm² sr",
             f"peak {curve.luminance[0]:.4g} {unit}",
         ]
-        if self.learning is not None:
-            lines += _lessons(self.learning)
+        if self.forecast is not None:
+            lines += _forecast_lines(self.forecast)
         lines += [
             f"least certain: ({', '.join(f'{c:.4g}' for c in s.point)}) mm towards θ = {s.theta:.0f}°, φ = {s.phi:.0f}° "
             f"on the {s.part}: {s.luminance:.3g} ± {s.standard_error:.2g} {unit}, {s.share:.1%} of the expected loss"
@@ -113,8 +120,9 @@ class Diagnostics:
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as plain data."""
+        """Everything, as plain data; ``learning`` is the old name of ``forecast``."""
         curve = self.curve
+        forecast = None if self.forecast is None else _forecast_facts(self.forecast)
         return {
             "surface": self.surface,
             "flux": self.flux,
@@ -131,7 +139,8 @@ class Diagnostics:
                 "flux": curve.flux.tolist(),
             },
             "least_certain": [dataclasses.asdict(spot) for spot in self.spots],
-            "learning": None if self.learning is None else _learning_facts(self.learning),
+            "forecast": forecast,
+            "learning": forecast,  # its name until version 0.2
             "source": self.source,
         }
 
@@ -174,7 +183,7 @@ def diagnose(
     >>> rays = et.RingSource(rays=100_000)
     >>> field = LightField.fit(rays, Disk(radius=30), depths=(4, 4, 2, 2))
     >>> diagnostics = diagnose(field, rays)
-    >>> bool(diagnostics.lead > 0), len(diagnostics.spots), diagnostics.learning.factor(0.5).value > 4
+    >>> bool(diagnostics.lead > 0), len(diagnostics.spots), diagnostics.forecast.factor(0.5).value > 4
     (True, 12, True)
     """
     if not (isinstance(spots, int) and spots >= 0):
@@ -184,9 +193,9 @@ def diagnose(
             f"the field is in {field.flux_unit}, the rays are in {rays.flux_unit}; give the rays of the fit, in its unit."
         )
     threads = checked_threads(threads)
-    learning = None
+    forecast = None
     if rays is not None:
-        learning = learning_curve(field, rays, seed=seed, threads=threads, progress=progress)
+        forecast = make_forecast(field, rays, seed=seed, threads=threads, progress=progress)
     fluxes = field.part_flux
     flux = math.fsum(fluxes)
     losses = [share / flux * _losses(part) for part, share in zip(field.parts, fluxes, strict=True)]
@@ -198,7 +207,7 @@ def diagnose(
         expected_error=math.sqrt(2.0 * sum(float(loss.sum()) for loss in losses)),
         curve=characteristic_curve(field, threads=threads),
         spots=tuple(_spots(field, losses, spots)),
-        learning=learning,
+        forecast=forecast,
         source=field.provenance.source,
     )
 
@@ -267,9 +276,9 @@ def _spot(field: LightField, index: int, coordinates: FloatArray, share: float) 
     )
 
 
-def _lessons(learning: LearningCurve) -> list[str]:
-    """What the learning curve says, for people."""
-    error, factor, gain = learning.error(), learning.factor(0.5), learning.gain(4.0)
+def _forecast_lines(forecast: Forecast) -> list[str]:
+    """What the forecast says, for people."""
+    error, factor, gain = forecast.error(), forecast.factor(0.5), forecast.gain(4.0)
     return [
         f"relative error at a ray by fits to parts of the rays {_between(error, '{:.1%}')}, and what the grid blurs",
         f"half of it would take {_between(factor, '{:.3g}')} times the rays",
@@ -277,17 +286,17 @@ def _lessons(learning: LearningCurve) -> list[str]:
     ]
 
 
-def _between(forecast: Forecast, form: str) -> str:
-    value, low, high = (form.format(v) for v in forecast)
+def _between(predicted: Predicted, form: str) -> str:
+    value, low, high = (form.format(v) for v in predicted)
     return f"{value} ({low} to {high})"
 
 
-def _learning_facts(learning: LearningCurve) -> dict[str, Any]:
+def _forecast_facts(forecast: Forecast) -> dict[str, Any]:
     return {
-        "rays": learning.rays.tolist(),
-        "gains": learning.gains.tolist(),
-        "gain_errors": learning.gain_errors.tolist(),
-        "exponent": learning.exponent._asdict(),
-        "error": learning.error()._asdict(),
-        "rays_factor_to_halve_error": learning.factor(0.5)._asdict(),
+        "rays": forecast.rays.tolist(),
+        "gains": forecast.gains.tolist(),
+        "gain_errors": forecast.gain_errors.tolist(),
+        "exponent": forecast.exponent._asdict(),
+        "error": forecast.error()._asdict(),
+        "rays_factor_to_halve_error": forecast.factor(0.5)._asdict(),
     }

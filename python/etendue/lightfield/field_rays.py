@@ -10,13 +10,13 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.ray_stream import FloatArray, Progress, RayBatch, RayStream, Tally
+from etendue.quantities.ray_stream import DrawnRays, FloatArray, Progress, RayBatch
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
 from etendue.units import FluxUnit
 
 
-class FieldRays(RayStream):
+class FieldRays(DrawnRays):
     """Rays of equal flux with the density of a light field's luminance in étendue, drawn exactly.
 
     Each ray starts on the carrier surface. If the field's spectrum is one of lines, each ray has the wavelength of one of
@@ -68,19 +68,10 @@ class FieldRays(RayStream):
         """Rays and field."""
         return f"<FieldRays, {len(self):,}, seed {self.seed}, of {self.field!r}>"
 
-    def __len__(self) -> int:
-        """Number of rays."""
-        return len(self._core)
-
     @property
     def flux_unit(self) -> FluxUnit:
         """The field's."""
         return self.field.flux_unit
-
-    @property
-    def has_position(self) -> bool:
-        """Rays start on the carrier surface."""
-        return True
 
     @property
     def total_flux(self) -> float:
@@ -88,23 +79,9 @@ class FieldRays(RayStream):
         return self.field.total_flux
 
     @property
-    def flux_scale(self) -> float:
-        """Rays are drawn with their flux in `flux_unit`."""
-        return 1.0
-
-    @property
     def provenance(self) -> Provenance:
         """The field's, and how many rays were drawn with which seed."""
         return self.field.provenance.then(f"{len(self)} rays drawn from the light field, seed {self.seed}")
-
-    def core_source(self) -> Any:
-        """The source as the compiled core takes it."""
-        return self._core
-
-    def accept_tally(self, tally: Tally) -> float:
-        """Nothing is found by a pass: the flux is known."""
-        del tally
-        return 1.0
 
     def total_spectrum(
         self,

@@ -208,14 +208,14 @@ def _calibrated(counts: EtendueCounts, candidate: Candidate, seed: int, threads:
 
 
 def _histogram(counts: EtendueCounts) -> FloatArray:
-    """At each kept ray the density of the fitted rays in its cell [flux unit/(mm² sr)]."""
-    kept = counts.kept
+    """At each of some held-out rays the density of the fitted rays in its cell [flux unit/(mm² sr)]."""
+    rays = counts.some_held_out
     total = sum(float(part.grid.weight.sum()) for part in counts["fitted"])
-    density = np.zeros(len(kept.part))
+    density = np.zeros(len(rays.part))
     for index, (part, chart) in enumerate(zip(counts["fitted"], counts.surface.parts(), strict=True)):
-        mine = kept.part == index
+        mine = rays.part == index
         shape = np.array(part.grid.weight.shape)
-        cells = np.minimum((kept.coordinates[mine] * shape).astype(np.intp), shape - 1)
+        cells = np.minimum((rays.coordinates[mine] * shape).astype(np.intp), shape - 1)
         density[mine] = part.grid.weight[tuple(cells.T)] * (part.grid.weight.size / chart.etendue)
     density *= sum(counts.part_flux) / total
     return density

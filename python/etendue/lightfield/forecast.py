@@ -58,7 +58,7 @@ SPREAD = (0.16, 0.5, 0.84)
 """Quantiles of a forecast: low, value, high."""
 
 
-class Forecast(NamedTuple):
+class Predicted(NamedTuple):
     """An extrapolated number, and the interval that holds it with a probability of 68 %."""
 
     value: float
@@ -67,7 +67,7 @@ class Forecast(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class LearningCurve:
+class Forecast:
     """How the error of a field falls with the number of rays.
 
     The *loss* is what the score per held-out ray lacks of what this grid can reach with endless rays [nat]; small losses
@@ -100,23 +100,23 @@ class LearningCurve:
     weights: FloatArray
 
     @property
-    def exponent(self) -> Forecast:
+    def exponent(self) -> Predicted:
         """β of loss ∝ rays^-β."""
         return self._forecast(self.exponents)
 
-    def loss(self, rays: float | None = None) -> Forecast:
+    def loss(self, rays: float | None = None) -> Predicted:
         """Loss with so many rays [nat per ray]; as many as the field has if None."""
         return self._forecast(self._loss(rays))
 
-    def error(self, rays: float | None = None) -> Forecast:
+    def error(self, rays: float | None = None) -> Predicted:
         """Relative error of luminance with so many rays, √(2 · loss)."""
         return self._forecast(np.sqrt(2.0 * self._loss(rays)))
 
-    def gain(self, factor: float) -> Forecast:
+    def gain(self, factor: float) -> Predicted:
         """Gain of score [nat per ray] from so many times the rays."""
         return self._forecast(self._loss(None) - self._loss(factor * self.field_rays))
 
-    def factor(self, share: float = 0.5) -> Forecast:
+    def factor(self, share: float = 0.5) -> Predicted:
         """How many times the rays leave this share of the error.
 
         Raises
@@ -136,21 +136,21 @@ class LearningCurve:
         falls: FloatArray = self.losses * (rays / self.field_rays) ** -self.exponents
         return falls
 
-    def _forecast(self, values: FloatArray) -> Forecast:
+    def _forecast(self, values: FloatArray) -> Predicted:
         order = np.argsort(values)
         reached = np.cumsum(self.weights[order])
         low, value, high = values[order][np.searchsorted(reached, np.array(SPREAD) * reached[-1])]
-        return Forecast(float(value), float(low), float(high))
+        return Predicted(float(value), float(low), float(high))
 
 
-def learning_curve(
+def make_forecast(
     field: LightField,
     rays: RayStream,
     *,
     seed: int = 1,
     threads: int | None = None,
     progress: Callable[[int], None] | None = None,
-) -> LearningCurve:
+) -> Forecast:
     """Fit the field again to an eighth, a quarter and half of its rays, and judge each fit on the other half.
 
     Surface, grid, symmetry, base measure and concentrations stay as they are.
@@ -200,9 +200,7 @@ def learning_curve(
     return law_of_gains(len(some) * np.array(RUNGS) / PARTS, gains, covariance, field.report.rays)
 
 
-def law_of_gains(
-    rays: FloatArray, gains: FloatArray, covariance: npt.NDArray[np.float64], field_rays: int
-) -> LearningCurve:
+def law_of_gains(rays: FloatArray, gains: FloatArray, covariance: npt.NDArray[np.float64], field_rays: int) -> Forecast:
     """The law loss = a (rays / field_rays)^-β through what the steps from rung to rung gained.
 
     Only gains are measured, never the loss itself, so the height of the law follows from how fast they fall. For each β
@@ -221,7 +219,7 @@ def law_of_gains(
         losses.append(np.maximum(heights, 0.0))
         weights.append(-(misfit + DEVIATES**2) / 2)
     logarithms = np.concatenate(weights)
-    return LearningCurve(
+    return Forecast(
         field_rays=field_rays,
         rays=rays,
         gains=gains,

@@ -248,7 +248,7 @@ def _surface(group: Node) -> Surface:
     dimensions = {
         name: group.truth(name)
         if hints[name] is bool
-        else group.numbers(name, (kind.centre_size(),)).tolist()
+        else group.numbers(name, (kind.CENTRE_SIZE,)).tolist()
         if name == "centre"
         else group.number(name)
         for name in known

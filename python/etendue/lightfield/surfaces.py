@@ -99,6 +99,8 @@ class Surface(abc.ABC):
     """
 
     NAME: ClassVar[str]
+    CENTRE_SIZE: ClassVar[int] = 2
+    """Coordinates of the centre: 3 where the height is no parameter of its own."""
 
     @abc.abstractmethod
     def parts(self) -> tuple[Part, ...]:
@@ -120,15 +122,8 @@ class Surface(abc.ABC):
                 raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give finite lengths in mm.")
             if field.name in LENGTHS and not (isinstance(numbers, float) and numbers > 0):
                 raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give a length above 0 mm.")
-            if field.name == "centre" and len(np.atleast_1d(numbers)) != self.centre_size():
-                raise ArgumentError(
-                    f"{type(self).__name__}: centre is {value!r}; give {self.centre_size()} coordinates."
-                )
-
-    @classmethod
-    def centre_size(cls) -> int:
-        """Coordinates of the centre: 2 where the height is a parameter of its own."""
-        return 2
+            if field.name == "centre" and len(np.atleast_1d(numbers)) != self.CENTRE_SIZE:
+                raise ArgumentError(f"{type(self).__name__}: centre is {value!r}; give {self.CENTRE_SIZE} coordinates.")
 
     @property
     def open_dimensions(self) -> tuple[str, ...]:
@@ -216,12 +211,8 @@ class Plane(Surface):
         """The smallest rectangle that the rays' lines cross, but for strays far off."""
         if not self.open_dimensions:
             return self
-        position, direction = _places_and_directions(rays)
-        up = direction[:, 2] > 0
-        if not up.any():
-            raise ArgumentError("Plane: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
-        x, y = (position[up] + ((self.z - position[up, 2]) / direction[up, 2])[:, None] * direction[up])[:, :2].T
-        spans = [_span(v, c) for v, c in zip((x, y), self.centre or (None, None), strict=True)]
+        hits = _hits_upwards(rays, self.z, "Plane")
+        spans = [_span(v, c) for v, c in zip(hits.T, self.centre or (None, None), strict=True)]
         centre = tuple((low + high) / 2 for low, high in spans)
         width, height = ((high - low) * (1 + SLACK) for low, high in spans)
         return dataclasses.replace(
@@ -266,12 +257,8 @@ class Disk(Surface):
         """The smallest disk that the rays' lines cross, but for strays far off."""
         if not self.open_dimensions:
             return self
-        position, direction = _places_and_directions(rays)
-        up = direction[:, 2] > 0
-        if not up.any():
-            raise ArgumentError("Disk: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
-        hit = position[up] + ((self.z - position[up, 2]) / direction[up, 2])[:, None] * direction[up]
-        return dataclasses.replace(self, radius=_reach(np.hypot(*(hit[:, :2] - self.centre).T)))
+        hits = _hits_upwards(rays, self.z, "Disk")
+        return dataclasses.replace(self, radius=_reach(np.hypot(*(hits - self.centre).T)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -297,13 +284,9 @@ class Hemisphere(Surface):
     """
 
     NAME = "hemisphere"
+    CENTRE_SIZE = 3
     radius: float | None = None
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    @classmethod
-    def centre_size(cls) -> int:
-        """x, y, z."""
-        return 3
 
     def parts(self) -> tuple[Part, ...]:
         """One hemisphere."""
@@ -337,13 +320,9 @@ class Sphere(Surface):
     """
 
     NAME = "sphere"
+    CENTRE_SIZE = 3
     radius: float | None = None
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    @classmethod
-    def centre_size(cls) -> int:
-        """x, y, z."""
-        return 3
 
     def parts(self) -> tuple[Part, ...]:
         """The upper and the lower hemisphere."""
@@ -446,15 +425,11 @@ class Box(Surface):
     """
 
     NAME = "box"
+    CENTRE_SIZE = 3
     width: float | None = None
     height: float | None = None
     depth: float | None = None
     centre: tuple[float, float, float] | None = None
-
-    @classmethod
-    def centre_size(cls) -> int:
-        """x, y, z."""
-        return 3
 
     def parts(self) -> tuple[Part, ...]:
         """Six rectangles."""
@@ -601,6 +576,16 @@ def _places_and_directions(rays: RayStream) -> tuple[FloatArray, FloatArray]:
     """Positions [mm] and directions of some of the rays."""
     some = pilot_sample(rays, PILOT_RAYS)
     return some.position, some.direction
+
+
+def _hits_upwards(rays: RayStream, z: float, name: str) -> FloatArray:
+    """Where the lines of rays that head towards +Z cross a height [mm], shape (m, 2)."""
+    position, direction = _places_and_directions(rays)
+    up = direction[:, 2] > 0
+    if not up.any():
+        raise ArgumentError(f"{name}: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
+    hits: FloatArray = position[up] + ((z - position[up, 2]) / direction[up, 2])[:, None] * direction[up]
+    return hits[:, :2]
 
 
 def _span(values: FloatArray, centre: float | None) -> tuple[float, float]:

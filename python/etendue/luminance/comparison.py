@@ -331,17 +331,17 @@ def _geometric_differences(test: LuminanceMap, reference: LuminanceMap) -> Itera
         yield f"screens differ: {ours.width:g} × {ours.height:g} mm against {theirs.width:g} × {theirs.height:g} mm"
     if ours.plane != theirs.plane:
         yield f"screen planes differ: {ours.plane!r} against {theirs.plane!r}"
-    eye, other = test.observer, reference.observer
+    one, other = test.observer, reference.observer
     reach = SAME_GEOMETRY * other.distance
-    if not np.allclose(eye.target, other.target, rtol=0.0, atol=reach):
-        yield f"observers' targets differ: {eye.target} against {other.target} mm"
+    if not np.allclose(one.target, other.target, rtol=0.0, atol=reach):
+        yield f"observers' targets differ: {one.target} against {other.target} mm"
     elif not (
-        np.allclose(eye.position, other.position, rtol=0.0, atol=reach)
+        np.allclose(one.position, other.position, rtol=0.0, atol=reach)
         # At θ = 180° the azimuth turns the screen without moving the observer.
-        and np.allclose(ours.axes(eye), ours.axes(other), rtol=0.0, atol=SAME_GEOMETRY)
+        and np.allclose(ours.axes(one), ours.axes(other), rtol=0.0, atol=SAME_GEOMETRY)
     ):
         yield (
-            f"observers differ: θ = {eye.theta:g}°, φ = {eye.phi:g}°, {eye.distance:g} mm against "
+            f"observers differ: θ = {one.theta:g}°, φ = {one.phi:g}°, {one.distance:g} mm against "
             f"θ = {other.theta:g}°, φ = {other.phi:g}°, {other.distance:g} mm"
         )
 

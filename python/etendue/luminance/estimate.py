@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Literal, cast, overload
+from typing import Literal, TypedDict, Unpack, cast, overload
 
 from etendue.errors import ArgumentError
 from etendue.lightfield.fit_cache import fit_or_recall
@@ -32,76 +32,68 @@ SCENE_PIXEL_BYTES, FIELD_PIXEL_BYTES, KEPT_PIXEL_BYTES = 250, 60, 50
 together were measured."""
 
 
+class _Options(TypedDict, total=False):
+    """Of maps of any source."""
+
+    cache: bool
+    threads: int | None
+    progress: Progress | None
+
+
+class _AnyOptions(_Options, total=False):
+    method: AnyMethod | MethodName
+
+
+class _RayOptions(_Options, total=False):
+    method: Cone | FromField | MethodName
+    acceptance: Acceptance
+    surface: Surface | Literal["auto"]
+    samples: int | None
+
+
+class _SceneOptions(_Options, total=False):
+    method: PathTracing | MethodName
+    rays_per_pixel: int | None
+    until: float | None
+    seed: int | None
+    forward_rays: float | None
+    gather: bool
+
+
 @overload
 def luminance_map(
     source: RayStream | LightField | str | os.PathLike[str],
     observer: Observer,
     screen: Screen | None = ...,
-    *,
-    method: Cone | FromField | MethodName = ...,
-    acceptance: Acceptance = ...,
-    surface: Surface | Literal["auto"] = ...,
-    samples: int | None = ...,
-    cache: bool = ...,
-    threads: int | None = ...,
-    progress: Progress | None = ...,
+    **options: Unpack[_RayOptions],
 ) -> LuminanceMap: ...
 @overload
 def luminance_map(
     source: RayStream | LightField | str | os.PathLike[str],
     observer: Sequence[Observer],
     screen: Screen | Sequence[Screen] | None = ...,
-    *,
-    method: Cone | FromField | MethodName = ...,
-    acceptance: Acceptance = ...,
-    surface: Surface | Literal["auto"] = ...,
-    samples: int | None = ...,
-    cache: bool = ...,
-    threads: int | None = ...,
-    progress: Progress | None = ...,
+    **options: Unpack[_RayOptions],
 ) -> list[LuminanceMap]: ...
 @overload
 def luminance_map(
     source: RayStream | LightField | Scene | ScatterEvents,
     observer: Sequence[Observer],
     screen: Screen | Sequence[Screen] | None = ...,
-    *,
-    method: AnyMethod | MethodName = ...,
-    cache: bool = ...,
-    threads: int | None = ...,
-    progress: Progress | None = ...,
+    **options: Unpack[_AnyOptions],
 ) -> list[LuminanceMap]: ...
 @overload
 def luminance_map(
     source: Scene | ScatterEvents | str | os.PathLike[str],
     observer: Observer,
     screen: Screen | None = ...,
-    *,
-    method: PathTracing | MethodName = ...,
-    rays_per_pixel: int | None = ...,
-    until: float | None = ...,
-    seed: int | None = ...,
-    forward_rays: float | None = ...,
-    gather: bool = ...,
-    cache: bool = ...,
-    threads: int | None = ...,
-    progress: Progress | None = ...,
+    **options: Unpack[_SceneOptions],
 ) -> LuminanceMap: ...
 @overload
 def luminance_map(
     source: Scene | ScatterEvents | str | os.PathLike[str],
     observer: Sequence[Observer] | None = ...,
     screen: Screen | Sequence[Screen] | None = ...,
-    *,
-    method: PathTracing | MethodName = ...,
-    rays_per_pixel: int | None = ...,
-    until: float | None = ...,
-    seed: int | None = ...,
-    forward_rays: float | None = ...,
-    gather: bool = ...,
-    cache: bool = ...,
-    threads: int | None = ...,
-    progress: Progress | None = ...,
+    **options: Unpack[_SceneOptions],
 ) -> list[LuminanceMap]: ...
 def luminance_map(
     source: RayStream | LightField | Scene | ScatterEvents | str | os.PathLike[str],

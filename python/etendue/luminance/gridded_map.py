@@ -62,14 +62,14 @@ def gridded_luminance_map(source: GriddedSource, observer: Observer, screen: Scr
     require_memory(PIXEL_BYTES * screen.columns * screen.rows, f"{source.patches.provenance.source}: {size}")
     fine = max(1, round(math.sqrt(samples)))
     right, up, _ = screen.axes(observer)
-    eye, target = observer.position, np.asarray(observer.target)
+    viewpoint, target = observer.position, np.asarray(observer.target)
     within = (np.arange(fine) + 0.5) / fine - 0.5
     x = (screen.x[:, None] + within * (screen.width / screen.columns)).ravel()
     values = np.zeros(screen.shape)
     for row, middle in enumerate(screen.y):
         y = middle + within * (screen.height / screen.rows)
         points = target + (y[:, None, None] * up + x[:, None] * right).reshape(-1, 3)
-        seen = source.luminance(points, eye - points)
+        seen = source.luminance(points, viewpoint - points)
         values[row] = seen.reshape(fine, screen.columns, fine).mean(axis=(0, 2))
     return LuminanceMap(
         values=values,

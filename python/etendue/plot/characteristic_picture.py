@@ -12,7 +12,7 @@ import numpy as np
 
 from etendue.lightfield.characteristic import CharacteristicCurve
 from etendue.lightfield.diagnostics import Diagnostics, UncertainSpot
-from etendue.lightfield.forecast import LearningCurve
+from etendue.lightfield.forecast import Forecast
 from etendue.plot import style
 from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT, FluxUnit
 
@@ -33,7 +33,7 @@ MOST_SPOTS = 8
 """Lines of the table."""
 
 AHEAD = 64.0
-"""How many times the rays the learning curve is drawn for."""
+"""How many times the rays the forecast is drawn for."""
 
 BRIGHTEST, LIT = 1e-3, 0.999
 """Shares of the flux: the logarithmic étendue axis begins with the first, the linear one ends with the second."""
@@ -47,7 +47,7 @@ def plot_characteristic(
     Parameters
     ----------
     diagnostics : Diagnostics
-        With or without a learning curve.
+        With or without a forecast.
     path : path, optional
         Where to write the picture, .png or .pdf. The same diagnostics give the same bytes.
     title : str, optional
@@ -79,16 +79,16 @@ def plot_characteristic(
     facts = style.wrapped(_facts(diagnostics), WIDTH - 0.6)
     under_table = 0.3 + 0.15 * len(facts) + 0.12
     under_panels = under_table + (ROW * (len(table) + 1) + 0.3 if table else 0.0) + UNDER
-    learning = diagnostics.learning
-    top = under_panels + (PANEL + UNDER + 0.1 if learning is not None else 0.0)
+    forecast = diagnostics.forecast
+    top = under_panels + (PANEL + UNDER + 0.1 if forecast is not None else 0.0)
     height = top + PANEL + ABOVE
     figure = style.new_figure(WIDTH, height)
     wide = (WIDTH - LEFT - RIGHT - GAP) / 2
     first, second = (style.add_axes(figure, LEFT + n * (wide + GAP), top, wide, PANEL) for n in (0, 1))
     _draw_luminance(first, diagnostics.curve, diagnostics.flux_unit)
     _draw_flux(second, diagnostics.curve, diagnostics.flux_unit)
-    if learning is not None:
-        _draw_learning(style.add_axes(figure, LEFT, under_panels, WIDTH - LEFT - RIGHT, PANEL), learning)
+    if forecast is not None:
+        _draw_forecast(style.add_axes(figure, LEFT, under_panels, WIDTH - LEFT - RIGHT, PANEL), forecast)
     heading = title if title is not None else "Light field"
     style.add_text(figure, 0.3, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     on = re.sub(r"\d+\.\d+", lambda number: f"{float(number[0]):.4g}", f"on {diagnostics.surface}")
@@ -147,27 +147,27 @@ def _draw_flux(axes: Axes, curve: CharacteristicCurve, unit: FluxUnit) -> None:
     )  # fmt: skip
 
 
-def _draw_learning(axes: Axes, learning: LearningCurve) -> None:
+def _draw_forecast(axes: Axes, forecast: Forecast) -> None:
     _open(axes)
-    n = np.geomspace(learning.rays[0], AHEAD * learning.field_rays, 97)
-    value, low, high = (100.0 * np.array(column) for column in zip(*map(learning.error, n), strict=True))
+    n = np.geomspace(forecast.rays[0], AHEAD * forecast.field_rays, 97)
+    value, low, high = (100.0 * np.array(column) for column in zip(*map(forecast.error, n), strict=True))
     colour = style.LINES[0]
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.fill_between(n, low, high, color=colour, alpha=0.22, linewidth=0.0)
     axes.plot(n, value, color=colour, linewidth=1.2, label="error and its 68 % interval")
-    now, then = learning.error(), learning.factor(0.5)
-    axes.plot([learning.field_rays], [100 * now.value], "o", color=style.INK, markersize=4.5, label="this field")
+    now, then = forecast.error(), forecast.factor(0.5)
+    axes.plot([forecast.field_rays], [100 * now.value], "o", color=style.INK, markersize=4.5, label="this field")
     # From a rung to the end of the law the loss falls by the gains on the way: those were measured.
-    top = learning.loss(learning.rays[-1]).value
-    losses = top + np.append(np.cumsum(learning.gains[::-1])[::-1], 0.0)
+    top = forecast.loss(forecast.rays[-1]).value
+    losses = top + np.append(np.cumsum(forecast.gains[::-1])[::-1], 0.0)
     measured = 100.0 * np.sqrt(2.0 * np.maximum(losses, 0.0))
-    axes.plot(learning.rays, measured, "s", color=style.LINES[1], markersize=3.5, label="fits to parts of the rays")
+    axes.plot(forecast.rays, measured, "s", color=style.LINES[1], markersize=3.5, label="fits to parts of the rays")
     wanted = 50.0 * now.value
-    reach = [learning.field_rays * factor for factor in (then.low, then.high)]
+    reach = [forecast.field_rays * factor for factor in (then.low, then.high)]
     axes.plot(reach, [wanted, wanted], color=style.LINES[2], linewidth=2.0, solid_capstyle="butt")
     axes.plot(
-        [learning.field_rays * then.value], [wanted], "D", color=style.LINES[2], markersize=4.5,
+        [forecast.field_rays * then.value], [wanted], "D", color=style.LINES[2], markersize=4.5,
         label=f"half the error: {then.value:.2g} times the rays ({then.low:.2g} to {then.high:.2g})",
     )  # fmt: skip
     axes.set_xlim(n[0] / 1.15, n[-1])
@@ -218,7 +218,7 @@ def _facts(diagnostics: Diagnostics) -> Iterator[str]:
     yield f"held-out score {score} ± {report.score_error:.4f} nat per ray"
     yield f"{lead} against the equal-étendue histogram"
     yield f"{style.grouped(f'{report.effective_cells:.0f}')} effective degrees of freedom"
-    yield f"error bars foretell a relative error of {style.percent(100 * diagnostics.expected_error)} at a ray"
+    yield f"error bars predict a relative error of {style.percent(100 * diagnostics.expected_error)} at a ray"
     yield f"99 % of the flux in {style.plain(float(f'{curve.etendue_of(0.99):.3g}'))} mm² sr"
     yield f"base measure {', '.join(report.bases)}"
     yield Path(diagnostics.source).name

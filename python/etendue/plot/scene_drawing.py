@@ -261,8 +261,8 @@ def _observers(axes: Axes, view: View, layout: SceneLayout, placer: LabelPlacer)
             axes.plot(*target, marker="o", markersize=1.6, color=OBSERVER, zorder=6.0)
             _name(axes, view, placer, name, [np.array([target, target])], OBSERVER)
             continue
-        eye = view.section.flat(observer.position)
-        inside = _clip(target, eye, view.window)
+        viewpoint = view.section.flat(observer.position)
+        inside = _clip(target, viewpoint, view.window)
         if inside is None:
             continue
         unit = toward / np.hypot(*toward)
@@ -276,7 +276,7 @@ def _observers(axes: Axes, view: View, layout: SceneLayout, placer: LabelPlacer)
         )
         shaft = np.array([start, start - reach * unit])
         placer.draw(_inches(view, placer, shaft))
-        far = "" if (inside[1] == eye).all() else f", {style.plain(observer.distance)} mm"
+        far = "" if (inside[1] == viewpoint).all() else f", {style.plain(observer.distance)} mm"
         _name(axes, view, placer, f"{name}{far}", [shaft], OBSERVER)
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 FINISH_LINES: dict[str, dict[str, Any]] = {
     "interface": {"color": "#4d5a66", "linewidth": 0.9},
     "mirror": {"color": "#1f5aa6", "linewidth": 2.0},
-    "scatterer": {"color": "#3c8d5a", "linewidth": 2.4, "linestyle": (0, (1.6, 0.7))},
+    "diffuse": {"color": "#3c8d5a", "linewidth": 2.4, "linestyle": (0, (1.6, 0.7))},
     "transparent": {"color": "#6b6b76", "linewidth": 1.0, "linestyle": (0, (1.0, 1.5))},
     "absorber": {"color": "#1c1c22", "linewidth": 2.4},
 }

@@ -14,7 +14,7 @@ from etendue.tracing.sections import Window
 Array = npt.NDArray[np.float64]
 Record = dict[str, Any]
 
-FINISH_KINDS = ("interface", "mirror", "scatterer", "transparent", "absorber")
+FINISH_KINDS = ("interface", "mirror", "diffuse", "transparent", "absorber")
 """What a finish mostly does; later ones are drawn over earlier ones."""
 
 
@@ -98,15 +98,15 @@ def finish_kind(finish: Record) -> str:
     >>> from etendue.scene.finishes import Lambertian
     >>> from etendue.scene.files import Files
     >>> finish_kind(Lambertian(reflectance=0.9).record(Files()))
-    'scatterer'
+    'diffuse'
     """
     if finish["kind"] == "fresnel":
         return "interface"
     does = {
         "specular_reflectance": "mirror",
         "specular_transmittance": "transparent",
-        "diffuse_reflectance": "scatterer",
-        "diffuse_transmittance": "scatterer",
+        "diffuse_reflectance": "diffuse",
+        "diffuse_transmittance": "diffuse",
     }
     most = {part: float(np.max(finish[part]["values"])) for part in does}
     part = max(most, key=lambda p: most[p])
@@ -123,11 +123,11 @@ def within(parts: list[Part], window: Window) -> list[Part]:
     []
     """
     left, right, bottom, top = window
-    kept = []
+    inside = []
     for part in parts:
         for curve in part.curves:
             (low_u, low_v), (high_u, high_v) = curve.min(axis=0), curve.max(axis=0)
             if low_u <= right and high_u >= left and low_v <= top and high_v >= bottom:
-                kept.append(part)
+                inside.append(part)
                 break
-    return kept
+    return inside

@@ -209,3 +209,32 @@ class RayStream(abc.ABC):
                 yield RayBatch(start, usable, position[usable], direction[usable], flux[usable] * scale)
             if self._watcher is not None:
                 self._watcher(stop)
+
+
+class DrawnRays(RayStream):
+    """Rays that the compiled core draws on demand: each has a place, and their flux is known before any is drawn."""
+
+    _core: Any
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self._core)
+
+    @property
+    def has_position(self) -> bool:
+        """They start on their source."""
+        return True
+
+    @property
+    def flux_scale(self) -> float:
+        """They are drawn with their flux in `flux_unit`."""
+        return 1.0
+
+    def core_source(self) -> Any:
+        """The source as the compiled core takes it."""
+        return self._core
+
+    def accept_tally(self, tally: Tally) -> float:
+        """Nothing is found by a pass: the flux is known."""
+        del tally
+        return 1.0

@@ -62,9 +62,6 @@ class Frame:
 HERE = Frame.shifted(0.0, 0.0, 0.0)
 """The outer frame itself."""
 
-UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
-"""Axes that are turned by half a turn about x: local +z points down."""
-
 
 class Placement(Description):
     """Where a thing stands: `at`, and one way of saying how it is turned.

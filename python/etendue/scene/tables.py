@@ -21,7 +21,6 @@ from etendue.scene.values import AsNumber, AsRow, Finite, FirstMistake, Share
 
 Array = npt.NDArray[np.float64]
 Angle = Annotated[float, Finite, Ge(0.0), Le(90.0), AsNumber]
-Row = Annotated[tuple[Share, ...], MinLen(1), MaxLen(1 << 16), FirstMistake, AsRow]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

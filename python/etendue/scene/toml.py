@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import math
 import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from etendue.errors import FormatError, SceneError
 from etendue.formats.encodings import decoded, wide_encoding
-
-BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 MOST_PARTS, DEEPEST, LONGEST_NUMBER = 16, 32, 1000
 """Parts of a key, levels of brackets, and letters of a number. The parser needs time and memory that grow with the square
@@ -87,65 +85,30 @@ def _check(path: Path, text: str) -> None:
 
 
 def to_toml(data: Mapping[str, Any]) -> str:
-    """A mapping of plain values as TOML.
-
-    Values come first, then tables, then rows of tables; tables within those stand on one line, in braces.
+    """A mapping of plain values as TOML: numbers in their shortest form, vectors on one line.
 
     Examples
     --------
-    >>> print(to_toml({"name": "a", "media": {"glass": {"index": 1.5}}, "solids": [{"shape": {"kind": "ball"}}]}), end="")
+    >>> print(to_toml({"name": "a", "media": {"glass": {"index": 1.5}}, "solids": [{"at": [0.0, 0.0, 7.0]}]}), end="")
     name = "a"
     <BLANKLINE>
     [media.glass]
     index = 1.5
     <BLANKLINE>
     [[solids]]
-    shape = { kind = "ball" }
+    at = [0, 0, 7]
     """
-    lines = [f"{_key(key)} = {_value(value)}" for key, value in data.items() if not _has_tables(value)]
-    for key, value in data.items():
-        if isinstance(value, Mapping) and _has_tables(value):
-            for name, table in value.items():
-                lines += ["", f"[{_key(key)}.{_key(name)}]", *_table(table)]
-    for key, value in data.items():
-        if isinstance(value, list) and _has_tables(value):
-            for table in value:
-                lines += ["", f"[[{_key(key)}]]", *_table(table)]
-    return "\n".join(lines).lstrip("\n") + "\n"
+    text = tomli_w.dumps(_shortest(data))
+    # An array begins a line for each value. Those of tables keep their lines; no text has a line break within it.
+    for breaks, instead in ((r"(?<=\[)\n *(?!\s|\{)", ""), (r"(?<!\}),\n *(?=\])", ""), (r"(?<!\}),\n *", ", ")):
+        text = re.sub(breaks, instead, text)
+    return text
 
 
-def _has_tables(value: Any) -> bool:
-    held = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
-    return any(isinstance(one, Mapping) for one in held)
-
-
-def _table(table: Mapping[str, Any]) -> list[str]:
-    return [f"{_key(key)} = {_value(value)}" for key, value in table.items()]
-
-
-def _key(key: str) -> str:
-    return key if BARE.fullmatch(key) else _text(key)
-
-
-def _text(text: str) -> str:
-    # JSON's escapes are TOML's; the one control character that JSON leaves alone is DEL.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return _text(value)
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float):
-        if math.isinf(value):
-            return "inf" if value > 0 else "-inf"
-        whole = value.is_integer() and abs(value) < 1e15
-        return str(int(value)) if whole else repr(value)
+def _shortest(value: Any) -> Any:
+    """The same with whole numbers as such: 7 reads better than 7.0."""
     if isinstance(value, Mapping):
-        return (
-            "{ " + ", ".join(f"{_key(key)} = {_value(held)}" for key, held in value.items()) + " }" if value else "{}"
-        )
-    return "[" + ", ".join(map(_value, value)) + "]"
+        return {key: _shortest(held) for key, held in value.items()}
+    if isinstance(value, list | tuple):
+        return [_shortest(held) for held in value]
+    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else value

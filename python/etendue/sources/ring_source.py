@@ -17,7 +17,7 @@ from etendue.errors import ArgumentError
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.ray_stream import RayStream, Tally
+from etendue.quantities.ray_stream import DrawnRays
 from etendue.units import MM2_PER_M2, FluxUnit
 
 FloatArray = npt.NDArray[np.float64]
@@ -44,7 +44,7 @@ def allocate_rays(rays: int, weights: Sequence[float]) -> tuple[int, ...]:
     return tuple(shares)
 
 
-class RingSource(RayStream):
+class RingSource(DrawnRays):
     """Concentric Lambertian rings in the plane z = 0 that emit towards +Z, each with its own luminance.
 
     The defaults are the source of [Audenaert2014]_ section 2.3: radii 10, 20, 30 mm, 300, 200, 100 lm.
@@ -151,19 +151,15 @@ class RingSource(RayStream):
         x = (np.arange(columns) + 0.5) * (screen.width / columns) - screen.width / 2
         within = (0.5 - (np.arange(subdivision) + 0.5) / subdivision) * (screen.height / screen.rows)
         right, up, _ = screen.axes(observer)
-        eye, target = observer.position, np.asarray(observer.target)
+        viewpoint, target = observer.position, np.asarray(observer.target)
         rows = []
         for centre in screen.y:
             points = target + x[None, :, None] * right + (centre + within)[:, None, None] * up
-            sight = points - eye
-            along = -eye[2] / np.where(sight[..., 2] < 0, sight[..., 2], np.nan)
-            seen = self.luminance(eye[0] + along * sight[..., 0], eye[1] + along * sight[..., 1])
+            sight = points - viewpoint
+            along = -viewpoint[2] / np.where(sight[..., 2] < 0, sight[..., 2], np.nan)
+            seen = self.luminance(viewpoint[0] + along * sight[..., 0], viewpoint[1] + along * sight[..., 1])
             rows.append(seen.reshape(subdivision, screen.columns, subdivision).mean(axis=(0, 2)))
         return np.array(rows)
-
-    def __len__(self) -> int:
-        """Rays of all runs."""
-        return len(self._core)
 
     @property
     def flux_unit(self) -> FluxUnit:
@@ -171,19 +167,9 @@ class RingSource(RayStream):
         return "lm"
 
     @property
-    def has_position(self) -> bool:
-        """Rays start on the rings."""
-        return True
-
-    @property
     def total_flux(self) -> float:
         """Sum over the rings [lm]."""
         return math.fsum(self.ring_flux)
-
-    @property
-    def flux_scale(self) -> float:
-        """Rays are drawn with their flux in lm."""
-        return 1.0
 
     @property
     def provenance(self) -> Provenance:
@@ -191,15 +177,6 @@ class RingSource(RayStream):
         rings = ", ".join(f"{f:g} lm to r = {r:g} mm" for f, r in zip(self.ring_flux, self.edges[1:], strict=True))
         step = f"{sum(self.allocation)} rays x {self.runs} runs, seed {self.seed}"
         return Provenance(source=f"ring source ({rings})", format="synthetic", steps=(step,))
-
-    def core_source(self) -> Any:
-        """The source as the compiled core takes it."""
-        return self._core
-
-    def accept_tally(self, tally: Tally) -> float:
-        """Nothing is found by a pass: the flux is known."""
-        del tally
-        return 1.0
 
     def ray_set(self) -> RaySet:
         """All rays as a ray set, for sets that fit into memory."""

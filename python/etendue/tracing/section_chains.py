@@ -87,12 +87,12 @@ def rings(curves: list[Array], reach: float) -> list[Array]:
     links = meeting.reshape(-1, 2)
     lonely = [curve for curve, (a, b) in zip(rest, links, strict=True) if a == b]
     closed += [np.concatenate([curve, curve[:1]]) for curve in lonely]
-    kept = [i for i, (a, b) in enumerate(links) if a != b]
+    apart = [i for i, (a, b) in enumerate(links) if a != b]
     by_pair: dict[tuple[int, int], list[int]] = {}
-    for i in kept:
+    for i in apart:
         a, b = links[i].tolist()
         by_pair.setdefault((min(a, b), max(a, b)), []).append(i)
-    for chain in chains(int(meeting.max()) + 1, links[kept].reshape(-1, 2)):
+    for chain in chains(int(meeting.max()) + 1, links[apart].reshape(-1, 2)):
         if chain[0] != chain[-1]:
             continue
         parts = []

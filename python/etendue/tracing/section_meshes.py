@@ -54,10 +54,10 @@ def mesh_curves(shape: dict[str, Any], origin: Array, axes: Array, section: Sect
     flat = section.flat(corners)
     points = (b[:, None] * flat[ends[:, 0]] - a[:, None] * flat[ends[:, 1]]) / (b - a)[:, None]
     curves = [points[chain] for chain in chains(len(points), links)]
-    return [kept for kept in map(_without_repeats, curves) if len(kept) > 1]
+    return [curve for curve in map(_without_repeats, curves) if len(curve) > 1]
 
 
 def _without_repeats(curve: Array) -> Array:
     moved = np.append(True, (np.diff(curve, axis=0) != 0.0).any(axis=1))
-    kept: Array = curve[moved]
-    return kept
+    distinct: Array = curve[moved]
+    return distinct

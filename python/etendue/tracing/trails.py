@@ -85,8 +85,8 @@ def near_section(trails: list[Array], section: Section, count: int, size: float)
     along = np.array([trail[1] for trail in trails]) - starts
     lean = along / np.maximum(np.linalg.norm(along, axis=1), np.finfo(np.float64).tiny)[:, None]
     aside = np.abs(lean[:, section.index]) + np.abs(section.depth(starts)) / size
-    kept = np.sort(np.argsort(aside, kind="stable")[:count])
-    return [trails[i] for i in kept]
+    nearest = np.sort(np.argsort(aside, kind="stable")[:count])
+    return [trails[i] for i in nearest]
 
 
 def sample_source(compiled: Compiled, source: dict[str, Any], rays: int, seed: int) -> tuple[Array, Array]:
@@ -123,5 +123,5 @@ def sample_source(compiled: Compiled, source: dict[str, Any], rays: int, seed: i
     ends = np.array([points[[0, -1]] for points in found if len(points) > 1]).reshape(-1, 2, 3)
     along = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(along, axis=1)
-    kept = length > 0.0
-    return ends[kept, 0], along[kept] / length[kept, None]
+    real = length > 0.0
+    return ends[real, 0], along[real] / length[real, None]

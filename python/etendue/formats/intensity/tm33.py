@@ -391,10 +391,10 @@ class _Reader:
             pairs = [(number(p.attributes.get("w", "")), number(p.text)) for p in tables[0].all("PwrData")]
             place = tables[0].place
         elif other is not None:
-            waves, powers = (other.words(name).split() for name in ("Wavelengths", "Values"))
+            wavelengths, powers = (other.words(name).split() for name in ("Wavelengths", "Values"))
             pairs = (
-                [(number(w), number(p)) for w, p in zip(waves, powers, strict=False)]
-                if len(waves) == len(powers)
+                [(number(w), number(p)) for w, p in zip(wavelengths, powers, strict=False)]
+                if len(wavelengths) == len(powers)
                 else []
             )
             place = other.place

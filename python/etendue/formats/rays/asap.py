@@ -190,15 +190,10 @@ def _offsets(path: Path, header: _Header, columns: int) -> tuple[list[int], list
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     """Write an ASAP binary ray file with seven columns, in millimetres.
 
-    Returns
-    -------
-    tuple of str
-        What the format could not express.
-
     Raises
     ------
     ArgumentError
-        If there is no usable ray, or more rays than the header's signed 32-bit number can say.
+        If there are more rays than the header's signed 32-bit number can say.
     """
     if len(rays) > MAX_RAYS:
         raise ArgumentError(

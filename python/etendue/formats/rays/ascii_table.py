@@ -261,18 +261,7 @@ def read(path: Path) -> RaySet:
 
 
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:
-    """Write a ray table, from which every number comes back bit by bit.
-
-    Returns
-    -------
-    tuple of str
-        What the format could not express.
-
-    Raises
-    ------
-    ArgumentError
-        If there is no usable ray.
-    """
+    """Write a ray table, from which every number comes back bit by bit."""
     colour = RayColour.of(rays)
     names = [*(("x_mm", "y_mm", "z_mm") if rays.has_position else ()), "l", "m", "n", f"flux_{rays.flux_unit}"]
     names += ["wavelength_nm"] if colour.has_wavelengths else []

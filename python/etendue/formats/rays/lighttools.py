@@ -175,16 +175,6 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     """Write a LightTools binary ray file of version 2, in millimetres, with flux that sums to the header's total.
 
     Rays with wavelengths keep them if they carry watts, rays with tristimulus values if they carry lumens.
-
-    Returns
-    -------
-    tuple of str
-        What the format could not express.
-
-    Raises
-    ------
-    ArgumentError
-        If there is no usable ray.
     """
     colour = RayColour.of(rays)
     held = held_colour(rays, colour)

@@ -82,7 +82,7 @@ class RayFormat:
         Path to RaySet; raises `FormatError`.
     write : callable
         Writes a stream to a path (of a temporary file; the caller moves it) and returns what the format could not
-        express, one sentence each.
+        express, one sentence each. Raises `ArgumentError` if there is no usable ray, or the format cannot hold the rays.
     far_field : bool
         Whether it can hold rays without positions.
     wants_watts : callable

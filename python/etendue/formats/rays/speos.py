@@ -93,32 +93,9 @@ def read(path: Path) -> RaySet:
 
 
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:
-    """Write a Speos binary ray file; the header carries the totals in watts and lumens.
-
-    Returns
-    -------
-    tuple of str
-        What the format could not express.
-
-    Raises
-    ------
-    ArgumentError
-        If the rays have no wavelengths, or there is no usable ray.
-    UnitError
-        If the rays carry lumens at wavelengths where V(λ) is 0.
-    """
+    """Write a Speos binary ray file; the header carries the totals in watts and lumens."""
+    rays, notes = in_watts(rays, "'lighttools', which Speos reads as well and gives a spectrum")
     colour = RayColour.of(rays)
-    if not (colour.has_wavelengths and isinstance(rays, RaySet)):
-        raise ArgumentError(
-            f"{rays.provenance.source}: a Speos file holds the wavelength of every ray, but this set has rays with "
-            f"{colour.kind.value}. Write 'lighttools', which Speos reads as well and gives a spectrum; or, if all rays "
-            "have one wavelength, say so: RaySet.with_spectrum(Spectrum([wavelength], [1]))."
-        )
-    notes = []
-    if rays.flux_unit == "lm":
-        rays = rays.in_unit("W")
-        colour = RayColour.of(rays)
-        notes.append("Lumens were turned into watts through the wavelengths: Speos files carry watts.")
     # Energies lie between 0 and 1. Watts that do so already are left as they are: then they also sum to the header's.
     largest = rays.moments().flux_range[1] * rays.flux_scale
     scale = 1 / largest if largest > 1 else 1.0
@@ -136,6 +113,28 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         file.write(HEADER.pack(written.totals["flux"] / scale, *(MARKER,) * 5, min(lumens, LARGEST_FLOAT)))
     notes += losses(rays, written, colour, colour_kept=True, kept=("radiant_flux",))
     return tuple(notes)
+
+
+def in_watts(rays: RayStream, instead: str) -> tuple[RaySet, list[str]]:
+    """The rays as a Speos file, binary or text, holds them: in watts, with a wavelength each; and what was done.
+
+    Raises
+    ------
+    ArgumentError
+        If they have no wavelengths; says what to write instead.
+    UnitError
+        If they carry lumens at wavelengths where V(λ) is 0.
+    """
+    colour = RayColour.of(rays)
+    if not (colour.has_wavelengths and isinstance(rays, RaySet)):
+        raise ArgumentError(
+            f"{rays.provenance.source}: a Speos file holds the wavelength of every ray, but this set has rays with "
+            f"{colour.kind.value}. Write {instead}; or, if all rays have one wavelength, say so: "
+            "RaySet.with_spectrum(Spectrum([wavelength], [1]))."
+        )
+    if rays.flux_unit == "W":
+        return rays, []
+    return rays.in_unit("W"), ["Lumens were turned into watts through the wavelengths: Speos energies are radiant."]
 
 
 FORMAT = RayFormat("speos", "Speos binary ray file", (".ray",), recognise, read, write)

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from etendue.errors import ArgumentError, FormatError
+from etendue.errors import FormatError
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
 from etendue.formats.rays.shared import FloatArray, RayColour, losses, wavelength_complaints
+from etendue.formats.rays.speos import in_watts
 from etendue.formats.rays.text_output import usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows, whole
 from etendue.quantities.ray_records import RaySetMeaning
@@ -76,31 +77,9 @@ def read(path: Path) -> RaySet:
 
 
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:
-    """Write a Speos text ray file, with energies relative to the strongest ray's.
-
-    Returns
-    -------
-    tuple of str
-        What the format could not express: the total flux, always.
-
-    Raises
-    ------
-    ArgumentError
-        If the rays have no wavelengths, or there is no usable ray.
-    UnitError
-        If the rays carry lumens at wavelengths where V(λ) is 0.
-    """
+    """Write a Speos text ray file, with energies relative to the strongest ray's."""
+    rays, notes = in_watts(rays, "'lighttools-text', which needs none")
     colour = RayColour.of(rays)
-    if not (colour.has_wavelengths and isinstance(rays, RaySet)):
-        raise ArgumentError(
-            f"{rays.provenance.source}: a Speos file holds the wavelength of every ray, but this set has rays with "
-            f"{colour.kind.value}. Write 'lighttools-text', which needs none, or give the set wavelengths."
-        )
-    notes = []
-    if rays.flux_unit == "lm":
-        rays = rays.in_unit("W")
-        colour = RayColour.of(rays)
-        notes.append("Lumens were turned into watts through the wavelengths: Speos energies are radiant.")
     count = usable_rays(rays)
     largest = rays.moments().flux_range[1] * rays.flux_scale
     scale = 1 / largest if largest > 0 else 1.0

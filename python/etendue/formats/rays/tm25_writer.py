@@ -62,16 +62,6 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     watts, because the standard allows them only so; lumens become watts if their spectrum is known. The sum over the
     rays is the header's total; the other total is taken from the rays or the ratio in the set's own header, or computed
     from the spectrum.
-
-    Returns
-    -------
-    tuple of str
-        What the format could not express.
-
-    Raises
-    ------
-    ArgumentError
-        If there is no usable ray.
     """
     rays, colour, notes = _in_writable_unit(rays)
     spectral, columns = _contents(rays, colour)

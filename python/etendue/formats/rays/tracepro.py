@@ -111,18 +111,7 @@ def _placement_complaints(lines: list[TextLine]) -> Iterator[Complaint]:
 
 
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:
-    """Write a TracePro text source file in metres, the one unit whose conversion factor, 1, cannot be misunderstood.
-
-    Returns
-    -------
-    tuple of str
-        What the format could not express: the unit of the flux, always.
-
-    Raises
-    ------
-    ArgumentError
-        If there is no usable ray.
-    """
+    """Write a TracePro text source file in metres, the one unit whose conversion factor, 1, cannot be misunderstood."""
     count = usable_rays(rays)
     source = re.sub(r"[^\x20-\x7e]", "?", rays.provenance.source)
     header = (

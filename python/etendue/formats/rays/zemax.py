@@ -18,6 +18,7 @@ from etendue.formats.rays.shared import (
     Colour,
     RayColour,
     Records,
+    Written,
     losses,
     read_bytes,
     stated_total,
@@ -155,15 +156,10 @@ def _record(kind: int) -> np.dtype[Any]:
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     """Write a Zemax binary source file in millimetres: spectral (``.sdf``) if the rays have wavelengths and watts.
 
-    Returns
-    -------
-    tuple of str
-        What the format could not express.
-
     Raises
     ------
     ArgumentError
-        If there are more than 4e9 rays, which OpticStudio does not read, or no usable ones.
+        If there are more than 4e9 rays, which OpticStudio does not read.
     """
     if len(rays) > MAX_RAYS:
         raise ArgumentError(
@@ -183,8 +179,16 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
         written = write_records(file, rays, _record(kind), fill)
         file.seek(0)
         file.write(_header(rays, kind, written.rays, written.totals["flux"], (colour.single or 0.0) / NM_PER_UM))
-    notes = list(losses(rays, written, colour, colour_kept=spectral or colour.single is not None))
-    if colour.kind is Colour.PER_RAY and not spectral:
+    wavelengths_lost = colour.kind is Colour.PER_RAY and not spectral
+    return zemax_losses(rays, written, colour, spectral or colour.single is not None, wavelengths_lost=wavelengths_lost)
+
+
+def zemax_losses(
+    rays: RayStream, written: Written, colour: RayColour, colour_kept: bool, *, wavelengths_lost: bool
+) -> tuple[str, ...]:
+    """What a Zemax file, binary or text, does not say of the rays, one sentence each."""
+    notes = list(losses(rays, written, colour, colour_kept=colour_kept))
+    if wavelengths_lost:
         notes.append("Zemax files hold wavelengths only beside watts; convert with RaySet.in_unit('W') to keep them.")
     if colour.kind is Colour.ONE_SPECTRUM:
         notes.append("OpticStudio takes the spectrum from a .spcd file (µm, weight) that is chosen with the source.")

@@ -13,9 +13,10 @@ import numpy as np
 
 from etendue.errors import FormatError
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
-from etendue.formats.rays.shared import Colour, FloatArray, RayColour, losses, wavelength_complaints
+from etendue.formats.rays.shared import FloatArray, RayColour, wavelength_complaints
 from etendue.formats.rays.text_output import usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows
+from etendue.formats.rays.zemax import DIMENSION_UNITS, FLUX_ONLY, LONGEST_WAVELENGTH, SPECTRAL, zemax_losses
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayBatch, RayStream
@@ -24,10 +25,6 @@ from etendue.units import MM_PER_LENGTH_UNIT, NM_PER_UM, FluxUnit
 
 CLAUSE = "ray-file formats, Zemax text"
 
-DIMENSION_UNITS = ("m", "inch", "cm", "feet", "mm")
-"""Length units in the order of the first line's numbers."""
-
-FLUX_ONLY, SPECTRAL = 0, 2
 EARLY_LUMENS = 2
 """An early converter from Speos wrote this for lumens."""
 
@@ -35,9 +32,6 @@ FLUX_TYPES: dict[float, FluxUnit] = {0: "W", 1: "lm", EARLY_LUMENS: "lm"}
 GEOMETRY = {"position": (0, 1, 2), "direction": (3, 4, 5), "flux": (6,)}
 FIELDS = {7: GEOMETRY, 8: {**GEOMETRY, "wavelength": (7,)}}
 """Record fields by the number of columns."""
-
-LONGEST_WAVELENGTH = 100.0
-"""[µm]; a file with longer ones was written with nanometres."""
 
 
 def recognise(head: Head) -> bool:
@@ -146,18 +140,7 @@ def _unit_of_wavelength(wavelength: FloatArray, row: TextLine) -> Iterator[Compl
 
 
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:
-    """Write a Zemax text source file in millimetres, spectral if the rays have wavelengths and carry watts.
-
-    Returns
-    -------
-    tuple of str
-        What the format could not express.
-
-    Raises
-    ------
-    ArgumentError
-        If there is no usable ray.
-    """
+    """Write a Zemax text source file in millimetres, spectral if the rays have wavelengths and carry watts."""
     colour = RayColour.of(rays)
     spectral = colour.has_wavelengths and rays.flux_unit == "W"
     kind, flux_type = SPECTRAL if spectral else FLUX_ONLY, 1 if rays.flux_unit == "lm" else 0
@@ -170,14 +153,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     with path.open("wb") as file:
         file.write(f"{count} {DIMENSION_UNITS.index('mm')} {kind} {flux_type}\r\n".encode("ascii"))
         written = write_rows(file, rays, columns)
-    notes = list(losses(rays, written, colour, colour_kept=spectral))
-    if colour.has_wavelengths and not spectral:
-        notes.append("Zemax files hold wavelengths only beside watts; convert with RaySet.in_unit('W') to keep them.")
-    if colour.kind is Colour.ONE_SPECTRUM:
-        notes.append("OpticStudio takes the spectrum from a .spcd file (µm, weight) that is chosen with the source.")
-    if written.dark_rays:
-        notes.append(f"{written.dark_rays:,} rays carry no flux, which OpticStudio may refuse.")
-    return tuple(notes)
+    return zemax_losses(rays, written, colour, spectral, wavelengths_lost=colour.has_wavelengths and not spectral)
 
 
 FORMAT = RayFormat("zemax-text", "Zemax text source file", (), recognise, read, write, value_bytes=2)

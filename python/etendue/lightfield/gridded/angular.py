@@ -132,33 +132,6 @@ def intensities(grid: AngularGrid, flux: Array) -> Array:
     return table
 
 
-def integrated_flux(grid: AngularGrid, table: Array) -> Array:
-    """Step 4f: flux of tables of intensities by eq. 3.2.
-
-    Parameters
-    ----------
-    grid : AngularGrid
-        Δθ and Δφ.
-    table : array, shape (..., rows, columns)
-        Intensity at the nodes, of `grid.shape`.
-
-    Returns
-    -------
-    array, shape (...)
-
-    Examples
-    --------
-    >>> grid = AngularGrid(1, 1)
-    >>> lambertian = np.cos(np.radians(grid.theta))[:, None] * np.ones(360)
-    >>> round(float(integrated_flux(grid, lambertian)), 6)                    # π, but for the rule's own error
-    3.141593
-    """
-    cosine = np.cos(np.radians(grid.theta))
-    mean = (table[..., :-1, :] + table[..., 1:, :]) / 2.0
-    result: Array = np.radians(grid.phi_step) * (mean * -np.diff(cosine)[:, None]).sum(axis=(-1, -2))
-    return result
-
-
 def quadrature_factors(grid: AngularGrid) -> Array:
     """How often eq. 3.2 counts the flux of each ring, shape (RINGS,): Φ_int = Σ factor · Φ_ring.
 

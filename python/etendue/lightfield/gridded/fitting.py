@@ -55,11 +55,6 @@ class Account:
     hidden: int = 0
     hidden_flux: float = 0.0
 
-    @property
-    def kept_flux(self) -> float:
-        """Of the rays on patches."""
-        return self.flux - self.missed_flux - self.hidden_flux
-
     def notes(self, unit: FluxUnit) -> list[str]:
         """What the user should know."""
         found = []

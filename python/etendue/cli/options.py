@@ -1,0 +1,12 @@
+"""Options that several verbs have in common."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+Flux = Annotated[str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")]
+Unit = Annotated[str | None, typer.Option("--unit", help="lm or W: convert through the file's spectrum.")]
+Threads = Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
