@@ -31,7 +31,7 @@ def room(lamp: Path) -> et.Scene:
     """Few rays of a file, given out again and again, beside a lamp of its own; every kind of detector."""
     return et.Scene(
         sources=[
-            {"name": "led", "kind": "rays", "rays": str(lamp), "flux": 40},
+            {"name": "led", "kind": "rays", "file": str(lamp), "flux": 40},
             {"name": "pilot", "kind": "point", "flux": 10, "at": [3, 4, 1]},
         ],
         surfaces=[{"name": "wall", "shape": {"kind": "rectangle", "width": 50, "height": 40}, "at": [3, 0, 22],
