@@ -1,7 +1,7 @@
 """The part of the walk that needs a compiler: a BSDF and a detector are added to a copy of the tree, compiled and used.
 
-Run by hand, `python tests/architecture/walk/compiled.py`; it takes some minutes, for everything is compiled in a folder of its
-own: cargo takes what it finds in another tree's for up to date by the times of the files alone.
+Run by hand, `python tests/architecture/walk/compiled.py`; it takes some minutes, for everything is compiled in a folder of
+its own: cargo goes by the times of files alone, and might take those of two trees for the same.
 """
 
 from __future__ import annotations
