@@ -84,11 +84,12 @@ def test_ray_format(tmp_path: Path) -> None:
     rays = et.RingSource(rays=500, seed=4).ray_set()
     et.write_rays(tmp_path / "led.dat", rays, "plain-text")
     run("convert", tmp_path / "led.dat", tmp_path / "led.rays")
-    back = et.read_rays(tmp_path / "led.rays")
-    assert back.provenance.format == "plain-text"
-    assert back.flux_unit == "lm"
-    for name in ("position", "direction", "flux"):
-        assert np.allclose(getattr(back, name), getattr(rays, name), rtol=1e-14, atol=1e-15)
+    for file in ("led.dat", "led.rays"):
+        back = et.read_rays(tmp_path / file)
+        assert back.provenance.format == "plain-text"
+        assert back.flux_unit == "lm"
+        for name in ("position", "direction", "flux"):
+            assert np.allclose(getattr(back, name), getattr(rays, name), rtol=1e-14, atol=1e-15)
 
 
 def test_verb(tmp_path: Path) -> None:
