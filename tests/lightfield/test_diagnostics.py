@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 import math
 from pathlib import Path
@@ -294,13 +293,15 @@ class Trial:
         self.source, self.surface = DieUnderDome(), Plane(z=0, width=2.6, height=2.6, centre=(0, 0))
         self.x, self.k = self.source.rays(128 * self.N, seed=3)
         self.fresh = self.source.rays(200_000, seed=4)
+        self.fields: dict[int, LightField] = {}
 
     def rays(self, n: int) -> et.RaySet:
         return et.RaySet(self.x[:n], self.k[:n], np.full(n, self.source.total_flux / n))
 
-    @functools.cache  # noqa: B019 - one object lives as long as the module's tests
     def field(self, n: int) -> LightField:
-        return LightField.fit(self.rays(n), self.surface, depths=(3, 3, 3, 3))
+        if n not in self.fields:
+            self.fields[n] = LightField.fit(self.rays(n), self.surface, depths=(3, 3, 3, 3))
+        return self.fields[n]
 
     def score(self, n: int) -> float:
         """Mean ln of the density at fresh rays, with the share of a uniform field that all scores have."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 from pathlib import Path
 
@@ -35,13 +34,12 @@ def rays_of(position: Array, direction: Array, **more: object) -> et.RaySet:
     return et.RaySet(position, direction, np.ones(len(position)), **more)  # type: ignore[arg-type]
 
 
-@functools.cache
 def led_lines(n: int = N) -> tuple[Array, Array]:
     position, direction = StructuredLed().rays(n, seed=1)
     return scattered(position + MOVE, direction, 3.0)
 
 
-@functools.cache
+@pytest.fixture(scope="module")
 def led_choice() -> SurfaceChoice:
     return choose_surface(rays_of(*led_lines()))
 
@@ -162,31 +160,31 @@ def assert_alike(choice: SurfaceChoice, other: SurfaceChoice, length: float = 1.
 
 
 @pytest.mark.parametrize("length", [1e-3, 1e3])
-def test_the_unit_of_length_does_not_matter(length: float) -> None:
+def test_the_unit_of_length_does_not_matter(length: float, led_choice: SurfaceChoice) -> None:
     position, direction = led_lines()
-    assert_alike(led_choice(), choose_surface(rays_of(position * length, direction)), length=length)
+    assert_alike(led_choice, choose_surface(rays_of(position * length, direction)), length=length)
 
 
-def test_the_number_of_threads_does_not_matter_nor_the_unit_of_flux() -> None:
+def test_the_number_of_threads_does_not_matter_nor_the_unit_of_flux(led_choice: SurfaceChoice) -> None:
     other = choose_surface(rays_of(*led_lines(), flux_unit="W"), threads=1)
-    assert (other.surface, other.table, other.depths) == (led_choice().surface, led_choice().table, led_choice().depths)
+    assert (other.surface, other.table, other.depths) == (led_choice.surface, led_choice.table, led_choice.depths)
 
 
 @pytest.mark.parametrize("move", [7.0, 1e6])
-def test_where_the_source_is_does_not_matter(move: float) -> None:
+def test_where_the_source_is_does_not_matter(move: float, led_choice: SurfaceChoice) -> None:
     """Also so far off that coordinates have no more than ten digits for the source."""
     position, direction = led_lines()
     choice = choose_surface(rays_of(position + move, direction))
     assert isinstance(choice.surface, Plane)
     assert choice.surface.z == pytest.approx(MOVE[2] + move, abs=2e-3)
-    assert choice.surface.area == pytest.approx(led_choice().surface.area, rel=0.01)
+    assert choice.surface.area == pytest.approx(led_choice.surface.area, rel=0.01)
 
 
-def test_where_on_their_lines_rays_start_does_not_matter() -> None:
+def test_where_on_their_lines_rays_start_does_not_matter(led_choice: SurfaceChoice) -> None:
     choice = choose_surface(rays_of(*scattered(*led_lines(), 1000.0)))
     assert isinstance(choice.surface, Plane)
     assert choice.surface.z == pytest.approx(MOVE[2], abs=2e-3)
-    assert choice.surface.area == pytest.approx(led_choice().surface.area, rel=0.01)
+    assert choice.surface.area == pytest.approx(led_choice.surface.area, rel=0.01)
 
 
 def test_start_points_on_a_plane_of_any_depth_do_not_hide_the_source() -> None:
@@ -198,14 +196,14 @@ def test_start_points_on_a_plane_of_any_depth_do_not_hide_the_source() -> None:
     assert choice.surface.z == pytest.approx(MOVE[2], abs=2e-3)
 
 
-def test_strays_far_off_do_not_matter() -> None:
+def test_strays_far_off_do_not_matter(led_choice: SurfaceChoice) -> None:
     position, direction = (values.copy() for values in led_lines())
     rng = np.random.default_rng(3)
     position[:400], direction[:400] = rng.normal(size=(400, 3)) * 100, rng.normal(size=(400, 3))
     choice = choose_surface(rays_of(position, direction / np.linalg.norm(direction, axis=1)[:, None]))
     assert isinstance(choice.surface, Plane)
     assert choice.surface.z == pytest.approx(MOVE[2], abs=4e-3)
-    assert choice.surface.area == pytest.approx(led_choice().surface.area, rel=0.02)
+    assert choice.surface.area == pytest.approx(led_choice.surface.area, rel=0.02)
     (row,) = (row for row in choice.table if row.surface == choice.surface)
     assert 0.001 < row.unmet < 0.011  # the strays
 
@@ -316,8 +314,8 @@ def test_a_real_file_gets_the_surface_an_engineer_would_choose(samples: Path, na
         assert getattr(found, field.name) == pytest.approx(getattr(wanted, field.name), abs=0.01)
 
 
-def test_notes_name_all_that_was_compared() -> None:
-    choice = led_choice()
+def test_notes_name_all_that_was_compared(led_choice: SurfaceChoice) -> None:
+    choice = led_choice
     assert choice.surface.spec in choice.notes[0]
     assert "32,768" in choice.notes[0] or f"{N:,}" in choice.notes[0]
     for row in choice.table:

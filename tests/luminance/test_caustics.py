@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any
 
@@ -38,7 +37,6 @@ def ball_over_paper() -> dict[str, Any]:
 SCENES = {"ball over paper": ball_over_paper(), "lens and mirror": lens_and_mirror()}
 
 
-@functools.cache
 def long_run(name: str) -> LuminanceMap:
     (lmap,) = et.luminance_map(et.Scene(**SCENES[name]), rays_per_pixel=1 << 13, seed=1 << 40, forward_rays=1.5e6)
     return lmap

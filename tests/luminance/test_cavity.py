@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import etendue as et
@@ -46,7 +45,7 @@ def cavity() -> et.Scene:
     )  # fmt: skip
 
 
-@functools.cache
+@pytest.fixture(scope="module")
 def traced() -> TraceResult:
     result = et.trace(cavity(), 2e6, 11)
     assert result.ledger.closes
@@ -80,9 +79,9 @@ def test_the_solution_loses_no_light_and_has_converged() -> None:
 # --- forwards --------------------------------------------------------------------------------------------------------
 
 
-def test_where_the_light_ends() -> None:
-    ledger = traced().ledger
-    n = traced().rays_done
+def test_where_the_light_ends(traced: TraceResult) -> None:
+    ledger = traced.ledger
+    n = traced.rays_done
     wall, base = CAVITY.absorbed
     top, back = CAVITY.left
     for flux, rays in (
@@ -92,9 +91,9 @@ def test_where_the_light_ends() -> None:
         assert_drawn_with(share=flux / FLUX, hits=rays, rays=n)
 
 
-def test_illuminance_of_the_base() -> None:
+def test_illuminance_of_the_base(traced: TraceResult) -> None:
     """E(r) over each cell of a grid that lies askew: a mean over 8 × 8 points, the integrand being smooth."""
-    seen = traced().illuminance["floor"]
+    seen = traced.illuminance["floor"]
     x, w = leggauss(8)
     half = np.array([24 / 6, 16 / 4]) / 2
     expected = np.zeros(seen.values.shape)
@@ -121,7 +120,6 @@ def sights(observer: Observer, screen: Screen, fine: int = 6) -> tuple[Array, Ar
     return observer.position, along.reshape(*x.shape[:2], -1, 3)
 
 
-@functools.cache
 def expected_map(observer: Observer, screen: Screen) -> Array:
     """Mean luminance of each pixel, in lm/(mm² sr): the exitance over π where lines through the opening end."""
     eye, along = sights(observer, screen)
@@ -141,8 +139,8 @@ def expected_map(observer: Observer, screen: Screen) -> Array:
     return CAVITY.reflectance / math.pi * seen.mean(axis=-1)
 
 
-def test_light_image() -> None:
-    image = traced().images["image"]
+def test_light_image(traced: TraceResult) -> None:
+    image = traced.images["image"]
     assert_agree(
         values=image.values,
         expected=expected_map(image.observer, image.screen) * 1e6,

@@ -1,7 +1,9 @@
-"""One of every body, with its volume in closed form, and one of every shape of a surface."""
+"""One of every body, with its volume in closed form, one of every shape of a surface, and what a docstring shows."""
 
 from __future__ import annotations
 
+import ast
+import doctest
 import math
 from typing import Any
 
@@ -54,3 +56,12 @@ SHAPES: dict[str, dict[str, Any]] = {
     "mesh": {"vertices": OCTAHEDRON, "triangles": OCTANTS[:5]},
 }
 """Keys of a shape of a surface."""
+
+
+def shown(part: type) -> dict[str, Any]:
+    """The keys with which the docstring of a part of a scene makes one: an example of kinds that no test knows by name."""
+    for example in doctest.DocTestParser().get_examples(part.__doc__ or ""):
+        for node in ast.walk(ast.parse(example.source)):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == part.__name__:
+                return {str(keyword.arg): ast.literal_eval(keyword.value) for keyword in node.keywords}
+    raise AssertionError(f"the docstring of {part.__name__} shows none")

@@ -17,7 +17,6 @@ from scipy.interpolate import RegularGridInterpolator
 HERE = Files(Path())
 
 SPECIMENS: dict[str, dict[str, Any]] = {
-    "interface": {},
     "mirror": {"reflectance": 0.9},
     "absorber": {},
     "lambertian": {"reflectance": 0.4, "transmittance": 0.5},
@@ -41,27 +40,32 @@ EXPECTED: dict[str, tuple[float, float, float, float]] = {
 """Shares in the order of `PARTS`."""
 
 
-def test_every_finish_is_tested() -> None:
-    assert set(SPECIMENS) == set(FINISHES)
-    assert set(EXPECTED) == set(FINISHES) - {"interface"}
+SCATTERING = [kind for kind, cls in FINISHES.items() if issubclass(cls, finishes.Scattering)]
+"""Finishes that are given by their shares alone."""
 
 
-@pytest.mark.parametrize("kind", FINISHES)
+def test_every_finish_with_given_shares_is_tested() -> None:
+    assert set(SPECIMENS) == set(EXPECTED) == set(SCATTERING)
+
+
+@pytest.mark.parametrize("kind", SCATTERING)
 def test_shares(kind: str) -> None:
-    """The four shares by hand; an interface leaves them to the media."""
+    """The four shares by hand."""
     record = FINISHES[kind](**SPECIMENS[kind]).record(HERE)
-    if kind == "interface":
-        assert record == {"kind": "fresnel"}
-    else:
-        assert [float(record[part]["values"][0, 0]) for part in PARTS] == pytest.approx(EXPECTED[kind])
-        assert all(record[part]["values"].shape == (1, 1) for part in PARTS)
+    assert [float(record[part]["values"][0, 0]) for part in PARTS] == pytest.approx(EXPECTED[kind])
+    assert all(record[part]["values"].shape == (1, 1) for part in PARTS)
 
 
-@pytest.mark.parametrize("kind", FINISHES)
+@pytest.mark.parametrize("kind", SCATTERING)
 def test_whether_light_gets_in(kind: str) -> None:
-    """Transmission decides, and an interface always lets light in."""
-    transmits = kind == "interface" or EXPECTED[kind][1] + EXPECTED[kind][3] > 0
+    """Transmission decides."""
+    transmits = EXPECTED[kind][1] + EXPECTED[kind][3] > 0
     assert FINISHES[kind](**SPECIMENS[kind]).lets_light_in() is transmits
+
+
+def test_an_interface_leaves_its_shares_to_the_media() -> None:
+    assert finishes.Interface().record(HERE) == {"kind": "fresnel"}
+    assert finishes.Interface().lets_light_in()
 
 
 def bilinear(record: dict[str, Any], angle: float, wavelength: float) -> float:

@@ -12,7 +12,7 @@ from etendue import _core
 from etendue.errors import SceneError
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.spectrum import photopic_efficiency
-from etendue.scene import Compiled, Scene, compile_scene, detectors, sources
+from etendue.scene import Compiled, Scene, compile_scene, sources
 
 DISK = {"kind": "disk", "radius": 1}
 
@@ -29,11 +29,6 @@ def source(*given: Any, **keys: Any) -> dict[str, Any]:
 
 def rays(**keys: Any) -> et.RaySet:
     return et.RaySet([[0, 0, 0], [1, 0, 0]], [[0, 0, 1], [0, 0.6, 0.8]], [1.0, 3.0], **keys)
-
-
-def test_every_source_is_tested() -> None:
-    assert set(sources.SOURCES) == {"rays", "light-field", "gridded", "surface", "rings", "point", "beam"}
-    assert set(detectors.DETECTORS) == {"rays", "illuminance", "intensity", "image", "scatter"}
 
 
 # --- rays --------------------------------------------------------------------------------------------------------------

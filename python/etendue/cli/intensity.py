@@ -25,7 +25,7 @@ from etendue.lightfield.light_field import LightField
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
 from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
 from etendue.quantities.intensity_nodes import check_steps
-from etendue.quantities.measured import measured, measured_peak
+from etendue.quantities.measured import measured, peak_line
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectrum import Spectrum
 
@@ -141,12 +141,6 @@ def _plain(fact: Any) -> Any:
     return (
         {"wavelength": fact.wavelength.tolist(), "weight": fact.weight.tolist()} if isinstance(fact, Spectrum) else fact
     )
-
-
-def peak_line(distribution: Intensity) -> str:
-    """The peak of a distribution with its error and direction."""
-    c, gamma = distribution.peak
-    return f"peak {measured_peak(distribution)} at C = {c:g}°, γ = {gamma:g}°"
 
 
 def print_intensity(distribution: Intensity) -> None:

@@ -12,7 +12,6 @@ from typing import Annotated, Any
 import typer
 
 from etendue.cli.guard import require_apart
-from etendue.cli.intensity import peak_line
 from etendue.cli.options import Json, Threads
 from etendue.cli.terminal import INTERRUPTED, check_folder, complain, count, print_json, progress_bar, say
 from etendue.errors import ArgumentError, UnknownNameError
@@ -20,7 +19,6 @@ from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import RAY_FORMATS, write_rays
 from etendue.plot.intensity_picture import plot_intensity
-from etendue.quantities.measured import measured
 from etendue.scene import Scene
 from etendue.tracing.plan import Plan
 from etendue.tracing.result import TraceResult
@@ -215,23 +213,7 @@ def print_result(result: TraceResult) -> None:
     for line in result.ledger.table().splitlines():
         say(f"  {line}")
     for detection in result.plan.detections:
-        match detection.KIND:
-            case "rays":
-                rays = result.rays[detection.name]
-                say(f"  {detection.name}: {len(rays):,} rays, {rays.total_flux:.6g} {rays.flux_unit}")
-            case "intensity":
-                far = result.intensity[detection.name]
-                say(f"  {detection.name}: flux {measured(far.flux, far.flux_error, far.flux_unit)}, {peak_line(far)}")
-            case "illuminance":
-                seen = result.illuminance[detection.name]
-                say(f"  {detection.name}: mean {seen.mean:.6g} {seen.unit}, least/mean {seen.uniformity:.3f}")
-            case "scatter":
-                events = result.events[detection.name]
-                share = "" if events.share == 1.0 else f", of 1 ray in {round(1.0 / events.share):,}"
-                say(f"  {detection.name}: {len(events):,} scatter events{share}")
-            case _:
-                image = result.images[detection.name]
-                say(f"  {detection.name}: maximum {image.values.max():.6g} {image.unit}")
+        say(f"  {detection.name}: {detection.summary(result.quantity_of(detection.name))}")
         for note in result.notes_of(detection.name):
             say(f"    {note}")
     for note in result.notes:

@@ -91,7 +91,7 @@ class View:
 
 
 def finish_kind(finish: Record) -> str:
-    """What a finish mostly does, as one of `FINISH_KINDS`: by the largest of its shares.
+    """What a finish mostly does, as one of `FINISH_KINDS`: by the largest of the shares that its record names.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def finish_kind(finish: Record) -> str:
         "diffuse_reflectance": "diffuse",
         "diffuse_transmittance": "diffuse",
     }
-    most = {part: float(np.max(finish[part]["values"])) for part in does}
+    most = {part: float(np.max(finish[part]["values"])) for part in does if part in finish}
     part = max(most, key=lambda p: most[p])
     return does[part] if most[part] > 0.0 else "absorber"
 

@@ -44,3 +44,16 @@ def measured_peak(found: Intensity) -> str:
     if not found.maximum - found.peak_intensity > 0.5 * found.peak_error:
         return peak
     return f"{peak} (largest value {found.maximum:.4g} {found.unit}, lifted by chance)"
+
+
+def peak_line(found: Intensity) -> str:
+    """The peak of a distribution with its error and direction.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> peak_line(et.Intensity([0], [0, 90, 180], [[500.0, 0, 0]], [[20.0, 0, 0]]))
+    'peak 500 ± 20 cd at C = 0°, γ = 0°'
+    """
+    c, gamma = found.peak
+    return f"peak {measured_peak(found)} at C = {c:g}°, γ = {gamma:g}°"

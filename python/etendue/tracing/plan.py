@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from etendue import _core
 from etendue.errors import ArgumentError, SceneError
 from etendue.quantities.fingerprint import fingerprint
-from etendue.quantities.intensity_nodes import Nodes
+from etendue.quantities.intensity_nodes import MOST_CELLS, Nodes
 from etendue.quantities.node_choice import Choice
 from etendue.quantities.provenance import Provenance
 from etendue.scene import Compiled, Scene
 from etendue.scene.dealing import Dealing
+from etendue.scene.detectors.detector import Detection, Setting
+from etendue.scene.detectors.intensity import FarFieldIntensity
 from etendue.scene.scatter_events import geometry_of
-from etendue.tracing.detections import (
-    Detection,
-    FarFieldIntensity,
-    GridIlluminance,
-    IncidentRays,
-    LightImage,
-    ScatteredLight,
-    check_cells,
-)
 from etendue.units import FluxUnit
 
 DEFAULT_RAYS = 10**7
@@ -67,7 +61,7 @@ class Plan:
     face_names: tuple[str, ...]
     medium_names: tuple[str, ...]
     loss_names: tuple[str, ...]
-    detections: tuple[Detection, ...]
+    detections: tuple[Detection[Any], ...]
     notes: tuple[str, ...] = ()
     scene: Scene | None = dataclasses.field(default=None, compare=False, repr=False)
 
@@ -145,10 +139,13 @@ def make_plan(
         choices = [Choice(d.nodes, d.told) for d in before.detections if isinstance(d, FarFieldIntensity)]
     elif any(record["kind"] == "intensity" for record in compiled.record["detectors"]):
         choices = look_around(count)
-    detections = tuple(_detections(scene, compiled, iter(choices)))
+    observers = {observer.name: observer for observer in scene.observers}
+    setting = Setting(observers, iter(choices), lambda: geometry_of(compiled))
+    named = zip(_unique(compiled.detector_names), scene.detectors, strict=True)
+    detections = tuple(detector.detection(name, setting) for name, detector in named)
     check_cells(detections)
     # The faces of detectors stand behind those of the scene.
-    detector_faces = [d.name for d in detections if isinstance(d, IncidentRays | GridIlluminance)]
+    detector_faces = [detection.name for detection in detections if detection.HAS_FACE]
     return Plan(
         scene.name,
         _text(scene),
@@ -204,22 +201,14 @@ def _unique(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(result)
 
 
-def _detections(scene: Scene, compiled: Compiled, choices: Iterator[Choice]) -> Iterable[Detection]:
-    observers = {observer.name: observer for observer in scene.observers}
-    rows = zip(_unique(compiled.detector_names), scene.detectors, compiled.record["detectors"], strict=True)
-    for name, described, record in rows:
-        match record["kind"]:
-            case "rays":
-                yield IncidentRays(name)
-            case "intensity":
-                yield FarFieldIntensity(name, *next(choices))
-            case "illuminance":
-                ox, oy, oz, xx, xy, xz, yx, yy, yz, *_ = record["frame"]
-                width, height = record["width"], record["height"]
-                axes = (ox, oy, oz), (xx, xy, xz), (yx, yy, yz)
-                yield GridIlluminance(name, width, height, record["columns"], record["rows"], *axes)
-            case "scatter":
-                yield ScatteredLight(name, record["most"], described.surfaces, geometry_of(compiled))  # type: ignore[attr-defined]
-            case _:
-                seen = observers[described.observer]  # type: ignore[attr-defined]
-                yield LightImage(name, seen.observer(), seen.screen.screen())
+def check_cells(detections: tuple[Detection[Any], ...]) -> None:
+    """Refuse detectors with more cells than memory is meant for.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+    """
+    total = sum(detection.cells for detection in detections)
+    if total > MOST_CELLS:
+        raise ArgumentError(f"the detectors have {total:,} cells together; {MOST_CELLS:,} are the most. Use fewer.")

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from etendue.formats.input import as_path
 from etendue.quantities.illuminance_map import IlluminanceMap
@@ -16,22 +16,21 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.scene.dealing import Array, Counts
+from etendue.scene.detectors.detector import Counted, Detection, Origin
+from etendue.scene.detectors.illuminance import GridIlluminance
+from etendue.scene.detectors.image import DiffuseLuminance
+from etendue.scene.detectors.intensity import FarFieldIntensity
+from etendue.scene.detectors.rays import IncidentRays
+from etendue.scene.detectors.scatter import ScatteredLight
 from etendue.scene.scatter_events import ScatterEvents
-from etendue.tracing.detections import (
-    Counted,
-    Detection,
-    FarFieldIntensity,
-    GridIlluminance,
-    IncidentRays,
-    LightImage,
-    Origin,
-    ScatteredLight,
-)
 from etendue.tracing.ledger import Entry, Ledger, Loss
 from etendue.tracing.named import ByName
 from etendue.tracing.plan import Plan
+from etendue.tracing.recorded import DetectorSums
 from etendue.tracing.storage import load_result, save_result
 from etendue.tracing.sums import Sums
+
+T = TypeVar("T")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -173,49 +172,57 @@ class TraceResult:
 
     # --- detectors -----------------------------------------------------------------------------------------------------
 
+    def quantity_of(self, detector: str) -> Any:
+        """What the detector of this name measured, whatever its kind.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such detector; suggests the nearest.
+        """
+        number = self._numbers[detector]
+        if number not in self._quantities:
+            recorded = DetectorSums(self.plan, self.sums, number, self._origin)
+            self._quantities[number] = self.plan.detections[number].read(recorded)
+        return self._quantities[number]
+
     @cached_property
     def rays(self) -> ByName[RaySet]:
         """The rays that crossed each ray collecting surface, with a wavelength each."""
-        return ByName(
-            "ray collecting surface",
-            {
-                detection.name: detection.read(self.sums.collected[i], self.plan.dealing, self.scale, self._origin)
-                for i, detection in enumerate(self.plan.detections)
-                if isinstance(detection, IncidentRays)
-            },
-        )
+        return self._all(IncidentRays, "ray collecting surface")
 
     @cached_property
     def intensity(self) -> ByName[Intensity]:
         """The far field of the light that left the scene [cd or W/sr]."""
-        found = ((d, c) for d, c in self._counted if isinstance(d, FarFieldIntensity))
-        return ByName("far-field detector", {d.name: d.read(c, self._origin) for d, c in found})
+        return self._all(FarFieldIntensity, "far-field detector")
 
     @cached_property
     def illuminance(self) -> ByName[IlluminanceMap]:
         """Illuminance by each illuminance detector [lx or W/m²]."""
-        found = ((d, c) for d, c in self._counted if isinstance(d, GridIlluminance))
-        return ByName("illuminance detector", {d.name: d.read(c, self._origin) for d, c in found})
+        return self._all(GridIlluminance, "illuminance detector")
 
     @cached_property
     def images(self) -> ByName[LuminanceMap]:
         """Light images of diffuse surfaces [cd/m² or W/(m² sr)]."""
-        found = ((d, c) for d, c in self._counted if isinstance(d, LightImage))
-        return ByName("light image", {d.name: d.read(c, self._origin) for d, c in found})
+        return self._all(DiffuseLuminance, "light image")
 
     @cached_property
     def events(self) -> ByName[ScatterEvents]:
         """Where light was scattered diffusely; `luminance_map` shows it to any observer."""
-        plan, done = self.plan, self.rays_done
-        found = ((d, held) for d, held in zip(plan.detections, self.sums.scattered, strict=True))
-        return ByName(
-            "scatter recorder",
-            {
-                d.name: d.read(held, plan.dealing, done, plan.face_names, plan.scene, self._origin)
-                for d, held in found
-                if isinstance(d, ScatteredLight)
-            },
-        )
+        return self._all(ScatteredLight, "scatter recorder")
+
+    @cached_property
+    def _numbers(self) -> ByName[int]:
+        return ByName("detector", {detection.name: i for i, detection in enumerate(self.plan.detections)})
+
+    @cached_property
+    def _quantities(self) -> dict[int, Any]:
+        """What was read so far, by the number of the detector."""
+        return {}
+
+    def _all(self, kind: type[Detection[T]], called: str) -> ByName[T]:
+        names = [detection.name for detection in self.plan.detections if isinstance(detection, kind)]
+        return ByName(called, {name: self.quantity_of(name) for name in names})
 
     @cached_property
     def relative_error(self) -> float:
@@ -223,19 +230,14 @@ class TraceResult:
 
         NaN if a detector saw nothing yet, or the scene has none with cells.
         """
-        errors = [detection.relative_error(counted) for detection, counted in self._counted]
-        return max(errors) if errors and all(error == error for error in errors) else float("nan")  # noqa: PLR0124
-
-    @cached_property
-    def _counted(self) -> list[tuple[Detection, Counted]]:
         pairs = zip(self.plan.detections, self.sums.cells, strict=True)
-        return [(d, Counted.of(cells, self.plan.dealing, self.rays_done)) for d, cells in pairs if d.cells]
+        counted = [(d, Counted.of(cells, self.plan.dealing, self.rays_done)) for d, cells in pairs if d.cells]
+        errors = [detection.relative_error(cells) for detection, cells in counted]
+        return max(errors) if errors and all(error == error for error in errors) else float("nan")  # noqa: PLR0124
 
     def notes_of(self, detector: str) -> tuple[str, ...]:
         """What there is to say of what a detector saw, beside the `notes` of the whole trace."""
-        kinds = (self.rays, self.intensity, self.illuminance, self.images, self.events)
-        found = next(kind[detector].notes for kind in kinds if detector in kind)
-        return tuple(note for note in found if note not in self.notes)
+        return tuple(note for note in self.quantity_of(detector).notes if note not in self.notes)
 
     @property
     def _origin(self) -> Origin:
@@ -293,38 +295,9 @@ class TraceResult:
             "relative_error": self.relative_error,
             "ledger": self.ledger.to_dict(),
             "detectors": [
-                {"name": d.name, "kind": d.KIND, "notes": list(self.notes_of(d.name))} | self._counts(d)
+                {"name": d.name, "kind": d.KIND, "notes": list(self.notes_of(d.name))}
+                | d.figures(self.quantity_of(d.name))
                 for d in self.plan.detections
             ],
             "notes": list(self.notes),
         }
-
-    def told(self, detection: Detection) -> tuple[str, ...]:
-        """What is to be said about a far field alone, beside the notes of the trace."""
-        notes = self.intensity[detection.name].notes if isinstance(detection, FarFieldIntensity) else ()
-        return tuple(note for note in notes if note not in self.notes)
-
-    def _counts(self, detection: Detection) -> dict[str, Any]:
-        """How much a detector kept, of those that keep rays or events; the figures of a far field."""
-        if isinstance(detection, FarFieldIntensity):
-            far = self.intensity[detection.name]
-            c, gamma = far.peak
-            return {
-                "flux": far.flux,
-                "flux_error": far.flux_error,
-                "maximum": far.maximum,
-                "maximum_error": far.maximum_error,
-                "peak_intensity": far.peak_intensity,
-                "peak_error": far.peak_error,
-                "maximum_at": {"c": c, "gamma": gamma},
-                "unit": far.unit,
-                "planes": far.c.size,
-                "gammas": far.gamma.size,
-                "notes": list(self.told(detection)),
-            }
-        if isinstance(detection, IncidentRays):
-            return {"rays": len(self.rays[detection.name])}
-        if isinstance(detection, ScatteredLight):
-            events = self.events[detection.name]
-            return {"events": len(events), "share_of_rays": events.share}
-        return {}

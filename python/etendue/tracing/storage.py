@@ -23,11 +23,11 @@ from etendue.formats.strict_json import strict_json
 from etendue.quantities.memory import require_memory
 from etendue.quantities.spool import MEMORY_LIMIT, Spool
 from etendue.scene.dealing import CellSums, Dealing, Units
+from etendue.scene.detectors import detection_from_dict
 from etendue.scene.scatter_events import EVENT
 from etendue.scene.scene import Scene
 from etendue.scene.toml import read_toml
-from etendue.tracing.detections import check_cells, detection_from_dict
-from etendue.tracing.plan import Plan
+from etendue.tracing.plan import Plan, check_cells
 from etendue.tracing.scattered import STRETCH, Scattered
 from etendue.tracing.sums import ENTRIES, RECORD, Collected, Sums
 from etendue.units import FLUX_UNITS

@@ -59,18 +59,20 @@ fn every(mut check: impl FnMut(&str, &dyn Bsdf, &Media, Vec3)) {
 const BANDS: usize = 6;
 const SECTORS: usize = 8;
 
-/// The mean of a function over a cell, times the solid angle of the cell.
+/// The mean of a function over a cell, times the solid angle of the cell: by height after Gauss and Legendre, two nodes in
+/// each of `fine`/2 parts, which is exact for cubics and leaves 10⁻⁸ of smooth lobes; by azimuth at the middles of `fine` parts.
 fn integral(front: bool, band: usize, sector: usize, fine: usize, f: impl Fn(Vec3) -> f64) -> f64 {
+    let off = 0.5 / 3_f64.sqrt();
+    let parts = fine / 2;
     let mut sum = 0.0;
-    for i in 0..fine {
+    for (i, node) in (0..parts).flat_map(|i| [(i, 0.5 - off), (i, 0.5 + off)]) {
+        let height = (band as f64 + (i as f64 + node) / parts as f64) / BANDS as f64;
         for k in 0..fine {
-            let part = |n: usize| (n as f64 + 0.5) / fine as f64;
-            let height = (band as f64 + part(i)) / BANDS as f64;
-            let turn = (sector as f64 + part(k)) / SECTORS as f64;
+            let turn = (sector as f64 + (k as f64 + 0.5) / fine as f64) / SECTORS as f64;
             sum += f(direction(if front { height } else { -height }, turn));
         }
     }
-    sum * 2.0 * PI / ((BANDS * SECTORS * fine * fine) as f64)
+    sum * 2.0 * PI / ((BANDS * SECTORS * 2 * parts * fine) as f64)
 }
 
 /// The integrals over all cells, those of the front first.

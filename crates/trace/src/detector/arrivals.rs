@@ -1,11 +1,18 @@
 //! Light that smooth surfaces send to the first diffuse one, of sources that can be seen: where it arrives, and from where.
 
 use super::kind::{Kind, Recorded, Scatter, Wants};
+use super::record::{Described, Record};
 use crate::guide::Arrival;
 
 /// Keeps such arrivals.
 #[derive(Clone, Copy, Debug)]
 pub struct Arrivals;
+
+impl Described for Arrivals {
+    fn read<R: Record>(_record: &R) -> Result<Self, R::Error> {
+        Ok(Self)
+    }
+}
 
 impl Kind for Arrivals {
     fn wants(&self) -> Wants {

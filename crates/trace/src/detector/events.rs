@@ -1,6 +1,7 @@
 //! Scatter events, to be seen later from anywhere.
 
 use super::kind::{Kind, Recorded, Scatter, Wants};
+use super::record::{Described, Record};
 
 /// Keeps scatter events.
 #[derive(Clone, Debug)]
@@ -9,6 +10,15 @@ pub struct Events {
     pub most: usize,
     /// For each face whether its scatters count; None: those of all.
     pub faces: Option<Vec<bool>>,
+}
+
+impl Described for Events {
+    fn read<R: Record>(record: &R) -> Result<Self, R::Error> {
+        Ok(Self {
+            most: record.whole("most")?,
+            faces: record.listed_faces("faces")?,
+        })
+    }
 }
 
 impl Kind for Events {

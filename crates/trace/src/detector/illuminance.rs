@@ -5,6 +5,7 @@ use etendue_geometry::shape::{Flat, Outline, Shape};
 use etendue_math::{Frame, Vec3};
 
 use super::kind::{Kind, Light, Recorded};
+use super::record::{Described, Record};
 
 /// A rectangle in the plane z = 0 of its frame: flux that arrives on its front, by cells.
 #[derive(Clone, Debug)]
@@ -19,6 +20,22 @@ pub struct Illuminance {
     pub columns: u32,
     /// Cells along y; row 0 is the top, at the largest y.
     pub rows: u32,
+}
+
+impl Described for Illuminance {
+    fn read<R: Record>(record: &R) -> Result<Self, R::Error> {
+        let cells = |key| {
+            let number = record.whole(key)?;
+            u32::try_from(number).map_err(|_| R::refuse("more cells than can be counted"))
+        };
+        Ok(Self {
+            frame: record.frame()?,
+            width: record.number("width")?,
+            height: record.number("height")?,
+            columns: cells("columns")?,
+            rows: cells("rows")?,
+        })
+    }
 }
 
 impl Kind for Illuminance {

@@ -3,6 +3,7 @@
 use etendue_lightfield::View;
 
 use super::kind::{Kind, Recorded, Scatter, Wants};
+use super::record::{Described, Record};
 use crate::camera_connection::seen;
 use crate::mis::MisBalance;
 
@@ -25,6 +26,18 @@ pub struct Image {
     pub view: View,
     /// Which light counts.
     pub portion: Portion,
+}
+
+impl Described for Image {
+    fn read<R: Record>(record: &R) -> Result<Self, R::Error> {
+        let portion = match (record.flag("complement")?, record.optional_number("shared")?) {
+            (false, _) => Portion::Whole,
+            (true, None) => Portion::Unseen,
+            (true, Some(rays)) => Portion::Shared(MisBalance { rays }),
+        };
+        let view = record.view("view")?;
+        Ok(Self { view, portion })
+    }
 }
 
 impl Kind for Image {

@@ -1,4 +1,7 @@
-//! Detectors: what records light and does not change it. Each kind is a file that implements [`Kind`], and a line of `kinds!`.
+//! Detectors: what records light and does not change it.
+//!
+//! Each kind is a file that implements [`Kind`], and a line of `kinds!`. Those that can be described outside the core implement
+//! [`Described`] too, and their line says what they are called there.
 
 mod arrivals;
 mod escapes;
@@ -9,6 +12,7 @@ mod image;
 mod intensity;
 mod kind;
 mod rays;
+mod record;
 
 pub use arrivals::Arrivals;
 pub use escapes::Escapes;
@@ -19,9 +23,10 @@ pub use image::{Image, Portion};
 pub use intensity::{FarFieldNodes, Intensity};
 pub use kind::{Kind, Light, Recorded, Scatter, Wants};
 pub use rays::Rays;
+pub use record::{Described, Record};
 
 macro_rules! kinds {
-    ($($(#[$meaning:meta])+ $name:ident,)+) => {
+    ($($(#[$meaning:meta])+ $name:ident $(= $called:literal)?,)+) => {
         /// A detector.
         #[derive(Clone, Debug)]
         pub enum Detector {
@@ -37,26 +42,40 @@ macro_rules! kinds {
                 }
             }
         }
+
+        impl Detector {
+            /// The detector of a kind that a record describes.
+            ///
+            /// # Errors
+            ///
+            /// If no kind is called so, or the record is not that of one.
+            pub fn read<R: Record>(kind: &str, record: &R) -> Result<Self, R::Error> {
+                match kind {
+                    $($($called => $name::read(record).map(Self::$name),)?)+
+                    other => Err(R::refuse(&format!("no detector is called {other}"))),
+                }
+            }
+        }
     };
 }
 
 kinds! {
     /// Every ray that passes a face.
-    Rays,
+    Rays = "rays",
     /// Flux that arrives on a rectangle, by cells.
-    Illuminance,
-    /// Every ray that leaves the scene.
-    Escapes,
+    Illuminance = "illuminance",
+    /// Every ray that leaves the scene: a far field until it is known which nodes suit it.
+    Escapes = "intensity",
     /// Flux that leaves the scene, by nodes of the far field.
     Intensity,
     /// Luminance of the pixels of an observer.
-    Image,
+    Image = "image",
     /// Light that smooth surfaces send to diffuse ones.
-    Arrivals,
+    Arrivals = "arrivals",
     /// Flux that diffuse surfaces send out, by cells of patches.
     Exitance,
     /// Scatter events, to be seen later from anywhere.
-    Events,
+    Events = "scatter",
 }
 
 impl Detector {

@@ -4,10 +4,17 @@ use etendue_geometry::Face;
 use etendue_math::Vec3;
 
 use super::kind::{Kind, Light, Recorded};
+use super::record::{Described, Record};
 
 /// Keeps every ray that passes its face, from either side.
 #[derive(Clone, Debug)]
 pub struct Rays(pub Face);
+
+impl Described for Rays {
+    fn read<R: Record>(record: &R) -> Result<Self, R::Error> {
+        record.face().map(Self)
+    }
+}
 
 impl Kind for Rays {
     fn face(&self) -> Option<Face> {

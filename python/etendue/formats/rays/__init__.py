@@ -136,8 +136,7 @@ def write_rays(
     rays : RayStream
         A ray set, or a source that draws its rays on demand.
     format : str, optional
-        ``tm25 | zemax | zemax-text | lighttools | lighttools-text | speos | speos-text | asap | tracepro | csv | etd``;
-        from the extension if None.
+        The name of one, as ``"tm25"`` or ``"zemax"``; `docs/formats/ray-files.md` lists them. From the extension if None.
     flux_unit : {"lm", "W"}, optional
         Unit of the flux in the file, whatever of the rays' spectra it then cannot hold. None: that of the rays, but watts in
         formats that hold wavelengths beside watts only (TM-25).
