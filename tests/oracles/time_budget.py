@@ -4,6 +4,9 @@ that does not.
 What counts is the processor time of the test itself (of all threads and of the processes that it started), without its
 fixtures, and in seconds of a machine that does a fixed piece of work in a fixed time: neither a busy machine nor a slow one
 makes a test slow.
+
+``@pytest.mark.slow`` is for all cases of a test, ``@pytest.mark.slow(only=["torus"])`` for those whose name in brackets has
+one of these words. Examples in docstrings cannot be marked; `SLOW_EXAMPLES` names those that are slow.
 """
 
 from __future__ import annotations
@@ -22,6 +25,24 @@ SLOW_LEAST = 0.5
 
 STEPS, SECONDS = 400_000, 0.02
 """Additions of a loop, and how long they take on the machine whose seconds these are."""
+
+
+SLOW_EXAMPLES: frozenset[str] = frozenset()
+"""Docstrings whose examples are slow."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave the marker on the cases that it is for, so that ``-m "not slow"`` runs the others."""
+    for item in items:
+        if isinstance(item, pytest.DoctestItem):
+            if item.name in SLOW_EXAMPLES:
+                item.add_marker("slow")
+            continue
+        case = item.name.partition("[")[2]
+        for marker in list(item.iter_markers("slow")):
+            if "only" in marker.kwargs and not any(word in case for word in marker.kwargs["only"]):
+                item.own_markers.remove(marker)
 
 
 def processor_time() -> float:

@@ -13,6 +13,10 @@ const STARTS: usize = 1 << 15;
 /// Starts in one pixel, at most.
 const MOST_STARTS: usize = 16;
 
+/// One pixel of so many is looked at first: where light wanders among thousands of surfaces, a search finds nothing and has
+/// no end.
+const FIRST_LOOK: usize = 32;
+
 /// Images in one pixel, at most.
 const MOST: usize = 32;
 
@@ -43,11 +47,27 @@ impl Glints {
             begins: vec![0; view.pixels() + 1],
             of: vec![false; sources],
         };
-        let Some(search) = Search::new(lit, view, most_events) else {
+        let Some(mut search) = Search::new(lit, view, most_events) else {
             return result;
         };
         let pixels = view.pixels();
         let starts = (STARTS / pixels.max(1)).clamp(1, MOST_STARTS);
+        let [first, caught] = (0..pixels)
+            .into_par_iter()
+            .step_by(FIRST_LOOK)
+            .map_init(
+                || search.clone(),
+                |search, pixel| {
+                    if lit.is_stopped() {
+                        return [0, 0];
+                    }
+                    search.first_look(pixel, starts)
+                },
+            )
+            .reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        if first == 0 && 2 * caught > starts * pixels.div_ceil(FIRST_LOOK) {
+            search.spend_little();
+        }
         let found: Vec<(Vec<Found>, Vec<Sight>)> = (0..pixels)
             .into_par_iter()
             .map_init(

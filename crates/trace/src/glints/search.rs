@@ -33,6 +33,9 @@ const MOST_MEETINGS: usize = 128;
 /// Surfaces met in all from one start, by chains and while they are bent: among thousands of prisms a search has no end.
 const WORK: usize = 256;
 
+/// As many where a first look has found that starts run out of them and lead to no image.
+const LITTLE_WORK: usize = 16;
+
 /// Points of each source that are looked for.
 const POINTS: usize = 64;
 
@@ -118,7 +121,8 @@ pub struct Search<'a> {
     /// What the observer is in and on.
     observer: (SolidStack, OriginFaces),
     media: MediumCache,
-    /// Surfaces that may still be met from the present start.
+    /// Surfaces that may be met from a start, and those that are left of them at the present one.
+    work: usize,
     left: usize,
 }
 
@@ -147,27 +151,31 @@ impl<'a> Search<'a> {
             wavelengths: wavelengths.collect(),
             observer,
             media: MediumCache::new(lit.scene),
+            work: WORK,
             left: 0,
         })
     }
 
+    /// Spends little on each start from now on.
+    pub fn spend_little(&mut self) {
+        self.work = LITTLE_WORK;
+    }
+
+    /// How many images are found from starts in a pixel, and how many of the starts end for want of work.
+    pub fn first_look(&mut self, pixel: usize, starts: usize) -> [usize; 2] {
+        let looks = (0..starts).map(|start| {
+            let mut found = Vec::new();
+            self.search_at(pixel, start, starts, &mut found, &mut Vec::new());
+            [found.len(), usize::from(self.left == 0)]
+        });
+        looks.fold([0, 0], |sum, look| [sum[0] + look[0], sum[1] + look[1]])
+    }
+
     /// Images that are found from starts in a pixel, wherever they are, and what most of the starts see without a search.
-    #[allow(clippy::cast_possible_truncation, reason = "a small number")]
     pub fn search_from(&mut self, pixel: usize, starts: usize) -> (Vec<Found>, Vec<Sight>) {
-        let columns = self.view.columns as usize;
-        let corner = [(pixel % columns) as f64, (pixel / columns) as f64];
         let (mut found, mut seen) = (Vec::new(), Vec::new());
         for start in 0..starts {
-            let point = lattice_point(start as u32, &[0.5; DIMENSIONS]);
-            let wavelength = self.wavelengths[(pixel + start) % self.wavelengths.len()];
-            let number = pixel * starts + start;
-            self.start(
-                [corner[0] + point[0], corner[1] + point[1]],
-                wavelength,
-                number,
-                &mut found,
-                &mut seen,
-            );
+            self.search_at(pixel, start, starts, &mut found, &mut seen);
         }
         seen.sort_unstable();
         let most = seen
@@ -178,6 +186,16 @@ impl<'a> Search<'a> {
         (found, most)
     }
 
+    /// Looks from one of the starts in a pixel.
+    #[allow(clippy::cast_possible_truncation, reason = "a small number")]
+    fn search_at(&mut self, pixel: usize, start: usize, starts: usize, found: &mut Vec<Found>, seen: &mut Vec<Sight>) {
+        let columns = self.view.columns as usize;
+        let point = lattice_point(start as u32, &[0.5; DIMENSIONS]);
+        let at = [(pixel % columns) as f64 + point[0], (pixel / columns) as f64 + point[1]];
+        let wavelength = self.wavelengths[(pixel + start) % self.wavelengths.len()];
+        self.start(at, wavelength, pixel * starts + start, found, seen);
+    }
+
     fn start(&mut self, at: Pair, wavelength: f64, number: usize, found: &mut Vec<Found>, seen: &mut Vec<Sight>) {
         let mut chains = vec![Chain {
             lines: self.lines(at),
@@ -185,7 +203,7 @@ impl<'a> Search<'a> {
             ways: Vec::new(),
         }];
         let mut interactions = 0;
-        self.left = WORK;
+        self.left = self.work;
         while let Some(mut chain) = chains.pop() {
             let mut events = chain.ways.len();
             loop {
