@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model
 from etendue.errors import SceneError
 from etendue.formats.input import as_path, require_readable
 from etendue.formats.output import atomic_output
+from etendue.quantities.notebook import InNotebook
 from etendue.scene.description import Description
 from etendue.scene.detectors import AnyDetector
 from etendue.scene.families import Family
@@ -45,7 +46,7 @@ NotTooMany = BeforeValidator(_not_too_many)
 """Looks at the length before the mistakes in millions of entries are told one by one."""
 
 
-class Scene(Description):
+class Scene(Description, InNotebook):
     """What light meets on its way, and where it is looked for.
 
     The same keys in Python and in a TOML file; docs/scenes.md explains every one.
