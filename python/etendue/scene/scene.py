@@ -21,7 +21,7 @@ from etendue.scene.files import Files
 from etendue.scene.finishes import BUILT_IN, AnyFinish
 from etendue.scene.media import Medium, MediumOrName
 from etendue.scene.media_library import MEDIA
-from etendue.scene.mistakes import scene_error
+from etendue.scene.mistakes import mistakes_of
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.sources import SOURCES
 from etendue.scene.sources.source import Source
@@ -161,7 +161,7 @@ class Scene(Description, InNotebook):
         try:
             scene = cls.model_validate(dict(data))
         except ValidationError as error:
-            raise scene_error(error, data, source) from None
+            raise SceneError(source, mistakes_of(error, data)) from None
         return scene._at(Path(folder))  # noqa: SLF001 - an alternative constructor
 
     @classmethod
