@@ -21,6 +21,11 @@ class Extra(NamedTuple):
         What its library is for, in the plural.
     endings : tuple of str
         Endings of files that cannot be written without it.
+
+    Examples
+    --------
+    >>> EXTRAS["matplotlib"].name, EXTRAS["matplotlib"].endings
+    ('plot', ('.png', '.pdf'))
     """
 
     name: str
