@@ -192,7 +192,7 @@ def test_every_wrong_combination_is_told(source: str, folder: Path) -> None:
     for _, method, option in (case for case in REFUSED if case[0] == source):
         value, words = VALUES[option]
         # Either the method is for other sources, or the option belongs to another method, or means nothing here.
-        expected = "method" if method not in ("auto", *TAKEN[source]) else option
+        expected = " is for " if method not in ("auto", *TAKEN[source]) else option
         with pytest.raises(ArgumentError, match=expected) as caught:
             et.luminance_map(light, EYE, SCREEN, method=method, **{option: value})  # type: ignore[call-overload]
         owner = next(kind for kind in METHODS.values() if option in option_names(kind))
