@@ -199,7 +199,7 @@ def test_every_wrong_combination_is_told(source: str, folder: Path) -> None:
         if expected == option and owner.NAME not in TAKEN[source]:
             assert owner.__name__ in str(caught.value)
         # What the verb asks once it has read the file; one case of each source goes through the program below.
-        with pytest.raises(typer.BadParameter, match="--method" if expected == "method" else spelt(option)):
+        with pytest.raises(typer.BadParameter, match="--method" if expected == " is for " else spelt(option)):
             method_of_verb(light, method, {option: value})
         told += 1
     assert told >= 8
