@@ -46,7 +46,7 @@ def trace(source: et.RingSource, seeds: int) -> Runs:
     halves = []
     for first, count in ((1, seeds // 2), (1 + seeds // 2, seeds - seeds // 2)):
         runs = et.RingSource(rays=sum(source.allocation), runs=count, seed=first)
-        halves.append(et.luminance_map(runs, [OBSERVER] * 2, [FINE, COARSE], method="cone", acceptance=ACCEPTANCE))
+        halves.append(et.luminance_map(runs, [OBSERVER] * 2, [FINE, COARSE], method=et.Cone(acceptance=ACCEPTANCE)))
     if seeds % 2:
         raise SystemExit("give an even number of seeds: figure 2.10 compares half of them with all")
     (half, half_coarse), (other, other_coarse) = halves

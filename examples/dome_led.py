@@ -81,7 +81,7 @@ def main() -> None:
 
     model = et.Scene(name="dome LED", **led.PARTS)
     et.draw_scene(model, options.output / "dome-led-section.png", section=["y=0"], rays=14, window=(-3, 3, -0.5, 2))
-    truth = et.luminance_map(model, OBSERVERS, screen, rays_per_pixel=lines)
+    truth = et.luminance_map(model, OBSERVERS, screen, method=et.PathTracing(rays_per_pixel=lines))
     file = options.output / "dome-led.tm25ray"
     et.write_rays(file, led.ray_file(rays))
     near_field = et.read_rays(file)

@@ -54,7 +54,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("first-picture.png"))
     options = parser.parse_args()
     source = et.RingSource(rays=options.rays)
-    maps = et.luminance_map(source, OBSERVERS, SCREEN, method="cone", acceptance=1.5)
+    maps = et.luminance_map(source, OBSERVERS, SCREEN, method=et.Cone(acceptance=1.5))
     for lmap in maps:
         print(f"θ = {lmap.observer.theta:g}°, φ = {lmap.observer.phi:g}°: maximum {np.nanmax(lmap.values):,.0f} cd/m²")
         for note in lmap.notes:

@@ -154,7 +154,10 @@ def main() -> None:
 
     screen = et.Screen(18, 18, pixels, pixels)
     seen = ("the LED itself", "light field", "Lambertian square")
-    maps = {name: et.luminance_map(scenes[name], OBSERVERS, screen, rays_per_pixel=lines) for name in seen}
+    maps = {
+        name: et.luminance_map(scenes[name], OBSERVERS, screen, method=et.PathTracing(rays_per_pixel=lines))
+        for name in seen
+    }
     print(
         "\nmaps of the lens against those with the LED itself: NCC / NRMSE of eq. 3.6 / true NRMSE [%]; intensity [cd]\n"
     )

@@ -145,7 +145,13 @@ def experiment(kind: str, options: argparse.Namespace) -> dict[float, dict[str, 
         if pixel == options.pixels[0]:
             # From the axis all azimuths see the same.
             apart = [o for o in observers if o.theta or not o.phi]
-            seen = dict(zip(apart, et.luminance_map(scene, apart, screen, rays_per_pixel=options.lines), strict=True))
+            seen = dict(
+                zip(
+                    apart,
+                    et.luminance_map(scene, apart, screen, method=et.PathTracing(rays_per_pixel=options.lines)),
+                    strict=True,
+                )
+            )
             truth = [seen[o] if o in seen else seen[observers[0]].replace(observer=o) for o in observers]
         else:
             truth = [coarser(lmap, screen) for lmap in truth]

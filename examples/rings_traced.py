@@ -43,7 +43,7 @@ def forward(runs: int, rays: int, *, full: bool) -> tuple[list[et.LuminanceMap],
     maps = []
     for seed in range(1, runs + 1):
         incident = et.trace(SCENE, rays=rays, seed=seed).rays["rcs"]
-        maps.append(et.luminance_map(incident, OBSERVERS, SCREEN, method="cone", acceptance=ACCEPTANCE))
+        maps.append(et.luminance_map(incident, OBSERVERS, SCREEN, method=et.Cone(acceptance=ACCEPTANCE)))
     joined = [et.combine_maps(list(same)) for same in zip(*maps, strict=True)] if runs > 1 else maps[0]
     field = et.LightField.fit(incident, et.Disk(radius=30, z=0), depths=None if full else QUICK)
     return joined, et.luminance_map(field, OBSERVERS, SCREEN), 600.0 / (runs * rays)
@@ -96,7 +96,7 @@ def main() -> None:
     start = time.perf_counter()
     cones, fields, ray_flux = forward(runs, rays, full=options.full)
     middle = time.perf_counter()
-    reverses = et.luminance_map(SCENE, OBSERVERS, SCREEN, rays_per_pixel=1024)
+    reverses = et.luminance_map(SCENE, OBSERVERS, SCREEN, method=et.PathTracing(rays_per_pixel=1024))
     end = time.perf_counter()
     print(f"{runs * rays:,} rays traced, mapped and fitted in {middle - start:.1f} s; reverse in {end - middle:.1f} s")
     for observer, cone, field, reverse in zip(OBSERVERS, cones, fields, reverses, strict=True):

@@ -43,7 +43,7 @@ def transmission(
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Mean luminance of one prism for each polar angle, with its standard error."""
     observers = [et.Observer(float(t), phi, 1e6, target=(0, 0, 1.5)) for t in np.asarray(theta)]
-    maps = et.luminance_map(SCENE, observers, et.Screen(1, 1, 1, 1, "xy"), rays_per_pixel=lines)
+    maps = et.luminance_map(SCENE, observers, et.Screen(1, 1, 1, 1, "xy"), method=et.PathTracing(rays_per_pixel=lines))
     return np.array([m.values[0, 0] for m in maps]), np.array([m.standard_error[0, 0] for m in maps])
 
 

@@ -15,6 +15,7 @@ from etendue.errors import (
     EtendueError,
     FormatError,
     MemoryLimitError,
+    MissingLibraryError,
     OutputError,
     SceneError,
     SceneWarning,
@@ -52,6 +53,7 @@ from etendue.plot import (
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.notebook import InNotebook, Pages
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.pixel_map import MapOutlets, PixelMap
 from etendue.quantities.ray_set import RaySet
@@ -84,6 +86,7 @@ __all__ = [
     "LightField",
     "LuminanceMap",
     "MemoryLimitError",
+    "MissingLibraryError",
     "Observer",
     "OutputError",
     "PathTracing",
@@ -138,8 +141,16 @@ __all__ = [
     "write_rays",
 ]
 
+
+def _page(value: object) -> str:
+    # Pages are made where all kinds of values are known, which nobody needs before a notebook shows one.
+    page: str = importlib.import_module("etendue.plot.notebook").notebook_page(value)
+    return page
+
+
 # Maps are quantities, which cannot import the files and pictures above them.
 PixelMap.outlets = MapOutlets(save=save_map, plot=plot_map)
+InNotebook.pages = Pages(of=_page)
 
 
 def __getattr__(name: str) -> Any:

@@ -65,6 +65,20 @@ class MemoryLimitError(EtendueError, MemoryError):
     """More memory is asked for than there is: names what for, how much, and how much there is."""
 
 
+class MissingLibraryError(EtendueError, ImportError):
+    """A library is needed that is not installed; names the extra of étendue that installs it."""
+
+    def __init__(self, library: str, purpose: str, extra: str) -> None:
+        super().__init__(
+            f"{library} is not installed, which {purpose} need. Install it: pip install 'etendue[{extra}]'."
+        )
+        self.library, self.purpose, self.extra = library, purpose, extra
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, which would give the message alone."""
+        return type(self), (self.library, self.purpose, self.extra)
+
+
 class UnitError(EtendueError, ValueError):
     """A conversion between units that the data does not support (watts to lumens without a spectrum)."""
 

@@ -70,6 +70,7 @@ ERRORS = {
     "EtendueError": et.EtendueError("told"),
     "FormatError": et.FormatError("led.ray", "byte 3", "nothing", "Copy it again."),
     "MemoryLimitError": et.MemoryLimitError("1 TB for a map"),
+    "MissingLibraryError": et.MissingLibraryError("xarray", "datasets of xarray", "xarray"),
     "OutputError": et.OutputError(28, "no room", "map.exr"),
     "SceneError": et.SceneError("lamp.toml", [("sources[0]", "no flux"), ("", "dark")]),
     "UnitError": et.UnitError("W cannot become lm"),

@@ -143,6 +143,10 @@ def test_the_lists_of_this_test_are_whole() -> None:
         assert getattr(et, kind.__name__) is kind
 
 
+UNSUITED = " is for "
+"""In messages about a method that does not take the source."""
+
+
 @pytest.mark.parametrize(("source", "method", "option"), combinations())
 def test_every_option_gives_the_same_map_through_every_door(
     source: str, method: str, option: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -192,20 +196,20 @@ def test_every_wrong_combination_is_told(source: str, folder: Path) -> None:
     for _, method, option in (case for case in REFUSED if case[0] == source):
         value, words = VALUES[option]
         # Either the method is for other sources, or the option belongs to another method, or means nothing here.
-        expected = "method" if method not in ("auto", *TAKEN[source]) else option
+        expected = UNSUITED if method not in ("auto", *TAKEN[source]) else option
         with pytest.raises(ArgumentError, match=expected) as caught:
             et.luminance_map(light, EYE, SCREEN, method=method, **{option: value})  # type: ignore[call-overload]
         owner = next(kind for kind in METHODS.values() if option in option_names(kind))
         if expected == option and owner.NAME not in TAKEN[source]:
             assert owner.__name__ in str(caught.value)
         # What the verb asks once it has read the file; one case of each source goes through the program below.
-        with pytest.raises(typer.BadParameter, match="--method" if expected == "method" else spelt(option)):
+        with pytest.raises(typer.BadParameter, match="--method" if expected == UNSUITED else spelt(option)):
             method_of_verb(light, method, {option: value})
         told += 1
     assert told >= 8
     outcome = run("luminance", folder / FILES[source], *VIEW, "--method", method, *words, "-o", "a.npz")
     assert outcome.exit_code == 2
-    assert ("--method" if expected == "method" else spelt(option)) in outcome.output
+    assert ("--method" if expected == UNSUITED else spelt(option)) in outcome.output
     for kind in METHODS.values():
         if kind.NAME not in TAKEN[source]:
             with pytest.raises(ArgumentError, match=f"{kind.__name__} is for {kind.SOURCES}"):

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from etendue.errors import FormatError, SceneError, SceneWarning
+from etendue.errors import FormatError, MissingLibraryError, SceneError, SceneWarning
 from etendue.scene import Scene, bodies, compile_scene
 from etendue.scene.files import Files
 from etendue.scene.mesh_files import MESH_FORMATS, read_mesh
@@ -152,7 +152,7 @@ def test_tolerances_are_for_surfaces_that_are_no_triangles_yet(tmp_path: Path) -
 def test_step_without_its_library_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "body.step").write_text(step.tetrahedron(30.0), encoding="ascii")
     monkeypatch.setitem(sys.modules, "cascadio", None)
-    with pytest.raises(FormatError, match=r"pip install 'etendue\[step\]'"):
+    with pytest.raises(MissingLibraryError, match=r"pip install 'etendue\[step\]'"):
         read_mesh(tmp_path / "body.step", None)
 
 

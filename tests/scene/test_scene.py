@@ -184,6 +184,10 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     ({"sources": [{"kind": "point", "flux": 1, "angle": 3}]}, ["'axis' and 'angle' belong together"]),
     ({"sources": [{"kind": "rays"}]}, ["sources[0]: 'file' is missing"]),
+    (
+        {"media": {"m": {1: 2}}},
+        ["media.m.1: unknown key. Known: ", "media.m: the refractive index is given by nothing"],
+    ),
     ({"sources": [{"kind": "point"}]}, ["sources[0]: 'flux' is missing"]),
     (
         {"sources": [{"kind": "point", "flux": 1, "spectrum": [[500, 1], [400, 1]]}]},
@@ -208,6 +212,20 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         ["detectors[1].name: 'a' is the name of detectors[0] already"],
     ),
 ]
+
+
+def test_a_value_that_is_none_of_a_few_is_told_once_with_all_others() -> None:
+    """Also where it is a whole number that Python does not spell out."""
+    lamp = {"kind": "surface", "name": "led", "side": "frnt", "shape": {"kind": "disk", "radius": -1}, "flux": 1}
+    mesh = {"kind": "mesh", "file": "a.stl", "unit": 10**5000}
+    with pytest.raises(SceneError) as caught:
+        Scene(sources=[lamp], solids=[{"shape": mesh, "medium": 3}])
+    assert caught.value.mistakes == (
+        ('sources[0] "led": side', "is 'frnt'. Did you mean 'front'? Known: front, back."),
+        ('sources[0] "led": shape.radius', "is -1; it must be greater than 0"),
+        ("solids[0].shape.unit", "is a whole number of thousands of digits. Known: nm, um, mm, cm, m, inch, feet."),
+        ("solids[0].medium", "is 3: input should be a valid string"),
+    )
 
 
 @pytest.mark.parametrize(("keys", "expected"), MISTAKES, ids=[e[0][:50] for _, e in MISTAKES])

@@ -10,6 +10,7 @@ from typing import Any
 
 from etendue.cli.terminal import complain
 from etendue.errors import ArgumentError, MemoryLimitError
+from etendue.extras import require_for
 from etendue.formats.input import is_stream, stream_in_file
 from etendue.formats.output import require_writable
 
@@ -31,6 +32,7 @@ def guarded(name: str, verb: Callable[..., None]) -> Callable[..., None]:
         if name != "patches":  # whose output is a folder
             for path in outputs:
                 require_writable(path)
+                require_for(path)
         read = [path for paths in inputs.values() for path in paths]
         try:
             with contextlib.ExitStack() as streams:

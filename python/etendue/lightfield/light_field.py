@@ -14,12 +14,13 @@ from etendue.lightfield.fitting import fit_light_field
 from etendue.lightfield.storage import load_field, save_field
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
+from etendue.quantities.notebook import InNotebook
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class LightField(EtendueDensity):
+class LightField(EtendueDensity, InNotebook):
     """Luminance as flux density in étendue, on a carrier surface, with its standard error.
 
     Make one with `LightField.fit`, keep it with `save`, get it back with `LightField.load`.

@@ -460,7 +460,7 @@ def _unsuitable(kind: type[Method], source: SourceKind, spelling: Spelling) -> s
     if kind in source.methods:
         return None
     return (
-        f"method: {spelling.method(kind)} is for {kind.SOURCES}, and the source is {source.words}; "
+        f"{spelling.method(kind)} is for {kind.SOURCES}, and the source is {source.words}; "
         f"leave it out, or give {_either(source.methods, spelling)}."
     )
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from etendue.lightfield.characteristic import CharacteristicCurve
 from etendue.lightfield.diagnostics import Diagnostics, UncertainSpot
@@ -39,9 +40,25 @@ BRIGHTEST, LIT = 1e-3, 0.999
 """Shares of the flux: the logarithmic étendue axis begins with the first, the linear one ends with the second."""
 
 
+@overload
 def plot_characteristic(
-    diagnostics: Diagnostics, path: str | os.PathLike[str] | None = None, *, title: str | None = None
-) -> Figure:
+    diagnostics: Diagnostics, path: str | os.PathLike[str] | None = None, *, title: str | None = None, ax: None = None
+) -> Figure: ...
+
+
+@overload
+def plot_characteristic(
+    diagnostics: Diagnostics, path: None = None, *, title: str | None = None, ax: Sequence[Axes] | npt.NDArray[Any]
+) -> tuple[Axes, ...]: ...
+
+
+def plot_characteristic(
+    diagnostics: Diagnostics,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    title: str | None = None,
+    ax: Sequence[Axes] | npt.NDArray[Any] | None = None,
+) -> Figure | tuple[Axes, ...]:
     """Draw what `etendue.diagnose` found of a light field.
 
     Parameters
@@ -52,18 +69,23 @@ def plot_characteristic(
         Where to write the picture, .png or .pdf. The same diagnostics give the same bytes.
     title : str, optional
         First line; "Light field" if not given.
+    ax : sequence of matplotlib.axes.Axes, optional
+        The axes to draw on, in a figure of your own: luminance, flux, and the forecast if there is one; there is no
+        table and no caption then.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, not registered with pyplot.
+    matplotlib.figure.Figure or tuple of matplotlib.axes.Axes
+        The figure, not registered with pyplot; or the axes of `ax`.
 
     Raises
     ------
     ArgumentError
-        If the directory of `path` does not exist.
+        If the directory of `path` does not exist, `path` and `ax` are both given, or there are more or fewer axes.
     UnknownNameError
         If the extension of `path` is none of a picture.
+    MissingLibraryError
+        If matplotlib is not installed.
 
     Examples
     --------
@@ -75,11 +97,20 @@ def plot_characteristic(
     >>> [axes.get_ylabel() for axes in plot_characteristic(diagnose(field)).axes]
     ['luminance [cd/m²]', 'flux [lm]']
     """
+    forecast = diagnostics.forecast
+    heading = title if title is not None else "Light field"
+    if ax is not None:
+        given = style.given_axes(ax, 2 if forecast is None else 3, path)
+        _draw_luminance(given[0], diagnostics.curve, diagnostics.flux_unit)
+        _draw_flux(given[1], diagnostics.curve, diagnostics.flux_unit)
+        if forecast is not None:
+            _draw_forecast(given[2], forecast)
+        style.put_title(given[0], heading)
+        return given
     table = diagnostics.spots[:MOST_SPOTS]
     facts = style.wrapped(_facts(diagnostics), WIDTH - 0.6)
     under_table = 0.3 + 0.15 * len(facts) + 0.12
     under_panels = under_table + (ROW * (len(table) + 1) + 0.3 if table else 0.0) + UNDER
-    forecast = diagnostics.forecast
     top = under_panels + (PANEL + UNDER + 0.1 if forecast is not None else 0.0)
     height = top + PANEL + ABOVE
     figure = style.new_figure(WIDTH, height)
@@ -89,7 +120,6 @@ def plot_characteristic(
     _draw_flux(second, diagnostics.curve, diagnostics.flux_unit)
     if forecast is not None:
         _draw_forecast(style.add_axes(figure, LEFT, under_panels, WIDTH - LEFT - RIGHT, PANEL), forecast)
-    heading = title if title is not None else "Light field"
     style.add_text(figure, 0.3, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     on = re.sub(r"\d+\.\d+", lambda number: f"{float(number[0]):.4g}", f"on {diagnostics.surface}")
     style.add_text(figure, 0.3, height - 0.54, on, size=style.LABEL_SIZE, color=style.FAINT)

@@ -4,25 +4,66 @@ from __future__ import annotations
 
 import math
 import os
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from etendue.errors import UnknownNameError
 from etendue.luminance.comparison import Comparison
 from etendue.plot import style
-from etendue.plot.map_picture import SCALES, Scale, colour_map, draw_colour_bar, draw_screen, normalisation
+from etendue.plot.map_picture import (
+    SCALES,
+    Scale,
+    bar_beside,
+    colour_map,
+    draw_colour_bar,
+    draw_screen,
+    normalisation,
+    picture_within,
+)
 from etendue.quantities.observer import Screen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+
+Array = npt.NDArray[np.float64]
 
 NARROWEST_COLUMN = 2.1
 """Room for the lines of text under three narrow maps [inches]."""
 
 GREATEST_DIFFERENCE = 200.0
 """What eq. 3.4 gives where one map is black [%]."""
+
+
+@overload
+def plot_comparison(
+    comparison: Comparison,
+    path: str | os.PathLike[str] | None = None,
+    scale: Scale = "linear",
+    *,
+    labels: tuple[str, str] = ("test", "reference"),
+    title: str | None = None,
+    cmap: str | Colormap | None = None,
+    ax: None = None,
+) -> Figure: ...
+
+
+@overload
+def plot_comparison(
+    comparison: Comparison,
+    path: None = None,
+    scale: Scale = "linear",
+    *,
+    labels: tuple[str, str] = ("test", "reference"),
+    title: str | None = None,
+    cmap: str | Colormap | None = None,
+    ax: Sequence[Axes] | npt.NDArray[Any],
+) -> tuple[Axes, ...]: ...
 
 
 def plot_comparison(
@@ -32,7 +73,9 @@ def plot_comparison(
     *,
     labels: tuple[str, str] = ("test", "reference"),
     title: str | None = None,
-) -> Figure:
+    cmap: str | Colormap | None = None,
+    ax: Sequence[Axes] | npt.NDArray[Any] | None = None,
+) -> Figure | tuple[Axes, ...]:
     """Draw both maps with the same colours, their difference [%], and the measures of agreement (cf. fig. 3.3).
 
     Parameters
@@ -47,16 +90,26 @@ def plot_comparison(
         Names of the two maps.
     title : str, optional
         First line; "Comparison" if not given.
+    cmap : str or matplotlib.colors.Colormap, optional
+        The colours of the luminance, as matplotlib calls them.
+    ax : sequence of matplotlib.axes.Axes, optional
+        The three axes to draw on, in a figure of your own: the maps and their difference, each with its colour bar; there
+        are no figures of agreement and no `title` then.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, not registered with pyplot. The region compared is outlined, the difference is grey outside it.
+    matplotlib.figure.Figure or tuple of matplotlib.axes.Axes
+        The figure, not registered with pyplot; or the axes of `ax`. The region compared is outlined, the difference is
+        grey outside it.
 
     Raises
     ------
+    ArgumentError
+        If the directory of `path` does not exist, `path` and `ax` are both given, or there are not three axes.
     UnknownNameError
-        If `scale` or the extension of `path` does not exist.
+        If `scale`, `cmap` or the extension of `path` does not exist.
+    MissingLibraryError
+        If matplotlib is not installed.
 
     Examples
     --------
@@ -71,33 +124,29 @@ def plot_comparison(
     """
     if scale not in SCALES:
         raise UnknownNameError("colour scale", scale, SCALES)
-    test, reference = comparison.test, comparison.reference
+    reference = comparison.reference
+    if ax is not None:
+        given = style.given_axes(ax, 3, path)
+        for axes, name, (image, data, label) in zip(
+            given,
+            (*labels, "difference"),
+            _draw_panels(given, comparison, scale, cmap, picture_within(given[0], reference.screen)),
+            strict=True,
+        ):
+            axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+            style.put_title(axes, name)
+            draw_colour_bar(image, data, label, bar_beside(axes, reference.screen))
+        return given
     layout = _Layout.around(reference.screen)
     figure = style.new_figure(layout.width, layout.height)
-    both = np.stack((test.values, reference.values))
-    norm = normalisation(both, scale, None, None)
     panels = [style.add_axes(figure, *place) for place in layout.panels]
-    for axes, lmap in zip(panels, (test, reference), strict=False):
-        image = draw_screen(axes, lmap.values, lmap.screen, colour_map("value"), norm, layout.panels[0][2:])
-    draw_colour_bar(
-        figure, style.add_axes(figure, *layout.bars[0]), image, both, f"{reference.quantity} [{reference.unit}]"
-    )
-    difference = comparison.difference
-    defined = difference[~np.isnan(difference)]
-    end = float(np.percentile(defined, 99)) if defined.size else 0.0
-    image = draw_screen(
-        panels[2],
-        difference,
-        reference.screen,
-        colour_map("difference"),
-        normalisation(difference, "linear", 0.0, end if end > 0.0 else GREATEST_DIFFERENCE),
-        layout.panels[2][2:],
-    )
-    draw_colour_bar(figure, style.add_axes(figure, *layout.bars[1]), image, difference, "difference [%]")
+    drawn = _draw_panels(panels, comparison, scale, cmap, layout.panels[0][2:])
+    # Both maps have the same colours: one bar for them.
+    for (image, data, label), place in zip(drawn[1:], layout.bars, strict=True):
+        draw_colour_bar(image, data, label, style.add_axes(figure, *place))
     for axes, name in zip(panels, (*labels, "difference"), strict=True):
         axes.set_title(name, loc="left", size=style.LABEL_SIZE, color=style.INK, pad=4)
         axes.set_xlabel("x [mm]")
-        _outline(axes, comparison)
     panels[0].set_ylabel("y [mm]")
     for axes in panels[1:]:
         axes.set_yticklabels([])
@@ -109,6 +158,36 @@ def plot_comparison(
     for number, line in enumerate(reversed(_figures(comparison, labels))):
         style.add_text(figure, left, 0.14 + 0.16 * number, line, size=style.TICK_SIZE, color=style.FAINT)
     return style.finish(figure, path)
+
+
+def _draw_panels(
+    panels: Sequence[Axes],
+    comparison: Comparison,
+    scale: str,
+    cmap: str | Colormap | None,
+    inches: tuple[float, float],
+) -> list[tuple[AxesImage, Array, str]]:
+    """Both maps and their difference: the pictures, with what their colour bars say."""
+    test, reference, difference = comparison.test, comparison.reference, comparison.difference
+    both = np.stack((test.values, reference.values))
+    defined = difference[~np.isnan(difference)]
+    end = float(np.percentile(defined, 99)) if defined.size else 0.0
+    norm = normalisation(both, scale, None, None)
+    of_difference = normalisation(difference, "linear", 0.0, end if end > 0.0 else GREATEST_DIFFERENCE)
+    luminance = f"{reference.quantity} [{reference.unit}]"
+    colours = colour_map("value", cmap)
+    drawn = [
+        (draw_screen(panels[0], test.values, test.screen, colours, norm, inches), both, luminance),
+        (draw_screen(panels[1], reference.values, reference.screen, colours, norm, inches), both, luminance),
+        (
+            draw_screen(panels[2], difference, reference.screen, colour_map("difference"), of_difference, inches),
+            difference,
+            "difference [%]",
+        ),
+    ]
+    for axes in panels:
+        _outline(axes, comparison)
+    return drawn
 
 
 def _outline(axes: Axes, comparison: Comparison) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,7 @@ DASHES = ("-", "--", ":")
 """Told apart by colour first, then by dashes."""
 
 
+@overload
 def plot_cross_sections(
     sections: Sequence[CrossSection],
     path: str | os.PathLike[str] | None = None,
@@ -37,7 +38,31 @@ def plot_cross_sections(
     *,
     labels: Sequence[str] | None = None,
     title: str | None = None,
-) -> Figure:
+    ax: None = None,
+) -> Figure: ...
+
+
+@overload
+def plot_cross_sections(
+    sections: Sequence[CrossSection],
+    path: None = None,
+    scale: Scale = "linear",
+    *,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    ax: Axes,
+) -> Axes: ...
+
+
+def plot_cross_sections(
+    sections: Sequence[CrossSection],
+    path: str | os.PathLike[str] | None = None,
+    scale: Scale = "linear",
+    *,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    ax: Axes | None = None,
+) -> Figure | Axes:
     """Draw cross sections over position, as steps as wide as the pixels, with a band of ± one standard error.
 
     Parameters
@@ -52,18 +77,23 @@ def plot_cross_sections(
         One name per section; by default where it was cut.
     title : str, optional
         First line; "Cross section" if not given.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw, in a figure of your own.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, not registered with pyplot. A line breaks where a pixel is dead.
+    matplotlib.figure.Figure or matplotlib.axes.Axes
+        The figure, not registered with pyplot; or `ax`. A line breaks where a pixel is dead.
 
     Raises
     ------
     ArgumentError
-        If there is no section, the sections differ in axis or unit, or the labels in number.
+        If there is no section, the sections differ in axis or unit, or the labels in number, or `path` and `ax` are both
+        given.
     UnknownNameError
         If `scale` or the extension of `path` does not exist.
+    MissingLibraryError
+        If matplotlib is not installed.
 
     Examples
     --------
@@ -75,29 +105,29 @@ def plot_cross_sections(
     first = sections[0]
     other = "y" if first.axis == "x" else "x"
     names = labels if labels is not None else [f"{other} = {style.plain(section.at)} mm" for section in sections]
+    heading = title if title is not None else "Cross section" + ("s" if len(sections) > 1 else "")
+    if ax is not None:
+        style.given_axes(ax, 1, path)
+        _draw_all(ax, sections, names, scale)
+        style.put_title(ax, heading)
+        style.put_legend(ax, loc="best")
+        return ax
     legend_columns = max(1, min(len(names), LEGEND_ROOM // (max(map(len, names)) + 6)))
     height = HEIGHT + 0.18 * (-(-len(names) // legend_columns) - 1)
     figure = style.new_figure(WIDTH, height)
     axes = style.add_axes(figure, LEFT, 0.55, WIDTH - LEFT - 0.2, HEIGHT - 1.2)
+    _draw_all(axes, sections, names, scale)
+    style.add_text(figure, LEFT, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
+    style.put_legend(axes, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=legend_columns)
+    return style.finish(figure, path)
+
+
+def _draw_all(axes: Axes, sections: Sequence[CrossSection], names: Sequence[str], scale: str) -> None:
     _prepare(axes, sections, scale)
     for number, (section, name) in enumerate(zip(sections, names, strict=True)):
         _draw(axes, section, name, number)
+    first = sections[0]
     axes.set(xlabel=f"{first.axis} [mm]", ylabel=f"{first.quantity} [{first.unit}]")
-    heading = title if title is not None else "Cross section" + ("s" if len(sections) > 1 else "")
-    style.add_text(figure, LEFT, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=legend_columns,
-        frameon=False,
-        fontsize=style.TICK_SIZE,
-        labelcolor=style.INK,
-        handlelength=1.6,
-        columnspacing=1.4,
-        borderaxespad=0.2,
-        borderpad=0.0,
-    )
-    return style.finish(figure, path)
 
 
 def _prepare(axes: Axes, sections: Sequence[CrossSection], scale: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -45,13 +45,36 @@ class _Curve(NamedTuple):
     error: Array
 
 
+@overload
 def plot_intensity(
     intensity: Intensity,
     path: str | os.PathLike[str] | None = None,
     kind: IntensityKind = "polar",
     *,
     title: str | None = None,
-) -> Figure:
+    ax: None = None,
+) -> Figure: ...
+
+
+@overload
+def plot_intensity(
+    intensity: Intensity,
+    path: None = None,
+    kind: IntensityKind = "polar",
+    *,
+    title: str | None = None,
+    ax: Axes,
+) -> Axes: ...
+
+
+def plot_intensity(
+    intensity: Intensity,
+    path: str | os.PathLike[str] | None = None,
+    kind: IntensityKind = "polar",
+    *,
+    title: str | None = None,
+    ax: Axes | None = None,
+) -> Figure | Axes:
     """Draw the curves of C0-C180, of C90-C270 and of the plane of the maximum, with a band of ± one standard error.
 
     Parameters
@@ -64,18 +87,22 @@ def plot_intensity(
         The diagram of a data sheet, γ = 0° pointing down; or intensity over γ.
     title : str, optional
         First line; "Luminous intensity" or "Radiant intensity" if not given.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw, in a figure of your own: plain axes, for either kind; there is no caption then.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, not registered with pyplot. The half γ > 90° is left out if it is dark.
+    matplotlib.figure.Figure or matplotlib.axes.Axes
+        The figure, not registered with pyplot; or `ax`. The half γ > 90° is left out if it is dark.
 
     Raises
     ------
     ArgumentError
-        If the directory of `path` does not exist.
+        If the directory of `path` does not exist, `path` and `ax` are both given, or `ax` is polar itself.
     UnknownNameError
         If `kind` or the extension of `path` does not exist.
+    MissingLibraryError
+        If matplotlib is not installed.
 
     Examples
     --------
@@ -87,15 +114,24 @@ def plot_intensity(
         raise UnknownNameError("kind of diagram", kind, INTENSITY_KINDS)
     reach = _reach(intensity)
     curves = list(_curves(intensity, reach))
+    draw, high = (_polar, (4.5 if reach > 90.0 else 2.55)) if kind == "polar" else (_cartesian, 3.0)
+    heading = title if title is not None else intensity.quantity.capitalize()
+    if ax is not None:
+        style.given_axes(ax, 1, path)
+        draw(ax, curves, intensity, reach)
+        style.put_title(ax, heading)
+        if kind == "polar":
+            style.put_legend(ax, loc="upper center", bbox_to_anchor=(0.5, 0.0))
+        else:
+            style.put_legend(ax, loc="best")
+        return ax
     facts = style.wrapped(_facts(intensity), WIDTH - 0.6)
     below = 0.3 + 0.15 * len(facts)
-    draw, high = (_polar, (4.5 if reach > 90.0 else 2.55)) if kind == "polar" else (_cartesian, 3.0)
     left, bottom = (0.3, below) if kind == "polar" else (0.85, below + 0.42)
     height = bottom + high + ABOVE[kind]
     figure = style.new_figure(WIDTH, height)
     axes = style.add_axes(figure, left, bottom, WIDTH - left - (0.3 if kind == "polar" else 0.25), high)
     draw(axes, curves, intensity, reach)
-    heading = title if title is not None else intensity.quantity.capitalize()
     style.add_text(figure, 0.3, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     for number, line in enumerate(reversed(facts)):
         style.add_text(figure, 0.3, 0.14 + 0.15 * number, line, size=style.CAPTION_SIZE, color=style.FAINT)

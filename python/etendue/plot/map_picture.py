@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,7 @@ DECADES = 4
 """How far a logarithmic scale reaches down from the brightest pixel unless `vmin` says otherwise."""
 
 
+@overload
 def plot_map(
     lmap: LuminanceMap | IlluminanceMap,
     path: str | os.PathLike[str] | None = None,
@@ -42,7 +43,38 @@ def plot_map(
     vmax: float | None = None,
     title: str | None = None,
     show: Show = "value",
-) -> Figure:
+    cmap: str | Colormap | None = None,
+    ax: None = None,
+) -> Figure: ...
+
+
+@overload
+def plot_map(
+    lmap: LuminanceMap | IlluminanceMap,
+    path: None = None,
+    scale: Scale = "linear",
+    *,
+    vmin: float | None = None,
+    vmax: float | None = None,
+    title: str | None = None,
+    show: Show = "value",
+    cmap: str | Colormap | None = None,
+    ax: Axes,
+) -> Axes: ...
+
+
+def plot_map(
+    lmap: LuminanceMap | IlluminanceMap,
+    path: str | os.PathLike[str] | None = None,
+    scale: Scale = "linear",
+    *,
+    vmin: float | None = None,
+    vmax: float | None = None,
+    title: str | None = None,
+    show: Show = "value",
+    cmap: str | Colormap | None = None,
+    ax: Axes | None = None,
+) -> Figure | Axes:
     """Draw a map in false colour with its geometry, unit and error.
 
     Parameters
@@ -61,19 +93,26 @@ def plot_map(
         First line; the name of the quantity if not given.
     show : {"value", "relative-error"}
         The value, or its standard error in per cent of it.
+    cmap : str or matplotlib.colors.Colormap, optional
+        The colours, as matplotlib calls them.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw the picture with its colour bar, in a figure of your own; there is no caption then.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, not registered with pyplot. Pixels without a number (dead; for the error also black ones and those
-        with unknown error) are grey, and the caption counts them.
+    matplotlib.figure.Figure or matplotlib.axes.Axes
+        The figure, not registered with pyplot; or `ax`. Pixels without a number (dead; for the error also black ones
+        and those with unknown error) are grey, and the caption counts them.
 
     Raises
     ------
     ArgumentError
-        If `vmin` and `vmax` are no range for this scale, or the directory of `path` does not exist.
+        If `vmin` and `vmax` are no range for this scale, the directory of `path` does not exist, or `path` and `ax` are
+        both given.
     UnknownNameError
-        If `scale`, `show` or the extension of `path` does not exist.
+        If `scale`, `show`, `cmap` or the extension of `path` does not exist.
+    MissingLibraryError
+        If matplotlib is not installed.
 
     Examples
     --------
@@ -91,19 +130,31 @@ def plot_map(
         data, colours, label = lmap.values, "value", f"{lmap.quantity} [{lmap.unit}]"
     else:
         data, colours, label = _relative_error(lmap), "error", f"standard error / {lmap.quantity} [%]"
-    norm = normalisation(data, scale, vmin, vmax)
+    heading = title if title is not None else lmap.quantity.capitalize()
+    something = bool((np.isfinite(data) & ((data > 0.0) | (scale == "linear"))).any())
+    if ax is not None:
+        style.given_axes(ax, 1, path)
+        norm = normalisation(data, scale, vmin, vmax)
+        place = picture_within(ax, lmap.screen)
+        image = draw_screen(ax, data, lmap.screen, colour_map(colours, cmap), norm, place)
+        ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+        style.put_title(ax, heading)
+        if something:
+            draw_colour_bar(image, data, label, bar_beside(ax, lmap.screen))
+        else:
+            _write_why_dark(ax, lmap)
+        return ax
     layout = _Layout.around(lmap.screen, list(_facts(lmap, data, show)))
     figure = style.new_figure(layout.width, layout.height)
+    norm = normalisation(data, scale, vmin, vmax)
     axes = style.add_axes(figure, *layout.picture)
-    image = draw_screen(axes, data, lmap.screen, colour_map(colours), norm, layout.picture[2:])
+    image = draw_screen(axes, data, lmap.screen, colour_map(colours, cmap), norm, layout.picture[2:])
     axes.set(xlabel="x [mm]", ylabel="y [mm]")
-    if (np.isfinite(data) & ((data > 0.0) | (scale == "linear"))).any():
-        draw_colour_bar(figure, style.add_axes(figure, *layout.bar), image, data, label)
+    if something:
+        draw_colour_bar(image, data, label, style.add_axes(figure, *layout.bar))
     else:
-        message = "no ray reached the screen" if np.isnan(lmap.values).all() else "nothing to show on this scale"
-        axes.text(0.5, 0.5, message, transform=axes.transAxes, ha="center", va="center", color="white", size=9)
+        _write_why_dark(axes, lmap)
     left, top = layout.text_left, layout.height
-    heading = title if title is not None else lmap.quantity.capitalize()
     style.add_text(figure, left, top - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     style.add_text(figure, left, top - 0.54, _geometry(lmap), size=style.LABEL_SIZE, color=style.FAINT)
     for number, line in enumerate(reversed(layout.caption)):
@@ -119,11 +170,25 @@ def _geometry(lmap: LuminanceMap | IlluminanceMap) -> str:
     return f"seen at {style.describe_observer(lmap.observer)}{plane}"
 
 
-def colour_map(colours: str) -> Colormap:
-    """One of `style.COLOUR_MAPS`, with the colour of missing numbers."""
+def _write_why_dark(axes: Axes, lmap: LuminanceMap | IlluminanceMap) -> None:
+    message = "no ray reached the screen" if np.isnan(lmap.values).all() else "nothing to show on this scale"
+    axes.text(0.5, 0.5, message, transform=axes.transAxes, ha="center", va="center", color="white", size=9)
+
+
+def colour_map(colours: str, wanted: str | Colormap | None = None) -> Colormap:
+    """The colours that are wanted, or those of `style.COLOUR_MAPS`, with the colour of missing numbers.
+
+    Raises
+    ------
+    UnknownNameError
+        If matplotlib knows no colours of this name.
+    """
     import matplotlib as mpl
 
-    return mpl.colormaps[style.COLOUR_MAPS[colours]].with_extremes(bad=style.DEAD)
+    name = style.COLOUR_MAPS[colours] if wanted is None else wanted
+    if isinstance(name, str) and name not in mpl.colormaps:
+        raise UnknownNameError("colour map", name, mpl.colormaps)
+    return mpl.colormaps.get_cmap(name).with_extremes(bad=style.DEAD)
 
 
 def normalisation(data: Array, scale: str, vmin: float | None, vmax: float | None) -> Normalize:
@@ -174,7 +239,30 @@ def draw_screen(
     return image
 
 
-def draw_colour_bar(figure: Figure, axes: Axes, image: AxesImage, data: Array, label: str) -> None:
+LYING = 2.0
+"""Width over height of a picture above which its colour bar lies under it."""
+
+
+def picture_within(axes: Axes, screen: Screen) -> tuple[float, float]:
+    """Width and height [inches] of a picture, its sides to scale, in axes that a colour bar takes some room from."""
+    aspect, (wide, high) = screen.width / screen.height, style.inches_of(axes)
+    # matplotlib gives 0.15 to a bar, and 0.05 or 0.15 to the gap.
+    wide, high = (wide, 0.7 * high) if aspect > LYING else (0.8 * wide, high)
+    return min(wide, high * aspect), min(high, wide / aspect)
+
+
+def bar_beside(axes: Axes, screen: Screen) -> Axes:
+    """Axes for a colour bar as long as the picture in axes of somebody else, which give it some of their room."""
+    from matplotlib.colorbar import make_axes
+
+    (wide, high), picture = style.inches_of(axes), picture_within(axes, screen)
+    lying = screen.width / screen.height > LYING
+    shrink = picture[0] / wide if lying else picture[1] / high
+    bar, _ = make_axes(axes, location="bottom" if lying else "right", shrink=shrink, aspect=25 * shrink)
+    return bar
+
+
+def draw_colour_bar(image: AxesImage, data: Array, label: str, axes: Axes) -> None:
     """A bar in `axes`, upright or lying as these are, with arrows where values lie beyond its ends."""
     from matplotlib.colors import LogNorm
 
@@ -183,7 +271,7 @@ def draw_colour_bar(figure: Figure, axes: Axes, image: AxesImage, data: Array, l
     ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
     place = axes.get_window_extent()
     upright = place.height > place.width
-    bar = figure.colorbar(
+    bar = style.figure_of(axes).colorbar(
         image,
         cax=axes,
         orientation="vertical" if upright else "horizontal",
@@ -194,7 +282,7 @@ def draw_colour_bar(figure: Figure, axes: Axes, image: AxesImage, data: Array, l
         bar.formatter = bar.minorformatter = style.log_formatter(lowest or 0.0, highest or 0.0)
     else:
         # Numbers side by side need more room than one above the other.
-        bar.locator = style.locator_for((place.height if upright else 0.85 * place.width) / figure.dpi)
+        bar.locator = style.locator_for((place.height if upright else 0.85 * place.width) / style.figure_of(axes).dpi)
         bar.formatter = style.number_formatter()
     bar.update_ticks()
     bar.set_label(label, size=style.LABEL_SIZE, color=style.INK)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
 
+from etendue.extras import require
 from etendue.plot import style
 from etendue.plot.scene_drawing import draw_view
 from etendue.plot.scene_layout import DEFAULT_SECTIONS, SceneLayout, lay_out_scene
@@ -17,6 +18,7 @@ from etendue.plot.scene_legend import legend_handles
 from etendue.scene import Scene
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = npt.NDArray[np.float64]
@@ -31,6 +33,7 @@ LEGEND_LINE, CAPTION_LINE = 0.185, 0.15
 """Heights of lines [inches]."""
 
 
+@overload
 def draw_scene(
     scene: Scene,
     path: str | os.PathLike[str] | None = None,
@@ -40,7 +43,35 @@ def draw_scene(
     seed: int = 1,
     window: Sequence[float] | None = None,
     title: str | None = None,
-) -> Figure:
+    ax: None = None,
+) -> Figure: ...
+
+
+@overload
+def draw_scene(
+    scene: Scene,
+    path: None = None,
+    *,
+    section: str | Sequence[str] = DEFAULT_SECTIONS,
+    rays: int = 30,
+    seed: int = 1,
+    window: Sequence[float] | None = None,
+    title: str | None = None,
+    ax: Axes | Sequence[Axes] | npt.NDArray[Any],
+) -> tuple[Axes, ...]: ...
+
+
+def draw_scene(
+    scene: Scene,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    section: str | Sequence[str] = DEFAULT_SECTIONS,
+    rays: int = 30,
+    seed: int = 1,
+    window: Sequence[float] | None = None,
+    title: str | None = None,
+    ax: Axes | Sequence[Axes] | npt.NDArray[Any] | None = None,
+) -> Figure | tuple[Axes, ...]:
     """Draw sections of a scene to scale, with a few rays.
 
     Solids have the colour of their medium, faces the line of what their finish mostly does, sources are warm with their
@@ -63,20 +94,26 @@ def draw_scene(
         What each section shows [mm]; by default everything that has an end, and detectors that are not too far.
     title : str, optional
         First line; the name of the scene if not given.
+    ax : matplotlib.axes.Axes, or a sequence of them, optional
+        Axes to draw on, one for each section, in a figure of your own; the legend stands under the first of them, and there
+        is no caption and no `title`.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, not registered with pyplot.
+    matplotlib.figure.Figure or tuple of matplotlib.axes.Axes
+        The figure, not registered with pyplot; or the axes of `ax`.
 
     Raises
     ------
     SceneError
         With every mistake in the scene.
     ArgumentError
-        If a section, a number or the window is out of its domain.
+        If a section, a number or the window is out of its domain, `path` and `ax` are both given, or there are not as
+        many axes as sections.
     UnknownNameError
         If the extension of `path` does not exist.
+    MissingLibraryError
+        If matplotlib is not installed.
 
     Examples
     --------
@@ -85,7 +122,28 @@ def draw_scene(
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
     ('y [mm]', 'z [mm]')
     """
-    return plot_layout(lay_out_scene(scene, section, rays=rays, seed=seed, window=window), path, title=title)
+    require("matplotlib")
+    layout = lay_out_scene(scene, section, rays=rays, seed=seed, window=window)
+    if ax is None:
+        return plot_layout(layout, path, title=title)
+    given = style.given_axes(ax, len(layout.views), path)
+    for axes, view in zip(given, layout.views, strict=True):
+        left, right, bottom, top = view.window
+        wide, high = style.inches_of(axes)
+        scale = min(wide / (right - left), high / (top - bottom))
+        draw_view(axes, view, layout, (scale * (right - left), scale * (top - bottom)), labelled=True)
+        axes.set_aspect("equal")
+        style.put_title(axes, str(view.section))
+    if handles := legend_handles(layout):
+        style.put_legend(
+            given[0],
+            handles=[handle for handle, _ in handles],
+            labels=[text for _, text in handles],
+            loc="upper left",
+            bbox_to_anchor=(0.0, -0.2),
+            handlelength=2.2,
+        )
+    return given
 
 
 def plot_layout(layout: SceneLayout, path: str | os.PathLike[str] | None = None, *, title: str | None = None) -> Figure:
@@ -96,6 +154,7 @@ def plot_layout(layout: SceneLayout, path: str | os.PathLike[str] | None = None,
     >>> len(plot_layout(lay_out_scene(Scene())).axes)
     2
     """
+    require("matplotlib")
     places = _Places.of(layout)
     figure = style.new_figure(places.width, places.height)
     handles = legend_handles(layout)

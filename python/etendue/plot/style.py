@@ -6,11 +6,15 @@ import math
 import os
 import re
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from etendue.errors import UnknownNameError
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.extras import require
 from etendue.formats.output import atomic_output
 from etendue.quantities.observer import Observer
 from etendue.quantities.printable import printable
@@ -18,6 +22,7 @@ from etendue.quantities.printable import printable
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
     from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 
 INK = "#1c1c22"
@@ -45,13 +50,77 @@ FILE_TYPES: dict[str, dict[str, Any]] = {".png": {"Software": None}, ".pdf": {"C
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure [inches] outside matplotlib's global state."""
+    """An empty figure [inches] outside matplotlib's global state.
+
+    Raises
+    ------
+    MissingLibraryError
+        If matplotlib is not installed.
+    """
+    require("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
+
+
+def given_axes(ax: Axes | Sequence[Axes] | npt.NDArray[Any], diagrams: int, path: object) -> tuple[Axes, ...]:
+    """The axes that a user hands over to be drawn on, one for each diagram.
+
+    Raises
+    ------
+    MissingLibraryError
+        If matplotlib is not installed.
+    ArgumentError
+        If there are more or fewer of them, they are no plain ones, or a path is given as well.
+    """
+    require("matplotlib")
+    if path is not None:
+        raise ArgumentError(f"ax and {path}: with axes of your own, save their figure: ax.figure.savefig(path).")
+    axes = tuple(np.ravel(np.array(ax, dtype=object)))
+    if len(axes) != diagrams:
+        raise ArgumentError(f"ax: {len(axes)} axes for {diagrams} diagram{'s' * (diagrams > 1)}; give one for each.")
+    for one in axes:
+        if getattr(one, "name", None) != "rectilinear":
+            raise ArgumentError(f"ax: {one!r} are no plain axes of matplotlib; make some with plt.subplots().")
+    return axes
+
+
+def figure_of(axes: Axes) -> Figure:
+    """The whole figure that axes are in."""
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        raise ArgumentError(f"ax: {axes!r} were taken out of their figure.")
+    return figure
+
+
+def inches_of(axes: Axes) -> tuple[float, float]:
+    """Width and height of axes [inches]."""
+    place, dpi = axes.get_window_extent(), figure_of(axes).dpi
+    return place.width / dpi, place.height / dpi
+
+
+def put_title(axes: Axes, text: str) -> None:
+    """A title over axes; it stands there as it is: a dollar sign begins no formula."""
+    axes.set_title(printable(text), loc="left", size=LABEL_SIZE, color=INK, weight="bold", parse_math=False)
+
+
+def put_legend(axes: Axes, **options: Any) -> Legend:
+    """A legend in the house look; names stand in it as they are."""
+    legend = axes.legend(
+        frameon=False,
+        fontsize=TICK_SIZE,
+        labelcolor=INK,
+        borderaxespad=0.2,
+        borderpad=0.0,
+        **({"handlelength": 1.6, "columnspacing": 1.4} | options),
+    )
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+        text.set_text(printable(text.get_text()))
+    return legend
 
 
 def add_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:

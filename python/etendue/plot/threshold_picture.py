@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -25,9 +25,25 @@ PANEL, GAP = 1.75, 0.42
 MOST_TICKS = 10
 
 
+@overload
 def plot_threshold_sweep(
-    sweep: ThresholdSweep, path: str | os.PathLike[str] | None = None, *, title: str | None = None
-) -> Figure:
+    sweep: ThresholdSweep, path: str | os.PathLike[str] | None = None, *, title: str | None = None, ax: None = None
+) -> Figure: ...
+
+
+@overload
+def plot_threshold_sweep(
+    sweep: ThresholdSweep, path: None = None, *, title: str | None = None, ax: Sequence[Axes] | npt.NDArray[Any]
+) -> tuple[Axes, ...]: ...
+
+
+def plot_threshold_sweep(
+    sweep: ThresholdSweep,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    title: str | None = None,
+    ax: Sequence[Axes] | npt.NDArray[Any] | None = None,
+) -> Figure | tuple[Axes, ...]:
     """Draw how well a source is sampled over the threshold, by the criterion of the thesis and by rays kept back.
 
     Parameters
@@ -38,18 +54,24 @@ def plot_threshold_sweep(
         Where to write the picture, .png or .pdf. The same sweep gives the same bytes.
     title : str, optional
         First line.
+    ax : sequence of matplotlib.axes.Axes, optional
+        The two axes to draw on, one above the other in a figure of your own: far field, and held-out score; there is no
+        caption then.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, not registered with pyplot.
+    matplotlib.figure.Figure or tuple of matplotlib.axes.Axes
+        The figure, not registered with pyplot; or the axes of `ax`.
 
     Raises
     ------
     ArgumentError
-        If there are fewer thresholds, or the directory of `path` does not exist.
+        If there are fewer thresholds, the directory of `path` does not exist, `path` and `ax` are both given, or there
+        are not two axes.
     UnknownNameError
         If the extension of `path` is none of a picture.
+    MissingLibraryError
+        If matplotlib is not installed.
 
     Examples
     --------
@@ -61,6 +83,13 @@ def plot_threshold_sweep(
     """
     if not (len(sweep) >= 2 and (sweep["threshold"] > 0.0).all()):
         raise ArgumentError("plot_threshold_sweep: give a sweep over two or more thresholds above 0 %.")
+    heading = title if title is not None else "Threshold of the flux error"
+    if ax is not None:
+        first, second = style.given_axes(ax, 2, path)
+        _far_field(first, sweep)
+        _score(second, sweep)
+        style.put_title(first, heading)
+        return first, second
     facts = style.wrapped(_facts(sweep), WIDTH - 0.6)
     below = 0.3 + 0.15 * len(facts)
     bottom = below + 0.42
@@ -71,7 +100,6 @@ def plot_threshold_sweep(
     _far_field(upper, sweep)
     lower = style.add_axes(figure, LEFT, bottom, wide, PANEL)
     _score(lower, sweep)
-    heading = title if title is not None else "Threshold of the flux error"
     style.add_text(figure, 0.3, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     subtitle = "above: far field of all patches together against that of the rays; below: rays that were kept back"
     style.add_text(figure, 0.3, height - 0.52, subtitle, size=style.TICK_SIZE, color=style.FAINT)

@@ -6,15 +6,20 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.labelled import dataset
+from etendue.quantities.notebook import InNotebook
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.report import Complaint
 from etendue.units import FLUX_UNITS, INTENSITY_NAME, INTENSITY_UNIT, FluxUnit
+
+if TYPE_CHECKING:
+    import xarray
 
 Array = npt.NDArray[np.float64]
 Symmetry = Literal["none", "C0-C180", "C90-C270", "both", "rotational"]
@@ -52,7 +57,7 @@ LUMINAIRE_FACTS: dict[str, str] = {
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Intensity:
+class Intensity(InNotebook):
     """Intensity over all directions in C-γ coordinates, with its standard error.
 
     The table stands for *one* function on the sphere: bilinear in (C, γ) between the nodes, periodic in C, and 0 where γ
@@ -337,6 +342,42 @@ class Intensity:
         about_90 = bool(np.abs(self.values - self.planes(180.0 - self.c)).max() <= limit)
         names: dict[tuple[bool, bool], Symmetry] = {(True, True): "both", (True, False): "C0-C180"}
         return names.get((about_0, about_90), "C90-C270" if about_90 else "none")
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The table as a dataset of xarray, for work by name and angle.
+
+        Returns
+        -------
+        xarray.Dataset
+            Variables ``intensity`` and ``standard_error`` over ``c`` and ``gamma`` [°]. The attributes name quantity, unit,
+            flux, provenance, notes and what is known of the luminaire; what is neither text nor a number is JSON.
+
+        Raises
+        ------
+        MissingLibraryError
+            If xarray is not installed: ``pip install 'etendue[xarray]'``.
+
+        Examples
+        --------
+        >>> half = Intensity(c=[0, 180], gamma=[0, 90], values=[[4.0, 0], [4, 2]])
+        >>> float(half.to_xarray().intensity.sel(c=180, gamma=90))
+        2.0
+        """
+        known = {name: fact for name, fact in self.luminaire.items() if name != "spectrum"}
+        return dataset(
+            {"intensity": (self.values, self.unit), "standard_error": (self.standard_error, self.unit)},
+            {"c": (self.c, "degree"), "gamma": (self.gamma, "degree")},
+            {
+                "quantity": self.quantity,
+                "unit": self.unit,
+                "flux_unit": self.flux_unit,
+                "flux": self.flux,
+                "flux_error": self.flux_error,
+                "luminaire": known,
+                "provenance": self.provenance.to_dict(),
+                "notes": list(self.notes),
+            },
+        )
 
     # --- other distributions ---------------------------------------------------------------------------------------------
 

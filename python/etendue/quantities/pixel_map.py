@@ -7,15 +7,20 @@ import dataclasses
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.labelled import dataset
+from etendue.quantities.notebook import InNotebook
 from etendue.quantities.observer import Screen
 from etendue.quantities.provenance import Provenance
 from etendue.units import FLUX_UNITS, FluxUnit
+
+if TYPE_CHECKING:
+    import xarray
 
 MapValues = npt.NDArray[np.float64]
 
@@ -35,7 +40,7 @@ class MapOutlets(NamedTuple):
     plot: Callable[..., Any]
 
 
-class PixelMap(abc.ABC):
+class PixelMap(InNotebook, abc.ABC):
     """A map on a screen: frozen, with its error and its origin.
 
     A kind of map is a dataclass that has these fields and those of its geometry, and says how both are called.
@@ -124,8 +129,41 @@ class PixelMap(abc.ABC):
         return self.outlets.save(self, Path(path))
 
     def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
-        """Draw the map in false colour; see `etendue.plot_map` for the options."""
+        """Draw the map in false colour; see `etendue.plot_map` for the options: `ax`, `cmap`, `scale` and so on."""
         return self.outlets.plot(self, path, **options)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The map as a dataset of xarray, for work by name and position.
+
+        Returns
+        -------
+        xarray.Dataset
+            Variables of the name of the `quantity`, ``standard_error`` and ``rays`` over ``y`` and ``x``: centres of the
+            pixels from the middle of the screen [mm], y falling as rows do. The attributes are those of `header`; what is
+            neither text nor a number is JSON.
+
+        Raises
+        ------
+        MissingLibraryError
+            If xarray is not installed: ``pip install 'etendue[xarray]'``.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> lmap = et.luminance_map(et.RingSource(rays=100_000), et.Observer(0, 0, 1000), et.Screen(60, 60, 6, 6))
+        >>> table = lmap.to_xarray()
+        >>> bool(table.luminance.sel(x=-5, y=5) == lmap.values[2, 2]), table.luminance.attrs["units"]
+        (True, 'cd/m²')
+        """
+        return dataset(
+            {
+                self.quantity: (self.values, self.unit),
+                "standard_error": (self.standard_error, self.unit),
+                "rays": (self.rays, ""),
+            },
+            {"y": (self.screen.y, "mm"), "x": (self.screen.x, "mm")},
+            self.header(),
+        )
 
     def header(self) -> dict[str, Any]:
         """Everything but the arrays, as plain data for file headers."""

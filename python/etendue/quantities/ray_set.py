@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities import ray_colours, ray_merge, ray_operations, ray_units
+from etendue.quantities.notebook import InNotebook
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_records import RayRecords, RaySetMeaning
 from etendue.quantities.ray_stream import FloatArray, Progress, RayBatch
@@ -18,7 +19,7 @@ from etendue.quantities.spectrum import Spectrum
 from etendue.units import FluxUnit
 
 
-class RaySet(RayRecords):
+class RaySet(RayRecords, InNotebook):
     """A sample of a source's light: rays with position, direction and flux.
 
     The rays stay where they are, in memory or in their file; properties copy what is asked for, `batches` streams.

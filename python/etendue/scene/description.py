@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from types import MappingProxyType, NoneType, UnionType
+from typing import Any, ClassVar, Literal, Self, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, ValidationError, ValidatorFunctionWrapHandler, model_validator
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic.functional_validators import ModelWrapValidatorHandler
 
 from etendue.errors import SceneError, nearest_name
-from etendue.scene.mistakes import scene_error
+from etendue.scene.mistakes import mistakes_of, shown
 
 FIRST = {"name": 0, "kind": 1}
 """Keys that are written before all others."""
@@ -29,35 +31,29 @@ class Description(BaseModel):
     """Fields that hold something that only Python can hand over, and no file can."""
 
     def __init__(self, **values: Any) -> None:
+        cls = type(self)
+        known = [name for name in cls.model_fields if name not in cls.IN_MEMORY]
+        mistakes = [(key, f"unknown key.{_hint(key, known)}") for key in values if key not in cls.model_fields]
+        wrong = {
+            name: f"is {shown(values[name])}.{_hint(values[name], choices)}"
+            for name, choices in _choices(cls).items()
+            if name in values and not (isinstance(values[name], str | None) and values[name] in choices)
+        }
+        mistakes += wrong.items()
         try:
-            super().__init__(**values)
+            super().__init__(**{name: value for name, value in values.items() if name in cls.model_fields})
         except ValidationError as error:
-            raise scene_error(error, values, type(self).__name__) from None
-
-    # Parts within parts are not made through the constructor, so that their mistakes arrive with their place.
-    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+            mistakes += [mistake for mistake in mistakes_of(error, values) if mistake[0] not in wrong]
+        if mistakes:
+            raise SceneError(cls.__name__, mistakes)
 
     @model_validator(mode="wrap")
     @classmethod
-    def _names_every_unknown_key(cls, data: Any, handler: ValidatorFunctionWrapHandler) -> Self:
-        if not isinstance(data, Mapping):
-            return handler(data)  # type: ignore[no-any-return]
-        known = [name for name in cls.model_fields if name not in cls.IN_MEMORY]
-        unknown: list[InitErrorDetails] = []
-        for key in data:
-            if key not in cls.model_fields:
-                near = nearest_name(str(key), known)
-                hint = f" Did you mean {near!r}?" if near else ""
-                message = f"unknown key.{hint} Known: {', '.join(known)}."
-                kind = PydanticCustomError("unknown_key", "{message}", {"message": message})
-                unknown.append(InitErrorDetails(type=kind, loc=(str(key),), input=data[key]))
-        if not unknown:
-            return handler(data)  # type: ignore[no-any-return]
-        try:
-            handler({key: value for key, value in data.items() if key in cls.model_fields})
-        except ValidationError as error:
-            unknown += [_again(details) for details in error.errors()]
-        raise ValidationError.from_exception_data(cls.__name__, unknown)
+    def _keys_are_texts(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        # Parts within parts are made by the constructor too, which gets their keys as keywords.
+        if isinstance(data, Mapping) and not all(isinstance(key, str) for key in data):
+            data = {str(key): value for key, value in data.items()}
+        return handler(data)
 
     def replace(self, **changes: Any) -> Self:
         """The same with other values for some keys, checked again.
@@ -99,7 +95,26 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def _again(details: Any) -> InitErrorDetails:
-    """A mistake that was found, to be told with others."""
-    kind = PydanticCustomError(details["type"], "{message}", {**details.get("ctx", {}), "message": details["msg"]})
-    return InitErrorDetails(type=kind, loc=details["loc"], input=details["input"])
+@functools.cache
+def _choices(kind: type[Description]) -> Mapping[str, tuple[str | None, ...]]:
+    """The fields that hold one of a few words, or perhaps nothing, by name."""
+    found = {name: _words(field.annotation) for name, field in kind.model_fields.items()}
+    return MappingProxyType({name: words for name, words in found.items() if words})
+
+
+def _words(annotation: Any) -> tuple[str | None, ...]:
+    """What a type admits if that is a few words, or None; empty if it admits anything else."""
+    if annotation is NoneType:
+        return (None,)
+    if get_origin(annotation) is Literal:
+        return get_args(annotation)
+    if get_origin(annotation) in (Union, UnionType):
+        parts = [_words(part) for part in get_args(annotation)]
+        return tuple(word for part in parts for word in part) if all(parts) else ()
+    return ()
+
+
+def _hint(found: Any, known: Iterable[str | None]) -> str:
+    words = [word for word in known if word is not None]
+    near = nearest_name(found, words) if isinstance(found, str) else None
+    return (f" Did you mean {near!r}?" if near else "") + f" Known: {', '.join(words)}."

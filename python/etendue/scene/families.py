@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel, GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from etendue.scene.mistakes import BY_NAME
+from etendue.errors import nearest_name
+from etendue.scene.mistakes import BY_NAME, shown
 
 
 class Family:
@@ -40,7 +41,23 @@ class Family:
         choices: dict[Any, CoreSchema] = {kind: handler.generate_schema(cls) for kind, cls in self.members.items()}
         if self.by_name:
             choices[BY_NAME] = core_schema.str_schema(min_length=1)
-        return core_schema.tagged_union_schema(choices, discriminator=self._choice)
+        union = core_schema.tagged_union_schema(choices, discriminator=self._choice)
+        return core_schema.no_info_before_validator_function(self._known, union)
+
+    def _known(self, value: Any) -> Any:
+        """Refuse a kind that no member has, before the union is asked."""
+        kind = self._choice(value)
+        if kind in self.members or (self.by_name and kind == BY_NAME):
+            return value
+        kinds = f"Known kinds: {', '.join(self.members)}."
+        if not isinstance(value, Mapping | BaseModel):
+            text = f"is {shown(value)}, not a {'name or a ' if self.by_name else ''}table with a 'kind'. {kinds}"
+        elif not kind:
+            text = f"'kind' is missing. {kinds}"
+        else:
+            near = nearest_name(kind, self.members)
+            text = f"unknown kind {kind!r}.{f' Did you mean {near!r}?' if near else ''} {kinds}"
+        raise PydanticCustomError("unknown_kind", "{message}", {"message": text})
 
     def _choice(self, value: Any) -> str:
         """The kind; an empty one, which no class has, if the value says none."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from etendue.errors import SceneError, nearest_name
+from etendue.errors import SceneError
 
 BY_NAME, DESCRIBED, NUMBER, TABLE = "(name)", "(description)", "(number)", "(table)"
 """What may stand in one place, where two different things may; pydantic puts these into its places, we leave them out."""
@@ -17,8 +16,8 @@ LONGEST = 60
 """Letters of a wrong value that a message repeats."""
 
 
-def scene_error(error: ValidationError, data: Any, source: object) -> SceneError:
-    """All findings of a validation as one `SceneError`.
+def mistakes_of(error: ValidationError, data: Any) -> list[tuple[str, str]]:
+    """All findings of a validation: the place of each, and a sentence.
 
     Parameters
     ----------
@@ -26,8 +25,6 @@ def scene_error(error: ValidationError, data: Any, source: object) -> SceneError
         Of pydantic.
     data : object
         What was validated; it tells the names of sources, solids and so on.
-    source : object
-        The file, or what was being made.
     """
     mistakes: list[tuple[str, str]] = []
     for details in error.errors():
@@ -37,7 +34,7 @@ def scene_error(error: ValidationError, data: Any, source: object) -> SceneError
             mistakes += [(join(place, inner), text) for inner, text in cause.mistakes]
         else:
             mistakes.append((place, sentence(details)))
-    return SceneError(source, mistakes)
+    return mistakes
 
 
 def join(place: str, inner: str) -> str:
@@ -91,17 +88,10 @@ def _get(data: Any, key: str) -> Any:
 def sentence(details: Mapping[str, Any]) -> str:
     """What was found and what is asked for."""
     context = details.get("ctx", {})
-    found = _shown(details["input"])
+    found = shown(details["input"])
     match details["type"]:
         case "missing":
             return "is missing"
-        case "union_tag_invalid":
-            return _wrong_kind(details["input"], context)
-        case "literal_error":
-            choices = re.findall(r"'([^']*)'", context["expected"])
-            near = nearest_name(str(details["input"]), choices)
-            hint = f" Did you mean {near!r}?" if near else ""
-            return f"is {found}.{hint} Known: {', '.join(choices)}."
         case "greater_than":
             return f"is {found}; it must be greater than {context['gt']:g}"
         case "greater_than_equal":
@@ -110,7 +100,7 @@ def sentence(details: Mapping[str, Any]) -> str:
             return f"is {found}; it must be at most {context['le']:g}"
         case "finite_number":
             return f"is {found}; it must be finite"
-        case "unknown_key":
+        case "unknown_kind":
             return str(details["msg"])
         case "value_error" | "assertion_error":
             text = str(context.get("error", details["msg"]))
@@ -119,20 +109,14 @@ def sentence(details: Mapping[str, Any]) -> str:
             return f"is {found}: {details['msg'][:1].lower()}{details['msg'][1:]}"
 
 
-def _wrong_kind(value: Any, context: Mapping[str, Any]) -> str:
-    tags = re.findall(r"'([^']*)'", context["expected_tags"])
-    known = [tag for tag in tags if tag != BY_NAME]
-    kinds = f"Known kinds: {', '.join(known)}."
-    if not isinstance(value, Mapping | BaseModel):
-        return f"is {_shown(value)}, not a {'name or a ' if BY_NAME in tags else ''}table with a 'kind'. {kinds}"
-    if not context["tag"]:
-        return f"'kind' is missing. {kinds}"
-    near = nearest_name(str(context["tag"]), known)
-    hint = f" Did you mean {near!r}?" if near else ""
-    return f"unknown kind {context['tag']!r}.{hint} {kinds}"
+def shown(value: Any) -> str:
+    """A wrong value as messages repeat it.
 
-
-def _shown(value: Any) -> str:
+    Examples
+    --------
+    >>> shown(2.0), shown("front")
+    ('2', "'front'")
+    """
     # Whole numbers are floats by now, whichever way they were written.
     try:
         text = str(int(value)) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else repr(value)

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model
 from etendue.errors import SceneError
 from etendue.formats.input import as_path, require_readable
 from etendue.formats.output import atomic_output
+from etendue.quantities.notebook import InNotebook
 from etendue.scene.description import Description
 from etendue.scene.detectors import AnyDetector
 from etendue.scene.families import Family
@@ -20,7 +21,7 @@ from etendue.scene.files import Files
 from etendue.scene.finishes import BUILT_IN, AnyFinish
 from etendue.scene.media import Medium, MediumOrName
 from etendue.scene.media_library import MEDIA
-from etendue.scene.mistakes import scene_error
+from etendue.scene.mistakes import mistakes_of
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.sources import SOURCES
 from etendue.scene.sources.source import Source
@@ -45,7 +46,7 @@ NotTooMany = BeforeValidator(_not_too_many)
 """Looks at the length before the mistakes in millions of entries are told one by one."""
 
 
-class Scene(Description):
+class Scene(Description, InNotebook):
     """What light meets on its way, and where it is looked for.
 
     The same keys in Python and in a TOML file; docs/scenes.md explains every one.
@@ -160,7 +161,7 @@ class Scene(Description):
         try:
             scene = cls.model_validate(dict(data))
         except ValidationError as error:
-            raise scene_error(error, data, source) from None
+            raise SceneError(source, mistakes_of(error, data)) from None
         return scene._at(Path(folder))  # noqa: SLF001 - an alternative constructor
 
     @classmethod

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError, UnknownNameError
+from etendue.extras import require
 from etendue.scene.triangles import chord_error, open_edges, smooth_where_round, volume, welded
 from etendue.units import MM_PER_LENGTH_UNIT
 
@@ -103,8 +104,10 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
 
     Raises
     ------
+    MissingLibraryError
+        If the library is not installed.
     FormatError
-        If the library is not installed, the file is damaged or has no body of that name, or the tolerance asks for more
+        If the file is damaged or has no body of that name, or the tolerance asks for more
         than `MOST_TRIANGLES`.
 
     Examples
@@ -142,12 +145,7 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
 
 
 def _meshed(path: Path, raw: bytes, tolerance: float, turn: float) -> bytes:
-    try:
-        import cascadio  # noqa: PLC0415 - an extra, which only STEP files need
-    except ImportError:
-        raise FormatError(
-            path, "format", "STEP, whose reader is not installed", "Install it: pip install 'etendue[step]'."
-        ) from None
+    cascadio = require("cascadio")
     try:
         made: bytes = cascadio.load(raw, tol_linear=tolerance, tol_angular=turn, include_brep=True)
     except Exception as error:  # noqa: BLE001 - whatever a damaged file makes the library raise

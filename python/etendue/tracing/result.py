@@ -13,6 +13,7 @@ from etendue.formats.input import as_path
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.notebook import InNotebook
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.scene.dealing import Array, Counts
@@ -34,7 +35,7 @@ T = TypeVar("T")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class TraceResult:
+class TraceResult(InNotebook):
     """What the detectors of a scene saw, and what became of all light.
 
     A result of n of N rays is a valid one: every flux is scaled by N/n, every standard error is that of n rays. `trace`

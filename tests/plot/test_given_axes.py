@@ -1,0 +1,138 @@
+"""Pictures in axes of the user: nothing is drawn elsewhere or written, colours and places are those of the values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import etendue as et
+import matplotlib as mpl
+import numpy as np
+import pytest
+from etendue.quantities.threshold_sweep import COLUMNS, ThresholdSweep
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from oracles.light_fields import SURFACES, make_field
+from oracles.map_files import make_map
+
+LENS = et.Scene(solids=[{"name": "lens", "shape": {"kind": "ball", "radius": 4}, "medium": "PMMA"}])
+
+
+def lambertian() -> et.Intensity:
+    return et.Intensity(c=[0], gamma=range(91), values=[np.cos(np.radians(range(91)))])
+
+
+def sweep() -> ThresholdSweep:
+    columns = {name: np.array([0.9, 0.8]) for name in COLUMNS} | {"threshold": np.array([2.1, 0.021])}
+    return ThresholdSweep(columns, patches=437, rays=10**6, held_out=10**5)
+
+
+DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {
+    "map": (1, lambda **given: et.plot_map(make_map(), **given)),
+    "method": (1, lambda **given: make_map().plot(**given)),
+    "cross sections": (1, lambda **given: et.plot_cross_sections([et.cross_section(make_map(), y=0)], **given)),
+    "polar": (1, lambda **given: et.plot_intensity(lambertian(), **given)),
+    "cartesian": (1, lambda **given: et.plot_intensity(lambertian(), kind="cartesian", **given)),
+    "comparison": (3, lambda **given: et.plot_comparison(et.compare(make_map(), make_map()), **given)),
+    "threshold": (2, lambda **given: et.plot_threshold_sweep(sweep(), **given)),
+    "characteristic": (2, lambda **given: et.plot_characteristic(et.diagnose(make_field(SURFACES["disk"])), **given)),
+    "scene": (2, lambda **given: et.draw_scene(LENS, rays=0, **given)),
+}
+"""Every function that draws: how many axes it needs."""
+
+
+def figure_with(axes: int) -> Figure:
+    figure = Figure(figsize=(4.0 * axes, 4.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.subplots(1, axes, squeeze=False)
+    return figure
+
+
+def test_every_picture_is_here() -> None:
+    public = {name for name in et.__all__ if name.startswith(("plot_", "draw_"))}
+    assert len(public) == len(set(DRAWN) - {"method", "cartesian"})
+
+
+@pytest.mark.parametrize("which", DRAWN)
+def test_axes_are_drawn_on_and_come_back(which: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    count, draw = DRAWN[which]
+    figure = figure_with(count)
+    given = list(figure.axes)
+    drawn = draw(ax=given if count > 1 else given[0])
+    assert drawn == (tuple(given) if count > 1 else given[0])
+    assert all(axes.has_data() or axes.patches for axes in given)
+    assert figure.texts == []  # no heading and no caption over a figure of somebody else
+    figure.canvas.draw()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("which", DRAWN)
+def test_axes_and_a_path_are_refused(which: str, tmp_path: Path) -> None:
+    count, draw = DRAWN[which]
+    with pytest.raises(et.ArgumentError, match="savefig"):
+        draw(path=tmp_path / "picture.png", ax=figure_with(count).axes[0] if count == 1 else figure_with(count).axes)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("which", DRAWN)
+def test_too_many_axes_are_refused(which: str) -> None:
+    count, draw = DRAWN[which]
+    with pytest.raises(et.ArgumentError, match=rf"{count + 1} axes for {count} diagram"):
+        draw(ax=figure_with(count + 1).axes)
+
+
+@pytest.mark.parametrize("which", ["polar", "map"])
+def test_polar_axes_are_refused(which: str) -> None:
+    with pytest.raises(et.ArgumentError, match="no plain axes"):
+        DRAWN[which][1](ax=Figure().add_subplot(projection="polar"))
+
+
+def test_a_map_has_its_values_and_its_colour_bar() -> None:
+    """The image holds the values at their places, and beside it the bar spans them."""
+    lmap, figure = make_map(), figure_with(1)
+    (axes,) = figure.axes
+    et.plot_map(lmap, ax=axes, cmap="viridis", title="$x")
+    (image,) = axes.get_images()
+    shown = np.ma.filled(image.get_array(), np.nan)
+    np.testing.assert_array_equal(shown, np.maximum(lmap.values, 0.0))
+    half = lmap.screen.width / 2, lmap.screen.height / 2
+    assert tuple(image.get_extent()) == (-half[0], half[0], -half[1], half[1])
+    assert image.get_cmap()(0.3) == mpl.colormaps["viridis"](0.3)
+    assert axes.get_title(loc="left") == "$x"
+    (bar,) = (other for other in figure.axes if other is not axes)
+    assert bar.get_ylabel() == f"luminance [{lmap.unit}]"
+    assert bar.get_ylim()[1] == pytest.approx(np.nanmax(lmap.values))
+
+
+@pytest.mark.parametrize("which", ["map", "comparison"])
+def test_colours_are_those_that_are_asked_for(which: str) -> None:
+    _, draw = DRAWN[which]
+    for wanted in ("cividis", mpl.colormaps["cividis"]):
+        image = draw(cmap=wanted).axes[0].get_images()[0]
+        assert image.get_cmap()(0.7) == mpl.colormaps["cividis"](0.7)
+    with pytest.raises(et.UnknownNameError, match="viridis"):
+        draw(cmap="virids")
+
+
+@pytest.mark.parametrize("size", [(70.0, 70.0), (120.0, 15.0), (15.0, 120.0), (20.0, 15.0)])
+def test_pixels_are_to_scale_and_the_bar_is_as_long_as_the_picture(size: tuple[float, float]) -> None:
+    """Without a layout engine, where the room is what matplotlib's axes and bars take."""
+    lmap = et.LuminanceMap(np.eye(4), np.eye(4), np.ones((4, 4)), et.Observer(0, 0, 1000), et.Screen(*size, 4, 4))
+    figure = Figure(figsize=(5, 5))
+    FigureCanvasAgg(figure)
+    axes = lmap.plot(ax=figure.subplots())
+    figure.canvas.draw()
+    bar = figure.axes[1].get_window_extent()
+    picture = axes.get_window_extent()
+    assert picture.width / picture.height == pytest.approx(size[0] / size[1], rel=1e-6)
+    lying = size[0] > 2 * size[1]
+    assert (bar.width / picture.width if lying else bar.height / picture.height) == pytest.approx(1.0, abs=0.05)
+
+
+def test_names_are_no_formulas() -> None:
+    axes = figure_with(1).axes[0]
+    et.plot_cross_sections([et.cross_section(make_map(), y=0)], labels=["$a^$"], ax=axes)
+    axes.figure.canvas.draw()
+    assert axes.get_legend().get_texts()[0].get_text() == "$a^$"
