@@ -15,7 +15,7 @@ hypothesis.settings.load_profile("fixed")
 # What a test fits, it fits: only the tests of the cache name a folder.
 os.environ["ETENDUE_CACHE_DIR"] = ""
 
-pytest_plugins = ["oracles.workers"]
+pytest_plugins = ["oracles.time_budget", "oracles.workers"]
 
 NO_SAMPLES = "the folder of real sample files is not there"
 

@@ -263,6 +263,7 @@ def test_a_deferred_import_counts(tmp_path: Path) -> None:
     assert circles(python_needs(package)) == [["house.above", "house.below"]]
 
 
+@pytest.mark.slow
 def test_no_circle_in_the_package() -> None:
     needs = python_needs(PACKAGE)
     assert sum(map(len, needs.values())) > 500

@@ -80,12 +80,14 @@ def test_the_contract_is_the_plan() -> None:
     assert None not in floors
 
 
+@pytest.mark.slow
 def test_every_module_stands_on_one_floor() -> None:
     assert len(modules()) > 20
     homeless = [m.name for m in modules() if place(m.name) is None]
     assert homeless == ["etendue"]  # the front door, through which users come in at the top
 
 
+@pytest.mark.slow
 def test_imports_go_down_only() -> None:
     known = {m.name for m in modules()} | {"etendue._core"}
     imports = 0
@@ -105,6 +107,7 @@ def test_imports_go_down_only() -> None:
     assert imports > 100
 
 
+@pytest.mark.slow
 def test_only_the_command_line_prints() -> None:
     looked = 0
     for module in modules():

@@ -137,6 +137,7 @@ def test_subsets_that_do_not_exist_are_refused(arguments: tuple[int, ...]) -> No
         _core.select_subset(*arguments)
 
 
+@pytest.mark.slow
 def test_type_checkers_find_nothing_to_object_to() -> None:
     """mypy's own comparison of stub and module; the tests above stand where mypy is not installed."""
     if importlib.util.find_spec("mypy") is not None:

@@ -119,6 +119,7 @@ def test_a_misspelt_name_is_met_with_the_nearest_one(run: Run, tmp_path: Path, a
 LUMINANCE = ["luminance", "led.tm25ray", "--observer", "0,0", "--size", "10,8", "-o", "a.npz"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -610,6 +611,7 @@ def test_demo_draws_other_rays_for_another_seed(run: Run) -> None:
 # --- Ctrl-C ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_long_work_with_status_130_and_no_file(tmp_path: Path) -> None:
     """In a process of its own, with a terminal, so that the progress bar tells when the work has begun."""
     parent, child = os.openpty()

@@ -11,6 +11,7 @@ from etendue.lightfield.fit_cache import FOLDER_VARIABLE
 from cli.outcome import Run
 
 
+@pytest.mark.slow
 def test_fields_are_kept_shown_and_cleared(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "kept"))
     et.write_rays(tmp_path / "led.tm25ray", et.RingSource(rays=3000))

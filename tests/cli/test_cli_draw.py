@@ -29,6 +29,7 @@ def lamp(tmp_path: Path) -> None:
     et.Scene(**SCENE).save(tmp_path / "lamp.toml")
 
 
+@pytest.mark.slow
 def test_the_picture_is_that_of_the_api(run: Run, tmp_path: Path) -> None:
     status, out, _ = run("draw", "lamp.toml", "-o", "a.png", "-o", "a.pdf", "--rays", 9, "--seed", 4)
     assert status == 0

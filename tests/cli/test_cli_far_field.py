@@ -28,6 +28,7 @@ def test_asked_steps_that_cannot_hold_the_beam_are_told(run: Run, tmp_path: Path
     assert "too wide" not in out
 
 
+@pytest.mark.slow
 def test_the_program_tells_what_it_traced(run: Run, tmp_path: Path) -> None:
     searchlight(c_planes=36, gamma_step=2.5).save(tmp_path / "light.toml")
     status, out, _ = run("trace", "light.toml", "--rays", "1e5", "-o", "a.ies", "-o", "a.h5")

@@ -58,6 +58,7 @@ def rays(tmp_path: Path) -> Path:
 # --- being stopped ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 def test_every_signal_keeps_the_part_of_a_trace_and_says_how_to_go_on(
     number: int, status: int, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -103,6 +104,7 @@ main()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", ["trace", "luminance", "fit", "convert"])
 def test_a_long_verb_stops_within_a_moment(verb: str, tmp_path: Path) -> None:
     """Also within a round that takes an hour; what cannot go on says so, and nothing is left behind."""
@@ -170,6 +172,7 @@ with atomic_output(Path("slow.csv")) as file, atomic_folder("slow", lambda old: 
 """
 
 
+@pytest.mark.slow
 def test_temporary_files_of_the_living_stay_and_those_of_the_dead_go(rays: Path, run: Run, tmp_path: Path) -> None:
     process = subprocess.Popen([sys.executable, "-c", WRITER], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -206,6 +209,7 @@ main()
     return done.returncode, done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["a.csv", "a.etd", "a.ray", "a.tm25ray"])
 def test_a_full_disk_names_file_and_size(output: str, tmp_path: Path) -> None:
     """A limit on the size of files stands in for the disk; both are found by the same calls."""
@@ -227,6 +231,7 @@ def test_a_sample_that_no_disk_holds_is_refused_at_once(rays: Path, run: Run, tm
     assert files(tmp_path) == ["led.h5", "led.tm25ray"]
 
 
+@pytest.mark.slow
 def test_a_memory_limit_names_file_and_size(tmp_path: Path) -> None:
     et.write_rays(tmp_path / "led.tm25ray", et.RingSource(rays=50_000, seed=1))
     look = ("--observer", "0,0", "--distance", "200", "--size", "10,10", "--pixels", "8192,8192", "-o", "a.npz")
@@ -267,6 +272,7 @@ def test_an_output_that_is_an_input_is_refused(way: str, rays: Path, run: Run, t
     assert rays.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_no_verb_writes_over_what_it_reads(rays: Path, run: Run, tmp_path: Path) -> None:
     assert run("fit", rays, "-o", "a.h5", "--surface", "disk:radius=40", "--depths", "2,2,2,2").status == 0
     look = ("--observer", "0,0", "--distance", "200", "--size", "60,60", "--pixels", "4,4")
@@ -328,6 +334,7 @@ def test_a_pipe_in_python_keeps_its_name(rays: Path, tmp_path: Path) -> None:
         et.read_rays(tmp_path / "cut")
 
 
+@pytest.mark.slow
 def test_a_pipe_without_a_writer_says_what_it_waits_for(rays: Path, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     process = started(tmp_path, "convert", "pipe", "a.csv")
@@ -346,6 +353,7 @@ def test_a_pipe_without_a_writer_says_what_it_waits_for(rays: Path, tmp_path: Pa
     assert process.returncode == 130
 
 
+@pytest.mark.slow
 def test_standard_input_and_process_substitution(rays: Path) -> None:
     program = f"{shlex.quote(sys.executable)} -c 'from etendue.cli import main; main()'"
     for text in (f"cat {rays} | {program} info /dev/stdin", f"{program} info <(cat {rays})"):
@@ -354,6 +362,7 @@ def test_standard_input_and_process_substitution(rays: Path) -> None:
         assert "2,000" in done.stdout
 
 
+@pytest.mark.slow
 def test_directories_devices_and_sockets_are_refused_by_name(run: Run, tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
     with socket.socket(socket.AF_UNIX) as server:

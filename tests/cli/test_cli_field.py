@@ -59,6 +59,7 @@ def api_field(folder: Path, **changes: Any) -> et.LightField:
     return et.LightField.fit(rays, options.pop("surface", Disk(radius=11.3, centre=(0.9, -0.5))), **options)
 
 
+@pytest.mark.slow
 def test_fit_is_the_fit_of_the_api_and_tells_all_of_it(run: Run, folder: Path, tmp_path: Path) -> None:
     outcome = run("fit", folder / "led.tm25ray", "-o", "led.h5", *GRID, "--seed", 7, "--threads", 1, "--json")
     assert (outcome.status, outcome.err) == (0, "")
@@ -110,6 +111,7 @@ def test_fit_for_people_says_the_same_and_info_says_it_again(run: Run, folder: P
     assert " s\n" in outcome.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "changes"),
     [
@@ -150,6 +152,7 @@ def test_fit_chooses_the_surface_unless_told(run: Run, folder: Path, monkeypatch
     ]
 
 
+@pytest.mark.slow
 def test_a_report_holds_the_diagnostics(run: Run, folder: Path, tmp_path: Path) -> None:
     outcome = run("fit", folder / "led.tm25ray", "-o", "a.h5", *GRID, "--report", "r.png", "--json")
     facts = outcome.json["diagnostics"]
@@ -242,6 +245,7 @@ def view(target: tuple[float, float, float] = (0.1, -0.2, 0.4), size: tuple[floa
     return et.Observer(25, -40, 300, target), et.Screen(*size, 12, 9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [(), ("--samples", 4), ("--method", "lightfield", "--threads", 1)])
 def test_luminance_of_a_field_is_the_map_of_the_api(run: Run, folder: Path, tmp_path: Path, options: Any) -> None:
     outcome = run("luminance", folder / "dome.h5", *VIEW, *options, "-o", "a.npz", "-o", "a.png", "--json")
@@ -260,6 +264,7 @@ def test_luminance_of_a_field_is_the_map_of_the_api(run: Run, folder: Path, tmp_
     assert outcome.json["complaints"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "method"),
     [
@@ -316,6 +321,7 @@ def test_many_observers_of_a_field(run: Run, folder: Path, tmp_path: Path) -> No
         np.testing.assert_array_equal(seen.values, et.luminance_map(field, seen.observer, seen.screen).values)
 
 
+@pytest.mark.slow
 def test_people_read_figures_and_a_note_where_nothing_is_seen(run: Run, folder: Path) -> None:
     outcome = run("luminance", folder / "watts.h5", *VIEW, "-o", "a.npz")
     assert "radiance from θ = 25°, φ = -40°, 300 mm" in outcome.out
@@ -332,6 +338,7 @@ def test_people_read_figures_and_a_note_where_nothing_is_seen(run: Run, folder: 
 # --- intensity -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_intensity_of_a_field(run: Run, folder: Path, tmp_path: Path) -> None:
     outputs = ["-o", "a.ies", "-o", "a.ldt", "-o", "a.png"]
     outcome = run("intensity", folder / "dome.h5", *outputs, "--c-planes", 8, "--gamma-step", 15, "--json")
@@ -352,6 +359,7 @@ def test_intensity_of_a_field(run: Run, folder: Path, tmp_path: Path) -> None:
 # --- what is refused -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "status", "hint"),
     [
@@ -465,6 +473,7 @@ def test_a_failing_fit_leaves_the_old_field_as_it_was(run: Run, folder: Path, tm
     assert (tmp_path / "a.h5").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_the_lumens_of_a_field_in_watts(run: Run, tmp_path: Path) -> None:
     """Two lines of 0.75 and 0.25 W: told by info, used by --unit; a scene's notes say what its spectrum leaves out."""
     rng = np.random.default_rng(8)

@@ -6,6 +6,7 @@ import tracemalloc
 from pathlib import Path
 
 import etendue as et
+import pytest
 from etendue.cli.terminal import count
 from etendue.lightfield.surfaces import Disk
 
@@ -30,6 +31,7 @@ ABSURD: dict[str, tuple[str, tuple[object, ...]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_absurd_sizes_are_refused_with_the_size(run: Run, tmp_path: Path) -> None:
     et.write_rays(tmp_path / "led.tm25ray", et.RingSource(rays=5000, seed=2))
     et.LightField.fit(et.RingSource(rays=5000, seed=2), Disk(radius=30), depths=(2, 2, 2, 2)).save(tmp_path / "led.h5")

@@ -15,6 +15,7 @@ from cli.outcome import Run
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("cascadio") is None, reason="STEP files need the extra [step]")
 
 
+@pytest.mark.slow
 def test_info_lists_bodies(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "optics.step"
     path.write_text(step.optics(), encoding="ascii")

@@ -312,6 +312,7 @@ def test_every_verb_is_here() -> None:
     assert set(CASES) == set(VERBS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", [verb for verb in VERBS if CASES.get(verb)])
 def test_what_python_knows_is_printed(
     verb: str, run: Run, folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch

@@ -44,6 +44,7 @@ def lamp(tmp_path: Path) -> None:
     et.Scene(**SCENE).save(tmp_path / "lamp.toml")
 
 
+@pytest.mark.slow
 def test_trace_is_the_trace_of_the_api(run: Run, tmp_path: Path) -> None:
     outputs = ["r.h5", "rcs.tm25ray", "far.ies", "top.npz", "{detector}.png"]
     status, out, _ = run(
@@ -96,6 +97,7 @@ def test_an_error_that_was_not_reached_is_told(run: Run, tmp_path: Path) -> None
     assert "--until" not in err
 
 
+@pytest.mark.slow
 def test_an_interruption_leaves_a_valid_result(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*arguments: Any, **options: Any) -> Any:
         rounds = et.trace_rounds(*arguments, **options)
@@ -129,6 +131,7 @@ def test_an_interruption_leaves_a_valid_result(run: Run, tmp_path: Path, monkeyp
     assert whole.ledger == et.trace(et.Scene(**SCENE), 4e6).ledger
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "status", "text"),
     [

@@ -159,6 +159,7 @@ def test_mistakes_of_a_scene_know_their_lines() -> None:
     assert str(error.value) == "\n  ".join(error.value.lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extension", [".png", ".pdf"])
 def test_pictures_of_names_that_look_like_formulas(scene: Path, extension: str, tmp_path: Path) -> None:
     """A formula that cannot be set raises ValueError in the drawing library."""

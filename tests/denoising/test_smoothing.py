@@ -59,6 +59,7 @@ FEW_AND_MANY: dict[str, tuple[float, int, int, float, Share, Share]] = {
 # --- the bar ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HUNDRED_THOUSAND)
 def test_a_hundred_thousand_rays_beat_the_gaussian_that_knew_the_truth(name: str) -> None:
     """By both measures; and the error bars hold."""
@@ -72,6 +73,7 @@ def test_a_hundred_thousand_rays_beat_the_gaussian_that_knew_the_truth(name: str
     assert_covers(deviations=deviations(found, truth), effective=effective, one=one, two=two)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FEW_AND_MANY)
 def test_error_bars_hold_for_few_rays_and_many(name: str) -> None:
     rays, n, seeds, effective, one, two = FEW_AND_MANY[name]
@@ -80,6 +82,7 @@ def test_error_bars_hold_for_few_rays_and_many(name: str) -> None:
     assert_covers(deviations=found, effective=seeds * effective, one=one, two=two)
 
 
+@pytest.mark.slow
 def test_a_uniform_image_stays_uniform() -> None:
     """Neither trees nor filters find structure in noise: only the total is uncertain."""
     for seed in (1, 2, 3):
@@ -92,6 +95,7 @@ def test_a_uniform_image_stays_uniform() -> None:
 # --- sums of weights --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_unit_of_weight_does_not_matter() -> None:
     counts, _ = counts_of("halo", 3e4, 4, 64)
     plain = smoothed(counts, shifts=4)
@@ -100,6 +104,7 @@ def test_the_unit_of_weight_does_not_matter() -> None:
     np.testing.assert_allclose(scaled.standard_error, 2.5e-7 * plain.standard_error, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_unequal_weights_are_worth_fewer_rays_and_their_errors_hold() -> None:
     """Exponential weights: E w² = 2 (E w)², so the rays are worth half their number. From seed to seed the coverage spreads
     as that of 213 independent cells."""
@@ -115,6 +120,7 @@ def test_unequal_weights_are_worth_fewer_rays_and_their_errors_hold() -> None:
     assert equal < nrmse(found.mass, truth=truth) < 2.2 * equal
 
 
+@pytest.mark.slow
 def test_base_measure_sets_the_level_and_nothing_lies_where_it_is_zero() -> None:
     """A round image on a slope of étendue, of constant density: no rim darkens, no mass leaks out."""
     rows, columns = np.mgrid[0:80, 0:90]
@@ -146,12 +152,14 @@ def test_halves_of_equal_rays_are_binomial_and_those_of_unequal_ones_have_the_sa
 # --- every input ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_same_bits_for_any_number_of_threads() -> None:
     counts, _ = counts_of("die", 2e4, 8, 48)
     results = [smoothed(counts[:, :37], shifts=5, threads=n) for n in (1, 2, 7)]
     assert len({r.mass.tobytes() + r.standard_error.tobytes() for r in results}) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(1, 1), (1, 40), (37, 1), (5, 9), (16, 16), (17, 200)])
 def test_any_shape(shape: tuple[int, int]) -> None:
     counts = np.random.default_rng(9).poisson(20.0, shape).astype(np.float64)
@@ -162,6 +170,7 @@ def test_any_shape(shape: tuple[int, int]) -> None:
     assert ("alone" in found.notes[0]) == (min(shape) < 16)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rays", [1.0, 150.0, 1e15])
 def test_one_hit_cell(rays: float) -> None:
     counts = np.zeros((40, 50))

@@ -73,6 +73,7 @@ def test_the_blocks_were_found() -> None:
         assert found.count(language) >= fewest
 
 
+@pytest.mark.slow
 # A page is many commands, each of which has a limit of its own; on a busy machine they add up.
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("page", [p for p in PAGES if any(b.language in RUNNABLE for b in blocks(p))], ids=name_of)

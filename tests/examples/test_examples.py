@@ -24,6 +24,7 @@ def test_every_example_is_run() -> None:
     assert {path.name for path in EXAMPLES.glob("*.py")} == set(RUNS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(RUNS))
 def test_runs_and_draws(name: str, tmp_path: Path) -> None:
     options, pictures = RUNS[name]

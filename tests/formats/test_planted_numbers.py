@@ -47,6 +47,7 @@ def require_sound_or_refused(path: Path) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ray_format", RAY_FORMATS, ids=lambda f: f.name)
 def test_no_planted_number_becomes_a_ray(ray_format: RayFormat, tmp_path: Path) -> None:
     path = tmp_path / "planted"

@@ -265,6 +265,7 @@ def read_or_refuse(path: Path) -> et.RaySet | FormatError:
             return error
 
 
+@pytest.mark.slow
 @every_format
 def test_cut_at_every_byte(ray_format: RayFormat, tmp_path: Path) -> None:
     """Either an error, or exactly the rays that are there and a complaint that there were more."""
@@ -316,6 +317,7 @@ def damage(data: bytes, places: list[tuple[int, int]]) -> bytes:
 POSITION = st.one_of(st.integers(0, 300), st.integers(-200, -1), st.integers(0, 1 << 20))
 
 
+@pytest.mark.slow
 @every_format
 @settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(places=st.lists(st.tuples(POSITION, st.integers(0, 255)), min_size=1, max_size=8), cut=st.integers(0, 40))
@@ -333,6 +335,7 @@ def test_damaged_bytes(ray_format: RayFormat, tmp_path: Path, places: list[tuple
     assert peak < 32e6
 
 
+@pytest.mark.slow
 @every_format
 @settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(noise=st.binary(max_size=400))

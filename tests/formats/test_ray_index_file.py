@@ -180,6 +180,7 @@ def refused(path: Path) -> FormatError:
     return caught.value
 
 
+@pytest.mark.slow
 def test_every_damaged_byte_before_the_records_is_found(tmp_path: Path) -> None:
     path = tmp_path / "a.etd"
     et.RayIndex.build(rays_of(5), path)
@@ -195,6 +196,7 @@ def test_every_damaged_byte_before_the_records_is_found(tmp_path: Path) -> None:
     assert len(et.read_rays(path)) == 5
 
 
+@pytest.mark.slow
 def test_every_cut_is_found(tmp_path: Path) -> None:
     path = tmp_path / "a.etd"
     et.RayIndex.build(rays_of(5), path)

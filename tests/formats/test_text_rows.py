@@ -292,6 +292,7 @@ def text_format(request: pytest.FixtureRequest) -> RayFormat:
     return chosen
 
 
+@pytest.mark.slow
 def test_all_numbers_come_back(tmp_path: Path, text_format: RayFormat) -> None:
     rays = sample(70_000)  # more than two stretches of the writer
     path = tmp_path / "rays.txt"
@@ -332,6 +333,7 @@ def test_nothing_usable_is_not_written(tmp_path: Path, text_format: RayFormat) -
         text_format.write(rays, tmp_path / "rays.txt")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rays", [1, 3])
 def test_truncation_at_every_byte(tmp_path: Path, text_format: RayFormat, rays: int) -> None:
     """A cut file is refused, or complained about; the rays that are read are those that were written, but for the last."""
@@ -357,6 +359,7 @@ def test_truncation_at_every_byte(tmp_path: Path, text_format: RayFormat, rays: 
             assert "error" in severities, size
 
 
+@pytest.mark.slow
 def test_no_damage_leads_to_another_error(tmp_path: Path, text_format: RayFormat) -> None:
     path = tmp_path / "rays.txt"
     text_format.write(sample(4), path)

@@ -436,6 +436,7 @@ PLACE = st.one_of(st.integers(0, 288), st.integers(36288, len(FULL_FILE) - 1))
 BYTE = st.sampled_from([0, 1, 2, 3, 4, 127, 128, 255])
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(damage=st.dictionaries(PLACE, BYTE, min_size=1, max_size=5), cut=st.integers(0, 100))
 def test_damaged_file_with_all_blocks(tmp_path: Path, damage: dict[int, int], cut: int) -> None:

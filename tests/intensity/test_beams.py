@@ -39,6 +39,7 @@ BEAMS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exponent", "c", "gamma"), [b[1:] for b in BEAMS], ids=[b[0] for b in BEAMS])
 def test_files_hold_the_flux_of_a_beam_and_its_peak(exponent: float, c: float, gamma: float, tmp_path: Path) -> None:
     """I₀ = Φ (n + 1)/2π of cosⁿ; a reader's trapezium rule finds Φ to 0.1 %."""
@@ -52,6 +53,7 @@ def test_files_hold_the_flux_of_a_beam_and_its_peak(exponent: float, c: float, g
     assert far.maximum_error < 0.25 * peak
 
 
+@pytest.mark.slow
 def test_two_beams_and_a_batwing(tmp_path: Path) -> None:
     two = rays_of(
         (beam(60_000, exponent=3e3, c=10.0, gamma=30.0, seed=1), 50.0),
@@ -83,6 +85,7 @@ def test_light_of_no_width_says_what_sets_its_peak(tmp_path: Path) -> None:
         assert read_back(far, tmp_path) == pytest.approx([7.0, 7.0], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_few_rays_of_a_lambertian_source_make_no_spike() -> None:
     """10⁴ rays, 20 seeds: the pole's node is not worse than a tenth, and the peak lies within its error."""
     z = []
@@ -95,6 +98,7 @@ def test_few_rays_of_a_lambertian_source_make_no_spike() -> None:
     assert np.abs(z).max() < LARGEST_Z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exponent", "c", "gamma"), [(1e3, 0.0, 0.0), (300.0, 70.0, 20.0), (1.0, 130.0, 35.0)])
 def test_errors_of_nodes_cover_the_truth_over_seeds(exponent: float, c: float, gamma: float) -> None:
     """The node that a beam of known intensity is seen by, 40 times: the number of hits within 1.645 errors is binomial.
@@ -128,6 +132,7 @@ def test_the_far_field_of_a_searchlight(tmp_path: Path) -> None:
     assert far.flux_error == pytest.approx(60 * np.sqrt(share * (1 - share) / 4e5), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_traced_far_fields_have_the_same_bits_however_they_are_made(tmp_path: Path) -> None:
     scene = searchlight()
     whole = et.trace(scene, 1.2e6, 5, threads=1)
@@ -149,6 +154,7 @@ def test_cells_of_earlier_versions_are_refused(tmp_path: Path, monkeypatch: pyte
         et.TraceResult.load(tmp_path / "old.h5")
 
 
+@pytest.mark.slow
 def test_traced_errors_cover_the_truth() -> None:
     """A cosine emitter about an axis off every plane, at asked steps, 8 seeds: nodes with no ray in common."""
     c, gamma, exponent, flux = 101.0, 28.0, 3.0, 9.0

@@ -105,6 +105,7 @@ def lobe(exponent: float, axis: Array) -> Callable[[Array, Array], Array]:
     return lambda c, gamma: (exponent + 1) / (2 * np.pi) * np.maximum(direction(c, gamma) @ axis, 0.0) ** exponent
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exponent", "c", "gamma"), [(1.0, 20.0, 35.0), (30.0, 250.0, 4.0), (6.0, 101.0, 170.0)])
 def test_a_leaning_lobe_node_by_node(exponent: float, c: float, gamma: float) -> None:
     """Against quadrature; every third node in C and γ, whose hats have no ray in common."""
@@ -120,6 +121,7 @@ def test_a_leaning_lobe_node_by_node(exponent: float, c: float, gamma: float) ->
     assert_differ(values=values, other=turned, standard_error=errors)
 
 
+@pytest.mark.slow
 def test_error_bars_cover_the_truth() -> None:
     """Rays of unequal flux, 12 seeds; nodes with no ray in common; the number of those within one error is binomial."""
     n, planes, step, inside, tried = 60_000, 24, 7.5, 0, 0
@@ -135,6 +137,7 @@ def test_error_bars_cover_the_truth() -> None:
     assert_drawn_with(share=0.6827, hits=inside, rays=tried)
 
 
+@pytest.mark.slow
 def test_a_lambertian_source_as_a_function() -> None:
     rays = et.RingSource(rays=4_000_000, seed=2)
     led = et.intensity_distribution(rays, 8, 5)
@@ -152,6 +155,7 @@ def test_a_lambertian_source_as_a_function() -> None:
 # --- every lumen once ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("planes", "step"), [(36, 2.5), (1, 90), (13, 11.25)])
 def test_flux_closes_to_rounding_over_several_batches(planes: int, step: float) -> None:
     n = 600_000

@@ -182,6 +182,7 @@ def test_other_files_are_refused(content: bytes, tmp_path: Path) -> None:
         read_intensity(tmp_path / "a.ies")
 
 
+@pytest.mark.slow
 def test_ray_files_are_no_intensity_files(samples: Path) -> None:
     from etendue.formats.rays import detect_format
 
@@ -221,6 +222,7 @@ def test_wrong_names_and_places(tmp_path: Path) -> None:
 # --- damage ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @WRITTEN
 @pytest.mark.parametrize("symmetry", ["none", "rotational", "C90-C270"])
 def test_cut_at_every_byte(name: str, symmetry: str, tmp_path: Path) -> None:
@@ -264,6 +266,7 @@ def test_cut_at_every_byte_where_an_end_is_marked(name: str, tmp_path: Path) -> 
     assert_same_function(read_intensity(path), led)
 
 
+@pytest.mark.slow
 @ALL
 @settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())

@@ -99,6 +99,7 @@ def test_directions(read: Read, kind: str) -> None:
     assert led.symmetry() == "none"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "h", "v", "c", "gamma"),
     [
@@ -223,6 +224,7 @@ def test_what_is_refused(read: Read, kind: str, h: tuple[float, ...], v: tuple[f
         read(kind, np.array(h, float), np.array(v, float), np.ones((len(h), len(v))))
 
 
+@pytest.mark.slow
 def test_very_fine_tables_stay_small(read: Read) -> None:
     """0.05° in V over ±50°: fine tables become no more than `MOST_NODES` of a C-γ table, with the error told."""
     h, v = np.linspace(-50, 50, 101), np.linspace(-50, 50, 2001)

@@ -78,6 +78,7 @@ def effective(deviations: list[Array]) -> float:
     return float(min(*found, sum(z.size for z in deviations)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOURCES)
 def test_nodes_and_peaks_lie_within_their_errors(name: str) -> None:
     """The truth is the intensity at the node, not its mean around it: errors have to cover what the steps blur.
@@ -106,6 +107,7 @@ def test_nodes_and_peaks_lie_within_their_errors(name: str) -> None:
     assert abs(np.mean(peaks)) < 1.0 / 3.0 + LARGEST_Z * np.std(peaks) / np.sqrt(len(peaks))
 
 
+@pytest.mark.slow
 def test_the_largest_of_values_that_are_alike_is_not_the_peak() -> None:
     """Even light in all directions: the largest of hundreds of nodes is too large, in every set; the peak is not."""
     peaks, lifted = [], []

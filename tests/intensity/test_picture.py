@@ -71,6 +71,7 @@ def test_noise_is_drawn_and_named(kind: str) -> None:
     assert "600" in texts
 
 
+@pytest.mark.slow
 @BOTH
 def test_strange_tables(kind: str, tmp_path: Path) -> None:
     for led in (
@@ -84,6 +85,7 @@ def test_strange_tables(kind: str, tmp_path: Path) -> None:
         assert path.stat().st_size > 5000
 
 
+@pytest.mark.slow
 @BOTH
 def test_the_same_distribution_gives_the_same_bytes(kind: str, tmp_path: Path) -> None:
     for suffix in (".png", ".pdf"):
@@ -93,6 +95,7 @@ def test_the_same_distribution_gives_the_same_bytes(kind: str, tmp_path: Path) -
         assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
+@pytest.mark.slow
 def test_unknown_names(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="'polar'"):
         plot_intensity(lid("none"), kind="ploar")  # type: ignore[arg-type]

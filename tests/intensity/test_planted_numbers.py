@@ -83,6 +83,7 @@ def require_sound_or_refused(path: Path) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_no_planted_number_becomes_light(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of text formats; the error of resampling is not the question here, so type B gets few nodes."""
@@ -103,6 +104,7 @@ def test_no_planted_number_becomes_light(name: str, tmp_path: Path, monkeypatch:
     assert peak < 32e6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["product", "lm63", "tm33"])
 def test_no_planted_number_in_a_container_becomes_light(name: str, tmp_path: Path) -> None:
     """In the list of its contents, and in the photometry: then the error names container and member."""

@@ -36,6 +36,7 @@ def files(samples: Path) -> list[Path]:
     return sorted((samples / "intensity").iterdir())
 
 
+@pytest.mark.slow
 def test_every_file_reads(samples: Path) -> None:
     found = {path.name: read_intensity(path) for path in files(samples)}
     assert len(found) == 20

@@ -68,6 +68,7 @@ def middles(curve: CharacteristicCurve) -> tuple[Array, Array]:
 # --- the characteristic curve ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [0, 1, 2, 3])
 def test_a_ramp_along_any_coordinate_has_a_straight_curve(axis: int) -> None:
     """L = v along one coordinate of n cells; the read-out is flat in half a cell at either end."""
@@ -108,6 +109,7 @@ def test_a_line_through_window_and_dome_counts_once_with_the_light_of_both() -> 
     assert curve.flux[-1] == pytest.approx(2.5 * through + 0.5 * (all_lines - through), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["plane", "hemisphere", "sphere", "cylinder", "box", "dome with a window"])
 def test_the_curve_holds_the_flux_of_a_rough_field(name: str) -> None:
     """A lattice sees all lines of any surface; a line that leaves one part only is met once."""
@@ -119,6 +121,7 @@ def test_the_curve_holds_the_flux_of_a_rough_field(name: str) -> None:
     assert (curve.standard_error >= 0).all()
 
 
+@pytest.mark.slow
 def test_the_curve_of_a_fit_is_at_least_as_close_to_the_true_one_as_the_field_to_the_source() -> None:
     """Sorting by luminance never brings two functions further apart: ∫|f* - g*| ≤ ∫|f - g|."""
     source, n = LimbDarkenedDisk(), 60_000
@@ -145,6 +148,7 @@ def test_the_curve_of_a_fit_is_at_least_as_close_to_the_true_one_as_the_field_to
     assert curve.luminance[0] < 1.25 * truth.max()
 
 
+@pytest.mark.slow
 def test_the_luminance_of_a_lambertian_disk_is_a_step() -> None:
     """One ring: Φ/(π A) over π A, and nothing beyond."""
     source = et.RingSource((5.0,), (30.0,), rays=40_000)
@@ -247,6 +251,7 @@ def test_the_law_is_found_again(exponent: float) -> None:
     assert curve.error().value == pytest.approx(math.sqrt(2 * curve.loss().value))
 
 
+@pytest.mark.slow
 def test_forecasts_hold_as_often_as_they_say() -> None:
     """Gains drawn from laws that the prior thinks possible, with the scatter and the noise that are assumed."""
     rng = np.random.default_rng(8)
@@ -320,6 +325,7 @@ def curve(trial: Trial) -> Forecast:
     return make_forecast(trial.field(trial.N), trial.rays(trial.N), threads=1)
 
 
+@pytest.mark.slow
 def test_forecasts_come_true(trial: Trial, curve: Forecast) -> None:
     """The field really fitted to 4 and 16 times the rays; and to as many as are said to halve its error."""
     scores = {m: trial.score(m * trial.N) for m in (1, 4, 16, 128)}
@@ -384,6 +390,7 @@ def test_rays_of_unequal_flux_are_judged_by_their_flux() -> None:
     assert (np.abs(apart) < stats.norm.isf(SIGNIFICANCE / 4) * np.hypot(noise, 0.1 * equal.gains)).all()
 
 
+@pytest.mark.slow
 def test_a_symmetry_tells_of_twice_the_rays(trial: Trial) -> None:
     """Of a source that is even in x, half the rays folded predict fresh rays at least as well as all rays unfolded."""
     surface, depths = Hemisphere(radius=1.264), (3, 3, 2, 2)
@@ -440,6 +447,7 @@ def test_what_cannot_be_diagnosed_is_refused(trial: Trial) -> None:
 # --- reports ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_diagnostics_are_plain_data_and_a_few_lines() -> None:
     field = field_of(PLANE, part(ramp(16).reshape(2, 2, 2, 2), 1e-3, 0.02))
     found = dataclasses.replace(
@@ -460,6 +468,7 @@ def test_diagnostics_are_plain_data_and_a_few_lines() -> None:
     assert diagnose(field).to_dict()["forecast"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["plane", "dome with a window", "cylinder"])
 def test_the_picture_shows_what_was_found_and_repeats_its_bytes(name: str, tmp_path: Path) -> None:
     field = make_field(SURFACES[name], flux_unit="W" if name == "cylinder" else "lm")

@@ -28,6 +28,7 @@ def field_of(n: int, exponent: float, c: float, gamma: float, seed: int, cells: 
     return et.LightField.fit(lamp(n, exponent, c, gamma, seed), et.Disk(radius=5.01), depths=(2, 2, cells, cells))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exponent", "c", "gamma"), [(1.0, 0.0, 0.0), (300.0, 40.0, 25.0), (1e5, 0.0, 0.0)])
 def test_files_of_a_field_hold_its_flux(exponent: float, c: float, gamma: float, tmp_path: Path) -> None:
     """A reader's trapezium rule finds it to 0.1 %, of a beam of 0.4° too, whose peak the field cannot know."""
@@ -50,6 +51,7 @@ def test_files_of_a_field_hold_its_flux(exponent: float, c: float, gamma: float,
         assert abs(far.peak_intensity - peak) < 4 * far.peak_error
 
 
+@pytest.mark.slow
 def test_the_values_are_the_integral_over_the_surface() -> None:
     """Another route: rays drawn from the field, shared by the same nodes; and the intensity of a map from afar."""
     field = field_of(30_000, 6.0, 200.0, 30.0, 5, 4)
@@ -62,6 +64,7 @@ def test_the_values_are_the_integral_over_the_surface() -> None:
     assert seen.intensity == pytest.approx(float(far.at(195, 30)), rel=0.03)
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_counting_and_cover_the_truth() -> None:
     """8 fields: the error of a node is that of the rays themselves, to noise; within it lie no fewer than 68 %."""
     n, exponent, c, gamma = 20_000, 6.0, 200.0, 30.0
@@ -80,6 +83,7 @@ def test_errors_are_those_of_counting_and_cover_the_truth() -> None:
     assert_drawn_with(share=(0.6827, 0.98), hits=inside, rays=tried)
 
 
+@pytest.mark.slow
 def test_rays_of_unequal_flux_count_less(tmp_path: Path) -> None:
     """Kish's number of them is kept with the field; a field without it takes its rays as equal ones, and says so."""
     rays = lamp(20_000, 6.0, 0.0, 0.0, 1)

@@ -73,6 +73,7 @@ def test_the_density_integrates_to_one(coordinates: tuple[LightField, Array]) ->
     assert total == pytest.approx(1, rel=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", range(4))
 def test_each_coordinate_is_uniform_under_its_distribution_function(
     coordinates: tuple[LightField, Array], axis: int
@@ -157,6 +158,7 @@ def features(point: Array, direction: Array) -> Array:
     return np.stack([direction[:, 0], direction[:, 1] + 0.3 * direction[:, 2], foot[:, 0], foot[:, 1] - foot[:, 2]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", ["plane", "disk", "hemisphere", "sphere", "cylinder", "box", "dome"])
 def test_lines_are_as_frequent_as_they_are_bright(which: str) -> None:
     """χ² over 256 classes of lines between counts of rays and the luminance averaged over other, even lines.
@@ -186,6 +188,7 @@ def test_lines_are_as_frequent_as_they_are_bright(which: str) -> None:
     assert SIGNIFICANCE < stats.chi2.sf(chi2, seen.sum()) < 1 - SIGNIFICANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", SURFACES)
 def test_rays_leave_their_surface(which: str) -> None:
     """But for one in a million of those that graze it, whose crossing rounding may lose."""
@@ -209,6 +212,7 @@ def cell_means(field: LightField, side: int) -> tuple[Array, Array]:
     return value, error
 
 
+@pytest.mark.slow
 def test_a_refit_of_the_rays_agrees_with_the_field() -> None:
     """In the cells of its grid, 49 rays each: nearer than counts would be, and as near as it says."""
     n, side = 200_000, 8
@@ -319,6 +323,7 @@ def test_a_trillion_rays_need_no_memory(field: LightField) -> None:
     assert np.isfinite(last[0]).all()
 
 
+@pytest.mark.slow
 def test_rays_are_written_as_they_are_drawn(field: LightField, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """To TM-25 and back, and never more than a batch at once."""
     read, stretches = _core.read_rays, []

@@ -469,6 +469,7 @@ def with_values(source: GriddedSource, values: Array) -> GriddedSource:
     return dataclasses.replace(source, patches=dataclasses.replace(source.patches, values=values)).as_printed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", [Hemisphere(radius=2), Cylinder(radius=2, bottom=0, top=3, ends=False)])
 def test_curved_patches_show_what_they_send(surface: Surface) -> None:
     """A surface of equal Lambertian patches looks the same from everywhere, and sends L · (its projected area)."""
@@ -536,6 +537,7 @@ def sampled(surface: Surface, n: int = 200_000, **options: float) -> tuple[Gridd
     return source, source.sample(n, seed=5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("surface", "options"),
     [

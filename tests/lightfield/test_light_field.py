@@ -54,6 +54,7 @@ def test_it_beats_the_grid_of_the_thesis_by_far_whatever_its_threshold(
         assert ours < theirs / 4
 
 
+@pytest.mark.slow
 def test_the_product_base_is_taken_for_a_film_and_not_for_an_entangled_source() -> None:
     source = LimbDarkenedDisk()
     field = LightField.fit(rays_of(source, 30_000), et.Plane(z=0), depths=DEPTHS)
@@ -72,6 +73,7 @@ def test_the_product_base_is_taken_for_a_film_and_not_for_an_entangled_source() 
     assert bright[1] < 0.01 * bright[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["film", "dome"])
 def test_error_bars_cover_the_truth(family: str) -> None:
     """Cells within one and two standard errors, over three seeds.
@@ -131,6 +133,7 @@ def test_maps_show_the_truth_from_everywhere(film: tuple[PrismaticFilm, et.RaySe
         assert lmap.dead_pixels == 0
 
 
+@pytest.mark.slow
 def test_both_parts_of_a_dome_are_seen() -> None:
     source = DieUnderDome()
     field = LightField.fit(rays_of(source, 30_000), et.Dome(radius=source.radius * 1.001), depths=(4, 4, 3, 3))
@@ -147,6 +150,7 @@ def test_both_parts_of_a_dome_are_seen() -> None:
     assert both == pytest.approx(sum(parts) * 1e6, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_flux_through_a_far_sphere_is_the_total(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
     _, _, field = film
     intensity = field.intensity(72, 2.5)
@@ -159,6 +163,7 @@ def test_flux_through_a_far_sphere_is_the_total(film: tuple[PrismaticFilm, et.Ra
     assert lmap.intensity == pytest.approx(float(intensity.at(40, 25)), rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_refit_of_drawn_rays_agrees(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
     """The drawn field is the truth here. It is rougher than what was smoothed to make it: twelve other draws covered 63.8
     and 89.5 %, and these shares spread by 0.038 and 0.015, the first as that of 164 independent lines."""
@@ -175,6 +180,7 @@ def test_a_refit_of_drawn_rays_agrees(film: tuple[PrismaticFilm, et.RaySet, Ligh
     assert_covers(deviations=np.concatenate(deviations), effective=3 * 164, one=(0.6, 0.68), two=(0.87, 0.92))
 
 
+@pytest.mark.slow
 def test_weights_count_as_flux_and_not_as_rays() -> None:
     source = LimbDarkenedDisk()
     x, k = source.rays(120_000, seed=3)
@@ -196,6 +202,7 @@ def test_weights_count_as_flux_and_not_as_rays() -> None:
     assert (np.abs(value - truth) < 4 * error).all()
 
 
+@pytest.mark.slow
 def test_bits_do_not_depend_on_threads() -> None:
     rays = rays_of(DieUnderDome(), 10_000)
     one, seven = (LightField.fit(rays, et.Dome(radius=1.3), depths=(3, 3, 3, 3), threads=t) for t in (1, 7))
@@ -225,6 +232,7 @@ def test_what_makes_no_sense_is_refused(film: tuple[PrismaticFilm, et.RaySet, Li
         field.intensity(24, 7.0)
 
 
+@pytest.mark.slow
 def test_scores_of_surfaces_compare_the_same_rays() -> None:
     """A Lambertian rectangle of area A on a carrier that half of its rays miss.
 

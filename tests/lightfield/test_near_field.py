@@ -51,6 +51,7 @@ def test_refused_whatever_the_method(start: str) -> None:
         et.luminance_map(scene, eye, screen)
 
 
+@pytest.mark.slow
 def test_a_small_source_far_from_the_origin_is_none_of_them() -> None:
     """A die of 20 µm, 3 m off the origin, kept in single precision on a sphere of 10 m: its rays still tell its size."""
     k = directions(20_000, 5)

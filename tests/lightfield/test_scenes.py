@@ -85,6 +85,7 @@ def expected(name: str) -> tuple[GriddedSource, Array, Array, Array]:
 # --- Radiance ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SURFACES)
 def test_radiance_shows_the_same_luminance(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     radiance = pytest.importorskip("pyradiance", reason="pyradiance, which brings Radiance along, is not installed")
@@ -140,6 +141,7 @@ def load(mi: Any, folder: Path, scene: str = "scene.xml") -> tuple[ModuleType, A
     return importlib.import_module("gridded_area"), mi.load_file(str(folder / scene))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SURFACES)
 def test_mitsuba_shows_the_same_luminance(name: str, tmp_path: Path, mi: Any) -> None:
     source, points, directions, luminance = expected(name)

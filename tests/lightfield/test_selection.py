@@ -57,6 +57,7 @@ FLAT = {
 """Five seeds gave less. A dome's image of its die is curved: the best plane is some thousandths of the radius beside it."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(FLAT))
 def test_a_flat_source_is_found_at_its_depth(name: str) -> None:
     source, kind, radius, error = FLAT[name]
@@ -89,6 +90,7 @@ def test_a_flat_source_is_found_at_its_depth(name: str) -> None:
     assert any(f"depths between {low:.6g} and {high:.6g} mm" in note for note in choice.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3, 4])
 def test_a_film_of_few_details_is_found_by_its_rim(seed: int) -> None:
     """Its cut-offs move with the place, so that what is within it hardly tells the depth."""
@@ -110,6 +112,7 @@ def test_a_globe_is_a_sphere() -> None:
     assert choice.depths is None  # light in all directions: no plane was tried
 
 
+@pytest.mark.slow
 def test_the_upper_half_of_a_globe_is_a_hemisphere() -> None:
     globe = Globe()
     position, direction = globe.rays(2 * N, seed=1)
@@ -131,6 +134,7 @@ def test_a_rod_is_a_cylinder() -> None:
     assert surface.centre == pytest.approx(rod.middle[:2], abs=0.01 * rod.radius)
 
 
+@pytest.mark.slow
 def test_a_block_is_a_box_by_its_start_points_and_something_tight_by_its_lines() -> None:
     block = Block()
     position, direction = block.rays(N, seed=1)
@@ -159,17 +163,20 @@ def assert_alike(choice: SurfaceChoice, other: SurfaceChoice, length: float = 1.
     assert b.centre == pytest.approx([c * length + move for c in a.centre], abs=1e-6 * length)  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-3, 1e3])
 def test_the_unit_of_length_does_not_matter(length: float, led_choice: SurfaceChoice) -> None:
     position, direction = led_lines()
     assert_alike(led_choice, choose_surface(rays_of(position * length, direction)), length=length)
 
 
+@pytest.mark.slow
 def test_the_number_of_threads_does_not_matter_nor_the_unit_of_flux(led_choice: SurfaceChoice) -> None:
     other = choose_surface(rays_of(*led_lines(), flux_unit="W"), threads=1)
     assert (other.surface, other.table, other.depths) == (led_choice.surface, led_choice.table, led_choice.depths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("move", [7.0, 1e6])
 def test_where_the_source_is_does_not_matter(move: float, led_choice: SurfaceChoice) -> None:
     """Also so far off that coordinates have no more than ten digits for the source."""
@@ -180,6 +187,7 @@ def test_where_the_source_is_does_not_matter(move: float, led_choice: SurfaceCho
     assert choice.surface.area == pytest.approx(led_choice.surface.area, rel=0.01)
 
 
+@pytest.mark.slow
 def test_where_on_their_lines_rays_start_does_not_matter(led_choice: SurfaceChoice) -> None:
     choice = choose_surface(rays_of(*scattered(*led_lines(), 1000.0)))
     assert isinstance(choice.surface, Plane)
@@ -187,6 +195,7 @@ def test_where_on_their_lines_rays_start_does_not_matter(led_choice: SurfaceChoi
     assert choice.surface.area == pytest.approx(led_choice.surface.area, rel=0.01)
 
 
+@pytest.mark.slow
 def test_start_points_on_a_plane_of_any_depth_do_not_hide_the_source() -> None:
     """Rays stopped at an exit plane, far above what shines."""
     position, direction = led_lines()
@@ -196,6 +205,7 @@ def test_start_points_on_a_plane_of_any_depth_do_not_hide_the_source() -> None:
     assert choice.surface.z == pytest.approx(MOVE[2], abs=2e-3)
 
 
+@pytest.mark.slow
 def test_strays_far_off_do_not_matter(led_choice: SurfaceChoice) -> None:
     position, direction = (values.copy() for values in led_lines())
     rng = np.random.default_rng(3)
@@ -208,6 +218,7 @@ def test_strays_far_off_do_not_matter(led_choice: SurfaceChoice) -> None:
     assert 0.001 < row.unmet < 0.011  # the strays
 
 
+@pytest.mark.slow
 def test_rays_without_a_place_do_not_matter() -> None:
     position, direction = (values.copy() for values in led_lines())
     broken = np.arange(0, N, 5000)
@@ -223,6 +234,7 @@ def test_rays_without_a_place_do_not_matter() -> None:
 # --- sources at the edge of what can be told ---------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_point_is_where_its_rays_meet() -> None:
     rng = np.random.default_rng(4)
     turn, square = rng.random(5000) * 2 * np.pi, 0.9 * rng.random(5000)
@@ -233,6 +245,7 @@ def test_a_point_is_where_its_rays_meet() -> None:
     assert choice.surface.area < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("towards", [(0.0, 0.0, 1.0), (0.3, 0.1, 0.9)])
 def test_a_beam_keeps_its_cross_section(towards: tuple[float, float, float]) -> None:
     """Any depth is as good for it: it stays where the rays start."""
@@ -253,6 +266,7 @@ def test_light_towards_minus_z_gets_a_closed_surface_and_a_hint() -> None:
     assert any("rays.rotated" in note for note in choice.notes)
 
 
+@pytest.mark.slow
 def test_too_few_rays_say_what_to_do() -> None:
     position, direction = led_lines(25)
     with pytest.raises(ArgumentError, match=r"24 rays with flux are too few.*surface="):
@@ -306,6 +320,7 @@ FILES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(FILES))
 def test_a_real_file_gets_the_surface_an_engineer_would_choose(samples: Path, name: str) -> None:
     found, wanted = choose_surface(et.read_rays(samples / "rays" / name)).surface, FILES[name]
@@ -323,6 +338,7 @@ def test_notes_name_all_that_was_compared(led_choice: SurfaceChoice) -> None:
     assert json.dumps(choice.notes)
 
 
+@pytest.mark.slow
 def test_the_choice_is_told_in_the_words_of_the_trade() -> None:
     """What was chosen and why; every other surface with its distance, and a reason if it predicts better."""
     choice = choose_surface(et.RingSource(rays=60_000))

@@ -77,6 +77,7 @@ FAMILIES = [(source, plane_lines, plane_unit) for source in PLANAR] + [(DOME, do
 NAMES = [type(source).__name__ for source, *_ in FAMILIES]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("source", "lines", "unit_of"), FAMILIES, ids=NAMES)
 def test_rays_follow_the_luminance(source, lines, unit_of) -> None:
     """χ² over étendue cells: counts against luminance at random points of each cell, both with their variance."""
@@ -152,6 +153,7 @@ def test_planar_sources_are_dark_from_behind_and_beside(source) -> None:
     assert (source.luminance(points=points, directions=directions) == 0).all()
 
 
+@pytest.mark.slow
 def test_the_flux_does_not_change_with_finer_gauss_rules(monkeypatch: pytest.MonkeyPatch) -> None:
     """An edge that a rule crosses would show here."""
     from tests.oracles import sources

@@ -202,6 +202,7 @@ def test_a_map_through_a_filter_takes_the_spectrum_of_the_field(field: LightFiel
     assert not any("all its rays together" in note for note in without.notes)
 
 
+@pytest.mark.slow
 def test_a_map_of_a_ray_file_takes_the_spectrum_of_its_rays(tmp_path: Path) -> None:
     """The set is fitted; its lines are those of the map, and what tells them apart is named."""
     et.write_rays(tmp_path / "led.tm25ray", rays())

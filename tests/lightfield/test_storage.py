@@ -174,6 +174,7 @@ def test_a_field_that_trees_made_takes_a_fraction_of_its_bytes(tmp_path: Path) -
 # --- what others read and write ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @EVERY
 def test_the_reader_on_the_page_finds_the_luminance(which: str, saved: dict[str, Path]) -> None:
     """The page's code knows nothing of étendue: every chart, the sums over parts and the read-out, written twice."""
@@ -260,6 +261,7 @@ def test_what_is_no_hdf5(content: bytes, tmp_path: Path) -> None:
         LightField.load(tmp_path / "x.h5")
 
 
+@pytest.mark.slow
 def test_cut_at_every_byte(tmp_path: Path) -> None:
     path = tmp_path / "cut.h5"
     field = make_field(SURFACES["plane"], cells=(2, 1, 1, 1), factors=None)
@@ -271,6 +273,7 @@ def test_cut_at_every_byte(tmp_path: Path) -> None:
             LightField.load(path)
 
 
+@pytest.mark.slow
 def test_damage_gives_a_format_error_or_the_right_field(saved: dict[str, Path], tmp_path: Path) -> None:
     """Every 19th byte is another one; the rest of them is space that the library left between its headers."""
     rng = np.random.default_rng(4)
@@ -291,6 +294,7 @@ def test_damage_gives_a_format_error_or_the_right_field(saved: dict[str, Path], 
     assert refused > 0.5 * len(whole) / 19
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ratio", "deviation", "space", "direction"])
 @pytest.mark.parametrize("cells", [(16, 8, 8, 16), (2, 1, 1, 1)], ids=["large", "small"])
 def test_damaged_arrays_are_never_taken(name: str, cells: Any, tmp_path: Path) -> None:
@@ -483,6 +487,7 @@ CHANGES: dict[str, tuple[Callable[[Any], None], str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 def test_what_does_not_fit_is_refused(change: str, saved: dict[str, Path], tmp_path: Path) -> None:
     path = tmp_path / "field.h5"

@@ -61,6 +61,7 @@ def test_folded_counts_are_those_of_all_images_of_the_rays(name: str, surface: e
     assert sum(folded.part_flux) == pytest.approx(sum(expected.part_flux) / len(copies), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_symmetric_source_is_found_and_its_errors_shrink() -> None:
     rays = et.RingSource(rays=100_000)
     plain = et.LightField.fit(rays, et.Disk(radius=30), depths=DEPTHS)
@@ -103,6 +104,7 @@ def test_images_of_a_ray_tell_nothing_more_of_the_flux(
     np.testing.assert_allclose(relative, np.sqrt(np.sum(weights**2)) / np.sum(weights), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_error_bars_of_folded_fields_cover_the_truth() -> None:
     """Each ray stands for two: error bars that took them for independent ones would be too small by √2.
 

@@ -36,6 +36,7 @@ def film_rays(n: int) -> et.RaySet:
     return et.RaySet(position, direction, weight * FILM.total_flux / weight.sum())
 
 
+@pytest.mark.slow
 def test_every_number_by_the_long_way() -> None:
     rays, thresholds = film_rays(40_000), (5.0, 0.5, 0.05)
     sweep = threshold_sweep(rays, DISK, 2.0, thresholds, c_planes=24, gamma_step=5.0, seed=4)
@@ -64,6 +65,7 @@ def test_every_number_by_the_long_way() -> None:
         assert sweep["score_error"][i] == pytest.approx(error, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_far_field_rises_while_the_light_field_drowns() -> None:
     """What section 3.2.4 would choose is far worse than a uniform light field, and the score says so."""
     sweep = threshold_sweep(film_rays(200_000), DISK, 1.0)
@@ -173,6 +175,7 @@ def test_the_picture(tmp_path: Path) -> None:
         plot_threshold_sweep(sweep, tmp_path / "a.bmp")
 
 
+@pytest.mark.slow
 def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     et.write_rays("film.tm25ray", film_rays(20_000))

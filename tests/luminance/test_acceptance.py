@@ -36,6 +36,7 @@ def lobed_truth(screen: et.Screen, observer: et.Observer, exponent: float) -> np
     return intensity * density / to_eye[..., 2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("n", "exponent", "pixels"),
     [(2_000_000, 400.0, 16), (200_000, 400.0, 16), (2_000_000, 5.0, 32), (100_000, 60.0, 8)],
@@ -51,6 +52,7 @@ def test_the_chosen_acceptance_is_nearly_the_best(n: int, exponent: float, pixel
     assert error[choice.index] < 1.25 * error.min(), (LADDER[choice.index], LADDER[int(error.argmin())])
 
 
+@pytest.mark.slow
 def test_the_cases_above_have_different_answers() -> None:
     """Otherwise a constant would pass: a sharp lobe with many rays wants a narrow cone, a wide lobe a wide one."""
     chosen = []

@@ -42,6 +42,7 @@ def long_run(name: str) -> LuminanceMap:
     return lmap
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_default_maps_are_unbiased_with_errors_that_hold(name: str) -> None:
     """Of 12 seeds: the light of each map, and of their mean, is that of the long run; in the bulk of the pixels no error is

@@ -148,6 +148,7 @@ def test_light_image(traced: TraceResult) -> None:
     )
 
 
+@pytest.mark.slow
 def test_reverse_map() -> None:
     """By lines of sight, to less than a hundredth a pixel; a mirror image would be told."""
     (seen,) = et.luminance_map(cavity(), rays_per_pixel=16384, seed=2)

@@ -28,6 +28,7 @@ def unequal_rays() -> et.RaySet:
     return et.RaySet(position, direction, rng.exponential(1.0, n))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plane", ["view", "xy"])
 @pytest.mark.parametrize(("theta", "phi"), [*OBSERVERS, (0.0, 0.0), (5.0, 300.0), (120.0, 45.0)])
 def test_equals_the_equations_ray_by_ray(unequal_rays: et.RaySet, theta: float, phi: float, plane: str) -> None:
@@ -49,6 +50,7 @@ def quadrilateral_rays() -> et.RaySet:
     return Quadrilateral().rays(6_000_000, seed=20)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plane", ["view", "xy"])
 @pytest.mark.parametrize(("theta", "phi"), OBSERVERS)
 def test_every_pixel_of_a_tilted_quadrilateral_is_in_its_place(

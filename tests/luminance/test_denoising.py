@@ -92,6 +92,7 @@ def scene(rows: int, columns: int) -> Array:
     return np.where((x < 0.2) & (y > 0.5), 0.05, 0.5 + x + bump + 6.0 * bar)
 
 
+@pytest.mark.slow
 def test_flux_is_kept_and_the_error_falls() -> None:
     screen = et.Screen(9.0, 6.0, 90, 60)
     truth = scene(60, 90)
@@ -109,6 +110,7 @@ def test_flux_is_kept_and_the_error_falls() -> None:
     assert error(smooth) < 0.5 * error(noisy)
 
 
+@pytest.mark.slow
 def test_error_bars_cover() -> None:
     """68 ± 5 % within one standard error, 95 ± 3 % within two (theory section 12), from few rays to many.
 
@@ -123,6 +125,7 @@ def test_error_bars_cover() -> None:
     assert_covers(deviations=np.array(deviations), effective=1461, one=(0.63, 0.73), two=(0.92, 0.98))
 
 
+@pytest.mark.slow
 def test_a_uniform_map_becomes_uniform() -> None:
     """One ray per pixel and no structure: the relative spread falls from 100 % to that of the total and little more."""
     noisy = poisson_map(np.ones((64, 64)), 1.0, 3, et.Screen(6, 6, 64, 64))
@@ -133,6 +136,7 @@ def test_a_uniform_map_becomes_uniform() -> None:
     assert np.median(smooth.standard_error) > 1 / 64 * 0.9
 
 
+@pytest.mark.slow
 def test_unequal_weights_count_as_fewer_rays() -> None:
     """The same map with errors three times as large rests on a ninth of the rays, and is smoothed more."""
     truth = scene(32, 32)
@@ -147,6 +151,7 @@ def test_unequal_weights_count_as_fewer_rays() -> None:
     assert roughness(smoother) < 0.97 * roughness(smooth)
 
 
+@pytest.mark.slow
 def test_same_bits_for_any_number_of_threads_and_any_odd_shape() -> None:
     for rows, columns in ((7, 33), (1, 5), (3, 1), (64, 64)):
         noisy = poisson_map(scene(rows, columns), 5.0, 2, et.Screen(2, 2, columns, rows))

@@ -269,6 +269,7 @@ def test_flux_from_disc_to_disc_as_it_is_seen() -> None:
 # --- mirrors and sums --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("angle", "length"), [(35.0, 3.0), (60.0, 5.0)])
 def test_mirrored_pipe(angle: float, length: float) -> None:
     """What is seen of a luminous disk through a mirror pipe is what it lets pass of parallel light [SwiftSmith1995]_."""

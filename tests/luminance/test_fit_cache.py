@@ -53,6 +53,7 @@ def forget() -> None:
     fit_cache._memory.clear()
 
 
+@pytest.mark.slow
 def test_the_map_is_the_same_from_a_fit_from_memory_from_disk_and_without_a_cache(
     folder: Path, fits: list[int]
 ) -> None:
@@ -69,6 +70,7 @@ def test_the_map_is_the_same_from_a_fit_from_memory_from_disk_and_without_a_cach
     assert et.cache_content().fields == 1 == len(list(folder.iterdir()))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_recalled_field_tells_the_notes_of_the_rays_as_they_are_now(fits: list[int]) -> None:
     rays = led()
@@ -81,6 +83,7 @@ def test_a_recalled_field_tells_the_notes_of_the_rays_as_they_are_now(fits: list
         assert told.notes[len(told.notes) - len(notes) :] == notes
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_another_ray_surface_unit_or_program_is_another_fit(fits: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     rays = led()
@@ -98,6 +101,7 @@ def test_another_ray_surface_unit_or_program_is_another_fit(fits: list[int], mon
     assert len(fits) == 6
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_scene_with_a_ray_file_is_fitted_once(fits: list[int], tmp_path: Path) -> None:
     et.write_rays(tmp_path / "led.tm25ray", led())
@@ -115,6 +119,7 @@ def test_a_scene_with_a_ray_file_is_fitted_once(fits: list[int], tmp_path: Path)
     assert len(fits) == 3
 
 
+@pytest.mark.slow
 def test_a_damaged_file_is_made_anew(folder: Path, fits: list[int]) -> None:
     rays = led()
     whole = seen(rays)
@@ -127,6 +132,7 @@ def test_a_damaged_file_is_made_anew(folder: Path, fits: list[int]) -> None:
     assert len(fits) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_the_folder_is_bounded_and_what_was_used_last_stays(fits: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     sets = [led(seed) for seed in range(4)]
@@ -153,6 +159,7 @@ def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path, monkeyp
     assert seen(led()).values.max() > 0
 
 
+@pytest.mark.slow
 def test_two_processes_share_the_folder(folder: Path, tmp_path: Path) -> None:
     """Both fit and keep at the same time, and clear what the other reads: each gets its map, and no file is left half."""
     et.write_rays(tmp_path / "led.tm25ray", led())

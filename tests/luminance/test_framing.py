@@ -94,6 +94,7 @@ def test_a_scene_needs_no_screen_and_no_object(tmp_path: Path) -> None:
     assert et.trace(tmp_path / "lamp.toml", rays=1000).rays_done == 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["cone", "lightfield"])
 def test_a_screen_that_misses_light_says_so(method: str) -> None:
     observer = et.Observer(20, 35, 2000, target=(4, 3, 7))

@@ -47,6 +47,7 @@ def gathered() -> et.LuminanceMap:
     return seen(et.Scene(**tray()), rays_per_pixel=1024, seed=3, gather=True)
 
 
+@pytest.mark.slow
 def test_the_map_is_that_of_the_light_image(gathered: et.LuminanceMap) -> None:
     """Rays forwards, each scatter connected to the eye, know nothing of patches."""
     image = et.trace(et.Scene(**tray()), 2e6, 9).images["image"]
@@ -72,6 +73,7 @@ def test_noise_is_much_smaller(gathered: et.LuminanceMap) -> None:
     assert "leave gather out" not in " ".join(gathered.notes)
 
 
+@pytest.mark.slow
 def test_integrating_sphere() -> None:
     """V6: L = ρ (E₀ + E_r)/π, as in test_scene_map, to a fraction of its error."""
     radius, reflectance, flux, top = 10.0, 0.9, 3.0, 8.0
@@ -101,6 +103,7 @@ def test_integrating_sphere() -> None:
     assert abs(lmap.values.mean() / expected - 1) < 3.9 * 2.5e-3
 
 
+@pytest.mark.slow
 def test_no_light_is_counted_twice() -> None:
     """A lens throws a caustic on the floor, which lights the walls; a beam falls on a side: what the light image adds and
     what the patches send are shared out."""
@@ -124,6 +127,7 @@ def test_no_light_is_counted_twice() -> None:
     assert_agree(values=both.values[clear], expected=image.values[clear], standard_error=error[clear], degrees=REVERSE)
 
 
+@pytest.mark.slow
 def test_triangles_of_a_mesh_are_patches(tmp_path: Any) -> None:
     """A dented bowl of small triangles and one of large ones, beside lines of sight that go on."""
     import trimesh
@@ -148,6 +152,7 @@ def test_triangles_of_a_mesh_are_patches(tmp_path: Any) -> None:
     assert np.median((exact.standard_error[lit] / known.standard_error[lit]) ** 2) * 4 > 1.2
 
 
+@pytest.mark.slow
 def test_the_same_bits_for_any_number_of_threads() -> None:
     maps = [seen(et.Scene(**tray()), rays_per_pixel=64, seed=3, gather=True, threads=n) for n in (1, 2, 7)]
     for other in maps[1:]:
@@ -176,6 +181,7 @@ def test_a_difference_is_told() -> None:
     assert "too few" in comparison_note(passes, [np.diag([1.0, 0, 0, 0, 0]) * k for k in (1.0, 2.0)])
 
 
+@pytest.mark.slow
 def test_colours_and_light_fields_are_gathered_too() -> None:
     """Two wavelengths of unequal shares, walls that reflect them unequally, a light field beside the lamp: the light image
     of rays forwards, which knows of no patches, has the same values."""

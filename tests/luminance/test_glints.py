@@ -34,6 +34,7 @@ def agree(scene: et.Scene, observer: et.Observer, screen: et.Screen, expected: f
     assert abs(light.mean() - expected) < LARGEST_Z * known
 
 
+@pytest.mark.slow
 def test_a_lamp_seen_directly_and_in_a_mirror() -> None:
     """A screen at the target, at right angles to the view of an eye D away: a lamp of area A at the distance d from the eye,
     turned by θ, makes ∫ L dA = L A cos θ (D/d)² of it."""
@@ -70,6 +71,7 @@ def glass(kind: str) -> dict[str, Any]:
     return {"sources": [{**lamp, "at": [4, 2, 30], "toward": [-0.1, -0.05, -1]}], "solids": [shapes[kind]]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ball", "torus"])
 def test_glints_in_glass(kind: str) -> None:
     """Each glint from close by, where it fills pixels and no line is aimed at it, shows the light of the coarse map."""
@@ -77,7 +79,7 @@ def test_glints_in_glass(kind: str) -> None:
     eye, screen = et.Observer(55, 20, 300, target=(1, 0.5, 9)), et.Screen(18, 14, 9, 7)
     core = _core.Scene({**compile_scene(scene).record, "detectors": []})
     assert _core.Glints(core, screen.core_view(eye), MOST_EVENTS).pixels() > 0
-    maps = [et.luminance_map(scene, eye, screen, rays_per_pixel=64, seed=seed) for seed in range(1, 13)]
+    maps = [et.luminance_map(scene, eye, screen, rays_per_pixel=64, seed=seed) for seed in range(1, 7)]
     values = np.array([lmap.values for lmap in maps])
     error = np.array([lmap.standard_error for lmap in maps])
     mean = values.mean(axis=0)
@@ -87,10 +89,10 @@ def test_glints_in_glass(kind: str) -> None:
     width, height = view["width"] / 9, view["height"] / 7
     off = ((column + 0.5) * width - view["width"] / 2, view["height"] / 2 - (row + 0.5) * height)
     view["target"] = tuple(np.array(view["target"]) + np.array(view["right"]) * off[0] + np.array(view["up"]) * off[1])
-    view.update(width=width, height=height, columns=2048, rows=2048)
+    view.update(width=width, height=height, columns=1024, rows=1024)
     fine, *_ = _core.look_at_scene(core, view, 1, 5, MOST_EVENTS, "nothing", 0, 1)
     shown = fine[fine > 0]
-    assert len(shown) > 30
+    assert len(shown) > 20
     expected = 1e6 * fine.mean()
     # Pixels of the rim are met or not by one line each.
     known = 1e6 * math.sqrt((shown**2).sum()) / fine.size

@@ -20,6 +20,7 @@ def furnace(body: str, times: int, radius: float) -> dict[str, Any]:
     return {"sources": [sky], "solids": [{"shape": smooth_mesh(body, times), "medium": {"index": 1.5}}]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", ROUND_BODIES)
 @pytest.mark.parametrize("times", [1, 2, 4])
 @pytest.mark.parametrize("view", [(20, 30), (88, 200)])
@@ -37,6 +38,7 @@ def test_every_pixel_of_a_smooth_mesh_shows_the_furnace(body: str, times: int, v
         assert chi2.sf((z**2).sum(), z.size) > SIGNIFICANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", ROUND_BODIES)
 @pytest.mark.parametrize("times", [1, 3])
 def test_a_clear_smooth_mesh_loses_no_light(body: str, times: int) -> None:
@@ -48,6 +50,7 @@ def test_a_clear_smooth_mesh_loses_no_light(body: str, times: int) -> None:
     assert ledger.escaped.flux == pytest.approx(4 * (math.pi * 15) ** 2, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_interpolated_normals_move_light_at_the_rim_and_less_with_finer_meshes() -> None:
     """In an even surround all lines are alike, with a ball or without: their squared distances from its middle are evenly
     spread. What interpolated normals do to étendue, and corners to the outline, is of second order in the size of the

@@ -147,6 +147,7 @@ UNSUITED = " is for "
 """In messages about a method that does not take the source."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("source", "method", "option"), combinations())
 def test_every_option_gives_the_same_map_through_every_door(
     source: str, method: str, option: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -168,6 +169,7 @@ def test_every_option_gives_the_same_map_through_every_door(
         assert same(by_object, et.read_map(tmp_path / "a.npz"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("source", "method", "option"), combinations())
 def test_no_option_is_without_effect(source: str, method: str, option: str, folder: Path) -> None:
     light = READERS[source](folder)

@@ -46,6 +46,7 @@ OBSERVERS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plane", ["view", "xy"])
 @pytest.mark.parametrize(("acceptance", "lit"), [(0.1, 4), (1.5, 10), (30.0, 16)])
 def test_counts_the_same_rays_for_every_observer(
@@ -78,6 +79,7 @@ def test_automatic_acceptance_is_that_of_the_full_pass(cloud: et.RaySet, index: 
     assert found.provenance.steps[-1] == expected.provenance.steps[-1]
 
 
+@pytest.mark.slow
 def test_drawn_rays_and_rays_of_a_field_are_indexed_too() -> None:
     rings = et.RingSource((2.0, 5.0), (30.0, 20.0), rays=200_000, seed=3)
     field = et.LightField.fit(rings, et.Plane(z=0.0), depths=(3, 3, 3, 3))

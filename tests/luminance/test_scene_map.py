@@ -141,6 +141,7 @@ def test_disk_in_a_dome() -> None:
     assert (lmap.values[outside] < 1e-3 * 1e6).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [3.0, 6.0])
 def test_flashed_disk_of_a_parabola(tilt: float) -> None:
     """V5: a sphere of radius a at the focus flashes the paraboloid where (f + r²/4f) sin δ ≤ a: I = ρ L π r² cos δ, and the
@@ -247,6 +248,7 @@ def test_diffuse_furnace() -> None:
     assert np.allclose(lmap.values[~known], 1e6, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_rings_through_a_collecting_surface() -> None:
     """V1: the rings of thesis section 2.3, Lᵢ = Φᵢ/(π Aᵢ), by lines of sight, and by the cone from the rays that a surface
     before them kept."""
@@ -292,6 +294,7 @@ def test_a_beam_on_paper() -> None:
         assert_agree(values=lmap.values, expected=expected, standard_error=lmap.standard_error)
 
 
+@pytest.mark.slow
 def test_no_light_is_counted_twice() -> None:
     """A lens throws a caustic on the floor, part of which lights the wall: lines of sight and rays forwards share the light
     out between them, and a whole light image has all of it, but for pixels in which the lens itself is seen."""
@@ -318,6 +321,7 @@ def test_no_light_is_counted_twice() -> None:
 # --- solids that touch -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_cemented_bodies_are_one() -> None:
     """A rod in two halves of the same medium, and one within another: nothing is seen of where they touch."""
     whole = [
@@ -407,9 +411,10 @@ def test_error_bars_hold() -> None:
     assert abs(ratio - 1) < LARGEST_Z * math.sqrt(2 / (23 * pixels) + 2 / (24 * 15 * pixels)) * 1.2
 
 
+@pytest.mark.slow
 def test_rays_are_fitted_before_they_are_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(fit_cache.FOLDER_VARIABLE, str(tmp_path / "kept"))
-    rings = et.RingSource(rays=300_000, seed=3)
+    rings = et.RingSource(rays=20_000, seed=3)
     rays = et.RaySet.merge([et.RaySet(b.position, b.direction, b.flux) for b in rings.batches()])
     et.write_rays(tmp_path / "rings.tm25ray", rays)
     # The same rays as a file and in memory: the second map finds the field of the first.
@@ -421,7 +426,7 @@ def test_rays_are_fitted_before_they_are_looked_at(tmp_path: Path, monkeypatch: 
         # the map.
         assert (lmap.standard_error > 0).all()
         error = float(lmap.standard_error.mean())
-        assert error < 0.01 * lmap.values.mean()
+        assert error < 0.05 * lmap.values.mean()
         assert abs(lmap.values.mean() - rings.zone_luminance[0] / 2) < LARGEST_Z * error
     fitted, notes = with_fields(scene)
     assert fitted.sources[0].kind == "light-field"
@@ -462,6 +467,7 @@ def test_options_belong_to_their_sources() -> None:
         et.luminance_map(scene, screen=screen)
 
 
+@pytest.mark.slow
 def test_a_gridded_source_is_seen_as_the_rays_it_draws() -> None:
     """Its patches have no luminance that a line of sight could meet: a light field is fitted to its rays."""
     rings = et.RingSource(rays=200_000)

@@ -15,6 +15,7 @@ from oracles.verdicts import LARGEST_Z, assert_agree, assert_differ
 SCENES: list[Callable[[], dict[str, Any]]] = [corner, lens_and_mirror, reflector_and_cover]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene_of", SCENES)
 def test_light_image_and_lines_of_sight_show_the_same(scene_of: Callable[[], dict[str, Any]]) -> None:
     """χ² over the pixels: the light image of a trace, every scatter connected to the eye, and the map by lines of sight."""
@@ -33,6 +34,7 @@ def test_light_image_and_lines_of_sight_show_the_same(scene_of: Callable[[], dic
         assert_differ(values=forward.values, other=other, standard_error=error)
 
 
+@pytest.mark.slow
 def test_collected_rays_and_lines_of_sight_show_the_same() -> None:
     """χ² over the pixels: cones of rays that a plane has collected, and lines of sight in directions drawn in the cones.
 
@@ -46,7 +48,7 @@ def test_collected_rays_and_lines_of_sight_show_the_same() -> None:
     rays = et.trace(scene, 1.5e6, 7).rays["plane"]
     cone = et.luminance_map(rays, eye, screen, method="cone", acceptance=acceptance)
     rng = np.random.default_rng(8)
-    count = 64
+    count = 28
     z = rng.uniform(math.cos(math.radians(acceptance)), 1.0, count)
     turn = rng.uniform(0, 2 * np.pi, count)
     right, up, axis = et.Screen(1, 1, 1, 1).axes(eye)

@@ -175,6 +175,7 @@ def test_unknown_errors_and_counts_spread_to_those_who_use_them() -> None:
     assert selective.standard_error[0, 2] == pytest.approx(math.sqrt(2) / 2, rel=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["average", "weighted"])
 def test_propagated_errors_are_right(name: str) -> None:
     """4000 noisy maps: variance of g over variance claimed, each pixel χ²(3999), Bonferroni over pixels at 1e-6."""

@@ -100,6 +100,7 @@ def test_each_extension_saves_in_its_format(name: str, tmp_path: Path) -> None:
         assert [entry.name for entry in MAP_FORMATS.values() if entry.sniff(path.read_bytes()[:64])] == [name]
 
 
+@pytest.mark.slow
 @ALL
 def test_cut_at_every_byte(name: str, tmp_path: Path) -> None:
     path = path_of(name, tmp_path)
@@ -112,6 +113,7 @@ def test_cut_at_every_byte(name: str, tmp_path: Path) -> None:
             read_map(path)
 
 
+@pytest.mark.slow
 @ALL
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
@@ -211,6 +213,7 @@ def test_csv_with_the_line_ends_of_any_system(end: bytes, tmp_path: Path) -> Non
         read_map(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tag", [256, 270, 273, 305])
 def test_tiff_tags_that_announce_more_than_the_file_has_are_refused_in_little_memory(tag: int, tmp_path: Path) -> None:
     """A count of 2³¹: 8 GB of numbers, for which the library would make room."""
@@ -435,6 +438,7 @@ def test_long_and_foreign_numbers_in_the_header(name: str, number: str, tmp_path
         read_map(path)
 
 
+@pytest.mark.slow
 def test_npz_members_are_not_unpacked_beyond_what_a_map_holds(tmp_path: Path) -> None:
     """Blanks where the JSON text should be, zeros behind the pixels; few bytes in the
     file, 300 MB unpacked."""

@@ -85,6 +85,7 @@ def words(figure: Figure) -> str:
     return "\n".join(text.get_text() for text in figure.texts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("show", ["value", "relative-error"])
 @pytest.mark.parametrize("scale", ["linear", "log"])
 @pytest.mark.parametrize("which", MAPS)
@@ -181,6 +182,7 @@ def test_limits_of_the_colours(which: str, options: dict[str, Any], limits: tupl
     assert (norm.vmin, norm.vmax) == pytest.approx(limits)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "extend"),
     [
@@ -216,6 +218,7 @@ def test_unknown_names_get_a_suggestion(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_more_pixels_than_dots_are_averaged_not_dropped(tmp_path: Path) -> None:
     """A bright pixel in every 16 x 16 must leave a trace: averaged, the whole picture is evenly lit."""
     values = np.zeros((4096, 4096))
@@ -236,6 +239,7 @@ def test_more_pixels_than_dots_are_averaged_not_dropped(tmp_path: Path) -> None:
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extension", [".png", ".pdf", ".PNG"])
 def test_the_same_map_gives_the_same_bytes(extension: str, tmp_path: Path) -> None:
     first, second = tmp_path / f"first{extension}", tmp_path / f"second{extension}"
@@ -271,6 +275,7 @@ def test_without_a_path_the_figure_comes_back_unregistered() -> None:
     assert plt.get_fignums() == []
 
 
+@pytest.mark.slow
 def test_matplotlib_waits_until_a_picture_is_asked_for() -> None:
     program = "import sys, etendue.plot; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
@@ -279,6 +284,7 @@ def test_matplotlib_waits_until_a_picture_is_asked_for() -> None:
 # --- cross sections --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", ["linear", "log"])
 @pytest.mark.parametrize("which", MAPS)
 def test_cross_sections_of_every_map(which: str, scale: Any) -> None:
@@ -317,6 +323,7 @@ def test_cross_sections_that_do_not_fit_together_are_refused() -> None:
 # --- comparisons -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", ["linear", "log"])
 @pytest.mark.parametrize("which", sorted(set(MAPS) - {"infinite"}))
 def test_comparisons_of_every_map(which: str, scale: Any) -> None:

@@ -301,6 +301,7 @@ ROUTES: dict[str, tuple[Callable[[], tuple[Any, Any]], float]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROUTES)
 def test_two_routes_agree_and_five_per_cent_are_found(name: str) -> None:
     routes, tolerance = ROUTES[name]

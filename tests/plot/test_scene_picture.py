@@ -129,6 +129,7 @@ def test_a_plane_without_an_end_widens_the_frame_if_it_is_near() -> None:
 # --- to scale --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("section", [["y=0", "x=0"], ["z=0.4"], ["y=0.2", "z=0.4", "x=0"]])
 @pytest.mark.parametrize("scene", [LAMP, {"sources": LAMP["sources"]}, {"solids": LAMP["solids"][:1]}, {}])
 def test_a_millimetre_is_as_long_in_all_directions(scene: dict[str, Any], section: list[str]) -> None:
@@ -149,6 +150,7 @@ def test_a_millimetre_is_as_long_in_all_directions(scene: dict[str, Any], sectio
     assert (size < (11, 11)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-3, 1e3])
 def test_drawings_of_small_and_large_scenes_are_alike(factor: float) -> None:
     here, there = (lay_out_scene(Scene(**scaled(LAMP, f))) for f in (1.0, factor))
@@ -277,6 +279,7 @@ def test_names_stand_side_by_side_in_the_frame() -> None:
     assert placer.place("outside", [np.array([[5.0, 1], [6, 1]])]) is None
 
 
+@pytest.mark.slow
 def test_many_things_do_not_get_a_name_each() -> None:
     rows = [{"shape": {"kind": "disk", "radius": 1}, "finish": "mirror", "at": [3 * i, 0, 0]} for i in range(60)]
     figure = et.draw_scene(Scene(surfaces=rows), rays=0, section="y=0")
@@ -286,6 +289,7 @@ def test_many_things_do_not_get_a_name_each() -> None:
 # --- files and mistakes ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extension", [".png", ".pdf", ".PNG"])
 def test_the_same_scene_gives_the_same_bytes(tmp_path: Path, extension: str) -> None:
     paths = [tmp_path / f"{name}{extension}" for name in "ab"]

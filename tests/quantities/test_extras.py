@@ -52,6 +52,7 @@ def libraries(requirements: list[str]) -> set[str]:
     return {re.split(r"[^\w-]", text)[0] for text in requirements}
 
 
+@pytest.mark.slow
 def test_the_main_job_needs_no_extra(tmp_path: Path) -> None:
     done = run_blocked(MAIN_JOB, tmp_path)
     assert done.returncode == 0, done.stderr
@@ -64,6 +65,7 @@ def test_extras_are_those_of_the_package(library: str) -> None:
     assert library not in libraries(PROJECT["dependencies"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("program", "extra"),
     [
@@ -83,6 +85,7 @@ def test_what_needs_an_extra_names_it(program: str, extra: str, tmp_path: Path) 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -102,6 +105,7 @@ def test_the_command_line_says_so_before_any_work(arguments: tuple[str, ...], tm
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_command_line_works_without(tmp_path: Path) -> None:
     program = "from etendue.cli import main; main()"
     (tmp_path / "lamp.toml").write_text('[[sources]]\nkind = "point"\nflux = 1\n')

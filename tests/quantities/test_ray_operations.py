@@ -267,6 +267,7 @@ def test_watts_per_lumen_of_a_ray_survive(operation: Callable[[RaySet], RaySet])
     assert changed.in_unit("W").total_flux == pytest.approx(1000.0 / 300, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_columns_of_more_rays_than_a_stretch_stay_with_their_rays() -> None:
     n = 2 * ray_rewriting.CHUNK + 1000
     table = np.zeros(n, [("position", "<f4", 3), ("direction", "<f4", 3), ("flux", "<f4"), ("wavelength", "<f8")])

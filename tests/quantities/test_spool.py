@@ -63,6 +63,7 @@ def test_strided_stretches_are_gathered_too() -> None:
         )
 
 
+@pytest.mark.slow
 def test_nothing_is_left_in_the_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     before = open_files()
@@ -75,6 +76,7 @@ def test_nothing_is_left_in_the_temporary_folder(tmp_path: Path, monkeypatch: py
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [0, 1 << 30])
 def test_a_failing_stretch_leaves_nothing(limit: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -104,6 +106,7 @@ def test_memory_stays_below_the_limit_and_one_stretch() -> None:
     assert peak < 9 * n * DTYPE.itemsize
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_an_os_error_and_never_a_short_file() -> None:
     """A limit on file size stands in for the disk: it strikes inside the last bytes, which a buffer may hold back."""
     script = """

@@ -25,6 +25,7 @@ def test_every_body_is_tested() -> None:
     assert set(BODIES) == set(REGISTRY)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", BODIES)
 def test_lines_enter_and_leave_in_turn(kind: str) -> None:
     """A line meets a closed surface an even number of times, and n · d is negative and positive in turn.
@@ -77,6 +78,7 @@ def test_lines_enter_and_leave_variants_in_turn(kind: str, keys: dict[str, Any])
     crossed_in_turn(faces_of(kind, keys), lines=400)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", BODIES)
 def test_volume(kind: str) -> None:
     """V = ∫∫ Σ (t_out - t_in) dx dy over parallel lines, by the midpoint rule on 120² lines; known in closed form.

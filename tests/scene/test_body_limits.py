@@ -137,6 +137,7 @@ def test_simple_polygons_against_every_pair_of_sides(corners: list[tuple[int, in
     assert simple == is_simple(corners)
 
 
+@pytest.mark.slow
 def test_a_polygon_of_many_corners_is_quick() -> None:
     """A circle of 20 000 corners is simple; with two of them exchanged it is not."""
     angle = np.linspace(0, 2 * np.pi, 20_000, endpoint=False)

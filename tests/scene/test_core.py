@@ -73,6 +73,7 @@ SOURCE_KEYS: dict[str, dict[str, Any]] = {
 """Of sources whose docstring shows a file, or less than this."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SOURCES)
 def test_the_core_takes_every_source_with_its_flux(kind: str) -> None:
     """What is emitted is what the record says."""

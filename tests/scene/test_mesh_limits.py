@@ -125,6 +125,7 @@ BOMBS: dict[str, tuple[bytes, str]] = {
 }
 
 
+@pytest.mark.slow
 def test_what_a_file_cannot_hold_is_refused_before_it_takes_memory(tmp_path: Path) -> None:
     for name, (content, _) in BOMBS.items():
         (tmp_path / name).write_bytes(content)
@@ -192,6 +193,7 @@ TEXTS: dict[str, bytes] = {
 }
 
 
+@pytest.mark.slow
 def test_texts_that_no_memory_holds_name_file_and_size(tmp_path: Path) -> None:
     """Texts of some 10 MB that become half a gigabyte while they are read."""
     for name, content in TEXTS.items():
@@ -215,6 +217,7 @@ def test_triangles_that_no_memory_holds_are_refused_before_they_are_welded(
         read_mesh(path, None)
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_covers_what_is_taken(tmp_path: Path) -> None:
     """With as much memory as is asked for, and the room that libraries take, it becomes triangles."""
     content = POINTS + b"f " + b"1 2 3 " * 300_000 + b"\n"

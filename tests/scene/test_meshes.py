@@ -129,6 +129,7 @@ def test_step_files_are_read(tmp_path: Path) -> None:
         read_mesh(tmp_path / "body.step", "mm")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("cascadio") is None, reason="STEP files need the extra [step]")
 @pytest.mark.parametrize("tolerance", [None, 0.1, 0.002])
 def test_step_surfaces_are_met_within_the_tolerance(tolerance: float | None, tmp_path: Path) -> None:

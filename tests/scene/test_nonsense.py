@@ -89,6 +89,7 @@ def with_value(tree: Any, path: tuple[Any, ...], value: Any) -> Any:
     return changed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", [key for key in SCENE if key != "wavelength"])
 def test_one_absurd_value_anywhere(family: str) -> None:
     """Every value of a scene in turn, replaced by one of the absurd ones; 600 at most for each family, drawn with a seed."""

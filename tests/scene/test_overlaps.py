@@ -47,6 +47,7 @@ def disk(radius: float = 1.0, at: Any = (0, 0, 0), **more: Any) -> dict[str, Any
 # --- solids ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_two_balls() -> None:
     """They overlap if |r₁ − r₂| < d < r₁ + r₂; the first is hidden if d < r₂ − r₁. To within a hundredth."""
     rng = np.random.default_rng(4)
@@ -238,6 +239,7 @@ def test_sources_in_or_on_solids_are_not_told() -> None:
         assert told(solids=[dome, die], sources=[source]) == []
 
 
+@pytest.mark.slow
 def test_rays_and_fields_that_start_in_a_lens(tmp_path: Path) -> None:
     """A ray file whose rays start on a disk of radius 30, and a lens of radius 10 at the same place."""
     rays = et.RaySet.merge([et.RaySet(b.position, b.direction, b.flux) for b in et.RingSource(rays=50_000).batches()])

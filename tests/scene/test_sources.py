@@ -155,6 +155,7 @@ def test_points_that_cannot_be() -> None:
         sources.Point(file="a.ies", flux_unit="W")
 
 
+@pytest.mark.slow
 def test_a_light_field(tmp_path: Path) -> None:
     """Its flux, or the one that is stated; from a file and from memory."""
     field = et.LightField.fit(et.RingSource(rays=50_000), et.Disk(radius=30), depths=(2, 2, 2, 2))

@@ -49,6 +49,7 @@ def test_bodies_are_separate_and_named_even_where_they_touch(tmp_path: Path) -> 
     assert 0 < lost < 9 * np.pi * bodies[3].chord_error
 
 
+@pytest.mark.slow
 def test_names_that_are_alike_are_numbered(tmp_path: Path) -> None:
     text = step.optics()
     for name in ("chip", "twin"):
@@ -61,6 +62,7 @@ def test_names_that_are_alike_are_numbered(tmp_path: Path) -> None:
     assert [body.name for body in nameless] == ["optics 1", "optics 2", "optics 3", "optics 4"]
 
 
+@pytest.mark.slow
 def test_one_of_several_bodies_is_chosen(tmp_path: Path) -> None:
     stored(tmp_path, step.optics())
     (face,) = compile_scene(glass(tmp_path, kind="mesh", file="optics.step", body="chip")).record["faces"]
@@ -116,6 +118,7 @@ def test_a_face_of_splines_is_met_where_it_is(height: float, tmp_path: Path) -> 
     assert np.abs(body.normals[top] - true / np.linalg.norm(true, axis=1, keepdims=True)).max() < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("unit", "mm"), [("mm", 1.0), ("inch", 25.4), ("m", 1000.0)])
 def test_units_of_the_file_count(unit: str, mm: float, tmp_path: Path) -> None:
     """A ball of radius 10 in each of them; its triangles follow its size."""
@@ -138,6 +141,7 @@ def test_the_stated_chord_error_is_that_of_the_triangles(tolerance: float | None
     assert mesh.chord_error == pytest.approx(10.0 - least, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_step_ball_looks_as_the_exact_ball(tmp_path: Path) -> None:
     """Default settings; with flat triangles the map is off by more than ten times as much."""
     stored(tmp_path, step.sphere(10.0))
@@ -149,6 +153,7 @@ def test_a_step_ball_looks_as_the_exact_ball(tmp_path: Path) -> None:
     assert et.compare(flat, exact).nrmse > 0.02
 
 
+@pytest.mark.slow
 def test_a_step_lens_keeps_its_sharp_rim(tmp_path: Path) -> None:
     """Half a ball looks as a dome; corners of its base have the normal of the plane, to the last bit."""
     stored(tmp_path, step.half_ball(10.0))

@@ -38,6 +38,7 @@ for path in sys.argv[1:]:
 """
 
 
+@pytest.mark.slow
 def test_bombs_are_told_with_their_place_in_little_memory(tmp_path: Path) -> None:
     paths = []
     for number, (text, _) in enumerate(BOMBS.values()):

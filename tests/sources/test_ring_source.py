@@ -234,6 +234,7 @@ VIEWS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
 @pytest.mark.parametrize("view", VIEWS.values(), ids=VIEWS)
 def test_pixels_are_the_mean_over_the_area_that_each_ring_takes(view: tuple[Observer, Screen]) -> None:

@@ -161,6 +161,7 @@ def room(*lamps: et.RaySet, most: int = 10**6, **more: Any) -> et.Scene:
     return et.Scene(**(keys | more))
 
 
+@pytest.mark.slow
 def test_the_same_bits_for_threads_and_after_stops(tmp_path: Path) -> None:
     """Three rays and five, whose copies are on their way at the end of every batch and round."""
     scene = room(lopsided(3, 1), lopsided(5, 2), detectors=[d for d in room(most=10**5).detectors if d.name != "rcs"])
@@ -180,6 +181,7 @@ def test_the_same_bits_for_threads_and_after_stops(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.illuminance["grid"].standard_error, whole.illuminance["grid"].standard_error)
 
 
+@pytest.mark.slow
 def test_scatter_events_looked_at_later_have_the_errors_of_the_light_image() -> None:
     """Two routes to one number: copies gathered while rays are traced, and from stored events afterwards."""
     scene = room(lopsided(30, 1), lopsided(700, 2))
@@ -192,6 +194,7 @@ def test_scatter_events_looked_at_later_have_the_errors_of_the_light_image() -> 
     assert image.rays.sum() < 0.3 * len(result.events["scatter"])
 
 
+@pytest.mark.slow
 def test_collected_rays_tell_that_they_are_copies(tmp_path: Path) -> None:
     rays = et.trace(room(lopsided(50, 1)), 25_000, 3).rays["rcs"]
     told = [str(c) for c in rays.complaints if "copies" in c.found]
@@ -299,6 +302,7 @@ def deviations(*, files: int, n: int, rays: int) -> Iterator[tuple[float, float]
         yield float(off), float(values.sum() / expected.sum() - 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("files", "n", "rays"), [(400, 800, 14_000), (60, 400, 150_000)])
 def test_stated_errors_cover_the_truth_over_independent_files(files: int, n: int, rays: int) -> None:
     """12 copies of each ray, and 260 across batches, beside another source, through many scatters."""

@@ -67,6 +67,7 @@ def test_light_from_behind_is_not_counted() -> None:
     assert (seen["down"].values > 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1.0, 4.0])
 def test_far_field_of_a_cosine_emitter(exponent: float) -> None:
     """V2: I = I₀ cosⁿγ about an axis that is tilted against the table; the mean around each node by quadrature."""
@@ -202,6 +203,7 @@ def test_mirrored_pipe(angle: float, length: float) -> None:
 # --- lossless optics -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_furnace() -> None:
     """V9: in a surround of luminance 1, every illuminance behind a lossless lens is π."""
     sky = 12.0

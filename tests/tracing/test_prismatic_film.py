@@ -69,6 +69,7 @@ def assert_same(found: Array, error: Array, truth: Array, truth_error: Array | f
     assert chi2.sf((z**2).sum(), z.size) > SIGNIFICANCE, z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("azimuth", TABLE)
 def test_transmission_by_angle(azimuth: int) -> None:
     """L_out = T(θ, φ) L: the known table; no light where total reflection turns back every line."""
@@ -115,6 +116,7 @@ def test_transmission_of_lambertian_light_forwards() -> None:
         assert_same(np.array([found]), np.array([error]), np.array([truth]), truth_error)
 
 
+@pytest.mark.slow
 def test_gain_above_a_reflecting_plate() -> None:
     """L_out / L = T(0) / (1 - R (1 - T̄)): light that the film sends back comes again from the plate.
 

@@ -81,6 +81,7 @@ BOMBS: dict[str, tuple[Callable[[Any], None], str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BOMBS)
 def test_what_a_file_cannot_hold_is_refused_in_little_memory(name: str, result: Path, tmp_path: Path) -> None:
     path = tmp_path / "bomb.h5"

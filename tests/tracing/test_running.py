@@ -57,11 +57,13 @@ def rounds() -> list[TraceResult]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2, 7])
 def test_the_same_bits_for_any_number_of_threads(threads: int, rounds: list[TraceResult]) -> None:
     assert bits(et.trace(luminaire(), 2.5 * ONE_ROUND, 7, threads=threads)) == bits(rounds[-1])
 
 
+@pytest.mark.slow
 def test_the_same_bits_after_a_stop(rounds: list[TraceResult], tmp_path: Path) -> None:
     # Events were thinned on the way.
     assert 0 < rounds[0].sums.scattered[4].level < rounds[-1].sums.scattered[4].level
@@ -75,6 +77,7 @@ def test_the_same_bits_after_a_stop(rounds: list[TraceResult], tmp_path: Path) -
     assert bits(et.trace(luminaire(), 2.5 * ONE_ROUND, 7, resume=rounds[-1])) == bits(rounds[-1])
 
 
+@pytest.mark.slow
 def test_a_file_holds_the_whole_result(rounds: list[TraceResult], tmp_path: Path) -> None:
     path = tmp_path / "result.h5"
     for result in rounds:
@@ -155,6 +158,7 @@ def test_one_colour_is_stated_once() -> None:
     assert again.plan.scene_text == ""
 
 
+@pytest.mark.slow
 def test_stops_when_the_error_is_small_enough() -> None:
     free = et.trace(luminaire(), 10 * ONE_ROUND, until=0.02)
     assert free.relative_error < 0.02
@@ -167,6 +171,7 @@ def test_stops_when_the_error_is_small_enough() -> None:
             et.trace(luminaire(), 1e5, until=nonsense)
 
 
+@pytest.mark.slow
 def test_another_trace_is_not_continued(rounds: list[TraceResult]) -> None:
     start, n = rounds[0], 2.5 * ONE_ROUND
     with pytest.raises(ArgumentError, match="the seed is 7 there and 8 here"):
@@ -195,6 +200,7 @@ def test_names_are_found_and_the_nearest_is_suggested(rounds: list[TraceResult])
         _ = et.trace(luminaire(detectors=[]), 1000).rays.only
 
 
+@pytest.mark.slow
 def test_progress_is_told_after_each_round() -> None:
     told: list[int] = []
     et.trace(luminaire(), 2 * ONE_ROUND, progress=told.append)
@@ -264,6 +270,7 @@ def test_rays_that_never_end_are_given_up() -> None:
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_damage_is_found(tmp_path: Path) -> None:
     path = tmp_path / "result.h5"
     small = et.trace(luminaire(), 20_000)

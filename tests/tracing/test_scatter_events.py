@@ -145,6 +145,7 @@ def test_what_events_say(traced: et.TraceResult) -> None:
     assert abs(absorbed - 0.05) < LARGEST_Z * math.sqrt(0.05 * 0.95 / n)
 
 
+@pytest.mark.slow
 def test_the_same_picture_as_lines_of_sight() -> None:
     """Diffuse surfaces and what stands before them, from two sides: no line of code in common but geometry and finishes."""
     scene = et.Scene(**corner())
@@ -160,6 +161,7 @@ def test_the_same_picture_as_lines_of_sight() -> None:
             assert chi2.sf(np.nansum(((lmap.values - other) / error) ** 2), error.size) < SIGNIFICANCE
 
 
+@pytest.mark.slow
 def test_with_what_lines_of_sight_find_besides() -> None:
     """A lamp in view, a mirror, a disk that mirrors and scatters: the whole is what lines of sight find, to which rays
     forwards add only what the mirrors throw on the walls, which is found by chance else."""
@@ -191,6 +193,7 @@ def test_with_what_lines_of_sight_find_besides() -> None:
         assert any("left out" in note for note in part.notes)
 
 
+@pytest.mark.slow
 def test_rays_as_a_source_are_counted_once() -> None:
     """Among diffuse surfaces, lines of sight add to events only what they see where all is black: the field that was fitted
     to the rays of the source, which is in view. What events show is what lines of sight show of the lamps themselves."""
@@ -216,6 +219,7 @@ def test_rays_as_a_source_are_counted_once() -> None:
         assert_agree(values=part.values[hidden], expected=on.values[hidden], standard_error=error)
 
 
+@pytest.mark.slow
 def test_integrating_sphere() -> None:
     """V6: a small Lambertian disk on the wall lights the sphere evenly, E₀ = Φ/A; L = ρ (E₀ + E_r)/π everywhere, from any
     observer; and the wall receives (E₀ + E_r) A (1 − f)."""
@@ -260,6 +264,7 @@ def test_thinning_keeps_whole_rays() -> None:
     assert all_.notes == ()
 
 
+@pytest.mark.slow
 def test_thinning_keeps_the_mean_and_tells_its_error() -> None:
     """A closed ball that reflects half receives 2 Φ; the stop at a number of events, which rays with many scatters reach
     first, does not bias it. Over 400 traces of a few rays, thinned hard."""
@@ -302,6 +307,7 @@ def test_thinning_keeps_the_mean_and_tells_its_error() -> None:
     assert math.sqrt((stated**2).mean()) == pytest.approx(values.std(ddof=1), rel=LARGEST_Z * spread)
 
 
+@pytest.mark.slow
 def test_thinned_maps_have_the_errors_that_they_state() -> None:
     scene = et.Scene(**corner(detectors=[{"kind": "scatter", "most": 60_000}]))
     events = et.trace(scene, 2.5 * ONE_ROUND, 3).events.only
@@ -359,6 +365,7 @@ def test_nonsense_is_refused(wrong: dict[str, Any]) -> None:
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_looked_at_from_a_file_in_another_place(tmp_path: Path, traced: et.TraceResult) -> None:
     """A result names the files of its scene as seen from where it is; a file that has changed is noticed."""
     (tmp_path / "results").mkdir()
@@ -407,6 +414,7 @@ def test_a_file_cut_short_anywhere_is_found(tmp_path: Path) -> None:
             et.TraceResult.load(path)
 
 
+@pytest.mark.slow
 def test_damage_is_found(tmp_path: Path) -> None:
     path = tmp_path / "result.h5"
     small = et.trace(et.Scene(**corner()), 30_000, 3)
@@ -457,6 +465,7 @@ def test_the_same_bits_for_any_number_of_threads() -> None:
             assert lmap.standard_error.tobytes() == same.standard_error.tobytes()
 
 
+@pytest.mark.slow
 def test_events_of_a_ray_stay_together_in_any_stretch(monkeypatch: pytest.MonkeyPatch, traced: et.TraceResult) -> None:
     from etendue.luminance import scatter_map
 

@@ -210,6 +210,7 @@ def far_from(curves: list[Array], point: Array) -> float:
     return nearest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "trimmed"), [*((kind, False) for kind in SHAPES if kind != "plane"), *((kind, True) for kind in TRIMS)]
 )

@@ -49,6 +49,7 @@ def room(lamp: Path) -> et.Scene:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_other_processes_and_another_order_give_the_same_bits(tmp_path: Path) -> None:
     """Units with copies of rays that go on from one to the next, thinned events, collected rays and chosen nodes."""
     scene, n = room(few_rays(tmp_path / "led.tm25ray", 7, 1)), 2.25 * ONE_UNIT
@@ -67,6 +68,7 @@ def test_other_processes_and_another_order_give_the_same_bits(tmp_path: Path) ->
     assert bits(work.join([middle, last], et.TraceResult.load(tmp_path / "part.h5"))) == bits(whole)
 
 
+@pytest.mark.slow
 def test_units_are_joined_in_their_order_and_none_is_left_out(tmp_path: Path) -> None:
     work = et.trace_work(room(few_rays(tmp_path / "led.tm25ray", 7, 1)), 2.25 * ONE_UNIT, 5)
     first, last = work(0), work(2)

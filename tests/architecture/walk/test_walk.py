@@ -60,6 +60,7 @@ def passed(root: Path, *tests: str) -> set[str]:
     return set(re.findall(r"^PASSED (.+)$", done.stdout, re.MULTILINE))
 
 
+@pytest.mark.slow
 def test_the_tests_of_the_tree_hold_for_it_unasked(tmp_path: Path) -> None:
     copy_tree(tmp_path)
     tests = []
