@@ -66,6 +66,7 @@ def test_help_names_every_verb_with_what_it_does(run: Run) -> None:
         assert verb.help
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(verbs()))
 def test_help_of_a_verb_explains_every_option_and_argument(run: Run, name: str) -> None:
     outcome = run(name, "--help")
@@ -165,6 +166,7 @@ def test_wrong_usage_ends_with_status_2(run: Run, folder: Path, arguments: list[
     assert files(tmp_path) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -302,6 +304,7 @@ def test_info_tells_the_wavelengths_that_are_known(run: Run, tmp_path: Path, fol
 # --- convert ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("format_", [f.name for f in RAY_FORMATS])
 def test_convert_writes_every_format(run: Run, folder: Path, tmp_path: Path, format_: str) -> None:
     outcome = run("convert", folder / "watts.tm25ray", "out.bin", "--format", format_, "--flux", "2W", "--json")
@@ -461,6 +464,7 @@ def test_luminance_takes_another_flux_and_unit(run: Run, folder: Path, tmp_path:
     assert (luminance.values != radiance.values).any()
 
 
+@pytest.mark.slow
 def test_many_observers_are_served_in_one_run_and_fill_in_their_names(run: Run, folder: Path, tmp_path: Path) -> None:
     observers = ["--observer", "0,0", "--observer", "30,12.5", "--observer", "30,-90"]
     outputs = ["-o", "t{theta}p{phi}.npz", "-o", "t{theta}p{phi}.png"]
@@ -587,6 +591,7 @@ def test_maps_of_different_views_are_compared_only_on_request(
 # --- demo ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_demo_finds_the_truth_within_its_error_bars(run: Run, tmp_path: Path) -> None:
     outcome = run("demo", "--rays", 4_000_000, "--seed", 5, "-o", "d.png", "--json").json
     assert [z["truth"] for z in outcome["zones"]] == pytest.approx([303_964, 67_547, 20_264], abs=0.5)
@@ -602,6 +607,7 @@ def test_demo_finds_the_truth_within_its_error_bars(run: Run, tmp_path: Path) ->
         assert f"{zone['estimate']:,.0f}" in again.out
 
 
+@pytest.mark.slow
 def test_demo_draws_other_rays_for_another_seed(run: Run) -> None:
     estimates = [run("demo", "--rays", 200_000, "--seed", s, "-o", "d.png", "--json").json["zones"] for s in (1, 2, 1)]
     assert estimates[0] != estimates[1]

@@ -184,7 +184,7 @@ def test_temporary_files_of_the_living_stay_and_those_of_the_dead_go(rays: Path,
     assert run("convert", rays, "a.csv").status == 0
     assert written <= set(files(tmp_path))
     process.kill()
-    process.wait()
+    process.communicate()  # closes the pipe, too
     assert written <= set(files(tmp_path))
     assert run("convert", rays, "b.csv").status == 0
     assert files(tmp_path) == [".writing-notes", "a.csv", "b.csv", "led.tm25ray"]

@@ -259,6 +259,7 @@ def test_luminance_of_collected_rays(run: Run, traced: et.TraceResult, tmp_path:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "status", "text"),
     [

@@ -117,6 +117,7 @@ def test_round_trip_in_lumens(ray_format: RayFormat, tmp_path: Path) -> None:
         assert back.flux_unit == "lm"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("second", NAMES)
 @pytest.mark.parametrize("first", NAMES)
 def test_written_by_one_and_read_through_another(first: str, second: str, tmp_path: Path) -> None:
@@ -152,6 +153,7 @@ def test_stream_is_written_in_batches(ray_format: RayFormat, tmp_path: Path) -> 
     assert_same_rays(read_rays(tmp_path / "a"), source.ray_set())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BINARY)
 def test_columns_stay_together_over_several_batches(name: str, tmp_path: Path) -> None:
     n = BATCH + 1000

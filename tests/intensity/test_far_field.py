@@ -76,6 +76,7 @@ def test_no_turn_and_no_mirror_image() -> None:
     assert np.allclose(found * led.node_solid_angle[lit[:, 0], lit[:, 1]], np.arange(1.0, 9.0))
 
 
+@pytest.mark.slow
 def test_the_solid_angles_are_exact_and_make_the_sphere() -> None:
     for planes, step in ((36, 2.5), (1, 90), (20, 0.25)):
         nodes = Nodes.even(planes, step)

@@ -250,6 +250,7 @@ def test_cut_at_every_byte(name: str, symmetry: str, tmp_path: Path) -> None:
     assert set(outcomes[len(data.rstrip()) + 1 :]) == {"right"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, f in INTENSITY_FORMATS.items() if f.write is None])
 def test_cut_at_every_byte_where_an_end_is_marked(name: str, tmp_path: Path) -> None:
     """XML ends with a tag and ZIP with a record: whatever is cut short is an error."""

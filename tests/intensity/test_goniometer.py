@@ -178,6 +178,7 @@ def test_what_was_not_measured_is_zero_and_told(read: Read, kind: str) -> None:
         assert "at the edge of what was measured the step to 0 became a slope" in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["A", "B"])
 def test_half_and_quarter_tables(read: Read, kind: str) -> None:
     """Angles from 0° belong to symmetric tables (LM-63 5.13, 5.14): the same as the table with both sides."""

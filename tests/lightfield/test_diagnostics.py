@@ -209,6 +209,7 @@ def test_the_worst_cell_is_found_and_named_in_space() -> None:
     assert found.expected_error == pytest.approx(math.sqrt(2 * whole / cells), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_parts_are_weighed_by_their_flux() -> None:
     """The side has three times the flux of an end and the same relative error: three times the loss."""
     surface = Cylinder(radius=1.0, bottom=0.0, top=1.5)
@@ -498,6 +499,7 @@ def test_the_picture_shows_what_was_found_and_repeats_its_bytes(name: str, tmp_p
         plot_characteristic(found, tmp_path / "a.exe")
 
 
+@pytest.mark.slow
 def test_a_dark_or_even_field_is_drawn_too() -> None:
     for ratio in (np.ones((1, 1, 1, 1)), np.eye(16)[0].reshape(2, 2, 2, 2)):
         assert len(plot_characteristic(diagnose(field_of(PLANE, part(ratio, 1e-3)))).axes) == 2

@@ -646,6 +646,7 @@ def test_points_on_curved_pixels_follow_the_cosine() -> None:
         assert abs(off) < norm.isf(0.5e-4) * math.sqrt((square - mean**2) / n)
 
 
+@pytest.mark.slow
 def test_a_refit_of_the_sample_agrees() -> None:
     """Fit, draw, fit again on the same bins: fluxes of all patches within the noise, 1 in 10⁴."""
     film = PrismaticFilm(radius=2.0, centre=(0.1, -0.2))

@@ -42,6 +42,7 @@ def test_flux_is_that_of_the_rays_that_were_met(film: tuple[PrismaticFilm, et.Ra
     assert field.total_flux == pytest.approx(rays.total_flux - field.report.unmet_flux, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_it_beats_the_grid_of_the_thesis_by_far_whatever_its_threshold(
     film: tuple[PrismaticFilm, et.RaySet, LightField],
 ) -> None:

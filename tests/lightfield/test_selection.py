@@ -123,6 +123,7 @@ def test_the_upper_half_of_a_globe_is_a_hemisphere() -> None:
     assert choice.surface.centre == pytest.approx(globe.middle, abs=0.02 * globe.radius)
 
 
+@pytest.mark.slow
 def test_a_rod_is_a_cylinder() -> None:
     rod = Rod()
     choice = choose_surface(rays_of(*scattered(*rod.rays(N, seed=1), 3.0)))

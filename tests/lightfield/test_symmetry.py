@@ -89,6 +89,7 @@ def test_what_a_field_was_folded_by_is_known_and_kept(tmp_path: Path) -> None:
     assert et.LightField.load(tmp_path / "field.h5").report.symmetry == "none"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("symmetry", ["none", "mirror-x", "c4"])
 @pytest.mark.parametrize("weighted", [False, True])
 def test_images_of_a_ray_tell_nothing_more_of_the_flux(

@@ -55,6 +55,7 @@ def every_partition(counts: Array, base: Array, c: float, rho: float = 0.5) -> t
     return visit(tuple((0, n) for n in counts.shape))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(16,), (8, 16), (4, 2, 8), (4, 4, 2, 4), (1, 8)])
 @pytest.mark.parametrize("c", [1.0, 3.0, 30.0])
 def test_the_core_equals_the_definition_in_any_number_of_dimensions(shape: tuple[int, ...], c: float) -> None:

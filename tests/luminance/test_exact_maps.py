@@ -89,6 +89,7 @@ def test_rays_from_an_aplanatic_point_come_from_another() -> None:
     assert seen > 2500
 
 
+@pytest.mark.slow
 def test_luminance_of_an_aplanatic_image() -> None:
     """V3: L = T(i) L₀/n² where the line of sight, carried on, meets the image of the cap on radius nR; else darkness."""
     rng = np.random.default_rng(3)

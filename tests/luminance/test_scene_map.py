@@ -450,7 +450,9 @@ def test_what_cannot_be_seen_is_told() -> None:
 
 def test_options_belong_to_their_sources() -> None:
     scene, eye, screen = et.Scene(**corner()), et.Observer(0, 0, 100), et.Screen(1, 1, 1, 1)
-    for wrong in ({"method": "cone"}, {"acceptance": 2.0}, {"surface": et.Plane(z=0)}, {"samples": 4}):
+    with pytest.raises(ArgumentError, match="Cone is for rays, and the source is a scene"):
+        et.luminance_map(scene, eye, screen, method="cone")
+    for wrong in ({"acceptance": 2.0}, {"surface": et.Plane(z=0)}, {"samples": 4}):
         with pytest.raises(ArgumentError, match=next(iter(wrong))):
             et.luminance_map(scene, eye, screen, **wrong)  # type: ignore[call-overload]
     for wrong in ({"rays_per_pixel": 4}, {"until": 0.1}, {"seed": 1}):

@@ -40,6 +40,7 @@ SLOW_EXAMPLES: frozenset[str] = frozenset(
         "etendue.lightfield.light_field.LightField.intensity",
         "etendue.lightfield.selection.search.choose_surface",
         "etendue.luminance.methods.FromField",
+        "etendue.luminance.denoising.denoise_map",
         "etendue.plot.characteristic_picture.plot_characteristic",
         "etendue.tracing.running.trace_rounds",
         "etendue.tracing.work.TraceWork",

@@ -54,6 +54,7 @@ def test_every_picture_is_here() -> None:
     assert len(public) == len(set(DRAWN) - {"method", "cartesian"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", DRAWN)
 def test_axes_are_drawn_on_and_come_back(which: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -68,6 +69,7 @@ def test_axes_are_drawn_on_and_come_back(which: str, tmp_path: Path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", DRAWN)
 def test_axes_and_a_path_are_refused(which: str, tmp_path: Path) -> None:
     count, draw = DRAWN[which]
@@ -76,6 +78,7 @@ def test_axes_and_a_path_are_refused(which: str, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", DRAWN)
 def test_too_many_axes_are_refused(which: str) -> None:
     count, draw = DRAWN[which]

@@ -72,6 +72,7 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
 """Further cases: a sharp edge, a concave lens, a half ball, aspheres, a tip, another apex, a notch, smooth normals."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "keys"), VARIANTS, ids=[f"{kind}{i}" for i, (kind, _) in enumerate(VARIANTS)])
 def test_lines_enter_and_leave_variants_in_turn(kind: str, keys: dict[str, Any]) -> None:
     """As above; aspheres are met by search, which takes longer, so by fewer lines."""

@@ -62,6 +62,7 @@ def test_the_edge_of_a_lens_ends_where_its_faces_do() -> None:
     assert lens.edge_thickness == edge.shape["z"][1] - edge.shape["z"][0]
 
 
+@pytest.mark.slow
 @given(st.integers(1, 60), st.floats(0.01, 10), st.floats(20, 160), st.floats(0.01, 5))
 def test_the_section_of_a_film_is_closed_and_has_its_area(n: int, pitch: float, apex: float, slab: float) -> None:
     """Slab and n triangles; every apex has its angle, and the faces' widths are the sides of the section."""

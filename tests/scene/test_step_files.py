@@ -37,6 +37,7 @@ def seen(scene: Scene) -> LuminanceMap:
     return et.luminance_map(scene, et.Observer(25, 200, 60), et.Screen(22, 22, 32, 32), rays_per_pixel=256, seed=1)
 
 
+@pytest.mark.slow
 def test_bodies_are_separate_and_named_even_where_they_touch(tmp_path: Path) -> None:
     """Two cubes have a square in common, a third lies on one of them: 2³, 1³, 2³ mm³, and 4/3 π 1.5³ but for the chords."""
     bodies = step_bodies(stored(tmp_path, step.optics()))
@@ -131,6 +132,7 @@ def test_units_of_the_file_count(unit: str, mm: float, tmp_path: Path) -> None:
     assert 10_000 < len(body.triangles) < 100_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [None, 0.1, 0.01])
 def test_the_stated_chord_error_is_that_of_the_triangles(tolerance: float | None, tmp_path: Path) -> None:
     """Of a ball of radius R: R less the smallest distance of a point of its triangles from the middle, by many points."""

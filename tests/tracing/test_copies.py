@@ -96,6 +96,7 @@ def test_a_set_beside_another_source_keeps_its_errors() -> None:
     assert both.effective_rays == pytest.approx(1 / (0.7**2 / kish + 0.3**2 / 300_000))
 
 
+@pytest.mark.slow
 def test_until_is_not_reached_by_copies() -> None:
     scene = et.Scene(
         sources=[{"kind": "rays", "rays": lopsided(500, 3)}, {"kind": "point", "flux": 1}], detectors=[GRID]

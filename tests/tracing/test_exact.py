@@ -133,6 +133,7 @@ def fresnel(cosine: float, n: float) -> float:
     return (s * s + p * p) / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.0, 40.0, 75.0])
 def test_slab_that_absorbs(angle: float) -> None:
     """All reflections in a slab of transmittance τ: T = (1−R)² τ/(1−R²τ²), R' = R + (1−R)² R τ²/(1−R²τ²)."""
@@ -218,6 +219,7 @@ def test_furnace() -> None:
     assert_agree(values=seen.values, standard_error=seen.standard_error, expected=np.full((3, 4), math.pi * 1e6))
 
 
+@pytest.mark.slow
 def test_luminance_out_of_a_dome() -> None:
     """V10: light that leaves n = 1.5 through any face keeps L/n²: a Lambertian disk in a dome, seen as intensity.
 

@@ -80,6 +80,7 @@ def test_transmission_by_angle(azimuth: int) -> None:
     assert_same(found, error, truth, 1e-3)
 
 
+@pytest.mark.slow
 def test_transmission_of_other_films_in_skew_directions() -> None:
     """The same as lines through grooves, prisms and slab of one period, of other index and thickness."""
     rng = np.random.default_rng(4)

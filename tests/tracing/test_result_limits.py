@@ -107,6 +107,7 @@ def test_more_events_than_are_kept_are_refused(result: Path, tmp_path: Path) -> 
         TraceResult.load(path)
 
 
+@pytest.mark.slow
 def test_records_that_find_no_room_on_the_disk_name_the_file(
     result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

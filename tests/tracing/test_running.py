@@ -147,6 +147,7 @@ def test_what_a_collecting_surface_keeps_is_a_ray_set(rounds: list[TraceResult],
     assert np.allclose(again.wavelength, rays.wavelength)
 
 
+@pytest.mark.slow
 def test_one_colour_is_stated_once() -> None:
     rays = et.trace(luminaire(sources=[{"kind": "point", "flux": 1, "wavelength": 470}]), 1e5).rays["rcs"]
     assert "wavelength" not in rays.columns

@@ -484,7 +484,7 @@ def test_options_that_mean_nothing_are_refused() -> None:
     events = et.trace(et.Scene(**corner()), 2000, 3).events.only
     for wrong, match in (
         ({"forward_rays": 1e5}, "forward_rays"), ({"until": 0.1}, "rays_per_pixel"), ({"seed": 2}, "rays_per_pixel"),
-        ({"method": "cone"}, "method"), ({"threads": 0}, "threads"), ({"rays_per_pixel": 0}, "rays_per_pixel"),
+        ({"method": "cone"}, "Cone is for rays"), ({"threads": 0}, "threads"), ({"rays_per_pixel": 0}, "rays_per_pixel"),
     ):  # fmt: skip
         with pytest.raises(ArgumentError, match=match):
             et.luminance_map(events, **wrong)  # type: ignore[call-overload]

@@ -150,7 +150,8 @@ class PixelMap(InNotebook, abc.ABC):
         Examples
         --------
         >>> import etendue as et
-        >>> lmap = et.luminance_map(et.RingSource(rays=100_000), et.Observer(0, 0, 1000), et.Screen(60, 60, 6, 6))
+        >>> screen = et.Screen(60, 60, 6, 6)
+        >>> lmap = et.luminance_map(et.RingSource(rays=5000), et.Observer(0, 0, 1000), screen, method=et.Cone(5))
         >>> table = lmap.to_xarray()
         >>> bool(table.luminance.sel(x=-5, y=5) == lmap.values[2, 2]), table.luminance.attrs["units"]
         (True, 'cd/m²')

@@ -11,6 +11,8 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
+from etendue import _core
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 
@@ -257,4 +259,7 @@ def copy_tree(root: Path) -> Path:
         shutil.copytree(ROOT / part, root / part, ignore=unwanted)
     for file in FILES:
         shutil.copy(ROOT / file, root / file)
+    # The built core stands in the tree only where it was built for development.
+    core = Path(_core.__file__)
+    shutil.copy(core, root / "python" / "etendue" / core.name)
     return root
