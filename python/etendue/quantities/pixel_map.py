@@ -151,7 +151,8 @@ class PixelMap(InNotebook, abc.ABC):
         --------
         >>> import etendue as et
         >>> screen = et.Screen(60, 60, 6, 6)
-        >>> lmap = et.luminance_map(et.RingSource(rays=5000), et.Observer(0, 0, 1000), screen, method=et.Cone(5))
+        >>> how = et.Cone(acceptance=5)
+        >>> lmap = et.luminance_map(et.RingSource(rays=5000), et.Observer(0, 0, 1000), screen, method=how)
         >>> table = lmap.to_xarray()
         >>> bool(table.luminance.sel(x=-5, y=5) == lmap.values[2, 2]), table.luminance.attrs["units"]
         (True, 'cd/m²')
