@@ -570,6 +570,7 @@ def test_compare_gives_the_measures_of_the_api(run: Run, maps: tuple[Path, Path]
     assert f"NCC {100 * expected.ncc:.3f} %" in run("compare", *maps, *options).out
 
 
+@pytest.mark.slow
 def test_compare_draws_the_difference_and_the_cuts(run: Run, maps: tuple[Path, Path], tmp_path: Path) -> None:
     outcome = run("compare", *maps, "-o", "d.png", "--section-y", 0.2, "--section-output", "s.png")
     assert outcome.status == 0, outcome.err

@@ -128,7 +128,6 @@ def test_fit_takes_surface_and_flux(run: Run, folder: Path, tmp_path: Path, opti
     assert facts["total_flux"] + facts["unmet_flux"] == pytest.approx(whole, rel=1e-9)
 
 
-@pytest.mark.slow
 def test_fit_turns_watts_into_lumens(run: Run, folder: Path) -> None:
     """555 nm: 683 lm/W."""
     facts = run("fit", folder / "watts.tm25ray", "-o", "a.h5", "--unit", "lm", *GRID, "--json").json

@@ -72,6 +72,7 @@ def test_a_file_that_shrinks_is_an_error_that_names_it(name: str, use: str, writ
         USES[use](rays)
 
 
+@pytest.mark.slow
 def test_the_program_ends_with_a_message_and_leaves_nothing_behind(written: RaySet, tmp_path: Path) -> None:
     """A map of such a file would end it with signal 7 and no word."""
     path = tmp_path / "shrinking.tm25ray"

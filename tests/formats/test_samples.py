@@ -179,6 +179,7 @@ def test_hand_made_zemax_and_speos_files(samples: Path) -> None:
     assert sample(samples, "test_08_ray.ray").header["luminous_flux"] == pytest.approx(686.415, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ray_format", [f.name for f in RAY_FORMATS])
 @pytest.mark.parametrize("name", ["Cyl10k.1.tm25ray", "ThreeRays_Wavelength.1.ray", "test_08_ray_reference.sdf"])
 def test_samples_convert_to_every_format(samples: Path, tmp_path: Path, name: str, ray_format: str) -> None:

@@ -182,7 +182,6 @@ def test_other_files_are_refused(content: bytes, tmp_path: Path) -> None:
         read_intensity(tmp_path / "a.ies")
 
 
-@pytest.mark.slow
 def test_ray_files_are_no_intensity_files(samples: Path) -> None:
     from etendue.formats.rays import detect_format
 

@@ -95,7 +95,6 @@ def test_the_same_distribution_gives_the_same_bytes(kind: str, tmp_path: Path) -
         assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
-@pytest.mark.slow
 def test_unknown_names(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="'polar'"):
         plot_intensity(lid("none"), kind="ploar")  # type: ignore[arg-type]

@@ -52,7 +52,6 @@ def test_every_root(read: Read, root: str) -> None:
     assert (led.provenance.format, led.flux_unit) == ("tm33", "lm")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("symmetry", SYMM)
 @pytest.mark.parametrize("stated", [True, False])
 def test_sectors(read: Read, symmetry: str, stated: bool) -> None:

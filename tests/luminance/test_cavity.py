@@ -67,6 +67,7 @@ def test_shares_of_the_wall_add_up() -> None:
         assert total == pytest.approx(1.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_solution_loses_no_light_and_has_converged() -> None:
     """What is absorbed, leaves and falls back is what was emitted; other nodes give the same."""
     assert sum(CAVITY.absorbed) + sum(CAVITY.left) == pytest.approx(FLUX, rel=2e-8)

@@ -153,7 +153,6 @@ def test_the_folder_is_bounded_and_what_was_used_last_stays(fits: list[int], mon
     assert len(fits) == made + 1
 
 
-@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setenv(fit_cache.FOLDER_VARIABLE, str(tmp_path / "file" / "kept"))

@@ -182,7 +182,6 @@ def test_limits_of_the_colours(which: str, options: dict[str, Any], limits: tupl
     assert (norm.vmin, norm.vmax) == pytest.approx(limits)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "extend"),
     [
@@ -293,7 +292,6 @@ def test_cross_sections_of_every_map(which: str, scale: Any) -> None:
     assert_nothing_is_cut_off(plot_cross_sections([cross_section(MAPS[which], x=0)] * 9, scale=scale))
 
 
-@pytest.mark.slow
 def test_cross_sections_draw_steps_with_bands(tmp_path: Path) -> None:
     line = cross_section(make_map([[1.0, NAN, 3.0, 2.0]]), y=0)
     figure = plot_cross_sections([line], tmp_path / "cut.png", labels=["my line"], title="Cut")

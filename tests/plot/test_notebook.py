@@ -94,6 +94,7 @@ class Reader(HTMLParser):
         self.texts.append(data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", VALUES)
 def test_pages_hold_what_they_should(which: str) -> None:
     pictured, make = VALUES[which]
