@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 use crate::run::interruptible;
 use crate::source::with_source;
 
-/// A tally as a dictionary.
+/// The account of a pass as a dictionary.
 pub fn account_dict<'py>(py: Python<'py>, tally: &PassAccount) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("rays", tally.rays)?;
