@@ -1,0 +1,75 @@
+"""What a module of this package offers: one format of files that hold a BSDF."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.quantities.bsdf_data import BsdfData
+
+Array = npt.NDArray[np.float64]
+
+
+class Tabulated(Protocol):
+    """What a writer asks of any BSDF, measured or modelled, to make a table of it."""
+
+    name: str
+    isotropic: bool
+    """Whether turning the sample about its normal changes nothing."""
+    reflects: bool
+    """Whether light is scattered back."""
+    transmits: bool
+    """Whether light is scattered to the other side."""
+    both_sides: bool
+    """Whether light that meets the back is treated as light that meets the front."""
+    wavelengths: tuple[float, ...]
+    """At which it is known [nm]; empty: it is the same at all."""
+    incidences: tuple[float, ...]
+    """Angles [°] at which it is known, in order, or a fair choice of them for a model."""
+
+    def evaluate(self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None) -> Array:
+        """f [1/sr] for pairs of unit vectors, shapes (…, 3) that broadcast, in the frame of `etendue.quantities.bsdf_data`."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class BsdfFormat:
+    """A format of BSDF files.
+
+    Parameters
+    ----------
+    name : str
+        As users write it: ``format="klems"``.
+    title : str
+        For people.
+    extensions : tuple of str
+        Those usual for it, with their dot; the first is the one that stands for the format when a file is written.
+    recognise : callable
+        Whether a file is of this format, from its first `SNIFFED_BYTES` bytes.
+    read : callable
+        The file as `BsdfData`, with all complaints.
+    fits : callable, optional
+        Whether `write` can hold data as they are, without a new table.
+    tabulate : callable, optional
+        A BSDF in the layout of this format.
+    write : callable, optional
+        Writes data of that layout; None: the format is read only. Returns what is lost, in sentences.
+    """
+
+    name: str
+    title: str
+    extensions: tuple[str, ...]
+    recognise: Callable[[bytes], bool]
+    read: Callable[[Path], BsdfData]
+    fits: Callable[[BsdfData], bool] | None = None
+    tabulate: Callable[[Tabulated], BsdfData] | None = None
+    write: Callable[[BsdfData, BinaryIO], tuple[str, ...]] | None = None
+
+
+SNIFFED_BYTES = 4096
+"""What `recognise` is given of a file."""

@@ -1,0 +1,401 @@
+"""What is known of a BSDF direction by direction: measured or tabulated values, one slice for each incidence.
+
+**Frame.** Directions are unit vectors in the frame of the surface, +z being the normal of its front. They point *away* from
+the surface: `incident` to where light comes from, scattered ones to where it goes. Light meets the front if the third
+component of `incident` is positive, and is reflected if both have the same sign.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+from etendue.quantities.provenance import Provenance
+from etendue.quantities.report import Complaint
+
+Array = npt.NDArray[np.float64]
+GridFrame = Literal["normal", "specular", "cosines"]
+GRID_FRAMES: tuple[str, ...] = get_args(GridFrame)
+
+GRAZING = 1e-9
+"""Heights below which a direction lies in the surface."""
+
+
+def direction(theta: npt.ArrayLike, phi: npt.ArrayLike, *, behind: bool = False) -> Array:
+    """Unit vectors at angles θ [°] from the normal of a side and azimuths φ [°] from +x towards +y.
+
+    Parameters
+    ----------
+    theta, phi : array_like
+        Shapes that broadcast.
+    behind : bool
+        About −z instead of +z; the azimuth is the same.
+
+    Returns
+    -------
+    array, shape (…, 3)
+
+    Examples
+    --------
+    >>> direction(30.0, 90.0).round(3).tolist()
+    [0.0, 0.5, 0.866]
+    """
+    t, p = np.broadcast_arrays(np.radians(theta), np.radians(phi))
+    height = -np.cos(t) if behind else np.cos(t)
+    return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), height], axis=-1)
+
+
+def mirrored(incident: npt.ArrayLike) -> Array:
+    """The specular direction of reflection of `incident`, shape (…, 3)."""
+    return np.asarray(incident, np.float64) * [-1.0, -1.0, 1.0]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PolarGrid:
+    """Scattered directions in polar coordinates about the normal or about the specular direction.
+
+    Parameters
+    ----------
+    frame : {"normal", "specular", "cosines"}
+        ``"normal"``: the radial coordinate is θ [°] from the normal of the side where light leaves, the azimuth φ [°] from +x
+        towards +y.
+        ``"specular"``: it is the angle [°] to the specular direction s (mirrored, or straight on), and the azimuth
+        [°] turns from the direction e at right angles to s that lies in the plane of incidence on the side of the normal, towards
+        s × e. If s is the normal, e points to −β₀ of a slightly larger incidence at the same azimuth.
+        ``"cosines"``: it is |β − β₀|, β and β₀ being the projections of the scattered and the specular direction on the
+        surface, and the azimuth [°] turns from the direction of β₀ towards +90° about +z (Harvey and Shack). At normal incidence
+        the direction of β₀ is that of a slightly larger incidence at the same azimuth.
+    radial : array, shape (n,)
+        Increasing, not negative.
+    azimuth : array, shape (m,)
+        Increasing, at most 360° wide; values repeat after 360°. A single azimuth: values do not depend on it.
+    """
+
+    frame: GridFrame
+    radial: Array
+    azimuth: Array
+
+    def __post_init__(self) -> None:
+        if self.frame not in GRID_FRAMES:
+            raise ArgumentError(f"frame is one of {', '.join(GRID_FRAMES)}, not {self.frame!r}")
+        for name in ("radial", "azimuth"):
+            values = np.array(getattr(self, name), np.float64)
+            if values.ndim != 1 or not values.size or not np.isfinite(values).all() or (np.diff(values) <= 0.0).any():
+                raise ArgumentError(f"the {name} coordinates of a grid are finite and increase")
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+        if self.radial[0] < 0.0 or np.ptp(self.azimuth) > 360.0:
+            raise ArgumentError("radial coordinates are not negative, and azimuths span 360° at most")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Azimuths, radial coordinates."""
+        return self.azimuth.size, self.radial.size
+
+    def directions(self, incident: Array, *, transmitted: bool) -> Array:
+        """Scattered directions, shape (m, n, 3); NaN where a coordinate is no direction on the side where light leaves."""
+        return self.direction(self.radial[None, :], self.azimuth[:, None], incident, transmitted=transmitted)
+
+    def direction(
+        self, radial: npt.ArrayLike, azimuth: npt.ArrayLike, incident: Array, *, transmitted: bool
+    ) -> Array:
+        """The directions at coordinates, shape (…, 3); NaN where there is none on the side where light leaves."""
+        r, a = np.broadcast_arrays(np.asarray(radial, np.float64), np.radians(azimuth))
+        side = math.copysign(1.0, incident[2]) * (-1.0 if transmitted else 1.0)
+        forward = _forward(incident)
+        if self.frame == "normal":
+            found = direction(np.degrees(np.radians(r)), np.degrees(a), behind=side < 0.0)
+        elif self.frame == "specular":
+            s, e, across = _axes(incident, transmitted=transmitted)
+            t = np.radians(r)
+            turned = np.cos(a)[..., None] * e + np.sin(a)[..., None] * across
+            found = np.cos(t)[..., None] * s + np.sin(t)[..., None] * turned
+        else:
+            sideways = np.array([-forward[1], forward[0]])
+            beta = -incident[:2] + r[..., None] * (np.cos(a)[..., None] * forward + np.sin(a)[..., None] * sideways)
+            with np.errstate(invalid="ignore"):
+                height = side * np.sqrt(1.0 - np.sum(beta * beta, axis=-1))
+            found = np.concatenate([beta, height[..., None]], axis=-1)
+        gone = ~(found[..., 2] * side >= -GRAZING)
+        found[gone] = np.nan
+        return found
+
+    def coordinates(self, scattered: npt.ArrayLike, incident: Array, *, transmitted: bool) -> tuple[Array, Array]:
+        """The inverse of `direction`: radial coordinates and azimuths [°] from 0 to 360 of directions of shape (…, 3)."""
+        v = np.asarray(scattered, np.float64)
+        forward = _forward(incident)
+        if self.frame == "normal":
+            radial = np.degrees(np.arctan2(np.hypot(v[..., 0], v[..., 1]), np.abs(v[..., 2])))
+            azimuth = np.arctan2(v[..., 1], v[..., 0])
+        elif self.frame == "specular":
+            s, e, across = _axes(incident, transmitted=transmitted)
+            x, y = v @ e, v @ across
+            radial = np.degrees(np.arctan2(np.hypot(x, y), v @ s))
+            azimuth = np.arctan2(y, x)
+        else:
+            off = v[..., :2] + incident[:2]
+            radial = np.hypot(off[..., 0], off[..., 1])
+            azimuth = np.arctan2(forward[0] * off[..., 1] - forward[1] * off[..., 0], off @ forward)
+        return np.asarray(radial), np.degrees(azimuth) % 360.0
+
+
+def _forward(incident: Array) -> Array:
+    """The direction of β₀ in the plane of the surface; along −x where light comes along the normal exactly."""
+    across = math.hypot(incident[0], incident[1])
+    return -incident[:2] / across if across > 0.0 else np.array([-1.0, 0.0])
+
+
+def _axes(incident: Array, *, transmitted: bool) -> tuple[Array, Array, Array]:
+    """The specular direction s, e at right angles to it towards the normal of its side, and s × e."""
+    s = -incident if transmitted else mirrored(incident)
+    side = math.copysign(1.0, s[2])
+    forward = _forward(incident)
+    sine = math.hypot(s[0], s[1])
+    e = np.array([*(-abs(s[2]) * forward), side * sine])
+    return s, e, np.cross(s, e)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class BsdfSlice:
+    """BSDF of one incidence, one way (reflected or transmitted) and one wavelength.
+
+    Parameters
+    ----------
+    incident : array, shape (3,)
+        Unit vector to where the light comes from.
+    values : array
+        f [1/sr], the cosine not included: shape (m, n) on a `PolarGrid` of m azimuths and n radial coordinates, or (n,) at single
+        `points`. NaN: not measured.
+    transmitted : bool
+        Whether the light passes to the other side.
+    grid : PolarGrid, optional
+        Where the values are; or
+    points : array, shape (n, 3), optional
+        the scattered directions themselves.
+    projected : array, shape (n,), optional
+        Projected solid angle [sr] of which each of the points stands for a part (Klems' patches, leaves of a tensor tree).
+    wavelength : float, optional
+        In nm; None: weighted by V(λ), or not known.
+    stated : float, optional
+        What the file says that the integral of f cosθ is: total integrated scatter (TIS).
+    standard_error : array, optional
+        Of the values, same shape.
+
+    Raises
+    ------
+    ArgumentError
+        If shapes do not fit, or a value is infinite.
+
+    Examples
+    --------
+    >>> half = BsdfSlice(direction(30.0, 0.0), [[0.5 / np.pi] * 2], grid=PolarGrid("normal", [0.0, 90.0], [0.0]))
+    >>> round(half.integral(), 6)
+    0.5
+    """
+
+    incident: Array
+    values: Array
+    transmitted: bool = False
+    _: dataclasses.KW_ONLY
+    grid: PolarGrid | None = None
+    points: Array | None = None
+    projected: Array | None = None
+    wavelength: float | None = None
+    stated: float | None = None
+    standard_error: Array | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("incident", "values", "points", "projected", "standard_error"):
+            given = getattr(self, name)
+            if given is not None:
+                array = np.array(given, np.float64)
+                array.flags.writeable = False
+                object.__setattr__(self, name, array)
+        if self.incident.shape != (3,) or not abs(float(np.linalg.norm(self.incident)) - 1.0) < 1e-9:
+            raise ArgumentError("incident is one unit vector")
+        if (self.grid is None) == (self.points is None):
+            raise ArgumentError("a slice has either a grid or points")
+        shape = self.grid.shape if self.grid is not None else np.shape(self.points)[:1]
+        if self.values.shape != shape or (self.points is not None and self.points.shape != (*shape, 3)):
+            raise ArgumentError(f"values of shape {self.values.shape} do not fit directions of shape {shape}")
+        if np.isinf(self.values).any():
+            raise ArgumentError("values of a BSDF are finite, or NaN where nothing was measured")
+        if self.projected is not None and self.projected.shape != shape:
+            raise ArgumentError("projected solid angles have the shape of the values")
+        if self.standard_error is not None and self.standard_error.shape != self.values.shape:
+            raise ArgumentError("standard errors have the shape of the values")
+
+    @property
+    def theta(self) -> float:
+        """Angle of incidence [°], from the normal of the side that the light meets."""
+        return math.degrees(math.atan2(math.hypot(self.incident[0], self.incident[1]), abs(self.incident[2])))
+
+    @property
+    def phi(self) -> float:
+        """Azimuth of the incident direction [°], 0 to 360."""
+        return math.degrees(math.atan2(self.incident[1], self.incident[0])) % 360.0
+
+    @property
+    def front(self) -> bool:
+        """Whether the light meets the front."""
+        return bool(self.incident[2] > 0.0)
+
+    @functools.cached_property
+    def directions(self) -> Array:
+        """Scattered directions of the values, shape (…, 3); NaN where a grid goes beyond the hemisphere."""
+        if self.grid is None:
+            assert self.points is not None
+            return self.points
+        return self.grid.directions(self.incident, transmitted=self.transmitted)
+
+    def at(self, scattered: npt.ArrayLike) -> Array:
+        """f [1/sr] at directions of shape (…, 3) on the side where light leaves, for slices on a grid: bilinear on it.
+
+        Beyond the last radial coordinate f is that of the last; between the ends of azimuths that do not go around it is
+        interpolated across the gap.
+
+        Raises
+        ------
+        ArgumentError
+            If the slice is made of points.
+        """
+        if self.grid is None:
+            raise ArgumentError("a slice of single points has to be interpolated first: see Bsdf.from_scans")
+        r, a = self.grid.coordinates(scattered, self.incident, transmitted=self.transmitted)
+        return _bilinear(self.grid, self.values, r, a)
+
+    def integral(self) -> float:
+        """∫ f cosθ dΩ: the share of the flux that is scattered (directional-hemispherical).
+
+        On a grid by the rule of Gauss and Legendre in each of its cells, f being bilinear there; f beyond the last radial
+        coordinate is that of the last. Of points by their projected solid angles.
+
+        Raises
+        ------
+        ArgumentError
+            If the slice is made of points of unknown solid angle.
+        """
+        if self.grid is None:
+            if self.projected is None:
+                raise ArgumentError("points of unknown solid angle cannot be added up: see Bsdf.from_scans")
+            return float(np.nansum(self.values * self.projected))
+        return _integral(self)
+
+
+def _bilinear(grid: PolarGrid, values: Array, r: Array, a: Array) -> Array:
+    i, u = _between(grid.radial, r)
+    j, k, v = _around(grid.azimuth, a)
+    last = np.minimum(i + 1, grid.radial.size - 1)
+    near, far = (1.0 - u) * values[j, i] + u * values[j, last], (1.0 - u) * values[k, i] + u * values[k, last]
+    return np.asarray((1.0 - v) * near + v * far)
+
+
+def _between(nodes: Array, x: Array) -> tuple[npt.NDArray[np.intp], Array]:
+    """The node below, and how far on to the next; constant beyond the ends."""
+    x = np.clip(x, nodes[0], nodes[-1])
+    i = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, max(nodes.size - 2, 0))
+    if nodes.size == 1:
+        return i, np.zeros_like(x)
+    return i, (x - nodes[i]) / (nodes[i + 1] - nodes[i])
+
+
+def _around(nodes: Array, x: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
+    """The nodes on both sides of azimuths [°], which repeat after 360°, and how far from the first to the second."""
+    if nodes.size == 1:
+        zero = np.zeros(np.shape(x), np.intp)
+        return zero, zero, np.zeros(np.shape(x))
+    whole = np.ptp(nodes) == 360.0
+    ring = nodes[:-1] if whole else nodes
+    x = (x - ring[0]) % 360.0
+    starts = ring - ring[0]
+    i = np.searchsorted(starts, x, side="right") - 1
+    following = np.append(starts[1:], 360.0)
+    return i, (i + 1) % ring.size, (x - starts[i]) / (following[i] - starts[i])
+
+
+NODES = 6
+"""Of the rule of Gauss and Legendre in each cell of a grid, and by azimuth."""
+
+
+def _integral(one: BsdfSlice) -> float:
+    grid = one.grid
+    assert grid is not None
+    end = {"normal": 90.0, "specular": 180.0, "cosines": 2.0}[grid.frame]
+    radial = np.unique(np.concatenate([[0.0], grid.radial[grid.radial < end], _extended(grid, one), [end]]))
+    azimuth = np.unique(np.concatenate([grid.azimuth, np.arange(grid.azimuth[0], grid.azimuth[0] + 361.0, 5.0)]))
+    azimuth = azimuth[azimuth <= grid.azimuth[0] + 360.0]
+    x, w = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = (0.5 * (x + 1.0), 0.5 * w)
+
+    def points(edges: Array) -> tuple[Array, Array]:
+        widths = np.diff(edges)
+        return (edges[:-1, None] + widths[:, None] * nodes).ravel(), (widths[:, None] * weights).ravel()
+
+    a, wa = points(azimuth)
+    r, wr = points(radial)
+    d = grid.direction(r[None, :], a[:, None], one.incident, transmitted=one.transmitted)
+    f = _bilinear(grid, one.values, np.broadcast_to(r, d.shape[:-1]), np.broadcast_to((a % 360.0)[:, None], d.shape[:-1]))
+    measure = r if grid.frame == "cosines" else np.sin(np.radians(r)) * math.radians(1.0) * np.abs(d[..., 2])
+    inside = np.where(np.isnan(d[..., 2]), 0.0, measure * f)
+    return float(np.einsum("i,ij,j->", np.radians(wa), inside, wr))
+
+
+def _extended(grid: PolarGrid, one: BsdfSlice) -> Array:
+    """More steps beyond and between the radial coordinates, so that the rim of the hemisphere is found in small cells."""
+    if grid.frame == "normal":
+        return np.linspace(0.0, 90.0, 19)
+    sine = math.hypot(one.incident[0], one.incident[1])
+    if grid.frame == "cosines":
+        return np.linspace(max(1.0 - sine, 0.0), 1.0 + sine, 129)
+    return np.linspace(max(90.0 - one.theta, 0.0), min(90.0 + one.theta, 180.0), 129)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class BsdfData:
+    """A BSDF as a file holds it: slices, and components that are described by a model.
+
+    Parameters
+    ----------
+    slices : sequence of BsdfSlice
+        In any order.
+    components : sequence of dict
+        What a file describes by a model, in the keys of a scene's finishes: ``{"kind": "abg", "a": 0.1, …}``. Components and
+        slices add up.
+    isotropic : bool
+        Whether turning the sample about its normal changes nothing: each slice then stands for all azimuths of incidence.
+    mirrored : bool
+        Whether the sample is its own mirror image in each plane of incidence.
+    both_sides : bool
+        Whether light that meets the back is treated as light that meets the front (nothing else is said about it).
+    name, provenance, complaints, facts
+        What the file calls it, where it comes from, what was not as it should be, and what else it says (text by name).
+    """
+
+    slices: tuple[BsdfSlice, ...] = ()
+    components: tuple[Mapping[str, Any], ...] = ()
+    _: dataclasses.KW_ONLY
+    isotropic: bool = True
+    mirrored: bool = True
+    both_sides: bool = True
+    name: str = ""
+    provenance: Provenance | None = None
+    complaints: tuple[Complaint, ...] = ()
+    facts: Mapping[str, str] = dataclasses.field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "slices", tuple(self.slices))
+        object.__setattr__(self, "components", tuple(self.components))
+        object.__setattr__(self, "complaints", tuple(self.complaints))
+
+    @property
+    def wavelengths(self) -> tuple[float, ...]:
+        """All that are stated [nm], in order."""
+        return tuple(sorted({one.wavelength for one in self.slices if one.wavelength is not None}))
