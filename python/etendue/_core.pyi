@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "Bsdf",
     "Dealing",
     "FarField",
     "FieldRays",
@@ -49,6 +50,17 @@ __all__ = [
 
 _Floats: TypeAlias = npt.NDArray[np.float64]
 _Progress: TypeAlias = Callable[[int], Any]
+_Media: TypeAlias = tuple[float, float, float]
+"""Wavelength [nm], refractive index in front and behind."""
+
+@final
+class Bsdf:
+    def __new__(cls, record: dict[str, Any]) -> Bsdf: ...
+    def evaluate(self, incident: _Floats, scattered: _Floats, media: _Media) -> _Floats: ...
+    def pdf(self, incident: _Floats, scattered: _Floats, media: _Media) -> _Floats: ...
+    def shares(self, incident: _Floats, media: _Media) -> _Floats: ...
+    def sample(self, incident: tuple[float, float, float], n: int, seed: int, media: _Media) -> _Floats: ...
+    def facts(self) -> tuple[list[bool], bool]: ...
 
 class _Tally(TypedDict):
     rays: int

@@ -16,7 +16,7 @@ from etendue.formats.rays import RAY_FORMATS
 from etendue.luminance.filters import FILTERS
 from etendue.scene import MEDIA, Medium, Scene, Solid, Surface
 from etendue.scene.bodies import BODIES
-from etendue.scene.description import Description
+from etendue.description.keys import Description
 from etendue.scene.detectors import DETECTORS
 from etendue.scene.finishes import FINISHES
 from etendue.scene.observers import ObserverKeys, ScreenKeys
@@ -173,7 +173,7 @@ def test_the_page_of_scenes_names_every_kind_and_every_key(section: str) -> None
     rows = dict(re.findall(r"^\| `([a-z-]+)` \| ([^|]*)\|", text, re.MULTILINE))
     assert set(FAMILIES[section]) <= set(rows)
     for kind, member in FAMILIES[section].items():
-        keys = set(member.model_fields) - TOLD_OF_ALL
+        keys = set(member.keys()) - TOLD_OF_ALL
         assert set(re.findall(r"`(\w+)`", rows[kind])) == keys, kind
 
 
@@ -182,7 +182,7 @@ def test_the_page_of_scenes_names_every_kind_and_every_key(section: str) -> None
 )
 def test_the_page_of_scenes_names_every_key(part: type[Description]) -> None:
     text = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
-    missing = [key for key in part.model_fields if f"`{key}`" not in text]
+    missing = [key for key in part.keys() if f"`{key}`" not in text]
     assert not missing
 
 

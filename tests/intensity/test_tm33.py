@@ -180,7 +180,7 @@ def test_type_b_and_a(read: Read) -> None:
 
 
 def test_a_spectrum_goes_with_the_source(read: Read, tmp_path: Path) -> None:
-    from etendue.scene.files import Files
+    from etendue.description.files import Files
     from etendue.scene.sources.from_files import Point
 
     pairs = "".join(f'<PwrData w="{w}">{p}</PwrData>' for w, p in ((450, 1.0), (650, 0.0), (550, 3.0)))

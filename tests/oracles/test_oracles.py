@@ -157,7 +157,7 @@ def searchlight() -> tuple[Any, Any]:
     scene = beams.searchlight()
     lamp, mirror = scene.sources[0], scene.surfaces[0]
     level = lamp.flux / (math.pi * 4 * math.pi * lamp.shape.radius**2)
-    return beams.PEAK, mirror.finish.reflectance * level * math.pi * mirror.shape.radius**2
+    return beams.PEAK, mirror.finish.stated_reflectance * level * math.pi * mirror.shape.radius**2
 
 
 def body(lamp: bodies.Body, area: float) -> Callable[[], tuple[Any, Any]]:

@@ -11,7 +11,7 @@ import pytest
 from etendue.plot.scene_parts import FINISH_KINDS, finish_kind
 from etendue.scene import Scene, compile_scene
 from etendue.scene.detectors import DETECTORS
-from etendue.scene.files import Files
+from etendue.description.files import Files
 from etendue.scene.finishes import FINISHES
 from etendue.scene.sources import SOURCES
 from oracles.scenes import BODIES, SHAPES, shown

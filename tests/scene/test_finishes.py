@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, SceneError
 from etendue.scene import Scene, compile_scene, finishes
-from etendue.scene.files import Files
+from etendue.description.files import Files
 from etendue.scene.finishes import BUILT_IN, FINISHES, PARTS
-from etendue.scene.tables import Grid, on_common_nodes
+from etendue.description.tables import Grid, on_common_nodes
 from scipy.interpolate import RegularGridInterpolator
 
 HERE = Files(Path())

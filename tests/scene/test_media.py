@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from etendue.errors import FormatError, SceneError
 from etendue.scene import Scene, compile_scene
-from etendue.scene.files import Files
+from etendue.description.files import Files
 from etendue.scene.media import Medium, Sellmeier
 from etendue.scene.media_library import MEDIA
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from etendue.errors import SceneError
 from etendue.scene import Scene, compile_scene
-from etendue.scene.files import Files
+from etendue.description.files import Files
 from etendue.scene.shapes import SHAPES as REGISTRY
 from etendue.scene.shapes import Asphere, Ellipsoid, Hyperboloid, Paraboloid, Trim
 from etendue.scene.shapes.conics import Profile

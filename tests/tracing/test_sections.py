@@ -17,7 +17,7 @@ from etendue.errors import ArgumentError
 from etendue.scene import Scene, compile_scene
 from etendue.scene.bodies import BODIES
 from etendue.scene.extents import box_of
-from etendue.scene.files import Files
+from etendue.description.files import Files
 from etendue.scene.placement import Placement
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.shape import Trim

@@ -3,6 +3,7 @@
 //! Nothing is computed here. Each file converts one noun, releases the interpreter while the core works, and comes back
 //! between rounds of batches to report progress and to honour Ctrl-C.
 
+mod bsdf;
 mod cone;
 mod counts;
 mod dealing;
@@ -30,6 +31,7 @@ use pyo3::prelude::*;
 /// The compiled core of étendue.
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<bsdf::Bsdf>()?;
     module.add_class::<source::RayTable>()?;
     module.add_class::<stored::StoredBytes>()?;
     module.add_class::<source::RingSource>()?;

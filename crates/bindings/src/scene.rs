@@ -59,7 +59,7 @@ fn table(dict: Dict<'_, '_>, key: &str) -> PyResult<Table> {
         .ok_or_else(|| refuse(format!("{key}: not a table over increasing angles and wavelengths")))
 }
 
-fn finish(dict: &Bound<'_, PyDict>) -> PyResult<Arc<dyn Bsdf>> {
+pub fn finish(dict: &Bound<'_, PyDict>) -> PyResult<Arc<dyn Bsdf>> {
     match get::<String>(dict, "kind")?.as_str() {
         "fresnel" => Ok(Arc::new(Interface)),
         "scatter" => {

@@ -96,7 +96,7 @@ def finish_kind(finish: Record) -> str:
     Examples
     --------
     >>> from etendue.scene.finishes import Lambertian
-    >>> from etendue.scene.files import Files
+    >>> from etendue.description.files import Files
     >>> finish_kind(Lambertian(reflectance=0.9).record(Files()))
     'diffuse'
     """

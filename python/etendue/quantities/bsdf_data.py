@@ -65,14 +65,14 @@ class PolarGrid:
     Parameters
     ----------
     frame : {"normal", "specular", "cosines"}
-        ``"normal"``: the radial coordinate is θ [°] from the normal of the side where light leaves, the azimuth φ [°] from +x
-        towards +y.
-        ``"specular"``: it is the angle [°] to the specular direction s (mirrored, or straight on), and the azimuth
-        [°] turns from the direction e at right angles to s that lies in the plane of incidence on the side of the normal, towards
+        ``"normal"``: the radial coordinate is θ [°] from the normal of the side where light leaves, the azimuth φ [°] from
+        +x towards +y.
+        ``"specular"``: it is the angle [°] to the specular direction s (mirrored, or straight on), and the azimuth [°] turns
+        from the direction e at right angles to s that lies in the plane of incidence on the side of the normal, towards
         s × e. If s is the normal, e points to −β₀ of a slightly larger incidence at the same azimuth.
         ``"cosines"``: it is |β − β₀|, β and β₀ being the projections of the scattered and the specular direction on the
-        surface, and the azimuth [°] turns from the direction of β₀ towards +90° about +z (Harvey and Shack). At normal incidence
-        the direction of β₀ is that of a slightly larger incidence at the same azimuth.
+        surface, and the azimuth [°] turns from the direction of β₀ towards +90° about +z (Harvey and Shack). At normal
+        incidence the direction of β₀ is that of a slightly larger incidence at the same azimuth.
     radial : array, shape (n,)
         Increasing, not negative.
     azimuth : array, shape (m,)
@@ -104,9 +104,7 @@ class PolarGrid:
         """Scattered directions, shape (m, n, 3); NaN where a coordinate is no direction on the side where light leaves."""
         return self.direction(self.radial[None, :], self.azimuth[:, None], incident, transmitted=transmitted)
 
-    def direction(
-        self, radial: npt.ArrayLike, azimuth: npt.ArrayLike, incident: Array, *, transmitted: bool
-    ) -> Array:
+    def direction(self, radial: npt.ArrayLike, azimuth: npt.ArrayLike, incident: Array, *, transmitted: bool) -> Array:
         """The directions at coordinates, shape (…, 3); NaN where there is none on the side where light leaves."""
         r, a = np.broadcast_arrays(np.asarray(radial, np.float64), np.radians(azimuth))
         side = math.copysign(1.0, incident[2]) * (-1.0 if transmitted else 1.0)
@@ -172,8 +170,8 @@ class BsdfSlice:
     incident : array, shape (3,)
         Unit vector to where the light comes from.
     values : array
-        f [1/sr], the cosine not included: shape (m, n) on a `PolarGrid` of m azimuths and n radial coordinates, or (n,) at single
-        `points`. NaN: not measured.
+        f [1/sr], the cosine not included: shape (m, n) on a `PolarGrid` of m azimuths and n radial coordinates, or (n,) at
+        single `points`. NaN: not measured.
     transmitted : bool
         Whether the light passes to the other side.
     grid : PolarGrid, optional
@@ -252,12 +250,12 @@ class BsdfSlice:
     def directions(self) -> Array:
         """Scattered directions of the values, shape (…, 3); NaN where a grid goes beyond the hemisphere."""
         if self.grid is None:
-            assert self.points is not None
+            assert self.points is not None  # noqa: S101 - for type checkers
             return self.points
         return self.grid.directions(self.incident, transmitted=self.transmitted)
 
     def at(self, scattered: npt.ArrayLike) -> Array:
-        """f [1/sr] at directions of shape (…, 3) on the side where light leaves, for slices on a grid: bilinear on it.
+        """F [1/sr] at directions of shape (…, 3) on the side where light leaves, for slices on a grid: bilinear on it.
 
         Beyond the last radial coordinate f is that of the last; between the ends of azimuths that do not go around it is
         interpolated across the gap.
@@ -327,7 +325,7 @@ NODES = 6
 
 def _integral(one: BsdfSlice) -> float:
     grid = one.grid
-    assert grid is not None
+    assert grid is not None  # noqa: S101 - for type checkers
     end = {"normal": 90.0, "specular": 180.0, "cosines": 2.0}[grid.frame]
     radial = np.unique(np.concatenate([[0.0], grid.radial[grid.radial < end], _extended(grid, one), [end]]))
     azimuth = np.unique(np.concatenate([grid.azimuth, np.arange(grid.azimuth[0], grid.azimuth[0] + 361.0, 5.0)]))
@@ -342,7 +340,9 @@ def _integral(one: BsdfSlice) -> float:
     a, wa = points(azimuth)
     r, wr = points(radial)
     d = grid.direction(r[None, :], a[:, None], one.incident, transmitted=one.transmitted)
-    f = _bilinear(grid, one.values, np.broadcast_to(r, d.shape[:-1]), np.broadcast_to((a % 360.0)[:, None], d.shape[:-1]))
+    f = _bilinear(
+        grid, one.values, np.broadcast_to(r, d.shape[:-1]), np.broadcast_to((a % 360.0)[:, None], d.shape[:-1])
+    )
     measure = r if grid.frame == "cosines" else np.sin(np.radians(r)) * math.radians(1.0) * np.abs(d[..., 2])
     inside = np.where(np.isnan(d[..., 2]), 0.0, measure * f)
     return float(np.einsum("i,ij,j->", np.radians(wa), inside, wr))

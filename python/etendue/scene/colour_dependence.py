@@ -22,7 +22,7 @@ def telling_media(rows: Sequence[Record], names: Sequence[str], wavelength: Arra
 
     Examples
     --------
-    >>> from etendue.scene.files import Files
+    >>> from etendue.description.files import Files
     >>> from etendue.scene.media_library import MEDIA
     >>> rows = [MEDIA[name].medium.record(Files()) for name in ("air", "BK7")]
     >>> list(telling_media(rows, ["air", "BK7"], np.array([450.0, 633.0])))
@@ -41,7 +41,7 @@ def telling_finishes(rows: Sequence[Record], names: Sequence[str], wavelength: A
 
     Examples
     --------
-    >>> from etendue.scene.files import Files
+    >>> from etendue.description.files import Files
     >>> from etendue.scene.finishes import Transmitter
     >>> row = Transmitter(transmittance={"wavelength": [400, 700], "values": [0.1, 0.9]}).record(Files())
     >>> list(telling_finishes([row], ["filter"], np.array([450.0, 633.0])))

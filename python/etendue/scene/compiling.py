@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue.description.mistakes import join
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
 from etendue.quantities.fingerprint import fingerprint
 from etendue.scene.colour_dependence import telling_finishes, telling_media
 from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
 from etendue.scene.media_library import MEDIA
-from etendue.scene.mistakes import join
 from etendue.scene.overlaps import Kind, doubts_about
 from etendue.scene.scene import Scene
 from etendue.scene.things import Solid, Surface

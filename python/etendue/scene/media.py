@@ -11,34 +11,17 @@ import numpy.typing as npt
 from annotated_types import Ge, Le, MaxLen, MinLen
 from pydantic import Discriminator, Tag, model_validator
 
+from etendue.description.files import Files, read_columns
+from etendue.description.keys import Description
+from etendue.description.mistakes import BY_NAME, DESCRIBED, NUMBER, TABLE
+from etendue.description.values import AsNumber, AsRow, Finite, FirstMistake, NotNegative, Number, Rising, rises
 from etendue.errors import ArgumentError
-from etendue.scene.description import Description
-from etendue.scene.files import Files, read_columns
-from etendue.scene.mistakes import BY_NAME, DESCRIBED, NUMBER, TABLE
-from etendue.scene.values import AsNumber, AsRow, Finite, FirstMistake, NotNegative, Number, Wavelength
 from etendue.units import NM_PER_UM
 
 Array = npt.NDArray[np.float64]
 Record = dict[str, Any]
 
 Index = Annotated[float, Finite, Ge(1.0), Le(10.0), AsNumber]
-Rising = Annotated[tuple[Wavelength, ...], MinLen(1), MaxLen(1 << 20), FirstMistake, AsRow]
-
-
-def rises(name: str, values: tuple[float, ...]) -> None:
-    """Refuse nodes of a table that do not rise strictly.
-
-    Raises
-    ------
-    ValueError
-        With the name of the key.
-
-    Examples
-    --------
-    >>> rises("wavelength", (400.0, 700.0))
-    """
-    if (np.diff(values) <= 0.0).any():
-        raise ValueError(f"{name!r} must rise from value to value")
 
 
 class Spectral(Description):

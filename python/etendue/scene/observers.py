@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from etendue.description.keys import Description
+from etendue.description.values import Number, Vector
 from etendue.quantities.observer import Observer, Screen
-from etendue.scene.description import Description
-from etendue.scene.values import Number, Vector
 
 
 class ScreenKeys(Description):

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import model_validator
 
+from etendue.description.keys import Description
+from etendue.description.values import Number, Point, Vector
 from etendue.quantities.observer import cos_sin_degrees
-from etendue.scene.description import Description
-from etendue.scene.values import Number, Point, Vector
 
 Array = npt.NDArray[np.float64]
 

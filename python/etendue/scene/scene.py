@@ -10,24 +10,24 @@ from typing import Annotated, Any, Self
 from annotated_types import MaxLen
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
+from etendue.description.families import Family
+from etendue.description.files import Files
+from etendue.description.keys import Description
+from etendue.description.mistakes import mistakes_of
+from etendue.description.values import AsRow, Wavelength
 from etendue.errors import SceneError
 from etendue.formats.input import as_path, require_readable
 from etendue.formats.output import atomic_output
 from etendue.quantities.notebook import InNotebook
-from etendue.scene.description import Description
 from etendue.scene.detectors import AnyDetector
-from etendue.scene.families import Family
-from etendue.scene.files import Files
 from etendue.scene.finishes import BUILT_IN, AnyFinish
 from etendue.scene.media import Medium, MediumOrName
 from etendue.scene.media_library import MEDIA
-from etendue.scene.mistakes import mistakes_of
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.sources import SOURCES
 from etendue.scene.sources.source import Source
 from etendue.scene.things import Solid, Surface
 from etendue.scene.toml import read_toml, to_toml
-from etendue.scene.values import AsRow, Wavelength
 
 MOST = 100_000
 """Sources, solids, surfaces, detectors or observers of one scene."""

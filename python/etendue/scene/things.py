@@ -7,10 +7,10 @@ from typing import Annotated
 
 from pydantic import Field
 
+from etendue.description.families import Family
 from etendue.errors import nearest_name
 from etendue.scene.bodies import BODIES
 from etendue.scene.bodies.body import Body, Face
-from etendue.scene.families import Family
 from etendue.scene.finishes import Finish, FinishOrName
 from etendue.scene.media import MediumOrName
 from etendue.scene.placement import Placement

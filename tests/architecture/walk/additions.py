@@ -108,8 +108,8 @@ ADDITIONS: dict[str, Addition] = {
             ),
             Insertion(
                 f"{SCENE}/finishes.py",
-                "from etendue.scene.tables import Grid, Shares, constant, grid_of, on_common_nodes\n",
-                "from etendue.scene.values import AsNumber, Finite\n",
+                "from etendue.description.tables import Grid, Shares, constant, grid_of, on_common_nodes\n",
+                "from etendue.description.values import AsNumber, Finite\n",
             ),
             Insertion(
                 f"{SCENE}/finishes.py",

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from etendue.quantities.measured import measured
 from etendue.scene.detectors.detector import Detection, Detector, Origin, Record, Recorded, Setting
-from etendue.scene.families import Family
-from etendue.scene.files import Files
+from etendue.description.families import Family
+from etendue.description.files import Files
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
 from etendue.scene.shapes import SHAPES

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Literal
 
-from etendue.scene.files import Files
+from etendue.description.files import Files
 from etendue.scene.shapes.round import Cylinder
 from etendue.scene.shapes.shape import WHOLE
 from etendue.scene.sources.source import Emitter, Source
-from etendue.scene.values import Length, Positive
+from etendue.description.values import Length, Positive
 from etendue.units import FluxUnit
 
 

@@ -9,6 +9,8 @@ mod interface;
 mod lambertian;
 mod mirror;
 mod mixture;
+mod more_numbers;
+mod tabulated;
 #[cfg(test)]
 mod tests;
 
@@ -17,6 +19,7 @@ pub use interface::Interface;
 pub use lambertian::Lambertian;
 pub use mirror::Mirror;
 pub use mixture::Mixture;
+pub use tabulated::{Row, Side, Slice, Tabulated, Way};
 
 /// Examples of all kinds, by the names of their files: what the tests go through.
 #[cfg(test)]
@@ -27,5 +30,6 @@ fn kinds() -> Vec<Vec<(String, std::sync::Arc<dyn Bsdf>)>> {
         Lambertian::named("lambertian"),
         Mirror::named("mirror"),
         Mixture::named("mixture"),
+        Tabulated::named("tabulated"),
     ]
 }

@@ -33,7 +33,7 @@ class Tabulated(Protocol):
     """Angles [°] at which it is known, in order, or a fair choice of them for a model."""
 
     def evaluate(self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None) -> Array:
-        """f [1/sr] for pairs of unit vectors, shapes (…, 3) that broadcast, in the frame of `etendue.quantities.bsdf_data`."""
+        """Return f [1/sr] for pairs of unit vectors, shapes (…, 3) that broadcast, in the frame of `bsdf_data`."""
         ...
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import abc
 import dataclasses
 
-from etendue.scene.description import Description
-from etendue.scene.files import Files
+from etendue.description.files import Files
+from etendue.description.keys import Description
 from etendue.scene.placement import HERE, Frame
 from etendue.scene.shapes.shape import Record
 

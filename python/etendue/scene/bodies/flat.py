@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import model_validator
 
+from etendue.description.files import Files
+from etendue.description.values import Length, Number, Vertices
 from etendue.scene.bodies.body import Body, Face
-from etendue.scene.files import Files
 from etendue.scene.placement import Frame
 from etendue.scene.shapes.outline import signed_area, simple_polygon
 from etendue.scene.shapes.shape import Record
-from etendue.scene.values import Length, Number, Vertices
 
 Array = npt.NDArray[np.float64]
 

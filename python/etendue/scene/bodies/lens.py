@@ -8,12 +8,12 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from etendue.description.files import Files
+from etendue.description.values import Length
 from etendue.scene.bodies.body import Body, Face
-from etendue.scene.files import Files
 from etendue.scene.placement import Frame
 from etendue.scene.shapes.conics import Profile
 from etendue.scene.shapes.round import quadric
-from etendue.scene.values import Length
 
 LOOKS = 4097
 """Distances from the axis at which the thickness is looked at."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from etendue.description.files import Files
 from etendue.scene.bodies.body import Body, Face
-from etendue.scene.files import Files
 from etendue.scene.placement import HERE
 from etendue.scene.shapes import mesh
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from etendue.description.files import Files
+from etendue.description.values import Length, LengthOrZero
 from etendue.scene.bodies.body import Body, Face
 from etendue.scene.bodies.flat import lid
-from etendue.scene.files import Files
 from etendue.scene.shapes.round import Cone, Cylinder, Hemisphere, Sphere
 from etendue.scene.shapes.shape import Record
-from etendue.scene.values import Length, LengthOrZero
 
 
 class Ball(Body):

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+from etendue.description.families import Family
 from etendue.scene.detectors.detector import Detection, Detector
 from etendue.scene.detectors.illuminance import Illuminance
 from etendue.scene.detectors.image import LightImage
 from etendue.scene.detectors.intensity import FarField
 from etendue.scene.detectors.rays import RayCollector
 from etendue.scene.detectors.scatter import ScatterRecorder
-from etendue.scene.families import Family
 
 DETECTORS: dict[str, type[Detector]] = {
     cls.model_fields["kind"].default: cls for cls in (RayCollector, Illuminance, FarField, LightImage, ScatterRecorder)

@@ -10,11 +10,11 @@ from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from etendue.description.files import Files
+from etendue.description.keys import Description
 from etendue.quantities.node_choice import Choice
 from etendue.quantities.provenance import Provenance
 from etendue.scene.dealing import Array, CellSums, Dealing
-from etendue.scene.description import Description
-from etendue.scene.files import Files
 from etendue.scene.observers import ObserverKeys
 from etendue.units import FluxUnit
 

@@ -6,13 +6,13 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Literal
 
+from etendue.description.files import Files
+from etendue.description.values import Length, Pixels
 from etendue.quantities.illuminance_map import IlluminanceMap, Point
 from etendue.quantities.observer import Screen
 from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
-from etendue.scene.files import Files
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
-from etendue.scene.values import Length, Pixels
 from etendue.units import MM2_PER_M2
 
 

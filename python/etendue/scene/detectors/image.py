@@ -6,11 +6,11 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self
 
+from etendue.description.files import Files
 from etendue.errors import UnknownNameError
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
 from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
-from etendue.scene.files import Files
 from etendue.scene.observers import ObserverKeys
 from etendue.units import MM2_PER_M2
 

@@ -10,13 +10,13 @@ from typing import Annotated, Any, Literal, Self
 from annotated_types import Gt, Le
 from pydantic import model_validator
 
+from etendue.description.files import Files
+from etendue.description.values import AsNumber, Finite, Pixels
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import Nodes
 from etendue.quantities.measured import measured, peak_line
 from etendue.scene.detectors.detector import Counted, Detection, Detector, Record, Recorded, Setting
-from etendue.scene.files import Files
 from etendue.scene.observers import ObserverKeys
-from etendue.scene.values import AsNumber, Finite, Pixels
 
 MOST_STEPS = 18_000
 """Steps of γ over 180°: a hundredth of a degree."""

@@ -6,11 +6,11 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
+from etendue.description.families import Family
+from etendue.description.files import Files
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
 from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
-from etendue.scene.families import Family
-from etendue.scene.files import Files
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
 from etendue.scene.shapes import SHAPES

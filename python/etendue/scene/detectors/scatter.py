@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le
 
+from etendue.description.files import Files
+from etendue.description.values import AsCount, AsRow
 from etendue.errors import UnknownNameError
 from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
-from etendue.scene.files import Files
 from etendue.scene.observers import ObserverKeys
-from etendue.scene.values import AsCount, AsRow
 
 MOST_SCATTERS = 1 << 36
 """Scatters that can be asked for: eight terabytes of them."""

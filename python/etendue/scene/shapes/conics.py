@@ -11,12 +11,12 @@ import numpy.typing as npt
 from annotated_types import MaxLen
 from pydantic import Field, model_validator
 
+from etendue.description.files import Files
+from etendue.description.keys import Description
+from etendue.description.values import Length, LengthOrZero, Number, Numbers
 from etendue.errors import ArgumentError
-from etendue.scene.description import Description
-from etendue.scene.files import Files
 from etendue.scene.shapes.round import Quadric, quadric
 from etendue.scene.shapes.shape import Record, Shape, Sheet, Trim, overlap
-from etendue.scene.values import Length, LengthOrZero, Number, Numbers
 
 Array = npt.NDArray[np.float64]
 Coefficients = Annotated[Numbers, MaxLen(16)]

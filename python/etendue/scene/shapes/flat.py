@@ -9,11 +9,11 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
+from etendue.description.files import Files
+from etendue.description.values import Length, LengthOrZero, Vertices
 from etendue.errors import ArgumentError
-from etendue.scene.files import Files
 from etendue.scene.shapes.outline import signed_area, simple_polygon
 from etendue.scene.shapes.shape import Record, Shape, Sheet, Trim, overlap
-from etendue.scene.values import Length, LengthOrZero, Vertices
 
 
 class Flat(Shape, abc.ABC):

@@ -11,12 +11,12 @@ import numpy.typing as npt
 from annotated_types import Ge, Le, MaxLen, MinLen
 from pydantic import model_validator
 
+from etendue.description.files import Files
+from etendue.description.values import LONGEST, AsNumber, AsRow, Finite, FirstMistake, Index, Point
 from etendue.errors import ArgumentError
-from etendue.scene.files import Files
 from etendue.scene.mesh_files import StoredMesh, read_mesh
 from etendue.scene.shapes.shape import Record, Shape, Sheet, Trim
 from etendue.scene.triangles import chord_error, facet_angle, open_edges, smooth_normals, volume, welded
-from etendue.scene.values import LONGEST, AsNumber, AsRow, Finite, FirstMistake, Index, Point
 
 Array = npt.NDArray[np.float64]
 Triangle = Annotated[tuple[Index, Index, Index], AsRow]

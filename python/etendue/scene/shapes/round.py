@@ -8,10 +8,10 @@ from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
+from etendue.description.files import Files
+from etendue.description.values import Length, LengthOrZero
 from etendue.errors import ArgumentError
-from etendue.scene.files import Files
 from etendue.scene.shapes.shape import UNBOUNDED, Record, Shape, Sheet, Trim, overlap
-from etendue.scene.values import Length, LengthOrZero
 
 ALL_RADII = (0.0, math.inf)
 

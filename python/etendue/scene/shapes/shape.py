@@ -10,9 +10,9 @@ from typing import Annotated, Any, Self
 from annotated_types import MaxLen
 from pydantic import Field, model_validator
 
-from etendue.scene.description import Description
-from etendue.scene.files import Files
-from etendue.scene.values import AsRow, Coordinate, Interval, Vector
+from etendue.description.files import Files
+from etendue.description.keys import Description
+from etendue.description.values import AsRow, Coordinate, Interval, Vector
 
 Record = dict[str, Any]
 Plane = tuple[float, float, float, float]

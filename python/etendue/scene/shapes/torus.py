@@ -6,10 +6,10 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from etendue.description.files import Files
+from etendue.description.values import Length
 from etendue.errors import ArgumentError
-from etendue.scene.files import Files
 from etendue.scene.shapes.shape import Record, Shape, Sheet, Trim
-from etendue.scene.values import Length
 
 
 class Torus(Shape):

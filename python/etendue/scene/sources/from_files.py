@@ -9,6 +9,8 @@ import numpy as np
 from pydantic import InstanceOf, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
+from etendue.description.files import Files
+from etendue.description.values import Positive
 from etendue.errors import ArgumentError
 from etendue.formats.intensity import read_intensity
 from etendue.formats.rays import read_rays
@@ -16,9 +18,7 @@ from etendue.lightfield.light_field import LightField
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
-from etendue.scene.files import Files
 from etendue.scene.sources.source import Emitter, Record, Source
-from etendue.scene.values import Positive
 from etendue.units import FluxUnit
 
 

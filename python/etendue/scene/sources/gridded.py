@@ -9,16 +9,16 @@ from annotated_types import Ge, Le
 from pydantic import InstanceOf, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
+from etendue.description.files import Files
+from etendue.description.values import AsCount, Index, Length, Positive
 from etendue.formats.rays import read_rays
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.surfaces import parse_surface
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
-from etendue.scene.files import Files
 from etendue.scene.placement import Placement
 from etendue.scene.sources.from_files import Rays
 from etendue.scene.sources.source import Emitter, Source
-from etendue.scene.values import AsCount, Index, Length, Positive
 
 
 class Gridded(Source):

@@ -11,11 +11,11 @@ import numpy.typing as npt
 from annotated_types import MaxLen, MinLen
 from pydantic import model_validator
 
+from etendue.description.files import Files
+from etendue.description.values import AsRow, FirstMistake, NotNegative, Wavelength
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
-from etendue.scene.files import Files
 from etendue.scene.placement import Placement
-from etendue.scene.values import AsRow, FirstMistake, NotNegative, Wavelength
 from etendue.units import FluxUnit
 
 Array = npt.NDArray[np.float64]

@@ -8,14 +8,14 @@ from typing import Annotated, Literal, Self
 from annotated_types import Ge, Le, MaxLen, MinLen
 from pydantic import model_validator
 
+from etendue.description.families import Family
+from etendue.description.files import Files
+from etendue.description.values import AsNumber, AsRow, Finite, Length, Positive
 from etendue.errors import ArgumentError
-from etendue.scene.families import Family
-from etendue.scene.files import Files
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.flat import FLAT, Plane
 from etendue.scene.shapes.shape import WHOLE, Shape, Trim, is_bounded
 from etendue.scene.sources.source import Emitter, Source
-from etendue.scene.values import AsNumber, AsRow, Finite, Length, Positive
 from etendue.units import FluxUnit
 
 

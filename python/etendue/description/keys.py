@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, ClassVar, Literal, Self, Union, get_args, get_origin
 
+from etendue.description.mistakes import mistakes_of, shown
+from etendue.errors import SceneError, nearest_name
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic.functional_validators import ModelWrapValidatorHandler
-
-from etendue.errors import SceneError, nearest_name
-from etendue.scene.mistakes import mistakes_of, shown
 
 FIRST = {"name": 0, "kind": 1}
 """Keys that are written before all others."""
@@ -32,8 +31,9 @@ class Description(BaseModel):
 
     def __init__(self, **values: Any) -> None:
         cls = type(self)
-        known = [name for name in cls.model_fields if name not in cls.IN_MEMORY]
-        mistakes = [(key, f"unknown key.{_hint(key, known)}") for key in values if key not in cls.model_fields]
+        keys = cls.keys()
+        known = [key for key, name in keys.items() if name not in cls.IN_MEMORY]
+        mistakes = [(key, f"unknown key.{_hint(key, known)}") for key in values if key not in keys]
         wrong = {
             name: f"is {shown(values[name])}.{_hint(values[name], choices)}"
             for name, choices in _choices(cls).items()
@@ -41,11 +41,16 @@ class Description(BaseModel):
         }
         mistakes += wrong.items()
         try:
-            super().__init__(**{name: value for name, value in values.items() if name in cls.model_fields})
+            super().__init__(**{key: value for key, value in values.items() if key in keys})
         except ValidationError as error:
             mistakes += [mistake for mistake in mistakes_of(error, values) if mistake[0] not in wrong]
         if mistakes:
             raise SceneError(cls.__name__, mistakes)
+
+    @classmethod
+    def keys(cls) -> dict[str, str]:
+        """The name of the attribute under each key; they differ where a method has the name of the key."""
+        return {field.alias or name: name for name, field in cls.model_fields.items()}
 
     @model_validator(mode="wrap")
     @classmethod
@@ -63,7 +68,11 @@ class Description(BaseModel):
         SceneError
             As the constructor.
         """
-        return type(self)(**{name: getattr(self, name) for name in type(self).model_fields} | changes)
+        return type(self)(**{key: getattr(self, name) for key, name in self.keys().items()} | changes)
+
+    def __repr_args__(self) -> Iterator[tuple[str, Any]]:
+        """Keys and values, as the constructor takes them."""
+        return ((key, getattr(self, name)) for key, name in self.keys().items())
 
     def to_dict(self) -> dict[str, Any]:
         """Keys and values as a TOML file holds them; keys that have their default are left out, but for ``kind``.
@@ -74,14 +83,14 @@ class Description(BaseModel):
             If something lives in memory only.
         """
         written: dict[str, Any] = {}
-        for name, field in sorted(type(self).model_fields.items(), key=lambda item: FIRST.get(item[0], len(FIRST))):
-            value = getattr(self, name)
+        for key, name in sorted(self.keys().items(), key=lambda item: FIRST.get(item[0], len(FIRST))):
+            value, field = getattr(self, name), type(self).model_fields[name]
             if name in self.IN_MEMORY and value is not None:
                 raise SceneError(
                     type(self).__name__, [(name, "lives in memory; write it to a file first, and name the file")]
                 )
             if name == "kind" or value != field.get_default(call_default_factory=True):
-                written[name] = _plain(value)
+                written[key] = _plain(value)
         return written
 
 
@@ -97,9 +106,9 @@ def _plain(value: Any) -> Any:
 
 @functools.cache
 def _choices(kind: type[Description]) -> Mapping[str, tuple[str | None, ...]]:
-    """The fields that hold one of a few words, or perhaps nothing, by name."""
-    found = {name: _words(field.annotation) for name, field in kind.model_fields.items()}
-    return MappingProxyType({name: words for name, words in found.items() if words})
+    """The keys that hold one of a few words, or perhaps nothing."""
+    found = {key: _words(kind.model_fields[name].annotation) for key, name in kind.keys().items()}
+    return MappingProxyType({key: words for key, words in found.items() if words})
 
 
 def _words(annotation: Any) -> tuple[str | None, ...]:

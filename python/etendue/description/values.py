@@ -73,3 +73,21 @@ Numbers = Annotated[tuple[Number, ...], FirstMistake, AsRow]
 Vertices = Annotated[
     tuple[Annotated[tuple[Coordinate, Coordinate], AsRow], ...], MinLen(3), MaxLen(1 << 16), FirstMistake, AsRow
 ]
+
+Rising = Annotated[tuple[Wavelength, ...], MinLen(1), MaxLen(1 << 20), FirstMistake, AsRow]
+
+
+def rises(name: str, values: tuple[float, ...]) -> None:
+    """Refuse nodes of a table that do not rise strictly.
+
+    Raises
+    ------
+    ValueError
+        With the name of the key.
+
+    Examples
+    --------
+    >>> rises("wavelength", (400.0, 700.0))
+    """
+    if (np.diff(values) <= 0.0).any():
+        raise ValueError(f"{name!r} must rise from value to value")

@@ -1,0 +1,1 @@
+"""Scatter: models and tables of the BSDF, goniometer scans, interpolation, appearance."""

@@ -1,0 +1,267 @@
+"""`Bsdf`: what a surface does to light, whether it is a model or a table.
+
+**Frame.** Directions are unit vectors in the frame of the surface, +z being the normal of its front. They point *away*
+from the surface: `incident` to where light comes from, `scattered` to where it goes. Light meets the front if the third
+component of `incident` is positive.
+"""
+
+from __future__ import annotations
+
+import abc
+import functools
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.bsdf_data import direction
+
+if TYPE_CHECKING:
+    from etendue import _core
+
+Array = npt.NDArray[np.float64]
+Side = Literal["front", "back"]
+
+UNIT = 1e-6
+"""By which the length of a direction may differ from 1."""
+
+WAVELENGTH = 555.0
+"""[nm], where nothing else is said."""
+
+
+def unit_vectors(name: str, values: npt.ArrayLike) -> Array:
+    """Directions of shape (…, 3), made unit exactly.
+
+    Raises
+    ------
+    ArgumentError
+        If they are not unit vectors.
+    """
+    given = np.asarray(values, np.float64)
+    if given.ndim < 1 or given.shape[-1] != 3:
+        raise ArgumentError(f"{name} has shape {given.shape}; unit vectors have shape (…, 3)")
+    length = np.linalg.norm(given, axis=-1, keepdims=True)
+    if not (np.abs(length - 1.0) <= UNIT).all():
+        raise ArgumentError(f"{name} holds vectors that are not of length 1")
+    return np.asarray(given / length)
+
+
+class Bsdf(abc.ABC):
+    """Bidirectional scattering distribution function of a surface, with the light that it mirrors and refracts beside it.
+
+    Models (`etendue.bsdf`) and tables (`read_bsdf`, `Bsdf.from_scans`) are asked alike. Both media are air unless
+    `media` states their refractive indices, in front and behind.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> paint = et.bsdf.DiffuseSpecular(total_reflectance=0.84, specular_reflectance=0.04)
+    >>> paint.reflectance([0, 45]).tolist()
+    [0.84, 0.84]
+    >>> float(paint.evaluate([0, 0, 1], [0.6, 0, 0.8]).round(6)) == round(0.8 / np.pi, 6)
+    True
+    """
+
+    @abc.abstractmethod
+    def _core_bsdf(self) -> _core.Bsdf:
+        """The same in the core."""
+
+    @functools.cached_property
+    def _compiled(self) -> _core.Bsdf:
+        return self._core_bsdf()
+
+    def evaluate(
+        self,
+        incident: npt.ArrayLike,
+        scattered: npt.ArrayLike,
+        *,
+        wavelength: float = WAVELENGTH,
+        media: tuple[float, float] = (1.0, 1.0),
+    ) -> Array:
+        """Return f [1/sr], the cosine not included; light that is mirrored or refracted has no f.
+
+        Parameters
+        ----------
+        incident, scattered : array_like, shapes (…, 3) that broadcast
+            Unit vectors away from the surface.
+        wavelength : float
+            In nm.
+        media : (float, float)
+            Refractive index in front and behind.
+
+        Returns
+        -------
+        array, shape (…)
+
+        Raises
+        ------
+        ArgumentError
+            If a vector is not of length 1.
+        """
+        shape, pairs = _pairs(incident, scattered)
+        return self._compiled.evaluate(*pairs, (wavelength, *media)).reshape(shape)
+
+    def pdf(
+        self,
+        incident: npt.ArrayLike,
+        scattered: npt.ArrayLike,
+        *,
+        wavelength: float = WAVELENGTH,
+        media: tuple[float, float] = (1.0, 1.0),
+    ) -> Array:
+        """Density [1/sr] of scattered directions: f |cos θₛ|, whose integral is the share that is scattered.
+
+        Parameters, result and errors are those of `evaluate`.
+        """
+        shape, pairs = _pairs(incident, scattered)
+        return self._compiled.pdf(*pairs, (wavelength, *media)).reshape(shape)
+
+    def sample(
+        self,
+        incident: npt.ArrayLike,
+        n: int,
+        *,
+        seed: int = 0,
+        wavelength: float = WAVELENGTH,
+        media: tuple[float, float] = (1.0, 1.0),
+    ) -> Array:
+        """What becomes of `n` rays from a direction, by the shares of their flux.
+
+        Parameters
+        ----------
+        incident : array_like, shape (3,)
+            Unit vector to where the rays come from.
+        n : int
+            How many.
+        seed : int
+            The same seed gives the same rays.
+        wavelength, media
+            As in `evaluate`.
+
+        Returns
+        -------
+        array, shape (n, 3)
+            Where they go, mirrored and refracted ones included; NaN for those that are absorbed. A ray that goes on keeps
+            its flux.
+
+        Raises
+        ------
+        ArgumentError
+            If `incident` is not one unit vector, or `n` is negative.
+        """
+        direction = unit_vectors("incident", incident)
+        if direction.shape != (3,):
+            raise ArgumentError("rays are drawn for one incident direction at a time")
+        if n < 0:
+            raise ArgumentError(f"{n} rays cannot be drawn")
+        return self._compiled.sample(tuple(direction.tolist()), n, seed, (wavelength, *media))
+
+    def reflectance(
+        self,
+        theta: npt.ArrayLike,
+        phi: npt.ArrayLike = 0.0,
+        side: Side = "front",
+        *,
+        wavelength: float = WAVELENGTH,
+        media: tuple[float, float] = (1.0, 1.0),
+    ) -> Array:
+        """Directional-hemispherical reflectance: the share of light from a direction that is mirrored or scattered back.
+
+        Parameters
+        ----------
+        theta, phi : array_like
+            Angle of incidence from the normal of the side, and its azimuth [°].
+        side : {"front", "back"}
+            The side that the light meets.
+        wavelength, media
+            As in `evaluate`.
+
+        Returns
+        -------
+        array
+            Of the shape of `theta` and `phi` together.
+
+        Raises
+        ------
+        ArgumentError
+            If an angle is not from 0 to 90°.
+        UnknownNameError
+            If there is no such side.
+        """
+        mirrored, _, back, _ = self._shares(theta, phi, side, (wavelength, *media))
+        return mirrored + back
+
+    def transmittance(
+        self,
+        theta: npt.ArrayLike,
+        phi: npt.ArrayLike = 0.0,
+        side: Side = "front",
+        *,
+        wavelength: float = WAVELENGTH,
+        media: tuple[float, float] = (1.0, 1.0),
+    ) -> Array:
+        """Directional-hemispherical transmittance: the share that passes to the other side, straight on or scattered.
+
+        Parameters, result and errors are those of `reflectance`.
+        """
+        _, refracted, _, through = self._shares(theta, phi, side, (wavelength, *media))
+        return refracted + through
+
+    def regular_reflectance(
+        self,
+        theta: npt.ArrayLike,
+        phi: npt.ArrayLike = 0.0,
+        side: Side = "front",
+        *,
+        wavelength: float = WAVELENGTH,
+        media: tuple[float, float] = (1.0, 1.0),
+    ) -> Array:
+        """The share that is mirrored in a single direction, which f does not hold.
+
+        Parameters, result and errors are those of `reflectance`.
+        """
+        return self._shares(theta, phi, side, (wavelength, *media))[0]
+
+    def regular_transmittance(
+        self,
+        theta: npt.ArrayLike,
+        phi: npt.ArrayLike = 0.0,
+        side: Side = "front",
+        *,
+        wavelength: float = WAVELENGTH,
+        media: tuple[float, float] = (1.0, 1.0),
+    ) -> Array:
+        """The share that goes straight on or is refracted in a single direction, which f does not hold.
+
+        Parameters, result and errors are those of `reflectance`.
+        """
+        return self._shares(theta, phi, side, (wavelength, *media))[1]
+
+    def _shares(
+        self, theta: npt.ArrayLike, phi: npt.ArrayLike, side: Side, media: tuple[float, float, float]
+    ) -> tuple[Array, Array, Array, Array]:
+        if side not in get_args(Side):
+            raise UnknownNameError("side", side, get_args(Side))
+        angles = np.asarray(theta, np.float64)
+        if not ((angles >= 0.0) & (angles <= 90.0)).all():
+            raise ArgumentError("angles of incidence are from 0 to 90°")
+        incident = direction(angles, phi, behind=side == "back")
+        found = self._compiled.shares(incident.reshape(-1, 3), media)
+        a, b, c, d = (column.reshape(incident.shape[:-1]) for column in found.T)
+        return a, b, c, d
+
+    @property
+    def reflects(self) -> bool:
+        """Whether light is scattered back."""
+        return self._compiled.facts()[0][2]
+
+    @property
+    def transmits(self) -> bool:
+        """Whether light is scattered to the other side."""
+        return self._compiled.facts()[0][3]
+
+
+def _pairs(incident: npt.ArrayLike, scattered: npt.ArrayLike) -> tuple[tuple[int, ...], tuple[Array, Array]]:
+    both = np.broadcast_arrays(unit_vectors("incident", incident), unit_vectors("scattered", scattered))
+    return both[0].shape[:-1], (both[0].reshape(-1, 3), both[1].reshape(-1, 3))

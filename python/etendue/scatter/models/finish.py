@@ -1,0 +1,41 @@
+"""What all optical properties of surfaces have in common: keys as a scene states them, and the BSDF that they describe."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any
+
+from etendue import _core
+from etendue.description.files import Files
+from etendue.description.keys import Description
+from etendue.scatter.bsdf import Bsdf
+
+Record = dict[str, Any]
+
+
+class Finish(Description, Bsdf, abc.ABC):
+    """An optical property of surfaces: the finish of a scene, and a BSDF."""
+
+    @abc.abstractmethod
+    def record(self, files: Files) -> Record:
+        """The finish as the core takes it.
+
+        Raises
+        ------
+        ArgumentError
+            If more light leaves than arrives, at any angle or wavelength.
+        FormatError, OSError
+            If a table cannot be read.
+        """
+
+    def lets_light_in(self) -> bool:
+        """Whether light gets through, so that a solid behind it needs a medium."""
+        return False
+
+    def __getstate__(self) -> dict[Any, Any]:
+        """For pickle: what was asked of the core is asked again."""
+        state = super().__getstate__()
+        return state | {"__dict__": {key: value for key, value in state["__dict__"].items() if key != "_compiled"}}
+
+    def _core_bsdf(self) -> _core.Bsdf:
+        return _core.Bsdf(self.record(Files()))
