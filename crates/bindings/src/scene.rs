@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use etendue_optics::bsdf::{Bsdf, Interface, Mixture};
+use etendue_optics::bsdf::{Bsdf, Interface, Mixture, Row, Side, Slice, Tabulated, Way};
 use etendue_optics::light_sampler::LightSampler;
 use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, PointSource, Source, SpectralLines, SurfaceSource};
@@ -10,6 +10,7 @@ use etendue_optics::table::{Curve, Table};
 use etendue_trace::detector::{Detector, Intensity};
 use etendue_trace::lit_scene::light_samplers;
 use etendue_trace::scene::{Scene as CoreScene, SceneFace};
+use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -72,8 +73,55 @@ pub fn finish(dict: &Bound<'_, PyDict>) -> PyResult<Arc<dyn Bsdf>> {
             let [a, b, c, d] = keys.map(|key| table(dict, key));
             Mixture::of_shares([a?, b?], [c?, d?]).ok_or_else(|| refuse("shares below 0, or above 1 together"))
         }
+        "sum" => {
+            let members: Vec<(f64, Bound<'_, PyDict>)> = get(dict, "members")?;
+            let members: PyResult<Vec<_>> = members.iter().map(|(weight, of)| Ok((*weight, finish(of)?))).collect();
+            let sum = Mixture::new(members?).ok_or_else(|| refuse("parts below 0, or more than 1 together"))?;
+            Ok(Arc::new(sum))
+        }
+        "table" => Ok(Arc::new(
+            Tabulated::new(&side(dict, "front")?, &side(dict, "back")?).map_err(refuse)?,
+        )),
         other => Err(refuse(format!("no finish is called {other}"))),
     }
+}
+
+/// The tables of scatter of one side.
+fn side(dict: &Bound<'_, PyDict>, key: &str) -> PyResult<Side> {
+    let sheets: Vec<Bound<'_, PyDict>> = get(dict, key)?;
+    let sheet = |of: &Bound<'_, PyDict>| {
+        let [a, b] = ["reflected", "transmitted"].map(|key| {
+            let rows: Option<Vec<Bound<'_, PyDict>>> = optional(of, key)?;
+            let way = |rows: Vec<Bound<'_, PyDict>>| {
+                let rows: PyResult<Vec<_>> = rows.iter().map(row).collect();
+                Ok::<_, PyErr>(Way { rows: rows? })
+            };
+            rows.map(way).transpose()
+        });
+        Ok((get(of, "wavelength")?, [a?, b?]))
+    };
+    let sheets: PyResult<Vec<_>> = sheets.iter().map(sheet).collect();
+    Ok(Side { sheets: sheets? })
+}
+
+fn row(dict: &Bound<'_, PyDict>) -> PyResult<Row> {
+    let slices: Vec<Bound<'_, PyDict>> = get(dict, "slices")?;
+    let slice = |of: &Bound<'_, PyDict>| {
+        let f: PyReadonlyArray2<'_, f64> = get(of, "f")?;
+        Ok(Slice {
+            sine: get(of, "sine")?,
+            radial: get(of, "radial")?,
+            azimuths: f.as_array().nrows(),
+            f: f.as_array().iter().copied().collect(),
+            share: get(of, "share")?,
+            floor: get(of, "floor")?,
+        })
+    };
+    let slices: PyResult<Vec<_>> = slices.iter().map(slice).collect();
+    Ok(Row {
+        azimuth: get(dict, "azimuth")?,
+        slices: slices?,
+    })
 }
 
 /// A source; ray sets are gathered in `sets`, those of several sources once.

@@ -5,7 +5,7 @@
 //! Lambertian floor apart from it; and the share of the flux of each.
 //!
 //! **In between.** At an angle of incidence between two slices both are moved with β₀ and added by their distance; the sum is
-//! scaled to the share there, a monotone cubic in β₀² through the shares of the slices `[Fritsch1984]`. Beyond the first and the last angle
+//! scaled to the share there. Slices that are far apart get others in between, ln f being linear in the angle. The share is a monotone cubic in β₀² through the shares of the slices `[Fritsch1984]`. Beyond the first and the last angle
 //! the nearest slice moves on unchanged, and what leaves the unit circle of direction cosines is absorbed.
 //!
 //! **Drawing** is exact: a slice by its share, a point of its grid by the inverse of its distribution in the plane of direction
@@ -14,6 +14,7 @@
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 use etendue_math::Vec3;
+use etendue_math::special::{exp, ln};
 use etendue_math::trig::{atan_eighths, sin_cos_turns};
 use etendue_sampling::warp::part_of;
 
@@ -186,12 +187,19 @@ impl Row {
         if sines.is_empty() || sines.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err("angles of incidence do not rise".into());
         }
-        let mut slices = self.slices.iter().map(Slice::grid).collect::<Result<Vec<_>, _>>()?;
-        let count = slices.len();
-        for k in 0..count {
-            let from = if k == 0 { 0.0 } else { sines[k - 1] };
-            let to = if k + 1 == count { 1.0 } else { sines[k + 1] };
-            slices[k].fill(from, to);
+        let mut slices: Vec<Grid> = Vec::new();
+        for (k, slice) in self.slices.iter().enumerate() {
+            if let Some(before) = k.checked_sub(1).map(|before| &self.slices[before]) {
+                for between in before.up_to(slice) {
+                    slices.push(between.grid()?);
+                }
+            }
+            slices.push(slice.grid()?);
+        }
+        let all: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
+        for (k, grid) in slices.iter_mut().enumerate() {
+            let from = if k == 0 { 0.0 } else { all[k - 1] };
+            grid.fill(from, all.get(k + 1).copied().unwrap_or(1.0));
         }
         let squares: Vec<f64> = sines.iter().map(|sine| sine * sine).collect();
         let of = |pick: fn(&Slice) -> f64| Cubic::new(&squares, &self.slices.iter().map(pick).collect::<Vec<_>>());
@@ -204,7 +212,69 @@ impl Row {
     }
 }
 
+/// Slices in between are made for steps of incidence of this size \[rad\] at most.
+const STEP: f64 = 0.0875;
+
+/// What is added to f before its logarithm is taken, relative to the largest f.
+const LITTLE: f64 = 1e-6;
+
 impl Slice {
+    /// Slices between this incidence and another one, close to each other: the logarithm of f is linear in the angle of incidence, so
+    /// that a lobe that grows and narrows stays one lobe.
+    ///
+    /// None where the grids differ in azimuths.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most 18 steps"
+    )]
+    fn up_to(&self, other: &Self) -> Vec<Self> {
+        let [from, to] = [self.sine, other.sine].map(|sine| sine.min(1.0).asin());
+        let steps = ((to - from) / STEP).ceil() as usize;
+        if self.azimuths != other.azimuths || self.radial.is_empty() || other.radial.is_empty() {
+            return Vec::new();
+        }
+        let mut radial = [&self.radial[..], &other.radial[..]].concat();
+        radial.sort_by(f64::total_cmp);
+        radial.dedup();
+        let [a, b] = [self, other].map(|slice| slice.on(&radial));
+        let largest = a.iter().chain(&b).copied().fold(0.0, f64::max);
+        let little = (LITTLE * largest).max(f64::MIN_POSITIVE);
+        (1..steps)
+            .map(|k| {
+                let part = k as f64 / steps as f64;
+                let mean = |(a, b): (&f64, &f64)| {
+                    (exp((1.0 - part) * ln(a + little) + part * ln(b + little)) - little).max(0.0)
+                };
+                Self {
+                    sine: (from + part * (to - from)).sin(),
+                    radial: radial.clone(),
+                    azimuths: self.azimuths,
+                    f: a.iter().zip(&b).map(mean).collect(),
+                    share: 0.0,
+                    floor: 0.0,
+                }
+            })
+            .collect()
+    }
+
+    /// f on other radial coordinates.
+    fn on(&self, radial: &[f64]) -> Vec<f64> {
+        let n = self.radial.len();
+        let along = |row: &[f64]| -> Vec<f64> {
+            let at = |r: &f64| {
+                let i = self.radial.partition_point(|x| x <= r).max(1) - 1;
+                let next = (i + 1).min(n - 1);
+                if next == i {
+                    return row[i];
+                }
+                row[i] + (row[next] - row[i]) * (r - self.radial[i]) / (self.radial[next] - self.radial[i])
+            };
+            radial.iter().map(at).collect()
+        };
+        self.f.chunks(n).flat_map(along).collect()
+    }
+
     fn grid(&self) -> Result<Grid, String> {
         let Self {
             radial, azimuths, f, ..
@@ -646,7 +716,7 @@ impl Bsdf for Tabulated {
         let incidence = Incidence::new(incident);
         let diffuse = [false, true].map(|transmitted| {
             let ways = self.ways(incident.z > 0.0, transmitted, media.wavelength);
-            ways.map(|(lobes, part)| part * lobes.share(&incidence)).sum()
+            ways.fold(0.0, |sum, (lobes, part)| sum + part * lobes.share(&incidence))
         });
         Shares {
             specular: [0.0; 2],

@@ -1,0 +1,152 @@
+"""`BsdfTable`: a BSDF from slices, measured or computed."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Iterable
+from typing import Any
+
+
+from etendue import _core
+from etendue.description.files import Files
+from etendue.errors import ArgumentError
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
+from etendue.quantities.report import Complaint
+from etendue.scatter.bsdf import WAVELENGTH, Bsdf
+from etendue.scatter.models import MODELS
+from etendue.scatter.resampling import lobes_of
+
+MOST = 1.01
+"""Share that a slice may scatter: more is refused, and what is above 1 is scaled to 1, with a complaint."""
+
+
+class BsdfTable(Bsdf):
+    """A BSDF as a table of slices, with the components that a file describes by models.
+
+    Between incidences the lobe moves with the specular direction and keeps its energy; beyond the last it moves unchanged,
+    and what leaves the hemisphere is absorbed: docs/scatter.md. Samples are exact.
+
+    Parameters
+    ----------
+    data : BsdfData
+        Slices and components.
+
+    Raises
+    ------
+    ArgumentError
+        If there is nothing in it, or a slice scatters more than 101 % of the light.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+    >>> grid = PolarGrid("normal", [0.0, 90.0], [0.0])
+    >>> half = BsdfTable(BsdfData([BsdfSlice(direction(30.0, 0.0), [[0.5 / np.pi] * 2], grid=grid)]))
+    >>> half.reflectance([0, 30, 80]).round(6).tolist()
+    [0.5, 0.5, 0.5]
+    """
+
+    def __init__(self, data: BsdfData) -> None:
+        if not data.slices and not data.components:
+            raise ArgumentError("a BSDF has slices or components; these data hold neither")
+        self.data = data
+        self.complaints: tuple[Complaint, ...] = data.complaints + tuple(_excesses(data))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For pickle: what was asked of the core is asked again."""
+        return {key: value for key, value in self.__dict__.items() if key not in ("_compiled", "_record")}
+
+    def __repr__(self) -> str:
+        """Name, slices and angles."""
+        angles = sorted({round(one.theta, 3) for one in self.data.slices})
+        held = f"{len(self.data.slices)} slices" + (f" at {angles[0]:g} to {angles[-1]:g}°" if angles else "")
+        return f"BsdfTable({self.data.name!r}, {held}, {len(self.data.components)} components)"
+
+    @property
+    def name(self) -> str:
+        """What its file calls it."""
+        return self.data.name
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether turning the sample about its normal changes nothing."""
+        return self.data.isotropic
+
+    @property
+    def both_sides(self) -> bool:
+        """Whether light that meets the back is treated as light that meets the front."""
+        return self.data.both_sides
+
+    @property
+    def wavelengths(self) -> tuple[float, ...]:
+        """At which it is known [nm]; empty: it is the same at all."""
+        return self.data.wavelengths
+
+    @property
+    def incidences(self) -> tuple[float, ...]:
+        """Angles of incidence at which it is known [°], in order."""
+        return tuple(sorted({round(one.theta, 6) for one in self.data.slices}))
+
+    def record(self) -> dict[str, Any]:
+        """As the core takes it."""
+        return self._record
+
+    @functools.cached_property
+    def _record(self) -> dict[str, Any]:
+        members = [(1.0, MODELS[part["kind"]](**part).record(Files())) for part in map(dict, self.data.components)]
+        if self.data.slices:
+            sides = [[one for one in self.data.slices if one.front is front] for front in (True, False)]
+            if self.data.both_sides:
+                sides = [sides[0] or sides[1]] * 2
+            front, back = (_sheets(side, self.data) for side in sides)
+            members.append((1.0, {"kind": "table", "front": front, "back": back}))
+        return members[0][1] if len(members) == 1 else {"kind": "sum", "members": members}
+
+    def _core_bsdf(self) -> _core.Bsdf:
+        return _core.Bsdf(self._record)
+
+
+def share_of(one: BsdfSlice) -> float:
+    """What a slice scatters of the flux: its integral, no more than 1."""
+    return min(one.integral(), 1.0)
+
+
+def _excesses(data: BsdfData) -> Iterable[Complaint]:
+    for one in data.slices:
+        share = one.integral()
+        way = "transmits" if one.transmitted else "reflects"
+        if share > MOST:
+            raise ArgumentError(
+                f"at {one.theta:g}° of incidence the table {way} {share:.4g} of the light, more than it receives"
+            )
+        if share > 1.0:
+            yield Complaint("warning", f"{one.theta:g}° of incidence", f"{way} {share:.6g} of the light; scaled to 1")
+
+
+def _sheets(slices: list[BsdfSlice], data: BsdfData) -> list[dict[str, Any]]:
+    def colour(one: BsdfSlice) -> float:
+        return WAVELENGTH if one.wavelength is None else one.wavelength
+
+    sheets = []
+    for wavelength, members in itertools.groupby(sorted(slices, key=colour), colour):
+        ways: list[list[BsdfSlice]] = [[], []]
+        for one in members:
+            ways[one.transmitted].append(one)
+        reflected, transmitted = (_rows(way, data) if way else None for way in ways)
+        sheets.append({"wavelength": wavelength, "reflected": reflected, "transmitted": transmitted})
+    return sheets
+
+
+def _rows(slices: list[BsdfSlice], data: BsdfData) -> list[dict[str, Any]]:
+    def azimuth(one: BsdfSlice) -> float:
+        # Of light along the normal the azimuth says how the sample is turned.
+        return 0.0 if data.isotropic else round(one.phi / 360.0, 9) % 1.0
+
+    rows = []
+    for turn, members in itertools.groupby(sorted(slices, key=azimuth), azimuth):
+        by_angle = {round(one.theta, 7): one for one in members}
+        rising = [by_angle[angle] for angle in sorted(by_angle)]
+        lobes = lobes_of(rising, [share_of(one) for one in rising], mirrored=data.isotropic and data.mirrored)
+        rows.append({"azimuth": turn, "slices": [lobe.record() for lobe in lobes]})
+    return rows
