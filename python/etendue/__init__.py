@@ -157,6 +157,8 @@ def __getattr__(name: str) -> Any:
     # Scenes are checked by pydantic, which takes as long to import as all the rest: only when somebody asks for one.
     if name == "scene":
         return importlib.import_module("etendue.scene")
+    if name == "bsdf":
+        return importlib.import_module("etendue.scatter.models")
     if name == "__version__":
         return importlib.import_module("importlib.metadata").version("etendue")
     if name == "Scene":

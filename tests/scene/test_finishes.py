@@ -60,12 +60,12 @@ def test_shares(kind: str) -> None:
 def test_whether_light_gets_in(kind: str) -> None:
     """Transmission decides."""
     transmits = EXPECTED[kind][1] + EXPECTED[kind][3] > 0
-    assert FINISHES[kind](**SPECIMENS[kind]).lets_light_in() is transmits
+    assert FINISHES[kind](**SPECIMENS[kind]).lets_light_in(HERE) is transmits
 
 
 def test_an_interface_leaves_its_shares_to_the_media() -> None:
     assert finishes.Interface().record(HERE) == {"kind": "fresnel"}
-    assert finishes.Interface().lets_light_in()
+    assert finishes.Interface().lets_light_in(HERE)
 
 
 def bilinear(record: dict[str, Any], angle: float, wavelength: float) -> float:

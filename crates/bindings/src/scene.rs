@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use etendue_math::Vec3;
 use etendue_optics::bsdf::{Bsdf, Interface, Mixture, Row, Side, Slice, Tabulated, Way};
 use etendue_optics::light_sampler::LightSampler;
 use etendue_optics::medium::{Index, Medium};
@@ -24,6 +25,7 @@ fn part(dict: &Bound<'_, PyDict>) -> PyResult<SceneFace> {
         face: face(dict)?,
         solid: optional(dict, "solid")?,
         finish: get(dict, "finish")?,
+        axis: optional::<[f64; 3]>(dict, "axis")?.map(|[x, y, z]| Vec3::new(x, y, z)),
     })
 }
 

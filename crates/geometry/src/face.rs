@@ -71,6 +71,21 @@ impl Face {
         Some(if self.flipped { -n } else { n })
     }
 
+    /// The same at a point of a triangle of a mesh.
+    #[must_use]
+    pub fn shading_normal_at(&self, part: u32, point: Vec3) -> Option<Vec3> {
+        let Shape::Mesh(mesh) = &self.shape else { return None };
+        if !mesh.is_smooth() {
+            return None;
+        }
+        let uv = mesh.weights(part, self.frame.point_to_local(point));
+        self.shading_normal(&Crossing {
+            part,
+            uv,
+            ..Crossing::default()
+        })
+    }
+
     /// Whether the point, in the coordinates of the shape, may lie in all half spaces.
     #[inline]
     #[must_use]

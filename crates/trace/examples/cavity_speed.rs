@@ -51,6 +51,7 @@ fn part(shape: Shape, frame: Frame, finish: usize) -> SceneFace {
         },
         solid: None,
         finish,
+        axis: None,
     }
 }
 

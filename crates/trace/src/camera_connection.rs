@@ -50,8 +50,9 @@ fn sight(event: &ScatterEvent, scene: &Scene, view: &View, media: &mut MediumCac
     let through = cosine < 0.0;
     let both = [event.before, event.after];
     let around = media.both(scene, both, event.front, event.wavelength).ok()?;
-    let normal = if event.front { event.side } else { -event.side };
-    let surface = Surface::new(&*scene.finishes[event.finish as usize], around, normal);
+    let normals = [event.side, event.normal].map(|n| if event.front { n } else { -n });
+    let axis = scene.axes[event.origin_faces.face[0] as usize];
+    let surface = Surface::new(&*scene.finishes[event.finish as usize], around, normals, axis);
     let f = surface.evaluate(-event.direction, k);
     if f == 0.0 || cosine == 0.0 {
         return None;

@@ -21,6 +21,8 @@ pub struct ScatterEvent {
     pub point: Vec3,
     /// Unit normal of the surface, on the side that the light came from.
     pub side: Vec3,
+    /// The interpolated normal of a mesh that states some, on the same side; else the same.
+    pub normal: Vec3,
     /// Where the light was going.
     pub direction: Vec3,
     /// Of the ray \[flux unit\].
@@ -57,6 +59,7 @@ impl ScatterEvent {
         Self {
             point: interaction.point,
             side: interaction.side,
+            normal: interaction.normal,
             direction,
             flux,
             wavelength,
@@ -171,9 +174,15 @@ pub fn from_row(scene: &Scene, row: &[u64]) -> Option<ScatterEvent> {
     };
     let normal = face.surface_point(point, direction, &here).normal;
     let front = direction.dot(normal) < 0.0;
+    let side = if front { normal } else { -normal };
+    let interpolated = face.shading_normal_at(part, point).map_or(side, |n| {
+        let n = if front { n } else { -n };
+        if direction.dot(n) < 0.0 { n } else { side }
+    });
     Some(ScatterEvent {
         point,
-        side: if front { normal } else { -normal },
+        side,
+        normal: interpolated,
         direction,
         flux: real(6),
         wavelength: real(7),

@@ -18,28 +18,56 @@ pub const SPLIT: f64 = 1e-4;
 pub struct Surface<'a> {
     bsdf: &'a dyn Bsdf,
     media: Media,
-    /// The third is the normal of the front.
+    /// Axes of the frame in which diffuse light is spread; the third is the normal of the front, and the first points along the
+    /// stated axis of the surface. Lambertian light is spread about the surface itself, so that none starts behind it; lobes
+    /// are about the interpolated normal, as the mirrored direction is.
     axes: [Vec3; 3],
+    /// The normal of the front of the surface itself.
+    side: Vec3,
 }
 
 impl<'a> Surface<'a> {
-    /// With the unit normal of the front.
+    /// With the unit normals of the front: that of the surface itself, and the interpolated one; and a direction that the first
+    /// axis follows along the surface, if there is one.
     #[inline(always)]
     #[must_use]
-    pub fn new(bsdf: &'a dyn Bsdf, media: Media, normal: Vec3) -> Self {
+    pub fn new(bsdf: &'a dyn Bsdf, media: Media, [side, normal]: [Vec3; 2], axis: Option<Vec3>) -> Self {
+        let normal = if bsdf.facts().lambertian { side } else { normal };
         Self {
             bsdf,
             media,
-            axes: axes(normal),
+            axes: axis.map_or_else(|| axes(normal), |axis| axes_along(normal, axis)),
+            side,
         }
     }
 
-    /// f \[1/sr\] for light that comes from one direction and goes to another, both pointing away from the surface.
+    /// Whether a direction lies on the same side of the surface itself as of the frame in which light is spread.
+    #[inline]
+    fn keeps_side(&self, v: Vec3) -> bool {
+        (v.dot(self.side) > 0.0) == (v.dot(self.axes[2]) > 0.0)
+    }
+
+    /// f \[1/sr\] for light that comes from one direction and goes to another, both pointing away from the surface: of the
+    /// surface itself, whose cosine makes intensity of it.
     #[inline]
     #[must_use]
     pub fn evaluate(&self, incident: Vec3, scattered: Vec3) -> f64 {
-        let [incident, scattered] = [incident, scattered].map(|v| local(&self.axes, v));
-        self.bsdf.evaluate(incident, scattered, &self.media)
+        let [i, s] = [incident, scattered].map(|v| local(&self.axes, v));
+        self.bsdf.evaluate(i, s, &self.media) * self.tilt(incident, scattered, s.z)
+    }
+
+    /// What f is multiplied by where normals are interpolated: the light that leaves in a direction is f cosθ about the
+    /// interpolated normal, forwards, and the same light is seen backwards, where the cosine is that of the surface itself
+    /// \[Veach1997, 5.3\]. 0 where either direction is on the other side of the surface itself.
+    #[inline]
+    fn tilt(&self, incident: Vec3, scattered: Vec3, height: f64) -> f64 {
+        if self.axes[2] == self.side {
+            1.0
+        } else if self.keeps_side(incident) && self.keeps_side(scattered) {
+            (height / scattered.dot(self.side)).abs()
+        } else {
+            0.0
+        }
     }
 }
 
@@ -47,6 +75,17 @@ impl<'a> Surface<'a> {
 fn axes(normal: Vec3) -> [Vec3; 3] {
     let [x, y] = across(normal);
     [x, y, normal]
+}
+
+/// Axes of which the first is a direction laid on the surface; any, where it stands upright on it.
+fn axes_along(normal: Vec3, axis: Vec3) -> [Vec3; 3] {
+    let laid = axis - normal * axis.dot(normal);
+    let length = laid.length();
+    if length <= 1e-9 * axis.length() {
+        return axes(normal);
+    }
+    let x = laid * (1.0 / length);
+    [x, normal.cross(x), normal]
 }
 
 /// Components of a unit vector along axes.
@@ -65,7 +104,7 @@ pub struct SurfaceEvent<'a> {
     d: Vec3,
     /// To where it came from, about the interpolated normal: what is mirrored and refracted goes by it.
     towards: Vec3,
-    /// As `towards`, about the normal of the surface itself. Diffuse light is spread about it, so that none starts behind it.
+    /// The same in the frame in which diffuse light is spread.
     outward: Vec3,
 }
 
@@ -96,12 +135,13 @@ impl<'a> SurfaceEvent<'a> {
             return Ok(None);
         }
         let front = |normal: Vec3| if interaction.front { normal } else { -normal };
-        let surface = Surface::new(bsdf, media, front(interaction.side));
+        let normals = [interaction.side, interaction.normal].map(front);
+        let surface = Surface::new(bsdf, media, normals, scene.axes[interaction.face as usize]);
         let outward = local(&surface.axes, -d);
-        let towards = if interaction.normal == interaction.side {
+        let towards = if surface.axes[2] == normals[1] {
             outward
         } else {
-            local(&axes(front(interaction.normal)), -d)
+            local(&axes(normals[1]), -d)
         };
         Ok(Some(Self {
             surface,
@@ -150,7 +190,11 @@ impl<'a> SurfaceEvent<'a> {
             Drawn::Refracted(cosine) => (Component::Specular(true), self.refracted(cosine)),
             Drawn::Scattered(direction) => {
                 let transmitted = (direction.z > 0.0) != self.interaction.front;
-                (Component::Diffuse(transmitted), self.scattered(direction))
+                let (d, stack) = self.scattered(direction);
+                if !self.surface.keeps_side(d) {
+                    return None;
+                }
+                (Component::Diffuse(transmitted), (d, stack))
             }
         };
         Some((component, d, stack))
@@ -224,8 +268,8 @@ impl<'a> SurfaceEvent<'a> {
         let (bsdf, media) = (self.surface.bsdf, &self.surface.media);
         Incoming {
             transmitted,
-            f: bsdf.evaluate(incident, self.outward, media),
-            cosine: incident.z.abs(),
+            f: bsdf.evaluate(incident, self.outward, media) * self.surface.tilt(k, -self.d, self.outward.z),
+            cosine: k.dot(self.surface.side).abs(),
             density: bsdf.incoming_pdf(incident, self.outward, media),
             stack: if transmitted {
                 self.interaction.after

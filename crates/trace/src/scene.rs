@@ -7,6 +7,7 @@ use etendue_geometry::Face;
 use etendue_geometry::FaceSet;
 use etendue_geometry::bounds::Bounds;
 use etendue_geometry::shape::ROUNDING;
+use etendue_math::Vec3;
 use etendue_optics::bsdf::{Bsdf, Facts};
 use etendue_optics::medium::Medium;
 use etendue_optics::source::Source;
@@ -40,6 +41,8 @@ pub struct Scene {
     pub face_set: FaceSet,
     /// One for each face.
     pub roles: Vec<Role>,
+    /// For each face, the direction that the first axis of its BSDF follows, if that matters.
+    pub axes: Vec<Option<Vec3>>,
     /// Optical properties.
     pub finishes: Vec<Arc<dyn Bsdf>>,
     /// Media; the first one fills the surroundings.
@@ -61,6 +64,8 @@ pub struct SceneFace {
     pub solid: Option<usize>,
     /// Number of its finish.
     pub finish: usize,
+    /// The direction that the first axis of its BSDF follows along the surface, if that matters.
+    pub axis: Option<Vec3>,
 }
 
 /// The faces that rays of a source may start on or in, by the boxes around them.
@@ -117,7 +122,7 @@ impl Scene {
         if parts.len() + detectors.len() >= (u32::MAX / 2) as usize {
             return Err(format!("{} faces", parts.len()));
         }
-        let (mut faces, mut roles) = (Vec::new(), Vec::new());
+        let (mut faces, mut roles, mut axes) = (Vec::new(), Vec::new(), Vec::new());
         for (number, part) in parts.into_iter().enumerate() {
             let solid = part.solid.map_or(0, |s| s + 1);
             if solid > solids.len() || part.finish >= finishes.len() {
@@ -129,6 +134,7 @@ impl Scene {
                 act: Act::Optical(part.finish as u32),
             });
             faces.push(part.face);
+            axes.push(part.axis);
         }
         for (number, face) in detectors.into_iter().enumerate() {
             if let Some(face) = face {
@@ -138,6 +144,7 @@ impl Scene {
                     act: Act::Detect(number as u32),
                 });
                 faces.push(face);
+                axes.push(None);
             }
         }
         let face_set = FaceSet::new(faces);
@@ -145,6 +152,7 @@ impl Scene {
         Ok(Self {
             face_set,
             roles,
+            axes,
             finishes,
             media,
             solids,

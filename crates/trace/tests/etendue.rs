@@ -31,6 +31,7 @@ fn lenses() -> Scene {
         },
         solid: Some(solid),
         finish: 0,
+        axis: None,
     };
     let lens = tilted(Vec3::new(0.2, -0.1, 0.0), 0.15);
     let front = Asphere::new(0.08, -0.6, vec![1e-4, -2e-7], [0.0, 4.0]).expect("sound");

@@ -70,6 +70,7 @@ fn part(shape: Shape, frame: Frame, solid: Option<usize>, finish: usize) -> Scen
             frame,
             trims: vec![],
             flipped: false,
+            axis: None,
         },
         solid,
         finish,

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import abc
 import functools
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from etendue import _core
+from etendue.description.files import Files
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.bsdf_data import direction
-
-if TYPE_CHECKING:
-    from etendue import _core
 
 Array = npt.NDArray[np.float64]
 Side = Literal["front", "back"]
@@ -64,12 +63,12 @@ class Bsdf(abc.ABC):
     """
 
     @abc.abstractmethod
-    def _core_bsdf(self) -> _core.Bsdf:
-        """The same in the core."""
+    def record(self, files: Files) -> dict[str, Any]:
+        """The BSDF as the core takes it; files that it names are looked for in the folder of `files`."""
 
     @functools.cached_property
     def _compiled(self) -> _core.Bsdf:
-        return self._core_bsdf()
+        return _core.Bsdf(self.record(Files()))
 
     def evaluate(
         self,
@@ -252,14 +251,20 @@ class Bsdf(abc.ABC):
         return a, b, c, d
 
     @property
+    def ways(self) -> tuple[bool, bool, bool, bool]:
+        """Whether light is mirrored, goes on in a single direction, is scattered back, is scattered to the other side."""
+        a, b, c, d = self._compiled.facts()[0]
+        return a, b, c, d
+
+    @property
     def reflects(self) -> bool:
         """Whether light is scattered back."""
-        return self._compiled.facts()[0][2]
+        return self.ways[2]
 
     @property
     def transmits(self) -> bool:
         """Whether light is scattered to the other side."""
-        return self._compiled.facts()[0][3]
+        return self.ways[3]
 
 
 def _pairs(incident: npt.ArrayLike, scattered: npt.ArrayLike) -> tuple[tuple[int, ...], tuple[Array, Array]]:

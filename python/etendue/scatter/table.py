@@ -8,7 +8,6 @@ from collections.abc import Iterable
 from typing import Any
 
 
-from etendue import _core
 from etendue.description.files import Files
 from etendue.errors import ArgumentError
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
@@ -88,7 +87,7 @@ class BsdfTable(Bsdf):
         """Angles of incidence at which it is known [°], in order."""
         return tuple(sorted({round(one.theta, 6) for one in self.data.slices}))
 
-    def record(self) -> dict[str, Any]:
+    def record(self, files: Files) -> dict[str, Any]:  # noqa: ARG002 - nothing in it comes from files
         """As the core takes it."""
         return self._record
 
@@ -102,9 +101,6 @@ class BsdfTable(Bsdf):
             front, back = (_sheets(side, self.data) for side in sides)
             members.append((1.0, {"kind": "table", "front": front, "back": back}))
         return members[0][1] if len(members) == 1 else {"kind": "sum", "members": members}
-
-    def _core_bsdf(self) -> _core.Bsdf:
-        return _core.Bsdf(self._record)
 
 
 def share_of(one: BsdfSlice) -> float:

@@ -19,11 +19,14 @@ from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
 from etendue.scene.media_library import MEDIA
 from etendue.scene.overlaps import Kind, doubts_about
+from etendue.scene.placement import Frame
 from etendue.scene.scene import Scene
 from etendue.scene.things import Solid, Surface
 from etendue.units import FluxUnit
 
 Record = dict[str, Any]
+Axis = tuple[float, float, float] | None
+"""Where the x axis of a sample points, if that matters."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -182,15 +185,15 @@ class _Compiler:
                 self.media.append((place, name, medium))
         return self.numbers[key]
 
-    def _finish(self, place: str, owner: str, given: Finish | str) -> tuple[int, bool]:
-        """Number of a finish, which is written down when it is first met; and whether it lets light in."""
+    def _finish(self, place: str, owner: str, given: Finish | str) -> tuple[int, bool, Axis]:
+        """Number of a finish, written down when it is first met; whether it lets light in; its axis, if it has one."""
         if isinstance(given, str):
             name = given
             finish = self.scene.finishes.get(given) or BUILT_IN.get(given)
             if finish is None:
                 known = [*self.scene.finishes, *BUILT_IN]
                 self.mistakes.append((place, str(UnknownNameError("finish", given, known))))
-                return 0, False
+                return 0, False, None
         else:
             name, finish = f"{owner}.finish", given
         key = ("finishes", name)
@@ -199,7 +202,7 @@ class _Compiler:
             with self._at(f"finishes.{name}" if given in self.scene.finishes else place):
                 self.rows["finishes"].append(finish.record(self.files))
                 self.names["finishes"].append(name)
-        return self.numbers[key], finish.lets_light_in()
+        return self.numbers[key], finish.lets_light_in(self.files), getattr(finish, "axis", None)
 
     def _check_indices(self) -> None:
         """Every medium has an index at every wavelength of the sources; a library's range is a note."""
@@ -258,12 +261,21 @@ class _Compiler:
             for face in faces:
                 key, given = solid.finish_of(face)
                 where, owner = ("finish", name) if key is None else (f"finishes.{key}", f"{name}.{key}")
-                finish, lets_in = self._finish(join(place, where), owner, given)
+                finish, lets_in, axis = self._finish(join(place, where), owner, given)
                 entered |= lets_in
                 self.notes += [f"{name}: {note}" for note in (*face.notes, *(face.facet_notes if lets_in else ()))]
-                self._face(
-                    f"{name}.{face.name}", face.shape, frame.then(face.frame).record(), [], number, face.flip, finish
+                self.rows["faces"].append(
+                    {
+                        "shape": face.shape,
+                        "frame": frame.then(face.frame).record(),
+                        "trims": [],
+                        "solid": number,
+                        "flip": face.flip,
+                        "finish": finish,
+                        "axis": _turned(axis, frame),
+                    }
                 )
+                self.names["faces"].append(f"{name}.{face.name}")
         if solid.medium is None and entered:
             text = "is missing; light enters this solid, so its refractive index is needed"
             self.mistakes.append((join(place, "medium"), text))
@@ -276,18 +288,22 @@ class _Compiler:
         with self._at(join(place, "shape")):
             sheet = surface.shape.sheet(surface.trim, self.files)
             self.notes += [f"{name}: {note}" for note in sheet.notes]
-            finish, _ = self._finish(join(place, "finish"), name, surface.finish)
+            finish, _, axis = self._finish(join(place, "finish"), name, surface.finish)
             if surface.finish in ("interface", Interface()):
                 self.notes.append(f"{name}: an interface changes nothing on a surface that is no solid's")
-            self._face(name, sheet.shape, surface.frame().record(), sheet.trims, None, False, finish)
-
-    def _face(
-        self, name: str, shape: Record, frame: list[float], trims: list[Any], solid: int | None, flip: bool, finish: int
-    ) -> None:
-        self.rows["faces"].append(
-            {"shape": shape, "frame": frame, "trims": trims, "solid": solid, "flip": flip, "finish": finish}
-        )
-        self.names["faces"].append(name)
+            frame = surface.frame()
+            self.rows["faces"].append(
+                {
+                    "shape": sheet.shape,
+                    "frame": frame.record(),
+                    "trims": sheet.trims,
+                    "solid": None,
+                    "flip": False,
+                    "finish": finish,
+                    "axis": _turned(axis, frame),
+                }
+            )
+            self.names["faces"].append(name)
 
     # --- light and what becomes of it ----------------------------------------------------------------------------------
 
@@ -335,6 +351,11 @@ class _Compiler:
             with self._at(_place("detectors", i, detector.name)):
                 self.rows["detectors"].append(detector.record(self.files, observers, self.names["faces"]))
                 self.names["detectors"].append(detector.name or f"detectors[{i}]")
+
+
+def _turned(axis: Axis, frame: Frame) -> list[float] | None:
+    """A direction of a frame in the world."""
+    return None if axis is None else (frame.axes @ np.asarray(axis)).tolist()
 
 
 def _place(family: str, i: int, name: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from etendue.description.families import Family
+from etendue.scatter.bsdf_file import BsdfFile
 from etendue.scatter.models import (
     MODELS,
     Absorber,
@@ -18,8 +19,8 @@ from etendue.scatter.models import (
     Transmitter,
 )
 
-FINISHES = MODELS
-"""Every finish by its kind."""
+FINISHES: dict[str, type[Finish]] = {**MODELS, "bsdf": BsdfFile}
+"""Every finish by its kind: the models, and scatter data from files."""
 
 BUILT_IN: dict[str, Finish] = {
     "interface": Interface(),
@@ -37,6 +38,7 @@ __all__ = [
     "FINISHES",
     "Absorber",
     "AnyFinish",
+    "BsdfFile",
     "DiffuseSpecular",
     "Finish",
     "FinishOrName",

@@ -226,6 +226,16 @@ impl Mesh {
         self.vertex_normals.is_some()
     }
 
+    /// The weights of the second and third vertex of a triangle at a point of it.
+    #[must_use]
+    pub fn weights(&self, i: u32, point: Vec3) -> [f64; 2] {
+        let [a, b, c] = self.triangle(i);
+        let (e, f, p) = (b - a, c - a, point - a);
+        let n = e.cross(f);
+        let square = n.dot(n);
+        [p.cross(f).dot(n) / square, e.cross(p).dot(n) / square]
+    }
+
     /// The unit normal of the smooth surface that a triangle stands for, at weights `u` and `v` of its second and third
     /// vertex: between the normals of its vertices. The geometric one if there are none or they cancel out.
     #[must_use]

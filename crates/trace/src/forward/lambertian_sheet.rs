@@ -153,6 +153,7 @@ mod tests {
             face,
             solid: None,
             finish: 0,
+            axis: None,
         };
         Scene::new(vec![face], vec![bsdf], vec![air], vec![], vec![], vec![]).expect("sound")
     }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import abc
 from typing import Any
 
-from etendue import _core
 from etendue.description.files import Files
 from etendue.description.keys import Description
 from etendue.scatter.bsdf import Bsdf
@@ -28,7 +27,7 @@ class Finish(Description, Bsdf, abc.ABC):
             If a table cannot be read.
         """
 
-    def lets_light_in(self) -> bool:
+    def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
         """Whether light gets through, so that a solid behind it needs a medium."""
         return False
 
@@ -36,6 +35,3 @@ class Finish(Description, Bsdf, abc.ABC):
         """For pickle: what was asked of the core is asked again."""
         state = super().__getstate__()
         return state | {"__dict__": {key: value for key, value in state["__dict__"].items() if key != "_compiled"}}
-
-    def _core_bsdf(self) -> _core.Bsdf:
-        return _core.Bsdf(self.record(Files()))

@@ -23,6 +23,6 @@ class Interface(Finish):
         """Nothing but its name: the media tell the rest."""
         return {"kind": "fresnel"}
 
-    def lets_light_in(self) -> bool:
+    def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
         """Always."""
         return True

@@ -102,7 +102,7 @@ class Lambertian(Scattering):
             "diffuse_transmittance": grid_of(self.stated_transmittance, files),
         }
 
-    def lets_light_in(self) -> bool:
+    def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
         """If it transmits."""
         return self.stated_transmittance != 0.0
 
@@ -166,7 +166,7 @@ class Transmitter(Scattering):
         """The specular transmittance."""
         return {"specular_transmittance": grid_of(self.stated_transmittance, files)}
 
-    def lets_light_in(self) -> bool:
+    def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
         """If it transmits."""
         return self.stated_transmittance != 0.0
 
@@ -194,6 +194,6 @@ class Mixed(Scattering):
         """All four."""
         return {part: grid_of(getattr(self, part), files) for part in PARTS}
 
-    def lets_light_in(self) -> bool:
+    def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
         """If it transmits in either way."""
         return self.specular_transmittance != 0.0 or self.diffuse_transmittance != 0.0
