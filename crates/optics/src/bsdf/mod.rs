@@ -23,7 +23,7 @@ pub use tabulated::{Row, Side, Slice, Tabulated, Way};
 
 /// Examples of all kinds, by the names of their files: what the tests go through.
 #[cfg(test)]
-fn kinds() -> Vec<Vec<(String, std::sync::Arc<dyn Bsdf>)>> {
+fn kinds() -> Vec<Vec<contract::Example>> {
     use contract::Examples;
     vec![
         Interface::named("interface"),

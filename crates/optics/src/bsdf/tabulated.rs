@@ -78,9 +78,20 @@ struct Lobes {
 struct Lobe {
     azimuth: f64,
     slices: Vec<Grid>,
-    /// Share of the lobe and of the floor over the square of the sine.
-    share: Cubic,
-    floor: Cubic,
+    /// Sines of incidence, rising, between which what follows is linear.
+    sines: Vec<f64>,
+    blends: Vec<Blend>,
+}
+
+/// How light from an angle of incidence is shared by slices.
+#[derive(Clone, Copy, Debug, Default)]
+struct Blend {
+    /// The first of the two slices from here to the next sine; the other one follows it.
+    first: usize,
+    /// Of the flux, in each of the two and in the floor.
+    shares: [f64; 3],
+    /// What f of each of the two slices is multiplied by.
+    factors: [f64; 2],
 }
 
 /// A slice with its integrals.
@@ -94,15 +105,16 @@ struct Grid {
     cumulative: Vec<f64>,
     /// Running sum over the sectors between azimuths, of the whole plane.
     sectors: Vec<f64>,
-    /// The integral over the unit circle about −β₀, by |β₀|: rising nodes and values, linear in between.
-    energy: [Vec<f64>; 2],
 }
 
 /// Farthest |β − β₀|.
 const END: f64 = 2.0;
 
-/// Of the integral over the unit circle, relative to its largest value: what its table may be off.
-const TOLERANCE: f64 = 2e-7;
+/// What interpolated shares may be off.
+const TOLERANCE: f64 = 5e-7;
+
+/// The smallest step of the sine of incidence for which shares are tabled.
+const SMALLEST_STEP: f64 = 1e-5;
 
 impl Tabulated {
     /// # Errors
@@ -196,19 +208,16 @@ impl Row {
             }
             slices.push(slice.grid()?);
         }
-        let all: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
-        for (k, grid) in slices.iter_mut().enumerate() {
-            let from = if k == 0 { 0.0 } else { all[k - 1] };
-            grid.fill(from, all.get(k + 1).copied().unwrap_or(1.0));
-        }
         let squares: Vec<f64> = sines.iter().map(|sine| sine * sine).collect();
         let of = |pick: fn(&Slice) -> f64| Cubic::new(&squares, &self.slices.iter().map(pick).collect::<Vec<_>>());
-        Ok(Lobe {
+        let mut lobe = Lobe {
             azimuth: self.azimuth,
             slices,
-            share: of(|slice| slice.share),
-            floor: of(|slice| slice.floor),
-        })
+            sines: Vec::new(),
+            blends: Vec::new(),
+        };
+        lobe.fill(&of(|slice| slice.share), &of(|slice| slice.floor));
+        Ok(lobe)
     }
 }
 
@@ -313,7 +322,6 @@ impl Slice {
             f: f.clone(),
             cumulative,
             sectors: Vec::new(),
-            energy: [Vec::new(), Vec::new()],
         };
         let mut sum = 0.0;
         for j in 0..*azimuths {
@@ -388,12 +396,7 @@ impl Grid {
     /// The integral over the unit circle about −β₀.
     fn integral(&self, sine: f64) -> f64 {
         // Gauss and Legendre, in parts of at most 5°; finer towards grazing incidence, where the circle is all on one side.
-        const NODES: [(f64, f64); 4] = [
-            (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
-            (0.330_009_478_207_571_9, 0.326_072_577_431_273_07),
-            (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
-            (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
-        ];
+        const NODES: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
         let parts = 72_usize.div_ceil(self.azimuths) * if sine > 0.9 { 4 } else { 1 };
         let mut sum = 0.0;
         for j in 0..self.azimuths {
@@ -410,38 +413,6 @@ impl Grid {
             }
         }
         sum * TAU / self.azimuths as f64
-    }
-
-    /// Tables the integral from one sine to another, in steps that are halved until it is linear within them.
-    fn fill(&mut self, from: f64, to: f64) {
-        let all = self.sectors[self.azimuths - 1].max(f64::MIN_POSITIVE);
-        let mut nodes = vec![(from, self.integral(from))];
-        let mut left = Vec::new();
-        let steps = 8;
-        for k in (1..=steps).rev() {
-            let x = from + (to - from) * f64::from(k) / f64::from(steps);
-            left.push((x, self.integral(x)));
-        }
-        while let (Some((x1, y1)), Some(&(x0, y0))) = (left.pop(), nodes.last()) {
-            let x = 0.5 * (x0 + x1);
-            let y = self.integral(x);
-            let off = (y - 0.5 * (y0 + y1)).abs();
-            if off <= TOLERANCE * all.min(1.0) || x1 - x0 < 1e-5 {
-                nodes.push((x, y));
-                nodes.push((x1, y1));
-            } else {
-                left.push((x1, y1));
-                left.push((x, y));
-            }
-        }
-        self.energy = [nodes.iter().map(|n| n.0).collect(), nodes.iter().map(|n| n.1).collect()];
-    }
-
-    /// The integral over the unit circle, from its table.
-    fn energy(&self, sine: f64) -> f64 {
-        let [x, y] = &self.energy;
-        let i = x.partition_point(|node| *node <= sine).clamp(1, x.len() - 1);
-        y[i - 1] + (y[i] - y[i - 1]) * ((sine - x[i - 1]) / (x[i] - x[i - 1])).clamp(0.0, 1.0)
     }
 
     /// A point of the plane with density f over its integral: distance and azimuth \[turns\].
@@ -480,7 +451,7 @@ impl Grid {
         let (start, width) = (low, high - low);
         let slope = if i + 1 < n { (f1 - f0) / width } else { 0.0 };
         // Newton's method, kept between ends that close in.
-        let mut r = 0.5 * (low + high);
+        let mut r = low + width * part_of(wanted - sums[i], sums[i + 1] - sums[i]);
         for _ in 0..60 {
             let off = self.up_to(j, i, r) - wanted;
             if off > 0.0 {
@@ -495,7 +466,7 @@ impl Grid {
             } else {
                 0.5 * (low + high)
             };
-            if (next - r).abs() <= 1e-15 * END {
+            if (next - r).abs() <= 1e-14 * END {
                 return next;
             }
             r = next;
@@ -528,50 +499,110 @@ fn rim(sine: f64, s: f64, c: f64) -> f64 {
     }
 }
 
-/// A slice that takes part at an angle of incidence, and the factor of its f.
-struct Part<'a> {
-    grid: &'a Grid,
-    factor: f64,
-}
-
 impl Lobe {
-    /// The slices next to a sine of incidence with their factors, and the floor.
-    fn parts(&self, sine: f64) -> ([Option<Part<'_>>; 2], f64) {
-        let above = self.slices.partition_point(|grid| grid.sine <= sine);
-        let square = sine * sine;
-        let floor = self.floor.at(square);
-        let (Some(below), true) = (above.checked_sub(1), above < self.slices.len()) else {
-            // Beyond the ends a slice moves on unchanged.
-            let grid = &self.slices[above.min(self.slices.len() - 1)];
-            let own = grid.energy(grid.sine);
-            let factor = if own > 0.0 { self.share.at(square) / own } else { 0.0 };
-            return ([Some(Part { grid, factor }), None], floor);
-        };
-        let (one, other) = (&self.slices[below], &self.slices[above]);
-        let part = (sine - one.sine) / (other.sine - one.sine);
-        let all = (1.0 - part) * one.energy(sine) + part * other.energy(sine);
-        let factor = if all > 0.0 { self.share.at(square) / all } else { 0.0 };
-        let parts = [(one, 1.0 - part), (other, part)];
-        (
-            parts.map(|(grid, part)| {
-                Some(Part {
-                    grid,
-                    factor: factor * part,
-                })
-            }),
-            floor,
-        )
+    /// Tables how light is shared, in steps that are halved until everything is linear within them.
+    fn fill(&mut self, share: &Cubic, floor: &Cubic) {
+        let slices = std::mem::take(&mut self.slices);
+        let count = slices.len();
+        // From 0 to the first slice, from each to the next, from the last to 1.
+        let mut ends: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
+        ends.insert(0, 0.0);
+        ends.push(1.0);
+        for (k, pair) in ends.windows(2).enumerate() {
+            let [from, to] = [pair[0], pair[1]];
+            if from >= to {
+                continue;
+            }
+            let beyond = k == 0 || k == count;
+            let first = k.saturating_sub(1).min(count - 1);
+            let own = slices[first].integral(slices[first].sine);
+            let at = |sine: f64| {
+                let square = sine * sine;
+                let (rho, floor) = (share.at(square), floor.at(square));
+                let (shares, factors) = if beyond {
+                    // The slice moves on unchanged.
+                    let factor = if own > 0.0 { rho / own } else { 0.0 };
+                    ([factor * slices[first].integral(sine), 0.0], [factor, 0.0])
+                } else {
+                    let part = (sine - from) / (to - from);
+                    let energies = [slices[first].integral(sine), slices[first + 1].integral(sine)];
+                    let all = (1.0 - part) * energies[0] + part * energies[1];
+                    let factor = if all > 0.0 { rho / all } else { 0.0 };
+                    let factors = [factor * (1.0 - part), factor * part];
+                    ([factors[0] * energies[0], factors[1] * energies[1]], factors)
+                };
+                Blend {
+                    first,
+                    shares: [shares[0], shares[1], floor],
+                    factors,
+                }
+            };
+            let mut last = (from, at(from));
+            self.push(last);
+            let mut left: Vec<_> = (1..=4)
+                .rev()
+                .map(|i| from + (to - from) * f64::from(i) / 4.0)
+                .map(|sine| (sine, at(sine)))
+                .collect();
+            while let Some(next) = left.pop() {
+                let sine = 0.5 * (last.0 + next.0);
+                let middle = (sine, at(sine));
+                if next.0 - last.0 < SMALLEST_STEP || middle.1.is_between(&last.1, &next.1) {
+                    self.push(middle);
+                    self.push(next);
+                    last = next;
+                } else {
+                    left.push(next);
+                    left.push(middle);
+                }
+            }
+        }
+        self.slices = slices;
     }
 
-    /// Shares of the lobe and of the floor.
-    fn shares(&self, sine: f64) -> [f64; 2] {
-        let (parts, floor) = self.parts(sine);
-        let lobe: f64 = parts
-            .iter()
-            .flatten()
-            .map(|part| part.factor * part.grid.energy(sine))
-            .sum();
-        [lobe, floor]
+    fn push(&mut self, (sine, blend): (f64, Blend)) {
+        self.sines.push(sine);
+        self.blends.push(blend);
+    }
+
+    fn blend(&self, sine: f64) -> Blend {
+        let above = self
+            .sines
+            .partition_point(|node| *node <= sine)
+            .clamp(1, self.sines.len() - 1);
+        let (a, b) = (&self.blends[above - 1], &self.blends[above]);
+        let [from, to] = [self.sines[above - 1], self.sines[above]];
+        let part = if to > from {
+            ((sine - from) / (to - from)).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        a.towards(b, part)
+    }
+}
+
+impl Blend {
+    fn towards(&self, other: &Self, part: f64) -> Self {
+        let mean = |a: f64, b: f64| a + part * (b - a);
+        Self {
+            first: self.first,
+            shares: std::array::from_fn(|k| mean(self.shares[k], other.shares[k])),
+            factors: std::array::from_fn(|k| mean(self.factors[k], other.factors[k])),
+        }
+    }
+
+    /// Whether it is what lies halfway between two others, for all that anybody can see.
+    fn is_between(&self, one: &Self, other: &Self) -> bool {
+        let middle = one.towards(other, 0.5);
+        let near = |a: f64, b: f64, scale: f64| (a - b).abs() <= TOLERANCE * scale;
+        let shares = self.shares.iter().zip(middle.shares);
+        let scale = self.factors[0].abs() + self.factors[1].abs();
+        let factors = self.factors.iter().zip(middle.factors);
+        shares.into_iter().all(|(a, b)| near(*a, b, 1.0)) && factors.into_iter().all(|(a, b)| near(*a, b, scale))
+    }
+
+    fn share(&self) -> f64 {
+        self.shares.iter().sum()
     }
 }
 
@@ -590,46 +621,41 @@ impl Lobes {
     }
 
     fn share(&self, incidence: &Incidence) -> f64 {
-        let rows = self.rows(incidence.turn);
-        let of = |(row, part): &(&Lobe, f64)| {
-            if *part > 0.0 {
-                part * row.shares(incidence.sine).iter().sum::<f64>()
-            } else {
-                0.0
-            }
-        };
-        rows.iter().map(of).sum()
+        let rows = self.rows(incidence.turn).into_iter().filter(|(_, part)| *part > 0.0);
+        rows.fold(0.0, |sum, (row, part)| sum + part * row.blend(incidence.sine).share())
     }
 
     /// f for light that leaves towards a point of the plane of direction cosines.
     fn evaluate(&self, incidence: &Incidence, r: f64, turn: f64) -> f64 {
         let mut sum = 0.0;
         for (row, part) in self.rows(incidence.turn).into_iter().filter(|(_, part)| *part > 0.0) {
-            let (slices, floor) = row.parts(incidence.sine);
-            let lobe: f64 = slices
-                .iter()
-                .flatten()
-                .map(|slice| slice.factor * slice.grid.at(r, turn))
-                .sum();
-            sum += part * (lobe + floor * FRAC_1_PI);
+            let blend = row.blend(incidence.sine);
+            let mut here = blend.shares[2] * FRAC_1_PI;
+            for (k, factor) in blend
+                .factors
+                .into_iter()
+                .enumerate()
+                .filter(|(_, factor)| *factor > 0.0)
+            {
+                here += factor * row.slices[blend.first + k].at(r, turn);
+            }
+            sum += part * here;
         }
         sum
     }
 
     /// A slice or a floor (None), picked by its share, with what is left of the number.
     fn pick(&self, incidence: &Incidence, number: f64) -> (Option<&Grid>, f64) {
-        let mut left = number * self.share(incidence);
+        let rows = self.rows(incidence.turn);
+        let blends = rows.map(|(row, part)| (row, part, row.blend(incidence.sine)));
+        let all: f64 = blends.iter().map(|(_, part, blend)| part * blend.share()).sum();
+        let mut left = number * all;
         let mut last = (None, number);
-        for (row, part) in self.rows(incidence.turn).into_iter().filter(|(_, part)| *part > 0.0) {
-            let (slices, floor) = row.parts(incidence.sine);
-            let lobes = slices.into_iter().flatten().map(|slice| {
-                let share = slice.factor * slice.grid.energy(incidence.sine);
-                (Some(slice.grid), share)
-            });
-            for (grid, share) in lobes.chain([(None, floor)]) {
+        for (row, part, blend) in &blends {
+            for (k, share) in blend.shares.iter().enumerate() {
                 let share = part * share;
                 if share > 0.0 {
-                    last = (grid, part_of(left, share));
+                    last = (row.slices.get(blend.first + k).filter(|_| k < 2), part_of(left, share));
                     if left < share {
                         return last;
                     }
@@ -762,10 +788,6 @@ impl Bsdf for Tabulated {
         }
         by_cosine(up, numbers)
     }
-
-    fn incoming(&self, _scattered: Vec3, _media: &Media) -> [f64; 2] {
-        self.facts.diffuse.map(f64::from)
-    }
 }
 
 /// A monotone cubic through points: between two of rising values it rises, and beyond the ends it is constant.
@@ -833,6 +855,9 @@ impl Cubic {
 
 #[cfg(test)]
 impl super::contract::Examples for Tabulated {
+    // f is bilinear between the nodes of each slice.
+    const QUADRATURE: f64 = 5e-5;
+
     fn examples() -> Vec<Self> {
         let lobe = |width: f64, skew: f64, sine: f64, share: f64, floor: f64| {
             let radial: Vec<f64> = (0..24).map(|i| 2.0 * (f64::from(i) / 23.0).powi(2)).collect();

@@ -42,12 +42,17 @@ fn direction(height: f64, turn: f64) -> Vec3 {
 }
 
 /// Every example in all media, with all directions.
-fn every(mut check: impl FnMut(&str, &dyn Bsdf, &Media, Vec3)) {
+fn every(mut check: impl FnMut((&str, f64), &dyn Bsdf, &Media, Vec3)) {
     let mut count = 0;
-    for (name, bsdf) in kinds().iter().flatten() {
+    for (name, bsdf, quadrature) in kinds().iter().flatten() {
         for media in &MEDIA {
             for (number, height) in HEIGHTS.into_iter().enumerate() {
-                check(name, &**bsdf, media, direction(height, 0.137 * number as f64));
+                check(
+                    (name, *quadrature),
+                    &**bsdf,
+                    media,
+                    direction(height, 0.137 * number as f64),
+                );
                 count += 1;
             }
         }
@@ -133,7 +138,7 @@ const DRAWN: u64 = 20_000;
 #[test]
 fn samples_have_their_shares_and_density() {
     let mut stream = 0;
-    every(|name, bsdf, media, incident| {
+    every(|(name, _), bsdf, media, incident| {
         stream += 1;
         let numbers = Stream::new(11, stream);
         let mut expected = integrals(12, |d| bsdf.pdf(incident, d, media));
@@ -189,7 +194,7 @@ fn a_density_that_is_wrong_is_seen() {
 
 #[test]
 fn the_density_integrates_to_the_shares_and_energy_is_kept() {
-    every(|name, bsdf, media, incident| {
+    every(|(name, quadrature), bsdf, media, incident| {
         let shares = bsdf.shares(incident, media);
         let parts = integrals(24, |d| bsdf.pdf(incident, d, media));
         let (front, back) = parts.split_at(BANDS * SECTORS);
@@ -197,7 +202,7 @@ fn the_density_integrates_to_the_shares_and_energy_is_kept() {
         let found = if incident.z > 0.0 { [front, back] } else { [back, front] };
         for side in 0..2 {
             assert!(
-                (found[side] - shares.diffuse[side]).abs() < 1e-6,
+                (found[side] - shares.diffuse[side]).abs() < quadrature,
                 "{name}, {media:?}, {incident:?}: {found:?} of {shares:?}"
             );
         }
@@ -211,7 +216,7 @@ fn the_density_integrates_to_the_shares_and_energy_is_kept() {
 #[test]
 fn facts_are_true() {
     let mut some = [false; 4];
-    for (name, bsdf) in kinds().iter().flatten() {
+    for (name, bsdf, _) in kinds().iter().flatten() {
         let facts = bsdf.facts();
         let mut met = [false; 4];
         let mut kept = true;
@@ -285,7 +290,7 @@ fn irreciprocity(bsdf: &dyn Bsdf) -> f64 {
 
 #[test]
 fn light_goes_back_as_it_came_or_the_exception_is_declared() {
-    for (name, bsdf) in kinds().iter().flatten() {
+    for (name, bsdf, _) in kinds().iter().flatten() {
         let worst = irreciprocity(&**bsdf);
         if bsdf.facts().reciprocal {
             assert!(worst < 1e-9, "{name}: {worst}");
@@ -303,7 +308,7 @@ fn in_a_furnace_one_sees_what_would_be_absorbed_missing() {
     // Surroundings of luminance n² on both sides. Who looks at a surface sees n² of his side times 1 − what it absorbs of light
     // from his eye, by Kirchhoff's law, which holds where light goes back as it came.
     let mut looked = 0;
-    every(|name, bsdf, media, towards| {
+    every(|(name, quadrature), bsdf, media, towards| {
         let n2 = |d: Vec3| media.seen_from(d)[0].powi(2);
         let (seen, shares) = bsdf.seen(towards, media);
         let scattered = integrals(12, |k| bsdf.evaluate(k, towards, media) * k.z.abs() * n2(k));
@@ -311,7 +316,7 @@ fn in_a_furnace_one_sees_what_would_be_absorbed_missing() {
         if bsdf.facts().reciprocal {
             looked += 1;
             assert!(
-                (all / n2(towards) - shares.total()).abs() < 1e-6,
+                (all / n2(towards) - shares.total()).abs() < quadrature,
                 "{name}, {media:?}, {towards:?}: {all}"
             );
         } else {
@@ -335,7 +340,7 @@ fn refracted_radiance_of_an_exception_is_that_of_light_from_there() {
 #[test]
 fn directions_that_light_may_come_from_are_drawn_with_their_density_and_none_is_left_out() {
     let mut stream = 0;
-    every(|name, bsdf, media, scattered| {
+    every(|(name, quadrature), bsdf, media, scattered| {
         stream += 1;
         let chances = bsdf.incoming(scattered, media);
         let whole = |d: Vec3| {
@@ -356,7 +361,10 @@ fn directions_that_light_may_come_from_are_drawn_with_their_density_and_none_is_
                 BANDS * SECTORS..2 * BANDS * SECTORS
             };
             let sum: f64 = expected[half.clone()].iter().sum();
-            assert!((sum - 1.0).abs() < 1e-6 && chance.is_finite(), "{name}: {sum}");
+            assert!(
+                (sum - 1.0).abs() < 10.0 * quadrature && chance.is_finite(),
+                "{name}: {sum}"
+            );
             let numbers = Stream::new(12, stream);
             let mut counts = vec![0; BANDS * SECTORS];
             for i in 0..DRAWN {
@@ -384,7 +392,7 @@ fn directions_that_light_may_come_from_are_drawn_with_their_density_and_none_is_
 
 #[test]
 fn at_grazing_incidence_everything_is_finite_and_on_its_side() {
-    for (name, bsdf) in kinds().iter().flatten() {
+    for (name, bsdf, _) in kinds().iter().flatten() {
         for media in &MEDIA {
             for height in [1e-3, 1e-9, 1e-15, f64::MIN_POSITIVE].into_iter().flat_map(|h| [h, -h]) {
                 let incident = direction(height, 0.2);
