@@ -10,13 +10,13 @@ from pathlib import Path
 import etendue as et
 import pytest
 from etendue.cli.app import VERBS
+from etendue.description.keys import Description
 from etendue.formats.intensity import INTENSITY_FORMATS
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import RAY_FORMATS
 from etendue.luminance.filters import FILTERS
 from etendue.scene import MEDIA, Medium, Scene, Solid, Surface
 from etendue.scene.bodies import BODIES
-from etendue.description.keys import Description
 from etendue.scene.detectors import DETECTORS
 from etendue.scene.finishes import FINISHES
 from etendue.scene.observers import ObserverKeys, ScreenKeys

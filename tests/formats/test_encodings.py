@@ -7,9 +7,9 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import pytest
+from etendue.description.files import read_columns
 from etendue.errors import FormatError
 from etendue.formats.encodings import decoded, in_utf8, unmarked_encoding, wide_encoding
-from etendue.description.files import read_columns
 from hypothesis import given
 from hypothesis import strategies as st
 

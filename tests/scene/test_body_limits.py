@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from etendue.description.files import Files
 from etendue.errors import SceneError
 from etendue.scene import bodies
-from etendue.description.files import Files
 from etendue.scene.shapes.outline import signed_area, simple_polygon
 from hypothesis import assume, given
 from hypothesis import strategies as st

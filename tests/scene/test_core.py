@@ -8,10 +8,10 @@ from typing import Any
 
 import etendue as et
 import pytest
+from etendue.description.files import Files
 from etendue.plot.scene_parts import FINISH_KINDS, finish_kind
 from etendue.scene import Scene, compile_scene
 from etendue.scene.detectors import DETECTORS
-from etendue.description.files import Files
 from etendue.scene.finishes import FINISHES
 from etendue.scene.sources import SOURCES
 from oracles.scenes import BODIES, SHAPES, shown

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from etendue.errors import ArgumentError, SceneError
-from etendue.scene import Scene, compile_scene, finishes
 from etendue.description.files import Files
-from etendue.scene.finishes import BUILT_IN, FINISHES, PARTS
 from etendue.description.tables import Grid, on_common_nodes
+from etendue.errors import ArgumentError, SceneError
+from etendue.scatter.models.shares import PARTS
+from etendue.scene import Scene, compile_scene, finishes
+from etendue.scene.finishes import BUILT_IN, FINISHES
 from scipy.interpolate import RegularGridInterpolator
 
 HERE = Files(Path())

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from etendue.description.files import Files
 from etendue.errors import FormatError, SceneError
 from etendue.scene import Scene, compile_scene
-from etendue.description.files import Files
 from etendue.scene.media import Medium, Sellmeier
 from etendue.scene.media_library import MEDIA
 

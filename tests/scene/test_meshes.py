@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from etendue.description.files import Files
 from etendue.errors import FormatError, MissingLibraryError, SceneError, SceneWarning
 from etendue.scene import Scene, bodies, compile_scene
-from etendue.description.files import Files
 from etendue.scene.mesh_files import MESH_FORMATS, read_mesh
 from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
 from oracles import step

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from etendue.description.files import Files
 from etendue.errors import SceneError
 from etendue.scene import Scene, compile_scene
-from etendue.description.files import Files
 from etendue.scene.shapes import SHAPES as REGISTRY
 from etendue.scene.shapes import Asphere, Ellipsoid, Hyperboloid, Paraboloid, Trim
 from etendue.scene.shapes.conics import Profile

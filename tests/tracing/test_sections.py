@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue import _core
+from etendue.description.files import Files
 from etendue.errors import ArgumentError
 from etendue.scene import Scene, compile_scene
 from etendue.scene.bodies import BODIES
 from etendue.scene.extents import box_of
-from etendue.description.files import Files
 from etendue.scene.placement import Placement
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.shape import Trim

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use etendue_math::Vec3;
-use etendue_optics::bsdf::{Bsdf, Interface, Mixture, Row, Side, Slice, Tabulated, Way};
+use etendue_optics::bsdf::{Bsdf, Mixture, Parameters, Row, Side, Slice, Tabulated, Way, described};
 use etendue_optics::light_sampler::LightSampler;
 use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, PointSource, Source, SpectralLines, SurfaceSource};
@@ -62,19 +62,22 @@ fn table(dict: Dict<'_, '_>, key: &str) -> PyResult<Table> {
         .ok_or_else(|| refuse(format!("{key}: not a table over increasing angles and wavelengths")))
 }
 
+/// The record of a finish, as the core asks for its parameters.
+struct Described<'a, 'py>(&'a Bound<'py, PyDict>);
+
+impl Parameters for Described<'_, '_> {
+    fn number(&self, key: &str) -> Result<f64, String> {
+        get(self.0, key).map_err(|error| error.to_string())
+    }
+
+    fn table(&self, key: &str) -> Result<Table, String> {
+        table(self.0, key).map_err(|error| error.to_string())
+    }
+}
+
 pub fn finish(dict: &Bound<'_, PyDict>) -> PyResult<Arc<dyn Bsdf>> {
-    match get::<String>(dict, "kind")?.as_str() {
-        "fresnel" => Ok(Arc::new(Interface)),
-        "scatter" => {
-            let keys = [
-                "specular_reflectance",
-                "specular_transmittance",
-                "diffuse_reflectance",
-                "diffuse_transmittance",
-            ];
-            let [a, b, c, d] = keys.map(|key| table(dict, key));
-            Mixture::of_shares([a?, b?], [c?, d?]).ok_or_else(|| refuse("shares below 0, or above 1 together"))
-        }
+    let kind = get::<String>(dict, "kind")?;
+    match kind.as_str() {
         "sum" => {
             let members: Vec<(f64, Bound<'_, PyDict>)> = get(dict, "members")?;
             let members: PyResult<Vec<_>> = members.iter().map(|(weight, of)| Ok((*weight, finish(of)?))).collect();
@@ -84,7 +87,10 @@ pub fn finish(dict: &Bound<'_, PyDict>) -> PyResult<Arc<dyn Bsdf>> {
         "table" => Ok(Arc::new(
             Tabulated::new(&side(dict, "front")?, &side(dict, "back")?).map_err(refuse)?,
         )),
-        other => Err(refuse(format!("no finish is called {other}"))),
+        other => match described(other, &Described(dict)) {
+            Some(bsdf) => bsdf.map_err(refuse),
+            None => Err(refuse(format!("no finish is called {other}"))),
+        },
     }
 }
 

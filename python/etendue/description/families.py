@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from etendue.description.mistakes import BY_NAME, shown
-from etendue.errors import nearest_name
 from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from etendue.description.mistakes import BY_NAME, shown
+from etendue.errors import nearest_name
 
 
 class Family:

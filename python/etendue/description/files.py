@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+
 from etendue.errors import FormatError
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number

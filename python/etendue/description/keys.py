@@ -8,10 +8,11 @@ from pathlib import Path
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, ClassVar, Literal, Self, Union, get_args, get_origin
 
-from etendue.description.mistakes import mistakes_of, shown
-from etendue.errors import SceneError, nearest_name
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic.functional_validators import ModelWrapValidatorHandler
+
+from etendue.description.mistakes import mistakes_of, shown
+from etendue.errors import SceneError, nearest_name
 
 FIRST = {"name": 0, "kind": 1}
 """Keys that are written before all others."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from etendue.errors import SceneError
 from pydantic import BaseModel, ValidationError
+
+from etendue.errors import SceneError
 
 BY_NAME, DESCRIBED, NUMBER, TABLE = "(name)", "(description)", "(number)", "(table)"
 """What may stand in one place, where two different things may; pydantic puts these into its places, we leave them out."""

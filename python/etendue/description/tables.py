@@ -10,12 +10,13 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Le, MaxLen, MinLen
+from pydantic import Discriminator, Tag, model_validator
+
 from etendue.description.files import Files, read_columns
 from etendue.description.keys import Description
 from etendue.description.mistakes import NUMBER, TABLE
 from etendue.description.values import AsNumber, AsRow, Finite, FirstMistake, Rising, Share, rises
 from etendue.errors import ArgumentError
-from pydantic import Discriminator, Tag, model_validator
 
 Array = npt.NDArray[np.float64]
 Angle = Annotated[float, Finite, Ge(0.0), Le(90.0), AsNumber]

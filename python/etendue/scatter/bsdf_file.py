@@ -8,6 +8,7 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import InstanceOf, model_validator
+from pydantic.json_schema import SkipJsonSchema
 
 from etendue.description.files import Files
 from etendue.description.values import Vector
@@ -42,7 +43,7 @@ class BsdfFile(Finish):
 
     kind: Literal["bsdf"] = "bsdf"
     file: Path | None = None
-    bsdf: InstanceOf[Bsdf] | None = None
+    bsdf: SkipJsonSchema[InstanceOf[Bsdf] | None] = None
     axis: Vector = (1.0, 0.0, 0.0)
 
     @model_validator(mode="after")

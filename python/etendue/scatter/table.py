@@ -7,7 +7,6 @@ import itertools
 from collections.abc import Iterable
 from typing import Any
 
-
 from etendue.description.files import Files
 from etendue.errors import ArgumentError
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice

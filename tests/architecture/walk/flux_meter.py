@@ -6,10 +6,10 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from etendue.quantities.measured import measured
-from etendue.scene.detectors.detector import Detection, Detector, Origin, Record, Recorded, Setting
 from etendue.description.families import Family
 from etendue.description.files import Files
+from etendue.quantities.measured import measured
+from etendue.scene.detectors.detector import Detection, Detector, Origin, Record, Recorded, Setting
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
 from etendue.scene.shapes import SHAPES

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 from etendue.description.files import Files
+from etendue.description.values import Length, Positive
 from etendue.scene.shapes.round import Cylinder
 from etendue.scene.shapes.shape import WHOLE
 from etendue.scene.sources.source import Emitter, Source
-from etendue.description.values import Length, Positive
 from etendue.units import FluxUnit
 
 

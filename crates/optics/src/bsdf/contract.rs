@@ -25,6 +25,8 @@ use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::warp::part_of;
 
+use crate::table::Table;
+
 /// What lies on both sides of a surface, for light of one wavelength.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Media {
@@ -305,6 +307,21 @@ pub trait Bsdf: Debug + Send + Sync {
 
 /// The part of the light of lobes that is looked for where nothing says that it comes from.
 const ANYWHERE: f64 = 0.1;
+
+/// What a BSDF is described by: values by name.
+pub trait Parameters {
+    /// A number.
+    ///
+    /// # Errors
+    /// If there is none of that name.
+    fn number(&self, key: &str) -> Result<f64, String>;
+
+    /// A table of shares over angle and wavelength.
+    ///
+    /// # Errors
+    /// If there is none of that name.
+    fn table(&self, key: &str) -> Result<Table, String>;
+}
 
 /// A direction in front of a surface or behind it with density |cos θ|/π, from two numbers.
 #[inline(always)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use etendue_math::Vec3;
 use etendue_sampling::warp::part_of;
 
-use super::contract::{Bsdf, Facts, Media, Shares};
+use super::contract::{Bsdf, Facts, Media, Parameters, Shares};
 use super::lambertian::Lambertian;
 use super::mirror::Mirror;
 use crate::table::Table;
@@ -68,6 +68,16 @@ impl Mixture {
         } else {
             Arc::new(diffuse)
         })
+    }
+
+    /// From the four tables of shares.
+    ///
+    /// # Errors
+    /// If a table is missing, a share is negative or they exceed 1 together.
+    pub fn described(by: &dyn Parameters) -> Result<Arc<dyn Bsdf>, String> {
+        let specular = [by.table("specular_reflectance")?, by.table("specular_transmittance")?];
+        let diffuse = [by.table("diffuse_reflectance")?, by.table("diffuse_transmittance")?];
+        Self::of_shares(specular, diffuse).ok_or_else(|| "shares below 0, or above 1 together".into())
     }
 
     fn is_sound(&self) -> bool {

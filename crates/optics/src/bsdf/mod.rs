@@ -4,22 +4,38 @@
 //! tests then hold for it: its samples against its density, density and shares against a quadrature, energy,
 //! reciprocity, grazing angles, both sides.
 
+use std::sync::Arc;
+
 mod contract;
 mod interface;
 mod lambertian;
+mod lobe;
 mod mirror;
 mod mixture;
-mod more_numbers;
 mod tabulated;
 #[cfg(test)]
 mod tests;
 
-pub use contract::{Bsdf, Component, Drawn, Facts, Media, Shares};
+pub use contract::{Bsdf, Component, Drawn, Facts, Media, Parameters, Shares};
 pub use interface::Interface;
 pub use lambertian::Lambertian;
+pub use lobe::{Lobe, Profile};
 pub use mirror::Mirror;
 pub use mixture::Mixture;
 pub use tabulated::{Row, Side, Slice, Tabulated, Way};
+
+/// A BSDF from the name of its kind and its parameters; None if there is no such kind.
+///
+/// # Errors
+/// What is wrong with the parameters.
+pub fn described(kind: &str, by: &dyn Parameters) -> Option<Result<Arc<dyn Bsdf>, String>> {
+    match kind {
+        "fresnel" => Some(Ok(Arc::new(Interface))),
+        "scatter" => Some(Mixture::described(by)),
+        "abg" | "harvey-shack" | "gaussian" => Some(Lobe::described(kind, by)),
+        _ => None,
+    }
+}
 
 /// Examples of all kinds, by the names of their files: what the tests go through.
 #[cfg(test)]
@@ -28,6 +44,7 @@ fn kinds() -> Vec<Vec<contract::Example>> {
     vec![
         Interface::named("interface"),
         Lambertian::named("lambertian"),
+        Lobe::named("lobe"),
         Mirror::named("mirror"),
         Mixture::named("mixture"),
         Tabulated::named("tabulated"),

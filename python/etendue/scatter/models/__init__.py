@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from etendue.scatter.models.finish import Finish
 from etendue.scatter.models.interface import Interface
+from etendue.scatter.models.lobes import ABg, Gaussian, HarveyShack
+from etendue.scatter.models.mixture import SIMPLE, Mixture
 from etendue.scatter.models.shares import Absorber, DiffuseSpecular, Lambertian, Mirror, Mixed, Scattering, Transmitter
 
-MODELS: dict[str, type[Finish]] = {
-    cls.model_fields["kind"].default: cls
-    for cls in (Interface, Mirror, Absorber, Lambertian, DiffuseSpecular, Transmitter, Mixed)
-}
+MODELS: dict[str, type[Finish]] = {**SIMPLE, "mixture": Mixture}
 """Every model by its kind, as a scene names it."""
 
 __all__ = [
     "MODELS",
+    "ABg",
     "Absorber",
     "DiffuseSpecular",
     "Finish",
+    "Gaussian",
+    "HarveyShack",
     "Interface",
     "Lambertian",
     "Mirror",
     "Mixed",
+    "Mixture",
     "Scattering",
     "Transmitter",
 ]

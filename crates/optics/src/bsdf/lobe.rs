@@ -1,0 +1,490 @@
+//! Lobes about the specular direction that depend on the distance |β − β₀| in direction cosines alone: ABg, Harvey and Shack,
+//! Gaussian.
+//!
+//! Part of such a lobe would leave the unit circle of direction cosines, where there are no directions: more of it, the more
+//! the light grazes. Either it is absorbed, or f is scaled so that the share is that at normal incidence.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use etendue_math::Vec3;
+use etendue_math::special::{exp, ln};
+use etendue_math::trig::sin_cos_turns;
+use etendue_sampling::more_numbers::MoreNumbers;
+
+use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
+
+/// f \[1/sr\] over |β − β₀|.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Profile {
+    /// A/(B + r^g).
+    ABg {
+        /// A \[1/sr\].
+        a: f64,
+        /// B > 0; any if g is 0.
+        b: f64,
+        /// g ≥ 0; 0 is a Lambertian surface.
+        g: f64,
+    },
+    /// b₀ (1 + (r/L)²)^(S/2), of three parameters \[Harvey1976\].
+    HarveyShack {
+        /// b₀ \[1/sr\].
+        b0: f64,
+        /// L > 0.
+        l: f64,
+        /// S ≤ 0.
+        s: f64,
+    },
+    /// peak · exp(−r²/(2 σ²)).
+    Gaussian {
+        /// At the specular direction \[1/sr\].
+        peak: f64,
+        /// In direction cosines.
+        sigma: f64,
+    },
+}
+
+impl Profile {
+    /// # Errors
+    /// The parameter that is out of its range.
+    fn check(&self) -> Result<(), String> {
+        let finite = |name: &str, value: f64, least: f64, above: bool| {
+            if value.is_finite() && (value > least || (!above && value == least)) {
+                Ok(())
+            } else {
+                let than = if above { "more than" } else { "at least" };
+                Err(format!("{name} is {value}; it must be {than} {least}"))
+            }
+        };
+        match *self {
+            Self::ABg { a, b, g } => {
+                finite("a", a, 0.0, false)?;
+                finite("g", g, 0.0, false)?;
+                finite("b", b, 0.0, g > 0.0)
+            }
+            Self::HarveyShack { b0, l, s } => {
+                finite("b0", b0, 0.0, false)?;
+                finite("l", l, 0.0, true)?;
+                finite("-s", -s, 0.0, false)
+            }
+            Self::Gaussian { peak, sigma } => {
+                finite("peak", peak, 0.0, false)?;
+                finite("sigma", sigma, 0.0, true)
+            }
+        }
+    }
+
+    #[inline]
+    fn at(&self, r: f64) -> f64 {
+        match *self {
+            Self::ABg { a, b, g } => {
+                if g == 0.0 {
+                    a / (b + 1.0)
+                } else if r <= 0.0 {
+                    a / b
+                } else if g == 2.0 {
+                    a / (b + r * r)
+                } else {
+                    a / (b + exp(g * ln(r)))
+                }
+            }
+            Self::HarveyShack { b0, l, s } => {
+                let q = r / l;
+                b0 * exp(0.5 * s * ln(1.0 + q * q))
+            }
+            Self::Gaussian { peak, sigma } => {
+                let q = r / sigma;
+                peak * exp(-0.5 * q * q)
+            }
+        }
+    }
+
+    /// A distance at which it begins to fall.
+    fn width(&self) -> f64 {
+        match *self {
+            Self::ABg { b, g, .. } if g > 0.0 => exp(ln(b) / g),
+            Self::ABg { .. } => 1.0,
+            Self::HarveyShack { l, .. } => l,
+            Self::Gaussian { sigma, .. } => sigma,
+        }
+    }
+}
+
+/// A lobe about the mirrored or the straight direction, from both sides alike.
+#[derive(Clone, Debug)]
+pub struct Lobe {
+    profile: Profile,
+    transmitted: bool,
+    /// Whether f is scaled so that the share is that at normal incidence.
+    renormalised: bool,
+    /// Distances from β₀, and ∫ f r dr from 0 to each.
+    radial: Vec<f64>,
+    cumulative: Vec<f64>,
+    /// Sines of incidence and the share of the flux there, f being as it is; linear in between.
+    sines: Vec<f64>,
+    shares: Vec<f64>,
+    facts: Facts,
+}
+
+/// Farthest |β − β₀|.
+const END: f64 = 2.0;
+
+/// What interpolated shares may be off.
+const TOLERANCE: f64 = 2e-7;
+
+/// The smallest step of the sine of incidence for which shares are tabled.
+const SMALLEST_STEP: f64 = 1e-6;
+
+/// Nodes and weights of the rule of Gauss and Legendre from 0 to 1.
+const GAUSS: [(f64, f64); 5] = [
+    (0.046_910_077_030_668, 0.118_463_442_528_094_54),
+    (0.230_765_344_947_158_45, 0.239_314_335_249_683_24),
+    (0.5, 0.284_444_444_444_444_45),
+    (0.769_234_655_052_841_5, 0.239_314_335_249_683_24),
+    (0.953_089_922_969_332, 0.118_463_442_528_094_54),
+];
+
+fn gauss(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
+    GAUSS.iter().map(|(x, w)| w * f(from + (to - from) * x)).sum::<f64>() * (to - from)
+}
+
+/// The integral of f, in parts that are halved where it is not yet exact.
+fn integral(from: f64, to: f64, whole: f64, depth: u32, f: &impl Fn(f64) -> f64) -> f64 {
+    let middle = 0.5 * (from + to);
+    let (a, b) = (gauss(from, middle, f), gauss(middle, to, f));
+    if depth == 0 || (a + b - whole).abs() <= 1e-9 {
+        a + b
+    } else {
+        integral(from, middle, a, depth - 1, f) + integral(middle, to, b, depth - 1, f)
+    }
+}
+
+impl Lobe {
+    /// # Errors
+    /// If a parameter is out of its range, or more light leaves than arrives.
+    pub fn new(profile: Profile, transmitted: bool, renormalised: bool) -> Result<Self, String> {
+        profile.check()?;
+        let first = (1e-3 * profile.width()).clamp(1e-12, 1e-2);
+        let mut radial = vec![0.0];
+        let mut r = first;
+        while r < END {
+            radial.push(r);
+            r *= 1.2;
+        }
+        radial.push(END);
+        let mut cumulative = vec![0.0];
+        for pair in radial.windows(2) {
+            let more = gauss(pair[0], pair[1], |r| profile.at(r) * r);
+            cumulative.push(cumulative[cumulative.len() - 1] + more);
+        }
+        let mut lobe = Self {
+            profile,
+            transmitted,
+            renormalised,
+            radial,
+            cumulative,
+            sines: Vec::new(),
+            shares: Vec::new(),
+            facts: Facts {
+                specular: [false; 2],
+                diffuse: [!transmitted, transmitted],
+                lambertian: false,
+                // Luminance over n² is what both sides would have to share.
+                reciprocal: !renormalised && !transmitted,
+                constant: None,
+                fresnel: false,
+            },
+        };
+        lobe.fill();
+        let most = lobe.shares.iter().copied().fold(0.0, f64::max);
+        if most > 1.0 + 1e-6 {
+            return Err(format!(
+                "{most:.6} of the light is scattered at some angle, more than arrives"
+            ));
+        }
+        lobe.facts.diffuse = if most > 0.0 { lobe.facts.diffuse } else { [false; 2] };
+        Ok(lobe)
+    }
+
+    /// From named parameters: those of the profile, `transmitted` and `renormalised` (0 or 1).
+    ///
+    /// # Errors
+    /// As [`Lobe::new`].
+    pub fn described(kind: &str, by: &dyn Parameters) -> Result<Arc<dyn Bsdf>, String> {
+        let profile = match kind {
+            "abg" => Profile::ABg {
+                a: by.number("a")?,
+                b: by.number("b")?,
+                g: by.number("g")?,
+            },
+            "harvey-shack" => Profile::HarveyShack {
+                b0: by.number("b0")?,
+                l: by.number("l")?,
+                s: by.number("s")?,
+            },
+            _ => Profile::Gaussian {
+                peak: by.number("peak")?,
+                sigma: by.number("sigma")?,
+            },
+        };
+        let flag = |key: &str| by.number(key).map(|value| value != 0.0);
+        Ok(Arc::new(Self::new(
+            profile,
+            flag("transmitted")?,
+            flag("renormalised")?,
+        )?))
+    }
+
+    /// ∫ f r dr from 0 to `r`.
+    fn up_to(&self, r: f64) -> f64 {
+        let i = self.radial.partition_point(|x| *x <= r).max(1) - 1;
+        self.cumulative[i] + gauss(self.radial[i], r, |r| self.profile.at(r) * r)
+    }
+
+    /// The distance up to which ∫ f r dr is this.
+    fn distance(&self, wanted: f64) -> f64 {
+        let last = self.radial.len() - 2;
+        let i = (self.cumulative.partition_point(|sum| *sum <= wanted).max(1) - 1).min(last);
+        let (start, mut low, mut high) = (self.radial[i], self.radial[i], self.radial[i + 1]);
+        let mut r = 0.5 * (low + high);
+        for _ in 0..60 {
+            let off = self.cumulative[i] + gauss(start, r, |r| self.profile.at(r) * r) - wanted;
+            if off > 0.0 {
+                high = r;
+            } else {
+                low = r;
+            }
+            let next = r - off / (self.profile.at(r) * r);
+            let next = if next > low && next < high {
+                next
+            } else {
+                0.5 * (low + high)
+            };
+            if (next - r).abs() <= 1e-13 * next {
+                return next;
+            }
+            r = next;
+        }
+        r
+    }
+
+    /// The share of the flux at a sine of incidence by quadrature, f being as it is.
+    ///
+    /// Of the circle of radius r about β₀ the part from the azimuth where it meets the unit circle lies within.
+    fn exact(&self, sine: f64) -> f64 {
+        let near = 1.0 - sine;
+        let mut sum = TAU * self.up_to(near.min(END));
+        if sine > 0.0 {
+            // With r = 1 − sine cos t the root at both ends is a smooth function of t.
+            let of = |t: f64| {
+                let r = near + sine * 2.0 * (0.5 * t).sin().powi(2);
+                let cosine = ((r * r + sine * sine - 1.0) / (2.0 * r * sine)).clamp(-1.0, 1.0);
+                if r > 0.0 {
+                    2.0 * cosine.acos() * self.profile.at(r) * r * sine * t.sin()
+                } else {
+                    0.0
+                }
+            };
+            // Parts that get the finer the nearer they are to the specular direction.
+            let mut to = PI;
+            for _ in 0..40 {
+                let from = 0.5 * to;
+                sum += integral(from, to, gauss(from, to, of), 12, &of);
+                to = from;
+            }
+            sum += gauss(0.0, to, of);
+        }
+        sum
+    }
+
+    fn fill(&mut self) {
+        let at = |lobe: &Self, sine: f64| (sine, lobe.exact(sine));
+        let mut last = at(self, 0.0);
+        let (mut sines, mut shares) = (vec![last.0], vec![last.1]);
+        let mut left: Vec<(f64, f64)> = (1..=16).rev().map(|i| at(self, f64::from(i) / 16.0)).collect();
+        while let Some(next) = left.pop() {
+            let middle = at(self, 0.5 * (last.0 + next.0));
+            if (middle.1 - 0.5 * (last.1 + next.1)).abs() <= TOLERANCE || next.0 - last.0 < SMALLEST_STEP {
+                sines.extend([middle.0, next.0]);
+                shares.extend([middle.1, next.1]);
+                last = next;
+            } else {
+                left.push(next);
+                left.push(middle);
+            }
+        }
+        (self.sines, self.shares) = (sines, shares);
+    }
+
+    /// The share of the flux, f being as it is.
+    fn share(&self, sine: f64) -> f64 {
+        let above = self
+            .sines
+            .partition_point(|node| *node <= sine)
+            .clamp(1, self.sines.len() - 1);
+        let [x0, x1] = [self.sines[above - 1], self.sines[above]];
+        let [y0, y1] = [self.shares[above - 1], self.shares[above]];
+        y0 + (y1 - y0) * ((sine - x0) / (x1 - x0)).clamp(0.0, 1.0)
+    }
+
+    /// What f is multiplied by.
+    fn scale(&self, sine: f64) -> f64 {
+        if self.renormalised {
+            self.shares[0] / self.share(sine).max(f64::MIN_POSITIVE)
+        } else {
+            1.0
+        }
+    }
+}
+
+/// |β₀|.
+fn sine(incident: Vec3) -> f64 {
+    (incident.x * incident.x + incident.y * incident.y).sqrt().min(1.0)
+}
+
+/// How often is tried again for a point within the unit circle.
+const TRIES: u32 = 10_000;
+
+impl Bsdf for Lobe {
+    fn facts(&self) -> &Facts {
+        &self.facts
+    }
+
+    fn shares(&self, incident: Vec3, _media: &Media) -> Shares {
+        let share = if self.renormalised {
+            self.shares[0]
+        } else {
+            self.share(sine(incident))
+        };
+        let mut diffuse = [0.0; 2];
+        diffuse[usize::from(self.transmitted)] = share.min(1.0);
+        Shares {
+            specular: [0.0; 2],
+            diffuse,
+            refraction: incident.z.abs(),
+        }
+    }
+
+    fn evaluate(&self, incident: Vec3, scattered: Vec3, _media: &Media) -> f64 {
+        if ((incident.z > 0.0) != (scattered.z > 0.0)) != self.transmitted {
+            return 0.0;
+        }
+        let (x, y) = (scattered.x + incident.x, scattered.y + incident.y);
+        let scale = if self.renormalised {
+            self.scale(sine(incident))
+        } else {
+            1.0
+        };
+        self.profile.at((x * x + y * y).sqrt()) * scale
+    }
+
+    fn draw(&self, incident: Vec3, transmitted: bool, _media: &Media, numbers: [f64; 2]) -> Vec3 {
+        let up = (incident.z > 0.0) != transmitted;
+        let all = self.up_to((1.0 + sine(incident)).min(END));
+        let mut more = MoreNumbers::new(numbers);
+        let mut pair = numbers;
+        for _ in 0..TRIES {
+            let r = self.distance(pair[0] * all);
+            let (s, c) = sin_cos_turns(pair[1]);
+            let (x, y) = (r * c - incident.x, r * s - incident.y);
+            let square = 1.0 - x * x - y * y;
+            if square > 0.0 {
+                return Vec3::new(x, y, if up { square.sqrt() } else { -square.sqrt() });
+            }
+            pair = more.pair();
+        }
+        by_cosine(up, numbers)
+    }
+}
+
+#[cfg(test)]
+impl super::contract::Examples for Lobe {
+    // Lobes have a cusp at the specular direction, and part of them is far narrower than the steps elsewhere.
+    const QUADRATURE: f64 = 1e-5;
+
+    fn examples() -> Vec<Self> {
+        let abg = |a, b, g| Profile::ABg { a, b, g };
+        [
+            (abg(0.1, 0.1, 1.5), false, false),
+            (abg(0.05, 0.3, 3.0), false, true),
+            (abg(0.2, 0.5, 0.0), true, false),
+            (
+                Profile::HarveyShack {
+                    b0: 0.5,
+                    l: 0.3,
+                    s: -2.5,
+                },
+                false,
+                false,
+            ),
+            (Profile::Gaussian { peak: 1.2, sigma: 0.3 }, true, false),
+            (Profile::Gaussian { peak: 1.2, sigma: 0.25 }, false, true),
+        ]
+        .map(|(profile, transmitted, renormalised)| Self::new(profile, transmitted, renormalised).expect("sound"))
+        .to_vec()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tis(profile: Profile, degrees: f64) -> f64 {
+        let lobe = Lobe::new(profile, false, false).expect("sound");
+        lobe.share(degrees.to_radians().sin())
+    }
+
+    #[test]
+    fn total_scatter_is_that_of_published_closed_forms_and_quadratures() {
+        let abg = |a, b, g| Profile::ABg { a, b, g };
+        for (found, expected) in [
+            (tis(abg(0.0025, 0.001, 1.8), 0.0), 0.041_344),
+            (tis(abg(0.1, 0.01, 1.5), 0.0), 0.935_524),
+            (tis(abg(0.1, 0.01, 1.5), 30.0), 0.872_527),
+            (tis(abg(0.1, 0.01, 1.5), 60.0), 0.690_449),
+        ] {
+            assert!((found - expected).abs() < 1e-6, "{found}, {expected}");
+        }
+        // g = 2: πA ln(1 + 1/B); g = 0: πA/(B + 1).
+        let closed = PI * 0.0025 * (1.0 + 1.0 / 0.001_f64).ln();
+        assert!((tis(abg(0.0025, 0.001, 2.0), 0.0) - closed).abs() < 1e-7);
+        assert!((tis(abg(0.3, 0.5, 0.0), 70.0) - PI * 0.3 / 1.5).abs() < 1e-6);
+        // Harvey and Shack: 2π b₀ L²/(S + 2) ((1 + 1/L²)^((S + 2)/2) − 1), and π b₀ L² ln(1 + 1/L²) for S = −2.
+        let (b0, l) = (2.0, 0.05_f64);
+        let q = 1.0 + 1.0 / (l * l);
+        for s in [-1.5, -3.0] {
+            let closed = 2.0 * PI * b0 * l * l / (s + 2.0) * (q.powf((s + 2.0) / 2.0) - 1.0);
+            assert!((tis(Profile::HarveyShack { b0, l, s }, 0.0) - closed).abs() < 1e-6);
+        }
+        let closed = PI * b0 * l * l * q.ln();
+        assert!((tis(Profile::HarveyShack { b0, l, s: -2.0 }, 0.0) - closed).abs() < 1e-6);
+        // Gaussian: 2π σ² peak (1 − exp(−1/(2σ²))).
+        let closed = TAU * 0.09 * 1.2 * (1.0 - (-0.5_f64 / 0.09).exp());
+        assert!((tis(Profile::Gaussian { peak: 1.2, sigma: 0.3 }, 0.0) - closed).abs() < 1e-6);
+    }
+
+    #[test]
+    fn narrow_lobes_keep_half_of_their_light_at_grazing_incidence() {
+        let (peak, sigma) = (0.9 / (TAU * 1e-6), 1e-3);
+        let lobe = Lobe::new(Profile::Gaussian { peak, sigma }, false, false).expect("sound");
+        assert!((lobe.share(0.9) - 0.9).abs() < 1e-6);
+        // The unit circle is nearly straight over the lobe.
+        assert!((lobe.share(1.0) - 0.45).abs() < 1e-3);
+    }
+
+    #[test]
+    fn impossible_parameters_are_refused() {
+        let of = |profile| Lobe::new(profile, false, false);
+        assert!(of(Profile::ABg { a: 0.1, b: 0.0, g: 2.0 }).is_err());
+        assert!(
+            of(Profile::ABg {
+                a: f64::NAN,
+                b: 0.1,
+                g: 2.0
+            })
+            .is_err()
+        );
+        assert!(of(Profile::Gaussian { peak: 1.0, sigma: 0.0 }).is_err());
+        assert!(of(Profile::Gaussian { peak: 10.0, sigma: 0.5 }).is_err_and(|e| e.contains("more than arrives")));
+    }
+}

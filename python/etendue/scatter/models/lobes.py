@@ -1,0 +1,137 @@
+"""Lobes about the specular direction that depend on the distance in direction cosines: ABg, Harvey and Shack, Gaussian."""
+
+from __future__ import annotations
+
+import abc
+from typing import Annotated, ClassVar, Literal
+
+from annotated_types import Ge, Gt, Le
+
+from etendue import _core
+from etendue.description.files import Files
+from etendue.description.values import AsNumber, Finite, NotNegative, Positive
+from etendue.errors import ArgumentError
+from etendue.scatter.models.finish import Finish, Record
+
+
+class Lobe(Finish, abc.ABC):
+    """What lobes have in common.
+
+    Of a lobe at an angle, part would leave the unit circle of direction cosines, where there are no directions. `beyond`
+    says whether that light is absorbed, so that the share falls with the angle of incidence, or f is scaled so that the share
+    stays what it is at normal incidence.
+    """
+
+    way: Literal["reflected", "transmitted"] = "reflected"
+    beyond: Literal["absorbed", "renormalised"] = "absorbed"
+
+    PARAMETERS: ClassVar[tuple[str, ...]] = ()
+    """Names of the numbers that the core takes."""
+
+    def record(self, files: Files) -> Record:  # noqa: ARG002 - other finishes have tables
+        """The numbers."""
+        record: Record = {
+            "kind": self.kind,  # type: ignore[attr-defined] # each class has one
+            "transmitted": float(self.way == "transmitted"),
+            "renormalised": float(self.beyond == "renormalised"),
+            **{name: getattr(self, name) for name in self.PARAMETERS},
+        }
+        try:
+            _core.Bsdf(record)
+        except ValueError as error:
+            raise ArgumentError(f"{type(self).__name__}: {error}") from None
+        return record
+
+    def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
+        """If it transmits."""
+        return self.way == "transmitted"
+
+
+class ABg(Lobe):
+    """The ABg model: f = A/(B + |β − β₀|ᵍ).
+
+    β and β₀ are the projections of the scattered and the specular direction on the surface. For g = 0 it is Lambertian, with
+    f = A/(B + 1).
+
+    Parameters
+    ----------
+    a : number
+        A [1/sr].
+    b : number
+        B, more than 0 unless g is 0; f is A/B at the specular direction, and falls from |β − β₀| = B^(1/g) on.
+    g : number
+        At least 0.
+    way : {"reflected", "transmitted"}
+        About the mirrored direction, or straight on.
+    beyond : {"absorbed", "renormalised"}
+        What becomes of light that would leave the unit circle of direction cosines.
+
+    Examples
+    --------
+    >>> polish = ABg(a=0.0025, b=0.001, g=1.8)
+    >>> polish.reflectance(0).round(6).tolist()
+    0.041344
+    """
+
+    kind: Literal["abg"] = "abg"
+    a: NotNegative
+    b: NotNegative
+    g: NotNegative
+
+    PARAMETERS = ("a", "b", "g")
+
+
+class HarveyShack(Lobe):
+    """The model of Harvey and Shack with three parameters: f = b₀ (1 + (|β − β₀|/L)²)^(S/2) [Harvey1976]_.
+
+    Parameters
+    ----------
+    b0 : number
+        f at the specular direction [1/sr].
+    l : number
+        L, the distance in direction cosines at which f begins to fall.
+    s : number
+        S, the slope of log f over log |β − β₀| far out; at most 0.
+    way, beyond
+        As of `ABg`.
+
+    Examples
+    --------
+    >>> mirror = HarveyShack(b0=2.0, l=0.01, s=-1.5)
+    >>> bool(mirror.evaluate([0, 0, 1], [0, 0, 1]) == 2.0)
+    True
+    """
+
+    kind: Literal["harvey-shack"] = "harvey-shack"
+    b0: NotNegative
+    l: Positive  # noqa: E741 - the letter of the literature
+    s: Annotated[float, Finite, Ge(-100.0), Le(0.0), AsNumber]
+
+    PARAMETERS = ("b0", "l", "s")
+
+
+class Gaussian(Lobe):
+    """A Gaussian in direction cosines: f = peak · exp(−|β − β₀|²/(2 σ²)).
+
+    Parameters
+    ----------
+    peak : number
+        f at the specular direction [1/sr].
+    sigma : number
+        σ. A holographic diffuser of full width at half maximum w, in air at normal incidence, has
+        σ = sin(w/2)/√(2 ln 2).
+    way, beyond
+        As of `ABg`.
+
+    Examples
+    --------
+    >>> diffuser = Gaussian(peak=17.0, sigma=0.09, way="transmitted")
+    >>> diffuser.transmittance(0).round(3).tolist()
+    0.865
+    """
+
+    kind: Literal["gaussian"] = "gaussian"
+    peak: NotNegative
+    sigma: Annotated[float, Finite, Gt(0.0), AsNumber]
+
+    PARAMETERS = ("peak", "sigma")
