@@ -32,7 +32,7 @@ class Description(BaseModel):
 
     def __init__(self, **values: Any) -> None:
         cls = type(self)
-        keys = cls.keys()
+        keys = cls.names_by_key()
         known = [key for key, name in keys.items() if name not in cls.IN_MEMORY]
         mistakes = [(key, f"unknown key.{_hint(key, known)}") for key in values if key not in keys]
         wrong = {
@@ -49,7 +49,7 @@ class Description(BaseModel):
             raise SceneError(cls.__name__, mistakes)
 
     @classmethod
-    def keys(cls) -> dict[str, str]:
+    def names_by_key(cls) -> dict[str, str]:
         """The name of the attribute under each key; they differ where a method has the name of the key."""
         return {field.alias or name: name for name, field in cls.model_fields.items()}
 
@@ -69,11 +69,11 @@ class Description(BaseModel):
         SceneError
             As the constructor.
         """
-        return type(self)(**{key: getattr(self, name) for key, name in self.keys().items()} | changes)
+        return type(self)(**{key: getattr(self, name) for key, name in self.names_by_key().items()} | changes)
 
     def __repr_args__(self) -> Iterator[tuple[str, Any]]:
         """Keys and values, as the constructor takes them."""
-        return ((key, getattr(self, name)) for key, name in self.keys().items())
+        return ((key, getattr(self, name)) for key, name in self.names_by_key().items())
 
     def to_dict(self) -> dict[str, Any]:
         """Keys and values as a TOML file holds them; keys that have their default are left out, but for ``kind``.
@@ -84,7 +84,7 @@ class Description(BaseModel):
             If something lives in memory only.
         """
         written: dict[str, Any] = {}
-        for key, name in sorted(self.keys().items(), key=lambda item: FIRST.get(item[0], len(FIRST))):
+        for key, name in sorted(self.names_by_key().items(), key=lambda item: FIRST.get(item[0], len(FIRST))):
             value, field = getattr(self, name), type(self).model_fields[name]
             if name in self.IN_MEMORY and value is not None:
                 raise SceneError(
@@ -108,7 +108,7 @@ def _plain(value: Any) -> Any:
 @functools.cache
 def _choices(kind: type[Description]) -> Mapping[str, tuple[str | None, ...]]:
     """The keys that hold one of a few words, or perhaps nothing."""
-    found = {key: _words(kind.model_fields[name].annotation) for key, name in kind.keys().items()}
+    found = {key: _words(kind.model_fields[name].annotation) for key, name in kind.names_by_key().items()}
     return MappingProxyType({key: words for key, words in found.items() if words})
 
 

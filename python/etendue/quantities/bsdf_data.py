@@ -266,7 +266,7 @@ class BsdfSlice:
             If the slice is made of points.
         """
         if self.grid is None:
-            raise ArgumentError("a slice of single points has to be interpolated first: see Bsdf.from_scans")
+            raise ArgumentError("a slice of single points has to be interpolated first")
         r, a = self.grid.coordinates(scattered, self.incident, transmitted=self.transmitted)
         return _bilinear(self.grid, self.values, r, a)
 
@@ -281,11 +281,13 @@ class BsdfSlice:
         ArgumentError
             If the slice is made of points of unknown solid angle.
         """
-        if self.grid is None:
-            if self.projected is None:
-                raise ArgumentError("points of unknown solid angle cannot be added up: see Bsdf.from_scans")
-            return float(np.nansum(self.values * self.projected))
-        return _integral(self)
+        if self.grid is None and self.projected is None:
+            raise ArgumentError("points of unknown solid angle cannot be added up")
+        return self._share
+
+    @functools.cached_property
+    def _share(self) -> float:
+        return float(np.nansum(self.values * self.projected)) if self.grid is None else _integral(self)
 
 
 def _bilinear(grid: PolarGrid, values: Array, r: Array, a: Array) -> Array:

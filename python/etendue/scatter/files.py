@@ -1,11 +1,23 @@
-"""`read_bsdf`: files of scatter data as a BSDF."""
+"""`read_bsdf` and `write_bsdf`: a BSDF from a file, and into one."""
 
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
-from etendue.formats.bsdf import read_bsdf_data
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data
+from etendue.formats.bsdf.bsdf_format import BsdfFormat
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.scatter.bsdf import WAVELENGTH, Bsdf
+from etendue.scatter.models.finish import Finish
 from etendue.scatter.table import BsdfTable
+
+INCIDENCES = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 85.0)
+"""Angles [°] at which a model is tabled."""
 
 
 def read_bsdf(path: str | os.PathLike[str]) -> BsdfTable:
@@ -25,7 +37,97 @@ def read_bsdf(path: str | os.PathLike[str]) -> BsdfTable:
     ------
     FormatError
         If it is none of the formats, or damaged; UnsupportedFormatError for formats that are known and refused.
+    ArgumentError
+        If a slice scatters more than 101 % of the light.
     OSError
         If the file cannot be opened.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from etendue.scatter.models import Gaussian
+    >>> with TemporaryDirectory() as folder:
+    ...     lost = write_bsdf(Path(folder) / "film.bsdf", Gaussian(peak=5, sigma=0.15))
+    ...     read_bsdf(Path(folder) / "film.bsdf").reflectance(30).round(3).tolist()
+    0.706
     """
     return BsdfTable(read_bsdf_data(path))
+
+
+class _Asked:
+    """A BSDF as writers ask for it."""
+
+    def __init__(self, bsdf: Bsdf) -> None:
+        data = bsdf.data if isinstance(bsdf, BsdfTable) else None
+        self._bsdf = bsdf
+        self.name = data.name if data else type(bsdf).__name__
+        self.isotropic = data.isotropic if data else True
+        self.both_sides = data.both_sides if data else True
+        self.wavelengths: tuple[float, ...] = data.wavelengths if data else ()
+        self.incidences: tuple[float, ...] = bsdf.incidences if isinstance(bsdf, BsdfTable) else INCIDENCES
+        _, _, self.reflects, self.transmits = bsdf.ways
+
+    def evaluate(
+        self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None
+    ) -> npt.NDArray[np.float64]:
+        return self._bsdf.evaluate(incident, scattered, wavelength=WAVELENGTH if wavelength is None else wavelength)
+
+
+def write_bsdf(path: str | os.PathLike[str], bsdf: Bsdf, format: str | None = None) -> tuple[str, ...]:
+    """Write a BSDF; a table that a format can hold as it is is written so, else one is made.
+
+    Parameters
+    ----------
+    path : path
+        Appears whole or not at all.
+    bsdf : Bsdf
+        A model or a table.
+    format : str, optional
+        Name of a format; by the extension if left out.
+
+    Returns
+    -------
+    tuple of str
+        What the file does not hold, one sentence each.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such format.
+    ArgumentError
+        If nothing of it is scattered: mirrors and interfaces have no table; or the format is read only.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from etendue.scatter.models import ABg
+    >>> with TemporaryDirectory() as folder:
+    ...     write_bsdf(Path(folder) / "polish.h5", ABg(a=0.0025, b=0.001, g=1.8))
+    ()
+    """
+    form = bsdf_format(Path(path), format)
+    data, lost = _laid_out(bsdf, form)
+    return lost + write_bsdf_data(path, data, form.name)
+
+
+def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
+    if form.fits is None or form.tabulate is None:
+        raise ArgumentError(f"{form.title} is read only")
+    if isinstance(bsdf, Finish) and form.name == "etendue":
+        return BsdfData(components=(bsdf.to_dict(),), name=type(bsdf).__name__), ()
+    if isinstance(bsdf, BsdfTable) and form.fits(bsdf.data):
+        return bsdf.data, ()
+    mirrored, refracted, back, through = bsdf.ways
+    if not (back or through):
+        raise ArgumentError("nothing of this BSDF is scattered, so there is no table of it to write")
+    lost = []
+    if mirrored or refracted:
+        lost.append("light that is mirrored or goes on in a single direction is not in the file")
+    data = form.tabulate(_Asked(bsdf))
+    kept = {one.transmitted for one in data.slices}
+    if back and through and len(kept) == 1:
+        lost.append(f"the file holds {'transmitted' if True in kept else 'reflected'} light only")
+    lost.append("the values are a table made for this format")
+    return data, tuple(lost)

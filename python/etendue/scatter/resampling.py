@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid
+from etendue.quantities.bsdf_data import BsdfSlice
 
 Array = npt.NDArray[np.float64]
 
@@ -24,6 +24,9 @@ ACCURACY = 2e-3
 
 CANDIDATES = 400
 """Radial coordinates that the grid is chosen from."""
+
+FEW = 80
+"""The same for slices of single points, none of which is closer to another than some hundredths."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,19 +56,23 @@ class Lobe:
         return {"sine": self.sine, "radial": self.radial, "f": self.f, "share": self.share, "floor": self.floor}
 
 
-def lobes_of(slices: Sequence[BsdfSlice], shares: Sequence[float], *, mirrored: bool) -> list[Lobe]:
-    """Slices of rising incidence on the grid of the core.
+def lobes_of(
+    slices: Sequence[BsdfSlice], shares: Sequence[float], *, isotropic: bool, mirrored: bool
+) -> dict[float, list[Lobe]]:
+    """Slices of one way and one wavelength on the grid of the core: by azimuth of incidence [°], of rising incidence.
 
     Beyond the rim of the hemisphere, where a slice holds nothing and the lobe of a neighbouring incidence may reach, f goes
     on in proportion to that of the slice before; that of the first is held constant. Single points stand for what is nearest
-    to them.
+    to them. If incidences are not known at the same azimuths, f is interpolated between azimuths, turned with them.
 
     Parameters
     ----------
     slices : sequence of BsdfSlice
-        Of one azimuth of incidence, one way and one wavelength, each at another angle.
+        In any order.
     shares : sequence of float
         Of the flux that each scatters; f is scaled by the core so that this is its integral.
+    isotropic : bool
+        Whether the azimuth of incidence does not matter.
     mirrored : bool
         Whether both sides of the plane of incidence are made equal.
 
@@ -74,33 +81,72 @@ def lobes_of(slices: Sequence[BsdfSlice], shares: Sequence[float], *, mirrored: 
     ArgumentError
         If a slice holds no values.
     """
+    for one in slices:
+        if np.isnan(one.values).all():
+            raise ArgumentError(f"the slice at {one.theta:g}° of incidence holds no values")
     radial = _candidates(slices)
     azimuths = max(AZIMUTHS, *(_azimuths(one) for one in slices))
-    polar = PolarGrid("cosines", radial, np.arange(azimuths) * (360.0 / azimuths))
-    lobes = []
-    before: Array | None = None
+    by_theta: dict[float, dict[float, tuple[BsdfSlice, float]]] = {}
     for one, share in zip(slices, shares, strict=True):
-        if np.isnan(one.values).all():
-            raise ArgumentError("a slice holds no values")
-        f = _values(one, polar.directions(one.incident, transmitted=one.transmitted))
-        if mirrored:
-            f = 0.5 * (f + f[(-np.arange(azimuths)) % azimuths])
-        floor = float(np.nanmin(f))
-        before = _continued(f, before)
-        lambertian = min(np.pi * floor, share)
-        raised = np.maximum(before - floor, 0.0)
-        chosen = _chosen(radial, raised)
-        sine = float(np.hypot(one.incident[0], one.incident[1]))
-        lobes.append(
-            Lobe(
-                sine,
-                radial[chosen],
-                np.ascontiguousarray(raised[:, chosen]),
-                max(share - lambertian, 0.0),
-                lambertian,
-            )
-        )
-    return lobes
+        phi = 0.0 if isotropic or one.theta < NORMAL else round(one.phi, 6) % 360.0
+        by_theta.setdefault(round(one.theta, 6), {}).setdefault(phi, (one, share))
+    oblique = [known for theta, known in by_theta.items() if theta >= NORMAL]
+    rows = sorted(max(oblique, key=len)) if oblique else [0.0]
+    found: dict[float, list[Lobe]] = {}
+    kept: dict[tuple[float, float], Array] = {}
+    for row in rows:
+        before: Array | None = None
+        lobes = []
+        for theta in sorted(by_theta):
+            known = by_theta[theta]
+            f, share, sine = 0.0, 0.0, 0.0
+            for phi, part in [(row, 1.0)] if theta < NORMAL else _around(sorted(known), row):
+                one, own = known[0.0] if theta < NORMAL else known[phi]
+                if (theta, phi) not in kept:
+                    turned = one.phi if isotropic and theta >= NORMAL else phi
+                    kept[theta, phi] = _values(one, _directions(one, radial, azimuths, turned))
+                f, share = f + part * kept[theta, phi], share + part * own
+                sine = float(np.hypot(one.incident[0], one.incident[1]))
+            if mirrored:
+                f = 0.5 * (f + f[(-np.arange(azimuths)) % azimuths])
+            before = _continued(f, before)
+            lobes.append(_lobe(sine, radial, before, share, floor=float(np.nanmin(f))))
+        found[row] = lobes
+    return found
+
+
+NORMAL = 1e-4
+"""Angles of incidence [°] below which light comes along the normal, and from no azimuth."""
+
+
+def _around(known: list[float], wanted: float) -> list[tuple[float, float]]:
+    """The azimuths on both sides of one, with their parts."""
+    if wanted in known or len(known) == 1:
+        return [(wanted if wanted in known else known[0], 1.0)]
+    above = int(np.searchsorted(known, wanted))
+    low, high = known[above - 1], known[above % len(known)]
+    part = ((wanted - low) % 360.0) / ((high - low) % 360.0)
+    return [(low, 1.0 - part), (high, part)]
+
+
+def _directions(one: BsdfSlice, radial: Array, azimuths: int, phi: float) -> Array:
+    """Scattered directions, shape (m, n, 3), about the specular direction of light from azimuth `phi`; NaN where none is."""
+    turn = np.radians(phi + 180.0 + np.arange(azimuths) * (360.0 / azimuths))
+    off = radial[None, :, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)[:, None, :]
+    beta = off - one.incident[:2]
+    square = 1.0 - np.einsum("ijk,ijk->ij", beta, beta)
+    height = np.sqrt(np.where(square >= 0.0, square, np.nan)) * (1.0 if one.front != one.transmitted else -1.0)
+    found = np.concatenate([beta, height[..., None]], axis=-1)
+    found[np.isnan(height)] = np.nan
+    return np.asarray(found)
+
+
+def _lobe(sine: float, radial: Array, f: Array, share: float, *, floor: float) -> Lobe:
+    lambertian = min(np.pi * floor, share)
+    raised = np.maximum(f - floor, 0.0)
+    chosen = _chosen(radial, raised)
+    lobe = np.ascontiguousarray(raised[:, chosen])
+    return Lobe(sine, radial[chosen], lobe, max(share - lambertian, 0.0), lambertian)
 
 
 def _azimuths(one: BsdfSlice) -> int:
@@ -109,7 +155,8 @@ def _azimuths(one: BsdfSlice) -> int:
 
 
 def _candidates(slices: Sequence[BsdfSlice]) -> Array:
-    spread = [[0.0], np.geomspace(SMALLEST, 2.0, CANDIDATES)]
+    gridded = any(one.grid is not None for one in slices)
+    spread = [[0.0], np.geomspace(SMALLEST, 2.0, CANDIDATES) if gridded else np.geomspace(1e-2, 2.0, FEW)]
     spread += [one.grid.radial for one in slices if one.grid is not None and one.grid.frame == "cosines"]
     found = np.unique(np.concatenate(spread))
     return found[found <= 2.0]

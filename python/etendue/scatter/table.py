@@ -134,14 +134,9 @@ def _sheets(slices: list[BsdfSlice], data: BsdfData) -> list[dict[str, Any]]:
 
 
 def _rows(slices: list[BsdfSlice], data: BsdfData) -> list[dict[str, Any]]:
-    def azimuth(one: BsdfSlice) -> float:
-        # Of light along the normal the azimuth says how the sample is turned.
-        return 0.0 if data.isotropic else round(one.phi / 360.0, 9) % 1.0
-
-    rows = []
-    for turn, members in itertools.groupby(sorted(slices, key=azimuth), azimuth):
-        by_angle = {round(one.theta, 7): one for one in members}
-        rising = [by_angle[angle] for angle in sorted(by_angle)]
-        lobes = lobes_of(rising, [share_of(one) for one in rising], mirrored=data.isotropic and data.mirrored)
-        rows.append({"azimuth": turn, "slices": [lobe.record() for lobe in lobes]})
-    return rows
+    shares = [share_of(one) for one in slices]
+    mirrored = data.isotropic and data.mirrored
+    rows = lobes_of(slices, shares, isotropic=data.isotropic, mirrored=mirrored)
+    return [
+        {"azimuth": phi / 360.0, "slices": [lobe.record() for lobe in lobes]} for phi, lobes in sorted(rows.items())
+    ]

@@ -20,9 +20,14 @@ pub struct Mixture {
 /// What shares may exceed 1 by, for rounding.
 const SLACK: f64 = 1e-9;
 
+/// The same for shares that come from quadratures.
+const CLOSE: f64 = 1e-5;
+
+/// Azimuths at which shares are looked at.
+const AROUND: [(f64, f64); 5] = [(1.0, 0.0), (0.8, 0.6), (0.0, 1.0), (-0.96, 0.28), (-0.6, -0.8)];
+
 impl Mixture {
-    /// None if a weight is negative or not finite, or if more light may leave than arrives: that is known if the weights are 1
-    /// together at most, or if the shares of all members are tables.
+    /// None if a weight is negative or not finite, or if more light may leave than arrives.
     #[must_use]
     pub fn new(members: Vec<(f64, Arc<dyn Bsdf>)>) -> Option<Self> {
         if !members.iter().all(|(weight, _)| *weight >= 0.0 && weight.is_finite()) {
@@ -84,18 +89,27 @@ impl Mixture {
         if self.members.iter().map(|(weight, _)| weight).sum::<f64>() <= 1.0 + SLACK {
             return true;
         }
-        // Sums of bilinear functions are extreme at the breakpoints of any of them.
-        self.breakpoints().is_some_and(|[angles, wavelengths]| {
-            angles.iter().all(|angle| {
-                wavelengths.iter().all(|wavelength| {
-                    let media = Media {
-                        wavelength: *wavelength,
-                        front: 1.0,
-                        back: 1.0,
-                    };
-                    let incident = Vec3::new(angle.sin(), 0.0, angle.cos());
-                    self.shares(incident, &media).total() <= 1.0 + SLACK
-                })
+        // Sums of bilinear functions are extreme at the breakpoints of any of them; others are looked at closely.
+        let known = self.breakpoints();
+        let slack = if known.is_some() { SLACK } else { CLOSE };
+        let [angles, wavelengths] = known.unwrap_or_else(|| {
+            let angles = (0..=360).map(|i| f64::from(i) * 0.25_f64.to_radians()).collect();
+            [angles, (0..=20).map(|i| 380.0 + 20.0 * f64::from(i)).collect()]
+        });
+        let directions = angles.iter().flat_map(|angle| {
+            let (s, c) = angle.sin_cos();
+            AROUND
+                .iter()
+                .flat_map(move |(x, y)| [c, -c].map(|z| Vec3::new(s * x, s * y, z)))
+        });
+        directions.into_iter().all(|incident| {
+            wavelengths.iter().all(|wavelength| {
+                let media = Media {
+                    wavelength: *wavelength,
+                    front: 1.0,
+                    back: 1.0,
+                };
+                self.shares(incident, &media).total() <= 1.0 + slack
             })
         })
     }

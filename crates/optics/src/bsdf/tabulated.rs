@@ -112,10 +112,10 @@ struct Grid {
 const END: f64 = 2.0;
 
 /// What interpolated shares may be off.
-const TOLERANCE: f64 = 5e-7;
+const TOLERANCE: f64 = 5e-6;
 
 /// The smallest step of the sine of incidence for which shares are tabled.
-const SMALLEST_STEP: f64 = 1e-5;
+const SMALLEST_STEP: f64 = 1e-4;
 
 impl Tabulated {
     /// # Errors

@@ -454,6 +454,6 @@ fn a_mixture_that_sends_out_more_than_it_gets_is_refused() {
     assert!(Mixture::new(vec![(1.0, mirror(0.1, 0.6)), (1.0, diffuse(0.9, 0.4))]).is_some());
     assert!(Mixture::new(vec![(1.0, mirror(0.1, 0.6)), (1.0, diffuse(0.9, 0.41))]).is_none());
     assert!(Mixture::new(vec![(-0.1, mirror(0.1, 0.6))]).is_none());
-    assert!(Mixture::new(vec![(0.5, Arc::new(Interface)), (0.6, diffuse(0.1, 0.1))]).is_none());
+    assert!(Mixture::new(vec![(0.5, Arc::new(Interface)), (0.6, diffuse(0.9, 0.9))]).is_none());
     assert!(Mixture::new(vec![(0.5, Arc::new(Interface)), (0.5, diffuse(1.0, 1.0))]).is_some());
 }

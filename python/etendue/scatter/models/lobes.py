@@ -17,9 +17,9 @@ from etendue.scatter.models.finish import Finish, Record
 class Lobe(Finish, abc.ABC):
     """What lobes have in common.
 
-    Of a lobe at an angle, part would leave the unit circle of direction cosines, where there are no directions. `beyond`
-    says whether that light is absorbed, so that the share falls with the angle of incidence, or f is scaled so that the share
-    stays what it is at normal incidence.
+    Of a lobe at an angle, part would leave the unit circle of direction cosines, where there are no directions.
+    `beyond` says whether that light is absorbed, so that the share falls with the angle of incidence, or f is scaled so
+    that the share stays what it is at normal incidence.
     """
 
     way: Literal["reflected", "transmitted"] = "reflected"
