@@ -26,10 +26,11 @@ GROUPS = {
         "scene", "Scene", "trace", "trace_rounds", "trace_work", "TraceWork", "TraceResult", "ScatterEvents",
         "IlluminanceMap", "read_illuminance_map",
     ),
+    "Scatter": ("bsdf", "Bsdf", "BsdfTable", "read_bsdf", "write_bsdf"),
     "Intensity and spectra": ("intensity_distribution", "Intensity", "read_intensity", "write_intensity", "Spectrum"),
     "Pictures": (
         "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",
-        "plot_threshold_sweep", "draw_scene",
+        "plot_threshold_sweep", "plot_bsdf", "draw_scene",
     ),
     "Errors and warnings": tuple(name for name in et.__all__ if name.endswith(("Error", "Warning"))),
 }  # fmt: skip

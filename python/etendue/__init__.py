@@ -43,6 +43,7 @@ from etendue.luminance.filters import filter_map
 from etendue.luminance.methods import Cone, FromField, PathTracing
 from etendue.plot import (
     draw_scene,
+    plot_bsdf,
     plot_characteristic,
     plot_comparison,
     plot_cross_sections,
@@ -66,11 +67,17 @@ from etendue.tracing.ledger import TraceWarning
 
 if TYPE_CHECKING:
     from etendue import scene
+    from etendue.scatter import models as bsdf
+    from etendue.scatter.bsdf import Bsdf
+    from etendue.scatter.files import read_bsdf, write_bsdf
+    from etendue.scatter.table import BsdfTable
     from etendue.scene import Scene
 
 __all__ = [
     "ArgumentError",
     "Box",
+    "Bsdf",
+    "BsdfTable",
     "ChangedFileWarning",
     "Cone",
     "Cylinder",
@@ -110,6 +117,7 @@ __all__ = [
     "UnknownNameError",
     "UnsupportedFormatError",
     "WaitingWarning",
+    "bsdf",
     "cache_content",
     "clear_cache",
     "combine_maps",
@@ -122,12 +130,14 @@ __all__ = [
     "intensity_distribution",
     "luminance_map",
     "parse_surface",
+    "plot_bsdf",
     "plot_characteristic",
     "plot_comparison",
     "plot_cross_sections",
     "plot_intensity",
     "plot_map",
     "plot_threshold_sweep",
+    "read_bsdf",
     "read_illuminance_map",
     "read_intensity",
     "read_map",
@@ -137,6 +147,7 @@ __all__ = [
     "trace",
     "trace_rounds",
     "trace_work",
+    "write_bsdf",
     "write_intensity",
     "write_rays",
 ]
@@ -153,16 +164,25 @@ PixelMap.outlets = MapOutlets(save=save_map, plot=plot_map)
 InNotebook.pages = Pages(of=_page)
 
 
+# Scenes and models are checked by pydantic, which takes as long to import as all the rest: only when somebody asks for one.
+LAZY = {
+    "Bsdf": "etendue.scatter.bsdf:Bsdf",
+    "BsdfTable": "etendue.scatter.table:BsdfTable",
+    "Scene": "etendue.scene:Scene",
+    "bsdf": "etendue.scatter.models",
+    "read_bsdf": "etendue.scatter.files:read_bsdf",
+    "scene": "etendue.scene",
+    "write_bsdf": "etendue.scatter.files:write_bsdf",
+}
+
+
 def __getattr__(name: str) -> Any:
-    # Scenes are checked by pydantic, which takes as long to import as all the rest: only when somebody asks for one.
-    if name == "scene":
-        return importlib.import_module("etendue.scene")
-    if name == "bsdf":
-        return importlib.import_module("etendue.scatter.models")
+    if name in LAZY:
+        module, _, attribute = LAZY[name].partition(":")
+        found = importlib.import_module(module)
+        return getattr(found, attribute) if attribute else found
     if name == "__version__":
         return importlib.import_module("importlib.metadata").version("etendue")
-    if name == "Scene":
-        return importlib.import_module("etendue.scene").Scene
     raise AttributeError(f"module 'etendue' has no attribute {name!r}")
 
 

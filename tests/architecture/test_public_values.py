@@ -11,6 +11,7 @@ from typing import Any
 import etendue as et
 import numpy as np
 import pytest
+from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.spool import Spool
 from oracles.light_fields import SURFACES, make_field
 from oracles.map_files import make_map
@@ -57,6 +58,8 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "Region": lambda: et.Region(left=-1, right=0, bottom=-2, top=2),
     "RingSource": lambda: et.RingSource(rays=77, runs=3, seed=9),
     "Scene": scene,
+    "Bsdf": lambda: et.BsdfTable(BsdfData(components=({"kind": "lambertian", "reflectance": 0.2},))),
+    "BsdfTable": lambda: et.BsdfTable(BsdfData(components=({"kind": "gaussian", "peak": 3.0, "sigma": 0.2},))),
     "ScatterEvents": lambda: result().events["scatter"],
     "Screen": lambda: et.Screen(2, 1, 8, 4),
     "Spectrum": lambda: et.Spectrum([450.0, 650.0], [1.0, 0.5]),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import etendue as et
 import pytest
-from etendue.cli.app import VERBS
+from etendue.cli.app import FAMILIES_OF_VERBS, VERBS
 from etendue.description.keys import Description
 from etendue.formats.intensity import INTENSITY_FORMATS
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
@@ -128,7 +128,16 @@ def test_architecture_names_every_crate_and_module() -> None:
     assert crates == set(re.findall(r"^\| `(crates/\w+)` \|", text, re.MULTILINE))
     package = ROOT / "python" / "etendue"
     # Families of like modules (formats, detectors, verbs) are named as a whole.
-    families = {"formats/rays", "formats/maps", "formats/intensity", "scene/detectors", "cli", "plot"}
+    families = {
+        "formats/rays",
+        "formats/maps",
+        "formats/bsdf",
+        "scatter/models",
+        "formats/intensity",
+        "scene/detectors",
+        "cli",
+        "plot",
+    }
     modules = {
         "etendue." + name.removesuffix(".py").replace("/", ".")
         for name in (path.relative_to(package).as_posix() for path in package.rglob("*.py"))
@@ -199,7 +208,7 @@ def test_theory_names_every_filter() -> None:
 def test_every_verb_is_run_by_a_page() -> None:
     commands = [block.text for path in PAGES for block in blocks(path) if block.language == "console"]
     run = set(re.findall(r"^\$ etendue (\w+)", "\n".join(commands), re.MULTILINE))
-    assert run == set(VERBS)
+    assert run == {*VERBS, *FAMILIES_OF_VERBS}
 
 
 def test_no_page_names_a_path_of_somebodys_machine() -> None:

@@ -57,6 +57,10 @@ def materials(tmp_path_factory: pytest.TempPathFactory) -> Path:
         nm = rng.uniform(low, high, n)
         rays = et.RaySet(position, direction, np.full(n, watts / n), flux_unit="W", wavelength=nm)
         et.write_rays(folder / file, rays, format=kind)
+    vinyl = et.bsdf.Mixture(
+        parts=[{"kind": "lambertian", "reflectance": 0.1}, {"kind": "gaussian", "peak": 0.3, "sigma": 0.2}]
+    )
+    et.write_bsdf(folder / "vinyl.bsdf", vinyl)
     return folder
 
 

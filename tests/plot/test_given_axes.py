@@ -37,6 +37,7 @@ DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {
     "comparison": (3, lambda **given: et.plot_comparison(et.compare(make_map(), make_map()), **given)),
     "threshold": (2, lambda **given: et.plot_threshold_sweep(sweep(), **given)),
     "characteristic": (2, lambda **given: et.plot_characteristic(et.diagnose(make_field(SURFACES["disk"])), **given)),
+    "bsdf": (3, lambda **given: et.plot_bsdf(et.bsdf.Gaussian(peak=3.0, sigma=0.2), **given)),
     "scene": (2, lambda **given: et.draw_scene(LENS, rays=0, **given)),
 }
 """Every function that draws: how many axes it needs."""

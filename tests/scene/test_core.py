@@ -45,6 +45,7 @@ def test_the_core_takes_every_surface(kind: str) -> None:
 
 
 FINISH_KEYS: dict[str, dict[str, Any]] = {
+    "bsdf": {"bsdf": et.bsdf.Gaussian(peak=3.0, sigma=0.2)},
     "diffuse-specular": {
         "total_reflectance": {"wavelength": [400, 700], "values": [0.8, 0.9]},
         "specular_reflectance": {"angle": [0, 80], "values": [0.1, 0.5]},
@@ -53,6 +54,7 @@ FINISH_KEYS: dict[str, dict[str, Any]] = {
 """Of finishes that show more than the example of their docstring."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FINISHES)
 def test_the_core_takes_every_finish(kind: str) -> None:
     """And no light is lost or made at a disk that has it."""

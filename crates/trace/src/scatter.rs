@@ -58,7 +58,7 @@ impl<'a> Surface<'a> {
 
     /// What f is multiplied by where normals are interpolated: the light that leaves in a direction is f cosθ about the
     /// interpolated normal, forwards, and the same light is seen backwards, where the cosine is that of the surface itself
-    /// \[Veach1997, 5.3\]. 0 where either direction is on the other side of the surface itself.
+    /// `[Veach1997]`, section 5.3. 0 where either direction is on the other side of the surface itself.
     #[inline]
     fn tilt(&self, incident: Vec3, scattered: Vec3, height: f64) -> f64 {
         if self.axes[2] == self.side {

@@ -10,6 +10,7 @@ from typing import Annotated, cast
 import typer
 
 from etendue.cli import (
+    bsdf,
     cache,
     compare,
     convert,
@@ -63,6 +64,10 @@ VERBS: dict[str, Callable[..., None]] = {
 }
 for _name, _verb in VERBS.items():
     app.command(_name)(guarded(_name, _verb))
+FAMILIES_OF_VERBS: dict[str, typer.Typer] = {"bsdf": bsdf.app}
+"""Verbs of two words, by the first."""
+for _name, _family in FAMILIES_OF_VERBS.items():
+    app.add_typer(_family, name=_name)
 
 
 def _print_version(wanted: bool) -> None:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue import _core
+from etendue.quantities.bsdf_data import direction
 from etendue.tracing.section import Section
 from etendue.tracing.sections import Window
 
@@ -102,6 +104,8 @@ def finish_kind(finish: Record) -> str:
     """
     if finish["kind"] == "fresnel":
         return "interface"
+    if finish["kind"] != "scatter":
+        return _kind_of_lobes(finish)
     does = {
         "specular_reflectance": "mirror",
         "specular_transmittance": "transparent",
@@ -111,6 +115,14 @@ def finish_kind(finish: Record) -> str:
     most = {part: float(np.max(finish[part]["values"])) for part in does if part in finish}
     part = max(most, key=lambda p: most[p])
     return does[part] if most[part] > 0.0 else "absorber"
+
+
+def _kind_of_lobes(finish: Record) -> str:
+    """The same for finishes that are no tables of shares: by what becomes of light at some angles."""
+    incident = np.concatenate([direction([0.0, 60.0], 0.0), direction([0.0, 60.0], 0.0, behind=True)])
+    shares = _core.Bsdf(finish).shares(incident, (555.0, 1.0, 1.0)).max(axis=0)
+    kinds = ("mirror", "transparent", "diffuse", "diffuse")
+    return kinds[int(shares.argmax())] if shares.max() > 0.0 else "absorber"
 
 
 def within(parts: list[Part], window: Window) -> list[Part]:

@@ -11,7 +11,6 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -54,7 +53,13 @@ def direction(theta: npt.ArrayLike, phi: npt.ArrayLike, *, behind: bool = False)
 
 
 def mirrored(incident: npt.ArrayLike) -> Array:
-    """The specular direction of reflection of `incident`, shape (…, 3)."""
+    """The specular direction of reflection of `incident`, shape (…, 3).
+
+    Examples
+    --------
+    >>> mirrored([0.6, 0.0, 0.8]).tolist()
+    [-0.6, -0.0, 0.8]
+    """
     return np.asarray(incident, np.float64) * [-1.0, -1.0, 1.0]
 
 
@@ -77,6 +82,12 @@ class PolarGrid:
         Increasing, not negative.
     azimuth : array, shape (m,)
         Increasing, at most 360° wide; values repeat after 360°. A single azimuth: values do not depend on it.
+
+    Examples
+    --------
+    >>> about = PolarGrid("specular", [0.0, 10.0], [0.0, 180.0])
+    >>> about.directions(direction(30.0, 180.0), transmitted=False)[0, 1].round(3).tolist()  # 10° towards the normal
+    [0.342, -0.0, 0.94]
     """
 
     frame: GridFrame
@@ -257,8 +268,8 @@ class BsdfSlice:
     def at(self, scattered: npt.ArrayLike) -> Array:
         """F [1/sr] at directions of shape (…, 3) on the side where light leaves, for slices on a grid: bilinear on it.
 
-        Beyond the last radial coordinate f is that of the last; between the ends of azimuths that do not go around it is
-        interpolated across the gap.
+        Beyond the last radial coordinate, or the last within the hemisphere, f is that of the last; between the ends of
+        azimuths that do not go around it is interpolated across the gap.
 
         Raises
         ------
@@ -268,7 +279,15 @@ class BsdfSlice:
         if self.grid is None:
             raise ArgumentError("a slice of single points has to be interpolated first")
         r, a = self.grid.coordinates(scattered, self.incident, transmitted=self.transmitted)
-        return _bilinear(self.grid, self.values, r, a)
+        return _bilinear(self.grid, self.held, r, a)
+
+    @functools.cached_property
+    def held(self) -> Array:
+        """Values of the grid, those that lie beyond the hemisphere or were not measured replaced by the last before them."""
+        known = ~(np.isnan(self.directions[..., 0]) | np.isnan(self.values))
+        last = np.maximum.accumulate(np.where(known, np.arange(self.values.shape[1]), -1), axis=1)
+        held = np.take_along_axis(self.values, np.maximum(last, 0), axis=1)
+        return np.asarray(np.where(last >= 0, held, self.values[known].min() if known.any() else np.nan))
 
     def integral(self) -> float:
         """∫ f cosθ dΩ: the share of the flux that is scattered (directional-hemispherical).
@@ -321,7 +340,7 @@ def _around(nodes: Array, x: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[n
     return i, (i + 1) % ring.size, (x - starts[i]) / (following[i] - starts[i])
 
 
-NODES = 6
+NODES = 4
 """Of the rule of Gauss and Legendre in each cell of a grid, and by azimuth."""
 
 
@@ -342,9 +361,7 @@ def _integral(one: BsdfSlice) -> float:
     a, wa = points(azimuth)
     r, wr = points(radial)
     d = grid.direction(r[None, :], a[:, None], one.incident, transmitted=one.transmitted)
-    f = _bilinear(
-        grid, one.values, np.broadcast_to(r, d.shape[:-1]), np.broadcast_to((a % 360.0)[:, None], d.shape[:-1])
-    )
+    f = _bilinear(grid, one.held, np.broadcast_to(r, d.shape[:-1]), np.broadcast_to((a % 360.0)[:, None], d.shape[:-1]))
     measure = r if grid.frame == "cosines" else np.sin(np.radians(r)) * math.radians(1.0) * np.abs(d[..., 2])
     inside = np.where(np.isnan(d[..., 2]), 0.0, measure * f)
     return float(np.einsum("i,ij,j->", np.radians(wa), inside, wr))
@@ -379,6 +396,11 @@ class BsdfData:
         Whether light that meets the back is treated as light that meets the front (nothing else is said about it).
     name, provenance, complaints, facts
         What the file calls it, where it comes from, what was not as it should be, and what else it says (text by name).
+
+    Examples
+    --------
+    >>> BsdfData(components=({"kind": "lambertian", "reflectance": 0.5},), name="paint").wavelengths
+    ()
     """
 
     slices: tuple[BsdfSlice, ...] = ()
@@ -390,7 +412,7 @@ class BsdfData:
     name: str = ""
     provenance: Provenance | None = None
     complaints: tuple[Complaint, ...] = ()
-    facts: Mapping[str, str] = dataclasses.field(default_factory=lambda: MappingProxyType({}))
+    facts: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "slices", tuple(self.slices))

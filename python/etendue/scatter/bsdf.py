@@ -250,6 +250,23 @@ class Bsdf(abc.ABC):
         a, b, c, d = (column.reshape(incident.shape[:-1]) for column in found.T)
         return a, b, c, d
 
+    def irreciprocity(self) -> float:
+        """By how much f there and back differ on average, relative to their mean: 0 where light goes back as it came.
+
+        Over pairs of directions in front of the surface (of transmitted light: one behind), between equal media.
+        """
+        angles = np.array([5.0, 20.0, 35.0, 50.0, 65.0])
+        one = direction(angles, 0.0)[:, None, None, :]
+        there = there_and_back = 0.0
+        for transmitted, is_there in ((False, self.reflects), (True, self.transmits)):
+            if not is_there:
+                continue
+            other = direction(angles[:, None], np.arange(0.0, 360.0, 30.0), behind=transmitted)[None]
+            pair = [self.evaluate(one, other), self.evaluate(other, one)]
+            there += float(np.abs(pair[0] - pair[1]).sum())
+            there_and_back += 0.5 * float((pair[0] + pair[1]).sum())
+        return there / there_and_back if there_and_back > 0.0 else 0.0
+
     @property
     def ways(self) -> tuple[bool, bool, bool, bool]:
         """Whether light is mirrored, goes on in a single direction, is scattered back, is scattered to the other side."""

@@ -47,8 +47,8 @@ def read_bsdf(path: str | os.PathLike[str]) -> BsdfTable:
     >>> from tempfile import TemporaryDirectory
     >>> from etendue.scatter.models import Gaussian
     >>> with TemporaryDirectory() as folder:
-    ...     lost = write_bsdf(Path(folder) / "film.bsdf", Gaussian(peak=5, sigma=0.15))
-    ...     read_bsdf(Path(folder) / "film.bsdf").reflectance(30).round(3).tolist()
+    ...     lost = write_bsdf(Path(folder) / "film.h5", Gaussian(peak=5, sigma=0.15))
+    ...     read_bsdf(Path(folder) / "film.h5").reflectance(30).round(3).tolist()
     0.706
     """
     return BsdfTable(read_bsdf_data(path))

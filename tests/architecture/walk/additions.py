@@ -77,12 +77,13 @@ class Addition:
 
 
 BSDFS, DETECTORS, SCENE = "crates/optics/src/bsdf", "crates/trace/src/detector", "python/etendue/scene"
+MODELS = "python/etendue/scatter/models"
 FORMATS, VERBS, SCENES_PAGE = "python/etendue/formats/rays", "python/etendue/cli", "docs/scenes.md"
 
 ADDITIONS: dict[str, Addition] = {
     "BSDF": Addition(
         "minnaert",
-        {f"{BSDFS}/minnaert.rs": "minnaert.rs"},
+        {f"{BSDFS}/minnaert.rs": "minnaert.rs", f"{MODELS}/minnaert.py": "minnaert_finish.py"},
         (
             Insertion(f"{BSDFS}/mod.rs", "mod lambertian;\n", "mod minnaert;\n"),
             Insertion(f"{BSDFS}/mod.rs", "pub use lambertian::Lambertian;\n", "pub use minnaert::Minnaert;\n"),
@@ -91,32 +92,17 @@ ADDITIONS: dict[str, Addition] = {
                 '        Lambertian::named("lambertian"),\n',
                 '        Minnaert::named("minnaert"),\n',
             ),
-            Insertion("crates/bindings/src/scene.rs", "use etendue_optics::bsdf::{Bsdf, Interface,", " Minnaert,"),
             Insertion(
-                "crates/bindings/src/scene.rs",
-                '        "fresnel" => Ok(Arc::new(Interface)),\n',
-                """\
-        "minnaert" => Minnaert::new(table(dict, "diffuse_reflectance")?, get(dict, "exponent")?)
-            .map(|bsdf| Arc::new(bsdf) as Arc<dyn Bsdf>)
-            .ok_or_else(|| refuse("a reflectance that is no share or depends on angle, or an exponent below 0")),
-""",
+                f"{BSDFS}/mod.rs",
+                '        "scatter" => Some(Mixture::described(by)),\n',
+                '        "minnaert" => Some(Minnaert::described(by)),\n',
             ),
             Insertion(
-                f"{SCENE}/finishes.py",
-                "from typing import Annotated, Any, Literal\n\nimport numpy as np\n",
-                "from annotated_types import Ge, Le\n",
+                f"{MODELS}/__init__.py",
+                "from etendue.scatter.models.lobes import ABg, Gaussian, HarveyShack\n",
+                "from etendue.scatter.models.minnaert import Minnaert\n",
             ),
-            Insertion(
-                f"{SCENE}/finishes.py",
-                "from etendue.description.tables import Grid, Shares, constant, grid_of, on_common_nodes\n",
-                "from etendue.description.values import AsNumber, Finite\n",
-            ),
-            Insertion(
-                f"{SCENE}/finishes.py",
-                "        return self.specular_transmittance != 0.0 or self.diffuse_transmittance != 0.0\n",
-                (HERE / "minnaert_finish.txt").read_text(encoding="utf-8"),
-            ),
-            Insertion(f"{SCENE}/finishes.py", "DiffuseSpecular, Transmitter, Mixed", ", Minnaert"),
+            Insertion(f"{MODELS}/__init__.py", '{**SIMPLE, "mixture": Mixture', ', "minnaert": Minnaert'),
         ),
         (
             Insertion(

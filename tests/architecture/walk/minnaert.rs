@@ -1,11 +1,12 @@
 //! Diffuse reflection that is weaker the more light comes and goes along the surface: Minnaert's law.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
 
-use super::contract::{Bsdf, Facts, Media, Shares};
+use super::contract::{Bsdf, Facts, Media, Parameters, Shares};
 use crate::table::Table;
 
 /// f = ρ (n + 2)/(2π) (cos θᵢ cos θₛ)ⁿ: of light along the normal the share ρ is reflected, of other light ρ cosⁿθᵢ. n = 0 is
@@ -39,6 +40,16 @@ impl Minnaert {
             exponent,
             facts,
         })
+    }
+
+    /// From the share along the normal and the exponent.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn described(by: &dyn Parameters) -> Result<Arc<dyn Bsdf>, String> {
+        let found = Self::new(by.table("diffuse_reflectance")?, by.number("exponent")?);
+        let bsdf = found.ok_or("a reflectance that is no share or depends on angle, or an exponent below 0")?;
+        Ok(Arc::new(bsdf))
     }
 
     fn share(&self, cosine: f64, media: &Media) -> f64 {

@@ -26,7 +26,7 @@ pub enum Profile {
         /// g ≥ 0; 0 is a Lambertian surface.
         g: f64,
     },
-    /// b₀ (1 + (r/L)²)^(S/2), of three parameters \[Harvey1976\].
+    /// b₀ (1 + (r/L)²)^(S/2), of three parameters `[Harvey1976]`.
     HarveyShack {
         /// b₀ \[1/sr\].
         b0: f64,

@@ -22,7 +22,7 @@ KEYWORDS = ("Source", "Symmetry", "SpectralContent", "ScatterType", "SampleRotat
 SYMMETRIES = ("PlaneSymmetrical", "Asymmetrical", "ASymmetrical4D")
 CHANNELS = ("TristimulusX", "TristimulusY", "TristimulusZ")
 
-RADIAL = np.concatenate([np.arange(0, 2, 0.25), np.arange(2, 10, 1), np.arange(10, 91, 5), [100, 120, 150, 180]])
+RADIAL = np.concatenate([np.arange(0, 2, 0.25), np.arange(2, 40, 1), np.arange(40, 91, 2.5), [100, 120, 150, 180]])
 """Angles from the specular direction [°] of tables that are made to be written."""
 
 AZIMUTH_STEP = 10.0

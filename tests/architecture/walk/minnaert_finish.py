@@ -1,3 +1,15 @@
+"""Minnaert's law of diffuse reflection."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Le
+from etendue.description.files import Files
+from etendue.description.tables import Shares, grid_of
+from etendue.description.values import AsNumber, Finite
+from etendue.scatter.models.finish import Finish, Record
+from pydantic import Field
 
 
 class Minnaert(Finish):
@@ -19,10 +31,10 @@ class Minnaert(Finish):
     """
 
     kind: Literal["minnaert"] = "minnaert"
-    reflectance: Shares
+    stated_reflectance: Shares = Field(alias="reflectance")
     exponent: Annotated[float, Finite, Ge(0.0), Le(1e3), AsNumber]
 
     def record(self, files: Files) -> Record:
         """The share along the normal, and the exponent."""
-        reflectance = grid_of(self.reflectance, files)
+        reflectance = grid_of(self.stated_reflectance, files)
         return {"kind": "minnaert", "diffuse_reflectance": reflectance.record(), "exponent": self.exponent}

@@ -1,0 +1,122 @@
+"""``etendue bsdf``: what a file says of scatter, its picture, and other formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from etendue.cli.guard import guarded
+from etendue.cli.terminal import check_folder, complain, one_of, print_json, say
+from etendue.formats.bsdf import BSDF_FORMATS
+from etendue.plot import plot_bsdf
+from etendue.scatter.files import read_bsdf, write_bsdf
+from etendue.scatter.table import BsdfTable
+
+app = typer.Typer(help="Files of scatter data: what they hold, pictures of it, other formats.", no_args_is_help=True)
+
+ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0)
+"""Angles of incidence at which shares are told [°]."""
+
+File = Annotated[Path, typer.Argument(help="A file with a BSDF, of any format that étendue reads.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+def info(file: File, json: Json = False) -> None:
+    """Say what a file holds: incidences, sides, shares by angle, reciprocity, and what is not as it should be."""
+    bsdf = read_bsdf(file)
+    facts = _facts(file, bsdf)
+    if json:
+        print_json(facts)
+        return
+    for complaint in facts["complaints"]:
+        complain(complaint)
+    say(f"{file}: {bsdf.name or 'no name'}, {'isotropic' if bsdf.isotropic else 'anisotropic'}")
+    for one in facts["tables"]:
+        stated = "" if one["stated"] is None else f", stated {one['stated']:.4f}"
+        way = "transmitted" if one["transmitted"] else "reflected"
+        place = f"{one['side']}, {one['theta']:g}°" + (f", azimuth {one['phi']:g}°" if not bsdf.isotropic else "")
+        say(f"  {place}: {one['share']:.4f} {way}{stated}")
+    for part in facts["components"]:
+        say(f"  component {part}")
+    for key in ("reflectance", "transmittance"):
+        if max(facts[key]) > 0.0:
+            told = ", ".join(f"{share:.4f} at {angle:g}°" for angle, share in zip(ANGLES, facts[key], strict=True))
+            say(f"{key}: {told}")
+    say(f"reciprocity: f there and back differ by {facts['reciprocity']:.1%} on average")
+
+
+def _facts(file: Path, bsdf: BsdfTable) -> dict[str, Any]:
+    # A file of many slices is told by the first azimuth.
+    first = {(one.front, one.transmitted, round(one.theta, 6)): one for one in reversed(bsdf.data.slices)}
+    tables = [
+        {
+            "side": "front" if one.front else "back",
+            "theta": round(one.theta, 6),
+            "phi": round(one.phi, 6),
+            "transmitted": one.transmitted,
+            "wavelength": one.wavelength,
+            "share": one.integral(),
+            "stated": one.stated,
+        }
+        for one in sorted(first.values(), key=lambda one: (not one.front, one.transmitted, one.theta))
+    ]
+    angles = np.array(ANGLES)
+    return {
+        "file": file,
+        "name": bsdf.name,
+        "isotropic": bsdf.isotropic,
+        "slices": len(bsdf.data.slices),
+        "tables": tables,
+        "components": [dict(part) for part in bsdf.data.components],
+        "angles": list(ANGLES),
+        "reflectance": bsdf.reflectance(angles).tolist(),
+        "transmittance": bsdf.transmittance(angles).tolist(),
+        "reciprocity": bsdf.irreciprocity(),
+        "complaints": [str(complaint) for complaint in bsdf.complaints],
+    }
+
+
+def plot(
+    file: File,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The picture, .png or .pdf.")],
+    incidence: Annotated[float, typer.Option("--incidence", help="Angle of the diagram in the middle [°].")] = 45.0,
+    side: Annotated[str, typer.Option("--side", help="The side that the light meets: front or back.")] = "front",
+) -> None:
+    """Draw f in the plane of incidence, the lobe in direction cosines, and the shares over the angle of incidence."""
+    one_of(side, ("front", "back"), "--side")
+    check_folder(output)
+    bsdf = read_bsdf(file)
+    for complaint in bsdf.complaints:
+        complain(str(complaint))
+    plot_bsdf(bsdf, output, incidence=incidence, side="back" if side == "back" else "front", title=bsdf.name or None)
+    say(f"{output}: f of {file}")
+
+
+def convert(
+    file: File,
+    output: Annotated[Path, typer.Argument(help="The file to write.")],
+    format: Annotated[
+        str | None, typer.Option("--format", help="Format to write; from the extension of OUTPUT if not given.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Read a file and write another one; what gets lost is told."""
+    if format is not None:
+        one_of(format, BSDF_FORMATS, "--format")
+    check_folder(output)
+    bsdf = read_bsdf(file)
+    complaints = [str(complaint) for complaint in bsdf.complaints]
+    notes = list(write_bsdf(output, bsdf, format))
+    if json:
+        print_json({"output": output, "complaints": complaints, "notes": notes})
+        return
+    for line in (*complaints, *(f"note: {note}" for note in notes)):
+        complain(line)
+    say(f"{output}: {len(bsdf.data.slices)} slices read from {file}")
+
+
+for _name, _verb in (("info", info), ("plot", plot), ("convert", convert)):
+    app.command(_name)(guarded(f"bsdf {_name}", _verb))

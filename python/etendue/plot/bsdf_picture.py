@@ -1,0 +1,210 @@
+"""A BSDF: curves in the plane of incidence, the lobe in direction cosines, shares over the angle of incidence."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.plot import style
+from etendue.quantities.bsdf_data import direction
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from etendue.scatter.bsdf import Bsdf, Side
+
+Array = npt.NDArray[np.float64]
+
+WIDTH, HEIGHT = 11.4, 3.6
+"""Of the figure [inches]."""
+
+LEFT, BOTTOM, PANEL, GAP = 0.75, 0.6, 2.45, 1.35
+"""Margins of the first diagram, side of each, and room between two [inches]."""
+
+INCIDENCES = (0.0, 30.0, 60.0, 75.0)
+"""Angles of incidence that are shown [°]."""
+
+DECADES = 4.0
+"""That logarithmic axes show below the largest value."""
+
+
+@overload
+def plot_bsdf(
+    bsdf: Bsdf,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    side: Side = "front",
+    incidence: float = 45.0,
+    title: str | None = None,
+    ax: None = None,
+) -> Figure: ...
+
+
+@overload
+def plot_bsdf(
+    bsdf: Bsdf,
+    path: None = None,
+    *,
+    side: Side = "front",
+    incidence: float = 45.0,
+    title: str | None = None,
+    ax: Sequence[Axes] | npt.NDArray[Any],
+) -> tuple[Axes, ...]: ...
+
+
+def plot_bsdf(
+    bsdf: Bsdf,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    side: Side = "front",
+    incidence: float = 45.0,
+    title: str | None = None,
+    ax: Sequence[Axes] | npt.NDArray[Any] | None = None,
+) -> Figure | tuple[Axes, ...]:
+    """Draw a BSDF.
+
+    Left f in the plane of incidence over the angle of the scattered light, negative on the side where light comes from;
+    in the middle f over the direction cosines of the scattered light, at one incidence; right the shares of the flux over
+    the angle of incidence. What is transmitted is dashed, and is left out in the middle if anything is reflected.
+
+    Parameters
+    ----------
+    bsdf : Bsdf
+        A model or a table.
+    path : path, optional
+        Where to write the picture, .png or .pdf.
+    side : {"front", "back"}
+        The side that the light meets.
+    incidence : number
+        Angle of incidence [°] of the diagram in the middle.
+    title : str, optional
+        Above everything.
+    ax : three Axes, optional
+        matplotlib's, to draw on instead of a figure of its own; there is no path then.
+
+    Returns
+    -------
+    Figure, or tuple of Axes
+        matplotlib's; the axes if they were handed over.
+
+    Raises
+    ------
+    MissingLibraryError
+        If matplotlib is not installed.
+    ArgumentError
+        If there are not three axes, or a path beside them.
+    UnknownNameError
+        If the extension is neither .png nor .pdf.
+
+    Examples
+    --------
+    >>> from etendue.scatter.models import Gaussian
+    >>> len(plot_bsdf(Gaussian(peak=5, sigma=0.15)).axes)
+    4
+    """
+    if ax is not None:
+        panels = style.given_axes(ax, 3, path)
+        _draw(panels, bsdf, side, incidence)
+        if title:
+            style.put_title(panels[0], title)
+        return panels
+    figure = style.new_figure(WIDTH, HEIGHT)
+    _draw(
+        [style.add_axes(figure, LEFT + k * (PANEL + GAP), BOTTOM, PANEL, PANEL) for k in range(3)],
+        bsdf,
+        side,
+        incidence,
+    )
+    if title:
+        style.add_text(figure, LEFT, HEIGHT - 0.25, title, size=style.TITLE_SIZE, color=style.INK, weight="bold")
+    return style.finish(figure, path)
+
+
+def _draw(panels: Sequence[Axes], bsdf: Bsdf, side: Side, incidence: float) -> None:
+    behind = side == "back"
+    _in_plane(panels[0], bsdf, behind=behind)
+    _lobe(panels[1], bsdf, incidence, behind=behind)
+    _shares(panels[2], bsdf, side)
+
+
+def _ways(bsdf: Bsdf) -> list[tuple[bool, str]]:
+    """The ways of scattered light that there are, with the style of their lines."""
+    return [(way, line) for way, line, there in ((False, "-", bsdf.reflects), (True, "--", bsdf.transmits)) if there]
+
+
+def _in_plane(axes: Axes, bsdf: Bsdf, *, behind: bool) -> None:
+    style.dress(axes)
+    angles = np.linspace(-89.9, 89.9, 1441)
+    highest = 0.0
+    for theta, colour in zip(INCIDENCES, style.LINES, strict=False):
+        incident = direction(max(theta, 1e-6), 180.0, behind=behind)
+        for transmitted, line in _ways(bsdf):
+            scattered = direction(angles, 0.0, behind=behind != transmitted)
+            f = bsdf.evaluate(incident, scattered)
+            highest = max(highest, float(f.max()))
+            label = f"from {theta:g}°" if line == "-" or not bsdf.reflects else None
+            axes.plot(angles, np.maximum(f, 1e-300), line, color=colour, lw=1.1, label=label)
+    if highest > 0.0:
+        axes.set_yscale("log")
+        axes.set_ylim(highest * 10.0**-DECADES, highest * 2.0)
+        style.put_legend(axes, loc="upper left")
+    axes.set(xlim=(-90, 90), xticks=range(-90, 91, 30), xlabel="angle of scattered light [°]", ylabel="f [1/sr]")
+    style.put_title(axes, "In the plane of incidence")
+
+
+def _lobe(axes: Axes, bsdf: Bsdf, theta: float, *, behind: bool) -> None:
+    from matplotlib.colors import LogNorm
+
+    style.dress(axes)
+    transmitted = not bsdf.reflects
+    cosines = np.linspace(-1.0, 1.0, 401)
+    x, y = np.meshgrid(cosines, cosines)
+    square = 1.0 - x * x - y * y
+    up = behind == transmitted
+    scattered = np.stack([x, y, np.sqrt(np.maximum(square, 0.0)) * (1.0 if up else -1.0)], axis=-1)
+    inside = square > 0.0
+    f = np.full(x.shape, np.nan)
+    f[inside] = bsdf.evaluate(direction(theta, 180.0, behind=behind), scattered[inside])
+    top = float(np.nanmax(f))
+    if top > 0.0:
+        norm = LogNorm(max(top * 10.0**-DECADES, 0.8 * float(np.nanmin(f))), top)
+        image = axes.imshow(
+            np.maximum(f, norm.vmin), origin="lower", extent=(-1, 1, -1, 1), norm=norm, cmap=style.COLOUR_MAPS["value"]
+        )
+        place, figure = axes.get_position(), style.figure_of(axes)
+        bar = figure.add_axes((place.x1 + 0.006, place.y0, 0.009, place.height))
+        figure.colorbar(image, cax=bar)
+        bar.tick_params(labelsize=style.TICK_SIZE, colors=style.FAINT)
+        style.put_title(bar, "1/sr")
+    axes.set(xlabel="β along the plane of incidence", ylabel="β across")
+    way = "transmitted" if transmitted else "reflected"
+    style.put_title(axes, f"f {way}, incidence {theta:g}°")
+
+
+def _shares(axes: Axes, bsdf: Bsdf, side: Side) -> None:
+    style.dress(axes)
+    theta = np.linspace(0.0, 89.5, 180)
+    curves: list[tuple[str, Array, str]] = [
+        ("R, all", bsdf.reflectance(theta, side=side), "-"),
+        ("R, specular", bsdf.regular_reflectance(theta, side=side), ":"),
+        ("T, all", bsdf.transmittance(theta, side=side), "--"),
+        ("T, straight on", bsdf.regular_transmittance(theta, side=side), "-."),
+    ]
+    for (label, values, line), colour in zip(curves, style.LINES, strict=False):
+        if values.max() > 0.0:
+            axes.plot(theta, values, line, color=colour, lw=1.2, label=label)
+    axes.set(
+        xlim=(0, 90),
+        ylim=(0, 1.02),
+        xticks=range(0, 91, 30),
+        xlabel="angle of incidence [°]",
+        ylabel="share of the flux",
+    )
+    if axes.lines:
+        style.put_legend(axes, loc="best")
+    style.put_title(axes, "Directional-hemispherical")

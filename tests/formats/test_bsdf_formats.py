@@ -1,0 +1,264 @@
+"""Every format of BSDF files: round trips of a table without symmetry, recognition, damage, and what is refused."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from etendue.errors import ArgumentError, EtendueError, FormatError, UnknownNameError, UnsupportedFormatError
+from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data, write_bsdf_data
+from etendue.formats.bsdf.bsdf_format import BsdfFormat
+from etendue.formats.bsdf.klems import BASES
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+Array = npt.NDArray[np.float64]
+
+
+class Slanted:
+    """A BSDF without symmetry: a lobe beside the specular direction, on another side of it for each incidence."""
+
+    name, isotropic, reflects, transmits, both_sides = "slanted & co", False, True, True, False
+    wavelengths: tuple[float, ...] = ()
+    incidences = (5.0, 30.0, 60.0)
+
+    def evaluate(self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None) -> Array:
+        assert wavelength is None
+        i, s = np.broadcast_arrays(np.asarray(incident, float), np.asarray(scattered, float))
+        back = (i[..., 2] > 0) == (s[..., 2] > 0)
+        off = s[..., :2] + i[..., :2] - 0.1 * np.stack([1.0 + i[..., 1], i[..., 0]], axis=-1)
+        lobe = 0.4 * np.exp(-0.5 * np.sum(off * off, axis=-1) / 0.3**2) * (1.0 + 0.4 * s[..., 1] + 0.2 * i[..., 0])
+        return np.asarray(np.where(back, lobe, 0.5 * lobe) * np.where(i[..., 2] > 0, 1.0, 0.7))
+
+
+FORMATS = list(BSDF_FORMATS.values())
+WRITTEN = [form for form in FORMATS if form.write is not None]
+
+
+def tabled(form: BsdfFormat) -> BsdfData:
+    assert form.tabulate is not None
+    return form.tabulate(Slanted())
+
+
+def as_bytes(form: BsdfFormat, data: BsdfData) -> bytes:
+    assert form.write is not None
+    stream = io.BytesIO()
+    form.write(data, stream)
+    return stream.getvalue()
+
+
+@pytest.fixture(scope="module")
+def written() -> Callable[[BsdfFormat], bytes]:
+    kept: dict[str, bytes] = {}
+
+    def bytes_of(form: BsdfFormat) -> bytes:
+        if form.name not in kept:
+            kept[form.name] = as_bytes(form, tabled(form))
+        return kept[form.name]
+
+    return bytes_of
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", WRITTEN, ids=lambda form: form.name)
+def test_round_trip(form: BsdfFormat, written: Callable[[BsdfFormat], bytes], tmp_path: Path) -> None:
+    """The same directions and values: a wrong azimuth zero, sense, side or order of a matrix would be seen."""
+    data = tabled(form)
+    assert form.fits is not None
+    assert form.fits(data)
+    path = tmp_path / "table.any"
+    path.write_bytes(written(form))
+    again = read_bsdf_data(path)
+    assert len(again.slices) == len(data.slices)
+    for one in again.slices:
+        truth = Slanted()
+        near = [
+            other
+            for other in data.slices
+            if np.allclose(other.incident, one.incident, atol=1e-8) and other.transmitted == one.transmitted
+        ]
+        assert len(near) == 1
+        assert np.allclose(one.directions, near[0].directions, atol=1e-7, equal_nan=True)
+        assert np.allclose(one.values, near[0].values, rtol=1e-7, atol=1e-9, equal_nan=True)
+        # And the values are the function there, within what a patch averages over.
+        there = ~np.isnan(one.directions[..., 0])
+        f = truth.evaluate(one.incident, one.directions[there])
+        assert np.abs(one.values[there] - f).max() < (1e-6 if one.grid is not None else 0.07)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
+def test_recognised_by_content_and_by_no_other_format(form: BsdfFormat, written: Callable[[BsdfFormat], bytes]) -> None:
+    head = written(form)[:4096]
+    assert [other.name for other in FORMATS if other.recognise(head)] == [form.name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", WRITTEN, ids=lambda form: form.name)
+def test_cut_anywhere(form: BsdfFormat, written: Callable[[BsdfFormat], bytes], tmp_path: Path) -> None:
+    """At bytes all over the file, and each of the first and last: an error that says so."""
+    whole = written(form)
+    rng = np.random.default_rng(4)
+    cuts = {*range(40), *range(len(whole) - 12, len(whole) - 1), *rng.integers(0, len(whole) - 12, 12).tolist()}
+    path = tmp_path / "cut"
+    for cut in sorted(cuts):
+        path.write_bytes(whole[:cut])
+        with pytest.raises(FormatError):
+            read_bsdf_data(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", WRITTEN, ids=lambda form: form.name)
+def test_damaged_bytes(form: BsdfFormat, written: Callable[[BsdfFormat], bytes], tmp_path: Path) -> None:
+    """A table or an error of ours, whatever stands there."""
+    whole = written(form)
+    path = tmp_path / "damaged"
+
+    @settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
+    @given(st.integers(0, len(whole) - 9), st.binary(min_size=1, max_size=8))
+    def check(at: int, bad: bytes) -> None:
+        path.write_bytes(whole[:at] + bad + whole[at + len(bad) :])
+        with contextlib.suppress(EtendueError):
+            read_bsdf_data(path)
+
+    check()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", WRITTEN, ids=lambda form: form.name)
+def test_tables_in_scenes_are_those_that_were_written(form: BsdfFormat, tmp_path: Path) -> None:
+    bsdf = et.bsdf.Mixture(
+        parts=[{"kind": "lambertian", "reflectance": 0.3}, {"kind": "gaussian", "peak": 2, "sigma": 0.2}]
+    )
+    path = tmp_path / f"film{form.extensions[0]}"
+    assert isinstance(et.write_bsdf(path, bsdf), tuple)
+    again = et.read_bsdf(path)
+    for theta in (0.0, 27.0, 55.0):
+        assert float(again.reflectance(theta)) == pytest.approx(float(bsdf.reflectance(theta)), rel=0.015), theta
+
+
+def test_directional_hemispherical_values_of_klems_are_exact(
+    written: Callable[[BsdfFormat], bytes], tmp_path: Path
+) -> None:
+    """Σ M Λ by hand over the text of the file."""
+    path = tmp_path / "x.xml"
+    path.write_bytes(written(BSDF_FORMATS["klems"]))
+    data = read_bsdf_data(path)
+    text = path.read_text().split("Reflection Back")[1].split("<ScatteringData>")[1].split("</Scatt")[0]
+    matrix = np.array([float(word) for word in text.replace(",", " ").split()]).reshape(145, 145)
+    lambdas = BASES["LBNL/Klems Full"].projected
+    assert float(lambdas.sum()) == pytest.approx(math.pi, rel=1e-12)
+    found = [one.integral() for one in data.slices if not one.front and not one.transmitted]
+    assert found == pytest.approx((lambdas @ matrix).tolist(), rel=1e-12)
+
+
+def test_bases_of_klems() -> None:
+    assert {name: basis.size for name, basis in BASES.items()} == {
+        "LBNL/Klems Full": 145, "LBNL/Klems Half": 77, "LBNL/Klems Quarter": 41,
+    }  # fmt: skip
+
+
+ZEMAX = """# made by hand
+Source  Measured
+symmetry  planesymmetrical
+SpectralContent  Monochrome
+ScatterType  BRDF
+SampleRotation  1
+0
+AngleOfIncidence  1
+40
+ScatterAzimuth  3
+0 90 180
+ScatterRadial  2
+0 20
+
+Monochrome
+DataBegin
+TIS 0.5
+1 2
+1 3
+1 4
+DataEnd
+"""
+
+
+def test_azimuth_zero_of_zemax_points_from_the_specular_direction_to_the_normal(tmp_path: Path) -> None:
+    path = tmp_path / "hand.bsdf"
+    path.write_text(ZEMAX)
+    (one,) = read_bsdf_data(path).slices
+    incident = one.incident
+    assert one.theta == pytest.approx(40.0)
+    # In the plane of incidence, 20° from the specular direction towards the normal, and away from it.
+    towards, away = (direction(angle, one.phi + 180.0) for angle in (20.0, 60.0))
+    assert float(one.at(towards)) == pytest.approx(2.0)
+    assert float(one.at(away)) == pytest.approx(4.0)
+    # Both sides are alike, and the specular direction is common to all.
+    specular = incident * [-1, -1, 1]
+    assert float(one.at(specular)) == pytest.approx(1.0)
+    across = np.cross(specular, towards)
+    side = [specular * math.cos(0.3) + sign * across / np.linalg.norm(across) * math.sin(0.3) for sign in (1, -1)]
+    assert one.at(side[0]) == pytest.approx(one.at(side[1]))
+    assert any("stated share" in str(complaint) for complaint in read_bsdf_data(path).complaints)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("AngleOfIncidence  1", "AngleOfIncidence  999999999999", "words follow"),
+        ("1 3", "1 nan", "no finite number"),
+        ("0 90 180", "0 180 90", "do not rise"),
+        ("planesymmetrical", "round", "not one of"),
+        ("\n40\n", "\n95\n", "0 to 90"),
+        ("DataEnd", "", "DataEnd"),
+    ],
+)
+def test_mistakes_of_zemax_files_are_told_with_their_line(tmp_path: Path, old: str, new: str, said: str) -> None:
+    path = tmp_path / "hand.bsdf"
+    path.write_text(ZEMAX.replace(old, new))
+    with pytest.raises(FormatError, match=said) as caught:
+        read_bsdf_data(path)
+    assert "line" in caught.value.place
+
+
+def test_the_vinyl_of_zemax(samples: Path) -> None:
+    """Its integrals beside what it states: reference values found by another program."""
+    data = read_bsdf_data(samples / "bsdf" / "planesymmetric_brdf_zemax.bsdf")
+    found = [(one.theta, one.integral(), one.stated) for one in data.slices[:3]]
+    for (theta, share, stated), expected in zip(
+        found, [(15, 0.1359, 0.1345), (20, 0.1355, 0.1322), (25, 0.1403, 0.1371)], strict=True
+    ):
+        assert theta == pytest.approx(expected[0])
+        assert share == pytest.approx(expected[1], abs=2e-4)
+        assert stated == pytest.approx(expected[2], abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ["R_test.anisotropicbsdf", "planesymmetric_brdf.anisotropicbsdf"])
+def test_what_is_known_and_not_read_is_refused_by_name(name: str, samples: Path) -> None:
+    with pytest.raises(UnsupportedFormatError, match="Speos"):
+        read_bsdf_data(samples / "bsdf" / name)
+
+
+def test_a_klems_file_that_lacks_values_is_refused_with_its_line(samples: Path) -> None:
+    with pytest.raises(FormatError, match="line 107, ScatteringData: 4 values; the bases have 21025"):
+        read_bsdf_data(samples / "bsdf" / "2011-SA1-small.xml")
+
+
+def test_what_cannot_be_written(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="klems"):
+        et.write_bsdf(tmp_path / "x.xml", et.bsdf.Gaussian(peak=1, sigma=0.1), format="klem")
+    with pytest.raises(UnknownNameError):
+        et.write_bsdf(tmp_path / "x.abc", et.bsdf.Gaussian(peak=1, sigma=0.1))
+    with pytest.raises(ArgumentError, match="nothing of this BSDF is scattered"):
+        et.write_bsdf(tmp_path / "x.xml", et.bsdf.Mirror(reflectance=0.9))
+    grid = PolarGrid("normal", np.array([0.0, 90.0]), np.array([0.0]))
+    with pytest.raises(FormatError, match="does not fit"):
+        write_bsdf_data(tmp_path / "x.bsdf", BsdfData([BsdfSlice(direction(10, 0), np.full((1, 2), 0.1), grid=grid)]))
+    assert list(tmp_path.iterdir()) == []
