@@ -70,10 +70,10 @@ fn part(shape: Shape, frame: Frame, solid: Option<usize>, finish: usize) -> Scen
             frame,
             trims: vec![],
             flipped: false,
-            axis: None,
         },
         solid,
         finish,
+        axis: None,
     }
 }
 

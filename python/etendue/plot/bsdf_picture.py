@@ -172,9 +172,10 @@ def _lobe(axes: Axes, bsdf: Bsdf, theta: float, *, behind: bool) -> None:
     f[inside] = bsdf.evaluate(direction(theta, 180.0, behind=behind), scattered[inside])
     top = float(np.nanmax(f))
     if top > 0.0:
-        norm = LogNorm(max(top * 10.0**-DECADES, 0.8 * float(np.nanmin(f))), top)
+        lowest = max(top * 10.0**-DECADES, 0.8 * float(np.nanmin(f)))
+        norm = LogNorm(lowest, top)
         image = axes.imshow(
-            np.maximum(f, norm.vmin), origin="lower", extent=(-1, 1, -1, 1), norm=norm, cmap=style.COLOUR_MAPS["value"]
+            np.maximum(f, lowest), origin="lower", extent=(-1, 1, -1, 1), norm=norm, cmap=style.COLOUR_MAPS["value"]
         )
         place, figure = axes.get_position(), style.figure_of(axes)
         bar = figure.add_axes((place.x1 + 0.006, place.y0, 0.009, place.height))

@@ -232,7 +232,7 @@ class BsdfSlice:
             raise ArgumentError("incident is one unit vector")
         if (self.grid is None) == (self.points is None):
             raise ArgumentError("a slice has either a grid or points")
-        shape = self.grid.shape if self.grid is not None else np.shape(self.points)[:1]
+        shape = self.grid.shape if self.grid is not None else self.points.shape[:1]  # type: ignore[union-attr] # there is one of both
         if self.values.shape != shape or (self.points is not None and self.points.shape != (*shape, 3)):
             raise ArgumentError(f"values of shape {self.values.shape} do not fit directions of shape {shape}")
         if np.isinf(self.values).any():
@@ -306,7 +306,7 @@ class BsdfSlice:
 
     @functools.cached_property
     def _share(self) -> float:
-        return float(np.nansum(self.values * self.projected)) if self.grid is None else _integral(self)
+        return _integral(self) if self.projected is None else float(np.nansum(self.values * self.projected))
 
 
 def _bilinear(grid: PolarGrid, values: Array, r: Array, a: Array) -> Array:

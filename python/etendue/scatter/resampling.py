@@ -91,7 +91,8 @@ def lobes_of(
         phi = 0.0 if isotropic or one.theta < NORMAL else round(one.phi, 6) % 360.0
         by_theta.setdefault(round(one.theta, 6), {}).setdefault(phi, (one, share))
     oblique = [known for theta, known in by_theta.items() if theta >= NORMAL]
-    rows = sorted(max(oblique, key=len)) if oblique else [0.0]
+    most = max((len(known) for known in oblique), default=0)
+    rows = sorted(next(known for known in oblique if len(known) == most)) if oblique else [0.0]
     found: dict[float, list[Lobe]] = {}
     kept: dict[tuple[float, float], Array] = {}
     for row in rows:
@@ -99,7 +100,7 @@ def lobes_of(
         lobes = []
         for theta in sorted(by_theta):
             known = by_theta[theta]
-            f, share, sine = 0.0, 0.0, 0.0
+            f, share, sine = np.zeros((azimuths, radial.size)), 0.0, 0.0
             for phi, part in [(row, 1.0)] if theta < NORMAL else _around(sorted(known), row):
                 one, own = known[0.0] if theta < NORMAL else known[phi]
                 if (theta, phi) not in kept:
@@ -156,7 +157,10 @@ def _azimuths(one: BsdfSlice) -> int:
 
 def _candidates(slices: Sequence[BsdfSlice]) -> Array:
     gridded = any(one.grid is not None for one in slices)
-    spread = [[0.0], np.geomspace(SMALLEST, 2.0, CANDIDATES) if gridded else np.geomspace(1e-2, 2.0, FEW)]
+    spread: list[Array] = [
+        np.zeros(1),
+        np.geomspace(SMALLEST, 2.0, CANDIDATES) if gridded else np.geomspace(1e-2, 2.0, FEW),
+    ]
     spread += [one.grid.radial for one in slices if one.grid is not None and one.grid.frame == "cosines"]
     found = np.unique(np.concatenate(spread))
     return found[found <= 2.0]

@@ -1,5 +1,5 @@
-//! Lobes about the specular direction that depend on the distance |β − β₀| in direction cosines alone: ABg, Harvey and Shack,
-//! Gaussian.
+//! Lobes about the specular direction that depend on the distance |β − β₀| in direction cosines alone: `ABg`, Harvey and
+//! Shack, Gaussian.
 //!
 //! Part of such a lobe would leave the unit circle of direction cosines, where there are no directions: more of it, the more
 //! the light grazes. Either it is absorbed, or f is scaled so that the share is that at normal incidence.
@@ -453,7 +453,7 @@ mod tests {
         let (b0, l) = (2.0, 0.05_f64);
         let q = 1.0 + 1.0 / (l * l);
         for s in [-1.5, -3.0] {
-            let closed = 2.0 * PI * b0 * l * l / (s + 2.0) * (q.powf((s + 2.0) / 2.0) - 1.0);
+            let closed = 2.0 * PI * b0 * l * l / (s + 2.0) * (q.powf(0.5 * s + 1.0) - 1.0);
             assert!((tis(Profile::HarveyShack { b0, l, s }, 0.0) - closed).abs() < 1e-6);
         }
         let closed = PI * b0 * l * l * q.ln();

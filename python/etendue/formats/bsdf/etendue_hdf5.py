@@ -46,7 +46,7 @@ def read(path: Path) -> BsdfData:
         facts = strict_json(top.text("facts"))
         complaints = strict_json(top.text("complaints"))
         return BsdfData(
-            slices,
+            tuple(slices),
             tuple(components),
             isotropic=top.truth("isotropic"),
             mirrored=top.truth("mirrored"),
@@ -69,9 +69,9 @@ def _slice(node: Node) -> BsdfSlice:
         frame = node.text("frame")
         if frame not in GRID_FRAMES:
             raise node.error("attribute 'frame'", f"{frame!r}")
-        axes = [node.values(node.dataset(name, np.dtype("<f8"), 1)) for name in ("radial", "azimuth")]
-        grid = PolarGrid(frame, *axes)  # type: ignore[arg-type] # one of them, as was looked at
-    optional = {name: node.number(name) for name in ("wavelength", "stated") if name in node.node.attrs}
+        radial, azimuth = (node.values(node.dataset(name, np.dtype("<f8"), 1)) for name in ("radial", "azimuth"))
+        grid = PolarGrid(frame, radial, azimuth)  # type: ignore[arg-type] # one of them, as was looked at
+    optional: dict[str, Any] = {name: node.number(name) for name in ("wavelength", "stated") if name in node.node.attrs}
     incident = node.numbers("incident", (3,))
     return BsdfSlice(incident, arrays.pop("values"), node.truth("transmitted"), grid=grid, **arrays, **optional)
 
@@ -97,7 +97,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
         values = np.full(grid.shape, np.nan)
         values[there] = bsdf.evaluate(incident, d[there], wavelength=colour)
         slices.append(BsdfSlice(incident, values, way, grid=grid, wavelength=colour))
-    return BsdfData(slices, isotropic=bsdf.isotropic, mirrored=False, both_sides=bsdf.both_sides, name=bsdf.name)
+    return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, both_sides=bsdf.both_sides, name=bsdf.name)
 
 
 def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:

@@ -133,7 +133,7 @@ def read(path: Path) -> BsdfData:
     both = {one.front for one in slices} == {True, False}
     name = layer.words("Material", "Name")
     return BsdfData(
-        slices, isotropic=False, mirrored=False, both_sides=not both, name=name, complaints=tuple(complaints)
+        tuple(slices), isotropic=False, mirrored=False, both_sides=not both, name=name, complaints=tuple(complaints)
     )
 
 
@@ -236,7 +236,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
                 centre = direction(thetas[k], (phis[k] + 180.0) % 360.0, behind=not front)
                 points = direction(thetas, phis, behind=behind)
                 slices.append(BsdfSlice(centre, values, transmitted, points=points, projected=basis.projected))
-    return BsdfData(slices, isotropic=False, mirrored=False, both_sides=False, name=bsdf.name)
+    return BsdfData(tuple(slices), isotropic=False, mirrored=False, both_sides=False, name=bsdf.name)
 
 
 def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:

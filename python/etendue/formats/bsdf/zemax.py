@@ -93,7 +93,7 @@ def read(path: Path) -> BsdfData:
         tokens.expect("DataEnd")
     complaints += disagreements(slices)
     return BsdfData(
-        slices,
+        tuple(slices),
         isotropic=rotations.size == 1,
         mirrored=mirrored,
         name=path.stem,
@@ -149,7 +149,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
             values = np.where(beyond, 0.0, bsdf.evaluate(incident, scattered))
             one = BsdfSlice(incident, values, transmitted, grid=grid)
             slices.append(BsdfSlice(incident, values, transmitted, grid=grid, stated=one.integral()))
-    return BsdfData(slices, isotropic=bsdf.isotropic, mirrored=False, name=bsdf.name)
+    return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, name=bsdf.name)
 
 
 def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:

@@ -54,7 +54,7 @@ class Mirror(Scattering):
     """
 
     kind: Literal["mirror"] = "mirror"
-    stated_reflectance: Shares = Field(1.0, alias="reflectance")
+    stated_reflectance: Shares = Field(default=1.0, alias="reflectance")
 
     def shares(self, files: Files) -> dict[str, Grid]:
         """The specular reflectance."""
@@ -93,7 +93,7 @@ class Lambertian(Scattering):
 
     kind: Literal["lambertian"] = "lambertian"
     stated_reflectance: Shares = Field(alias="reflectance")
-    stated_transmittance: Shares = Field(0.0, alias="transmittance")
+    stated_transmittance: Shares = Field(default=0.0, alias="transmittance")
 
     def shares(self, files: Files) -> dict[str, Grid]:
         """Diffuse reflectance and transmittance."""
@@ -160,7 +160,7 @@ class Transmitter(Scattering):
     """
 
     kind: Literal["transmitter"] = "transmitter"
-    stated_transmittance: Shares = Field(1.0, alias="transmittance")
+    stated_transmittance: Shares = Field(default=1.0, alias="transmittance")
 
     def shares(self, files: Files) -> dict[str, Grid]:
         """The specular transmittance."""
