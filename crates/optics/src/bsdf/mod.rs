@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+mod coated;
 mod contract;
 mod interface;
 mod lambertian;
@@ -16,6 +17,7 @@ mod tabulated;
 #[cfg(test)]
 mod tests;
 
+pub use coated::Coated;
 pub use contract::{Bsdf, Component, Drawn, Facts, Media, Parameters, Shares};
 pub use interface::Interface;
 pub use lambertian::Lambertian;
@@ -32,6 +34,7 @@ pub fn described(kind: &str, by: &dyn Parameters) -> Option<Result<Arc<dyn Bsdf>
     match kind {
         "fresnel" => Some(Ok(Arc::new(Interface))),
         "scatter" => Some(Mixture::described(by)),
+        "coated" => Some(Coated::described(by)),
         "abg" | "harvey-shack" | "gaussian" => Some(Lobe::described(kind, by)),
         _ => None,
     }
@@ -42,6 +45,7 @@ pub fn described(kind: &str, by: &dyn Parameters) -> Option<Result<Arc<dyn Bsdf>
 fn kinds() -> Vec<Vec<contract::Example>> {
     use contract::Examples;
     vec![
+        Coated::named("coated"),
         Interface::named("interface"),
         Lambertian::named("lambertian"),
         Lobe::named("lobe"),

@@ -90,9 +90,9 @@ fn integrals(fine: usize, f: impl Fn(Vec3) -> f64) -> Vec<f64> {
 }
 
 /// ∫ g |cos θ| dΩ over one side, in polar coordinates about the specular direction of `incident` in the plane of direction
-/// cosines, where cos θ dΩ is area; in steps that are the finer the nearer they are to it.
+/// cosines, where cos θ dΩ is area; in steps that are finer towards it and towards the rim.
 fn projected(incident: Vec3, transmitted: bool, g: impl Fn(Vec3) -> f64) -> f64 {
-    const AZIMUTHS: usize = 512;
+    const AZIMUTHS: usize = 200;
     const STEPS: usize = 24;
     let up = (incident.z > 0.0) != transmitted;
     let square = incident.x * incident.x + incident.y * incident.y;
@@ -106,11 +106,11 @@ fn projected(incident: Vec3, transmitted: bool, g: impl Fn(Vec3) -> f64) -> f64 
         for i in 0..STEPS {
             for node in [0.5 - off, 0.5 + off] {
                 let u = (i as f64 + node) / STEPS as f64;
-                let r = rim * u * u;
+                let r = rim * (0.5 * PI * u).sin().powi(2);
                 let (x, y) = (r * c - incident.x, r * s - incident.y);
                 let height = (1.0 - x * x - y * y).max(1e-300).sqrt();
                 let d = Vec3::new(x, y, if up { height } else { -height });
-                sum += g(d) * r * rim * 2.0 * u;
+                sum += g(d) * r * rim * 0.5 * PI * (PI * u).sin();
             }
         }
     }

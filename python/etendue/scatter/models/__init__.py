@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from etendue.scatter.models.coated import Coated
 from etendue.scatter.models.finish import Finish
 from etendue.scatter.models.interface import Interface
 from etendue.scatter.models.lobes import ABg, Gaussian, HarveyShack
@@ -15,6 +16,7 @@ __all__ = [
     "MODELS",
     "ABg",
     "Absorber",
+    "Coated",
     "DiffuseSpecular",
     "Finish",
     "Gaussian",

@@ -12,6 +12,7 @@ from etendue.description.families import Family
 from etendue.description.files import Files
 from etendue.description.values import AsRow, NotNegative
 from etendue.errors import ArgumentError
+from etendue.scatter.models.coated import Coated
 from etendue.scatter.models.finish import Finish, Record
 from etendue.scatter.models.interface import Interface
 from etendue.scatter.models.lobes import ABg, Gaussian, HarveyShack
@@ -30,6 +31,7 @@ SIMPLE: dict[str, type[Finish]] = {
         ABg,
         HarveyShack,
         Gaussian,
+        Coated,
     )
 }
 """Models that are made of no others, by their kind."""
