@@ -15,7 +15,7 @@ use crate::table::Table;
 ///
 /// Fresnel's part is mirrored at the coat. Of the rest, the base scatters the share ρ; of that the coat lets out 1 − F(θₛ) in
 /// each direction and sends back the rest, again and again `[Saunderson1942]`:
-/// f = (1 − F(θᵢ)) (1 − F(θₛ)) ρ / (π m² (1 − ρ F_in)), m being the index of the coat over that outside and F_in the
+/// f = (1 − F(θᵢ)) (1 − F(θₛ)) ρ / (π m² (1 − ρ Fᵢₙ)), m being the index of the coat over that outside and Fᵢₙ the
 /// reflectance of the coat for diffuse light from within.
 #[derive(Clone, Debug)]
 pub struct Coated {

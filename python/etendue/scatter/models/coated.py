@@ -16,8 +16,8 @@ from etendue.scatter.models.finish import Finish, Record
 class Coated(Finish):
     """A smooth clear coat on a Lambertian base: Fresnel reflection at the coat, and what the base scatters through it.
 
-    f = (1 − F(θᵢ)) (1 − F(θₛ)) ρ / (π m² (1 − ρ F_in)), m being the index of the coat over that of the medium outside and
-    F_in the reflectance of the coat for diffuse light from within [Saunderson1942]_.
+    f = (1 − F(θᵢ)) (1 − F(θₛ)) ρ / (π m² (1 − ρ Fᵢₙ)), m being the index of the coat over that of the medium outside and
+    Fᵢₙ the reflectance of the coat for diffuse light from within [Saunderson1942]_.
 
     Parameters
     ----------
