@@ -12,6 +12,7 @@ from etendue.cli.guard import guarded
 from etendue.cli.terminal import check_folder, complain, one_of, print_json, say
 from etendue.formats.bsdf import BSDF_FORMATS
 from etendue.plot import plot_bsdf
+from etendue.scatter.appearance import GLASS, appearance
 from etendue.scatter.files import read_bsdf, write_bsdf
 from etendue.scatter.table import BsdfTable
 
@@ -118,5 +119,21 @@ def convert(
     say(f"{output}: {len(bsdf.data.slices)} slices read from {file}")
 
 
-for _name, _verb in (("info", info), ("plot", plot), ("convert", convert)):
+def gloss(file: File, json: Json = False) -> None:
+    """Say how glossy a surface is at 20°, 60° and 85° (ISO 2813), and how hazy what it transmits (ASTM D1003)."""
+    bsdf = read_bsdf(file)
+    found = appearance(bsdf)
+    if json:
+        complaints = [str(complaint) for complaint in bsdf.complaints]
+        print_json({"file": file, "gloss": found.gloss, "haze": found.haze, "complaints": complaints})
+        return
+    for complaint in bsdf.complaints:
+        complain(str(complaint))
+    for angle, value in found.gloss.items():
+        say(f"gloss at {angle}°: {value:.2f} (black glass of index {GLASS}: 100)")
+    if found.haze is not None:
+        say(f"haze of transmitted light: {found.haze:.2f} %")
+
+
+for _name, _verb in (("info", info), ("plot", plot), ("convert", convert), ("gloss", gloss)):
     app.command(_name)(guarded(f"bsdf {_name}", _verb))
