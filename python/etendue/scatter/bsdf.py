@@ -36,6 +36,11 @@ def unit_vectors(name: str, values: npt.ArrayLike) -> Array:
     ------
     ArgumentError
         If they are not unit vectors.
+
+    Examples
+    --------
+    >>> unit_vectors("incident", [0, 0, 1]).tolist()
+    [0.0, 0.0, 1.0]
     """
     given = np.asarray(values, np.float64)
     if given.ndim < 1 or given.shape[-1] != 3:

@@ -103,7 +103,15 @@ class BsdfTable(Bsdf):
 
 
 def share_of(one: BsdfSlice) -> float:
-    """What a slice scatters of the flux: its integral, no more than 1."""
+    """What a slice scatters of the flux: its integral, no more than 1.
+
+    Examples
+    --------
+    >>> from etendue.quantities.bsdf_data import PolarGrid, direction
+    >>> grid = PolarGrid("normal", [0.0, 90.0], [0.0])
+    >>> round(share_of(BsdfSlice(direction(20.0, 0.0), [[0.1, 0.1]], grid=grid)), 6)
+    0.314159
+    """
     return min(one.integral(), 1.0)
 
 
