@@ -26,7 +26,7 @@ STRAIGHT = 2.5
 """Angle from the incident direction [°] beyond which transmitted light counts as haze [ASTMD1003]_."""
 
 NODES = 24
-"""Of the rule of Gauss and Legendre along each side of the receptor."""
+"""Of the rule of Gauss and Legendre along each side of the receptor, on both sides of the mirrored direction."""
 
 STEPS = 5
 """The same of the source."""
@@ -144,19 +144,27 @@ def appearance(bsdf: Bsdf) -> Appearance:
 def _into_receptor(bsdf: Bsdf, angle: int) -> float:
     """∫ f cosθ dΩ over the aperture, averaged over the directions of the source."""
     along, across = (0.5 * side for side in RECEPTORS[angle])
-    x, w = np.polynomial.legendre.leggauss(NODES)
-    # The receptor, about the axis that the mirrored centre of the source follows.
-    towards = _about(angle, 0.0, along * x[:, None], across * x[None, :])
-    area = np.outer(w, w) * np.radians(along) * np.radians(across) * np.cos(np.radians(across * x))[None, :]
     s, v = np.polynomial.legendre.leggauss(STEPS)
     total = 0.0
-    for step, part in zip(s, v, strict=True):
-        for step_across, part_across in zip(s, v, strict=True):
-            incident = _about(angle, 180.0, 0.5 * SOURCE[0] * step, 0.5 * SOURCE[1] * step_across)
-            f = bsdf.evaluate(incident, towards)
-            above = np.maximum(towards[..., 2], 0.0)
-            total += 0.25 * part * part_across * float(np.sum(f * above * area))
+    for tilt, part in zip(0.5 * SOURCE[0] * s, v, strict=True):
+        for turn, part_across in zip(0.5 * SOURCE[1] * s, v, strict=True):
+            # The receptor, about the axis that the mirrored centre of the source follows.
+            a, weights = _towards(tilt, along)
+            b, weights_across = _towards(turn, across)
+            received = _about(angle, 0.0, a[:, None], b[None, :])
+            f = bsdf.evaluate(_about(angle, 180.0, tilt, turn), received)
+            projected = np.maximum(received[..., 2], 0.0) * np.cos(np.radians(b))
+            total += 0.25 * part * part_across * float(weights @ (f * projected) @ weights_across)
     return total
+
+
+def _towards(centre: float, half: float) -> tuple[Array, Array]:
+    """Angles from −half to half [°] that get denser towards the mirrored direction, and their weights [rad]."""
+    x, w = np.polynomial.legendre.leggauss(NODES)
+    u, w = 0.5 * (x + 1.0), 0.5 * w
+    nodes = [centre + (end - centre) * u**3 for end in (-half, half)]
+    weights = [abs(end - centre) * 3.0 * u * u * w for end in (-half, half)]
+    return np.concatenate(nodes), np.radians(np.concatenate(weights))
 
 
 def _about(angle: float, phi: float, along: npt.ArrayLike, across: npt.ArrayLike) -> Array:
