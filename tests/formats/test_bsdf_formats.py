@@ -91,7 +91,7 @@ def test_round_trip(form: BsdfFormat, written: Callable[[BsdfFormat], bytes], tm
         # And the values are the function there, or its mean over the two patches, as well as the rule of `tabulate` has it.
         there = ~np.isnan(one.directions[..., 0])
         f = truth.evaluate(one.incident, one.directions[there]) if one.grid is not None else mean_of_patches(one)
-        assert np.abs(one.values[there] - f).max() < (1e-6 if one.grid is not None else 1e-2)
+        assert np.abs(one.values[there] - f).max() < (1e-6 if one.grid is not None else 0.03 * f.max() + 1e-4)
 
 
 def patches(points: Array) -> Array:
