@@ -6,20 +6,18 @@ import functools
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
-import numpy as np
 from pydantic import InstanceOf, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
 from etendue.description.files import Files
-from etendue.description.values import Vector
 from etendue.errors import ArgumentError
 from etendue.scatter.bsdf import Bsdf
 from etendue.scatter.files import read_bsdf
-from etendue.scatter.models.finish import Finish, Record
+from etendue.scatter.models.finish import Directed, Record
 from etendue.scatter.table import BsdfTable
 
 
-class BsdfFile(Finish):
+class BsdfFile(Directed):
     """A surface that scatters as a file says, or a BSDF in memory.
 
     Parameters
@@ -44,14 +42,11 @@ class BsdfFile(Finish):
     kind: Literal["bsdf"] = "bsdf"
     file: Path | None = None
     bsdf: SkipJsonSchema[InstanceOf[Bsdf] | None] = None
-    axis: Vector = (1.0, 0.0, 0.0)
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
         if (self.file is None) == (self.bsdf is None):
             raise ValueError("name a 'file', or hand over a 'bsdf' in Python")
-        if not np.linalg.norm(self.axis) > 0.0:
-            raise ValueError("'axis' has no direction")
         return self
 
     def opened(self, files: Files) -> Bsdf:

@@ -333,9 +333,19 @@ pub fn by_cosine(front: bool, [height, turn]: [f64; 2]) -> Vec3 {
     Vec3::new(sine * c, sine * s, if front { cosine } else { -cosine })
 }
 
-/// A BSDF by name, and to what the quadrature of the tests is right for it.
+/// A BSDF by name, and how the tests integrate it.
 #[cfg(test)]
-pub type Example = (String, std::sync::Arc<dyn Bsdf>, f64);
+#[derive(Clone, Debug)]
+pub struct Example {
+    /// The name of its file and its number.
+    pub name: String,
+    /// What is tested.
+    pub bsdf: std::sync::Arc<dyn Bsdf>,
+    /// To which the quadrature is right.
+    pub quadrature: f64,
+    /// Whether that is a lattice.
+    pub lattice: bool,
+}
 
 /// Some of a kind, for the tests of all kinds.
 #[cfg(test)]
@@ -346,15 +356,18 @@ pub trait Examples: Bsdf + Sized + 'static {
     /// To which the quadrature of the tests is right for them: less for functions with kinks that it does not know.
     const QUADRATURE: f64 = 1e-6;
 
+    /// Whether that is a lattice over the hemisphere, for functions with edges in unknown places, and not in polar coordinates
+    /// about the specular direction.
+    const LATTICE: bool = false;
+
     /// The same, by the name of their file and their number.
     fn named(file: &str) -> Vec<Example> {
         let each = Self::examples().into_iter().enumerate();
-        each.map(|(number, bsdf)| {
-            (
-                format!("{file} {number}"),
-                std::sync::Arc::new(bsdf) as _,
-                Self::QUADRATURE,
-            )
+        each.map(|(number, bsdf)| Example {
+            name: format!("{file} {number}"),
+            bsdf: std::sync::Arc::new(bsdf),
+            quadrature: Self::QUADRATURE,
+            lattice: Self::LATTICE,
         })
         .collect()
     }

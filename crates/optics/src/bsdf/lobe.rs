@@ -12,6 +12,7 @@ use etendue_math::special::{exp, ln};
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::more_numbers::MoreNumbers;
 
+use super::albedo::Albedo;
 use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
 
 /// f \[1/sr\] over |β − β₀|.
@@ -114,6 +115,8 @@ impl Profile {
 #[derive(Clone, Debug)]
 pub struct Lobe {
     profile: Profile,
+    /// How much wider it is across the axis than along it.
+    aspect: f64,
     transmitted: bool,
     /// Whether f is scaled so that the share is that at normal incidence.
     renormalised: bool,
@@ -123,11 +126,16 @@ pub struct Lobe {
     /// Sines of incidence and the share of the flux there, f being as it is; linear in between.
     sines: Vec<f64>,
     shares: Vec<f64>,
+    /// The shares of a lobe that is not round.
+    turning: Option<Albedo<1>>,
     facts: Facts,
 }
 
 /// Farthest |β − β₀|.
 const END: f64 = 2.0;
+
+/// The most that a lobe is wider across the axis than along it, and the least.
+const ASPECT: f64 = 1e3;
 
 /// What interpolated shares may be off.
 const TOLERANCE: f64 = 2e-7;
@@ -136,7 +144,7 @@ const TOLERANCE: f64 = 2e-7;
 const SMALLEST_STEP: f64 = 1e-6;
 
 /// Nodes and weights of the rule of Gauss and Legendre from 0 to 1.
-const GAUSS: [(f64, f64); 5] = [
+pub const GAUSS: [(f64, f64); 5] = [
     (0.046_910_077_030_668, 0.118_463_442_528_094_54),
     (0.230_765_344_947_158_45, 0.239_314_335_249_683_24),
     (0.5, 0.284_444_444_444_444_45),
@@ -163,15 +171,30 @@ impl Lobe {
     /// # Errors
     /// If a parameter is out of its range, or more light leaves than arrives.
     pub fn new(profile: Profile, transmitted: bool, renormalised: bool) -> Result<Self, String> {
+        Self::elliptical(profile, 1.0, transmitted, renormalised)
+    }
+
+    /// That is `aspect` times as wide across the axis as along it: |β − β₀| is taken with its part across divided by it.
+    ///
+    /// # Errors
+    /// As [`Lobe::new`].
+    pub fn elliptical(profile: Profile, aspect: f64, transmitted: bool, renormalised: bool) -> Result<Self, String> {
         profile.check()?;
+        if !(1.0 / ASPECT..=ASPECT).contains(&aspect) {
+            return Err(format!(
+                "aspect is {aspect}; it must be from {} to {ASPECT}",
+                1.0 / ASPECT
+            ));
+        }
+        let end = END * f64::max(1.0, aspect.recip());
         let first = (1e-3 * profile.width()).clamp(1e-12, 1e-2);
         let mut radial = vec![0.0];
         let mut r = first;
-        while r < END {
+        while r < end {
             radial.push(r);
             r *= 1.2;
         }
-        radial.push(END);
+        radial.push(end);
         let mut cumulative = vec![0.0];
         for pair in radial.windows(2) {
             let more = gauss(pair[0], pair[1], |r| profile.at(r) * r);
@@ -179,12 +202,14 @@ impl Lobe {
         }
         let mut lobe = Self {
             profile,
+            aspect,
             transmitted,
             renormalised,
             radial,
             cumulative,
             sines: Vec::new(),
             shares: Vec::new(),
+            turning: None,
             facts: Facts {
                 specular: [false; 2],
                 diffuse: [!transmitted, transmitted],
@@ -195,8 +220,15 @@ impl Lobe {
                 fresnel: false,
             },
         };
-        lobe.fill();
-        let most = lobe.shares.iter().copied().fold(0.0, f64::max);
+        let most = if aspect == 1.0 {
+            lobe.fill();
+            lobe.shares.iter().copied().fold(0.0, f64::max)
+        } else {
+            let table = Albedo::new(true, |d| [lobe.exact_of(d)]);
+            let most = -table.least(|share| -share[0]);
+            lobe.turning = Some(table);
+            most
+        };
         if most > 1.0 + 1e-6 {
             return Err(format!(
                 "{most:.6} of the light is scattered at some angle, more than arrives"
@@ -228,8 +260,9 @@ impl Lobe {
             },
         };
         let flag = |key: &str| by.number(key).map(|value| value != 0.0);
-        Ok(Arc::new(Self::new(
+        Ok(Arc::new(Self::elliptical(
             profile,
+            by.number("aspect")?,
             flag("transmitted")?,
             flag("renormalised")?,
         )?))
@@ -297,6 +330,31 @@ impl Lobe {
         sum
     }
 
+    /// The share of the flux at a direction of incidence by quadrature, f being as it is, of any lobe: in polar coordinates in
+    /// which it is round, to where each line from β₀ meets the unit circle.
+    fn exact_of(&self, incident: Vec3) -> f64 {
+        let (x0, y0) = (-incident.x, -incident.y);
+        let outside = (incident.z * incident.z).max(0.0);
+        let of = |t: f64| {
+            let (s, c) = t.sin_cos();
+            let (x, y) = (c, self.aspect * s);
+            // |β₀ + r (x, y)| = 1, from inside.
+            let (a, b) = (x * x + y * y, x * x0 + y * y0);
+            let root = (b * b + a * outside).sqrt();
+            let r = if b > 0.0 { outside / (b + root) } else { (root - b) / a };
+            self.up_to(r.min(self.radial[self.radial.len() - 1]))
+        };
+        let parts = 16;
+        let each = (0..parts).map(|k| {
+            let (from, to) = (
+                TAU * f64::from(k) / f64::from(parts),
+                TAU * f64::from(k + 1) / f64::from(parts),
+            );
+            integral(from, to, gauss(from, to, of), 12, &of)
+        });
+        each.sum::<f64>() * self.aspect
+    }
+
     fn fill(&mut self) {
         let at = |lobe: &Self, sine: f64| (sine, lobe.exact(sine));
         let mut last = at(self, 0.0);
@@ -316,7 +374,15 @@ impl Lobe {
         (self.sines, self.shares) = (sines, shares);
     }
 
-    /// The share of the flux, f being as it is.
+    /// The share of light from a direction, f being as it is.
+    fn share_of(&self, incident: Vec3) -> f64 {
+        match &self.turning {
+            Some(table) => table.at(incident)[0],
+            None => self.share(sine(incident)),
+        }
+    }
+
+    /// The same of a round lobe.
     fn share(&self, sine: f64) -> f64 {
         let above = self
             .sines
@@ -327,12 +393,11 @@ impl Lobe {
         y0 + (y1 - y0) * ((sine - x0) / (x1 - x0)).clamp(0.0, 1.0)
     }
 
-    /// What f is multiplied by.
-    fn scale(&self, sine: f64) -> f64 {
-        if self.renormalised {
-            self.shares[0] / self.share(sine).max(f64::MIN_POSITIVE)
-        } else {
-            1.0
+    /// What leaves at normal incidence.
+    fn share_of_normal(&self) -> f64 {
+        match &self.turning {
+            Some(table) => table.at(Vec3::new(0.0, 0.0, 1.0))[0],
+            None => self.shares[0],
         }
     }
 }
@@ -352,9 +417,9 @@ impl Bsdf for Lobe {
 
     fn shares(&self, incident: Vec3, _media: &Media) -> Shares {
         let share = if self.renormalised {
-            self.shares[0]
+            self.share_of_normal()
         } else {
-            self.share(sine(incident))
+            self.share_of(incident)
         };
         let mut diffuse = [0.0; 2];
         diffuse[usize::from(self.transmitted)] = share.min(1.0);
@@ -369,9 +434,9 @@ impl Bsdf for Lobe {
         if ((incident.z > 0.0) != (scattered.z > 0.0)) != self.transmitted {
             return 0.0;
         }
-        let (x, y) = (scattered.x + incident.x, scattered.y + incident.y);
+        let (x, y) = (scattered.x + incident.x, (scattered.y + incident.y) / self.aspect);
         let scale = if self.renormalised {
-            self.scale(sine(incident))
+            self.share_of_normal() / self.share_of(incident).max(f64::MIN_POSITIVE)
         } else {
             1.0
         };
@@ -380,13 +445,14 @@ impl Bsdf for Lobe {
 
     fn draw(&self, incident: Vec3, transmitted: bool, _media: &Media, numbers: [f64; 2]) -> Vec3 {
         let up = (incident.z > 0.0) != transmitted;
-        let all = self.up_to((1.0 + sine(incident)).min(END));
+        let farthest = (1.0 + sine(incident)) * f64::max(1.0, self.aspect.recip());
+        let all = self.up_to(farthest.min(self.radial[self.radial.len() - 1]));
         let mut more = MoreNumbers::new(numbers);
         let mut pair = numbers;
         for _ in 0..TRIES {
             let r = self.distance(pair[0] * all);
             let (s, c) = sin_cos_turns(pair[1]);
-            let (x, y) = (r * c - incident.x, r * s - incident.y);
+            let (x, y) = (r * c - incident.x, r * s * self.aspect - incident.y);
             let square = 1.0 - x * x - y * y;
             if square > 0.0 {
                 return Vec3::new(x, y, if up { square.sqrt() } else { -square.sqrt() });
@@ -421,7 +487,12 @@ impl super::contract::Examples for Lobe {
             (Profile::Gaussian { peak: 1.2, sigma: 0.25 }, false, true),
         ]
         .map(|(profile, transmitted, renormalised)| Self::new(profile, transmitted, renormalised).expect("sound"))
-        .to_vec()
+        .into_iter()
+        .chain([
+            Self::elliptical(Profile::Gaussian { peak: 0.8, sigma: 0.5 }, 0.6, false, false).expect("sound"),
+            Self::elliptical(abg(0.05, 0.3, 2.0), 1.8, true, true).expect("sound"),
+        ])
+        .collect()
     }
 }
 
@@ -470,6 +541,29 @@ mod tests {
         assert!((lobe.share(0.9) - 0.9).abs() < 1e-6);
         // The unit circle is nearly straight over the lobe.
         assert!((lobe.share(1.0) - 0.45).abs() < 1e-3);
+    }
+
+    #[test]
+    fn elliptical_lobes_have_the_shares_of_round_ones_and_of_stretched_planes() {
+        let gaussian = |sigma| Profile::Gaussian { peak: 0.9, sigma };
+        // The same lobe, from another axis: turned by 90°.
+        let [along, across] = [(0.3, 0.5), (0.15, 2.0)]
+            .map(|(sigma, aspect)| Lobe::elliptical(gaussian(sigma), aspect, false, false).expect("sound"));
+        for (x, y, z) in [(0.0, 0.0, 1.0), (0.48, 0.36, 0.8), (0.0, 0.8, 0.6), (0.96, -0.28, 0.0)] {
+            let [a, b] = [along.share_of(Vec3::new(x, y, z)), across.share_of(Vec3::new(y, x, z))];
+            assert!((a - b).abs() < 2e-6, "{a} {b}");
+        }
+        // Nearly round.
+        let round = Lobe::new(gaussian(0.3), false, false).expect("sound");
+        let nearly = Lobe::elliptical(gaussian(0.3), 1.0 + 1e-9, false, false).expect("sound");
+        for z in [1.0_f64, 0.7, 0.2, 0.01] {
+            let d = Vec3::new(0.6 * (1.0 - z * z).sqrt(), 0.8 * (1.0 - z * z).sqrt(), z);
+            assert!((round.share_of(d) - nearly.share_of(d)).abs() < 2e-6);
+        }
+        // Far from the unit circle: 2π σ₁ σ₂ peak.
+        let narrow = Lobe::elliptical(gaussian(0.05), 0.2, false, false).expect("sound");
+        let share = narrow.share_of(Vec3::new(0.3, 0.2, (1.0_f64 - 0.13).sqrt()));
+        assert!((share / (TAU * 0.05 * 0.01 * 0.9) - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -6,24 +6,34 @@
 
 use std::sync::Arc;
 
+mod albedo;
 mod coated;
 mod contract;
+mod cosine_power;
+mod facets;
 mod interface;
 mod lambertian;
 mod lobe;
 mod mirror;
 mod mixture;
+mod rough_coat;
+mod rough_interface;
+mod rough_metal;
 mod tabulated;
 #[cfg(test)]
 mod tests;
 
 pub use coated::Coated;
 pub use contract::{Bsdf, Component, Drawn, Facts, Media, Parameters, Shares};
+pub use cosine_power::CosinePower;
 pub use interface::Interface;
 pub use lambertian::Lambertian;
 pub use lobe::{Lobe, Profile};
 pub use mirror::Mirror;
 pub use mixture::Mixture;
+pub use rough_coat::RoughCoat;
+pub use rough_interface::RoughInterface;
+pub use rough_metal::RoughMetal;
 pub use tabulated::{Row, Side, Slice, Tabulated, Way};
 
 /// A BSDF from the name of its kind and its parameters; None if there is no such kind.
@@ -34,7 +44,11 @@ pub fn described(kind: &str, by: &dyn Parameters) -> Option<Result<Arc<dyn Bsdf>
     match kind {
         "fresnel" => Some(Ok(Arc::new(Interface))),
         "scatter" => Some(Mixture::described(by)),
+        "cosine-power" => Some(CosinePower::described(by)),
         "coated" => Some(Coated::described(by)),
+        "rough-coat" => Some(RoughCoat::described(by)),
+        "rough-metal" => Some(RoughMetal::described(by)),
+        "rough-interface" => Some(RoughInterface::described(by)),
         "abg" | "harvey-shack" | "gaussian" => Some(Lobe::described(kind, by)),
         _ => None,
     }
@@ -42,15 +56,22 @@ pub fn described(kind: &str, by: &dyn Parameters) -> Option<Result<Arc<dyn Bsdf>
 
 /// Examples of all kinds, by the names of their files: what the tests go through.
 #[cfg(test)]
-fn kinds() -> Vec<Vec<contract::Example>> {
+fn kinds() -> &'static [Vec<contract::Example>] {
     use contract::Examples;
-    vec![
-        Coated::named("coated"),
-        Interface::named("interface"),
-        Lambertian::named("lambertian"),
-        Lobe::named("lobe"),
-        Mirror::named("mirror"),
-        Mixture::named("mixture"),
-        Tabulated::named("tabulated"),
-    ]
+    static KINDS: std::sync::OnceLock<Vec<Vec<contract::Example>>> = std::sync::OnceLock::new();
+    KINDS.get_or_init(|| {
+        vec![
+            Coated::named("coated"),
+            CosinePower::named("cosine_power"),
+            Interface::named("interface"),
+            Lambertian::named("lambertian"),
+            Lobe::named("lobe"),
+            Mirror::named("mirror"),
+            Mixture::named("mixture"),
+            RoughCoat::named("rough_coat"),
+            RoughInterface::named("rough_interface"),
+            RoughMetal::named("rough_metal"),
+            Tabulated::named("tabulated"),
+        ]
+    })
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use etendue_math::Vec3;
 use etendue_sampling::philox::Stream;
 
-use super::contract::{Bsdf, Drawn, Examples, Media};
+use super::contract::{Bsdf, Drawn, Example, Examples, Media, by_cosine};
 use super::interface::Interface;
 use super::kinds;
 use super::lambertian::Lambertian;
@@ -42,17 +42,12 @@ fn direction(height: f64, turn: f64) -> Vec3 {
 }
 
 /// Every example in all media, with all directions.
-fn every(mut check: impl FnMut((&str, f64), &dyn Bsdf, &Media, Vec3)) {
+fn every(mut check: impl FnMut(&Example, &dyn Bsdf, &Media, Vec3)) {
     let mut count = 0;
-    for (name, bsdf, quadrature) in kinds().iter().flatten() {
+    for example in kinds().iter().flatten() {
         for media in &MEDIA {
             for (number, height) in HEIGHTS.into_iter().enumerate() {
-                check(
-                    (name, *quadrature),
-                    &**bsdf,
-                    media,
-                    direction(height, 0.137 * number as f64),
-                );
+                check(example, &*example.bsdf, media, direction(height, 0.137 * number as f64));
                 count += 1;
             }
         }
@@ -89,12 +84,26 @@ fn integrals(fine: usize, f: impl Fn(Vec3) -> f64) -> Vec<f64> {
     cells.collect()
 }
 
+/// ∫ g |cos θ| dΩ over one side, by a lattice of Fibonacci that is finer along the normal and at the rim.
+fn over_lattice(up: bool, g: impl Fn(Vec3) -> f64) -> f64 {
+    let (n, step) = (17_711_u32, 10_946_u32);
+    let each = (0..n).map(|k| {
+        let u = (f64::from(k) + 0.5) / f64::from(n);
+        let turn = (f64::from(k) * f64::from(step) / f64::from(n)).fract();
+        g(by_cosine(up, [u * u * (3.0 - 2.0 * u), turn])) * 6.0 * u * (1.0 - u)
+    });
+    each.sum::<f64>() * PI / f64::from(n)
+}
+
 /// ∫ g |cos θ| dΩ over one side, in polar coordinates about the specular direction of `incident` in the plane of direction
 /// cosines, where cos θ dΩ is area; in steps that are finer towards it and towards the rim.
-fn projected(incident: Vec3, transmitted: bool, g: impl Fn(Vec3) -> f64) -> f64 {
+fn projected(example: &Example, incident: Vec3, transmitted: bool, g: impl Fn(Vec3) -> f64) -> f64 {
     const AZIMUTHS: usize = 200;
     const STEPS: usize = 24;
     let up = (incident.z > 0.0) != transmitted;
+    if example.lattice {
+        return over_lattice(up, g);
+    }
     let square = incident.x * incident.x + incident.y * incident.y;
     let off = 0.5 / 3_f64.sqrt();
     let mut sum = 0.0;
@@ -166,7 +175,7 @@ const DRAWN: u64 = 20_000;
 #[test]
 fn samples_have_their_shares_and_density() {
     let mut stream = 0;
-    every(|(name, _), bsdf, media, incident| {
+    every(|Example { name, .. }, bsdf, media, incident| {
         stream += 1;
         let numbers = Stream::new(11, stream);
         let mut expected = integrals(12, |d| bsdf.pdf(incident, d, media));
@@ -222,13 +231,17 @@ fn a_density_that_is_wrong_is_seen() {
 
 #[test]
 fn the_density_integrates_to_the_shares_and_energy_is_kept() {
-    every(|(name, quadrature), bsdf, media, incident| {
+    every(|example, bsdf, media, incident| {
+        let Example { name, quadrature, .. } = example;
         let shares = bsdf.shares(incident, media);
-        let found = [false, true]
-            .map(|transmitted| projected(incident, transmitted, |d| bsdf.pdf(incident, d, media) / d.z.abs()));
+        let found = [false, true].map(|transmitted| {
+            projected(example, incident, transmitted, |d| {
+                bsdf.pdf(incident, d, media) / d.z.abs()
+            })
+        });
         for side in 0..2 {
             assert!(
-                (found[side] - shares.diffuse[side]).abs() < quadrature,
+                (found[side] - shares.diffuse[side]).abs() < *quadrature,
                 "{name}, {media:?}, {incident:?}: {found:?} of {shares:?}"
             );
         }
@@ -242,7 +255,7 @@ fn the_density_integrates_to_the_shares_and_energy_is_kept() {
 #[test]
 fn facts_are_true() {
     let mut some = [false; 4];
-    for (name, bsdf, _) in kinds().iter().flatten() {
+    for Example { name, bsdf, .. } in kinds().iter().flatten() {
         let facts = bsdf.facts();
         let mut met = [false; 4];
         let mut kept = true;
@@ -316,7 +329,7 @@ fn irreciprocity(bsdf: &dyn Bsdf) -> f64 {
 
 #[test]
 fn light_goes_back_as_it_came_or_the_exception_is_declared() {
-    for (name, bsdf, _) in kinds().iter().flatten() {
+    for Example { name, bsdf, .. } in kinds().iter().flatten() {
         let worst = irreciprocity(&**bsdf);
         if bsdf.facts().reciprocal {
             assert!(worst < 1e-9, "{name}: {worst}");
@@ -334,16 +347,20 @@ fn in_a_furnace_one_sees_what_would_be_absorbed_missing() {
     // Surroundings of luminance n² on both sides. Who looks at a surface sees n² of his side times 1 − what it absorbs of light
     // from his eye, by Kirchhoff's law, which holds where light goes back as it came.
     let mut looked = 0;
-    every(|(name, quadrature), bsdf, media, towards| {
+    every(|example, bsdf, media, towards| {
+        let Example { name, quadrature, .. } = example;
         let n2 = |d: Vec3| media.seen_from(d)[0].powi(2);
         let (seen, shares) = bsdf.seen(towards, media);
-        let scattered = [false, true]
-            .map(|transmitted| projected(towards, transmitted, |k| bsdf.evaluate(k, towards, media) * n2(k)));
+        let scattered = [false, true].map(|transmitted| {
+            projected(example, towards, transmitted, |k| {
+                bsdf.evaluate(k, towards, media) * n2(k)
+            })
+        });
         let all = seen[0] * n2(towards) + seen[1] * n2(-towards) + scattered.iter().sum::<f64>();
         if bsdf.facts().reciprocal {
             looked += 1;
             assert!(
-                (all / n2(towards) - shares.total()).abs() < quadrature,
+                (all / n2(towards) - shares.total()).abs() < *quadrature,
                 "{name}, {media:?}, {towards:?}: {all}"
             );
         } else {
@@ -367,7 +384,8 @@ fn refracted_radiance_of_an_exception_is_that_of_light_from_there() {
 #[test]
 fn directions_that_light_may_come_from_are_drawn_with_their_density_and_none_is_left_out() {
     let mut stream = 0;
-    every(|(name, quadrature), bsdf, media, scattered| {
+    every(|example, bsdf, media, scattered| {
+        let Example { name, quadrature, .. } = example;
         stream += 1;
         let chances = bsdf.incoming(scattered, media);
         let whole = |d: Vec3| {
@@ -387,8 +405,8 @@ fn directions_that_light_may_come_from_are_drawn_with_their_density_and_none_is_
             } else {
                 BANDS * SECTORS..2 * BANDS * SECTORS
             };
-            let sum = projected(scattered, side == 1, |d| whole(d) / d.z.abs());
-            assert!((sum - 1.0).abs() < quadrature && chance.is_finite(), "{name}: {sum}");
+            let sum = projected(example, scattered, side == 1, |d| whole(d) / d.z.abs());
+            assert!((sum - 1.0).abs() < *quadrature && chance.is_finite(), "{name}: {sum}");
             let numbers = Stream::new(12, stream);
             let mut counts = vec![0; BANDS * SECTORS];
             for i in 0..DRAWN {
@@ -416,7 +434,7 @@ fn directions_that_light_may_come_from_are_drawn_with_their_density_and_none_is_
 
 #[test]
 fn at_grazing_incidence_everything_is_finite_and_on_its_side() {
-    for (name, bsdf, _) in kinds().iter().flatten() {
+    for Example { name, bsdf, .. } in kinds().iter().flatten() {
         for media in &MEDIA {
             for height in [1e-3, 1e-9, 1e-15, f64::MIN_POSITIVE].into_iter().flat_map(|h| [h, -h]) {
                 let incident = direction(height, 0.2);

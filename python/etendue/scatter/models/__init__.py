@@ -5,8 +5,9 @@ from __future__ import annotations
 from etendue.scatter.models.coated import Coated
 from etendue.scatter.models.finish import Finish
 from etendue.scatter.models.interface import Interface
-from etendue.scatter.models.lobes import ABg, Gaussian, HarveyShack
+from etendue.scatter.models.lobes import ABg, CosinePower, Gaussian, HarveyShack
 from etendue.scatter.models.mixture import SIMPLE, Mixture
+from etendue.scatter.models.rough import RoughCoat, RoughInterface, RoughMetal
 from etendue.scatter.models.shares import Absorber, DiffuseSpecular, Lambertian, Mirror, Mixed, Scattering, Transmitter
 
 MODELS: dict[str, type[Finish]] = {**SIMPLE, "mixture": Mixture}
@@ -17,6 +18,7 @@ __all__ = [
     "ABg",
     "Absorber",
     "Coated",
+    "CosinePower",
     "DiffuseSpecular",
     "Finish",
     "Gaussian",
@@ -26,6 +28,9 @@ __all__ = [
     "Mirror",
     "Mixed",
     "Mixture",
+    "RoughCoat",
+    "RoughInterface",
+    "RoughMetal",
     "Scattering",
     "Transmitter",
 ]

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import abc
-from typing import Any
+from typing import Any, Self
+
+import numpy as np
+from pydantic import model_validator
 
 from etendue.description.files import Files
 from etendue.description.keys import Description
+from etendue.description.values import Vector
 from etendue.scatter.bsdf import Bsdf
 
 Record = dict[str, Any]
@@ -35,3 +39,17 @@ class Finish(Description, Bsdf, abc.ABC):
         """For pickle: what was asked of the core is asked again."""
         state = super().__getstate__()
         return state | {"__dict__": {key: value for key, value in state["__dict__"].items() if key != "_compiled"}}
+
+
+class Directed(Finish, abc.ABC):
+    """A finish that may scatter otherwise along an axis than across it."""
+
+    axis: Vector = (1.0, 0.0, 0.0)
+    """Where the x axis of the frame of the BSDF points, in the coordinates of the solid or surface; it is laid on the surface
+    at every point."""
+
+    @model_validator(mode="after")
+    def _has_a_direction(self) -> Self:
+        if not np.linalg.norm(self.axis) > 0.0:
+            raise ValueError("'axis' has no direction")
+        return self

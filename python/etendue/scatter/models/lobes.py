@@ -1,4 +1,4 @@
-"""Lobes about the specular direction that depend on the distance in direction cosines: ABg, Harvey and Shack, Gaussian."""
+"""Lobes: over the distance in direction cosines (ABg, Harvey and Shack, Gaussian), and powers of a cosine."""
 
 from __future__ import annotations
 
@@ -11,19 +11,23 @@ from etendue import _core
 from etendue.description.files import Files
 from etendue.description.values import AsNumber, Finite, NotNegative, Positive
 from etendue.errors import ArgumentError
-from etendue.scatter.models.finish import Finish, Record
+from etendue.scatter.models.finish import Directed, Finish, Record
 
 
-class Lobe(Finish, abc.ABC):
+class Lobe(Directed, abc.ABC):
     """What lobes have in common.
 
     Of a lobe at an angle, part would leave the unit circle of direction cosines, where there are no directions.
     `beyond` says whether that light is absorbed, so that the share falls with the angle of incidence, or f is scaled so
     that the share stays what it is at normal incidence.
+
+    A lobe that is not round has an `aspect`: how much wider it is across `axis` than along it. The part of β − β₀ across
+    the axis is divided by it before the length is taken.
     """
 
     way: Literal["reflected", "transmitted"] = "reflected"
     beyond: Literal["absorbed", "renormalised"] = "absorbed"
+    aspect: Annotated[float, Finite, Ge(1e-3), Le(1e3), AsNumber] = 1.0
 
     PARAMETERS: ClassVar[tuple[str, ...]] = ()
     """Names of the numbers that the core takes."""
@@ -34,6 +38,7 @@ class Lobe(Finish, abc.ABC):
             "kind": self.kind,  # type: ignore[attr-defined] # each class has one
             "transmitted": float(self.way == "transmitted"),
             "renormalised": float(self.beyond == "renormalised"),
+            "aspect": self.aspect,
             **{name: getattr(self, name) for name in self.PARAMETERS},
         }
         try:
@@ -65,6 +70,10 @@ class ABg(Lobe):
         About the mirrored direction, or straight on.
     beyond : {"absorbed", "renormalised"}
         What becomes of light that would leave the unit circle of direction cosines.
+    aspect : number
+        How much wider the lobe is across the axis than along it; 1 is round.
+    axis : three numbers
+        Of lobes that are not round, in the coordinates of the solid or surface; it is laid on the surface at every point.
 
     Examples
     --------
@@ -92,7 +101,7 @@ class HarveyShack(Lobe):
         L, the distance in direction cosines at which f begins to fall.
     s : number
         S, the slope of log f over log |β − β₀| far out; at most 0.
-    way, beyond
+    way, beyond, aspect, axis
         As of `ABg`.
 
     Examples
@@ -120,7 +129,7 @@ class Gaussian(Lobe):
     sigma : number
         σ. A holographic diffuser of full width at half maximum w, in air at normal incidence, has
         σ = sin(w/2)/√(2 ln 2).
-    way, beyond
+    way, beyond, aspect, axis
         As of `ABg`.
 
     Examples
@@ -135,3 +144,52 @@ class Gaussian(Lobe):
     sigma: Annotated[float, Finite, Gt(0.0), AsNumber]
 
     PARAMETERS = ("peak", "sigma")
+
+
+class CosinePower(Finish):
+    """A power of the cosine of the angle from the specular direction, or from the normal: f = peak · cosⁿ α.
+
+    Beyond 90° from its axis it is 0. About the normal, total scatter is 2π peak/(n + 2) at all angles of incidence.
+
+    Parameters
+    ----------
+    peak : number
+        f along the axis of the lobe [1/sr].
+    exponent : number
+        n, from 0 to 1,000,000.
+    about : {"specular", "normal"}
+        The axis: the mirrored direction (straight on, of transmitted light), or the normal of the surface.
+    way : {"reflected", "transmitted"}
+        To which side.
+
+    Examples
+    --------
+    >>> opal = CosinePower(peak=0.25, exponent=0.5, about="normal", way="transmitted")
+    >>> opal.transmittance([0, 60]).round(4).tolist()
+    [0.6283, 0.6283]
+    """
+
+    kind: Literal["cosine-power"] = "cosine-power"
+    peak: NotNegative
+    exponent: Annotated[float, Finite, Ge(0.0), Le(1e6), AsNumber]
+    about: Literal["specular", "normal"] = "specular"
+    way: Literal["reflected", "transmitted"] = "reflected"
+
+    def record(self, files: Files) -> Record:  # noqa: ARG002 - other finishes have tables
+        """The numbers."""
+        record: Record = {
+            "kind": self.kind,
+            "peak": self.peak,
+            "exponent": self.exponent,
+            "about_normal": float(self.about == "normal"),
+            "transmitted": float(self.way == "transmitted"),
+        }
+        try:
+            _core.Bsdf(record)
+        except ValueError as error:
+            raise ArgumentError(f"CosinePower: {error}") from None
+        return record
+
+    def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
+        """If it transmits."""
+        return self.way == "transmitted"

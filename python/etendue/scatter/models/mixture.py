@@ -13,9 +13,10 @@ from etendue.description.files import Files
 from etendue.description.values import AsRow, NotNegative
 from etendue.errors import ArgumentError
 from etendue.scatter.models.coated import Coated
-from etendue.scatter.models.finish import Finish, Record
+from etendue.scatter.models.finish import Directed, Finish, Record
 from etendue.scatter.models.interface import Interface
-from etendue.scatter.models.lobes import ABg, Gaussian, HarveyShack
+from etendue.scatter.models.lobes import ABg, CosinePower, Gaussian, HarveyShack
+from etendue.scatter.models.rough import RoughCoat, RoughInterface, RoughMetal
 from etendue.scatter.models.shares import Absorber, DiffuseSpecular, Lambertian, Mirror, Mixed, Transmitter
 
 SIMPLE: dict[str, type[Finish]] = {
@@ -31,13 +32,17 @@ SIMPLE: dict[str, type[Finish]] = {
         ABg,
         HarveyShack,
         Gaussian,
+        CosinePower,
         Coated,
+        RoughCoat,
+        RoughInterface,
+        RoughMetal,
     )
 }
 """Models that are made of no others, by their kind."""
 
 
-class Mixture(Finish):
+class Mixture(Directed):
     """A sum of finishes, each times its weight: a lobe on a diffuse floor, a coat with holes.
 
     Parameters
@@ -46,6 +51,8 @@ class Mixture(Finish):
         What is added up.
     weights : numbers, optional
         One for each; all are 1 if left out. No more light may leave than arrives.
+    axis : three numbers
+        For parts that are not alike in all directions, in the coordinates of the solid or surface. The parts share it.
 
     Examples
     --------
@@ -62,6 +69,8 @@ class Mixture(Finish):
     def _as_many_weights(self) -> Self:
         if self.weights and len(self.weights) != len(self.parts):
             raise ValueError(f"{len(self.weights)} weights for {len(self.parts)} parts")
+        if any(isinstance(part, Directed) and "axis" in part.model_fields_set for part in self.parts):
+            raise ValueError("the parts share one axis: state 'axis' beside 'parts', not within")
         return self
 
     def record(self, files: Files) -> Record:
