@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from oracles.both_ways import forwards_and_backwards_agree, two_walls
 from scipy.stats import chi2
 
 Array = npt.NDArray[np.float64]
@@ -177,27 +178,4 @@ def test_light_forwards_and_backwards_is_the_same(width: float) -> None:
             d = grid.directions(incident, transmitted=False)
             slices.append(BsdfSlice(incident, skewed(incident=incident, scattered=d), grid=grid))
     table = et.BsdfTable(BsdfData(slices, isotropic=False, mirrored=False))
-    finish = {"kind": "bsdf", "bsdf": table, "axis": [0.3, 1.0, 0.2]}
-    screen = {"width": 24, "height": 24, "columns": 4, "rows": 4}
-    scene = et.Scene(
-        sources=[{"kind": "surface", "shape": {"kind": "disk", "radius": 1.5}, "at": [4, 2, 9], "toward": [-0.3, -0.1, -1],
-                  "flux": 100}],
-        surfaces=[
-            {"shape": {"kind": "rectangle", "width": 30, "height": 30}, "finish": finish},
-            {"shape": {"kind": "rectangle", "width": 30, "height": 30}, "at": [-12, 0, 12], "toward": [1, 0, 0.1],
-             "finish": finish},
-        ],
-        detectors=[{"kind": "image", "name": "eye", "observer": "o"}],
-        observers=[{"name": "o", "theta": 50, "phi": 20, "distance": 400, "screen": screen}],
-    )  # fmt: skip
-    forwards = et.trace(scene, rays=1_500_000, seed=3).quantity_of("eye")
-    observer, view = et.Observer(theta=50, phi=20, distance=400), et.Screen(24, 24, 4, 4)
-    method = et.PathTracing(rays_per_pixel=6000, forward_rays=0, gather=False, seed=4)
-    backwards = et.luminance_map(scene, observer, view, method=method)
-    assert isinstance(forwards, et.LuminanceMap)
-    error = np.hypot(forwards.standard_error, backwards.standard_error)
-    z = (forwards.values - backwards.values) / error
-    assert np.isfinite(z).all()
-    assert float(np.sum(z * z)) < chi2.ppf(1.0 - 1e-4, z.size)
-    # Both are sharp enough to see 5 %.
-    assert float((error / backwards.values).max()) < 0.05
+    forwards_and_backwards_agree(surfaces=two_walls({"kind": "bsdf", "bsdf": table, "axis": [0.3, 1.0, 0.2]}))

@@ -72,6 +72,8 @@ pub struct RoughFacets {
 struct Known {
     /// Reflected and transmitted.
     albedo: Albedo<2>,
+    /// Of diffuse light.
+    means: [f64; 2],
     /// ∫ (1 − E) cos θ dΩ.
     missing: f64,
     /// The largest 1 − E.
@@ -131,6 +133,7 @@ impl RoughFacets {
                 missing: PI * (1.0 - means[0] - means[1]).max(0.0),
                 most: most.max(0.0),
                 albedo,
+                means,
             }
         })
     }
@@ -156,7 +159,7 @@ impl RoughFacets {
 
     /// The mean of [`once`](RoughFacets::once) over diffuse light.
     pub fn once_of_diffuse(&self, ratio: f64) -> [f64; 2] {
-        self.at(ratio, |known| known.albedo.means())
+        self.at(ratio, |known| known.means)
     }
 
     /// ∫ (1 − E) cos θ dΩ, and the most of 1 − E.

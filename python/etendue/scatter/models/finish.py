@@ -45,8 +45,7 @@ class Directed(Finish, abc.ABC):
     """A finish that may scatter otherwise along an axis than across it."""
 
     axis: Vector = (1.0, 0.0, 0.0)
-    """Where the x axis of the frame of the BSDF points, in the coordinates of the solid or surface; it is laid on the surface
-    at every point."""
+    """Where the x axis of the BSDF points, in the coordinates of the solid or surface; it is laid on the surface there."""
 
     @model_validator(mode="after")
     def _has_a_direction(self) -> Self:

@@ -1,0 +1,118 @@
+"""Models against closed forms and quadratures through Python, and light through scenes of each both ways."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.errors import ArgumentError, SceneError
+from etendue.scatter.models import MODELS
+from oracles.both_ways import forwards_and_backwards_agree, two_walls
+
+REFLECTING: dict[str, dict[str, Any]] = {
+    "abg": {"a": 0.1, "b": 0.1, "g": 1.5},
+    "gaussian": {"peak": 1.5, "sigma": 0.4, "aspect": 0.5, "axis": [0.3, 1, 0.2]},
+    "harvey-shack": {"b0": 0.8, "l": 0.3, "s": -2.5, "beyond": "renormalised"},
+    "cosine-power": {"peak": 0.8, "exponent": 4},
+    "rough-coat": {"roughness": 0.4, "index": 1.5, "base_reflectance": 0.8},
+    "rough-metal": {
+        "roughness": 0.2,
+        "roughness_across": 0.5,
+        "axis": [0.3, 1, 0.2],
+        "index": 0.96,
+        "extinction": 6.69,
+    },
+    "mixture": {
+        "parts": [{"kind": "lambertian", "reflectance": 0.3}, {"kind": "gaussian", "peak": 1.0, "sigma": 0.3}],
+    },
+}
+"""A finish of each kind that scatters back, and mirrors nothing: mirror images are in no light image."""
+
+TRANSMITTING: dict[str, dict[str, Any]] = {
+    "gaussian": {"peak": 1.0, "sigma": 0.3, "way": "transmitted"},
+    "cosine-power": {"peak": 0.3, "exponent": 2, "about": "normal", "way": "transmitted"},
+    "lambertian": {"reflectance": 0.2, "transmittance": 0.6},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", REFLECTING)
+def test_reflected_light_forwards_and_backwards_is_the_same(kind: str) -> None:
+    forwards_and_backwards_agree(surfaces=two_walls({"kind": kind, **REFLECTING[kind]}))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", TRANSMITTING)
+def test_transmitted_light_forwards_and_backwards_is_the_same(kind: str) -> None:
+    sheet = {"shape": {"kind": "rectangle", "width": 30, "height": 30}, "finish": {"kind": kind, **TRANSMITTING[kind]}}
+    forwards_and_backwards_agree(surfaces=[sheet], below=True)
+
+
+@pytest.mark.slow
+def test_light_through_ground_glass_forwards_and_backwards_is_the_same() -> None:
+    """Radiance grows by n² and falls again, each face scatters, and light is led along the slab."""
+    slab = {"shape": {"kind": "block", "width": 30, "height": 30, "depth": 4}, "medium": "glass", "at": [0, 0, -2],
+            "finish": {"kind": "rough-interface", "roughness": 0.4}}  # fmt: skip
+    forwards_and_backwards_agree(solids=[slab], media={"glass": {"index": 1.5}}, below=True, sharp=0.15)
+
+
+def test_every_model_that_scatters_into_lobes_is_traced_both_ways() -> None:
+    plain = {"coated", "interface", "mirror", "absorber", "lambertian", "diffuse-specular", "transmitter", "mixed"}
+    assert {*REFLECTING, "rough-interface", *plain} == set(MODELS)
+
+
+def test_reflectance_of_metals_is_the_closed_form() -> None:
+    """|(n − 1 + ik)/(n + 1 + ik)|² at normal incidence; of aluminium, 555 nm: 0.92."""
+    n, k = 0.96, 6.69
+    expected = ((n - 1.0) ** 2 + k * k) / ((n + 1.0) ** 2 + k * k)
+    smooth = et.bsdf.RoughMetal(roughness=0.001, index=n, extinction=k)
+    assert float(smooth.reflectance(0)) == pytest.approx(expected, abs=2e-4)
+    # Of a dielectric (k = 0): Fresnel's equations at Brewster's angle, ½ ((n² − 1)/(n² + 1))².
+    glass = et.bsdf.RoughMetal(roughness=0.001, index=1.5, extinction=0.0)
+    assert float(glass.reflectance(math.degrees(math.atan(1.5)))) == pytest.approx(0.5 * (1.25 / 3.25) ** 2, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_brushed_metal_is_wide_across_its_axis() -> None:
+    metal = et.bsdf.RoughMetal(roughness=0.05, roughness_across=0.4, reflectance=1.0)
+    normal, tilt = [0.0, 0.0, 1.0], math.sin(math.radians(20.0))
+    along, across = metal.evaluate(normal, [[tilt, 0, math.cos(math.asin(tilt))], [0, tilt, math.cos(math.asin(tilt))]])
+    assert across > 5.0 * along
+
+
+@pytest.mark.parametrize(
+    ("finish", "said"),
+    [
+        ({"kind": "rough-metal", "roughness": 0.1}, "needs reflectance, or index and extinction"),
+        ({"kind": "rough-metal", "roughness": 0.1, "index": 1.0, "extinction": 6, "reflectance": 1}, "not both"),
+        ({"kind": "gaussian", "peak": 9.0, "sigma": 0.4}, "more than arrives"),
+        ({"kind": "cosine-power", "peak": 1.0, "exponent": 0.5}, "more than arrives"),
+        ({"kind": "gaussian", "peak": 0.1, "sigma": 0.1, "axis": [0, 0, 0]}, "'axis' has no direction"),
+        (
+            {"kind": "mixture", "parts": [{"kind": "gaussian", "peak": 0.1, "sigma": 0.1, "axis": [0, 1, 0]}]},
+            "share one axis",
+        ),
+        ({"kind": "rough-interface", "roughness": 0.0}, "roughness"),
+    ],
+)
+def test_impossible_finishes_are_refused(finish: dict[str, Any], said: str) -> None:
+    with pytest.raises((ArgumentError, SceneError), match=said):
+        et.trace(
+            et.Scene(
+                sources=[{"kind": "point", "flux": 1.0, "at": [0, 0, 3]}],
+                surfaces=[{"shape": {"kind": "disk", "radius": 1}, "finish": finish}],
+            ),
+            rays=10,
+        )
+
+
+def test_lobes_of_a_round_and_an_elliptical_gaussian() -> None:
+    """2π σ₁ σ₂ peak far from the rim."""
+    lobe = et.bsdf.Gaussian(peak=10.0, sigma=0.02, aspect=3.0)
+    assert float(lobe.reflectance(30, phi=45)) == pytest.approx(2.0 * math.pi * 0.02 * 0.06 * 10.0, rel=1e-5)
+    off = np.array([[0.02, 0.0], [0.0, 0.06]])
+    scattered = np.column_stack([off, np.sqrt(1.0 - np.sum(off * off, axis=1))])
+    assert np.allclose(lobe.evaluate([0, 0, 1], scattered), 10.0 * math.exp(-0.5), rtol=1e-9)
