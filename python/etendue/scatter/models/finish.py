@@ -42,7 +42,14 @@ class Finish(Description, Bsdf, abc.ABC):
 
 
 class Directed(Finish, abc.ABC):
-    """A finish that may scatter otherwise along an axis than across it."""
+    """A finish that may scatter otherwise along an axis than across it.
+
+    Examples
+    --------
+    >>> from etendue.scatter.models import Gaussian
+    >>> Gaussian(peak=1, sigma=0.1, aspect=2, axis=(0, 1, 0)).axis
+    (0.0, 1.0, 0.0)
+    """
 
     axis: Vector = (1.0, 0.0, 0.0)
     """Where the x axis of the BSDF points, in the coordinates of the solid or surface; it is laid on the surface there."""
