@@ -99,7 +99,7 @@ ADDITIONS: dict[str, Addition] = {
             ),
             Insertion(
                 f"{MODELS}/__init__.py",
-                "from etendue.scatter.models.lobes import ABg, Gaussian, HarveyShack\n",
+                "from etendue.scatter.models.lobes import ABg, CosinePower, Gaussian, HarveyShack\n",
                 "from etendue.scatter.models.minnaert import Minnaert\n",
             ),
             Insertion(f"{MODELS}/__init__.py", '{**SIMPLE, "mixture": Mixture', ', "minnaert": Minnaert'),

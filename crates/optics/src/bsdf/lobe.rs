@@ -12,7 +12,7 @@ use etendue_math::special::{exp, ln};
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::more_numbers::MoreNumbers;
 
-use super::albedo::Albedo;
+use super::albedo::{Albedo, GAUSS};
 use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
 
 /// f \[1/sr\] over |β − β₀|.
@@ -142,15 +142,6 @@ const TOLERANCE: f64 = 2e-7;
 
 /// The smallest step of the sine of incidence for which shares are tabled.
 const SMALLEST_STEP: f64 = 1e-6;
-
-/// Nodes and weights of the rule of Gauss and Legendre from 0 to 1.
-pub const GAUSS: [(f64, f64); 5] = [
-    (0.046_910_077_030_668, 0.118_463_442_528_094_54),
-    (0.230_765_344_947_158_45, 0.239_314_335_249_683_24),
-    (0.5, 0.284_444_444_444_444_45),
-    (0.769_234_655_052_841_5, 0.239_314_335_249_683_24),
-    (0.953_089_922_969_332, 0.118_463_442_528_094_54),
-];
 
 fn gauss(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
     GAUSS.iter().map(|(x, w)| w * f(from + (to - from) * x)).sum::<f64>() * (to - from)

@@ -93,7 +93,13 @@ class RoughMetal(Rough):
 
 
 def reflectance_of_metal(angle: npt.NDArray[np.float64], *, index: float, extinction: float) -> npt.NDArray[np.float64]:
-    """Of unpolarised light from air on a smooth surface of n + ik, at angles [°]: [BornWolf1999]_, section 14.2."""
+    """Of unpolarised light from air on a smooth surface of n + ik, at angles [°]: [BornWolf1999]_, section 14.2.
+
+    Examples
+    --------
+    >>> reflectance_of_metal(np.array([0.0, 90.0]), index=0.96, extinction=6.69).round(4).tolist()
+    [0.921, 1.0]
+    """
     cosine = np.cos(np.radians(np.minimum(angle, 90.0)))
     n = complex(index, extinction)
     across = np.sqrt(n * n - (1.0 - cosine * cosine))
