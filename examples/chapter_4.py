@@ -269,7 +269,8 @@ def print_fewer_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, ray
         c = et.compare(look(table, truth.screen, lines), truth, REGION)
         same = alike(distribution(table, rays), lid)
         print(
-            f"    {len(angles)}: NCC of the map {100 * c.ncc:.1f} %, NRMSE {100 * c.nrmse_thesis:.1f} %; of the LID {same:.2f} %"
+            f"    {len(angles)}: NCC of the map {100 * c.ncc:.1f} %, NRMSE {100 * c.nrmse_thesis:.1f} %, "
+            f"NCC of the LID {same:.2f} %"
         )
 
 

@@ -49,7 +49,7 @@ def overlap(apart: Array) -> Array:
 
 
 def measured(bsdf: et.Bsdf, theta: float, scattered: Array) -> Array:
-    """F [1/sr] as the instrument states it: flux over that which arrives, solid angle and cosine, over both apertures.
+    """The BRDF [1/sr] as the instrument states it: flux over that which arrives, over solid angle and cosine.
 
     Directions are those of the detector, shape (..., 3); the light arrives at an angle [°] in the plane φ = 180°.
     """
@@ -65,9 +65,7 @@ def measured(bsdf: et.Bsdf, theta: float, scattered: Array) -> Array:
 
 
 def specular_reflectance(bsdf: et.Bsdf, theta: float) -> float:
-    """The share of the light that arrives in the aperture at the specular direction, without what a Lambertian surface of the
-    same reflectance would send there.
-    """
+    """The share of the light in the aperture at the specular direction, less that of an even surface of the same R."""
     at = mirrored(direction(theta, 180.0))
     solid_angle = 2.0 * math.pi * (1.0 - math.cos(math.radians(APERTURE)))
     f = float(measured(bsdf, theta, at[None])[0]) - total_reflectance(bsdf) / math.pi

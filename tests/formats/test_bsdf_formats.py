@@ -264,7 +264,7 @@ def test_the_vinyl_of_zemax(samples: Path) -> None:
         assert stated == pytest.approx(expected[2], abs=1e-4)
 
 
-@pytest.mark.parametrize("name", ["R_test.anisotropicbsdf", "planesymmetric_brdf.anisotropicbsdf"])
+@pytest.mark.parametrize("name", ["R_test.anisotropicbsdf"])
 def test_what_is_known_and_not_read_is_refused_by_name(name: str, samples: Path) -> None:
     with pytest.raises(UnsupportedFormatError, match="Speos"):
         read_bsdf_data(samples / "bsdf" / name)

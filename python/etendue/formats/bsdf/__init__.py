@@ -6,19 +6,20 @@ import os
 from pathlib import Path
 
 from etendue.errors import FormatError, UnknownNameError, UnsupportedFormatError
-from etendue.formats.bsdf import etendue_hdf5, klems, zemax
+from etendue.formats.bsdf import etendue_hdf5, klems, speos, tracepro, zemax
 from etendue.formats.bsdf.bsdf_format import SNIFFED_BYTES, BsdfFormat
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import as_path, require_readable
 from etendue.formats.output import atomic_output
 from etendue.quantities.bsdf_data import BsdfData
 
-BSDF_FORMATS: dict[str, BsdfFormat] = {module.FORMAT.name: module.FORMAT for module in (etendue_hdf5, klems, zemax)}
+BSDF_FORMATS: dict[str, BsdfFormat] = {
+    module.FORMAT.name: module.FORMAT for module in (etendue_hdf5, klems, speos, tracepro, zemax)
+}
 """Every format by name."""
 
 REFUSED: dict[bytes, tuple[str, str]] = {
-    b"OPTIS - ": ("a Speos surface file", "étendue does not read it yet; export the table as Zemax BSDF."),
-    b"TracePro": ("a TracePro surface property", "étendue does not read it yet; export the table as Zemax BSDF."),
+    b"OPTIS - ": ("a Speos surface file of another kind", "étendue reads anisotropic BSDF as text; save it as that."),
     b"tensor_file": ("a tensor file of RGL", "étendue does not read it yet."),
 }
 """Formats that are known by how they begin, and are not read: what they are, and what to do."""
