@@ -24,10 +24,10 @@ EYE = et.Observer(theta=55, phi=90, distance=1000, target=(0, 0, HEIGHT))
 REGION = et.Region(left=-10, right=10, bottom=-10.5, top=-2.5)
 """X 15 to 35 mm and Y 15 to 23 mm of a screen of 50 mm × 25 mm, from its upper left corner."""
 
-PET = et.bsdf.RoughCoat(roughness=0.035, index=1.575, base_reflectance=0.99375)
+PET = et.bsdf.RoughCoat(roughness=0.035, index=1.575, base_reflectance=0.9938)
 """Stand-in for microcellular PET: its index, R = 0.984, and a roughness with highlights as bright as in table 4.1."""
 
-GLOSS = et.bsdf.Coated(index=1.5, base_reflectance=0.9235)
+GLOSS = et.bsdf.Coated(index=1.5, base_reflectance=0.9211)
 """Stand-in for the gloss paint: a smooth coat, R = 0.832."""
 
 ALUMINIUM = et.bsdf.RoughMetal(roughness=0.12, reflectance=0.85)
@@ -193,7 +193,7 @@ def draw_images(path: Path, lines: int) -> None:
     """Figure 4.10: two lamps over a plate of each material."""
     made = new_figure(9.0, 2.6)
     plain = et.bsdf.Mixture(parts=[GLOSS], weights=[1.0])
-    painted = et.bsdf.RoughCoat(roughness=0.01, index=1.5, base_reflectance=0.9235)
+    painted = et.bsdf.RoughCoat(roughness=0.01, index=1.5, base_reflectance=0.9211)
     kinds = {"PET": PET, "painted PET": painted, "aluminium on PET": ALUMINIUM, "painted aluminium": plain}
     screen = et.Screen(40, 30, 80, 60)
     for axes, (name, bsdf) in zip(made.subplots(1, len(kinds)), kinds.items(), strict=True):

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from etendue.description.families import Family
 from etendue.scatter.bsdf_file import BsdfFile
+from etendue.scatter.materials import MATERIALS
 from etendue.scatter.models import (
     MODELS,
     Absorber,
@@ -27,6 +28,7 @@ BUILT_IN: dict[str, Finish] = {
     "absorber": Absorber(),
     "mirror": Mirror(),
     "transparent": Transmitter(),
+    **{name: material.finish for name, material in MATERIALS.items()},
 }
 """Finishes that a scene may name without describing them."""
 
