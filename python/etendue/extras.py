@@ -36,6 +36,7 @@ class Extra(NamedTuple):
 EXTRAS: dict[str, Extra] = {
     "matplotlib": Extra("plot", "pictures", (".png", ".pdf")),
     "cascadio": Extra("step", "STEP files"),
+    "scipy": Extra("scans", "interpolations of scattered points"),
     "xarray": Extra("xarray", "datasets of xarray"),
 }
 """By the name of the library."""

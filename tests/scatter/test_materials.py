@@ -28,7 +28,6 @@ def test_reflectance_at_8_degrees(name: str, reflectance: float) -> None:
     assert float(MATERIALS[name].finish.reflectance(8)) == pytest.approx(reflectance, abs=0.006)
 
 
-@pytest.mark.slow
 def test_gloss_is_that_of_gloss_and_matt_paint() -> None:
     assert specular_gloss(MATERIALS["gloss-white-paint"].finish, 60) > 85.0
     assert specular_gloss(MATERIALS["matt-white-paint"].finish, 60) < 5.0
@@ -43,7 +42,6 @@ def test_holographic_diffusers_fall_to_half_at_half_their_width(width: float) ->
     assert float(finish.transmittance(0)) == pytest.approx(0.9, abs=1e-5)
 
 
-@pytest.mark.slow
 def test_haze_rises_with_the_width_of_a_diffuser() -> None:
     haze = [transmission_haze(MATERIALS[f"holographic-diffuser-{width}"].finish) for width in ("0.5", "5", "20")]
     assert haze == sorted(haze)

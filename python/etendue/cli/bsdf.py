@@ -14,6 +14,8 @@ from etendue.formats.bsdf import BSDF_FORMATS
 from etendue.plot import plot_bsdf
 from etendue.scatter.appearance import GLASS, appearance
 from etendue.scatter.files import read_bsdf, write_bsdf
+from etendue.scatter.scans.files import read_scans
+from etendue.scatter.scans.interpolations import METHODS
 from etendue.scatter.table import BsdfTable
 
 app = typer.Typer(help="Files of scatter data: what they hold, pictures of it, other formats.", no_args_is_help=True)
@@ -135,5 +137,43 @@ def gloss(file: File, json: Json = False) -> None:
         say(f"haze of transmitted light: {found.haze:.2f} %")
 
 
-for _name, _verb in (("info", info), ("plot", plot), ("convert", convert), ("gloss", gloss)):
+def fit(
+    files: Annotated[
+        list[Path], typer.Argument(help="CSV files of scans: theta_i,phi_i,theta_s,phi_s,bsdf, or stages.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The table, of any format that étendue writes.")],
+    method: Annotated[
+        str, typer.Option("--method", help=f"From scans to a grid: {', '.join(METHODS)}.")
+    ] = "specular-centred",
+    reflectance: Annotated[
+        float | None, typer.Option("--reflectance", help="Of an integrating sphere; each incidence is scaled to it.")
+    ] = None,
+    incident_flux: Annotated[
+        Path | None, typer.Option("--incident-flux", help="For stages: the file with the flux on the sample.")
+    ] = None,
+    solid_angle: Annotated[
+        float | None, typer.Option("--solid-angle", help="For stages: that of the aperture [sr].")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Make a table of goniometer scans, and say what they add up to."""
+    one_of(method, METHODS, "--method")
+    check_folder(output)
+    scans = read_scans(files, incident_flux=incident_flux, solid_angle=solid_angle, reflectance=reflectance)
+    table = BsdfTable.from_scans(scans, method)
+    notes = list(write_bsdf(output, table))
+    shares = {round(one.theta, 6): one.stated for one in table.data.slices}
+    complaints = [str(complaint) for complaint in table.complaints]
+    if json:
+        print_json({"output": output, "method": method, "shares": shares, "complaints": complaints, "notes": notes})
+        return
+    for line in (*complaints, *(f"note: {note}" for note in notes)):
+        complain(line)
+    for theta, share in shares.items():
+        scaled = "" if reflectance is None else f", scaled to {reflectance:g}"
+        say(f"  {theta:g}°: the scans add up to {share:.4f}{scaled}")
+    say(f"{output}: {len(table.data.slices)} incidences of {scans.values.size} values, {method}")
+
+
+for _name, _verb in (("info", info), ("plot", plot), ("convert", convert), ("gloss", gloss), ("fit", fit)):
     app.command(_name)(guarded(f"bsdf {_name}", _verb))

@@ -14,6 +14,8 @@ from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf
 from etendue.scatter.models import MODELS
 from etendue.scatter.resampling import lobes_of
+from etendue.scatter.scans.interpolations import tabulated
+from etendue.scatter.scans.scans import Scans
 
 MOST = 1.01
 """Share that a slice may scatter: more is refused, and what is above 1 is scaled to 1, with a complaint."""
@@ -50,6 +52,38 @@ class BsdfTable(Bsdf):
             raise ArgumentError("a BSDF has slices or components; these data hold neither")
         self.data = data
         self.complaints: tuple[Complaint, ...] = data.complaints + tuple(_excesses(data))
+
+    @classmethod
+    def from_scans(cls, scans: Scans, method: str = "specular-centred") -> BsdfTable:
+        """A table of what a goniometer measured.
+
+        Parameters
+        ----------
+        scans : Scans
+            Of all incidences.
+        method : {"specular-centred", "direction-cosines", "radial-basis", "shepard", "smooth"}
+            The way from the measured directions to a grid.
+
+        Raises
+        ------
+        ArgumentError
+            If the values do not suit the method, or a slice scatters more than 101 % of the light.
+        UnknownNameError
+            If there is no such method.
+        MissingLibraryError
+            If the method needs SciPy, and it is not installed.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from etendue.quantities.bsdf_data import direction
+        >>> incident = direction(30.0, 180.0)
+        >>> to = np.concatenate([direction(np.arange(0.0, 85.0, 5.0), a) for a in (0.0, 90.0, 180.0)])
+        >>> flat = Scans(np.tile(incident, (len(to), 1)), to, np.full(len(to), 0.25), reflectance=0.8)
+        >>> round(float(BsdfTable.from_scans(flat, method="smooth").reflectance(30)), 3)
+        0.8
+        """
+        return cls(tabulated(scans, method))
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: what was asked of the core is asked again."""

@@ -1,0 +1,74 @@
+"""Goniometer scans as CSV: directions with values of the BSDF, or the angles of the stages with fluxes."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import FormatError
+from etendue.formats.encodings import decoded
+from etendue.formats.input import as_path
+from etendue.formats.rays.text_rows import number
+
+Array = npt.NDArray[np.float64]
+
+DIRECTIONS = ("theta_i", "phi_i", "theta_s", "phi_s", "bsdf")
+STAGES = ("alpha", "beta", "gamma", "delta", "flux")
+ERROR = "standard_error"
+LARGEST = 1 << 28
+
+
+def read_columns(path: Path, layouts: Sequence[tuple[str, ...]]) -> dict[str, Array]:
+    """The columns of a CSV file with a line of names; lines that begin with ``#`` are left out.
+
+    Parameters
+    ----------
+    path : Path
+        Separated by commas, semicolons or tabs.
+    layouts : sequence of tuple of str
+        Names of columns, any one of which sets must be there; ``standard_error`` may be.
+
+    Raises
+    ------
+    FormatError
+        If names are missing or not known, or a field is no finite number.
+    """
+    path = as_path(path)
+    with path.open("rb") as file:
+        data = file.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise FormatError(path, "length", "more than 256 MiB", "No scan is so large.")
+    lines = [(at, line) for at, line in enumerate(decoded(path, data).splitlines(), 1) if line.strip()]
+    lines = [(at, line) for at, line in lines if not line.lstrip().startswith("#")]
+    wanted = " or ".join(",".join(layout) for layout in layouts)
+    if not lines:
+        raise FormatError(path, "first line", "the file is empty", f"Its first line names columns: {wanted}.")
+    separator = next((s for s in (";", "\t") if s in lines[0][1]), ",")
+    names = [name.strip().casefold() for name in lines[0][1].split(separator)]
+    layout = next((one for one in layouts if set(one) <= set(names)), None)
+    unknown = [name for name in names if layout is not None and name not in (*layout, ERROR)]
+    if layout is None or unknown or len(set(names)) < len(names):
+        found = f"columns {', '.join(names)[:120]}"
+        raise FormatError(path, f"line {lines[0][0]}", found, f"Name them {wanted}, and {ERROR} if it is known.")
+    rows = []
+    for (at, _), fields in zip(
+        lines[1:], csv.reader((line for _, line in lines[1:]), delimiter=separator), strict=True
+    ):
+        if len(fields) != len(names):
+            raise FormatError(
+                path, f"line {at}", f"{len(fields)} fields; the columns are {len(names)}", "Mend the line."
+            )
+        try:
+            values = [number(field.strip()) for field in fields]
+        except ValueError:
+            values = [np.nan]
+        if not np.isfinite(values).all():
+            raise FormatError(path, f"line {at}", "a field that is no finite number", "Mend the line.")
+        rows.append(values)
+    if not rows:
+        raise FormatError(path, f"line {lines[0][0]}", "no values follow", "Export the scan again.")
+    return dict(zip(names, np.array(rows).T, strict=True))

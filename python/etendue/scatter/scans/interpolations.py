@@ -1,0 +1,275 @@
+"""Values that were measured here and there, on a grid of |β − β₀| and azimuth: thesis appendix B, and better ways."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.extras import require
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid
+from etendue.scatter.scans import harvey_shack
+from etendue.scatter.scans.scans import Scans
+
+Array = npt.NDArray[np.float64]
+Interpolation = Callable[[Array, Array, Array, Array], tuple[Array, Array | None]]
+"""Of an incidence, measured directions, values and wanted directions: values there, and their standard errors if known."""
+
+SMALLEST = 1e-3
+"""The smallest |β − β₀| above 0 of the grid, which the thesis leaves open: 0.06° at normal incidence."""
+
+RADIAL, AZIMUTHS = 100, 36
+"""Logarithmic steps of |β − β₀| to 2, and azimuths: those of the thesis."""
+
+ON_ARM = 2.5
+"""Azimuths about the specular direction that differ by less belong to one scan [°]."""
+
+
+def radial_coordinates(smallest: float = SMALLEST) -> Array:
+    """0, and 99 logarithmic steps to 2.
+
+    Examples
+    --------
+    >>> radial_coordinates()[[0, 1, -1]].tolist()
+    [0.0, 0.001, 2.0]
+    """
+    return np.concatenate([[0.0], np.geomspace(smallest, 2.0, RADIAL - 1)])
+
+
+def _planar(incident: Array, scattered: Array) -> Array:
+    r, a = harvey_shack.coordinates(incident, scattered)
+    return np.column_stack([r * np.cos(np.radians(a)), r * np.sin(np.radians(a))])
+
+
+def direction_cosines(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, None]:
+    """Linear over the triangles of the measured points in U, V, 0 outside them: the first scheme of appendix B.
+
+    Raises
+    ------
+    MissingLibraryError
+        Without SciPy.
+    """
+    inside = require("scipy.interpolate").LinearNDInterpolator(_planar(incident, measured), values, fill_value=0.0)
+    return np.asarray(inside(_planar(incident, wanted))), None
+
+
+def radial_basis(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, None]:
+    """Thin plates through ln f in U, V, of not less than a thousandth of the least value.
+
+    Raises
+    ------
+    MissingLibraryError
+        Without SciPy.
+    """
+    # A direction that was measured several times counts once.
+    points, own = np.unique(np.round(_planar(incident, measured), 9), axis=0, return_inverse=True)
+    mean = np.bincount(own.ravel(), values) / np.bincount(own.ravel())
+    logs = np.log(np.maximum(mean, 1e-3 * values[values > 0.0].min()))
+    plate = require("scipy.interpolate").RBFInterpolator(points, logs, kernel="linear")
+    return np.asarray(np.exp(np.minimum(plate(_planar(incident, wanted)), np.log(values.max())))), None
+
+
+def shepard(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, None]:
+    """Means weighted with the inverse square of the distance in U, V [Shepard1968]_."""
+    points, at = _planar(incident, measured), _planar(incident, wanted)
+    square = np.sum((at[:, None, :] - points) ** 2, axis=-1)
+    weights = 1.0 / np.maximum(square, 1e-18)
+    return np.asarray(weights @ values / weights.sum(axis=1)), None
+
+
+def specular_centred(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, None]:
+    """Linear in the angle from the specular direction and the azimuth about it, 0 at the horizon: the second scheme.
+
+    The measured points form scans at some azimuths about the specular direction; where only one side was scanned, the other
+    is its mirror image. The rotations of eqs. B.3 and B.4 are those of `PolarGrid` ("specular"); the dense set of step 3 is
+    left out, since the grid is read from the interpolation itself.
+
+    Raises
+    ------
+    ArgumentError
+        If the points do not form scans through the specular direction.
+    """
+    frame = PolarGrid("specular", np.zeros(1), np.zeros(1))
+    r, a = frame.coordinates(measured, incident, transmitted=False)
+    centre = r < 0.05
+    arms = _arms(r[~centre], a[~centre])
+    peak = float(values[centre].mean()) if centre.any() else None
+    curves = []
+    for azimuth in arms:
+        own = ~centre & (_apart(a, azimuth) < ON_ARM)
+        if not own.any():
+            # The mirror image in the plane of incidence.
+            own = ~centre & (_apart(a, -azimuth) < ON_ARM)
+        order = np.argsort(r[own])
+        x, y = r[own][order], values[own][order]
+        start = [(0.0, peak if peak is not None else float(y[0]))]
+        edge = horizon(incident, azimuth)
+        inner = x < edge - 1e-9
+        points = [*start, *zip(x[inner].tolist(), y[inner].tolist(), strict=True), (edge, 0.0)]
+        curves.append(np.array(points).T)
+    at_r, at_a = frame.coordinates(wanted, incident, transmitted=False)
+    table = np.stack([np.interp(at_r, *curve) for curve in curves])
+    ring = np.append(arms, arms[0] + 360.0)
+    k = np.clip(np.searchsorted(ring, arms[0] + (at_a - arms[0]) % 360.0, side="right") - 1, 0, len(arms) - 1)
+    t = ((at_a - ring[k]) % 360.0) / (ring[k + 1] - ring[k])
+    columns = np.arange(at_r.size)
+    return (1.0 - t) * table[k, columns] + t * table[(k + 1) % len(arms), columns], None
+
+
+def _apart(a: Array, b: float) -> Array:
+    return np.asarray(np.abs((a - b + 180.0) % 360.0 - 180.0))
+
+
+def _arms(r: Array, a: Array) -> Array:
+    """Azimuths of the scans, with their mirror images."""
+    if r.size < 2:
+        raise ArgumentError("fewer than two values beside the specular direction: nothing to interpolate")
+    found: list[float] = []
+    for azimuth in a[np.argsort(-r)].tolist():
+        for each in (azimuth % 360.0, -azimuth % 360.0):
+            if all(_apart(np.array(each), other) >= ON_ARM for other in found):
+                found.append(each)
+    if len(found) < 2 or len(found) > 72:
+        raise ArgumentError(
+            f"the values lie at {len(found)} azimuths about the specular direction; this method takes scans through it"
+        )
+    return np.array(sorted(found))
+
+
+def horizon(incident: Array, azimuth: float) -> float:
+    """Angle from the specular direction to the surface [°], at an azimuth about it that counts from the side of the normal.
+
+    Examples
+    --------
+    >>> [round(horizon(np.array([-0.6, 0.0, 0.8]), a), 2) for a in (0.0, 90.0, 180.0)]
+    [126.87, 90.0, 53.13]
+    """
+    # Heights are cos t · s_z + sin t · cos φ · e_z, with e_z = √(1 − s_z²).
+    slope = np.cos(np.radians(azimuth)) * np.sqrt(max(0.0, 1.0 - incident[2] ** 2))
+    return float(np.degrees(np.arctan2(incident[2], -slope)))
+
+
+def smooth(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, Array]:
+    """Local lines through ln f over the logarithmic distance from the specular direction, with errors.
+
+    The width along the distance is that which predicts each value best from all others; along the azimuth it bridges the
+    largest gap between the scans. The standard error is that by which the others miss a value, averaged in the same way: of
+    the shape between the scans, and of the noise of one value, which is more than that of their mean.
+    """
+    least = max(1e-3 * float(values[values > 0.0].min()), 1e-300)
+    logs = np.log(np.maximum(values, least))
+    planes = [harvey_shack.coordinates(incident, one) for one in (measured, wanted)]
+    scale = max(float(np.quantile(planes[0][0][planes[0][0] > 0.0], 0.25)), SMALLEST)
+    (x, a), (at_x, at_a) = ((np.arcsinh(r / scale), azimuth) for r, azimuth in planes)
+    steps = np.sort(a[planes[0][0] > scale])
+    gap = float(np.diff(np.append(steps, steps[0] + 360.0)).max()) if steps.size > 1 else 360.0
+    turn = max(0.5 * gap, 5.0)
+
+    def weights(at_x: Array, at_a: Array, width: float) -> Array:
+        # Azimuths mean the less, the closer to the specular direction.
+        part = -np.expm1(-0.5 * (at_x[:, None] * x) / (0.25 * width + 1e-12))
+        log = -0.5 * ((at_x[:, None] - x) / width) ** 2
+        log -= 0.5 * (part * ((at_a[:, None] - a + 180.0) % 360.0 - 180.0) / turn) ** 2
+        return np.asarray(log)
+
+    def line(log: Array, at_x: Array, width: float) -> tuple[Array, Array]:
+        w = np.exp(log - log.max(axis=1, keepdims=True))
+        w /= w.sum(axis=1, keepdims=True)
+        mean = w @ x
+        spread = w @ (x * x) - mean**2 + (0.05 * width) ** 2
+        slope = ((w * (x - mean[:, None])) @ logs) / spread
+        return w @ logs + slope * (at_x - mean), w
+
+    best = None
+    for width in np.geomspace(0.03, 1.5, 14):
+        log = weights(x, a, float(width))
+        np.fill_diagonal(log, -np.inf)
+        if not np.isfinite(log.max(axis=1)).all():
+            continue
+        predicted, _ = line(log, x, float(width))
+        missed = logs - predicted
+        score = float(np.mean(missed**2))
+        if best is None or score < best[0]:
+            best = (score, float(width), missed)
+    if best is None:
+        raise ArgumentError("too few values to smooth")
+    _, width, missed = best
+    found, w = line(weights(at_x, at_a, width), at_x, width)
+    f = np.exp(np.minimum(found, logs.max()))
+    return f, f * np.sqrt(w @ missed**2)
+
+
+METHODS: dict[str, Interpolation] = {
+    "specular-centred": specular_centred,
+    "direction-cosines": direction_cosines,
+    "radial-basis": radial_basis,
+    "shepard": shepard,
+    "smooth": smooth,
+}
+"""Ways from scattered values to a grid, by name."""
+
+
+def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = SMALLEST) -> BsdfData:
+    """A table on 100 logarithmic |β − β₀| and 36 azimuths for each incidence.
+
+    Parameters
+    ----------
+    scans : Scans
+        All incidences.
+    method : str
+        One of `METHODS`.
+    smallest : float
+        The smallest |β − β₀| above 0.
+
+    Returns
+    -------
+    BsdfData
+        Isotropic if all light comes from one azimuth. Scaled to `scans.reflectance` where that is known; `stated` is the
+        share before.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such method.
+    ArgumentError
+        If the values do not suit it.
+    MissingLibraryError
+        If it needs a library that is not installed.
+
+    Examples
+    --------
+    >>> from etendue.quantities.bsdf_data import direction
+    >>> incident = direction(30.0, 180.0)
+    >>> scattered = np.concatenate([direction(np.arange(0.0, 85.0, 5.0), a) for a in (0.0, 90.0, 180.0)])
+    >>> flat = Scans(np.tile(incident, (len(scattered), 1)), scattered, np.full(len(scattered), 0.25))
+    >>> round(tabulated(flat, method="shepard").slices[0].integral(), 3)
+    0.785
+    """
+    if method not in METHODS:
+        raise UnknownNameError("method of interpolation", method, METHODS)
+    radial = radial_coordinates(smallest)
+    slices = []
+    for incident, own in scans.by_incidence():
+        # The azimuth of PolarGrid counts from the forward direction, that of Harvey and Shack from 90° before it.
+        grid = PolarGrid("cosines", radial, np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False, dtype=np.float64))
+        at = grid.directions(incident, transmitted=False)
+        there = ~np.isnan(at[..., 0])
+        f, error = METHODS[method](incident, scans.scattered[own], scans.values[own], at[there])
+        values, errors = np.full(grid.shape, np.nan), None
+        values[there] = np.maximum(f, 0.0)
+        if error is not None:
+            errors = np.full(grid.shape, np.nan)
+            errors[there] = error
+        one = BsdfSlice(incident, values, grid=grid, standard_error=errors)
+        share = one.integral()
+        factor = 1.0
+        if scans.reflectance is not None:
+            if not share > 0.0:
+                raise ArgumentError("nothing is scattered: the values cannot be scaled to a reflectance")
+            factor = scans.reflectance / share
+        scaled = None if errors is None else errors * factor
+        slices.append(BsdfSlice(incident, values * factor, grid=grid, stated=share, standard_error=scaled))
+    azimuths = {round(one.phi, 4) % 360.0 for one in slices if one.theta > 1e-4}
+    return BsdfData(tuple(slices), isotropic=len(azimuths) <= 1, mirrored=False, name="scans")

@@ -1,0 +1,127 @@
+"""What a goniometer measured: values at directions of incidence and scatter."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction
+
+Array = npt.NDArray[np.float64]
+
+SAME = 1e-6
+"""How far directions of incidence may differ that are one."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Scans:
+    """BRDF at measured pairs of directions, light meeting and leaving the front.
+
+    Parameters
+    ----------
+    incident, scattered : array, shape (n, 3)
+        Unit vectors away from the surface, +z the normal: to where the light comes from, and to the detector.
+    values : array, shape (n,)
+        f [1/sr].
+    standard_error : array, shape (n,), optional
+        Of the values [1/sr].
+    reflectance : float, optional
+        Total reflectance of an integrating sphere; tables are scaled to it at each incidence.
+
+    Raises
+    ------
+    ArgumentError
+        If shapes do not fit, a direction is no unit vector in front of the sample, a value is not finite or below 0.
+
+    Examples
+    --------
+    >>> one = Scans([[-0.6, 0, 0.8]], [[0.6, 0, 0.8]], [2.5])
+    >>> [round(theta, 3) for theta in one.thetas]
+    [36.87]
+    """
+
+    incident: Array
+    scattered: Array
+    values: Array
+    standard_error: Array | None = None
+    reflectance: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("incident", "scattered", "values", "standard_error"):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, np.array(given, np.float64))
+        n = self.values.shape
+        if len(n) != 1 or not n[0] or self.incident.shape != (*n, 3) or self.scattered.shape != (*n, 3):
+            raise ArgumentError("scans are n pairs of directions of shape (n, 3) with n values")
+        for name, vectors in (("incident", self.incident), ("scattered", self.scattered)):
+            unit = np.abs(np.linalg.norm(vectors, axis=1) - 1.0) < SAME
+            if not (unit & (vectors[:, 2] > 0.0)).all():
+                at = int(np.argmin(unit & (vectors[:, 2] > 0.0)))
+                raise ArgumentError(f"{name}[{at}] is {vectors[at].tolist()}, no unit vector in front of the sample")
+        if not (np.isfinite(self.values) & (self.values >= 0.0)).all():
+            raise ArgumentError("measured values are finite and not below 0")
+        if self.standard_error is not None and self.standard_error.shape != n:
+            raise ArgumentError("standard errors have the shape of the values")
+        if self.reflectance is not None and not 0.0 < self.reflectance <= 1.0:
+            raise ArgumentError(f"reflectance is {self.reflectance:g}; it must be more than 0 and at most 1")
+
+    @classmethod
+    def from_stages(
+        cls,
+        stages: npt.ArrayLike,
+        scattered_flux: npt.ArrayLike,
+        incident_flux: npt.ArrayLike,
+        *,
+        solid_angle: float,
+        reflectance: float | None = None,
+    ) -> Scans:
+        """From the raw angles of the four stages and fluxes.
+
+        Parameters
+        ----------
+        stages : array_like, shape (n, 4)
+            α, β, γ, δ [°].
+        scattered_flux, incident_flux : array_like
+            Of each position, and on the sample: n numbers, or one.
+        solid_angle : float
+            Of the aperture [sr].
+        reflectance : float, optional
+            As of the class.
+
+        Raises
+        ------
+        ArgumentError
+            As the class, and if a flux is not positive.
+
+        Examples
+        --------
+        >>> raw = Scans.from_stages([[240.0, 0.0, 30.0, 0.0]], [1e-4], 1.0, solid_angle=1e-3)
+        >>> raw.values.round(4).tolist(), raw.scattered.round(3).tolist()
+        ([0.1155], [[-0.5, 0.0, 0.866]])
+        """
+        angles = np.array(stages, np.float64)
+        if angles.ndim != 2 or angles.shape[1] != 4:
+            raise ArgumentError("stages are rows of α, β, γ, δ")
+        to = detector_direction(*angles.T)
+        f = bsdf_of_flux(scattered_flux, incident_flux, solid_angle=solid_angle, direction=to)
+        return cls(incident_direction(angles[:, 2], angles[:, 3]), to, f, reflectance=reflectance)
+
+    def by_incidence(self) -> list[tuple[Array, npt.NDArray[np.intp]]]:
+        """Each direction of incidence, by angle, and which values belong to it."""
+        left = np.arange(self.values.size)
+        found = []
+        while left.size:
+            first = self.incident[left[0]]
+            same = np.abs(self.incident[left] - first).max(axis=1) < SAME
+            found.append((first / np.linalg.norm(first), left[same]))
+            left = left[~same]
+        return sorted(found, key=lambda one: -one[0][2])
+
+    @property
+    def thetas(self) -> list[float]:
+        """Angles of incidence [°]."""
+        return [float(np.degrees(np.arccos(min(1.0, i[2])))) for i, _ in self.by_incidence()]

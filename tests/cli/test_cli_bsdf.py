@@ -1,0 +1,69 @@
+"""The verbs of scatter: what they say, write and refuse."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.quantities.bsdf_data import PolarGrid, direction
+
+from cli.outcome import Run
+
+
+@pytest.fixture
+def scans(tmp_path: Path) -> list[Path]:
+    """Two incidences of gloss paint without its gloss: a lobe on a floor."""
+    bsdf = et.bsdf.Mixture(
+        parts=[{"kind": "lambertian", "reflectance": 0.5}, {"kind": "gaussian", "peak": 1.0, "sigma": 0.2}]
+    )
+    paths = []
+    for theta in (10.0, 50.0):
+        incident = direction(theta, 180.0)
+        grid = PolarGrid("specular", np.arange(0.0, 140.0, 4.0), np.array([0.0, 90.0, 180.0, 270.0]))
+        at = grid.directions(incident, transmitted=False)
+        at = at[np.nan_to_num(at[..., 2], nan=-1.0) > 0.03]
+        f = bsdf.evaluate(incident, at)
+        rows = [
+            f"{theta},180,{math.degrees(math.acos(d[2]))},{math.degrees(math.atan2(d[1], d[0]))},{value}"
+            for d, value in zip(at, f, strict=True)
+        ]
+        paths.append(tmp_path / f"scan_{theta:g}.csv")
+        paths[-1].write_text("theta_i,phi_i,theta_s,phi_s,bsdf\n" + "\n".join(rows) + "\n")
+    return paths
+
+
+@pytest.mark.slow
+def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) -> None:
+    fitted = run("bsdf", "fit", *scans, "-o", "pet.h5", "--reflectance", "0.7", "--json")
+    assert fitted.status == 0, fitted.err
+    shares = json.loads(fitted.out)["shares"]
+    assert shares["10.0"] == pytest.approx(0.72, abs=0.04)
+    told = run("bsdf", "info", "pet.h5", "--json")
+    facts = json.loads(told.out)
+    assert [one["share"] for one in facts["tables"]] == pytest.approx([0.7, 0.7], abs=1e-3)
+    assert "10°" in run("bsdf", "info", "pet.h5").out
+    drawn = run("bsdf", "plot", "pet.h5", "-o", "pet.png", "--incidence", "30")
+    assert drawn.status == 0
+    assert Path("pet.png").stat().st_size > 5000
+    converted = run("bsdf", "convert", "pet.h5", "pet.txt", "--format", "tracepro")
+    assert converted.status == 0, converted.err
+    assert Path("pet.txt").read_text().startswith("TracePro Surface Property Data")
+    gloss = json.loads(run("bsdf", "gloss", "pet.h5", "--json").out)
+    assert set(gloss["gloss"]) == {"20", "60", "85"}
+
+
+def test_mistakes_are_told_and_nothing_is_written(run: Run, scans: list[Path]) -> None:
+    wrong = run("bsdf", "fit", *scans, "-o", "pet.h5", "--method", "smoth")
+    assert wrong.status == 2
+    assert "smooth" in wrong.err
+    scans[0].write_text("theta_i,phi_i,theta_s,phi_s,bsdf\n10,180,20,0,x\n")
+    broken = run("bsdf", "fit", *scans, "-o", "pet.h5")
+    assert broken.status == 1
+    assert "line 2" in broken.err
+    missing = run("bsdf", "info", "pet.h5")
+    assert missing.status == 1
+    assert not Path("pet.h5").exists()

@@ -1,0 +1,242 @@
+"""Goniometer scans: the printed equations of the thesis where they are right, the mended ones, and what schemes cost."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.quantities.bsdf_data import PolarGrid, direction, mirrored
+from etendue.scatter.scans import harvey_shack
+from etendue.scatter.scans.files import read_scans
+from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction
+from etendue.scatter.scans.interpolations import METHODS, SMALLEST, horizon, radial_coordinates, tabulated
+from etendue.scatter.scans.scans import Scans
+
+Array = npt.NDArray[np.float64]
+
+
+# --- appendix A ------------------------------------------------------------------------------------------------------
+
+
+def printed_detector(*, alpha: float, beta: float, gamma: float, delta: float) -> Array:
+    """Eq. A.2, letter by letter."""
+    a, b, g, d = (math.radians(x) for x in (alpha, beta, gamma, delta))
+    sin, cos = math.sin, math.cos
+    return np.array([
+        -cos(a) * cos(b) * sin(g) * cos(d) + sin(a) * cos(b) * cos(g) * cos(d) + sin(b) * sin(d),
+        cos(a) * cos(b) * sin(g) * sin(d) - sin(a) * cos(b) * cos(g) * sin(d) + sin(b) * cos(d),
+        -cos(a) * cos(b) * cos(g) - sin(a) * cos(b) * sin(g),
+    ])  # fmt: skip
+
+
+def test_stages_point_where_the_printed_equations_say() -> None:
+    rng = np.random.default_rng(3)
+    for alpha, beta, gamma, delta in rng.uniform([-180, -90, -90, -180], [180, 90, 90, 180], (200, 4)):
+        found = detector_direction(alpha, beta, gamma, delta)
+        assert np.allclose(found, printed_detector(alpha=alpha, beta=beta, gamma=gamma, delta=delta), atol=1e-14)
+        assert np.linalg.norm(found) == pytest.approx(1.0, abs=1e-14)
+        i = incident_direction(gamma, delta)
+        # At rest the light goes straight on into the detector; 180° + 2γ is the specular direction.
+        assert np.allclose(detector_direction(0, 0, gamma, delta), -i, atol=1e-14)
+        assert np.allclose(detector_direction(180 + 2 * gamma, 0, gamma, delta), mirrored(i), atol=1e-14)
+
+
+def test_bsdf_of_fluxes() -> None:
+    """Of a Lambertian sample: Φ ρ cosθ Ω/π arrives."""
+    to = direction(np.array([0.0, 40.0, 80.0]), 20.0)
+    flux = 0.7 / math.pi * to[:, 2] * 2e-4 * 3.0
+    assert bsdf_of_flux(flux, 3.0, solid_angle=2e-4, direction=to) == pytest.approx(np.full(3, 0.7 / math.pi))
+    with pytest.raises(ArgumentError, match="plane of the sample"):
+        bsdf_of_flux(1.0, 1.0, solid_angle=1e-3, direction=[1.0, 0.0, 0.0])
+    with pytest.raises(ArgumentError, match="more than 0"):
+        bsdf_of_flux(1.0, 0.0, solid_angle=1e-3, direction=[0.0, 0.0, 1.0])
+
+
+def test_coordinates_go_there_and_back_and_a17_as_printed_does_not() -> None:
+    rng = np.random.default_rng(4)
+    incident = direction(40.0, 25.0)
+    scattered = direction(np.degrees(np.arccos(rng.uniform(0.01, 1.0, 2000))), rng.uniform(0, 360, 2000))
+    r, a = harvey_shack.coordinates(incident, scattered)
+    assert np.allclose(harvey_shack.directions(incident, r, a), scattered, atol=1e-9)
+    # A.16, and A.17 with 2π − φ in place of φ + π.
+    i, d = incident, scattered
+    off = d[:, :2] + i[:2]
+    across = math.hypot(i[0], i[1])
+    phi = np.degrees(np.arccos((-i[1] * off[:, 0] + i[0] * off[:, 1]) / (np.hypot(*off.T) * across)))
+    below = (-i[0] * off[:, 0] - i[1] * off[:, 1]) / across < 0
+    assert np.allclose(np.where(below, 360.0 - phi, phi), a, atol=1e-5)
+    printed = np.where(below, phi + 180.0, phi)
+    wrong = np.abs((printed - a + 180.0) % 360.0 - 180.0) > 1e-5
+    assert wrong.mean() == pytest.approx(below.mean(), abs=0.01)
+    assert wrong.mean() > 0.5
+
+
+def test_at_normal_incidence_the_axis_is_x() -> None:
+    """Where A.13 is 0/0: A.4 to A.6."""
+    r, a = harvey_shack.coordinates([0.0, 0.0, 1.0], direction(30.0, [0.0, 100.0, 200.0]))
+    assert r == pytest.approx(np.full(3, 0.5))
+    assert a == pytest.approx([0.0, 100.0, 200.0])
+
+
+def test_the_edge_of_directions_and_b2_as_printed() -> None:
+    for theta in (0.0, 5.0, 60.0, 85.0):
+        incident = direction(theta, 130.0)
+        azimuth = np.arange(0.0, 360.0, 7.0)
+        r = harvey_shack.farthest(theta, azimuth)
+        assert not np.isnan(harvey_shack.directions(incident, r * (1 - 1e-9), azimuth)).any()
+        assert np.isnan(harvey_shack.directions(incident, r * (1 + 1e-9), azimuth)).all()
+    sine = math.sin(math.radians(60.0))
+    printed = math.sqrt(1.0 + sine**2 - 2.0 * sine * math.cos(math.radians(90.0)))
+    assert printed == pytest.approx(1.3229, abs=1e-4)
+    assert float(harvey_shack.farthest(60.0, 0.0)) == pytest.approx(0.5)
+
+
+def test_b4_as_printed_is_no_rotation() -> None:
+    """About X by −60°; with minus signs at (2,3) and (3,1) and +θ it turns the specular direction to Z."""
+
+    def matrix(*, theta: float, sign: float) -> Array:
+        c, s = math.cos(math.radians(theta)), math.sin(math.radians(theta))
+        return np.array([[1, 0, 0], [0, c, sign * s], [0, s, c]])
+
+    specular = np.array([0.0, math.sin(math.radians(60)), math.cos(math.radians(60))])
+    assert np.linalg.det(matrix(theta=-60.0, sign=+1.0)) == pytest.approx(-0.5)
+    mended = matrix(theta=60.0, sign=-1.0)
+    assert np.linalg.det(mended) == pytest.approx(1.0)
+    assert np.allclose(mended @ specular, [0, 0, 1])
+    # The frame of PolarGrid is that rotation: angles to the specular direction are kept.
+    incident = direction(60.0, 270.0)
+    at = direction(np.array([20.0, 50.0, 70.0]), np.array([80.0, 90.0, 100.0]))
+    r, _ = PolarGrid("specular", np.zeros(1), np.zeros(1)).coordinates(at, incident, transmitted=False)
+    assert np.cos(np.radians(r)) == pytest.approx((at @ mended.T)[:, 2])
+
+
+def test_limits_of_the_scans_are_those_of_the_thesis() -> None:
+    """(90°, 0°), (90° − θ, 90°), (90°, 180°), (90° + θ, 270°), azimuth 90° being forwards there."""
+    incident = direction(25.0, 180.0)
+    assert [round(horizon(incident, a), 9) for a in (90.0, 180.0, 270.0, 0.0)] == [90.0, 65.0, 90.0, 115.0]
+
+
+# --- appendix B ------------------------------------------------------------------------------------------------------
+
+PET = et.bsdf.RoughCoat(roughness=0.1, index=1.575, base_reflectance=0.99)
+
+
+def two_planes(bsdf: et.Bsdf, *, thetas: tuple[float, ...], reflectance: float | None = None) -> Scans:
+    """Denser at the specular direction, none where the detector would shade the light, as in fig. B.1."""
+    incidents, scattered = [], []
+    for theta in thetas:
+        incident = direction(theta, 180.0)
+        r = np.concatenate([np.arange(0.0, 10.0, 0.5), np.arange(10.0, 150.0, 5.0)])
+        at = PolarGrid("specular", r, np.array([0.0, 90.0, 180.0, 270.0])).directions(incident, transmitted=False)
+        own = at[~np.isnan(at[..., 0])]
+        shaded = own @ incident > math.cos(math.radians(6.0))
+        own = own[(own[:, 2] > math.sin(math.radians(2.0))) & ~shaded]
+        incidents.append(np.tile(incident, (len(own), 1)))
+        scattered.append(own)
+    i, s = np.concatenate(incidents), np.concatenate(scattered)
+    return Scans(i, s, bsdf.evaluate(i, s), reflectance=reflectance)
+
+
+@pytest.mark.slow
+def test_what_each_scheme_costs() -> None:
+    """Shares before scaling: triangles in U, V lose a third, as 67 and 75 % in the thesis; those about the specular few."""
+    scans = two_planes(PET, thetas=(5.0, 60.0))
+    truth = PET.reflectance([5.0, 60.0])
+    lost = {
+        name: np.array([one.stated for one in tabulated(scans, name).slices], float) / truth - 1.0 for name in METHODS
+    }
+    assert (lost["direction-cosines"] < -0.2).all()
+    assert (np.abs(lost["specular-centred"]) < 0.12).all()
+    assert (np.abs(lost["smooth"]) < 0.12).all()
+    assert (np.abs(lost["smooth"]) < np.abs(lost["direction-cosines"])).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["specular-centred", "smooth"])
+def test_the_lobe_comes_back(method: str) -> None:
+    """f about the specular direction to 10 %, between the planes too; the share is the stated one."""
+    table = et.BsdfTable.from_scans(two_planes(PET, thetas=(5.0, 30.0, 60.0), reflectance=0.97), method)
+    incident = direction(30.0, 180.0)
+    at = PolarGrid("specular", np.array([1.0, 4.0, 8.0]), np.arange(0.0, 360.0, 22.5))
+    scattered = at.directions(incident, transmitted=False)
+    ratio = table.evaluate(incident, scattered) / PET.evaluate(incident, scattered)
+    assert float(np.abs(ratio / np.median(ratio) - 1.0).max()) < 0.1
+    assert table.reflectance([5.0, 30.0, 60.0]) == pytest.approx(np.full(3, 0.97), abs=2e-3)
+
+
+@pytest.mark.slow
+def test_stated_errors_of_the_smooth_method_hold() -> None:
+    """Noise of 5 % on a Lambertian surface: f misses R/π by less than its standard error, which is that of one value."""
+    rng = np.random.default_rng(7)
+    squares = []
+    for _ in range(8):
+        clean = two_planes(et.bsdf.Lambertian(reflectance=0.8), thetas=(30.0,))
+        noisy = Scans(
+            clean.incident, clean.scattered, clean.values * np.exp(0.05 * rng.standard_normal(clean.values.size))
+        )
+        (one,) = tabulated(noisy, "smooth").slices
+        assert one.standard_error is not None
+        there = ~np.isnan(one.values)
+        z = (one.values[there] - 0.8 / math.pi) / one.standard_error[there]
+        squares.append(float(np.median(z * z)))
+    # The median of χ² with one degree of freedom is 0.455.
+    assert 0.455 / 10 < np.mean(squares) < 0.455
+
+
+def test_grids_are_those_of_the_thesis() -> None:
+    r = radial_coordinates()
+    assert (r.size, r[0], r[1], r[-1]) == (100, 0.0, SMALLEST, 2.0)
+
+
+def test_impossible_scans_are_refused() -> None:
+    i, s = [direction(30.0, 180.0)], [direction(30.0, 0.0)]
+    with pytest.raises(ArgumentError, match="shape"):
+        Scans(np.array(i), np.array(s), np.ones(2))
+    with pytest.raises(ArgumentError, match="no unit vector"):
+        Scans(np.array(i), -np.array(s), np.ones(1))
+    with pytest.raises(ArgumentError, match="not below 0"):
+        Scans(np.array(i), np.array(s), -np.ones(1))
+    with pytest.raises(ArgumentError, match="fewer than two"):
+        tabulated(Scans(np.array(i), np.array(s), np.ones(1)))
+    with pytest.raises(UnknownNameError, match="smooth"):
+        tabulated(Scans(np.array(i), np.array(s), np.ones(1)), "smoth")
+
+
+# --- files -----------------------------------------------------------------------------------------------------------
+
+
+def test_stages_in_two_files(tmp_path: Path) -> None:
+    scan, arriving = tmp_path / "scan.csv", tmp_path / "incident.csv"
+    scan.write_text(
+        "# a comment\nalpha;beta;gamma;delta;flux\n" + "".join(f"{240 + a};0;30;0;1e-4\n" for a in (-5, 0, 5))
+    )
+    arriving.write_text("alpha,beta,gamma,delta,flux\n0,0,0,0,0.9\n0,0,0,0,1.1\n")
+    scans = read_scans([scan], incident_flux=arriving, solid_angle=1e-3, reflectance=0.9)
+    assert scans.thetas == pytest.approx([30.0])
+    assert scans.values[1] == pytest.approx(0.1 / math.cos(math.radians(30.0)))
+    with pytest.raises(ArgumentError, match="state the incident flux"):
+        read_scans([scan])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "the file is empty"),
+        ("theta,phi\n1,2\n", "columns theta, phi"),
+        ("theta_i,phi_i,theta_s,phi_s,bsdf,colour\n", "columns"),
+        ("theta_i,phi_i,theta_s,phi_s,bsdf\n", "no values follow"),
+        ("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0\n", "4 fields; the columns are 5"),
+        ("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0,nan\n", "no finite number"),
+        ("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0,-1\n", "a value of -1"),
+    ],
+)
+def test_mistakes_in_files_are_told(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "scan.csv"
+    path.write_text(text)
+    with pytest.raises(FormatError, match=said):
+        read_scans([path])
