@@ -150,6 +150,7 @@ WITHOUT_EXAMPLE = {
     "etendue.plot.scene_parts.Glow": "a part of a View",
     "etendue.plot.scene_parts.Part": "within shows one",
     "etendue.plot.scene_parts.View": "a part of a SceneLayout",
+    "etendue.scatter.scans.interpolations": "tabulated shows how all are used",
     "etendue.scatter.models.rough.Rough": "what its kinds share; each has an example",
     "etendue.formats": "formats live on files: docs/how-to.md writes and reads them, the tests take them apart",
     "etendue.lightfield.etendue_density": "what LightField is made of, which shows it",

@@ -100,6 +100,32 @@ impl Profile {
         }
     }
 
+    /// The distance up to which ∫ f r dr is `wanted`, where that has a closed form.
+    fn distance(&self, wanted: f64) -> Option<f64> {
+        match *self {
+            Self::ABg { a, b, g } if g == 2.0 => {
+                // a/2 ln(1 + r²/b).
+                Some((b * (exp(2.0 * wanted / a) - 1.0)).max(0.0).sqrt())
+            }
+            Self::ABg { a, b, g } if g == 0.0 => Some((2.0 * wanted * (b + 1.0) / a).sqrt()),
+            Self::ABg { .. } => None,
+            Self::HarveyShack { b0, l, s } => {
+                // b₀ L²/(S + 2) ((1 + q²)^(S/2 + 1) − 1), and its limit b₀ L²/2 ln(1 + q²).
+                let (unit, power) = (wanted / (b0 * l * l), 0.5 * s + 1.0);
+                let square = if power.abs() < 1e-6 {
+                    exp(2.0 * unit)
+                } else {
+                    exp(ln((1.0 + 2.0 * power * unit).max(f64::MIN_POSITIVE)) / power)
+                };
+                Some(l * (square - 1.0).max(0.0).sqrt())
+            }
+            Self::Gaussian { peak, sigma } => {
+                let left = 1.0 - wanted / (peak * sigma * sigma);
+                Some(sigma * (-2.0 * ln(left.max(1e-14))).max(0.0).sqrt())
+            }
+        }
+    }
+
     /// A distance at which it begins to fall.
     fn width(&self) -> f64 {
         match *self {
@@ -267,6 +293,9 @@ impl Lobe {
 
     /// The distance up to which ∫ f r dr is this.
     fn distance(&self, wanted: f64) -> f64 {
+        if let Some(r) = self.profile.distance(wanted) {
+            return r;
+        }
         let last = self.radial.len() - 2;
         let i = (self.cumulative.partition_point(|sum| *sum <= wanted).max(1) - 1).min(last);
         let (start, mut low, mut high) = (self.radial[i], self.radial[i], self.radial[i + 1]);
@@ -523,6 +552,26 @@ mod tests {
         // Gaussian: 2π σ² peak (1 − exp(−1/(2σ²))).
         let closed = TAU * 0.09 * 1.2 * (1.0 - (-0.5_f64 / 0.09).exp());
         assert!((tis(Profile::Gaussian { peak: 1.2, sigma: 0.3 }, 0.0) - closed).abs() < 1e-6);
+    }
+
+    #[test]
+    fn distances_are_those_of_the_quadrature() {
+        let (b0, l) = (2.0, 0.05_f64);
+        for profile in [
+            Profile::ABg { a: 0.1, b: 0.1, g: 2.0 },
+            Profile::ABg { a: 0.1, b: 0.1, g: 0.0 },
+            Profile::ABg { a: 0.1, b: 0.1, g: 1.7 },
+            Profile::HarveyShack { b0, l, s: -1.5 },
+            Profile::HarveyShack { b0, l, s: -2.0 },
+            Profile::HarveyShack { b0, l, s: -4.0 },
+            Profile::Gaussian { peak: 1.2, sigma: 0.3 },
+        ] {
+            let lobe = Lobe::new(profile, false, false).expect("sound");
+            for r in [1e-3, 0.02, 0.3, 0.9] {
+                let back = lobe.distance(lobe.up_to(r));
+                assert!((back / r - 1.0).abs() < 2e-5, "{profile:?}: {r} {back}");
+            }
+        }
     }
 
     #[test]
