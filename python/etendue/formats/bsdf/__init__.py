@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from etendue.errors import FormatError, UnknownNameError, UnsupportedFormatError
-from etendue.formats.bsdf import etendue_hdf5, fred, klems, speos, tracepro, zemax
+from etendue.formats.bsdf import astm, etendue_hdf5, fred, klems, speos, tracepro, zemax
 from etendue.formats.bsdf.bsdf_format import SNIFFED_BYTES, BsdfFormat
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import as_path, require_readable
@@ -14,7 +14,7 @@ from etendue.formats.output import atomic_output
 from etendue.quantities.bsdf_data import BsdfData
 
 BSDF_FORMATS: dict[str, BsdfFormat] = {
-    module.FORMAT.name: module.FORMAT for module in (etendue_hdf5, fred, klems, speos, tracepro, zemax)
+    module.FORMAT.name: module.FORMAT for module in (astm, etendue_hdf5, fred, klems, speos, tracepro, zemax)
 }
 """Every format by name."""
 

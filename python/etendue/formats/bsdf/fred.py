@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.points import on_grid
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number
@@ -131,18 +132,12 @@ def _slices(path: Path, block: Block, scale: float, *, mirrored: bool) -> list[B
         if not len(own):
             continue
         polar = np.where(transmitted, 180.0 - own[:, 0], own[:, 0])
-        radial, azimuth = np.unique(polar), np.unique(own[:, 1])
-        if np.ptp(azimuth) > 360.0 or radial.size * azimuth.size > 100 * len(own):
+        made = on_grid(polar, own[:, 1], np.maximum(own[:, 2], 0.0) * scale)
+        if made is None:
             raise FormatError(
                 path, f"{theta:g}° of incidence", "directions that make no grid", "Export a grid of θ and φ."
             )
-        values = np.full((azimuth.size, radial.size), np.nan)
-        values[np.searchsorted(azimuth, own[:, 1]), np.searchsorted(radial, polar)] = np.maximum(own[:, 2], 0.0) * scale
-        if radial[0] == 0.0:
-            # Along the normal all azimuths are one direction.
-            values[:, 0] = np.nanmean(values[:, 0])
-        if np.ptp(azimuth) == 360.0:
-            azimuth, values = azimuth[:-1], values[:-1]
+        radial, azimuth, values = made
         if mirrored:
             inner = (azimuth - turn > 0.0) & (azimuth - turn < 180.0)
             azimuth = np.concatenate([azimuth, 2.0 * turn + 360.0 - azimuth[inner][::-1]])

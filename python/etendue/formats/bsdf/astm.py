@@ -1,0 +1,226 @@
+"""ASTM E1392 and E2387 style text: lines of keys, then directions in radians with values."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.points import on_grid, projected_solid_angles
+from etendue.formats.bsdf.tokens import ADVICE, LARGEST
+from etendue.formats.encodings import decoded
+from etendue.formats.rays.text_rows import number, whole
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.report import Complaint
+
+Array = npt.NDArray[np.float64]
+
+ANGLES = ("theta_i", "phi_i", "theta_s", "phi_s")
+
+THETA = np.concatenate([np.arange(0.0, 80.0, 2.0), np.arange(80.0, 90.0, 1.0)])
+PHI_STEP, TURN = 5.0, 45.0
+"""Directions of tables that are made to be written [°]."""
+
+SAME = 1e-6
+"""Angles of incidence that differ by less are one [rad]."""
+
+
+def recognise(head: bytes) -> bool:
+    """By the line that names the variables, and a key of the standard before it."""
+    found = re.search(rb"^VARS[ \t]+theta_i[ \t]*,", head, re.MULTILINE)
+    return found is not None and b"NUM_POINTS" in head
+
+
+def read(path: Path) -> BsdfData:
+    """Read all incidences, from both sides, reflected and transmitted; of X, Y, Z the second.
+
+    Angles are those of étendue: from the normal of the front and from +x, of directions away from the surface; θ beyond 90°
+    is behind it. So the mirrored direction has φs = φi + π. Directions that make a grid in θ and φ become one; others stand
+    for what is nearest to them.
+    """
+    with path.open("rb") as file:
+        data = file.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise FormatError(path, "length", "more than 256 MiB", "No measurement of a BSDF is so large.")
+    text = decoded(path, data)
+    lines = text.splitlines()
+    if not text.endswith(("\n", "\r")):
+        advice = "If it is whole, end it; if not, ask for the file again."
+        raise FormatError(path, f"line {len(lines)}", "the last line has no end", advice)
+    facts, names, begin = _header(path, lines)
+    rows = _rows(path, lines, begin, len(names), facts)
+    channels, complaints = _channels(path, names, begin)
+    slices = [one for column, wavelength in channels for one in _slices(rows, column, wavelength)]
+    if (rows[:, [column for column, _ in channels]] < 0.0).any():
+        complaints.append(Complaint("warning", "values", "values below 0 became 0"))
+    turns = {round(one.phi, 4) for one in slices if one.theta > 1e-3}
+    fronts = {one.front for one in slices}
+    return BsdfData(
+        tuple(slices),
+        isotropic=len(turns) <= 1,
+        mirrored=False,
+        both_sides=len(fronts) == 1,
+        name=facts.get("SAMPLE_NAME", "") or path.stem,
+        complaints=tuple(complaints),
+        facts=facts,
+    )
+
+
+def _header(path: Path, lines: list[str]) -> tuple[dict[str, str], list[str], int]:
+    """Keys with their values, names of the variables, and the first line of data."""
+    facts: dict[str, str] = {}
+    for at, line in enumerate(lines):
+        key, _, value = line.strip().partition(" ")
+        key, value = (key, value) if value else (line.strip().partition("\t")[0], line.strip().partition("\t")[2])
+        if key == "VARS":
+            names = [name.strip() for name in value.split(",")]
+            if tuple(names[:4]) != ANGLES or len(names) < 5 or len(set(names)) < len(names):
+                found = f"VARS are {', '.join(names)[:100]}"
+                raise FormatError(
+                    path, f"line {at + 1}", found, f"They begin with {', '.join(ANGLES)}, and values follow."
+                )
+            return facts, names, at + 1
+        facts[key] = value.strip()
+    raise FormatError(path, f"line {len(lines)}", "there is no VARS", ADVICE)
+
+
+def _rows(path: Path, lines: list[str], begin: int, columns: int, facts: dict[str, str]) -> Array:
+    count = whole(facts.get("NUM_POINTS", ""))
+    rows = []
+    for at, line in enumerate(lines[begin:], begin + 1):
+        if not line.strip():
+            continue
+        fields = line.split(",")
+        try:
+            values = [number(field.strip()) for field in fields]
+        except ValueError:
+            values = [np.nan]
+        if len(fields) != columns or not np.isfinite(values).all():
+            found = f"{line.strip()[:60]!r} is not {columns} finite numbers"
+            raise FormatError(path, f"line {at}", found, ADVICE)
+        rows.append(values)
+    if count is None or count != len(rows) or not rows:
+        found = f"{len(rows)} points; NUM_POINTS is {facts.get('NUM_POINTS', 'not stated')[:20]!r}"
+        raise FormatError(path, f"line {len(lines)}", found, ADVICE)
+    angles = np.array(rows)
+    # Angles below 0 are those a turn later; θ may run on either side of the normal.
+    if (np.abs(angles[:, :4]) > 2.0 * np.pi + 1e-9).any():
+        raise FormatError(path, "angles", "angles beyond a turn", "They are in radians in this format.")
+    for theta, phi in ((0, 1), (2, 3)):
+        over = angles[:, theta] < 0.0
+        angles[over, theta] *= -1.0
+        angles[over, phi] += np.pi
+        angles[:, phi] %= 2.0 * np.pi
+    flat = np.abs(angles[:, 0] - 0.5 * np.pi) < 1e-6
+    if flat.any() or (angles[:, [0, 2]] > np.pi + 1e-9).any():
+        raise FormatError(path, "angles", "light along the surface, or θ beyond π", "Leave such points out.")
+    return angles
+
+
+def _channels(path: Path, names: list[str], begin: int) -> tuple[list[tuple[int, float | None]], list[Complaint]]:
+    """Columns to read, with their wavelengths [nm]."""
+    own = names[4:]
+    if len(own) == 1 and not own[0].endswith("nm"):
+        return [(4, None)], []
+    upper = [name.upper() for name in own]
+    if upper == ["X", "Y", "Z"]:
+        return [(5, None)], [Complaint("note", "VARS", "of X, Y, Z the second is read")]
+    try:
+        waves = [number(name.removesuffix("nm").strip()) for name in own]
+    except ValueError:
+        advice = "étendue reads one value, X,Y,Z, or wavelengths as 465nm."
+        raise UnsupportedFormatError(path, f"line {begin}", f"values named {', '.join(own)[:60]}", advice) from None
+    return [(4 + k, wave) for k, wave in enumerate(waves)], []
+
+
+def _slices(rows: Array, column: int, wavelength: float | None) -> list[BsdfSlice]:
+    """One for each incidence and way."""
+    found = []
+    incidences = np.unique(np.round(rows[:, :2] / SAME), axis=0) * SAME
+    for theta, phi in incidences:
+        own = rows[(np.abs(rows[:, :2] - (theta, phi)) < 2.0 * SAME).all(axis=1)]
+        behind = theta > 0.5 * np.pi
+        incident = direction(
+            np.degrees(np.pi - own[0, 0] if behind else own[0, 0]), np.degrees(own[0, 1]), behind=behind
+        )
+        for transmitted in (False, True):
+            there = own[(own[:, 2] > 0.5 * np.pi) == (behind != transmitted)]
+            if not len(there):
+                continue
+            below = behind != transmitted
+            polar = np.degrees(np.pi - there[:, 2] if below else there[:, 2])
+            f = np.maximum(there[:, column], 0.0)
+            grid = on_grid(polar, np.degrees(there[:, 3]), f)
+            if grid is not None:
+                radial, azimuth, values = grid
+                at = PolarGrid("normal", radial, azimuth)
+                found.append(BsdfSlice(incident, values, transmitted, grid=at, wavelength=wavelength))
+            else:
+                points = direction(polar, np.degrees(there[:, 3]), behind=below)
+                projected = projected_solid_angles(points)
+                one = BsdfSlice(incident, f, transmitted, points=points, projected=projected, wavelength=wavelength)
+                found.append(one)
+    return found
+
+
+def fits(data: BsdfData) -> bool:
+    """Whether the slices are tables about the normal below 90°, of one colour."""
+    return (
+        bool(data.slices)
+        and not data.components
+        and all(
+            one.grid is not None
+            and one.grid.frame == "normal"
+            and one.wavelength is None
+            and one.grid.radial[-1] < 90.0
+            and not np.isnan(one.values).any()
+            for one in data.slices
+        )
+    )
+
+
+def tabulate(bsdf: Tabulated) -> BsdfData:
+    """Light from both sides, or from the front if the back is alike; reflected and transmitted."""
+    turns = (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))
+    slices = []
+    for front in (True,) if bsdf.both_sides else (True, False):
+        for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
+            for turn in turns if is_there else ():
+                for theta in bsdf.incidences:
+                    incident = direction(theta, (180.0 + turn) % 360.0, behind=not front)
+                    grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP))
+                    scattered = grid.directions(incident, transmitted=transmitted)
+                    slices.append(BsdfSlice(incident, bsdf.evaluate(incident, scattered), transmitted, grid=grid))
+    return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, both_sides=bsdf.both_sides, name=bsdf.name)
+
+
+def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
+    """Write all points, twelve digits of the angles and nine of the values."""
+    rows = []
+    for one in data.slices:
+        grid = one.grid
+        assert grid is not None  # noqa: S101 - `fits` says so
+        theta_i = np.radians(one.theta if one.front else 180.0 - one.theta)
+        polar = np.radians(grid.radial if one.front != one.transmitted else 180.0 - grid.radial)
+        azimuth = np.radians(grid.azimuth % 360.0)
+        for k, a in enumerate(azimuth):
+            for i, t in enumerate(polar):
+                if i == 0 and k > 0 and grid.radial[0] == 0.0:
+                    continue
+                rows.append(f"{theta_i:.12g},{np.radians(one.phi):.12g},{t:.12g},{a:.12g},{one.values[k, i]:.9g}")
+    name = " ".join(data.name.encode("ascii", "replace").decode("ascii").split())
+    head = ["LAB_NAME -", "SYSTEM_NAME etendue", f"SAMPLE_NAME {name}", f"NUM_POINTS {len(rows)}"]
+    head.append(f"VARS {','.join(ANGLES)},BSDF")
+    stream.write(("\n".join([*head, *rows]) + "\n").encode("ascii"))
+    lost = []
+    if any(one.standard_error is not None for one in data.slices):
+        lost.append("the format has no standard errors")
+    return tuple(lost)
+
+
+FORMAT = BsdfFormat("astm", "ASTM E1392/E2387 text", (".astm",), recognise, read, fits, tabulate, write)
