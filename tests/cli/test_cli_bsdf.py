@@ -46,8 +46,8 @@ def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) ->
     facts = json.loads(told.out)
     assert [one["share"] for one in facts["tables"]] == pytest.approx([0.7, 0.7], abs=1e-3)
     assert "10°" in run("bsdf", "info", "pet.h5").out
-    drawn = run("bsdf", "plot", "pet.h5", "-o", "pet.png", "--incidence", "30")
-    assert drawn.status == 0
+    drawn = run("bsdf", "plot", "pet.h5", "-o", "pet.png", "--incidence", "30", "--json")
+    assert json.loads(drawn.out)["output"] == "pet.png"
     assert Path("pet.png").stat().st_size > 5000
     converted = run("bsdf", "convert", "pet.h5", "pet.txt", "--format", "tracepro")
     assert converted.status == 0, converted.err

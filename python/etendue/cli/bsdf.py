@@ -87,14 +87,19 @@ def plot(
     output: Annotated[Path, typer.Option("--output", "-o", help="The picture, .png or .pdf.")],
     incidence: Annotated[float, typer.Option("--incidence", help="Angle of the diagram in the middle [°].")] = 45.0,
     side: Annotated[str, typer.Option("--side", help="The side that the light meets: front or back.")] = "front",
+    json: Json = False,
 ) -> None:
     """Draw f in the plane of incidence, the lobe in direction cosines, and the shares over the angle of incidence."""
     one_of(side, ("front", "back"), "--side")
     check_folder(output)
     bsdf = read_bsdf(file)
-    for complaint in bsdf.complaints:
-        complain(str(complaint))
+    complaints = [str(complaint) for complaint in bsdf.complaints]
     plot_bsdf(bsdf, output, incidence=incidence, side="back" if side == "back" else "front", title=bsdf.name or None)
+    if json:
+        print_json({"output": output, "complaints": complaints})
+        return
+    for complaint in complaints:
+        complain(complaint)
     say(f"{output}: f of {file}")
 
 
