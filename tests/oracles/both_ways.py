@@ -50,7 +50,8 @@ def forwards_and_backwards_agree(
     assert np.isfinite(z).all()
     statistic = float(np.sum(z * z))
     assert statistic < chi2.ppf(1.0 - 1e-4, z.size), (statistic, forwards.values, backwards.values)
-    assert float((error / backwards.values).max()) < sharp
+    least = float((error / backwards.values).max())
+    assert least < sharp, least
 
 
 def two_walls(finish: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ import pytest
 from etendue.description.files import Files
 from etendue.description.tables import Grid, on_common_nodes
 from etendue.errors import ArgumentError, SceneError
+from etendue.scatter.materials import MATERIALS
 from etendue.scatter.models.shares import PARTS
 from etendue.scene import Scene, compile_scene, finishes
 from etendue.scene.finishes import BUILT_IN, FINISHES
@@ -193,7 +194,7 @@ def test_interfaces_on_surfaces_are_told_of() -> None:
 
 
 def test_built_in_finishes() -> None:
-    assert set(BUILT_IN) == {"interface", "absorber", "mirror", "transparent"}
+    assert set(BUILT_IN) == {"interface", "absorber", "mirror", "transparent", *MATERIALS}
     transparent = BUILT_IN["transparent"].record(HERE)
     assert transparent["specular_transmittance"]["values"].tolist() == [[1.0]]
 

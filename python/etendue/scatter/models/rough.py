@@ -12,7 +12,7 @@ from pydantic import Field
 
 from etendue.description.files import Files
 from etendue.description.tables import Grid, Shares, grid_of
-from etendue.description.values import AsNumber, Finite, NotNegative
+from etendue.description.values import AsNumber, Finite
 from etendue.errors import ArgumentError
 from etendue.scatter.models.finish import Directed, Record
 
@@ -76,7 +76,7 @@ class RoughMetal(Rough):
     kind: Literal["rough-metal"] = "rough-metal"
     stated_reflectance: Shares | None = Field(default=None, alias="reflectance")
     index: Annotated[float, Finite, Gt(0.0), Le(100.0), AsNumber] | None = None
-    extinction: Annotated[NotNegative, Le(100.0)] | None = None
+    extinction: Annotated[float, Finite, Ge(0.0), Le(100.0), AsNumber] | None = None
 
     def parameters(self, files: Files) -> Record:
         """The reflectance, by Fresnel's equations where the index is stated."""
