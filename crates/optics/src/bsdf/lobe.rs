@@ -103,11 +103,11 @@ impl Profile {
     /// The distance up to which ∫ f r dr is `wanted`, where that has a closed form.
     fn distance(&self, wanted: f64) -> Option<f64> {
         match *self {
-            Self::ABg { a, b, g } if g == 2.0 => {
+            Self::ABg { a, b, g: 2.0 } => {
                 // a/2 ln(1 + r²/b).
                 Some((b * (exp(2.0 * wanted / a) - 1.0)).max(0.0).sqrt())
             }
-            Self::ABg { a, b, g } if g == 0.0 => Some((2.0 * wanted * (b + 1.0) / a).sqrt()),
+            Self::ABg { a, b, g: 0.0 } => Some((2.0 * wanted * (b + 1.0) / a).sqrt()),
             Self::ABg { .. } => None,
             Self::HarveyShack { b0, l, s } => {
                 // b₀ L²/(S + 2) ((1 + q²)^(S/2 + 1) − 1), and its limit b₀ L²/2 ln(1 + q²).
