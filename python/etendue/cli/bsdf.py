@@ -24,19 +24,22 @@ ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0)
 """Angles of incidence at which shares are told [°]."""
 
 File = Annotated[Path, typer.Argument(help="A file with a BSDF, of any format that étendue reads.")]
+Files = Annotated[
+    list[Path], typer.Argument(help="A file with a BSDF; or several that hold a part each, as one incidence.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
-def info(file: File, json: Json = False) -> None:
+def info(files: Files, json: Json = False) -> None:
     """Say what a file holds: incidences, sides, shares by angle, reciprocity, and what is not as it should be."""
-    bsdf = read_bsdf(file)
-    facts = _facts(file, bsdf)
+    bsdf = read_bsdf(files)
+    facts = _facts(files, bsdf)
     if json:
         print_json(facts)
         return
     for complaint in facts["complaints"]:
         complain(complaint)
-    say(f"{file}: {bsdf.name or 'no name'}, {'isotropic' if bsdf.isotropic else 'anisotropic'}")
+    say(f"{_named(files)}: {bsdf.name or 'no name'}, {'isotropic' if bsdf.isotropic else 'anisotropic'}")
     for one in facts["tables"]:
         stated = "" if one["stated"] is None else f", stated {one['stated']:.4f}"
         way = "transmitted" if one["transmitted"] else "reflected"
@@ -51,7 +54,11 @@ def info(file: File, json: Json = False) -> None:
     say(f"reciprocity: f there and back differ by {facts['reciprocity']:.1%} on average")
 
 
-def _facts(file: Path, bsdf: BsdfTable) -> dict[str, Any]:
+def _named(files: list[Path]) -> str:
+    return str(files[0]) if len(files) == 1 else f"{len(files)} files"
+
+
+def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
     # A file of many slices is told by the first azimuth.
     first = {(one.front, one.transmitted, round(one.theta, 6)): one for one in reversed(bsdf.data.slices)}
     tables = [
@@ -68,7 +75,7 @@ def _facts(file: Path, bsdf: BsdfTable) -> dict[str, Any]:
     ]
     angles = np.array(ANGLES)
     return {
-        "file": file,
+        "file": files[0] if len(files) == 1 else files,
         "name": bsdf.name,
         "isotropic": bsdf.isotropic,
         "slices": len(bsdf.data.slices),
@@ -104,18 +111,18 @@ def plot(
 
 
 def convert(
-    file: File,
+    files: Files,
     output: Annotated[Path, typer.Argument(help="The file to write.")],
     format: Annotated[
         str | None, typer.Option("--format", help="Format to write; from the extension of OUTPUT if not given.")
     ] = None,
     json: Json = False,
 ) -> None:
-    """Read a file and write another one; what gets lost is told."""
+    """Read a file, or several that belong together, and write another one; what gets lost is told."""
     if format is not None:
         one_of(format, BSDF_FORMATS, "--format")
     check_folder(output)
-    bsdf = read_bsdf(file)
+    bsdf = read_bsdf(files)
     complaints = [str(complaint) for complaint in bsdf.complaints]
     notes = list(write_bsdf(output, bsdf, format))
     if json:
@@ -123,7 +130,7 @@ def convert(
         return
     for line in (*complaints, *(f"note: {note}" for note in notes)):
         complain(line)
-    say(f"{output}: {len(bsdf.data.slices)} slices read from {file}")
+    say(f"{output}: {len(bsdf.data.slices)} slices read from {_named(files)}")
 
 
 def gloss(file: File, json: Json = False) -> None:

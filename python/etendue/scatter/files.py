@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from etendue.errors import ArgumentError
 from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
 from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf
 from etendue.scatter.models.finish import Finish
 from etendue.scatter.table import BsdfTable
@@ -20,13 +22,14 @@ INCIDENCES = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 85
 """Angles [°] at which a model is tabled."""
 
 
-def read_bsdf(path: str | os.PathLike[str]) -> BsdfTable:
+def read_bsdf(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> BsdfTable:
     """Read a BSDF; the format is found from the content.
 
     Parameters
     ----------
-    path : path
-        A file of any format of docs/formats/bsdf-files.md.
+    path : path or sequence of paths
+        A file of any format of docs/formats/bsdf-files.md; or several that hold a part each, as goniophotometers write one
+        for each incidence: their slices and components are put together.
 
     Returns
     -------
@@ -38,9 +41,9 @@ def read_bsdf(path: str | os.PathLike[str]) -> BsdfTable:
     FormatError
         If it is none of the formats, or damaged; UnsupportedFormatError for formats that are known and refused.
     ArgumentError
-        If a slice scatters more than 101 % of the light.
+        If a slice scatters more than 101 % of the light, two files hold the same one, or there is no file.
     OSError
-        If the file cannot be opened.
+        If a file cannot be opened.
 
     Examples
     --------
@@ -51,7 +54,40 @@ def read_bsdf(path: str | os.PathLike[str]) -> BsdfTable:
     ...     read_bsdf(Path(folder) / "film.h5").reflectance(30).round(3).tolist()
     0.706
     """
-    return BsdfTable(read_bsdf_data(path))
+    paths = [path] if isinstance(path, str | os.PathLike) else list(path)
+    if not paths:
+        raise ArgumentError("there is no file to read")
+    parts = [read_bsdf_data(one) for one in paths]
+    return BsdfTable(parts[0] if len(parts) == 1 else _joined(parts, [Path(one).name for one in paths]))
+
+
+def _joined(parts: Sequence[BsdfData], names: Sequence[str]) -> BsdfData:
+    """What several files hold of one sample."""
+    slices = tuple(one for part in parts for one in part.slices)
+    places: dict[tuple[float, float, bool, bool, float | None], str] = {}
+    for part, name in zip(parts, names, strict=True):
+        for one in part.slices:
+            place = (round(one.theta, 4), round(one.phi, 4), one.front, one.transmitted, one.wavelength)
+            if place in places:
+                both = f"{places[place]} and {name}"
+                raise ArgumentError(f"{both} both hold light from {one.theta:g}°, azimuth {one.phi:g}°")
+            places[place] = name
+    turns = {round(one.phi, 3) % 360.0 for one in slices if one.theta > 1e-3}
+    complaints = [
+        Complaint(complaint.severity, f"{name}, {complaint.place}", complaint.found)
+        for part, name in zip(parts, names, strict=True)
+        for complaint in part.complaints
+    ]
+    return BsdfData(
+        slices,
+        tuple(component for part in parts for component in part.components),
+        isotropic=all(part.isotropic for part in parts) and len(turns) <= 1,
+        mirrored=all(part.mirrored for part in parts),
+        both_sides=len({one.front for one in slices}) <= 1 and all(part.both_sides for part in parts),
+        name=parts[0].name,
+        complaints=tuple(complaints),
+        facts=parts[0].facts,
+    )
 
 
 class _Asked:

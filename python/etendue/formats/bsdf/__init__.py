@@ -6,7 +6,26 @@ import os
 from pathlib import Path
 
 from etendue.errors import FormatError, UnknownNameError, UnsupportedFormatError
-from etendue.formats.bsdf import astm, etendue_hdf5, fred, klems, speos, tracepro, zemax
+from etendue.formats.bsdf import (
+    astm,
+    bird,
+    etendue_hdf5,
+    fred,
+    klems,
+    lighttools,
+    merl,
+    pab,
+    rgl,
+    speos,
+    speos_brdf,
+    speos_coated,
+    speos_scattering,
+    speos_simple,
+    ssdd,
+    tensor_tree,
+    tracepro,
+    zemax,
+)
 from etendue.formats.bsdf.bsdf_format import SNIFFED_BYTES, BsdfFormat
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import as_path, require_readable
@@ -14,15 +33,38 @@ from etendue.formats.output import atomic_output
 from etendue.quantities.bsdf_data import BsdfData
 
 BSDF_FORMATS: dict[str, BsdfFormat] = {
-    module.FORMAT.name: module.FORMAT for module in (astm, etendue_hdf5, fred, klems, speos, tracepro, zemax)
+    module.FORMAT.name: module.FORMAT
+    for module in (
+        astm,
+        bird,
+        etendue_hdf5,
+        fred,
+        klems,
+        lighttools,
+        merl,
+        pab,
+        rgl,
+        speos,
+        speos_brdf,
+        speos_coated,
+        speos_scattering,
+        speos_simple,
+        ssdd,
+        tensor_tree,
+        tracepro,
+        zemax,
+    )
 }
 """Every format by name."""
 
-REFUSED: dict[bytes, tuple[str, str]] = {
-    b"OPTIS - ": ("a Speos surface file of another kind", "étendue reads anisotropic BSDF as text; save it as that."),
-    b"tensor_file": ("a tensor file of RGL", "étendue does not read it yet."),
+REFUSED: dict[str, tuple[str, str]] = {
+    ".bsdf180": ("a Speos BSDF180 container", "Save its parts as .anisotropicbsdf, as text."),
+    ".ddr": ("a diffuse distribution of Integra", "Export it as SSDD."),
+    ".ddt": ("a diffuse distribution of Integra", "Export it as SSDD."),
+    ".sdr": ("a specular distribution of Integra", "Export it as SSDD."),
+    ".sdt": ("a specular distribution of Integra", "Export it as SSDD."),
 }
-"""Formats that are known by how they begin, and are not read: what they are, and what to do."""
+"""Formats that are known by their extension, and are not read: what they are, and what to do."""
 
 
 def read_bsdf_data(path: str | os.PathLike[str]) -> BsdfData:
@@ -64,9 +106,12 @@ def read_bsdf_data(path: str | os.PathLike[str]) -> BsdfData:
         for candidate in BSDF_FORMATS.values():
             if candidate.recognise(head):
                 return candidate.read(readable)
-    for start, (what, advice) in REFUSED.items():
-        if head.startswith(start):
-            raise UnsupportedFormatError(path, "first bytes", f"this is {what}", advice)
+    if path.suffix.lower() in REFUSED:
+        what, advice = REFUSED[path.suffix.lower()]
+        raise UnsupportedFormatError(path, "extension", f"this is {what}", advice)
+    if head.startswith(b"OPTIS - "):
+        advice = "étendue reads BSDF, BRDF, scattering, simple scattering and coated surfaces, as text."
+        raise UnsupportedFormatError(path, "first line", "this is a Speos file of another kind", advice)
     refuse_unmarked(path, head)
     found = f"no BSDF format begins with {head[:8]!r}" if head else "the file is empty"
     names = ", ".join(form.title for form in BSDF_FORMATS.values())
@@ -85,8 +130,13 @@ def bsdf_format(path: Path, name: str | None) -> BsdfFormat:
         if name not in BSDF_FORMATS:
             raise UnknownNameError("BSDF format", name, BSDF_FORMATS)
         return BSDF_FORMATS[name]
-    for form in BSDF_FORMATS.values():
-        if path.suffix.lower() in form.extensions:
+    # Of ".bsdf" and ".lt.bsdf" the longer one says more.
+    endings = sorted(
+        ((extension, form) for form in BSDF_FORMATS.values() for extension in form.extensions),
+        key=lambda pair: -len(pair[0]),
+    )
+    for extension, form in endings:
+        if path.name.lower().endswith(extension):
             return form
     known = [extension for form in BSDF_FORMATS.values() for extension in form.extensions]
     raise UnknownNameError("extension of BSDF files", path.suffix, known)

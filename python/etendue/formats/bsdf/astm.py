@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
-from etendue.formats.bsdf.points import on_grid, projected_solid_angles
+from etendue.formats.bsdf.points import slices_of
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number, whole
@@ -25,9 +25,6 @@ ANGLES = ("theta_i", "phi_i", "theta_s", "phi_s")
 THETA = np.concatenate([np.arange(0.0, 80.0, 2.0), np.arange(80.0, 90.0, 1.0)])
 PHI_STEP, TURN = 5.0, 45.0
 """Directions of tables that are made to be written [°]."""
-
-SAME = 1e-6
-"""Angles of incidence that differ by less are one [rad]."""
 
 
 def recognise(head: bytes) -> bool:
@@ -55,7 +52,10 @@ def read(path: Path) -> BsdfData:
     facts, names, begin = _header(path, lines)
     rows = _rows(path, lines, begin, len(names), facts)
     channels, complaints = _channels(path, names, begin)
-    slices = [one for column, wavelength in channels for one in _slices(rows, column, wavelength)]
+    angles = np.degrees(rows[:, :4])
+    slices = [
+        one for column, wavelength in channels for one in slices_of(angles, rows[:, column], wavelength=wavelength)
+    ]
     if (rows[:, [column for column, _ in channels]] < 0.0).any():
         complaints.append(Complaint("warning", "values", "values below 0 became 0"))
     turns = {round(one.phi, 4) for one in slices if one.theta > 1e-3}
@@ -136,36 +136,6 @@ def _channels(path: Path, names: list[str], begin: int) -> tuple[list[tuple[int,
         advice = "étendue reads one value, X,Y,Z, or wavelengths as 465nm."
         raise UnsupportedFormatError(path, f"line {begin}", f"values named {', '.join(own)[:60]}", advice) from None
     return [(4 + k, wave) for k, wave in enumerate(waves)], []
-
-
-def _slices(rows: Array, column: int, wavelength: float | None) -> list[BsdfSlice]:
-    """One for each incidence and way."""
-    found = []
-    incidences = np.unique(np.round(rows[:, :2] / SAME), axis=0) * SAME
-    for theta, phi in incidences:
-        own = rows[(np.abs(rows[:, :2] - (theta, phi)) < 2.0 * SAME).all(axis=1)]
-        behind = theta > 0.5 * np.pi
-        incident = direction(
-            np.degrees(np.pi - own[0, 0] if behind else own[0, 0]), np.degrees(own[0, 1]), behind=behind
-        )
-        for transmitted in (False, True):
-            there = own[(own[:, 2] > 0.5 * np.pi) == (behind != transmitted)]
-            if not len(there):
-                continue
-            below = behind != transmitted
-            polar = np.degrees(np.pi - there[:, 2] if below else there[:, 2])
-            f = np.maximum(there[:, column], 0.0)
-            grid = on_grid(polar, np.degrees(there[:, 3]), f)
-            if grid is not None:
-                radial, azimuth, values = grid
-                at = PolarGrid("normal", radial, azimuth)
-                found.append(BsdfSlice(incident, values, transmitted, grid=at, wavelength=wavelength))
-            else:
-                points = direction(polar, np.degrees(there[:, 3]), behind=below)
-                projected = projected_solid_angles(points)
-                one = BsdfSlice(incident, f, transmitted, points=points, projected=projected, wavelength=wavelength)
-                found.append(one)
-    return found
 
 
 def fits(data: BsdfData) -> bool:

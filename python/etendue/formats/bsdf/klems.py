@@ -6,30 +6,19 @@ import dataclasses
 import itertools
 from pathlib import Path
 from typing import BinaryIO
-from xml.sax.saxutils import escape
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.window_xml import DAMAGED, WAYS, azimuth_of, block_of, document, read_window
 from etendue.formats.rays.text_rows import number
-from etendue.formats.xml_tree import Element, parse_xml
+from etendue.formats.xml_tree import Element
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
-
-LARGEST = 1 << 28
-DAMAGED = "The file is damaged or cut short; ask for it again."
-
-WAYS = {
-    "Transmission Front": (True, True),
-    "Transmission Back": (False, True),
-    "Reflection Front": (True, False),
-    "Reflection Back": (False, False),
-}
-"""Whether light meets the front, and whether it is transmitted. The front of the file is étendue's."""
 
 ACROSS = 6
 """Midpoints along each coordinate of a patch whose mean is its value."""
@@ -97,44 +86,18 @@ def recognise(head: bytes) -> bool:
 
 def read(path: Path) -> BsdfData:
     """Read the visible values, of both sides and ways that are there; negative ones become 0."""
-    with path.open("rb") as file:
-        data = file.read(LARGEST + 1)
-    if len(data) > LARGEST:
-        raise FormatError(path, "length", "more than 256 MiB", "No matrix of Klems is so large.")
-    root = parse_xml(data, path)
-    layer = root.first("Optical", "Layer")
-    definition = layer.first("DataDefinition") if layer else None
-    if root.name != "WindowElement" or layer is None or definition is None:
-        raise FormatError(path, root.place, "there is no Optical, Layer, DataDefinition", DAMAGED)
-    structure = definition.words("IncidentDataStructure")
-    if structure not in ("Columns", "Rows"):
-        place = definition.place
-        raise FormatError(
-            path, place, f"IncidentDataStructure is {structure[:40]!r}", "Columns or Rows are Klems data."
-        )
-    bases = {**BASES, **{name: basis for one in definition.all("AngleBasis") for name, basis in [_basis(one, path)]}}
-    slices: list[BsdfSlice] = []
-    complaints: list[Complaint] = []
-    seen = []
-    for wavelength in layer.all("WavelengthData"):
-        colour = wavelength.words("Wavelength")
-        if colour != "Visible":
-            complaints.append(Complaint("note", wavelength.place, f"values for {colour!r} are left out"))
-            continue
-        for block in wavelength.all("WavelengthDataBlock"):
-            way = block.words("WavelengthDataDirection")
-            if way not in WAYS or way in seen:
-                again = "stands there twice" if way in seen else "is no direction of data"
-                raise FormatError(path, block.place, f"{way[:40]!r} {again}", f"Known: {', '.join(WAYS)}.")
-            seen.append(way)
-            slices += _slices(block, path, bases, structure, WAYS[way], complaints)
-    if not slices:
-        raise FormatError(path, layer.place, "there are no visible values", "Ask for values weighted by V(λ).")
-    both = {one.front for one in slices} == {True, False}
-    name = layer.words("Material", "Name")
-    return BsdfData(
-        tuple(slices), isotropic=False, mirrored=False, both_sides=not both, name=name, complaints=tuple(complaints)
-    )
+    window = read_window(path)
+    if window.structure not in ("Columns", "Rows"):
+        found = f"IncidentDataStructure is {window.structure[:40]!r}"
+        raise FormatError(path, window.definition.place, found, "Columns or Rows are Klems data.")
+    own = dict(_basis(one, path) for one in window.definition.all("AngleBasis"))
+    bases = {**BASES, **own}
+    slices = [
+        one
+        for block, way in window.blocks
+        for one in _slices(block, path, bases, window.structure, way, window.complaints)
+    ]
+    return window.data(slices)
 
 
 def _basis(element: Element, path: Path) -> tuple[str, Basis]:
@@ -188,12 +151,12 @@ def _slices(
     if structure == "Rows":
         matrix = matrix.T
     front, transmitted = way
-    points = direction(*outgoing.centres, behind=front == transmitted)
+    points = _points(outgoing, behind=front == transmitted)
     # An index of incidence names where the light goes: it comes from the opposite azimuth.
     thetas, phis = incident.centres
     return [
         BsdfSlice(
-            direction(theta, (phi + 180.0) % 360.0, behind=not front),
+            direction(theta, azimuth_of(phi + 180.0), behind=not front),
             column,
             transmitted,
             points=points,
@@ -203,6 +166,12 @@ def _slices(
     ]
 
 
+def _points(basis: Basis, *, behind: bool) -> Array:
+    """Centres of the patches as directions in étendue's frame."""
+    thetas, phis = basis.centres
+    return direction(thetas, azimuth_of(phis), behind=behind)
+
+
 def fits(data: BsdfData) -> bool:
     """Whether the slices are matrices of the full basis, each of them whole."""
     basis = BASES["LBNL/Klems Full"]
@@ -210,7 +179,7 @@ def fits(data: BsdfData) -> bool:
     for one in data.slices:
         if one.points is None or len(one.points) != basis.size or one.wavelength is not None:
             return False
-        expected = direction(*basis.centres, behind=one.front == one.transmitted)
+        expected = _points(basis, behind=one.front == one.transmitted)
         if not np.allclose(one.points, expected, atol=1e-9) or np.isnan(one.values).any():
             return False
         ways[one.front, one.transmitted] = ways.get((one.front, one.transmitted), 0) + 1
@@ -226,15 +195,16 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     for front in (True, False):
         for transmitted in ways:
             behind = front == transmitted
-            scattered = np.stack([direction(*basis.inside(k), behind=behind) for k in range(basis.size)])
+            inside = [basis.inside(k) for k in range(basis.size)]
+            scattered = np.stack([direction(theta, azimuth_of(phi), behind=behind) for theta, phi in inside])
             for k in range(basis.size):
-                theta, phi = basis.inside(k)
+                theta, phi = inside[k]
                 # Where the light comes from within its patch, one for each point of the others.
                 order = np.arange(theta.size) * 7 % theta.size
-                incident = direction(theta[order], phi[order] + 180.0, behind=not front)
+                incident = direction(theta[order], azimuth_of(phi[order] + 180.0), behind=not front)
                 values = bsdf.evaluate(incident, scattered).mean(axis=1)
-                centre = direction(thetas[k], (phis[k] + 180.0) % 360.0, behind=not front)
-                points = direction(thetas, phis, behind=behind)
+                centre = direction(thetas[k], azimuth_of(phis[k] + 180.0), behind=not front)
+                points = _points(basis, behind=behind)
                 slices.append(BsdfSlice(centre, values, transmitted, points=points, projected=basis.projected))
     return BsdfData(tuple(slices), isotropic=False, mirrored=False, both_sides=False, name=bsdf.name)
 
@@ -243,11 +213,6 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
     """Write matrices of the full basis, incidence in columns; nine digits each."""
     basis = BASES["LBNL/Klems Full"]
     lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        '<WindowElement xmlns="http://windows.lbl.gov">',
-        "<WindowElementType>System</WindowElementType>",
-        "<Optical><Layer>",
-        f"<Material><Name>{escape(data.name)}</Name><Manufacturer>-</Manufacturer></Material>",
         "<DataDefinition><IncidentDataStructure>Columns</IncidentDataStructure>",
         "<AngleBasis><AngleBasisName>LBNL/Klems Full</AngleBasisName>",
     ]
@@ -261,24 +226,18 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         own = [one for one in data.slices if (one.front, one.transmitted) == (front, transmitted)]
         if not own:
             continue
-        wanted = direction(thetas, (phis + 180.0) % 360.0, behind=not front)
+        wanted = direction(thetas, azimuth_of(phis + 180.0), behind=not front)
         order = [int(np.argmin([np.abs(one.incident - d).max() for one in own])) for d in wanted]
         matrix = np.stack([own[k].values for k in order], axis=1)
-        lines += [
-            "<WavelengthData><LayerNumber>System</LayerNumber>",
-            '<Wavelength unit="Integral">Visible</Wavelength>',
-            f"<WavelengthDataBlock><WavelengthDataDirection>{name}</WavelengthDataDirection>",
-            "<ColumnAngleBasis>LBNL/Klems Full</ColumnAngleBasis><RowAngleBasis>LBNL/Klems Full</RowAngleBasis>",
-            f"<ScatteringDataType>{'BTDF' if transmitted else 'BRDF'}</ScatteringDataType>",
-            "<ScatteringData>",
-            *(",".join(f"{value:.9g}" for value in row) + "," for row in matrix),
-            "</ScatteringData></WavelengthDataBlock></WavelengthData>",
-        ]
-    stream.write(("\n".join([*lines, "</Layer></Optical>", "</WindowElement>"]) + "\n").encode("utf-8"))
-    lost = []
+        lines += block_of(
+            name,
+            ["<ColumnAngleBasis>LBNL/Klems Full</ColumnAngleBasis><RowAngleBasis>LBNL/Klems Full</RowAngleBasis>"],
+            [",".join(f"{value:.9g}" for value in row) + "," for row in matrix],
+        )
+    stream.write(document(data.name, lines))
     if any(one.standard_error is not None for one in data.slices):
-        lost.append("the format has no standard errors")
-    return tuple(lost)
+        return ("the format has no standard errors",)
+    return ()
 
 
 FORMAT = BsdfFormat("klems", "Klems XML", (".xml",), recognise, read, fits, tabulate, write)

@@ -50,9 +50,9 @@ def read(path: Path) -> BsdfData:
         )
     tokens = Tokens(path)
     text = decoded(path, path.read_bytes()).splitlines()
-    _skip_header(tokens, text)
+    past_header(tokens, text)
     tokens.numbers("anisotropy vector", 3)
-    there = [_flag(tokens, way) for way in WAYS]
+    there = [flag(tokens, way) for way in WAYS]
     if not any(there):
         tokens.refuse("neither reflection nor transmission is there", "Ask for a file with data.")
     proportional = tokens.number("type")
@@ -66,7 +66,7 @@ def read(path: Path) -> BsdfData:
         if spectrum is None:
             continue
         own = [
-            _slice(tokens, theta, turn, bool(transmitted), intensity=proportional == 0.0)
+            slice_of(tokens, theta, turn, bool(transmitted), intensity=proportional == 0.0)
             for turn, thetas in incidences.items()
             for theta in thetas
         ]
@@ -83,7 +83,7 @@ def read(path: Path) -> BsdfData:
     )
 
 
-def _skip_header(tokens: Tokens, text: list[str]) -> None:
+def past_header(tokens: Tokens, text: list[str]) -> None:
     """Past the header, the comment, and a description of so many characters that may run over lines."""
     try:
         left = int(text[3])
@@ -98,7 +98,8 @@ def _skip_header(tokens: Tokens, text: list[str]) -> None:
     tokens.at = int(np.searchsorted(tokens.lines, line, side="right"))
 
 
-def _flag(tokens: Tokens, way: str) -> bool:
+def flag(tokens: Tokens, way: str) -> bool:
+    """0 or 1: whether a way of light is there."""
     value = tokens.number(f"flag of {way}")
     if value not in (0.0, 1.0):
         tokens.refuse(f"the flag of {way} is {value:g}, not 0 or 1")
@@ -129,7 +130,8 @@ def _spectrum(tokens: Tokens, way: str) -> tuple[float, float, Array, Array]:
     return theta, phi, rows[:, 0], rows[:, 1] / 100.0
 
 
-def _slice(tokens: Tokens, theta: float, turn: float, transmitted: bool, *, intensity: bool) -> BsdfSlice:
+def slice_of(tokens: Tokens, theta: float, turn: float, transmitted: bool, *, intensity: bool) -> BsdfSlice:
+    """One table: sizes, azimuths, then θ and values row by row."""
     thetas, phis = tokens.count("number of polar angles"), tokens.count("number of azimuths")
     phi = tokens.numbers("azimuths", phis)
     rows = tokens.numbers("values", thetas * (phis + 1)).reshape(thetas, phis + 1)
@@ -230,16 +232,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         lines += [f"{wavelength}\t{100.0 * own[0].integral():.12g}" for wavelength in (350, 850)]
     for transmitted in ways:
         for one in (one for own in ordered[transmitted].values() for one in own):
-            grid = one.grid
-            assert grid is not None  # noqa: S101 - `fits` says so
-            azimuth, values = grid.azimuth - grid.azimuth[0], one.values
-            if np.ptp(azimuth) < 360.0:
-                azimuth, values = np.append(azimuth, 360.0), np.vstack([values, values[:1]])
-            lines += [f"{grid.radial.size} {azimuth.size}", "\t" + "\t".join(f"{a:.9g}" for a in azimuth)]
-            columns = range(grid.radial.size)
-            for k in reversed(columns) if transmitted else columns:
-                theta = 180.0 - grid.radial[k] if transmitted else grid.radial[k]
-                lines.append("\t".join([f"{theta:.9g}", *(f"{value:.9g}" for value in values[:, k])]))
+            lines += table_rows(one)
     stream.write(("\n".join([*lines, "End of file"]) + "\n").encode("ascii"))
     lost = []
     if any(one.standard_error is not None for one in data.slices):
@@ -247,6 +240,21 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
     if not data.both_sides:
         lost.append("only light that meets the front is written")
     return tuple(lost)
+
+
+def table_rows(one: BsdfSlice) -> list[str]:
+    """Lines of one table about the normal: sizes, azimuths, then a line for each θ."""
+    grid = one.grid
+    assert grid is not None  # noqa: S101 - `fits` says so
+    azimuth, values = grid.azimuth - grid.azimuth[0], one.values
+    if np.ptp(azimuth) < 360.0:
+        azimuth, values = np.append(azimuth, 360.0), np.vstack([values, values[:1]])
+    lines = [f"{grid.radial.size} {azimuth.size}", "\t" + "\t".join(f"{a:.9g}" for a in azimuth)]
+    columns = range(grid.radial.size)
+    for k in reversed(columns) if one.transmitted else columns:
+        theta = 180.0 - grid.radial[k] if one.transmitted else grid.radial[k]
+        lines.append("\t".join([f"{theta:.9g}", *(f"{value:.9g}" for value in values[:, k])]))
+    return lines
 
 
 FORMAT = BsdfFormat("speos", "Speos anisotropic BSDF", (".anisotropicbsdf",), recognise, read, fits, tabulate, write)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Never
 
@@ -16,6 +17,8 @@ Array = npt.NDArray[np.float64]
 
 LARGEST = 1 << 28
 """Most bytes of a text file with a BSDF."""
+
+ODD = re.compile(r"[^0-9eE+. -]")
 
 ADVICE = "The file is damaged or cut short; ask for it again."
 
@@ -106,6 +109,16 @@ class Tokens:
         if self.left < count:
             self.at = len(self.words)
             self.refuse(f"the file ends within {what}")
+        words = self.words[self.at : self.at + count]
+        # Tables are long: all at once, if they are made of nothing but digits, signs, points and exponents.
+        if not ODD.search(" ".join(words)):
+            try:
+                values = np.array([float(word) for word in words])
+            except ValueError:
+                values = np.array([np.nan])
+            if np.isfinite(values).all():
+                self.at += count
+                return values
         return np.array([self.number(what) for _ in range(count)])
 
     def rising(self, what: str) -> Array:

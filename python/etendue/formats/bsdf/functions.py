@@ -1,0 +1,63 @@
+"""Files that hold f as a function of two directions: its values on a grid about the specular direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+
+Array = npt.NDArray[np.float64]
+
+RADIAL = np.concatenate(
+    [
+        [0.0],
+        np.geomspace(0.05, 2.0, 14),
+        np.arange(2.5, 10.0, 0.5),
+        np.arange(10.0, 40.0, 1.0),
+        np.arange(40.0, 181.0, 2.5),
+    ]
+)
+"""Angles from the specular direction [°]."""
+
+AZIMUTH_STEP = 5.0
+
+
+def sampled(
+    evaluate: Callable[[Array, Array], Array],
+    incidences: Iterable[tuple[float, float]],
+    *,
+    transmitted: bool = False,
+    wavelength: float | None = None,
+) -> list[BsdfSlice]:
+    """A slice for each incidence.
+
+    Parameters
+    ----------
+    evaluate : callable
+        f [1/sr] for pairs of unit vectors away from the surface, shapes (n, 3); NaN where nothing is known.
+    incidences : sequence of (θ, φ)
+        In degrees, of light that meets the front.
+    transmitted : bool
+        Whether the light passes to the other side.
+    wavelength : float, optional
+        In nm.
+
+    Returns
+    -------
+    list of BsdfSlice
+        On grids about the specular direction, as far as there is a hemisphere.
+    """
+    found = []
+    grid = PolarGrid("specular", RADIAL, np.arange(0.0, 360.0, AZIMUTH_STEP))
+    for theta, phi in incidences:
+        incident = direction(theta, phi)
+        scattered = grid.directions(incident, transmitted=transmitted)
+        there = ~np.isnan(scattered[..., 0])
+        values = np.full(grid.shape, np.nan)
+        to = scattered[there]
+        values[there] = np.maximum(evaluate(np.broadcast_to(incident, to.shape), to), 0.0)
+        found.append(BsdfSlice(incident, values, transmitted, grid=grid, wavelength=wavelength))
+    return found

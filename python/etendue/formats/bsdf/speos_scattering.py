@@ -1,0 +1,69 @@
+"""Ansys Speos ``.scattering``: specular, Lambertian and Gaussian shares by angle and wavelength."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from etendue.formats.bsdf.bsdf_format import BsdfFormat
+from etendue.formats.bsdf.speos_shares import gaussian, mixed, require_end, share, width, words_after_lines
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
+
+START = b"OPTIS - Scattering surface file"
+
+PARTS = ("specular", "diffuse")
+WAYS = ("reflectance", "transmittance")
+
+
+def recognise(head: bytes) -> bool:
+    """By the first line."""
+    return head.startswith(START)
+
+
+def read(path: Path) -> BsdfData:
+    """Read all angles and wavelengths; Gaussian lobes are those of intensity, about the mirrored or straight direction."""
+    tokens, text = words_after_lines(path, 2)
+    angles, waves = (tokens.count(what) for what in ("number of incidences", "number of wavelengths"))
+    wavelength = tokens.numbers("wavelengths", waves)
+    if (np.diff(wavelength) <= 0.0).any() or wavelength[0] <= 0.0:
+        tokens.refuse("wavelengths do not rise")
+    angle = np.zeros(angles)
+    shares = np.zeros((3, 2, angles, waves))
+    widths = np.zeros((2, 2, angles, waves))
+    for i in range(angles):
+        angle[i] = tokens.number("angle of incidence")
+        if not 0.0 <= angle[i] <= 90.0 or (i and angle[i] <= angle[i - 1]):
+            tokens.refuse("angles of incidence do not rise within 0 to 90°")
+        for part in range(5):
+            for j in range(waves):
+                for way in range(2):
+                    if part < 3:
+                        shares[part, way, i, j] = share(tokens, "share")
+                    else:
+                        widths[part - 3, way, i, j] = width(tokens, "full width at half maximum")
+        if (total := float(shares[:, :, i].sum(axis=(0, 1)).max())) > 1.0 + 1e-9:
+            tokens.refuse(f"shares at {angle[i]:g}° add up to {100.0 * total:.6g} %")
+    require_end(path, tokens)
+    names = {f"{part}_{way}": shares[p, w] for p, part in enumerate(PARTS) for w, way in enumerate(WAYS)}
+    slices: list[BsdfSlice] = []
+    for way in (0, 1):
+        if shares[2, way].any():
+            even = not np.ptp(shares[2, way], axis=1).any() and not np.ptp(widths[:, way], axis=2).any()
+            slices += [
+                gaussian(
+                    float(angle[i]),
+                    float(shares[2, way, i, j]),
+                    (float(widths[0, way, i, j]), float(widths[1, way, i, j])),
+                    transmitted=bool(way),
+                    wavelength=None if even else float(wavelength[j]),
+                )
+                for i in range(angles)
+                for j in range(1 if even else waves)
+                if angle[i] < 90.0 or angles == 1
+            ]
+    name = text[1].strip() if len(text) > 1 and text[1].strip() else path.stem
+    return BsdfData(tuple(slices), tuple(mixed(angle, wavelength, names)), name=name)
+
+
+FORMAT = BsdfFormat("speos-scattering", "Speos scattering surface", (".scattering",), recognise, read)

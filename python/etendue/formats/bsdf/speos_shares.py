@@ -1,0 +1,101 @@
+"""What Speos' files of shares have in common: parts of the light in per cent, and Gaussian lobes by their width."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.formats.bsdf.tokens import Tokens
+from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+
+Array = npt.NDArray[np.float64]
+
+WHOLE = 100.0
+"""Per cent."""
+
+STEEPEST = 89.0
+"""Largest angle of incidence [°] of a lobe."""
+
+NARROWEST = 0.01
+"""Full width at half maximum [°] below which a lobe is drawn no narrower."""
+
+STEPS = np.concatenate([[0.0], np.geomspace(0.03, 3.0, 40)])
+"""Angles from the specular direction over the full width at half maximum."""
+
+
+def words_after_lines(path: Path, lines: int) -> tuple[Tokens, list[str]]:
+    """The words of a text from a line on, and the lines before it."""
+    tokens = Tokens(path)
+    text = path.read_bytes().decode("utf-8", "replace").splitlines()[:lines]
+    tokens.at = int(np.searchsorted(tokens.lines, lines, side="right"))
+    return tokens, text
+
+
+def require_end(path: Path, tokens: Tokens) -> None:
+    """Refuse a text whose last line has no end, or that goes on after its data."""
+    if tokens.left:
+        tokens.at += 1
+        tokens.refuse("the file goes on after its data")
+    with path.open("rb") as file:
+        file.seek(-1, 2)
+        ended = file.read(1) in b"\r\n\t "
+    if not ended:
+        tokens.refuse("the last line has no end", "If it is whole, end it; if not, ask for the file again.")
+
+
+def share(tokens: Tokens, what: str) -> float:
+    """A number of per cent, as a share."""
+    value = tokens.number(what)
+    if not 0.0 <= value <= WHOLE:
+        tokens.refuse(f"{what} is {value:g} %")
+    return value / WHOLE
+
+
+def width(tokens: Tokens, what: str) -> float:
+    """A full width at half maximum [°]."""
+    value = tokens.number(what)
+    if not 0.0 <= value <= 0.5 * 180.0:
+        tokens.refuse(f"{what} is {value:g}°")
+    return value
+
+
+def mixed(angle: Array, wavelength: Array, shares: Mapping[str, Array]) -> list[Mapping[str, Any]]:
+    """Shares of shape (angles, wavelengths) as a component; none if all are 0."""
+    there: dict[str, Any] = {}
+    for name, values in shares.items():
+        if not values.any():
+            continue
+        if not np.ptp(values):
+            there[name] = float(values.flat[0])
+        elif wavelength.size == 1 or not np.ptp(values, axis=1).any():
+            there[name] = {"angle": angle.tolist(), "values": values[:, 0].tolist()}
+        elif angle.size == 1 or not np.ptp(values, axis=0).any():
+            there[name] = {"wavelength": wavelength.tolist(), "values": values[0].tolist()}
+        else:
+            there[name] = {"angle": angle.tolist(), "wavelength": wavelength.tolist(), "values": values.tolist()}
+    return [{"kind": "mixed", **there}] if there else []
+
+
+def gaussian(
+    theta: float, part: float, widths: tuple[float, float], *, transmitted: bool, wavelength: float | None
+) -> BsdfSlice:
+    """A lobe whose intensity is Gaussian in angle, of full widths at half maximum in and across the plane of incidence."""
+    in_plane, across = (max(one, NARROWEST) for one in widths)
+    radial = STEPS * max(in_plane, across)
+    radial = radial[radial < 180.0]
+    grid = PolarGrid("specular", radial, np.arange(0.0, 360.0, 5.0))
+    incident = direction(min(theta, STEEPEST), 180.0)
+    to = grid.directions(incident, transmitted=transmitted)
+    turn = np.radians(grid.azimuth)[:, None]
+    square = (np.cos(turn) * radial / in_plane) ** 2 + (np.sin(turn) * radial / across) ** 2
+    f = np.exp(-4.0 * math.log(2.0) * square) / np.maximum(np.abs(to[..., 2]), 1e-3)
+    f[:, -1] = 0.0
+    one = BsdfSlice(incident, np.where(np.isnan(f), 0.0, f), transmitted, grid=grid, wavelength=wavelength)
+    known = one.integral()
+    factor = part / known if known > 0.0 else 0.0
+    return BsdfSlice(incident, one.values * factor, transmitted, grid=grid, wavelength=wavelength)

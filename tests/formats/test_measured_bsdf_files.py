@@ -1,0 +1,193 @@
+"""Files of goniophotometers and databases made by hand: BiRD, PAB, MERL, RGL."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from etendue.errors import ArgumentError, FormatError
+from etendue.formats.bsdf import read_bsdf_data
+from etendue.quantities.bsdf_data import direction
+from oracles.bsdf_files import merl, pab, rgl
+
+Array = npt.NDArray[np.float64]
+
+
+def bird(**data: Any) -> dict[str, Any]:
+    """The layout of the project's own example: two polarisations at two wavelengths."""
+    columns: dict[str, Any] = {
+        "wavelength_i": {"unit": "nm", "values": [550, 550, 650, 650]},
+        "polarization_i": {"notation": "inStokes", "values": 2 * [[1, 1, 0, 0], [1, -1, 0, 0]]},
+        "theta_i": {"unit": "°", "values": 4 * [30]},
+        "phi_i": {"unit": "deg", "values": 4 * [0]},
+        "theta_r": {"unit": "rad", "values": 4 * [math.radians(10)]},
+        "phi_r": {"unit": "°", "values": 4 * [60]},
+        "BRDF": {"unit": "sr^-1", "values": [0.254, 0.264, 0.267, 0.273]},
+        "uBRDF": {"unit": "%", "values": [1, 1, 2, 2]},
+    }
+    sample = {"name": "SRT1", "properties_symmetry": "isotropic"}
+    return {"metadata": {"type": "BRDF", "sample": sample}, "data": {**columns, **data}}
+
+
+def test_bird_has_uncertainties_and_polarisations(tmp_path: Path) -> None:
+    path = tmp_path / "x.brdf"
+    path.write_text(json.dumps(bird(), ensure_ascii=False))
+    data = read_bsdf_data(path)
+    assert data.name == "SRT1"
+    assert data.wavelengths == (550.0, 650.0)
+    first = data.slices[0]
+    assert np.allclose(first.incident, direction(30.0, 0.0))
+    assert np.allclose(first.directions.reshape(-1, 3), direction(10.0, 60.0), atol=1e-7)
+    assert first.values.ravel().tolist() == pytest.approx([0.259])
+    assert first.standard_error is not None
+    assert first.standard_error.ravel().tolist() == pytest.approx([0.00259])
+    assert any("several times" in complaint.found for complaint in data.complaints)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"theta_i": {"unit": "gon", "values": 4 * [30]}}, "unit is 'gon'"),
+        ({"theta_r": {"unit": "deg", "values": 4 * [95]}}, "not from 0 to 90"),
+        ({"phi_r": {"unit": "deg", "values": [1, 2]}}, "2 values for 4"),
+        ({"BRDF": {"unit": "1/sr", "values": [1, 2, 3, -4]}}, "below 0"),
+        ({"BRDF": {"unit": "1/sr", "values": "many"}}, "no list of numbers"),
+        ({"BRDF": None}, "no object"),
+        ({"uBRDF": {"unit": "1/sr", "values": [1, 2, 3, True]}}, "no list of numbers"),
+    ],
+)
+def test_mistakes_of_bird_files(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    path = tmp_path / "x.brdf"
+    path.write_text(json.dumps(bird(**change), ensure_ascii=False))
+    with pytest.raises(FormatError, match=said):
+        read_bsdf_data(path)
+
+
+@pytest.mark.parametrize("quantity", ["BRDF", "DSF"])
+def test_pab_directions_and_quantities(tmp_path: Path, quantity: str) -> None:
+    path = tmp_path / "x.dat"
+    path.write_bytes(pab(quantity))
+    data = read_bsdf_data(path)
+    (one,) = data.slices
+    assert data.name == "brushed sheet"
+    assert np.allclose(one.incident, direction(30.0, 0.0))
+    theta = np.degrees(np.arccos(one.directions[:, 2]))
+    phi = np.degrees(np.arctan2(one.directions[:, 1], one.directions[:, 0])) % 360.0
+    assert np.allclose(one.values, 0.1 + theta / 1000 + phi / 10000, rtol=1e-5)
+    # Each point stands for what is nearest to it: an even 0.2 would add up to 0.2 π.
+    assert one.projected is not None
+    assert float(one.projected.sum()) == pytest.approx(math.pi, rel=1e-6)
+
+
+def test_files_of_single_incidences_are_read_together(tmp_path: Path) -> None:
+    paths = [tmp_path / f"{theta}.dat" for theta in (30, 60)]
+    for path, theta in zip(paths, (30.0, 60.0), strict=True):
+        path.write_bytes(pab(theta=theta))
+    bsdf = et.read_bsdf(paths)
+    assert bsdf.incidences == (30.0, 60.0)
+    assert bsdf.isotropic
+    paths[1].write_bytes(pab(theta=60.0, phi=45.0))
+    assert not et.read_bsdf(paths).isotropic
+    with pytest.raises(ArgumentError, match="both hold light from 30"):
+        et.read_bsdf([paths[0], paths[0]])
+    with pytest.raises(ArgumentError, match="no file"):
+        et.read_bsdf([])
+
+
+def test_pab_mistakes(tmp_path: Path) -> None:
+    path = tmp_path / "x.dat"
+    whole = pab().decode()
+    for old, new, said in (
+        ("#intheta 30\n", "", "no angles of incidence"),
+        ("in_file: 200", "in_file: 201", "201 are stated, 200"),
+        ("#intheta 30", "#intheta 90", "light from θ 90"),
+    ):
+        path.write_text(whole.replace(old, new))
+        with pytest.raises(FormatError, match=said):
+            read_bsdf_data(path)
+
+
+def test_merl_coordinates(tmp_path: Path) -> None:
+    """f of the half angle and of the difference angles, at directions of ours."""
+
+    def f(h: Array, d: Array, p: Array) -> Array:
+        return 0.1 + 0.2 * np.cos(h) ** 2 + 0.1 * np.cos(d) + 0.05 * np.cos(2.0 * p) * np.sin(d) ** 2
+
+    path = tmp_path / "x.binary"
+    path.write_bytes(merl(f))
+    data = read_bsdf_data(path)
+    (one,) = (one for one in data.slices if abs(one.theta - 40.0) < 1e-6)
+    for s in (direction(20.0, 130.0), direction(65.0, 200.0), direction(70.0, 10.0)):
+        half = (one.incident + s) / np.linalg.norm(one.incident + s)
+        e = np.cross(np.cross(half, [0.0, 0.0, 1.0]), half)
+        e = -e / max(float(np.linalg.norm(e)), 1e-12)
+        phi = math.atan2(float(one.incident @ np.cross(half, e)), float(one.incident @ e))
+        angles = math.acos(min(half[2], 1.0)), math.acos(float(one.incident @ half))
+        assert float(one.at(s)) == pytest.approx(float(f(*map(np.asarray, (*angles, phi)))), rel=0.02)
+
+
+def test_merl_that_was_not_measured_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "x.binary"
+    path.write_bytes(merl(lambda h, d, p: np.where(d > 1.4, -1.0, 0.2) + 0.0 * h * p))
+    data = read_bsdf_data(path)
+    assert float(np.nanmax(data.slices[3].values)) == pytest.approx(0.2, rel=1e-6)
+    assert float(np.nanmin(data.slices[3].values)) == pytest.approx(0.2, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_rgl_warp_against_a_quadrature(tmp_path: Path) -> None:
+    """f cosθ = a + b x' + c y', x' and y' being the distribution functions of the density of visible normals.
+
+    Both by midpoints over the bilinear density: nothing of the reader's sums is used.
+    """
+    rng = np.random.default_rng(5)
+    density = rng.uniform(0.2, 2.0, (5, 4))
+    y, x = np.linspace(0, 1, 6)[:, None], np.linspace(0, 1, 7)
+    values, ndf, sigma = 0.05 + 0.03 * x + 0.04 * y, rng.uniform(1, 2, (3, 4)), rng.uniform(1, 2, (2, 5))
+    path = tmp_path / "x.bsdf"
+    path.write_bytes(rgl(vndf=density, values=values, ndf=ndf, sigma=sigma))
+    data = read_bsdf_data(path)
+    (one,) = (one for one in data.slices if abs(one.theta - 30.0) < 1e-3)
+
+    def bilinear(table: Array, u: Array, v: Array) -> Array:
+        i, j = u * (table.shape[1] - 1), v * (table.shape[0] - 1)
+        wx = np.maximum(1.0 - np.abs(i[..., None] - np.arange(table.shape[1])), 0.0)
+        wy = np.maximum(1.0 - np.abs(j[..., None] - np.arange(table.shape[0])), 0.0)
+        return np.asarray(np.einsum("...x,...y,yx->...", wx, wy, table))
+
+    middle = (np.arange(2000) + 0.5) / 2000
+    for s in (direction(20.0, 130.0), direction(65.0, 200.0), direction(40.0, 260.0)):
+        half = (one.incident + s) / np.linalg.norm(one.incident + s)
+        u = math.sqrt(math.acos(half[2]) * 2.0 / math.pi)
+        v = (math.atan2(half[1], half[0]) + math.pi) / (2.0 * math.pi)
+        along = bilinear(density, middle, np.full(2000, v))
+        rows = bilinear(density, *np.meshgrid(middle, middle)).mean(axis=1)
+        left, below = along[middle < u].sum() / along.sum(), rows[middle < v].sum() / rows.sum()
+        # Of the light: θ as on the axis of half angles, and the azimuth 0, which is the middle of the second.
+        from_light = math.sqrt(math.radians(30.0) * 2.0 / math.pi)
+        scale = bilinear(ndf, np.array(u), np.array(v)) / (4.0 * bilinear(sigma, np.array(from_light), np.array(0.5)))
+        expected = (0.05 + 0.03 * left + 0.04 * below) * scale / s[2]
+        assert float(one.at(s)) == pytest.approx(float(expected), rel=0.01)
+
+
+def test_rgl_mistakes(tmp_path: Path) -> None:
+    path = tmp_path / "x.bsdf"
+    whole = rgl(vndf=np.ones((4, 4)), values=np.full((4, 4), 0.1))
+    for old, new, said in (
+        (b"sigma", b"sigmo", "'sigma'"),
+        (b"tensor_file\0\1\0", b"tensor_file\0\2\0", "version"),
+        (b"\x02\x00ndf", b"\x02\x00ndg", "ends within|beyond|no array|dimensions"),
+    ):
+        path.write_bytes(whole.replace(old, new))
+        if old in whole:
+            with pytest.raises(FormatError, match=said):
+                read_bsdf_data(path)
+    path.write_bytes(whole[:200])
+    with pytest.raises(FormatError):
+        read_bsdf_data(path)
