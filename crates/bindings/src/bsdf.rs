@@ -50,6 +50,11 @@ fn specular(incident: Vec3, media: &Media, cosine: Option<f64>) -> Vec3 {
 }
 
 impl Bsdf {
+    /// What a scene takes.
+    pub fn core(&self) -> Arc<dyn CoreBsdf> {
+        Arc::clone(&self.core)
+    }
+
     fn of_pairs<'py>(
         &self,
         py: Python<'py>,

@@ -75,6 +75,14 @@ impl Parameters for Described<'_, '_> {
     }
 }
 
+/// A finish: a BSDF that is built already, or its record.
+fn finish_of(value: &Bound<'_, PyAny>) -> PyResult<Arc<dyn Bsdf>> {
+    match value.extract::<PyRef<'_, crate::bsdf::Bsdf>>() {
+        Ok(built) => Ok(built.core()),
+        Err(_) => finish(value.cast::<PyDict>()?),
+    }
+}
+
 pub fn finish(dict: &Bound<'_, PyDict>) -> PyResult<Arc<dyn Bsdf>> {
     let kind = get::<String>(dict, "kind")?;
     match kind.as_str() {
@@ -251,7 +259,8 @@ impl Scene {
     fn new(record: &Bound<'_, PyDict>) -> PyResult<Self> {
         let each = |key: &str| list(record, key);
         let parts: Vec<SceneFace> = each("faces")?.iter().map(part).collect::<PyResult<_>>()?;
-        let finishes = each("finishes")?.iter().map(finish).collect::<PyResult<_>>()?;
+        let finishes: Vec<Bound<'_, PyAny>> = get(record, "finishes")?;
+        let finishes = finishes.iter().map(finish_of).collect::<PyResult<_>>()?;
         let media = each("media")?.iter().map(medium).collect::<PyResult<_>>()?;
         let solids = each("solids")?
             .iter()

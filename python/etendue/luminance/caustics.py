@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
+from etendue.scatter.building import core_scene
 from etendue.scene.dealing import CellSums, Dealing, Units
 
 Array = npt.NDArray[np.float64]
@@ -177,7 +178,7 @@ def plan(
     seed ^= PILOT
     pixels = max(view["columns"] * view["rows"] for view in views)
     images = [{"kind": "image", "view": view, "complement": True, "shared": float(pixels)} for view in views]
-    core = _core.Scene({**record, "detectors": [*images, {"kind": "arrivals"}]})
+    core = core_scene({**record, "detectors": [*images, {"kind": "arrivals"}]})
     dealing = Dealing.of(record["sources"], RUN)
     batch, batches, segments, arrivals = _core.batch_size(), 0, 0, []
     sums = [np.zeros((3, view["columns"] * view["rows"])) for view in views]

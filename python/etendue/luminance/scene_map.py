@@ -22,6 +22,7 @@ from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.quantities.relative_error import RelativeError
+from etendue.scatter.building import core_scene
 from etendue.scene import Compiled, Scene, compile_scene
 from etendue.scene.placement import Placement
 from etendue.scene.sources.from_files import Field, Rays
@@ -67,7 +68,7 @@ def look_at_scene(
     compiled = compile_scene(seeable)
     if not compiled.record["sources"]:
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
-    core = _core.Scene({**compiled.record, "detectors": []})
+    core = core_scene({**compiled.record, "detectors": []})
     survey = _core.Survey(core, how.seed, MOST_EVENTS, threads) if how.gather else None
     forward = _forward(core, compiled, views, how, threads, wanted=scattered is None)
     images = forward.images

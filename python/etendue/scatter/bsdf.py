@@ -18,6 +18,7 @@ from etendue import _core
 from etendue.description.files import Files
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.bsdf_data import direction
+from etendue.scatter.building import built
 
 Array = npt.NDArray[np.float64]
 Side = Literal["front", "back"]
@@ -73,7 +74,7 @@ class Bsdf(abc.ABC):
 
     @functools.cached_property
     def _compiled(self) -> _core.Bsdf:
-        return _core.Bsdf(self.record(Files()))
+        return built(self.record(Files()))
 
     def evaluate(
         self,

@@ -14,6 +14,7 @@ from etendue import _core
 from etendue.errors import ArgumentError, SceneWarning
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.provenance import Provenance
+from etendue.scatter.building import core_scene
 from etendue.scene.compiling import Compiled, compile_scene
 from etendue.scene.dealing import Dealing
 from etendue.scene.scene import Scene
@@ -193,7 +194,7 @@ class ScatterEvents:
                 f"the scatter events of {self.name!r} are of another scene, or a file that it names has changed: "
                 "trace it again, or give the scene as it was, as in events.replace(scene=scene)."
             )
-        return _core.Scene(compiled.record)
+        return core_scene(compiled.record)
 
     def _column(self, name: str) -> Array:
         return np.asarray(self.rows[name])

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
+from etendue.scatter.building import core_scene
 from etendue.scene import Compiled
 from etendue.tracing.section import Section
 
@@ -53,7 +54,7 @@ def trace_trails(compiled: Compiled, rays: int, seed: int, far: float) -> list[A
     """
     if not (rays and compiled.record["sources"]):
         return []
-    found = _core.trace_trails(_core.Scene(compiled.record), rays, seed, MOST_EVENTS, far)
+    found = _core.trace_trails(core_scene(compiled.record), rays, seed, MOST_EVENTS, far)
     return [points for points in found if len(points) > 1]
 
 

@@ -14,6 +14,7 @@ from etendue.errors import ArgumentError
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.memory import require_memory
 from etendue.quantities.ray_stream import checked_threads
+from etendue.scatter.building import core_scene
 from etendue.scene import Scene, compile_scene
 from etendue.tracing.far_fields import far_field_nodes
 from etendue.tracing.plan import DEFAULT_RAYS, Plan, make_plan
@@ -75,7 +76,7 @@ class TraceWork:
         if fingerprint(compiled.record) != self.plan.fingerprint:
             name = self.plan.scene_name or "the scene"
             raise ArgumentError(f"{name}: a file that the scene names is not the one that the trace was planned with.")
-        return _core.Scene(compiled.record).with_far_fields([nodes.core() for nodes in self.plan.far_fields])
+        return core_scene(compiled.record).with_far_fields([nodes.core() for nodes in self.plan.far_fields])
 
     def __reduce__(self) -> tuple[type[TraceWork], tuple[Plan]]:
         """For pickle: the compiled scene is made anew."""
@@ -183,7 +184,7 @@ def trace_work(
         scene = Scene.load(Path(scene))
     threads = checked_threads(threads)
     compiled = compile_scene(scene)
-    core = _core.Scene(compiled.record)
+    core = core_scene(compiled.record)
     plan = make_plan(
         scene,
         compiled,

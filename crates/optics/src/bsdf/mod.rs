@@ -16,9 +16,12 @@ mod lambertian;
 mod lobe;
 mod mirror;
 mod mixture;
+mod monotone_cubic;
 mod rough_coat;
 mod rough_interface;
 mod rough_metal;
+mod table_grid;
+mod table_lobes;
 mod tabulated;
 #[cfg(test)]
 mod tests;
@@ -34,7 +37,9 @@ pub use mixture::Mixture;
 pub use rough_coat::RoughCoat;
 pub use rough_interface::RoughInterface;
 pub use rough_metal::RoughMetal;
-pub use tabulated::{Row, Side, Slice, Tabulated, Way};
+pub use table_grid::Slice;
+pub use table_lobes::{Row, Way};
+pub use tabulated::{Side, Tabulated};
 
 /// A BSDF from the name of its kind and its parameters; None if there is no such kind.
 ///

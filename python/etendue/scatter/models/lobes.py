@@ -7,10 +7,10 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Ge, Gt, Le
 
-from etendue import _core
 from etendue.description.files import Files
 from etendue.description.values import AsNumber, Finite, NotNegative, Positive
 from etendue.errors import ArgumentError
+from etendue.scatter.building import built
 from etendue.scatter.models.finish import Directed, Finish, Record
 
 
@@ -42,7 +42,7 @@ class Lobe(Directed, abc.ABC):
             **{name: getattr(self, name) for name in self.PARAMETERS},
         }
         try:
-            _core.Bsdf(record)
+            built(record)
         except ValueError as error:
             raise ArgumentError(f"{type(self).__name__}: {error}") from None
         return record
@@ -185,7 +185,7 @@ class CosinePower(Finish):
             "transmitted": float(self.way == "transmitted"),
         }
         try:
-            _core.Bsdf(record)
+            built(record)
         except ValueError as error:
             raise ArgumentError(f"CosinePower: {error}") from None
         return record

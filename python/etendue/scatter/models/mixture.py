@@ -7,11 +7,11 @@ from typing import Annotated, Literal, Self
 from annotated_types import MaxLen, MinLen
 from pydantic import model_validator
 
-from etendue import _core
 from etendue.description.families import Family
 from etendue.description.files import Files
 from etendue.description.values import AsRow, NotNegative
 from etendue.errors import ArgumentError
+from etendue.scatter.building import built
 from etendue.scatter.models.coated import Coated
 from etendue.scatter.models.finish import Directed, Finish, Record
 from etendue.scatter.models.interface import Interface
@@ -81,7 +81,7 @@ class Mixture(Directed):
             "members": [(w, part.record(files)) for w, part in zip(weights, self.parts, strict=True)],
         }
         try:
-            _core.Bsdf(record)
+            built(record)
         except ValueError as error:
             raise ArgumentError(f"Mixture: {error}") from None
         return record

@@ -1,0 +1,380 @@
+//! How the slices of a table of scattered light go together: between angles and azimuths of incidence.
+
+use std::f64::consts::FRAC_1_PI;
+
+use etendue_math::Vec3;
+use etendue_math::trig::{atan_eighths, sin_cos_turns};
+use etendue_sampling::guide::Guide;
+use etendue_sampling::warp::part_of;
+
+use super::monotone_cubic::Cubic;
+use super::table_grid::{Grid, Slice};
+
+/// Slices at one azimuth of incidence, with rising sines.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Azimuth of the incident direction \[turns\]; of one row it does not matter.
+    pub azimuth: f64,
+    /// At least one.
+    pub slices: Vec<Slice>,
+}
+
+/// The table of one way of light, at one wavelength.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Way {
+    /// Azimuths rise within a turn.
+    pub rows: Vec<Row>,
+}
+
+/// One way of light, ready to be asked.
+#[derive(Clone, Debug)]
+pub(super) struct Lobes {
+    rows: Vec<Lobe>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Lobe {
+    azimuth: f64,
+    slices: Vec<Grid>,
+    /// Sines of incidence, rising, between which what follows is linear.
+    sines: Vec<f64>,
+    guide: Guide,
+    blends: Vec<Blend>,
+}
+
+/// How light from an angle of incidence is shared by slices.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Blend {
+    /// The first of the two slices from here to the next sine; the other one follows it.
+    first: usize,
+    /// Of the flux, in each of the two and in the floor.
+    shares: [f64; 3],
+    /// What f of each of the two slices is multiplied by.
+    factors: [f64; 2],
+}
+
+/// What interpolated shares may be off.
+const TOLERANCE: f64 = 5e-6;
+
+/// The smallest step of the sine of incidence for which shares are tabled.
+const SMALLEST_STEP: f64 = 1e-4;
+
+impl Way {
+    pub(super) fn lobes(&self) -> Result<Lobes, String> {
+        if self.rows.is_empty() || self.rows.windows(2).any(|pair| pair[0].azimuth >= pair[1].azimuth) {
+            return Err("azimuths of incidence do not rise".into());
+        }
+        if self.rows.iter().any(|row| !(0.0..1.0).contains(&row.azimuth)) {
+            return Err("an azimuth of incidence lies outside a turn".into());
+        }
+        let rows: Result<_, _> = self.rows.iter().map(Row::lobe).collect();
+        Ok(Lobes { rows: rows? })
+    }
+}
+
+impl Row {
+    fn lobe(&self) -> Result<Lobe, String> {
+        let sines: Vec<f64> = self.slices.iter().map(|slice| slice.sine).collect();
+        if sines.is_empty() || sines.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err("angles of incidence do not rise".into());
+        }
+        let mut slices: Vec<Grid> = Vec::new();
+        for (k, slice) in self.slices.iter().enumerate() {
+            if let Some(before) = k.checked_sub(1).map(|before| &self.slices[before]) {
+                for between in before.up_to(slice) {
+                    slices.push(between.grid()?);
+                }
+            }
+            slices.push(slice.grid()?);
+        }
+        let squares: Vec<f64> = sines.iter().map(|sine| sine * sine).collect();
+        let of = |pick: fn(&Slice) -> f64| Cubic::new(&squares, &self.slices.iter().map(pick).collect::<Vec<_>>());
+        let mut lobe = Lobe {
+            azimuth: self.azimuth,
+            slices,
+            sines: Vec::new(),
+            guide: Guide::default(),
+            blends: Vec::new(),
+        };
+        lobe.fill(&of(|slice| slice.share), &of(|slice| slice.floor));
+        Ok(lobe)
+    }
+}
+
+impl Lobe {
+    /// Tables how light is shared, in steps that are halved until everything is linear within them.
+    fn fill(&mut self, share: &Cubic, floor: &Cubic) {
+        let slices = std::mem::take(&mut self.slices);
+        let count = slices.len();
+        // From 0 to the first slice, from each to the next, from the last to 1.
+        let mut ends: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
+        ends.insert(0, 0.0);
+        ends.push(1.0);
+        for (k, pair) in ends.windows(2).enumerate() {
+            let [from, to] = [pair[0], pair[1]];
+            if from >= to {
+                continue;
+            }
+            let beyond = k == 0 || k == count;
+            let first = k.saturating_sub(1).min(count - 1);
+            let own = slices[first].integral(slices[first].sine);
+            let at = |sine: f64| {
+                let square = sine * sine;
+                let (rho, floor) = (share.at(square), floor.at(square));
+                let (shares, factors) = if beyond {
+                    // The slice moves on unchanged.
+                    let factor = if own > 0.0 { rho / own } else { 0.0 };
+                    ([factor * slices[first].integral(sine), 0.0], [factor, 0.0])
+                } else {
+                    let part = (sine - from) / (to - from);
+                    let energies = [slices[first].integral(sine), slices[first + 1].integral(sine)];
+                    let all = (1.0 - part) * energies[0] + part * energies[1];
+                    let factor = if all > 0.0 { rho / all } else { 0.0 };
+                    let factors = [factor * (1.0 - part), factor * part];
+                    ([factors[0] * energies[0], factors[1] * energies[1]], factors)
+                };
+                Blend {
+                    first,
+                    shares: [shares[0], shares[1], floor],
+                    factors,
+                }
+            };
+            let mut last = (from, at(from));
+            self.push(last);
+            let mut left: Vec<_> = (1..=4)
+                .rev()
+                .map(|i| from + (to - from) * f64::from(i) / 4.0)
+                .map(|sine| (sine, at(sine)))
+                .collect();
+            while let Some(next) = left.pop() {
+                let sine = 0.5 * (last.0 + next.0);
+                let middle = (sine, at(sine));
+                if next.0 - last.0 < SMALLEST_STEP || middle.1.is_between(&last.1, &next.1) {
+                    self.push(middle);
+                    self.push(next);
+                    last = next;
+                } else {
+                    left.push(next);
+                    left.push(middle);
+                }
+            }
+        }
+        self.slices = slices;
+        self.guide = Guide::new(&self.sines);
+    }
+
+    fn push(&mut self, (sine, blend): (f64, Blend)) {
+        self.sines.push(sine);
+        self.blends.push(blend);
+    }
+
+    #[inline]
+    pub(super) fn blend(&self, sine: f64) -> Blend {
+        let above = self.guide.not_above(&self.sines, sine).clamp(1, self.sines.len() - 1);
+        let (a, b) = (&self.blends[above - 1], &self.blends[above]);
+        let [from, to] = [self.sines[above - 1], self.sines[above]];
+        let part = if to > from {
+            ((sine - from) / (to - from)).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        a.towards(b, part)
+    }
+
+    /// f \[1/sr\] for light that leaves towards a point of the plane of direction cosines.
+    #[inline]
+    pub(super) fn at(&self, blend: &Blend, r: f64, turn: f64) -> f64 {
+        let mut f = blend.shares[2] * FRAC_1_PI;
+        let factors = blend.factors.into_iter().enumerate();
+        for (k, factor) in factors.filter(|(_, factor)| *factor > 0.0) {
+            f += factor * self.slices[blend.first + k].at(r, turn);
+        }
+        f
+    }
+
+    /// A slice or a floor (None), picked by its share, with what is left of the number.
+    #[inline]
+    pub(super) fn pick(&self, blend: &Blend, number: f64) -> (Option<&Grid>, f64) {
+        let mut left = number * blend.share();
+        let mut last = (None, number);
+        for (k, share) in blend.shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
+            last = (self.slices.get(blend.first + k).filter(|_| k < 2), part_of(left, share));
+            if left < share {
+                break;
+            }
+            left -= share;
+        }
+        last
+    }
+}
+
+impl Blend {
+    fn towards(&self, other: &Self, part: f64) -> Self {
+        let mean = |a: f64, b: f64| a + part * (b - a);
+        Self {
+            first: self.first,
+            shares: std::array::from_fn(|k| mean(self.shares[k], other.shares[k])),
+            factors: std::array::from_fn(|k| mean(self.factors[k], other.factors[k])),
+        }
+    }
+
+    /// Whether it is what lies halfway between two others, for all that anybody can see.
+    fn is_between(&self, one: &Self, other: &Self) -> bool {
+        let middle = one.towards(other, 0.5);
+        let near = |a: f64, b: f64, scale: f64| (a - b).abs() <= TOLERANCE * scale;
+        let shares = self.shares.iter().zip(middle.shares);
+        let scale = self.factors[0].abs() + self.factors[1].abs();
+        let factors = self.factors.iter().zip(middle.factors);
+        shares.into_iter().all(|(a, b)| near(*a, b, 1.0)) && factors.into_iter().all(|(a, b)| near(*a, b, scale))
+    }
+
+    #[inline]
+    pub(super) fn share(&self) -> f64 {
+        self.shares.iter().sum()
+    }
+}
+
+impl Lobes {
+    /// The only row, if there is one.
+    pub(super) fn lone(&self) -> Option<&Lobe> {
+        match &self.rows[..] {
+            [lobe] => Some(lobe),
+            _ => None,
+        }
+    }
+
+    /// What light from one direction is shared by.
+    pub(super) fn lit(&self, incidence: &Incidence) -> Lit<'_> {
+        let n = self.rows.len();
+        if n == 1 {
+            return Lit::of(&self.rows[0], incidence);
+        }
+        let turn = incidence.turn();
+        let above = self.rows.partition_point(|row| row.azimuth <= turn);
+        let (one, other) = (&self.rows[(above + n - 1) % n], &self.rows[above % n]);
+        let span = (other.azimuth - one.azimuth).rem_euclid(1.0);
+        let part = (turn - one.azimuth).rem_euclid(1.0) / if span > 0.0 { span } else { 1.0 };
+        Lit {
+            parts: [(one, 1.0 - part), (other, part)].map(|(row, part)| (row, part, row.blend(incidence.sine))),
+        }
+    }
+}
+
+/// What light from one direction is shared by: the rows next to its azimuth, each with its part and its blend.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lit<'a> {
+    parts: [(&'a Lobe, f64, Blend); 2],
+}
+
+impl<'a> Lit<'a> {
+    /// Of a single row.
+    fn of(row: &'a Lobe, incidence: &Incidence) -> Self {
+        let blend = row.blend(incidence.sine);
+        Self {
+            parts: [(row, 1.0, blend), (row, 0.0, blend)],
+        }
+    }
+
+    fn there(&self) -> impl Iterator<Item = &(&'a Lobe, f64, Blend)> {
+        self.parts.iter().filter(|(_, part, _)| *part > 0.0)
+    }
+
+    /// Of the flux, in all directions.
+    pub(super) fn share(&self) -> f64 {
+        self.there()
+            .fold(0.0, |sum, (_, part, blend)| sum + part * blend.share())
+    }
+
+    /// f for light that leaves towards a point of the plane of direction cosines.
+    pub(super) fn at(&self, r: f64, turn: f64) -> f64 {
+        let mut sum = 0.0;
+        for (row, part, blend) in self.there() {
+            sum += part * row.at(blend, r, turn);
+        }
+        sum
+    }
+
+    /// A slice or a floor (None), picked by its share, with what is left of the number.
+    pub(super) fn pick(&self, number: f64) -> (Option<&'a Grid>, f64) {
+        let mut left = number * self.share();
+        let mut last = (None, number);
+        for (row, part, blend) in self.there() {
+            for (k, share) in blend.shares.iter().enumerate() {
+                let share = part * share;
+                if share > 0.0 {
+                    last = (row.slices.get(blend.first + k).filter(|_| k < 2), part_of(left, share));
+                    if left < share {
+                        return last;
+                    }
+                    left -= share;
+                }
+            }
+        }
+        last
+    }
+}
+
+/// Where light comes from, as the tables are asked.
+pub(super) struct Incidence {
+    /// Of the angle of incidence.
+    pub(super) sine: f64,
+    /// Cosine and sine of the azimuth of β₀.
+    forward: [f64; 2],
+}
+
+impl Incidence {
+    pub(super) fn new(incident: Vec3) -> Self {
+        let sine = (incident.x * incident.x + incident.y * incident.y).sqrt();
+        let forward = if sine > 0.0 {
+            [-incident.x / sine, -incident.y / sine]
+        } else {
+            [-1.0, 0.0]
+        };
+        Self {
+            sine: sine.min(1.0),
+            forward,
+        }
+    }
+
+    /// Azimuth of the incident direction \[turns\].
+    fn turn(&self) -> f64 {
+        turns(-self.forward[0], -self.forward[1])
+    }
+
+    /// Distance from β₀ and azimuth about it \[turns\] of a scattered direction.
+    pub(super) fn place(&self, incident: Vec3, scattered: Vec3) -> (f64, f64) {
+        let (x, y) = (scattered.x + incident.x, scattered.y + incident.y);
+        let [c, s] = self.forward;
+        let (along, across) = (c * x + s * y, c * y - s * x);
+        ((x * x + y * y).sqrt(), turns(along, across))
+    }
+
+    /// The direction at a place, with this height's sign; None outside the unit circle.
+    pub(super) fn direction(&self, incident: Vec3, (r, turn): (f64, f64), up: bool) -> Option<Vec3> {
+        let [c, s] = self.forward;
+        let (sin, cos) = sin_cos_turns(turn);
+        let (along, across) = (r * cos, r * sin);
+        let x = c * along - s * across - incident.x;
+        let y = s * along + c * across - incident.y;
+        let square = 1.0 - x * x - y * y;
+        (square > 0.0).then(|| Vec3::new(x, y, if up { square.sqrt() } else { -square.sqrt() }))
+    }
+}
+
+/// The azimuth of a point \[turns\], from 0 to 1.
+fn turns(x: f64, y: f64) -> f64 {
+    if x == 0.0 && y == 0.0 {
+        return 0.0;
+    }
+    let steep = y.abs() > x.abs();
+    let angle = if steep {
+        let right = atan_eighths(x / y);
+        (if y > 0.0 { 2.0 } else { 6.0 }) - right
+    } else {
+        let right = atan_eighths(y / x);
+        (if x > 0.0 { 0.0 } else { 4.0 }) + right
+    };
+    let turn = angle / 8.0;
+    let turn = if turn < 0.0 { turn + 1.0 } else { turn };
+    if turn >= 1.0 { 0.0 } else { turn }
+}
