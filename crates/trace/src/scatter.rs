@@ -2,6 +2,7 @@
 
 use etendue_math::Vec3;
 use etendue_optics::bsdf::{Bsdf, Component, Drawn, Media, Shares};
+use etendue_optics::fresnel::reflect;
 use etendue_optics::source::surface::across;
 
 use crate::interaction::Interaction;
@@ -54,6 +55,26 @@ impl<'a> Surface<'a> {
     pub fn evaluate(&self, incident: Vec3, scattered: Vec3) -> f64 {
         let [i, s] = [incident, scattered].map(|v| local(&self.axes, v));
         self.bsdf.evaluate(i, s, &self.media) * self.tilt(incident, scattered, s.z)
+    }
+
+    /// The direction of light that arrived along `d` after it met a surface without interpolated normals that lets nothing
+    /// through, from two numbers; None: absorbed.
+    #[inline]
+    #[must_use]
+    pub fn bounced(&self, d: Vec3, numbers: [f64; 2]) -> Option<Vec3> {
+        let outward = local(&self.axes, -d);
+        match self.bsdf.sample(outward, &self.media, numbers) {
+            Drawn::Scattered(v) => {
+                let [x, y, z] = self.axes;
+                let d = x * v.x + y * v.y + z * v.z;
+                self.keeps_side(d).then_some(d)
+            }
+            Drawn::Mirrored => {
+                let facing = if outward.z > 0.0 { self.side } else { -self.side };
+                Some(reflect(d, facing, outward.z.abs()))
+            }
+            Drawn::Absorbed | Drawn::Refracted(_) => None,
+        }
     }
 
     /// What f is multiplied by where normals are interpolated: the light that leaves in a direction is f cosθ about the

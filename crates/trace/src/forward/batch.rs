@@ -5,14 +5,16 @@ use etendue_geometry::hits::Hits;
 use etendue_geometry::origin_faces::NONE;
 use etendue_geometry::ray_batch::BLOCK;
 use etendue_math::Vec3;
+use etendue_optics::bsdf::Media;
 use etendue_sampling::ordered::BATCH;
 use etendue_sampling::philox::{Pairs, fill_pairs};
 
 use super::block_trace::BlockTrace;
-use super::lambertian_sheet::{LambertianSheet, SheetRays, lambertian_sheets};
+use super::lambertian_sheet::{LambertianSheet, SheetRays};
 use super::queue::RayQueue;
 use super::run::Run;
-use super::sorter::Sorter;
+use super::scattering_sheet::ScatteringSheet;
+use super::sorter::{Sheet, Sorter, sheets};
 use crate::dealing::Dealing;
 use crate::detector::Detector;
 use crate::events::depth;
@@ -38,7 +40,7 @@ struct BatchTrace<'a> {
     now: RayQueue,
     next: RayQueue,
     hits: Hits,
-    sorter: Sorter,
+    sorter: Sorter<'a>,
     /// Rays whose random numbers are wanted, and the numbers.
     addresses: Vec<u64>,
     numbers: [Vec<f64>; 2],
@@ -102,7 +104,7 @@ impl<'a> BatchTrace<'a> {
             now: RayQueue::default(),
             next: RayQueue::default(),
             hits: Hits::default(),
-            sorter: Sorter::new(scene, lambertian_sheets(scene, wants)),
+            sorter: Sorter::new(scene, sheets(scene, wants)),
             addresses: Vec::new(),
             numbers: Default::default(),
             going: Vec::new(),
@@ -227,7 +229,10 @@ impl<'a> BatchTrace<'a> {
             next.clear();
             for (sheet, which) in sorter.bounced() {
                 self.draw(&now, which, event);
-                self.bounce(sheet, which, &now, &hits, &mut next);
+                match sheet {
+                    Sheet::Lambertian(sheet) => self.bounce(sheet, which, &now, &hits, &mut next),
+                    Sheet::Scattering(sheet) => self.scatter(sheet, which, &now, &hits, &mut next),
+                }
             }
             self.draw(&now, sorter.single(), event);
             for (k, i) in sorter.single().iter().enumerate() {
@@ -284,6 +289,41 @@ impl<'a> BatchTrace<'a> {
         self.sheet_rays.gather(now, hits, &self.going);
         let face = &self.block.scene.face_set.faces()[sheet.face as usize];
         self.sheet_rays.bounce(face, sheet, &self.numbers);
+        self.sheet_rays.go_on(sheet.face, next);
+    }
+
+    /// Rays that meet one face go on, each by itself, or are absorbed.
+    fn scatter(&mut self, sheet: ScatteringSheet<'_>, which: &[u32], now: &RayQueue, hits: &Hits, next: &mut RayQueue) {
+        let BlockTrace {
+            scene,
+            media,
+            states,
+            out,
+            ..
+        } = &mut self.block;
+        let [numbers, turns] = &self.numbers;
+        self.sheet_rays.gather(now, hits, which);
+        let face = &scene.face_set.faces()[sheet.face as usize];
+        self.sheet_rays.bounce_each(face, |k, who, d, normal| {
+            let RayState { flux, wavelength, .. } = states[who as usize];
+            let n = media.at(scene, 0, wavelength).n;
+            // Not so if it is NaN, either.
+            if n > 0.0 {
+                let around = Media {
+                    wavelength,
+                    front: n,
+                    back: n,
+                };
+                let bounced = sheet.bounced(d, normal, around, [numbers[k], turns[k]]);
+                if bounced.is_none() {
+                    out.ledger.book(Fate::OnFace(sheet.face), flux);
+                }
+                bounced
+            } else {
+                out.ledger.book(Fate::Lost(Loss::NoIndex, sheet.face), flux);
+                None
+            }
+        });
         self.sheet_rays.go_on(sheet.face, next);
     }
 }

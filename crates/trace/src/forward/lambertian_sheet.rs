@@ -84,6 +84,31 @@ impl SheetRays {
         turn(sheet, numbers, &self.normal, &mut self.d);
     }
 
+    /// Turns the lines to the face into those from there, as `bounced` says for each (its state, its direction, the normal);
+    /// those for which there is none are left out.
+    pub fn bounce_each(&mut self, face: &Face, mut bounced: impl FnMut(usize, u32, Vec3, Vec3) -> Option<Vec3>) {
+        surface_points(face, &mut self.o, &self.d, &self.t, &self.part, &mut self.normal);
+        let at = |lists: &Vectors, k: usize| Vec3::new(lists[0][k], lists[1][k], lists[2][k]);
+        let mut place = 0;
+        for k in 0..self.who.len() {
+            let Some(d) = bounced(k, self.who[k], at(&self.d, k), at(&self.normal, k)) else {
+                continue;
+            };
+            // No later than where it is: the rays move up.
+            (self.who[place], self.part[place]) = (self.who[k], self.part[k]);
+            for (axis, component) in [d.x, d.y, d.z].into_iter().enumerate() {
+                self.o[axis][place] = self.o[axis][k];
+                self.d[axis][place] = component;
+            }
+            place += 1;
+        }
+        self.who.truncate(place);
+        self.part.truncate(place);
+        for lists in [&mut self.o, &mut self.d] {
+            lists.iter_mut().for_each(|list| list.truncate(place));
+        }
+    }
+
     /// Adds the rays to a queue.
     pub fn go_on(&self, face: u32, queue: &mut RayQueue) {
         let [o, d] = [&self.o, &self.d].map(|lists| lists.each_ref().map(|list| &list[..]));

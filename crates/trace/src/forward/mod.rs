@@ -5,7 +5,7 @@
 //! detector keeps have equal flux if those of the source have.
 //!
 //! `run`: how many rays, and how; `queue`: rays on their way; `sorter`: what comes next; `lambertian_sheet`: many at once off a
-//! plain wall; `step`: one by one; `block_trace`: what rays leave; `batch`: from the sources to their
+//! plain wall; `scattering_sheet`: off any other that lets nothing through; `step`: one by one; `block_trace`: what rays leave; `batch`: from the sources to their
 //! ends.
 
 pub mod batch;
@@ -13,5 +13,6 @@ mod block_trace;
 mod lambertian_sheet;
 mod queue;
 pub mod run;
+mod scattering_sheet;
 mod sorter;
 mod step;

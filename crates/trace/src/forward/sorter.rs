@@ -2,19 +2,52 @@
 
 use etendue_geometry::hits::Hits;
 
-use super::lambertian_sheet::LambertianSheet;
+use super::lambertian_sheet::{LambertianSheet, lambertian_sheets};
 use super::queue::RayQueue;
+use super::scattering_sheet::{ScatteringSheet, scattering_sheets};
 use crate::buckets::Buckets;
+use crate::detector::Wants;
 use crate::scene::Scene;
 use crate::solid_stack::SolidStack;
 
+/// A face off which many rays are bounced at once.
+#[derive(Clone, Copy, Debug)]
+pub enum Sheet<'a> {
+    /// A plain wall.
+    Lambertian(LambertianSheet),
+    /// Any other that lets nothing through.
+    Scattering(ScatteringSheet<'a>),
+}
+
+impl Sheet<'_> {
+    /// Its number.
+    const fn face(&self) -> u32 {
+        match self {
+            Self::Lambertian(sheet) => sheet.face,
+            Self::Scattering(sheet) => sheet.face,
+        }
+    }
+}
+
+/// The faces of a scene off which rays are bounced many at a time.
+#[must_use]
+pub fn sheets(scene: &Scene, wants: Wants) -> Vec<Sheet<'_>> {
+    let plain: Vec<_> = lambertian_sheets(scene, wants);
+    let others = scattering_sheets(scene, wants);
+    let others = others
+        .into_iter()
+        .filter(|other| plain.iter().all(|sheet| sheet.face != other.face))
+        .map(Sheet::Scattering);
+    plain.iter().copied().map(Sheet::Lambertian).chain(others).collect()
+}
+
 /// Sorts the rays of a queue by what comes next.
 #[derive(Default)]
-pub struct Sorter {
+pub struct Sorter<'a> {
     /// For each face, and for none, the number of the list of most rays that meet it: [`GONE`], [`SINGLE`], or from [`FIRST`] on
     /// for faces off which many are bounced at once.
     list_of: Vec<usize>,
-    lambertian_sheets: Vec<LambertianSheet>,
+    sheets: Vec<Sheet<'a>>,
     lists: Buckets,
     /// For each ray whether it may be at more than one face.
     tied: Vec<bool>,
@@ -31,22 +64,22 @@ const SINGLE: usize = 1;
 /// The list of the first bouncer.
 const FIRST: usize = 2;
 
-impl Sorter {
+impl<'a> Sorter<'a> {
     /// Of a scene, and those of its faces off which many rays are bounced at once.
     #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^16 solids")]
-    pub fn new(scene: &Scene, lambertian_sheets: Vec<LambertianSheet>) -> Self {
+    pub fn new(scene: &Scene, sheets: Vec<Sheet<'a>>) -> Self {
         let solids = 0..=scene.solids.len();
         let clear = |solid: usize| scene.media[scene.medium(solid as u16)].absorption.range() == [0.0, 0.0];
         let clear: Vec<bool> = solids.map(clear).collect();
         let mut list_of = vec![SINGLE; scene.roles.len() + 1];
         list_of[scene.roles.len()] = if clear[0] { GONE } else { SINGLE };
-        for (list, sheet) in (FIRST..).zip(&lambertian_sheets) {
-            list_of[sheet.face as usize] = list;
+        for (list, sheet) in (FIRST..).zip(&sheets) {
+            list_of[sheet.face() as usize] = list;
         }
         Self {
             list_of,
-            lists: Buckets::new(FIRST + lambertian_sheets.len()),
-            lambertian_sheets,
+            lists: Buckets::new(FIRST + sheets.len()),
+            sheets,
             tied: Vec::new(),
             clear,
         }
@@ -83,8 +116,8 @@ impl Sorter {
     }
 
     /// Places of the rays that are bounced, face by face.
-    pub fn bounced(&self) -> impl Iterator<Item = (LambertianSheet, &[u32])> {
-        let sheet = |list: usize| self.lambertian_sheets.get(list.checked_sub(FIRST)?);
+    pub fn bounced(&self) -> impl Iterator<Item = (Sheet<'a>, &[u32])> {
+        let sheet = |list: usize| self.sheets.get(list.checked_sub(FIRST)?);
         self.lists
             .used()
             .filter_map(move |(list, places)| Some((*sheet(list)?, places)))
