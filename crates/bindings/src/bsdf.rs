@@ -10,7 +10,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::scene::finish;
+use crate::finish::finish;
 use crate::scene_values::refuse;
 
 /// Optical properties of a surface, as a scene takes them, to be asked outside of one.

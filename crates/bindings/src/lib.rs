@@ -10,6 +10,7 @@ mod dealing;
 mod detector;
 mod far_field;
 mod field;
+mod finish;
 mod glints;
 mod guide;
 mod polya;

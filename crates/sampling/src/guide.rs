@@ -30,21 +30,21 @@ impl Guide {
         }
     }
 
-    /// How many of its list are not above `x`: what `partition_point(|number| *number <= x)` finds.
-    #[inline]
+    /// How many of its list, whose numbers `of` tells, are not above `x`: what `partition_point` finds.
+    #[inline(always)]
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "kept within the table"
     )]
-    pub fn not_above(&self, rising: &[f64], x: f64) -> usize {
+    pub fn not_above<T>(&self, rising: &[T], x: f64, of: impl Fn(&T) -> f64) -> usize {
         let step = ((x * self.scale) as usize).min(self.first.len().saturating_sub(1));
         let mut at = self.first.get(step).map_or(0, |first| *first as usize);
-        while at > 0 && rising[at - 1] > x {
+        while at > 0 && of(&rising[at - 1]) > x {
             at -= 1;
         }
-        while at < rising.len() && rising[at] <= x {
+        while at < rising.len() && of(&rising[at]) <= x {
             at += 1;
         }
         at
@@ -80,7 +80,7 @@ mod tests {
                     .collect();
                 for x in asked.into_iter().chain([0.0, -1.0, 2.0 * sum, f64::MAX]) {
                     assert_eq!(
-                        guide.not_above(&list, x),
+                        guide.not_above(&list, x, |y| *y),
                         list.partition_point(|y| *y <= x),
                         "{length} {steep} {x}"
                     );

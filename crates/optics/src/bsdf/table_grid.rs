@@ -28,20 +28,30 @@ pub struct Slice {
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     pub sine: f64,
+    /// From 0 to the end of the plane.
     radial: Vec<f64>,
     azimuths: usize,
-    f: Vec<f64>,
-    /// ∫ f r dr from 0 to each radial coordinate and, last, to the end of the plane.
-    cumulative: Vec<f64>,
+    /// Azimuth by azimuth, at each radial coordinate.
+    nodes: Vec<Node>,
+    /// ∫ f r dr along each azimuth, all over the plane.
+    wholes: Vec<f64>,
     /// Running sum over the sectors between azimuths, of the whole plane.
     sectors: Vec<f64>,
-    /// Of `sectors`, and of `cumulative` along each azimuth.
+    /// Of `sectors`, and of the sums along each azimuth.
     sector_guide: Guide,
     guides: Vec<Guide>,
     /// Of the radial coordinates, by the leading bits of a number: coordinates rise by ratios.
     first_below: Vec<u16>,
     /// Leading bits of the second radial coordinate.
     lowest: u64,
+}
+
+/// What a slice holds at a point of its grid.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    f: f64,
+    /// ∫ f r dr along its azimuth from 0.
+    sum: f64,
 }
 
 /// Farthest |β − β₀|.
@@ -120,6 +130,11 @@ impl Slice {
         self.f.chunks(n).flat_map(along).collect()
     }
 
+    /// With its integrals.
+    ///
+    /// # Errors
+    /// What is wrong with the slice.
+    #[allow(clippy::cast_possible_truncation, reason = "fewer than 2^16 radial coordinates")]
     pub(super) fn grid(&self) -> Result<Grid, String> {
         let Self {
             radial, azimuths, f, ..
@@ -143,43 +158,56 @@ impl Slice {
         if !(self.share >= 0.0 && self.floor >= 0.0 && self.share + self.floor <= 1.0 + 1e-9) {
             return Err(format!("{} of the flux leaves", self.share + self.floor));
         }
-        let n = radial.len();
-        let mut cumulative = Vec::with_capacity(azimuths * (n + 1));
-        for row in f.chunks(n) {
-            let mut sum = 0.0;
-            cumulative.push(sum);
-            for i in 1..n {
-                sum += moment(radial[i - 1], radial[i], row[i - 1], row[i], radial[i]);
-                cumulative.push(sum);
-            }
-            cumulative.push(sum + row[n - 1] * 0.5 * (END * END - radial[n - 1] * radial[n - 1]));
+        let mut all = radial.clone();
+        if radial[radial.len() - 1] < END {
+            all.push(END);
         }
+        let mut nodes = Vec::with_capacity(azimuths * all.len());
+        for row in f.chunks(radial.len()) {
+            let mut sum = 0.0;
+            for (i, r) in all.iter().enumerate() {
+                // Constant beyond the last of its coordinates.
+                let f = row[i.min(row.len() - 1)];
+                if i > 0 {
+                    sum += moment(all[i - 1], *r, row[i - 1], f, *r);
+                }
+                nodes.push(Node { f, sum });
+            }
+        }
+        let rows = || nodes.chunks(all.len());
+        let sums = |row: &[Node]| row.iter().map(|node| node.sum).collect::<Vec<f64>>();
         let mut grid = Grid {
             sine: self.sine,
-            radial: radial.clone(),
             azimuths: *azimuths,
-            f: f.clone(),
-            guides: cumulative.chunks(n + 1).map(Guide::new).collect(),
-            cumulative,
+            guides: rows().map(|row| Guide::new(&sums(row))).collect(),
+            wholes: rows().map(|row| row[row.len() - 1].sum).collect(),
+            nodes,
             sectors: Vec::new(),
             sector_guide: Guide::default(),
             first_below: Vec::new(),
-            lowest: radial.get(1).map_or(0, |r| leading(*r)),
+            lowest: all.get(1).map_or(0, |r| leading(*r)),
+            radial: all,
         };
         let mut sum = 0.0;
         for j in 0..*azimuths {
-            sum += 0.5 * (grid.whole(j) + grid.whole((j + 1) % azimuths)) * TAU / *azimuths as f64;
+            sum += 0.5 * (grid.wholes[j] + grid.wholes[grid.after(j)]) * TAU / *azimuths as f64;
             grid.sectors.push(sum);
         }
         grid.sector_guide = Guide::new(&grid.sectors);
         grid.first_below = (grid.lowest..=leading(END))
-            .map(|bits| radial.partition_point(|r| *r < f64::from_bits(bits << SHIFT)).max(1) as u16 - 1)
+            .map(|bits| {
+                grid.radial
+                    .partition_point(|r| *r < f64::from_bits(bits << SHIFT))
+                    .max(1) as u16
+                    - 1
+            })
             .collect();
         Ok(grid)
     }
 }
 
 /// ∫ g r dr from `a` to `x`, g being linear from `(a, ga)` to `(b, gb)`.
+#[inline]
 fn moment(a: f64, b: f64, ga: f64, gb: f64, x: f64) -> f64 {
     let slope = (gb - ga) / (b - a);
     let h = x - a;
@@ -188,25 +216,29 @@ fn moment(a: f64, b: f64, ga: f64, gb: f64, x: f64) -> f64 {
 }
 
 impl Grid {
-    /// ∫ f r dr along an azimuth, all over the plane.
-    fn whole(&self, j: usize) -> f64 {
-        self.cumulative[(j + 1) * (self.radial.len() + 1) - 1]
-    }
-
-    /// ∫ f r dr along an azimuth up to `r`.
-    fn up_to(&self, j: usize, i: usize, r: f64) -> f64 {
-        let n = self.radial.len();
-        let before = self.cumulative[j * (n + 1) + i];
-        let row = &self.f[j * n..(j + 1) * n];
-        if i + 1 < n {
-            before + moment(self.radial[i], self.radial[i + 1], row[i], row[i + 1], r)
-        } else {
-            before + row[i] * 0.5 * (r * r - self.radial[i] * self.radial[i])
-        }
-    }
-
-    /// The last radial coordinate not above `r`.
+    /// The azimuth after one.
     #[inline]
+    const fn after(&self, j: usize) -> usize {
+        if j + 1 == self.azimuths { 0 } else { j + 1 }
+    }
+
+    /// What is held along an azimuth.
+    #[inline]
+    fn row(&self, j: usize) -> &[Node] {
+        let n = self.radial.len();
+        &self.nodes[j * n..(j + 1) * n]
+    }
+
+    /// ∫ f r dr along an azimuth up to `r`, which is beyond radial coordinate `i`.
+    #[inline]
+    fn up_to(&self, j: usize, i: usize, r: f64) -> f64 {
+        let row = self.row(j);
+        row[i].sum + moment(self.radial[i], self.radial[i + 1], row[i].f, row[i + 1].f, r)
+    }
+
+    /// The last radial coordinate not above `r`, but for the very last.
+    #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "14 bits")]
     fn below(&self, r: f64) -> usize {
         let bits = leading(r);
         if bits < self.lowest || self.first_below.is_empty() {
@@ -214,7 +246,7 @@ impl Grid {
         }
         let step = ((bits - self.lowest) as usize).min(self.first_below.len() - 1);
         let mut at = usize::from(self.first_below[step]);
-        while at + 1 < self.radial.len() && self.radial[at + 1] <= r {
+        while at + 2 < self.radial.len() && self.radial[at + 1] <= r {
             at += 1;
         }
         at
@@ -222,17 +254,12 @@ impl Grid {
 
     /// f at a distance from β₀ and an azimuth \[turns\].
     pub(super) fn at(&self, r: f64, turn: f64) -> f64 {
-        let (n, i) = (self.radial.len(), self.below(r));
-        let next = (i + 1).min(n - 1);
-        let u = if next > i {
-            (r - self.radial[i]) / (self.radial[next] - self.radial[i])
-        } else {
-            0.0
-        };
+        let i = self.below(r);
+        let u = ((r - self.radial[i]) / (self.radial[i + 1] - self.radial[i])).min(1.0);
         let (j, k, v) = self.around(turn);
         let along = |j: usize| {
-            let row = &self.f[j * n..(j + 1) * n];
-            row[i] + u * (row[next] - row[i])
+            let row = self.row(j);
+            row[i].f + u * (row[i + 1].f - row[i].f)
         };
         let (near, far) = (along(j), along(k));
         near + v * (far - near)
@@ -247,7 +274,7 @@ impl Grid {
     fn around(&self, turn: f64) -> (usize, usize, f64) {
         let place = turn * self.azimuths as f64;
         let j = (place as usize).min(self.azimuths - 1);
-        (j, (j + 1) % self.azimuths, place - j as f64)
+        (j, self.after(j), place - j as f64)
     }
 
     /// The integral over the unit circle about −β₀.
@@ -257,12 +284,12 @@ impl Grid {
         let parts = 72_usize.div_ceil(self.azimuths) * if sine > 0.9 { 4 } else { 1 };
         let mut sum = 0.0;
         for j in 0..self.azimuths {
-            let k = (j + 1) % self.azimuths;
+            let k = self.after(j);
             for part in 0..parts {
                 for (node, weight) in NODES {
                     let v = (part as f64 + node) / parts as f64;
                     let (s, c) = sin_cos_turns((j as f64 + v) / self.azimuths as f64);
-                    let r = rim(sine, s, c);
+                    let r = rim(sine, s, c).min(END);
                     let i = self.below(r);
                     let (near, far) = (self.up_to(j, i, r), self.up_to(k, i, r));
                     sum += weight / parts as f64 * (near + v * (far - near));
@@ -278,11 +305,11 @@ impl Grid {
         let wanted = numbers[1] * all;
         let j = self
             .sector_guide
-            .not_above(&self.sectors, wanted)
+            .not_above(&self.sectors, wanted, |sum| *sum)
             .min(self.azimuths - 1);
         let before = if j == 0 { 0.0 } else { self.sectors[j - 1] };
-        let k = (j + 1) % self.azimuths;
-        let (near, far) = (self.whole(j), self.whole(k));
+        let k = self.after(j);
+        let (near, far) = (self.wholes[j], self.wholes[k]);
         // Within the sector the density is linear from one azimuth to the next.
         let v = of_linear(part_of(wanted - before, self.sectors[j] - before), near, far);
         // There it is a mixture of those along both azimuths.
@@ -298,21 +325,20 @@ impl Grid {
 
     /// A distance along an azimuth, with density f r.
     fn draw_along(&self, j: usize, number: f64) -> f64 {
-        let n = self.radial.len();
-        let sums = &self.cumulative[j * (n + 1)..(j + 1) * (n + 1)];
-        let wanted = number * sums[n];
-        let i = (self.guides[j].not_above(sums, wanted).max(1) - 1).min(n - 1);
-        let (mut low, mut high) = (self.radial[i], if i + 1 < n { self.radial[i + 1] } else { END });
-        let row = &self.f[j * n..(j + 1) * n];
-        let (f0, f1) = (row[i], row[(i + 1).min(n - 1)]);
+        let row = self.row(j);
+        let wanted = number * self.wholes[j];
+        let steps = row.len() - 1;
+        let i = (self.guides[j].not_above(row, wanted, |node| node.sum).max(1) - 1).min(steps - 1);
+        let (mut low, mut high) = (self.radial[i], self.radial[i + 1]);
+        let (Node { f: f0, sum: before }, Node { f: f1, sum: after }) = (row[i], row[i + 1]);
         let (start, width) = (low, high - low);
-        let slope = if i + 1 < n { (f1 - f0) / width } else { 0.0 };
-        let left = wanted - sums[i];
+        let slope = (f1 - f0) / width;
+        let left = wanted - before;
         // ∫ f r dr from the start of the step on, as `moment` has it.
         let linear = f0 + slope * start;
         let moment = |h: f64| h * (f0 * start + h * (0.5 * linear + h * slope / 3.0));
         // Newton's method, kept between ends that close in, from where f r would be if it were linear in r.
-        let mut r = low + width * of_linear(part_of(left, sums[i + 1] - sums[i]), f0 * start, f1 * high);
+        let mut r = low + width * of_linear(part_of(left, after - before), f0 * start, f1 * high);
         for _ in 0..60 {
             let h = r - start;
             let off = moment(h) - left;
@@ -338,6 +364,7 @@ impl Grid {
 }
 
 /// The number from 0 to 1 below which lies a part of a density that is linear from `a` to `b`.
+#[inline]
 fn of_linear(part: f64, a: f64, b: f64) -> f64 {
     let root = (a * a + part * (b * b - a * a)).max(0.0).sqrt();
     let below = a + root;

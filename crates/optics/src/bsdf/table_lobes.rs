@@ -170,7 +170,10 @@ impl Lobe {
 
     #[inline]
     pub(super) fn blend(&self, sine: f64) -> Blend {
-        let above = self.guide.not_above(&self.sines, sine).clamp(1, self.sines.len() - 1);
+        let above = self
+            .guide
+            .not_above(&self.sines, sine, |node| *node)
+            .clamp(1, self.sines.len() - 1);
         let (a, b) = (&self.blends[above - 1], &self.blends[above]);
         let [from, to] = [self.sines[above - 1], self.sines[above]];
         let part = if to > from {

@@ -104,8 +104,8 @@ impl SheetRays {
         }
         self.who.truncate(place);
         self.part.truncate(place);
-        for lists in [&mut self.o, &mut self.d] {
-            lists.iter_mut().for_each(|list| list.truncate(place));
+        for list in self.o.iter_mut().chain(&mut self.d) {
+            list.truncate(place);
         }
     }
 

@@ -51,3 +51,114 @@ impl ScatteringSheet<'_> {
         Surface::new(self.bsdf, media, [normal; 2], self.axis).bounced(d, numbers)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use std::sync::Arc;
+
+    use etendue_geometry::Face;
+    use etendue_geometry::hits::Hits;
+    use etendue_geometry::origin_faces::OriginFaces;
+    use etendue_geometry::shape::{Quadric, Shape};
+    use etendue_math::Frame;
+    use etendue_optics::bsdf::{Lobe, Mixture, Profile};
+    use etendue_optics::medium::{Index, Medium};
+    use etendue_optics::source::surface::about;
+    use etendue_optics::table::{Curve, Table};
+    use etendue_sampling::philox::Stream;
+
+    use crate::forward::queue::RayQueue;
+    use crate::interaction::interaction_of;
+    use crate::medium_cache::MediumCache;
+    use crate::scatter::SurfaceEvent;
+    use crate::scene::SceneFace;
+    use crate::solid_stack::SolidStack;
+
+    /// A ball that mirrors a fifth, scatters about the mirrored direction with an axis along which the lobe is narrow, and
+    /// absorbs the rest.
+    fn ball() -> Scene {
+        let [mirrored, none] = [0.2, 0.0].map(Table::constant);
+        let mirror = Mixture::of_shares([mirrored, none.clone()], [none.clone(), none]).expect("at most 1");
+        let profile = Profile::Gaussian { peak: 1.0, sigma: 0.15 };
+        let lobe = Lobe::elliptical(profile, 3.0, false, false).expect("sound");
+        let parts: Vec<(f64, Arc<dyn Bsdf>)> = vec![(1.0, mirror), (1.0, Arc::new(lobe))];
+        let both: Arc<dyn Bsdf> = Arc::new(Mixture::new(parts).expect("at most 1"));
+        let shape = Shape::Quadric(Quadric {
+            r2: 1.0,
+            z2: 1.0,
+            z1: 0.0,
+            z0: -25.0,
+            z: [f64::NEG_INFINITY, f64::INFINITY],
+            r: [0.0, f64::INFINITY],
+        });
+        let face = Face {
+            shape,
+            frame: Frame {
+                origin: Vec3::new(0.0, 0.0, 0.0),
+                x: Vec3::new(1.0, 0.0, 0.0),
+                y: Vec3::new(0.0, 1.0, 0.0),
+                z: Vec3::new(0.0, 0.0, 1.0),
+            },
+            trims: vec![],
+            flipped: false,
+        };
+        let air = Medium {
+            index: Index::Table(Curve::constant(1.0)),
+            absorption: Curve::constant(0.0),
+        };
+        let axis = Some(Vec3::new(0.3, 0.1, 0.9));
+        let face = SceneFace {
+            face,
+            solid: None,
+            finish: 0,
+            axis,
+        };
+        Scene::new(vec![face], vec![both], vec![air], vec![], vec![], vec![]).expect("sound")
+    }
+
+    #[test]
+    fn a_bounce_is_what_the_surface_event_comes_to() {
+        let scene = ball();
+        let sheets = scattering_sheets(&scene, Wants::default());
+        assert_eq!(sheets.len(), 1);
+        let (stream, rays) = (Stream::new(5, 6), 3000_u32);
+        let mut queue = RayQueue::default();
+        for i in 0..rays {
+            let [a, b, c, d] = stream.uniforms(u64::from(i), 0);
+            let z = Vec3::new(0.0, 0.0, 1.0);
+            let o = about(z, 2.0 * a - 1.0, b) * if i % 2 == 0 { 9.0 } else { 3.0 };
+            let to = about(z, 2.0 * c - 1.0, d) * 2.0;
+            queue.push(
+                i,
+                (o, (to - o).normalized(), OriginFaces::default()),
+                SolidStack::default(),
+            );
+        }
+        let mut hits = Hits::default();
+        scene.face_set.nearest(&queue.lines, &mut hits);
+        let mut media = MediumCache::new(&scene);
+        let mut ends = [0; 3];
+        for i in (0..rays as usize).filter(|i| hits.face[*i] == 0) {
+            let [number, turn, ..] = stream.uniforms(i as u64, 1);
+            let met =
+                interaction_of(&scene, &queue.lines, &hits, i, SolidStack::default(), |_, _, _| {}).expect("sound");
+            let d = queue.lines.direction(i);
+            let event = SurfaceEvent::new(&scene, &met, d, 555.0, &mut media)
+                .expect("air")
+                .expect("a surface");
+            let expected = event.sample([number, turn]);
+            let around = Media {
+                wavelength: 555.0,
+                front: 1.0,
+                back: 1.0,
+            };
+            let front = if met.front { met.side } else { -met.side };
+            let found = sheets[0].bounced(d, front, around, [number, turn]);
+            assert_eq!(found, expected.map(|(_, d, _)| d));
+            ends[expected.map_or(0, |(component, ..)| 1 + usize::from(component.is_specular()))] += 1;
+        }
+        assert!(ends.iter().all(|count| *count > 100), "{ends:?}");
+    }
+}
