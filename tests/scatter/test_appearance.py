@@ -7,8 +7,18 @@ import math
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
-from etendue.scatter.appearance import RECEPTORS, appearance, specular_gloss, transmission_haze
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.scatter.appearance import (
+    RECEPTORS,
+    appearance,
+    distinctness_of_image,
+    haze_index,
+    reflection_haze,
+    specular_gloss,
+    transmission_haze,
+)
 from etendue.scatter.models import Coated, Gaussian, Lambertian, Mirror, Mixture, Transmitter
+from etendue.scatter.table import BsdfTable
 
 
 def glass(*, index: float, angle: float) -> float:
@@ -81,3 +91,92 @@ def test_haze() -> None:
 def test_only_the_angles_of_the_standard() -> None:
     with pytest.raises(ArgumentError, match="20, 60, 85"):
         specular_gloss(Mirror(reflectance=0.9), 45)
+
+
+def lambert_in(*, rho: float, angle: float, low: float, high: float, across: float) -> float:
+    """ρ/π ∫ cosθ dΩ over a rectangle about a direction: angles in the plane of incidence from low to high, ± across / 2."""
+    a = math.sin(math.radians(angle + high)) - math.sin(math.radians(angle + low))
+    b = math.radians(0.5 * across)
+    return rho / math.pi * a * (b + math.sin(b) * math.cos(b))
+
+
+def test_reflection_haze_of_a_lambertian_surface() -> None:
+    parts = [lambert_in(rho=0.8, angle=20.0, low=c - 0.9, high=c + 0.9, across=3.6) for c in (-1.9, 1.9)]
+    expected = 100.0 * sum(parts) / glass(index=1.567, angle=20.0)
+    assert reflection_haze(Lambertian(reflectance=0.8)) == pytest.approx(expected, rel=1e-9)
+    assert reflection_haze(Coated(index=1.567, base_reflectance=0.0)) == 0.0
+
+
+def test_haze_index_and_distinctness_of_a_lambertian_surface() -> None:
+    """Fluxes over the widths of their slits: nearly the same for a matt surface, whose distinctness is that of no image."""
+    white = Lambertian(reflectance=0.8)
+    whole = lambert_in(rho=0.8, angle=30.0, low=-0.2, high=0.2, across=5.0) / 0.4
+    for angle, width in ((2, 0.4), (5, 0.5)):
+        parts = [
+            lambert_in(rho=0.8, angle=30.0, low=c - 0.5 * width, high=c + 0.5 * width, across=5.0)
+            for c in (-angle, angle)
+        ]
+        expected = 100.0 * 0.5 * sum(parts) / width / whole
+        assert haze_index(white, angle) == pytest.approx(expected, rel=1e-9)
+    # The mirror's part of the slits beside: of the image's 0.44° those from 0.23° on, so nothing.
+    assert distinctness_of_image(white) == pytest.approx(0.0, abs=0.01)
+    for nothing in (distinctness_of_image, haze_index):
+        with pytest.raises(ArgumentError, match="nothing is"):
+            nothing(Mirror(reflectance=0.0))
+    with pytest.raises(ArgumentError, match="2 and 5"):
+        haze_index(white, 3)
+
+
+def test_distinctness_of_a_sharp_image_under_a_veil() -> None:
+    """A mirror of 4 % and a Lambertian veil, by hand: of the mirror's image 0.4/0.44 fall into the slit."""
+    veiled = Mixture(parts=[Mirror(reflectance=0.04), Lambertian(reflectance=0.8)])
+    veil = lambert_in(rho=0.8, angle=30.0, low=-0.2, high=0.2, across=5.0) / 0.4
+    beside = [lambert_in(rho=0.8, angle=30.0, low=c - 0.07, high=c + 0.07, across=5.0) / 0.14 for c in (-0.3, 0.3)]
+    image = 0.04 * (0.4 / 0.44) / 0.4
+    expected = 100.0 * (1.0 - 0.5 * sum(beside) / (image + veil))
+    assert distinctness_of_image(veiled) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_reflection_haze_of_a_lobe_by_rays() -> None:
+    """Rays from directions within the source, counted in the receptors on both sides."""
+    sigma = 0.03
+    lobe = Gaussian(peak=0.5 / (2.0 * math.pi * sigma**2), sigma=sigma)
+    rng = np.random.default_rng(5)
+    inside = drawn = 0
+    for k in range(60):
+        tilt, turn = rng.uniform(-0.375, 0.375), rng.uniform(-1.25, 1.25)
+        a, b = math.radians(20.0 + tilt), math.radians(turn)
+        rays = lobe.sample([-math.sin(a) * math.cos(b), -math.sin(b), math.cos(a) * math.cos(b)], 20_000, seed=k)
+        gone = rays[~np.isnan(rays[:, 0])]
+        along = np.degrees(np.arctan2(gone[:, 0], gone[:, 2])) - 20.0
+        across = np.degrees(np.arcsin(gone[:, 1]))
+        beside = np.abs(np.abs(along) - 1.9) < 0.9
+        inside += int((beside & (np.abs(across) < 1.8)).sum())
+        drawn += 20_000
+    share = inside / drawn
+    found = reflection_haze(lobe) * glass(index=1.567, angle=20) / 100.0
+    assert abs(found - share) < 4.0 * math.sqrt(share * (1.0 - share) / drawn)
+
+
+@pytest.mark.slow
+def test_errors_of_a_table_are_those_of_the_cells_that_the_receptor_sees() -> None:
+    """A flat table whose cells are independent: gloss is off by the mean of those within the aperture.
+
+    The shares of slices are off too, by their own cells; both are small beside the few cells at the mirrored direction.
+    """
+    radial = np.concatenate([np.linspace(0.0, 12.0, 7), np.linspace(20.0, 180.0, 9)])
+    grid = PolarGrid("specular", radial, np.arange(0.0, 360.0, 60.0))
+    values = np.full(grid.shape, 0.2)
+    slices = [
+        BsdfSlice(direction(theta, 180.0), values, grid=grid, standard_error=0.1 * values)
+        for theta in (20.0, 60.0, 85.0)
+    ]
+    looks = appearance(BsdfTable(BsdfData(tuple(slices))))
+    # At 60° the aperture of 4.4° × 11.7° holds the middle of the lobe, 6 copies of one cell, and the six at 2°.
+    relative = looks.errors["gloss 60"] / looks.gloss[60]
+    assert 0.02 < relative < 0.1
+    assert appearance(BsdfTable(BsdfData(tuple(slices)))).errors == looks.errors
+    assert appearance(BsdfTable(BsdfData(tuple(slices))), seed=2).errors != looks.errors
+    plain = [BsdfSlice(one.incident, one.values, grid=grid) for one in slices]
+    assert appearance(BsdfTable(BsdfData(tuple(plain)))).errors == {}

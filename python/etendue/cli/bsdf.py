@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,6 +14,7 @@ from etendue.cli.guard import guarded
 from etendue.cli.terminal import check_folder, complain, one_of, print_json, say
 from etendue.formats.bsdf import BSDF_FORMATS
 from etendue.plot import plot_bsdf
+from etendue.quantities.measured import measured
 from etendue.scatter.appearance import GLASS, appearance
 from etendue.scatter.files import read_bsdf, write_bsdf
 from etendue.scatter.scans.files import read_scans
@@ -133,20 +136,28 @@ def convert(
     say(f"{output}: {len(bsdf.data.slices)} slices read from {_named(files)}")
 
 
-def gloss(file: File, json: Json = False) -> None:
-    """Say how glossy a surface is at 20°, 60° and 85° (ISO 2813), and how hazy what it transmits (ASTM D1003)."""
-    bsdf = read_bsdf(file)
-    found = appearance(bsdf)
+def gloss(
+    files: Files,
+    seed: Annotated[int, typer.Option("--seed", help="For the tables that errors are made of.")] = 1,
+    json: Json = False,
+) -> None:
+    """Say how a surface looks to instruments: gloss, reflection haze, distinctness of image, haze of what it transmits.
+
+    After ISO 2813 at 20°, 60° and 85°, ISO 13803, ASTM E430 and D1003; with errors if the file has those of its values.
+    """
+    bsdf = read_bsdf(files)
+    found = appearance(bsdf, seed)
+    complaints = [str(complaint) for complaint in bsdf.complaints]
     if json:
-        complaints = [str(complaint) for complaint in bsdf.complaints]
-        print_json({"file": file, "gloss": found.gloss, "haze": found.haze, "complaints": complaints})
+        facts = {**dataclasses.asdict(found), "file": files[0] if len(files) == 1 else files}
+        print_json({**facts, "complaints": complaints})
         return
-    for complaint in bsdf.complaints:
-        complain(str(complaint))
-    for angle, value in found.gloss.items():
-        say(f"gloss at {angle}°: {value:.2f} (black glass of index {GLASS}: 100)")
-    if found.haze is not None:
-        say(f"haze of transmitted light: {found.haze:.2f} %")
+    for complaint in complaints:
+        complain(complaint)
+    units = {"haze": "% of transmitted light", "distinctness": "%"}
+    for name, value in found.values().items():
+        say(f"{name}: {measured(value, found.errors.get(name, math.nan), units.get(name, 'gloss units'))}")
+    say(f"gloss units: black glass of index {GLASS} has 100")
 
 
 def fit(

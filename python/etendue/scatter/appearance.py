@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_data import BsdfData, direction
 from etendue.scatter.bsdf import Bsdf
+from etendue.scatter.table import BsdfTable
 
 Array = npt.NDArray[np.float64]
 
@@ -25,6 +26,48 @@ RECEPTORS: dict[int, tuple[float, float]] = {20: (1.8, 3.6), 60: (4.4, 11.7), 85
 STRAIGHT = 2.5
 """Angle from the incident direction [°] beyond which transmitted light counts as haze [ASTMD1003]_."""
 
+
+@dataclasses.dataclass(frozen=True)
+class Receptor:
+    """A slit beside the mirrored direction.
+
+    Parameters
+    ----------
+    offset : float
+        Of its middle from the mirrored direction, in the plane of incidence, towards larger angles [°].
+    along, across : float
+        Angles that it subtends in the plane of incidence and across it [°].
+
+    Examples
+    --------
+    >>> Receptor(offset=1.9, along=1.8, across=3.6) in HAZE_RECEPTORS
+    True
+    """
+
+    offset: float
+    along: float
+    across: float
+
+
+HAZE_INCIDENCE = 20.0
+HAZE_RECEPTORS = (Receptor(-1.9, 1.8, 3.6), Receptor(1.9, 1.8, 3.6))
+"""Angle of incidence [°] of reflection haze, and the receptors on both sides of that of gloss [ISO13803]_."""
+
+IMAGE_INCIDENCE = 30.0
+IMAGE_SOURCE = (0.44, 5.0)
+"""Angle of incidence [°] of distinctness of image and of haze near it, and the source's image [°] [ASTME4302019]_."""
+
+IMAGE_RECEPTORS = {
+    "specular": (Receptor(0.0, 0.4, 5.0),),
+    "0.3": (Receptor(-0.3, 0.14, 5.0), Receptor(0.3, 0.14, 5.0)),
+    "2": (Receptor(-2.0, 0.4, 5.0), Receptor(2.0, 0.4, 5.0)),
+    "5": (Receptor(-5.0, 0.5, 5.0), Receptor(5.0, 0.5, 5.0)),
+}
+"""Receptors by their angle from the mirrored direction [°]; of two the mean is taken."""
+
+DRAWS = 12
+"""Tables drawn from a table with standard errors, whose spread is the error of its appearance."""
+
 NODES = 24
 """Of the rule of Gauss and Legendre along each side of the receptor, on both sides of the mirrored direction."""
 
@@ -34,7 +77,7 @@ STEPS = 5
 
 @dataclasses.dataclass(frozen=True)
 class Appearance:
-    """Gloss and haze of a surface.
+    """How a surface looks to the instruments of the standards.
 
     Parameters
     ----------
@@ -42,16 +85,37 @@ class Appearance:
         Specular gloss in gloss units at 20°, 60° and 85°.
     haze : float or None
         Of transmitted light [%]; None if nothing is transmitted.
+    reflection_haze : float
+        In gloss units.
+    distinctness : float or None
+        Distinctness of image [%]; None if nothing is reflected.
+    errors : mapping of str to float
+        Standard errors, of "gloss 20", "gloss 60", "gloss 85", "haze", "reflection haze" and "distinctness"; empty if those
+        of the BSDF are not known.
 
     Examples
     --------
     >>> from etendue.scatter.models import Mirror
-    >>> appearance(Mirror(reflectance=0.5)).haze is None
-    True
+    >>> looks = appearance(Mirror(reflectance=0.5))
+    >>> looks.haze is None, looks.reflection_haze, looks.distinctness, looks.errors
+    (True, 0.0, 100.0, {})
     """
 
     gloss: dict[int, float]
     haze: float | None
+    reflection_haze: float
+    distinctness: float | None
+    errors: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    def values(self) -> dict[str, float]:
+        """All numbers by the names of their errors."""
+        named: dict[str, float | None] = {f"gloss {angle}": value for angle, value in self.gloss.items()}
+        named |= {
+            "haze": self.haze,
+            "reflection haze": self.reflection_haze,
+            "distinctness": self.distinctness,
+        }
+        return {name: value for name, value in named.items() if value is not None}
 
 
 def specular_gloss(bsdf: Bsdf, angle: int = 60) -> float:
@@ -85,9 +149,115 @@ def specular_gloss(bsdf: Bsdf, angle: int = 60) -> float:
     """
     if angle not in RECEPTORS:
         raise ArgumentError(f"gloss is measured at {', '.join(map(str, RECEPTORS))}°, not at {angle}°")
-    mirrored = float(bsdf.regular_reflectance(angle))
-    scattered = _into_receptor(bsdf, angle) if bsdf.reflects else 0.0
-    return float(100.0 * (mirrored + scattered) / _fresnel(angle))
+    along, across = RECEPTORS[angle]
+    return 100.0 * _received(bsdf, angle, SOURCE, Receptor(0.0, along, across)) / _fresnel(angle)
+
+
+def reflection_haze(bsdf: Bsdf) -> float:
+    """Reflection haze after ISO 13803: at 20°, the flux into receptors beside that of gloss, in gloss units.
+
+    The receptors are as large as that of gloss, 1.8° in the plane of incidence, with their middles 1.9° from the mirrored
+    direction; both are added up.
+
+    Parameters
+    ----------
+    bsdf : Bsdf
+        Its front is looked at.
+
+    Returns
+    -------
+    float
+        In gloss units: 100 times the flux over that of black glass into the receptor of gloss.
+
+    Examples
+    --------
+    >>> from etendue.scatter.models import Lambertian
+    >>> white = Lambertian(reflectance=0.9)
+    >>> round(reflection_haze(white) / specular_gloss(white, 20), 2)
+    2.0
+    """
+    found = sum(_received(bsdf, HAZE_INCIDENCE, SOURCE, receptor) for receptor in HAZE_RECEPTORS)
+    return 100.0 * found / _fresnel(HAZE_INCIDENCE)
+
+
+def distinctness_of_image(bsdf: Bsdf) -> float:
+    """Distinctness of image after ASTM E430 and D5767 (A) [%]: 100 (1 − R₀.₃/R₀) at 30°.
+
+    R₀ is the flux into a slit of 0.4° at the mirrored direction, R₀.₃ the mean of those into slits of 0.14° that stand 0.3°
+    beside it, both divided by the width of their slits; the image of the source is 0.44° wide, and the slits and it are 5°
+    high. So a matt surface has 0 %. The image of a perfect mirror ends within the slits beside it: what a mirror of the same
+    R₀ would send there is left out of R₀.₃, so that a perfect mirror has 100 %.
+
+    Parameters
+    ----------
+    bsdf : Bsdf
+        Its front is looked at.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ArgumentError
+        If nothing is reflected into the slit.
+
+    Examples
+    --------
+    >>> from etendue.scatter.models import Mirror
+    >>> distinctness_of_image(Mirror(reflectance=0.9))
+    100.0
+    """
+    found = {name: _image(bsdf, name) for name in ("specular", "0.3")}
+    if not found["specular"] > 0.0:
+        raise ArgumentError("distinctness of image is a part of the light that is reflected, and nothing is")
+    beside, middle = (IMAGE_RECEPTORS[name][0] for name in ("0.3", "specular"))
+    of_mirror = _mirrored_part(IMAGE_SOURCE, beside) / beside.along
+    of_mirror /= _mirrored_part(IMAGE_SOURCE, middle) / middle.along
+    return 100.0 * (1.0 - (found["0.3"] / found["specular"] - of_mirror) / (1.0 - of_mirror))
+
+
+def haze_index(bsdf: Bsdf, angle: int = 2) -> float:
+    """Haze index after ASTM E430 [%]: 100 R/R₀ at 30°, R being the flux 2° or 5° beside the mirrored direction.
+
+    The slits are 0.4° wide at 2°, 0.5° at 5°, and fluxes are divided by these widths; the source and R₀ are those of
+    `distinctness_of_image`.
+
+    Parameters
+    ----------
+    bsdf : Bsdf
+        Its front is looked at.
+    angle : {2, 5}
+        From the mirrored direction [°].
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ArgumentError
+        If the angle is none of the standard's, or nothing is reflected into the slit.
+
+    Examples
+    --------
+    >>> from etendue.scatter.models import Lambertian
+    >>> round(haze_index(Lambertian(reflectance=0.9), 2))
+    100
+    """
+    if str(angle) not in IMAGE_RECEPTORS:
+        raise ArgumentError(f"haze is measured 2 and 5° beside the mirrored direction, not {angle}°")
+    whole = _image(bsdf, "specular")
+    if not whole > 0.0:
+        raise ArgumentError("haze is a part of the light that is reflected, and nothing is")
+    return 100.0 * _image(bsdf, str(angle)) / whole
+
+
+def _image(bsdf: Bsdf, name: str) -> float:
+    """The mean of what the receptors of a name get, over the width of their slits."""
+    receptors = IMAGE_RECEPTORS[name]
+    found = [_received(bsdf, IMAGE_INCIDENCE, IMAGE_SOURCE, receptor) / receptor.along for receptor in receptors]
+    return sum(found) / len(found)
 
 
 def transmission_haze(bsdf: Bsdf) -> float:
@@ -128,8 +298,18 @@ def transmission_haze(bsdf: Bsdf) -> float:
     return float(100.0 * (1.0 - straight / total))
 
 
-def appearance(bsdf: Bsdf) -> Appearance:
-    """Gloss at all three angles, and haze if light is transmitted.
+def appearance(bsdf: Bsdf, seed: int = 1) -> Appearance:
+    """All numbers of a surface; of tables with standard errors these go through to the numbers.
+
+    Errors are the spread over tables drawn with independent normal errors of their values. What errors of an instrument have
+    in common, as that of its reference, is not in them.
+
+    Parameters
+    ----------
+    bsdf : Bsdf
+        Its front is looked at.
+    seed : int
+        For the tables that are drawn.
 
     Examples
     --------
@@ -137,20 +317,67 @@ def appearance(bsdf: Bsdf) -> Appearance:
     >>> {angle: round(gloss, 2) for angle, gloss in appearance(Lambertian(reflectance=0.9)).gloss.items()}
     {20: 1.08, 60: 2.24, 85: 0.03}
     """
+    found = _appearance(bsdf)
+    data = bsdf.data if isinstance(bsdf, BsdfTable) else None
+    if data is None or not any(one.standard_error is not None for one in data.slices):
+        return found
+    rng = np.random.default_rng(seed)
+    drawn = [_appearance(BsdfTable(_drawn(data, rng))).values() for _ in range(DRAWS)]
+    errors = {
+        name: float(np.std([one[name] for one in drawn if name in one], ddof=1))
+        for name in found.values()
+        if sum(name in one for one in drawn) > 1
+    }
+    return dataclasses.replace(found, errors=errors)
+
+
+def _appearance(bsdf: Bsdf) -> Appearance:
     gloss = {angle: specular_gloss(bsdf, angle) for angle in RECEPTORS}
-    return Appearance(gloss, transmission_haze(bsdf) if float(bsdf.transmittance(0.0)) > 0.0 else None)
+    reflected = float(bsdf.reflectance(IMAGE_INCIDENCE)) > 0.0
+    return Appearance(
+        gloss,
+        transmission_haze(bsdf) if float(bsdf.transmittance(0.0)) > 0.0 else None,
+        reflection_haze(bsdf),
+        distinctness_of_image(bsdf) if reflected else None,
+    )
 
 
-def _into_receptor(bsdf: Bsdf, angle: int) -> float:
+def _drawn(data: BsdfData, rng: np.random.Generator) -> BsdfData:
+    """With values off by errors of their size; the share that a slice scatters is off with them."""
+    slices = []
+    for one in data.slices:
+        if one.standard_error is not None:
+            values = np.maximum(one.values + one.standard_error * rng.standard_normal(one.values.shape), 0.0)
+            one = dataclasses.replace(one, values=values, stated=None)  # noqa: PLW2901 - the same slice, drawn
+        slices.append(one)
+    return dataclasses.replace(data, slices=tuple(slices))
+
+
+def _received(bsdf: Bsdf, angle: float, source: tuple[float, float], receptor: Receptor) -> float:
+    """What a receptor gets, over the flux on the sample: mirrored light of the image of the source, and scattered light."""
+    mirrored = float(bsdf.regular_reflectance(angle)) * _mirrored_part(source, receptor)
+    return float(mirrored + (_scattered_into(bsdf, angle, source, receptor) if bsdf.reflects else 0.0))
+
+
+def _mirrored_part(source: tuple[float, float], receptor: Receptor) -> float:
+    """The part of the image of a source, evenly bright, that lies in a receptor."""
+    part = 1.0
+    for size, offset, opening in ((source[0], receptor.offset, receptor.along), (source[1], 0.0, receptor.across)):
+        low, high = max(-0.5 * size, offset - 0.5 * opening), min(0.5 * size, offset + 0.5 * opening)
+        part *= max(high - low, 0.0) / size
+    return part
+
+
+def _scattered_into(bsdf: Bsdf, angle: float, source: tuple[float, float], receptor: Receptor) -> float:
     """∫ f cosθ dΩ over the aperture, averaged over the directions of the source."""
-    along, across = (0.5 * side for side in RECEPTORS[angle])
     s, v = np.polynomial.legendre.leggauss(STEPS)
     total = 0.0
-    for tilt, part in zip(0.5 * SOURCE[0] * s, v, strict=True):
-        for turn, part_across in zip(0.5 * SOURCE[1] * s, v, strict=True):
+    for tilt, part in zip(0.5 * source[0] * s, v, strict=True):
+        for turn, part_across in zip(0.5 * source[1] * s, v, strict=True):
             # The receptor, about the axis that the mirrored centre of the source follows.
-            a, weights = _towards(tilt, along)
-            b, weights_across = _towards(turn, across)
+            low, high = receptor.offset - 0.5 * receptor.along, receptor.offset + 0.5 * receptor.along
+            a, weights = _towards(tilt, low, high)
+            b, weights_across = _towards(turn, -0.5 * receptor.across, 0.5 * receptor.across)
             received = _about(angle, 0.0, a[:, None], b[None, :])
             f = bsdf.evaluate(_about(angle, 180.0, tilt, turn), received)
             projected = np.maximum(received[..., 2], 0.0) * np.cos(np.radians(b))
@@ -158,12 +385,16 @@ def _into_receptor(bsdf: Bsdf, angle: int) -> float:
     return total
 
 
-def _towards(centre: float, half: float) -> tuple[Array, Array]:
-    """Angles from −half to half [°] that get denser towards the mirrored direction, and their weights [rad]."""
+def _towards(centre: float, low: float, high: float) -> tuple[Array, Array]:
+    """Angles from low to high [°] that get denser towards the mirrored direction, and their weights [rad]."""
     x, w = np.polynomial.legendre.leggauss(NODES)
     u, w = 0.5 * (x + 1.0), 0.5 * w
-    nodes = [centre + (end - centre) * u**3 for end in (-half, half)]
-    weights = [abs(end - centre) * 3.0 * u * u * w for end in (-half, half)]
+    if not low < centre < high:
+        # It lies outside: from the edge that is nearer to it.
+        near, far = (low, high) if centre <= low else (high, low)
+        return near + (far - near) * u * u, np.radians(abs(far - near) * 2.0 * u * w)
+    nodes = [centre + (end - centre) * u**3 for end in (low, high)]
+    weights = [abs(end - centre) * 3.0 * u * u * w for end in (low, high)]
     return np.concatenate(nodes), np.radians(np.concatenate(weights))
 
 

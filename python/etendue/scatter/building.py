@@ -38,7 +38,7 @@ def built(record: Mapping[str, Any]) -> _core.Bsdf:
         if key in _built:
             _built.move_to_end(key)
             return _built[key]
-    bsdf = _core.Bsdf(record)
+    bsdf = _core.Bsdf(dict(record))
     with _lock:
         _built[key] = bsdf
         while len(_built) > MOST:
@@ -47,5 +47,13 @@ def built(record: Mapping[str, Any]) -> _core.Bsdf:
 
 
 def core_scene(record: Mapping[str, Any]) -> _core.Scene:
-    """The scene of a record, with finishes that are built already where they are."""
+    """The scene of a record, with finishes that are built already where they are.
+
+    Examples
+    --------
+    >>> empty = {key: [] for key in ("finishes", "faces", "solids", "sources", "detectors")}
+    >>> air = {"index": {"kind": "constant", "n": 1.0}, "absorption": {"wavelength": [500.0], "per_mm": [0.0]}}
+    >>> core_scene({**empty, "media": [air]}).may_focus()
+    False
+    """
     return _core.Scene({**record, "finishes": [built(finish) for finish in record["finishes"]]})
