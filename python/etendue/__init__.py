@@ -70,6 +70,8 @@ if TYPE_CHECKING:
     from etendue.scatter import models as bsdf
     from etendue.scatter.bsdf import Bsdf
     from etendue.scatter.files import read_bsdf, write_bsdf
+    from etendue.scatter.scans.files import read_scans
+    from etendue.scatter.scans.scans import Scans
     from etendue.scatter.table import BsdfTable
     from etendue.scene import Scene
 
@@ -103,6 +105,7 @@ __all__ = [
     "RaySet",
     "Region",
     "RingSource",
+    "Scans",
     "ScatterEvents",
     "Scene",
     "SceneError",
@@ -142,6 +145,7 @@ __all__ = [
     "read_intensity",
     "read_map",
     "read_rays",
+    "read_scans",
     "scene",
     "threshold_sweep",
     "trace",
@@ -166,11 +170,13 @@ InNotebook.pages = Pages(of=_page)
 
 # Scenes and models are checked by pydantic, which takes as long to import as all the rest: only when somebody asks for one.
 LAZY = {
-    "Bsdf": "etendue.scatter.bsdf:Bsdf",
+    "Bsdf": "etendue.scatter.table:Bsdf",
     "BsdfTable": "etendue.scatter.table:BsdfTable",
+    "Scans": "etendue.scatter.scans.scans:Scans",
     "Scene": "etendue.scene:Scene",
     "bsdf": "etendue.scatter.models",
     "read_bsdf": "etendue.scatter.files:read_bsdf",
+    "read_scans": "etendue.scatter.scans.files:read_scans",
     "scene": "etendue.scene",
     "write_bsdf": "etendue.scatter.files:write_bsdf",
 }

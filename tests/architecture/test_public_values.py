@@ -57,6 +57,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "RaySet": rays,
     "Region": lambda: et.Region(left=-1, right=0, bottom=-2, top=2),
     "RingSource": lambda: et.RingSource(rays=77, runs=3, seed=9),
+    "Scans": lambda: et.Scans([[-0.6, 0, 0.8]] * 50, [[0.6, 0, 0.8]] * 50, [2.5] * 50),
     "Scene": scene,
     "Bsdf": lambda: et.BsdfTable(BsdfData(components=({"kind": "lambertian", "reflectance": 0.2},))),
     "BsdfTable": lambda: et.BsdfTable(BsdfData(components=({"kind": "gaussian", "peak": 3.0, "sigma": 0.2},))),

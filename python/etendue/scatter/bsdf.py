@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import abc
 import functools
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from etendue.description.files import Files
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.bsdf_data import direction
 from etendue.scatter.building import built
+from etendue.scatter.scans.scans import Scans
 
 Array = npt.NDArray[np.float64]
 Side = Literal["front", "back"]
@@ -67,6 +68,45 @@ class Bsdf(abc.ABC):
     >>> float(paint.evaluate([0, 0, 1], [0.6, 0, 0.8]).round(6)) == round(0.8 / np.pi, 6)
     True
     """
+
+    table: ClassVar[type[Bsdf]]
+    """The class of tables, which is made of this one: `etendue.scatter.table` sets it."""
+
+    @classmethod
+    def from_scans(cls, scans: Scans, method: str = "specular-centred") -> Bsdf:
+        """A table of what a goniometer measured.
+
+        Parameters
+        ----------
+        scans : Scans
+            Of all incidences, as `read_scans` reads them.
+        method : {"specular-centred", "direction-cosines", "radial-basis", "shepard", "smooth"}
+            The way from the measured directions to a grid.
+
+        Returns
+        -------
+        BsdfTable
+
+        Raises
+        ------
+        ArgumentError
+            If the values do not suit the method, or a slice scatters more than 101 % of the light.
+        UnknownNameError
+            If there is no such method.
+        MissingLibraryError
+            If the method needs SciPy, and it is not installed.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> from etendue.quantities.bsdf_data import direction
+        >>> incident = direction(30.0, 180.0)
+        >>> to = np.concatenate([direction(np.arange(0.0, 85.0, 5.0), a) for a in (0.0, 90.0, 180.0)])
+        >>> flat = et.Scans(np.tile(incident, (len(to), 1)), to, np.full(len(to), 0.25), reflectance=0.8)
+        >>> round(float(et.Bsdf.from_scans(flat, method="smooth").reflectance(30)), 3)
+        0.8
+        """
+        return cls.table.from_scans(scans, method)
 
     @abc.abstractmethod
     def record(self, files: Files) -> dict[str, Any]:

@@ -55,34 +55,7 @@ class BsdfTable(Bsdf):
 
     @classmethod
     def from_scans(cls, scans: Scans, method: str = "specular-centred") -> BsdfTable:
-        """A table of what a goniometer measured.
-
-        Parameters
-        ----------
-        scans : Scans
-            Of all incidences.
-        method : {"specular-centred", "direction-cosines", "radial-basis", "shepard", "smooth"}
-            The way from the measured directions to a grid.
-
-        Raises
-        ------
-        ArgumentError
-            If the values do not suit the method, or a slice scatters more than 101 % of the light.
-        UnknownNameError
-            If there is no such method.
-        MissingLibraryError
-            If the method needs SciPy, and it is not installed.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from etendue.quantities.bsdf_data import direction
-        >>> incident = direction(30.0, 180.0)
-        >>> to = np.concatenate([direction(np.arange(0.0, 85.0, 5.0), a) for a in (0.0, 90.0, 180.0)])
-        >>> flat = Scans(np.tile(incident, (len(to), 1)), to, np.full(len(to), 0.25), reflectance=0.8)
-        >>> round(float(BsdfTable.from_scans(flat, method="smooth").reflectance(30)), 3)
-        0.8
-        """
+        """See `Bsdf.from_scans`."""
         return cls(tabulated(scans, method))
 
     def __getstate__(self) -> dict[str, Any]:
@@ -134,6 +107,9 @@ class BsdfTable(Bsdf):
             front, back = (_sheets(side, self.data) for side in sides)
             members.append((1.0, {"kind": "table", "front": front, "back": back}))
         return members[0][1] if len(members) == 1 else {"kind": "sum", "members": members}
+
+
+Bsdf.table = BsdfTable
 
 
 def share_of(one: BsdfSlice) -> float:

@@ -16,7 +16,7 @@ SAME = 1e-6
 """How far directions of incidence may differ that are one."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Scans:
     """BRDF at measured pairs of directions, light meeting and leaving the front.
 
@@ -120,6 +120,13 @@ class Scans:
             found.append((first / np.linalg.norm(first), left[same]))
             left = left[~same]
         return sorted(found, key=lambda one: -one[0][2])
+
+    def __repr__(self) -> str:
+        """How many values, at which angles of incidence."""
+        thetas = self.thetas
+        angles = f"{min(thetas):.3g} to {max(thetas):.3g}°"
+        known = "with errors" if self.standard_error is not None else "without errors"
+        return f"Scans({self.values.size} values at {len(thetas)} incidences, {angles}, {known})"
 
     @property
     def thetas(self) -> list[float]:
