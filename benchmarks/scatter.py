@@ -5,14 +5,23 @@
 2. Samples and values per second of each model and of the table, and the chamber of thesis chapter 4 traced forwards with
    each, all beside a Lambertian surface of the same reflectance.
 
-python benchmarks/scatter.py [--rays 1e6]
+3. With `--peers` (needs `pyradiance` and `mitsuba`): the same BRDF through `pabopto2bsdf` and `bsdf2klems`; and the map of
+   the chamber from 55°, 50 × 25 pixels, with a satin paint beside Mitsuba's `roughplastic` of the same reflectance at 20°
+   (`scalar_rgb`, `path`): 1/(variance · time), the variance that of a pixel over independent runs.
+
+python benchmarks/scatter.py [--rays 1e6] [--peers]
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Mapping
+import os
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import etendue as et
@@ -67,10 +76,129 @@ def chamber(finish: Mapping[str, Any]) -> et.Scene:
     return et.Scene(sources=lamps, surfaces=walls)
 
 
+def as_mountain(folder: Path) -> list[Path]:
+    """The known BRDF as PAB writes it, a file for each incidence."""
+    paths = []
+    for theta in np.linspace(0.0, 75.0, 6):
+        grid = PolarGrid("normal", np.linspace(0.0, 89.9, 56), np.arange(56) * (360.0 / 56))
+        incident = direction(theta, 0.0)
+        f = known(incident, grid.directions(incident, transmitted=False))
+        lines = [f"#intheta {theta:g}", "#inphi 0", "#format: theta phi BRDF"]
+        lines += [
+            f"{polar:.6f}\t{azimuth:.6f}\t{f[k, i]:.9g}"
+            for k, azimuth in enumerate(grid.azimuth)
+            for i, polar in enumerate(grid.radial)
+        ]
+        paths.append(folder / f"known_{theta:g}.dat")
+        paths[-1].write_text("\n".join(lines) + "\n")
+    return paths
+
+
+def radiance_row() -> None:
+    """What Radiance makes of the known BRDF: Klems' full basis."""
+    import pyradiance  # noqa: PLC0415 - only with --peers
+
+    home = Path(pyradiance.__file__).parent
+    tools = {**os.environ, "PATH": f"{home / 'bin'}:{os.environ['PATH']}", "RAYPATH": str(home / "lib")}
+    with tempfile.TemporaryDirectory() as folder:
+        paths = as_mountain(Path(folder))
+        mesh, xml = Path(folder) / "known.sir", Path(folder) / "known.xml"
+        with mesh.open("wb") as out:
+            subprocess.run(["pabopto2bsdf", *map(str, paths)], stdout=out, stderr=subprocess.DEVNULL, env=tools, check=True)  # noqa: S607
+        with xml.open("wb") as out:
+            subprocess.run(["bsdf2klems", str(mesh)], stdout=out, stderr=subprocess.DEVNULL, env=tools, check=True)  # noqa: S607
+        found = et.read_bsdf(xml)
+        for theta in ANGLES:
+            truth, share = exact(theta), float(found.reflectance(theta))
+            off = f"{100 * (share / truth - 1):+.2f} %"
+            row(f"reflectance by bsdf2klems at {theta:g}°", f"{share:.4f} of {truth:.4f}", off)
+
+
+def efficiency(look: Callable[[int], Array], runs: int = 8) -> tuple[float, float]:
+    """1/(relative variance · time), the median over lit pixels; and their mean."""
+    look(0)
+    begun = time.perf_counter()
+    maps = np.array([look(seed) for seed in range(1, runs + 1)])
+    each = (time.perf_counter() - begun) / runs
+    mean, variance = maps.mean(axis=0), maps.var(axis=0, ddof=1)
+    lit = mean > 0.05 * np.median(mean[mean > 0.0])
+    return 1.0 / (float(np.median(variance[lit] / mean[lit] ** 2)) * each), float(mean[lit].mean())
+
+
+def mitsuba_row() -> None:
+    """The chamber with satin paint, seen from 55°, by both."""
+    import mitsuba as mi  # noqa: PLC0415 - only with --peers
+
+    mi.set_variant("scalar_rgb")
+    moved = mi.ScalarTransform4f
+    observer, screen = et.Observer(55, 0, 1000), et.Screen(50, 25, 50, 25)
+    paint = et.bsdf.RoughCoat(roughness=0.2, index=1.5, base_reflectance=0.8)
+    wanted = float(paint.reflectance(20.0))
+
+    def wall(base: float) -> dict[str, Any]:
+        coat = {"type": "roughplastic", "distribution": "ggx", "alpha": 0.2, "int_ior": 1.5, "ext_ior": 1.0}
+        inner = {**coat, "diffuse_reflectance": {"type": "rgb", "value": base}}
+        return {"type": "twosided", "bsdf": inner}
+
+    def reflectance(base: float) -> float:
+        bsdf, at, context = mi.load_dict(wall(base)), mi.SurfaceInteraction3f(), mi.BSDFContext()
+        at.wi = mi.Vector3f(math.sin(math.radians(20.0)), 0.0, math.cos(math.radians(20.0)))
+        numbers = np.random.default_rng(1).random((20_000, 3)).tolist()
+        return float(np.mean([bsdf.sample(context, at, a, mi.Point2f(b, c))[1][0] for a, b, c in numbers]))
+
+    # Linear in the reflectance of the base.
+    low, high = reflectance(0.2), reflectance(1.0)
+    base = 0.2 + 0.8 * (wanted - low) / (high - low)
+    _, up, _ = screen.axes(observer)
+    eye = np.asarray(observer.position).tolist()
+    light = {"type": "area", "radiance": {"type": "rgb", "value": 0.96 / (math.pi**2 * 2.5**2)}}
+    black = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+    lamps = {
+        f"lamp{k}": {
+            "type": "disk",
+            "to_world": moved().translate([x, y, 0.1]) @ moved().scale(2.5),
+            "emitter": light,
+            "bsdf": black,
+        }
+        for k, (x, y) in enumerate((x, y) for x in (-4.5, 4.5) for y in (-4.5, 4.5))
+    }
+    film = {"type": "hdrfilm", "width": 50, "height": 25, "rfilter": {"type": "box"}, "pixel_format": "luminance"}
+    there = moved().look_at(origin=eye, target=[0, 0, 0], up=np.asarray(up).tolist())
+    theirs = mi.load_dict(
+        {
+            "type": "scene",
+            **lamps,
+            "wall": {"type": "cylinder", "p0": [0, 0, 0], "p1": [0, 0, 21.4], "radius": 21.5, "bsdf": wall(base)},
+            "base": {"type": "disk", "to_world": moved().scale(21.5), "bsdf": wall(base)},
+            "integrator": {"type": "path", "max_depth": -1, "rr_depth": 100},
+            "sensor": {
+                "type": "perspective",
+                "fov": 2 * math.degrees(math.atan(25 / 1000)),
+                "fov_axis": "x",
+                "to_world": there,
+                "film": film,
+                "sampler": {"type": "independent", "sample_count": 64},
+            },
+        }
+    )
+    scene = chamber({"kind": "bsdf", "bsdf": paint})
+
+    def ours(seed: int) -> Array:
+        values = et.luminance_map(scene, observer, screen, seed=seed + 100, rays_per_pixel=1024).values
+        return np.nan_to_num(np.asarray(values)) * 1e-6
+
+    peer, their_mean = efficiency(lambda seed: np.asarray(mi.render(theirs, seed=seed, spp=256))[..., 0])
+    own, own_mean = efficiency(ours)
+    row("satin chamber from 55°: mitsuba", f"{peer:.0f} /s", f"mean {their_mean:.3g} cd/mm²")
+    row("satin chamber from 55°: etendue", f"{own:.0f} /s", f"{own / peer:.2f} × mitsuba, mean {own_mean:.3g}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=float, default=1e6)
-    rays = int(parser.parse_args().rays)
+    parser.add_argument("--peers", action="store_true", help="beside Radiance and Mitsuba")
+    given = parser.parse_args()
+    rays = int(given.rays)
 
     measured = table()
     for theta in ANGLES:
@@ -108,6 +236,9 @@ def main() -> None:
         row(f"{name}: a value", f"{1e9 * asked / SAMPLES:.0f} ns", f"{ratios[1]:.1f} × lambertian")
         row(f"{name}: a ray of the chamber", f"{1e9 * traced / rays:.0f} ns", f"{ratios[2]:.1f} × lambertian")
         assert ledger.closes  # noqa: S101 - what does not close is no benchmark
+    if given.peers:
+        radiance_row()
+        mitsuba_row()
 
 
 if __name__ == "__main__":

@@ -287,11 +287,12 @@ impl<'a> SurfaceEvent<'a> {
         let incident = local(&self.surface.axes, k);
         let transmitted = (incident.z > 0.0) != self.interaction.front;
         let (bsdf, media) = (self.surface.bsdf, &self.surface.media);
+        let (f, density) = bsdf.incoming_light(incident, self.outward, media);
         Incoming {
             transmitted,
-            f: bsdf.evaluate(incident, self.outward, media) * self.surface.tilt(k, -self.d, self.outward.z),
+            f: f * self.surface.tilt(k, -self.d, self.outward.z),
             cosine: k.dot(self.surface.side).abs(),
-            density: bsdf.incoming_pdf(incident, self.outward, media),
+            density,
             stack: if transmitted {
                 self.interaction.after
             } else {

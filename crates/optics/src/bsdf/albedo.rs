@@ -1,5 +1,6 @@
 //! Shares of light that leave a surface, tabled over the direction of incidence.
 
+use etendue_math::special::cube_root;
 use std::f64::consts::FRAC_PI_2;
 
 use etendue_math::Vec3;
@@ -93,7 +94,7 @@ impl<const N: usize> Albedo<N> {
     /// The shares of light from a direction, whichever side it is on.
     #[inline]
     pub fn at(&self, incident: Vec3) -> [f64; N] {
-        let place = libm::cbrt(incident.z.abs().clamp(LOWEST, 1.0)) * HEIGHTS as f64;
+        let place = cube_root(incident.z.abs().clamp(LOWEST, 1.0)) * HEIGHTS as f64;
         let mut sum = [0.0; N];
         for (node, weight) in cubic(place, HEIGHTS, false) {
             let row = Self::along(&self.values[node], incident);

@@ -281,17 +281,35 @@ pub trait Bsdf: Debug + Send + Sync {
         )
     }
 
+    /// f \[1/sr\] for light from `incident` to `scattered`, and the density \[1/sr\] of [`draw_incoming`](Bsdf::draw_incoming) on
+    /// the side of `incident`: who looks for light asks for both.
+    #[inline]
+    fn incoming_light(&self, incident: Vec3, scattered: Vec3, media: &Media) -> (f64, f64) {
+        let f = self.evaluate(incident, scattered, media);
+        let any = incident.z.abs() * FRAC_1_PI;
+        if self.facts().lambertian {
+            return (f, any);
+        }
+        let transmitted = (incident.z > 0.0) != (scattered.z > 0.0);
+        let share = self.shares(scattered, media).diffuse[usize::from(transmitted)];
+        if share <= 0.0 {
+            return (f, any);
+        }
+        let back = if self.facts().reciprocal {
+            // f over n² on the side where light leaves is the same there and back.
+            let [here, there] = media.seen_from(incident);
+            let ratio = if transmitted { here / there } else { 1.0 };
+            f * ratio * ratio * incident.z.abs()
+        } else {
+            self.pdf(scattered, incident, media)
+        };
+        (f, ANYWHERE * any + (1.0 - ANYWHERE) * back / share)
+    }
+
     /// Density \[1/sr\] of [`draw_incoming`](Bsdf::draw_incoming) on the side of `incident`.
     #[inline]
     fn incoming_pdf(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {
-        let transmitted = (incident.z > 0.0) != (scattered.z > 0.0);
-        let chance = self.chance_of_any(scattered, transmitted, media);
-        let any = chance * incident.z.abs() * FRAC_1_PI;
-        if chance >= 1.0 {
-            return any;
-        }
-        let share = self.shares(scattered, media).diffuse[usize::from(transmitted)];
-        any + (1.0 - chance) * self.pdf(scattered, incident, media) / share
+        self.incoming_light(incident, scattered, media).1
     }
 
     /// The part of the directions of [`draw_incoming`](Bsdf::draw_incoming) that may be any.

@@ -195,17 +195,21 @@ impl Bsdf for Mixture {
         member.draw_incoming(scattered, transmitted, media, [rest, turn])
     }
 
-    fn incoming_pdf(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {
+    fn incoming_light(&self, incident: Vec3, scattered: Vec3, media: &Media) -> (f64, f64) {
         let side = usize::from((incident.z > 0.0) != (scattered.z > 0.0));
-        let (mut sum, mut total) = (0.0, 0.0);
+        let (mut f, mut sum, mut total) = (0.0, 0.0, 0.0);
         for (weight, bsdf) in &self.members {
             let share = weight * bsdf.incoming(scattered, media)[side];
             if share > 0.0 {
-                sum += share * bsdf.incoming_pdf(incident, scattered, media);
+                let (own, density) = bsdf.incoming_light(incident, scattered, media);
+                f += weight * own;
+                sum += share * density;
                 total += share;
+            } else {
+                f += weight * bsdf.evaluate(incident, scattered, media);
             }
         }
-        if total > 0.0 { sum / total } else { 0.0 }
+        (f, if total > 0.0 { sum / total } else { 0.0 })
     }
 }
 
