@@ -100,13 +100,17 @@ def radiance_row() -> None:
 
     home = Path(pyradiance.__file__).parent
     tools = {**os.environ, "PATH": f"{home / 'bin'}:{os.environ['PATH']}", "RAYPATH": str(home / "lib")}
+
+    def made(path: Path, tool: str, *arguments: str) -> Path:
+        command = [str(home / "bin" / tool), *arguments]
+        with path.open("wb") as out:
+            subprocess.run(command, stdout=out, stderr=subprocess.DEVNULL, env=tools, check=True)  # noqa: S603
+        return path
+
     with tempfile.TemporaryDirectory() as folder:
-        paths = as_mountain(Path(folder))
-        mesh, xml = Path(folder) / "known.sir", Path(folder) / "known.xml"
-        with mesh.open("wb") as out:
-            subprocess.run(["pabopto2bsdf", *map(str, paths)], stdout=out, stderr=subprocess.DEVNULL, env=tools, check=True)  # noqa: S607
-        with xml.open("wb") as out:
-            subprocess.run(["bsdf2klems", str(mesh)], stdout=out, stderr=subprocess.DEVNULL, env=tools, check=True)  # noqa: S607
+        measured = as_mountain(Path(folder))
+        mesh = made(Path(folder) / "known.sir", "pabopto2bsdf", *map(str, measured))
+        xml = made(Path(folder) / "known.xml", "bsdf2klems", str(mesh))
         found = et.read_bsdf(xml)
         for theta in ANGLES:
             truth, share = exact(theta), float(found.reflectance(theta))

@@ -157,6 +157,42 @@ def test_what_each_scheme_costs() -> None:
 
 
 @pytest.mark.slow
+def test_natural_neighbours_keep_a_plane_and_take_sibsons_areas() -> None:
+    """Linear functions come back between the points; four points on a square share its middle evenly."""
+    incident = direction(0.0, 0.0)
+
+    def lifted(beta: Array) -> Array:
+        return np.column_stack([beta, np.sqrt(1.0 - np.sum(beta * beta, axis=1))])
+
+    square = np.array([[0.3, 0.0], [0.0, 0.3], [-0.3, 0.0], [0.0, -0.3]])
+    (middle,), _ = METHODS["natural-neighbours"](
+        incident, lifted(square), np.array([1.0, 2.0, 3.0, 8.0]), lifted(np.zeros((1, 2)))
+    )
+    assert middle == pytest.approx(3.5, abs=0.02)
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-0.6, 0.6, (300, 2))
+    at = rng.uniform(-0.3, 0.3, (60, 2))
+    plane = lambda beta: 1.0 + beta @ np.array([0.7, -0.4])  # noqa: E731 - a function of a line
+    found, _ = METHODS["natural-neighbours"](incident, lifted(points), plane(points), lifted(at))
+    assert np.abs(found / plane(at) - 1.0).max() < 0.02
+
+
+def test_turning_the_sample() -> None:
+    """Brushed metal differs when it is turned, paint does not; turned on the stage, not in the plane of incidence."""
+    brushed = et.bsdf.RoughMetal(roughness=0.3, roughness_across=0.1, reflectance=0.9)
+    for bsdf, most, least in ((brushed, 9.0, 0.3), (et.bsdf.Gaussian(peak=2.0, sigma=0.2), 1e-9, 0.0)):
+        incidents, scattered = [], []
+        for phi in (180.0, 225.0, 300.0):
+            incident = direction(40.0, phi)
+            to = direction(np.array([20.0, 35.0, 45.0, 60.0]), phi + np.array([170.0, 180.0, 190.0, 180.0]))
+            incidents.append(np.tile(incident, (4, 1)))
+            scattered.append(to)
+        i, s = np.concatenate(incidents), np.concatenate(scattered)
+        assert least <= Scans(i, s, bsdf.evaluate(i, s)).anisotropy() <= most
+    assert math.isnan(two_planes(PET, thetas=(5.0, 60.0)).anisotropy())
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["specular-centred", "smooth"])
 def test_the_lobe_comes_back(method: str) -> None:
     """f about the specular direction to 10 %, between the planes too; the share is the stated one."""

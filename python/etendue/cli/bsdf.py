@@ -186,12 +186,17 @@ def fit(
     table = BsdfTable.from_scans(scans, method)
     notes = list(write_bsdf(output, table))
     shares = {round(one.theta, 6): one.stated for one in table.data.slices}
+    turning = scans.anisotropy()
     complaints = [str(complaint) for complaint in table.complaints]
     if json:
-        print_json({"output": output, "method": method, "shares": shares, "complaints": complaints, "notes": notes})
+        told = {"complaints": complaints, "notes": notes}
+        turned = turning if math.isfinite(turning) else None
+        print_json({"output": output, "method": method, "shares": shares, "anisotropy": turned, **told})
         return
     for line in (*complaints, *(f"note: {note}" for note in notes)):
         complain(line)
+    if math.isfinite(turning):
+        say(f"  turning the sample changes values by {turning:.1%} (root mean square)")
     for theta, share in shares.items():
         scaled = "" if reflectance is None else f", scaled to {reflectance:g}"
         say(f"  {theta:g}°: the scans add up to {share:.4f}{scaled}")

@@ -80,7 +80,7 @@ class Bsdf(abc.ABC):
         ----------
         scans : Scans
             Of all incidences, as `read_scans` reads them.
-        method : {"specular-centred", "direction-cosines", "radial-basis", "shepard", "smooth"}
+        method : {"specular-centred", "direction-cosines", "natural-neighbours", "radial-basis", "shepard", "smooth"}
             The way from the measured directions to a grid.
 
         Returns

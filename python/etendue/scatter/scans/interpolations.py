@@ -79,6 +79,52 @@ def shepard(incident: Array, measured: Array, values: Array, wanted: Array) -> t
     return np.asarray(weights @ values / weights.sum(axis=1)), None
 
 
+RINGS, SPOKES = 160, 144
+"""Cells on which areas are counted by natural neighbours: in ln |β − β₀|, and in azimuth."""
+
+
+def natural_neighbours(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, None]:
+    """Means weighted with the area in U, V that a point would take from each of the measured ones [Sibson1981]_.
+
+    Areas are counted on cells that get smaller towards the specular direction, where scans are dense: a cell is taken by the
+    point if that is nearer than all measured ones.
+    """
+    # A direction that was measured several times counts once.
+    points, own = np.unique(np.round(_planar(incident, measured), 9), axis=0, return_inverse=True)
+    mean = np.bincount(own.ravel(), values) / np.bincount(own.ravel())
+    edges = np.concatenate([[0.0], np.geomspace(1e-4, 2.0, RINGS)])
+    r = np.sqrt(0.5 * (edges[1:] ** 2 + edges[:-1] ** 2))
+    a = (np.arange(SPOKES) + 0.5) * (2.0 * np.pi / SPOKES)
+    cells = np.stack([r[:, None] * np.cos(a), r[:, None] * np.sin(a)], axis=-1).reshape(-1, 2)
+    area = np.repeat(np.diff(edges**2), SPOKES)
+    owner, reach = _nearest(cells, points)
+    at = _planar(incident, wanted)
+    found = mean[_nearest(at, points)[0]]
+    for start in range(0, len(at), 256):
+        square = _squares(at[start : start + 256], cells)
+        taken = np.where(square < reach, area, 0.0)
+        whole = taken.sum(axis=1)
+        some = whole > 0.0
+        found[start : start + 256][some] = ((taken @ mean[owner])[some]) / whole[some]
+    return found, None
+
+
+def _squares(a: Array, b: Array) -> Array:
+    """Squares of the distances of all points of one list from all of another."""
+    return np.asarray(np.sum(a * a, axis=1)[:, None] + np.sum(b * b, axis=1) - 2.0 * (a @ b.T))
+
+
+def _nearest(at: Array, points: Array) -> tuple[npt.NDArray[np.intp], Array]:
+    """The nearest of some points, and the square of its distance."""
+    found, square = np.zeros(len(at), np.intp), np.zeros(len(at))
+    step = max(1, (1 << 22) // len(points))
+    for start in range(0, len(at), step):
+        all_of_them = _squares(at[start : start + step], points)
+        found[start : start + step] = all_of_them.argmin(axis=1)
+        square[start : start + step] = all_of_them.min(axis=1)
+    return found, square
+
+
 def specular_centred(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, None]:
     """Linear in the angle from the specular direction and the azimuth about it, 0 at the horizon: the second scheme.
 
@@ -204,6 +250,7 @@ def smooth(incident: Array, measured: Array, values: Array, wanted: Array) -> tu
 METHODS: dict[str, Interpolation] = {
     "specular-centred": specular_centred,
     "direction-cosines": direction_cosines,
+    "natural-neighbours": natural_neighbours,
     "radial-basis": radial_basis,
     "shepard": shepard,
     "smooth": smooth,

@@ -15,6 +15,9 @@ Array = npt.NDArray[np.float64]
 SAME = 1e-6
 """How far directions of incidence may differ that are one."""
 
+TURNED = 2e-3
+"""Angles [rad] within which directions of a turned sample are the same, and cosines of incidence."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Scans:
@@ -120,6 +123,36 @@ class Scans:
             found.append((first / np.linalg.norm(first), left[same]))
             left = left[~same]
         return sorted(found, key=lambda one: -one[0][2])
+
+    def anisotropy(self) -> float:
+        """By how much values differ when the sample is turned about its normal: root mean square of relative differences.
+
+        Of pairs of the same angle of incidence, measured at different azimuths of the sample, and of scattered directions
+        that lie alike to the plane of incidence. NaN if there is none: the sample was not turned. It is the test by which
+        the thesis, in appendix A, calls a sample isotropic.
+
+        Examples
+        --------
+        >>> Scans([[-0.6, 0, 0.8], [0, -0.6, 0.8]], [[0.6, 0, 0.8], [0, 0.6, 0.8]], [2.0, 2.2]).anisotropy().__round__(4)
+        0.0952
+        """
+        groups = self.by_incidence()
+        differences: list[float] = []
+        for k, (first, own) in enumerate(groups):
+            for other, its in groups[k + 1 :]:
+                if abs(first[2] - other[2]) > TURNED:
+                    continue
+                # The second turned so that its light comes from where that of the first does.
+                turn = np.arctan2(first[1], first[0]) - np.arctan2(other[1], other[0])
+                c, s = np.cos(turn), np.sin(turn)
+                to = self.scattered[its] @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+                near = to @ self.scattered[own].T
+                pair = near.argmax(axis=1)
+                met = near.max(axis=1) > 1.0 - 0.5 * TURNED**2
+                a, b = self.values[own][pair[met]], self.values[its][met]
+                mean = 0.5 * (a + b)
+                differences += ((b - a)[mean > 0.0] / mean[mean > 0.0]).tolist()
+        return float(np.sqrt(np.mean(np.square(differences)))) if differences else float("nan")
 
     def __repr__(self) -> str:
         """How many values, at which angles of incidence."""

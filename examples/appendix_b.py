@@ -1,0 +1,156 @@
+"""Appendix B of the thesis: from two scans per incidence to a table, by its two schemes, step by step.
+
+    python examples/appendix_b.py
+
+A stand-in for microcellular PET is scanned by a virtual goniophotometer at 5° and 60°; the pictures are those of the thesis,
+figs. B.1 to B.7, and the numbers beside them what each scheme adds up to.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+from chapter_4 import PET
+from etendue.quantities.bsdf_data import direction
+from etendue.scatter.scans import harvey_shack
+from etendue.scatter.scans.interpolations import METHODS, tabulated
+from experiments import goniometer
+from experiments.panels import FAINT, INK, LINES, new_figure, print_table, save
+from matplotlib.axes import Axes
+
+Array = npt.NDArray[np.float64]
+
+THETAS = (5.0, 60.0)
+SCHEMES = {"first scheme: U, V": "direction-cosines", "second scheme: about the specular": "specular-centred"}
+THESIS = {"direction-cosines": ("67 %", "75 %"), "specular-centred": ("99.5 %", "91.4 %")}
+
+
+def scanned(theta: float) -> tuple[Array, Array]:
+    """Directions of both planes in which something was measured, and the BRDF there [1/sr]."""
+    one = goniometer.scan(PET, theta)
+    there = ~np.isnan(one.values) & ~np.isnan(one.directions[..., 0])
+    return one.directions[there], one.values[there]
+
+
+def all_scans() -> et.Scans:
+    """Both incidences."""
+    parts = [(direction(theta, 180.0), *scanned(theta)) for theta in THETAS]
+    incident = np.concatenate([np.tile(i, (len(d), 1)) for i, d, _ in parts])
+    return et.Scans(incident, np.concatenate([d for _, d, _ in parts]), np.concatenate([f for *_, f in parts]))
+
+
+def rim(axes: Axes, theta: float) -> None:
+    """The edge of all directions in U, V."""
+    a = np.linspace(0.0, 360.0, 361)
+    r = harvey_shack.farthest(theta, a)
+    axes.plot(r * np.cos(np.radians(a)), r * np.sin(np.radians(a)), color=FAINT, lw=1)
+    axes.set_aspect("equal")
+
+
+def planar(theta: float, scattered: Array) -> tuple[Array, Array]:
+    """U and V of directions."""
+    r, a = harvey_shack.coordinates(direction(theta, 180.0), scattered)
+    return r * np.cos(np.radians(a)), r * np.sin(np.radians(a))
+
+
+def draw_scans(path: Path) -> None:
+    """B.1 and B.2: what was measured, over the angle and in the plane of direction cosines."""
+    figure = new_figure(9.6, 6.6)
+    for column, theta in enumerate(THETAS):
+        scattered, f = scanned(theta)
+        axes = figure.add_subplot(2, 2, column + 1)
+        for plane, colour, name in ((1, LINES[0], "in the plane of incidence"), (0, LINES[1], "across it")):
+            own = np.abs(scattered[:, 1]) < 1e-6 if plane else np.abs(scattered[:, 1]) > 1e-6
+            angle = np.degrees(np.arctan2(scattered[own, 0 if plane else 1], scattered[own, 2]))
+            axes.semilogy(angle, f[own], ".", ms=3, color=colour, label=name)
+        axes.set(title=f"light from {theta:g}°", xlabel="scatter angle [°]", xlim=(-90, 90))
+        axes.set_ylabel("f [1/sr]" if not column else "")
+        if not column:
+            axes.legend(frameon=False, fontsize=8)
+        axes = figure.add_subplot(2, 2, column + 3)
+        rim(axes, theta)
+        axes.plot(*planar(theta, scattered), ".", ms=2, color=INK)
+        axes.set(xlabel="U")
+        axes.set_ylabel("V" if not column else "")
+    save(figure, path)
+
+
+def draw_edge(path: Path) -> None:
+    """B.3: the largest |β − β₀| by azimuth, as it is and as the thesis prints it."""
+    figure = new_figure(7.4, 3.4)
+    axes = figure.add_subplot()
+    a = np.linspace(0.0, 360.0, 361)
+    for theta, colour in zip((5.0, 30.0, 60.0, 80.0), LINES, strict=False):
+        axes.plot(a, harvey_shack.farthest(theta, a), color=colour, label=f"{theta:g}°")
+    s = math.sin(math.radians(60.0))
+    printed = np.sqrt(1.0 + s * s - 2.0 * s * np.cos(np.radians(a + 90.0)))
+    axes.plot(a, printed, "--", lw=1, color=INK, label="60°, as printed")
+    axes.set(xlabel="azimuth of β − β₀ [°]", ylabel="largest |β − β₀|", xlim=(0, 360))
+    figure.legend(loc="outside right upper", frameon=False, fontsize=8)
+    save(figure, path)
+
+
+def illuminance(table: et.Bsdf, theta: float, rays: float) -> tuple[Array, float]:
+    """E of a hemisphere of 1 m about a sample that gets 1 lm [lx], on 91 × 91 cells seen from above; and its flux."""
+    beam = {
+        "kind": "beam",
+        "flux": 1.0,
+        "shape": {"kind": "disk", "radius": 0.1},
+        "at": (direction(theta, 180.0) * 20.0).tolist(),
+        "toward": (-direction(theta, 180.0)).tolist(),
+    }
+    sample = {"shape": {"kind": "disk", "radius": 5.0}, "finish": {"kind": "bsdf", "bsdf": table}}
+    far = {"name": "far", "kind": "intensity", "c_planes": 72, "gamma_step": 1}
+    scene = et.Scene(sources=[beam], surfaces=[sample], detectors=[far])
+    found = et.trace(scene, rays=rays, seed=1).intensity["far"]
+    x = (np.arange(91) - 45.0) / 45.5
+    u, v = np.meshgrid(x, x)
+    inside = u * u + v * v < 1.0
+    height = np.sqrt(np.where(inside, 1.0 - u * u - v * v, 1.0))
+    at = np.stack([np.where(inside, u, 0.0), np.where(inside, v, 0.0), height], axis=-1)
+    # E = I/r² at 1 m.
+    return np.where(inside, found.in_direction(at), np.nan), float(found.flux)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--output", type=Path, default=Path())
+    parser.add_argument("--rays", type=float, default=4e5)
+    given = parser.parse_args()
+    folder = given.output
+    draw_scans(folder / "appendix-b-scans.png")
+    draw_edge(folder / "appendix-b-edge.png")
+    scans = all_scans()
+    tables = {method: et.BsdfTable.from_scans(scans, method) for method in SCHEMES.values()}
+    figure = new_figure(9.6, 8.4)
+    rows = []
+    for line, (title, method) in enumerate(SCHEMES.items()):
+        table = tables[method]
+        for column, theta in enumerate(THETAS):
+            axes = figure.add_subplot(2, 2, 2 * line + column + 1)
+            shown, flux = illuminance(table, theta, given.rays)
+            lowest = 1e-3 * np.nanmax(shown)
+            picture = axes.imshow(
+                np.log10(np.maximum(shown, lowest)), origin="lower", extent=(-1, 1, -1, 1), cmap="magma"
+            )
+            axes.set(title=f"{title}, {theta:g}°", xticks=[], yticks=[])
+            figure.colorbar(picture, ax=axes, label="lg E [lx]", shrink=0.8)
+            (one,) = (s for s in table.data.slices if abs(s.theta - theta) < 1e-6)
+            printed = THESIS[method][column]
+            share = f"{100.0 * (one.stated or one.integral()):.1f} %"
+            rows.append((title, f"{theta:g}°", share, printed, f"{100.0 * flux:.1f} %"))
+    save(figure, folder / "appendix-b-hemisphere.png")
+    truth = PET.reflectance(np.array(THETAS))
+    print_table(("scheme", "incidence", "share of the table", "thesis", "traced"), rows)
+    print(f"true shares: {', '.join(f'{100.0 * share:.1f} %' for share in truth)}\n")
+    every = [(method, *(f"{one.integral():.3f}" for one in tabulated(scans, method).slices)) for method in METHODS]
+    print_table(("method", "share at 5°", "share at 60°"), every)
+
+
+if __name__ == "__main__":
+    main()
