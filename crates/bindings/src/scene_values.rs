@@ -73,7 +73,7 @@ fn outline(dict: Dict<'_, '_>) -> PyResult<Outline> {
             outer: get(dict, "outer")?,
         },
         "polygon" => Outline::Polygon {
-            vertices: get::<Vec<[f64; 2]>>(dict, "vertices")?,
+            vertices: get::<Vec<[f64; 2]>>(dict, "vertices")?.into(),
         },
         other => return Err(refuse(format!("no outline is called {other}"))),
     })

@@ -2,6 +2,7 @@
 
 use etendue_math::Vec3;
 
+use super::corners::Corners;
 use super::rounding::{ROUNDING, size};
 
 /// Which piece of the plane.
@@ -26,7 +27,7 @@ pub enum Outline {
     /// Inside a polygon that does not cross itself.
     Polygon {
         /// Corners \[mm\], in order.
-        vertices: Vec<[f64; 2]>,
+        vertices: Corners,
     },
 }
 
@@ -114,7 +115,7 @@ impl Flat {
             }
             Outline::Polygon { vertices } => {
                 let (t, x, y, error) = on_plane(o, d, starts_on);
-                if t.is_finite() && within(vertices, x, y, error) {
+                if t.is_finite() && vertices.hold(x, y, error) {
                     t
                 } else {
                     f64::INFINITY
@@ -122,28 +123,6 @@ impl Flat {
             }
         }
     }
-}
-
-/// Whether (x, y) lies in the polygon, or so near an edge that it may.
-fn within(vertices: &[[f64; 2]], x: f64, y: f64, error: f64) -> bool {
-    let mut inside = false;
-    let mut from = vertices[vertices.len() - 1];
-    for &to in vertices {
-        let (ex, ey) = (to[0] - from[0], to[1] - from[1]);
-        let (px, py) = (x - from[0], y - from[1]);
-        let length2 = ex * ex + ey * ey;
-        let along = ((px * ex + py * ey) / length2).clamp(0.0, 1.0);
-        let (qx, qy) = (px - along * ex, py - along * ey);
-        if qx * qx + qy * qy <= error * error {
-            return true;
-        }
-        // An edge counts for the half-open range of y that it spans, so that a corner is passed once.
-        if (from[1] > y) != (to[1] > y) && px < py / ey * ex {
-            inside = !inside;
-        }
-        from = to;
-    }
-    inside
 }
 
 #[cfg(test)]
@@ -155,7 +134,9 @@ mod tests {
         // An L of area 3; the midpoint rule on a fine grid counts cells.
         let vertices = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
         let flat = Flat {
-            outline: Outline::Polygon { vertices },
+            outline: Outline::Polygon {
+                vertices: vertices.into(),
+            },
         };
         let n = 200;
         let mut cells = 0;

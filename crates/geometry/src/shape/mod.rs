@@ -7,6 +7,7 @@
 
 pub mod asphere;
 pub mod chart;
+pub mod corners;
 pub mod flat;
 pub mod quadric;
 pub mod roots;
@@ -16,6 +17,7 @@ pub mod surface;
 pub mod torus;
 
 pub use asphere::Asphere;
+pub use corners::Corners;
 pub use flat::{Flat, Outline};
 pub use quadric::Quadric;
 pub use rounding::{ROUNDING, size};

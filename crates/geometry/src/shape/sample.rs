@@ -358,7 +358,7 @@ mod tests {
         let l = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
         near(
             area(&Shape::Flat(Flat {
-                outline: Outline::Polygon { vertices: l },
+                outline: Outline::Polygon { vertices: l.into() },
             })),
             3.0,
         );
@@ -405,7 +405,7 @@ mod tests {
             (
                 Shape::Flat(Flat {
                     outline: Outline::Polygon {
-                        vertices: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]],
+                        vertices: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]].into(),
                     },
                 }),
                 |p| {

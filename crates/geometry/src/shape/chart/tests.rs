@@ -40,7 +40,7 @@ fn zoo() -> Vec<Shape> {
         }),
         flat(Outline::Annulus { inner: 0.0, outer: 3.0 }),
         flat(Outline::Annulus { inner: 1.0, outer: 3.0 }),
-        flat(Outline::Polygon { vertices: ell }),
+        flat(Outline::Polygon { vertices: ell.into() }),
         quadric(1.0, 1.0, 0.0, -9.0, [-inf, inf], [0.0, inf]),
         quadric(1.0, 0.0, 0.0, -4.0, [-3.0, 5.0], [0.0, inf]),
         quadric(0.25, 0.0, -1.0, 0.0, [-inf, inf], [0.5, 4.0]),
