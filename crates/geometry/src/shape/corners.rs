@@ -190,7 +190,9 @@ mod tests {
             }
             points.push([0.0, 1.0]);
             if turned {
-                points.iter_mut().for_each(|p| p.swap(0, 1));
+                for p in &mut points {
+                    p.swap(0, 1);
+                }
             }
             Corners::from(points)
         };
