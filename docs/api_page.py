@@ -26,7 +26,7 @@ GROUPS = {
         "scene", "Scene", "trace", "trace_rounds", "trace_work", "TraceWork", "TraceResult", "ScatterEvents",
         "IlluminanceMap", "read_illuminance_map",
     ),
-    "Scatter": ("bsdf", "Bsdf", "BsdfTable", "read_bsdf", "write_bsdf"),
+    "Scatter": ("bsdf", "Bsdf", "BsdfTable", "Scans", "read_bsdf", "read_scans", "write_bsdf"),
     "Intensity and spectra": ("intensity_distribution", "Intensity", "read_intensity", "write_intensity", "Spectrum"),
     "Pictures": (
         "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",
