@@ -17,9 +17,10 @@ from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data, write_bsdf_data
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
 from etendue.formats.bsdf.klems import BASES
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from formats.slanted import Slanted
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from oracles.bsdf_files import READ_ONLY, Slanted
+from oracles.bsdf_files import READ_ONLY
 
 Array = npt.NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from etendue.errors import FormatError
 from etendue.formats.bsdf import read_bsdf_data, write_bsdf_data
 from etendue.formats.bsdf.tensor_tree import FORMAT
 from etendue.quantities.bsdf_data import BsdfSlice, direction
-from oracles.bsdf_files import Slanted
+from formats.slanted import Slanted
 
 Array = npt.NDArray[np.float64]
 

@@ -1,0 +1,24 @@
+"""A BSDF without symmetry, of which a writer may make tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class Slanted:
+    """A BSDF without symmetry: a lobe beside the specular direction, on another side of it for each incidence."""
+
+    name, isotropic, reflects, transmits, both_sides = "slanted & co", False, True, True, False
+    wavelengths: tuple[float, ...] = ()
+    incidences = (5.0, 30.0, 60.0)
+
+    def evaluate(self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None) -> Array:
+        assert wavelength is None
+        i, s = np.broadcast_arrays(np.asarray(incident, float), np.asarray(scattered, float))
+        back = (i[..., 2] > 0) == (s[..., 2] > 0)
+        off = s[..., :2] + i[..., :2] - 0.1 * np.stack([1.0 + i[..., 1], i[..., 0]], axis=-1)
+        lobe = 0.4 * np.exp(-0.5 * np.sum(off * off, axis=-1) / 0.3**2) * (1.0 + 0.4 * s[..., 1] + 0.2 * i[..., 0])
+        return np.asarray(np.where(back, lobe, 0.5 * lobe) * np.where(i[..., 2] > 0, 1.0, 0.7))
