@@ -85,12 +85,12 @@ ADDITIONS: dict[str, Addition] = {
         "minnaert",
         {f"{BSDFS}/minnaert.rs": "minnaert.rs", f"{MODELS}/minnaert.py": "minnaert_finish.py"},
         (
-            Insertion(f"{BSDFS}/mod.rs", "mod lambertian;\n", "mod minnaert;\n"),
-            Insertion(f"{BSDFS}/mod.rs", "pub use lambertian::Lambertian;\n", "pub use minnaert::Minnaert;\n"),
+            Insertion(f"{BSDFS}/mod.rs", "mod lobe;\n", "mod minnaert;\n"),
+            Insertion(f"{BSDFS}/mod.rs", "pub use lobe::{Lobe, Profile};\n", "pub use minnaert::Minnaert;\n"),
             Insertion(
                 f"{BSDFS}/mod.rs",
-                '        Lambertian::named("lambertian"),\n',
-                '        Minnaert::named("minnaert"),\n',
+                '            Lobe::named("lobe"),\n',
+                '            Minnaert::named("minnaert"),\n',
             ),
             Insertion(
                 f"{BSDFS}/mod.rs",
