@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.bsdf import read_bsdf_data
 from etendue.quantities.bsdf_data import direction
-from oracles.bsdf_files import merl, pab, rgl
+from oracles.bsdf_files import merl, pab, rgl, tensors
 
 Array = npt.NDArray[np.float64]
 
@@ -190,4 +191,15 @@ def test_rgl_mistakes(tmp_path: Path) -> None:
                 read_bsdf_data(path)
     path.write_bytes(whole[:200])
     with pytest.raises(FormatError):
+        read_bsdf_data(path)
+    # More dimensions than any array has; an empty one beside one that no machine holds.
+    path.write_bytes(
+        tensors({"ndf": np.ones((1,) * 30, np.float32)}).replace(b"ndf\x1e\x00", b"ndf\x46\x00") + bytes(800)
+    )
+    with pytest.raises(FormatError):
+        read_bsdf_data(path)
+    path.write_bytes(
+        b"tensor_file\0" + struct.pack("<2BIH", 1, 0, 1, 3) + b"ndf" + struct.pack("<HBQ3Q", 3, 10, 0, 0, 2**63, 2**63)
+    )
+    with pytest.raises(FormatError, match="3 dimensions"):
         read_bsdf_data(path)

@@ -169,10 +169,12 @@ def test_coated(tmp_path: Path) -> None:
     [
         (COATED, "31.9\t68.1", "31.9\t78.1", "add up to 110"),
         (COATED, "50\t11.3", "-5\t11.3", "do not rise"),
-        (COATED, "90\t100\t0", "90\t100", "share"),
+        (COATED, "90\t100\t0", "90\t100", "words follow"),
         (SCATTERING, "45\t0\t0", "45\t0\t101", "101 %"),
         (SCATTERING, "\t0\t0\t30\t5\t", "\t0\t0\t300\t5\t", "300°"),
         (SCATTERING, "\t400\t\t600", "\t600\t\t400", "do not rise"),
+        (COATED, "4 3\n", "40 3\n", "words follow"),
+        (SCATTERING, "3 2\n", "60 2\n", "words follow"),
         (SIMPLE, "Reflection", "Reflexion", "not one of"),
         (SIMPLE, "10 60 30 12", "10 80 30 12", "more than 100"),
         (SIMPLE, "12\n", "12\n13\n", "goes on"),

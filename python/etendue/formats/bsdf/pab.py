@@ -16,8 +16,6 @@ from etendue.formats.rays.text_rows import number, whole
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.report import Complaint
 
-QUANTITIES = ("DSF", "BSDF", "BRDF", "BTDF")
-
 HORIZON = 1e-3
 """Cosine below which the intensity is no longer divided by it."""
 

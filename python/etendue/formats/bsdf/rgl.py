@@ -111,7 +111,11 @@ def _fields(path: Path) -> dict[str, npt.NDArray[np.generic]]:
             size *= one
         if offset + size * dtype.itemsize > len(data):
             raise FormatError(path, f"field {name[:40]!r}", "it goes beyond the end of the file", ADVICE)
-        found[name] = np.frombuffer(data, dtype, size, offset).reshape(shape)
+        try:
+            found[name] = np.frombuffer(data, dtype, size, offset).reshape(shape)
+        except (ValueError, OverflowError):
+            text = f"{dimensions} dimensions, {size} values"
+            raise FormatError(path, f"field {name[:40]!r}", text, ADVICE) from None
     return found
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
-from etendue.formats.bsdf.speos_shares import mixed, require_end, share, words_after_lines
+from etendue.formats.bsdf.speos_shares import mixed, next_angle, require_end, share, sizes, words_after_lines
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.report import Complaint
 
@@ -22,16 +22,12 @@ def recognise(head: bytes) -> bool:
 def read(path: Path) -> BsdfData:
     """Read the mean of both polarisations, which stand on two lines for each angle."""
     tokens, text = words_after_lines(path, 2)
-    angles, waves = (tokens.count(what) for what in ("number of incidences", "number of wavelengths"))
-    wavelength = tokens.numbers("wavelengths", waves)
-    if (np.diff(wavelength) <= 0.0).any() or wavelength[0] <= 0.0:
-        tokens.refuse("wavelengths do not rise")
+    angles, wavelength = sizes(tokens, 4)
+    waves = wavelength.size
     angle = np.zeros(angles)
     shares = np.zeros((2, angles, waves))
     for i in range(angles):
-        angle[i] = tokens.number("angle of incidence")
-        if not 0.0 <= angle[i] <= 90.0 or (i and angle[i] <= angle[i - 1]):
-            tokens.refuse("angles of incidence do not rise within 0 to 90°")
+        angle[i] = next_angle(tokens, angle[i - 1] if i else -1e-300)
         both = np.array([share(tokens, "share") for _ in range(2 * 2 * waves)]).reshape(2, waves, 2)
         if (total := float(both.sum(axis=2).max())) > 1.0 + 1e-9:
             tokens.refuse(f"shares at {angle[i]:g}° add up to {100.0 * total:.6g} %")

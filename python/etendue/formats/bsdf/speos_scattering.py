@@ -7,7 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
-from etendue.formats.bsdf.speos_shares import gaussian, mixed, require_end, share, width, words_after_lines
+from etendue.formats.bsdf.speos_shares import (
+    gaussian,
+    mixed,
+    next_angle,
+    require_end,
+    share,
+    sizes,
+    width,
+    words_after_lines,
+)
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
 
 START = b"OPTIS - Scattering surface file"
@@ -24,17 +33,13 @@ def recognise(head: bytes) -> bool:
 def read(path: Path) -> BsdfData:
     """Read all angles and wavelengths; Gaussian lobes are those of intensity, about the mirrored or straight direction."""
     tokens, text = words_after_lines(path, 2)
-    angles, waves = (tokens.count(what) for what in ("number of incidences", "number of wavelengths"))
-    wavelength = tokens.numbers("wavelengths", waves)
-    if (np.diff(wavelength) <= 0.0).any() or wavelength[0] <= 0.0:
-        tokens.refuse("wavelengths do not rise")
+    angles, wavelength = sizes(tokens, 10)
+    waves = wavelength.size
     angle = np.zeros(angles)
     shares = np.zeros((3, 2, angles, waves))
     widths = np.zeros((2, 2, angles, waves))
     for i in range(angles):
-        angle[i] = tokens.number("angle of incidence")
-        if not 0.0 <= angle[i] <= 90.0 or (i and angle[i] <= angle[i - 1]):
-            tokens.refuse("angles of incidence do not rise within 0 to 90°")
+        angle[i] = next_angle(tokens, angle[i - 1] if i else -1e-300)
         for part in range(5):
             for j in range(waves):
                 for way in range(2):

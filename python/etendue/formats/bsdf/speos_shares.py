@@ -48,6 +48,25 @@ def require_end(path: Path, tokens: Tokens) -> None:
         tokens.refuse("the last line has no end", "If it is whole, end it; if not, ask for the file again.")
 
 
+def sizes(tokens: Tokens, words: int) -> tuple[int, Array]:
+    """How many angles of incidence, and the wavelengths [nm], with so many `words` of each at each angle to follow."""
+    angles, waves = (tokens.count(what) for what in ("number of incidences", "number of wavelengths"))
+    wavelength = tokens.numbers("wavelengths", waves)
+    if (np.diff(wavelength) <= 0.0).any() or wavelength[0] <= 0.0:
+        tokens.refuse("wavelengths do not rise")
+    if tokens.left < angles * (1 + words * waves):
+        tokens.refuse(f"{tokens.left} words follow; {angles} angles and {waves} wavelengths have more")
+    return angles, wavelength
+
+
+def next_angle(tokens: Tokens, before: float) -> float:
+    """An angle of incidence [°] beyond the one before it."""
+    value = tokens.number("angle of incidence")
+    if not before < value <= 0.5 * 180.0:
+        tokens.refuse("angles of incidence do not rise within 0 to 90°")
+    return value
+
+
 def share(tokens: Tokens, what: str) -> float:
     """A number of per cent, as a share."""
     value = tokens.number(what)
