@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.luminance.gathering import BLOCKS, blocks, comparison_note
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
 from oracles.verdicts import REVERSE, assert_agree
 
 Array = npt.NDArray[np.float64]
@@ -42,6 +43,44 @@ def seen(scene: et.Scene, **how: Any) -> et.LuminanceMap:
     return lmap
 
 
+def painted(**finishes: Any) -> dict[str, Any]:
+    """The tray with other finishes, by the names of its surfaces."""
+    there = tray()
+    assert {*finishes} <= {surface["name"] for surface in there["surfaces"]}
+    surfaces = [
+        {**surface, "finish": finishes.get(surface["name"], surface["finish"])} for surface in there["surfaces"]
+    ]
+    return {**there, "surfaces": surfaces}
+
+
+def leaning_table() -> et.BsdfTable:
+    """0.4/π and a lobe that is wider to one side, at three angles of incidence: R about 0.75."""
+    slices = []
+    for theta in (0.0, 40.0, 75.0):
+        incident, grid = direction(theta, 180.0), PolarGrid("normal", np.linspace(0.0, 88.0, 45), np.arange(48) * 7.5)
+        off = (incident + grid.directions(incident, transmitted=False))[..., :2]
+        width = np.where(off[..., 1] > 0, 0.3, 0.15)
+        f = 0.4 / math.pi + 0.9 * np.exp(-0.5 * (off[..., 0] / 0.3) ** 2 - 0.5 * (off[..., 1] / width) ** 2)
+        slices.append(BsdfSlice(incident, f, grid=grid))
+    return et.BsdfTable(BsdfData(tuple(slices)))
+
+
+def agrees_with_the_light_image(*, scene: dict[str, Any], gathered: et.LuminanceMap, rays: float, sharp: float) -> None:
+    """Rays forwards, each scatter connected to the eye, know nothing of patches."""
+    image = et.trace(et.Scene(**scene), rays, 9).images["image"]
+    # The lamp itself is no scattered light.
+    eye, screen = gathered.observer, gathered.screen
+    dark = {**scene, "surfaces": [dict(s, finish="absorber") for s in scene["surfaces"]]}
+    bare = et.luminance_map(et.Scene(**dark), eye, screen, rays_per_pixel=256)
+    clear = (bare.values == 0) & (image.values > 0)
+    assert clear.sum() > 60
+    error = np.hypot(gathered.standard_error, image.standard_error)
+    assert np.median(error[clear] / image.values[clear]) < sharp
+    assert_agree(
+        values=gathered.values[clear], expected=image.values[clear], standard_error=error[clear], degrees=REVERSE
+    )
+
+
 @pytest.fixture(scope="module")
 def gathered() -> et.LuminanceMap:
     return seen(et.Scene(**tray()), rays_per_pixel=1024, seed=3, gather=True)
@@ -49,19 +88,38 @@ def gathered() -> et.LuminanceMap:
 
 @pytest.mark.slow
 def test_the_map_is_that_of_the_light_image(gathered: et.LuminanceMap) -> None:
-    """Rays forwards, each scatter connected to the eye, know nothing of patches."""
-    image = et.trace(et.Scene(**tray()), 2e6, 9).images["image"]
-    # The lamp itself is no scattered light.
-    eye, screen = gathered.observer, gathered.screen
-    dark = {**tray(), "surfaces": [dict(s, finish="absorber") for s in tray()["surfaces"]]}
-    bare = et.luminance_map(et.Scene(**dark), eye, screen, rays_per_pixel=256)
-    clear = (bare.values == 0) & (image.values > 0)
-    assert clear.sum() > 60
-    error = np.hypot(gathered.standard_error, image.standard_error)
-    assert np.median(error[clear] / image.values[clear]) < 0.02
-    assert_agree(
-        values=gathered.values[clear], expected=image.values[clear], standard_error=error[clear], degrees=REVERSE
+    agrees_with_the_light_image(scene=tray(), gathered=gathered, rays=2e6, sharp=0.02)
+
+
+@pytest.mark.slow
+def test_what_does_not_depend_on_where_light_came_from_is_known_of_any_finish() -> None:
+    """The base of a satin paint, the floor of a table, the Lambertian part of a mixture, light about the normal: patches
+    know this part, lines go on for the rest."""
+    lobe = {"kind": "gaussian", "peak": 0.8, "sigma": 0.25, "aspect": 0.6}
+    parts = [{"kind": "lambertian", "reflectance": 0.55}, lobe]
+    scene = painted(
+        floor={"kind": "rough-coat", "roughness": 0.3, "index": 1.6, "base_reflectance": 0.95},
+        left={"kind": "bsdf", "bsdf": leaning_table()},
+        right={"kind": "mixture", "parts": parts, "axis": [0.2, 1, 0.3]},
+        back={"kind": "cosine-power", "about": "normal", "exponent": 1.5, "peak": 0.46},
     )
+    known = seen(et.Scene(**scene), rays_per_pixel=1024, seed=3, gather=True)
+    agrees_with_the_light_image(scene=scene, gathered=known, rays=2e6, sharp=0.03)
+    assert any("known light" in note for note in known.notes)
+
+
+@pytest.mark.slow
+def test_gloss_paint_is_known_but_for_what_it_mirrors() -> None:
+    """Light that leaves a coat depends on the angle; mirror images are in no light image: beside lines that go on."""
+    gloss = {"kind": "coated", "index": 1.3, "base_reflectance": 0.95}
+    mixed = {"kind": "mixture", "parts": [gloss, WHITE], "weights": [0.5, 0.5]}
+    scene = et.Scene(**painted(floor=gloss, left=gloss, right=mixed, back=gloss))
+    known = seen(scene, rays_per_pixel=2048, seed=3, forward_rays=0, gather=True)
+    exact = seen(scene, rays_per_pixel=4096, seed=7, forward_rays=0)
+    error = np.hypot(known.standard_error, exact.standard_error)
+    lit = exact.values > 0.05 * np.median(exact.values)
+    assert np.median(error[lit] / exact.values[lit]) < 0.04
+    assert_agree(values=known.values[lit], expected=exact.values[lit], standard_error=error[lit], degrees=REVERSE)
 
 
 def test_noise_is_much_smaller(gathered: et.LuminanceMap) -> None:

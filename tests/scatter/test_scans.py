@@ -156,7 +156,6 @@ def test_what_each_scheme_costs() -> None:
     assert (np.abs(lost["smooth"]) < np.abs(lost["direction-cosines"])).all()
 
 
-@pytest.mark.slow
 def test_natural_neighbours_keep_a_plane_and_take_sibsons_areas() -> None:
     """Linear functions come back between the points; four points on a square share its middle evenly."""
     incident = direction(0.0, 0.0)

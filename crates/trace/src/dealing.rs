@@ -21,6 +21,8 @@ const LONGEST: u64 = 1 << 50;
 pub struct Dealing {
     /// Of the whole run.
     rays: u64,
+    /// Of a batch.
+    each: u64,
     /// Sums of the sources' shares of the flux.
     shares: Vec<f64>,
     /// Rays of each source in the whole run.
@@ -44,6 +46,7 @@ impl Dealing {
         }
         let mut dealing = Self {
             rays,
+            each: BATCH,
             shares,
             counts: Vec::new(),
             stratum: vec![0; fluxes.len()],
@@ -77,6 +80,18 @@ impl Dealing {
         };
         let sets: Vec<_> = scene.sources.iter().map(|source| set(&source.emitter)).collect();
         Self::new(&fluxes, &sets, rays)
+    }
+
+    /// The same in batches of another size, for work that needs fewer rays.
+    #[must_use]
+    pub fn in_batches_of(self, each: u64) -> Self {
+        Self { each, ..self }
+    }
+
+    /// The number of the first ray of a batch.
+    #[must_use]
+    pub const fn first(&self, batch: u64) -> u64 {
+        batch * self.each
     }
 
     /// Number of sources.
@@ -129,7 +144,7 @@ impl Dealing {
     /// beginning of a run serves all sources in proportion, and each number is known without counting.
     #[must_use]
     pub fn batch(&self, batch: u64) -> Vec<Range<u64>> {
-        let (from, to) = (batch * BATCH, (batch + 1) * BATCH);
+        let (from, to) = (self.first(batch), self.first(batch + 1));
         let from = self.dealt(from.min(self.rays));
         from.zip(self.dealt(to.min(self.rays)))
             .map(|(from, to)| from..to)
@@ -150,8 +165,8 @@ impl Dealing {
             return;
         }
         let ranges = self.batch(batch);
-        let mut firsts = vec![batch * BATCH];
-        firsts.extend(ranges.iter().scan(batch * BATCH, |first, range| {
+        let mut firsts = vec![self.first(batch)];
+        firsts.extend(ranges.iter().scan(self.first(batch), |first, range| {
             *first += range.end - range.start;
             Some(*first)
         }));

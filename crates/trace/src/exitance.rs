@@ -1,7 +1,8 @@
 //! The light that diffuse surfaces send out, patch by patch, from rays traced forwards.
 //!
 //! A path from the observer that goes from one diffuse surface to another may end there if the luminance of the second one is
-//! known: *final gathering*, `[Jensen1996]`. What is known is a mean over a small patch of the surface, by the rays that
+//! known: *final gathering*, `[Jensen1996]`. Where only a part of that luminance does not depend on where the light came from
+//! (the base of a satin paint, the floor of a table), this part is known, and the path goes on for the rest. What is known is a mean over a small patch of the surface, by the rays that
 //! arrive on it. The first surface that the observer sees is never looked up, so that patches are not seen: they enter integrals
 //! over all that the surface faces. A patch is of no use where light is blocked from a part of it, since the mean is that of
 //! the whole; a survey finds those, and paths that meet them go on. So do paths that are too near to a patch to take it for
@@ -18,12 +19,13 @@ use etendue_geometry::shape::chart::BINS;
 use etendue_geometry::shape::sample::AreaSampler;
 use etendue_sampling::ordered::BATCH;
 
+use crate::dealing::Dealing;
 use crate::detector::{Detector, Exitance};
 use crate::exitance_cells::{ExitanceCells, FacePoint};
 use crate::forward::run::Run;
 use crate::lit_scene::LitScene;
 use crate::scene::{Act, Role, Scene};
-use crate::work_unit::work_unit;
+use crate::work_unit::{work_unit, work_unit_of};
 
 /// Batches of rays from which the sizes of patches are chosen.
 const SCOUTS: u64 = 1;
@@ -31,8 +33,14 @@ const SCOUTS: u64 = 1;
 /// Batches of rays that look at the bins of each patch.
 const SURVEYORS: u64 = 8;
 
-/// Batches of rays for each pass of a map.
-const EACH: u64 = 2;
+/// Rays in a batch of a pass.
+const FEW: u64 = 1 << 13;
+
+/// Batches of a pass: at least and at most.
+const EACH: [u64; 2] = [4, 64];
+
+/// Lines of sight of a pass for each of its rays.
+const LINES: u64 = 1;
 
 /// Rays that a bin has on average in a survey: of as many, hardly one in 10⁶ gets none by chance.
 const FILL: f64 = 16.0;
@@ -68,16 +76,18 @@ impl ExitanceSurvey {
     /// Cuts the diffuse surfaces of a scene by the light that falls on them, and finds the patches that light reaches
     /// everywhere.
     ///
-    /// A face is cut if it has a finite area, nothing is cut off it, and its light has the same luminance in all directions. Runs on the threads of the current pool; the same
-    /// for any number.
+    /// A face is cut if it has a finite area, nothing is cut off it, and a part of its light is a product (`Parts`); with
+    /// interpolated normals, if it is Lambertian. Runs on the threads of the current pool; the same for any number.
     #[must_use]
     pub fn new(lit: &LitScene<'_>, seed: u64, most_events: u32) -> Self {
         let (scene, seed) = (lit.scene, seed ^ SURVEY);
         let wavelengths: Vec<f64> = lit.lines.iter().map(|line| line.1).collect();
         let own = |(face, role): (&Face, &Role)| {
             let Act::Optical(finish) = role.act else { return None };
-            let facts = scene.finishes[finish as usize].facts();
-            let cut = facts.is_diffuse() && facts.lambertian && face.trims.is_empty();
+            let bsdf = &*scene.finishes[finish as usize];
+            let facts = bsdf.facts();
+            let known = facts.lambertian || (bsdf.parts().is_some() && !face.shape.is_smooth());
+            let cut = facts.is_diffuse() && known && face.trims.is_empty();
             cut.then(|| AreaSampler::new(&face.shape).map(|sampler| sampler.area()))?
         };
         let areas: Vec<Option<f64>> = scene.face_set.faces().iter().zip(&scene.roles).map(own).collect();
@@ -160,9 +170,9 @@ impl ExitanceSurvey {
         self.sides.chunks(2).filter(known).count() as f64 / self.patches().max(1) as f64
     }
 
-    /// What the patches send out, by the rays of a pass.
+    /// What the patches send out, by the rays of a pass of so many lines of sight.
     #[must_use]
-    pub fn exitance(&self, lit: &LitScene<'_>, pass: u32) -> ExitanceCache<'_> {
+    pub fn exitance(&self, lit: &LitScene<'_>, pass: u32, lines: u64) -> ExitanceCache<'_> {
         let detectors = [Detector::Exitance(Exitance(Arc::clone(&self.patches)))];
         let run = Run {
             rays: RUN,
@@ -172,11 +182,13 @@ impl ExitanceSurvey {
             stop: lit.stop,
             light_samplers: &[],
         };
-        let first = SCOUTS + SURVEYORS + u64::from(pass) * EACH;
-        let sums = work_unit(lit.scene, &detectors, &run, first..first + EACH);
+        let dealing = Dealing::of(lit.scene, RUN, &[]).in_batches_of(FEW);
+        let first = (SCOUTS + SURVEYORS) * BATCH / FEW + u64::from(pass) * EACH[1];
+        let batches = (2 * lines / (LINES * FEW)).clamp(EACH[0], EACH[1]);
+        let sums = work_unit_of(lit.scene, &detectors, &run, &dealing, first..first + batches);
         let cells = &sums.tallies[0].cells;
         // The rays stand for the whole run.
-        let scale = RUN as f64 / (EACH * BATCH) as f64;
+        let scale = RUN as f64 / (batches * FEW) as f64;
         let lines = lit.lines.len();
         let mut below = 0.0;
         let shares: Vec<f64> = lit

@@ -1,7 +1,7 @@
 //! The surface event: what becomes of light at a surface that it meets. Rays from the sources and lines of sight both ask here.
 
 use etendue_math::Vec3;
-use etendue_optics::bsdf::{Bsdf, Component, Drawn, Media, Shares};
+use etendue_optics::bsdf::{Bsdf, Component, Drawn, Media, Parts, Shares};
 use etendue_optics::fresnel::reflect;
 use etendue_optics::source::surface::across;
 
@@ -55,6 +55,16 @@ impl<'a> Surface<'a> {
     pub fn evaluate(&self, incident: Vec3, scattered: Vec3) -> f64 {
         let [i, s] = [incident, scattered].map(|v| local(&self.axes, v));
         self.bsdf.evaluate(i, s, &self.media) * self.tilt(incident, scattered, s.z)
+    }
+
+    /// The share of light along `d` that the product of the BSDF sends back (see [`Parts`]).
+    #[inline]
+    #[must_use]
+    pub fn product(&self, d: Vec3) -> f64 {
+        let parts = self.bsdf.parts();
+        parts.map_or(0.0, |parts| {
+            parts.product.arriving(local(&self.axes, -d), &self.media)[0]
+        })
     }
 
     /// The direction of light that arrived along `d` after it met a surface without interpolated normals that lets nothing
@@ -199,6 +209,37 @@ impl<'a> SurfaceEvent<'a> {
     #[must_use]
     pub fn shares(&self) -> Shares {
         self.surface.bsdf.shares(self.towards, &self.surface.media)
+    }
+
+    /// The diffuse part of the optical properties, taken apart where that is of use: where normals are interpolated, what leaves
+    /// in a direction depends on the point.
+    #[inline]
+    #[must_use]
+    pub fn parts(&self) -> Option<Parts<'a>> {
+        let even = self.surface.axes[2] == self.surface.side;
+        self.surface.bsdf.parts().filter(|_| even)
+    }
+
+    /// The product's shares of the light that arrives (see [`Parts`]).
+    #[inline]
+    #[must_use]
+    pub fn arriving(&self, parts: Parts<'_>) -> [f64; 2] {
+        parts.product.arriving(self.towards, &self.surface.media)
+    }
+
+    /// The product's luminance where the line of sight came from, over that of Lambertian light (see [`Parts`]).
+    #[inline]
+    #[must_use]
+    pub fn leaving(&self, parts: Parts<'_>) -> f64 {
+        parts.product.leaving(self.outward, &self.surface.media)
+    }
+
+    /// The same for another BSDF in the place of this one.
+    #[inline]
+    #[must_use]
+    pub fn of(&self, bsdf: &'a dyn Bsdf) -> Self {
+        let surface = Surface { bsdf, ..self.surface };
+        Self { surface, ..*self }
     }
 
     /// What becomes of a ray, from two numbers: the component, its direction and the solids that it is in; None if it is absorbed.

@@ -17,9 +17,21 @@ use crate::tallies::{BatchSums, TraceSums};
 #[must_use]
 pub fn work_unit(scene: &Scene, detectors: &[Detector], run: &Run<'_>, batches: Range<u64>) -> TraceSums {
     let dealing = Dealing::of(scene, run.rays, run.sets);
+    work_unit_of(scene, detectors, run, &dealing, batches)
+}
+
+/// The same with rays that are dealt in another way.
+#[must_use]
+pub fn work_unit_of(
+    scene: &Scene,
+    detectors: &[Detector],
+    run: &Run<'_>,
+    dealing: &Dealing,
+    batches: Range<u64>,
+) -> TraceSums {
     let parts: Vec<BatchSums> = batches
         .into_par_iter()
-        .map(|batch| trace_batch(scene, detectors, run, &dealing, batch))
+        .map(|batch| trace_batch(scene, detectors, run, dealing, batch))
         .collect();
-    TraceSums::of(scene, detectors, &dealing, parts)
+    TraceSums::of(scene, detectors, dealing, parts)
 }

@@ -166,7 +166,8 @@ class PathTracing(Method):
         traced forwards already.
     gather : bool
         Lines of sight end at the second diffuse surface, whose light is then known from rays traced forwards, as a mean
-        over small patches. Many times as fast where light goes to and fro between diffuse surfaces. Patches that light
+        over small patches; of finishes that are not Lambertian a part of it is known, and lines go on for the rest. Many
+        times as fast where light goes to and fro between diffuse surfaces. Patches that light
         does not reach evenly are not used; the map's notes tell how it compares with lines that go on.
 
     Raises

@@ -58,6 +58,43 @@ fn cubic(place: f64, last: usize, even: bool) -> [(usize, f64); 4] {
     std::array::from_fn(|k| (nodes[k], weights[k]))
 }
 
+/// One share over the height of the direction of incidence alone, in steps so fine that it is linear within them to 10⁻⁶.
+#[derive(Clone, Debug)]
+pub struct ByHeight {
+    /// Over even steps of the square root of the height.
+    values: Vec<f64>,
+}
+
+/// Steps of [`ByHeight`].
+const FINE: usize = 4096;
+
+impl ByHeight {
+    /// From the share at a height.
+    pub fn new(of: impl Fn(f64) -> f64) -> Self {
+        let at = |k: usize| {
+            let root = k as f64 / FINE as f64;
+            of(root * root)
+        };
+        Self {
+            values: (0..=FINE).map(at).collect(),
+        }
+    }
+
+    /// The share of light from a direction, whichever side it is on.
+    #[inline]
+    pub fn at(&self, incident: Vec3) -> f64 {
+        let place = incident.z.abs().min(1.0).sqrt() * FINE as f64;
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "from 0 to the last node"
+        )]
+        let cell = (place as usize).min(FINE - 1);
+        let [a, b] = [self.values[cell], self.values[cell + 1]];
+        a + (place - cell as f64) * (b - a)
+    }
+}
+
 impl<const N: usize> Albedo<N> {
     /// From the shares at a direction in front.
     pub fn new(turning: bool, of: impl Fn(Vec3) -> [f64; N] + Sync) -> Self {

@@ -8,6 +8,7 @@ use etendue_math::special::ln;
 use etendue_sampling::more_numbers::MoreNumbers;
 
 use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
+use super::parts::{Parts, Product};
 use crate::fresnel::fresnel;
 use crate::table::Table;
 
@@ -111,9 +112,15 @@ impl Bsdf for Coated {
             return 0.0;
         }
         let [outside, _] = media.seen_from(incident);
-        let [there, back] = [incident, scattered].map(|d| 1.0 - self.mirrored(d.z.abs(), outside));
-        let m = self.index / outside;
-        there * back * FRAC_1_PI * self.leaves(outside, media.wavelength) / (m * m * let_out(m))
+        let there = (1.0 - self.mirrored(incident.z.abs(), outside)) * self.leaves(outside, media.wavelength);
+        there * FRAC_1_PI * self.leaving(scattered, media)
+    }
+
+    fn parts(&self) -> Option<Parts<'_>> {
+        Some(Parts {
+            product: self,
+            rest: None,
+        })
     }
 
     fn draw(&self, incident: Vec3, _transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3 {
@@ -131,8 +138,26 @@ impl Bsdf for Coated {
     }
 }
 
+impl Product for Coated {
+    fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2] {
+        self.shares(incident, media).diffuse
+    }
+
+    fn leaving(&self, scattered: Vec3, media: &Media) -> f64 {
+        let [outside, _] = media.seen_from(scattered);
+        let m = self.index / outside;
+        (1.0 - self.mirrored(scattered.z.abs(), outside)) / (m * m * let_out(m))
+    }
+
+    fn is_even(&self) -> bool {
+        false
+    }
+}
+
 #[cfg(test)]
 impl super::contract::Examples for Coated {
+    const MEDIA: bool = true;
+
     fn examples() -> Vec<Self> {
         [(1.65, 0.9), (1.6, 0.0), (1.8, 1.0)]
             .map(|(index, base)| Self::new(index, Table::constant(base)).expect("sound"))

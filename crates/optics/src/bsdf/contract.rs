@@ -25,6 +25,7 @@ use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::warp::part_of;
 
+use super::parts::Parts;
 use crate::table::Table;
 
 /// What lies on both sides of a surface, for light of one wavelength.
@@ -195,6 +196,11 @@ pub trait Bsdf: Debug + Send + Sync {
         by_cosine((incident.z > 0.0) != transmitted, numbers)
     }
 
+    /// Its diffuse part, taken apart; None if no part of it is a product.
+    fn parts(&self) -> Option<Parts<'_>> {
+        None
+    }
+
     /// Whether light passes as if nothing were there.
     fn is_nothing(&self, _media: &Media) -> bool {
         false
@@ -286,14 +292,13 @@ pub trait Bsdf: Debug + Send + Sync {
     #[inline]
     fn incoming_light(&self, incident: Vec3, scattered: Vec3, media: &Media) -> (f64, f64) {
         let f = self.evaluate(incident, scattered, media);
-        let any = incident.z.abs() * FRAC_1_PI;
         if self.facts().lambertian {
-            return (f, any);
+            return (f, proposed(incident, 0.0, 0.0));
         }
         let transmitted = (incident.z > 0.0) != (scattered.z > 0.0);
         let share = self.shares(scattered, media).diffuse[usize::from(transmitted)];
         if share <= 0.0 {
-            return (f, any);
+            return (f, proposed(incident, 0.0, share));
         }
         let back = if self.facts().reciprocal {
             // f over n² on the side where light leaves is the same there and back.
@@ -303,7 +308,7 @@ pub trait Bsdf: Debug + Send + Sync {
         } else {
             self.pdf(scattered, incident, media)
         };
-        (f, ANYWHERE * any + (1.0 - ANYWHERE) * back / share)
+        (f, proposed(incident, back, share))
     }
 
     /// Density \[1/sr\] of [`draw_incoming`](Bsdf::draw_incoming) on the side of `incident`.
@@ -325,6 +330,19 @@ pub trait Bsdf: Debug + Send + Sync {
 
 /// The part of the light of lobes that is looked for where nothing says that it comes from.
 const ANYWHERE: f64 = 0.1;
+
+/// Density \[1/sr\] of [`Bsdf::draw_incoming`] at `incident` on its side, where light that goes back as it came would have the
+/// density `back` and this share; Lambert's where there is none.
+#[inline]
+#[must_use]
+pub fn proposed(incident: Vec3, back: f64, share: f64) -> f64 {
+    let any = incident.z.abs() * FRAC_1_PI;
+    if share > 0.0 {
+        ANYWHERE * any + (1.0 - ANYWHERE) * back / share
+    } else {
+        any
+    }
+}
 
 /// What a BSDF is described by: values by name.
 pub trait Parameters {
@@ -363,6 +381,8 @@ pub struct Example {
     pub quadrature: f64,
     /// Whether that is a lattice.
     pub lattice: bool,
+    /// Whether indices matter.
+    pub media: bool,
 }
 
 /// Some of a kind, for the tests of all kinds.
@@ -378,6 +398,9 @@ pub trait Examples: Bsdf + Sized + 'static {
     /// about the specular direction.
     const LATTICE: bool = false;
 
+    /// Whether the refractive indices on both sides matter.
+    const MEDIA: bool = false;
+
     /// The same, by the name of their file and their number.
     fn named(file: &str) -> Vec<Example> {
         let each = Self::examples().into_iter().enumerate();
@@ -386,6 +409,17 @@ pub trait Examples: Bsdf + Sized + 'static {
             bsdf: std::sync::Arc::new(bsdf),
             quadrature: Self::QUADRATURE,
             lattice: Self::LATTICE,
+            media: Self::MEDIA,
+        })
+        // What is left of a BSDF is one, too.
+        .flat_map(|whole| {
+            let left = whole.bsdf.parts().and_then(|parts| parts.rest.cloned());
+            let left = left.map(|bsdf| Example {
+                name: format!("rest of {}", whole.name),
+                bsdf,
+                ..whole.clone()
+            });
+            std::iter::once(whole).chain(left)
         })
         .collect()
     }

@@ -10,6 +10,7 @@ use etendue_sampling::more_numbers::MoreNumbers;
 
 use super::albedo::Albedo;
 use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
+use super::parts::{Parts, Product};
 
 /// f = peak · cosⁿ α, α being the angle from an axis, and 0 beyond 90°; from both sides alike.
 #[derive(Clone, Debug)]
@@ -141,6 +142,13 @@ impl Bsdf for CosinePower {
         }
     }
 
+    fn parts(&self) -> Option<Parts<'_>> {
+        self.about_normal.then_some(Parts {
+            product: self,
+            rest: None,
+        })
+    }
+
     fn draw(&self, incident: Vec3, transmitted: bool, _media: &Media, numbers: [f64; 2]) -> Vec3 {
         let up = (incident.z > 0.0) != transmitted;
         let side = if up { 1.0 } else { -1.0 };
@@ -163,6 +171,21 @@ impl Bsdf for CosinePower {
             pair = more.pair();
         }
         by_cosine(up, numbers)
+    }
+}
+
+/// About the normal.
+impl Product for CosinePower {
+    fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2] {
+        self.shares(incident, media).diffuse
+    }
+
+    fn leaving(&self, scattered: Vec3, _media: &Media) -> f64 {
+        0.5 * (self.exponent + 2.0) * exp(self.exponent * ln(scattered.z.abs().max(f64::MIN_POSITIVE)))
+    }
+
+    fn is_even(&self) -> bool {
+        self.exponent == 0.0
     }
 }
 

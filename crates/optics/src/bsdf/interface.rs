@@ -41,6 +41,8 @@ impl Bsdf for Interface {
 
 #[cfg(test)]
 impl super::contract::Examples for Interface {
+    const MEDIA: bool = true;
+
     fn examples() -> Vec<Self> {
         vec![Self]
     }

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_1_PI;
 use etendue_math::Vec3;
 
 use super::contract::{Bsdf, Facts, Media, Shares};
+use super::parts::{Parts, Product};
 use crate::table::Table;
 
 /// Cosines of the angle of incidence at which is asked how much light may come from a side.
@@ -59,6 +60,13 @@ impl Bsdf for Lambertian {
         self.tables[usize::from(transmitted)].at(incident.z.abs(), media.wavelength) * FRAC_1_PI
     }
 
+    fn parts(&self) -> Option<Parts<'_>> {
+        Some(Parts {
+            product: self,
+            rest: None,
+        })
+    }
+
     fn breakpoints(&self) -> Option<[Vec<f64>; 2]> {
         Some(Table::breakpoints(&self.tables))
     }
@@ -68,6 +76,13 @@ impl Bsdf for Lambertian {
             let most = ASKED.map(|cosine| table.at(cosine, media.wavelength));
             most.into_iter().fold(0.0, f64::max)
         })
+    }
+}
+
+impl Product for Lambertian {
+    #[inline]
+    fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2] {
+        self.shares(incident, media).diffuse
     }
 }
 

@@ -66,6 +66,8 @@ impl Bsdf for Mirror {
 
 #[cfg(test)]
 impl super::contract::Examples for Mirror {
+    const MEDIA: bool = true;
+
     fn examples() -> Vec<Self> {
         let table = |a: f64, b: f64| Table::new(vec![0.0, 1.5], vec![500.0], vec![a, b]).expect("sound");
         [

@@ -8,6 +8,7 @@ use etendue_sampling::warp::part_of;
 use super::contract::{Bsdf, Facts, Media, Parameters, Shares};
 use super::lambertian::Lambertian;
 use super::mirror::Mirror;
+use super::parts::{Parts, Product};
 use crate::table::Table;
 
 /// A sum of BSDFs, each times a weight.
@@ -15,6 +16,9 @@ use crate::table::Table;
 pub struct Mixture {
     members: Vec<(f64, Arc<dyn Bsdf>)>,
     facts: Facts,
+    /// Numbers of the members whose products are taken together; and what scatters light beside them, if anything does.
+    products: Vec<usize>,
+    rest: Option<Arc<dyn Bsdf>>,
 }
 
 /// What shares may exceed 1 by, for rounding.
@@ -33,6 +37,11 @@ impl Mixture {
         if !members.iter().all(|(weight, _)| *weight >= 0.0 && weight.is_finite()) {
             return None;
         }
+        let mixture = Self::of(members);
+        mixture.is_sound().then_some(mixture)
+    }
+
+    fn of(members: Vec<(f64, Arc<dyn Bsdf>)>) -> Self {
         let each: Vec<(f64, Facts)> = members.iter().map(|(weight, bsdf)| (*weight, *bsdf.facts())).collect();
         let any = |pick: fn(&Facts) -> [bool; 2]| {
             std::array::from_fn(|side| each.iter().any(|(weight, facts)| *weight > 0.0 && pick(facts)[side]))
@@ -51,8 +60,31 @@ impl Mixture {
             constant,
             fresnel: false,
         };
-        let mixture = Self { members, facts };
-        mixture.is_sound().then_some(mixture)
+        // All that are even, or one that is not.
+        let has = |number: &usize, even: bool| {
+            let (weight, bsdf) = &members[*number];
+            *weight > 0.0 && bsdf.parts().is_some_and(|parts| parts.product.is_even() == even)
+        };
+        let mut products: Vec<usize> = (0..members.len()).filter(|k| has(k, true)).collect();
+        if products.is_empty() {
+            products.extend((0..members.len()).find(|k| has(k, false)));
+        }
+        let mut others = Vec::new();
+        for (number, (weight, bsdf)) in members.iter().enumerate() {
+            let left = if products.contains(&number) {
+                bsdf.parts().and_then(|parts| parts.rest)
+            } else {
+                Some(bsdf).filter(|bsdf| bsdf.facts().is_diffuse())
+            };
+            others.extend(left.filter(|_| *weight > 0.0).map(|left| (*weight, Arc::clone(left))));
+        }
+        let rest = (!products.is_empty() && !others.is_empty()).then(|| Arc::new(Self::of(others)) as Arc<dyn Bsdf>);
+        Self {
+            members,
+            facts,
+            products,
+            rest,
+        }
     }
 
     /// Of mirrored and refracted, scattered and through-scattered light by their shares; None if a share is negative or they exceed 1 together.
@@ -151,6 +183,13 @@ impl Bsdf for Mixture {
         self.members.iter().map(own).sum()
     }
 
+    fn parts(&self) -> Option<Parts<'_>> {
+        (!self.products.is_empty()).then_some(Parts {
+            product: self,
+            rest: self.rest.as_ref(),
+        })
+    }
+
     fn draw(&self, incident: Vec3, transmitted: bool, media: &Media, [which, turn]: [f64; 2]) -> Vec3 {
         let side = usize::from(transmitted);
         let share = |(weight, bsdf): &(f64, Arc<dyn Bsdf>)| weight * bsdf.shares(incident, media).diffuse[side];
@@ -213,6 +252,38 @@ impl Bsdf for Mixture {
     }
 }
 
+impl Mixture {
+    /// The products that are taken together, each with its weight.
+    #[inline]
+    fn products(&self) -> impl Iterator<Item = (f64, &dyn Product)> {
+        self.products.iter().filter_map(|number| {
+            let (weight, bsdf) = &self.members[*number];
+            Some((*weight, bsdf.parts()?.product))
+        })
+    }
+}
+
+impl Product for Mixture {
+    fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2] {
+        let mut all = [0.0; 2];
+        for (weight, product) in self.products() {
+            let own = product.arriving(incident, media);
+            all = [all[0] + weight * own[0], all[1] + weight * own[1]];
+        }
+        all
+    }
+
+    fn leaving(&self, scattered: Vec3, media: &Media) -> f64 {
+        self.products()
+            .next()
+            .map_or(1.0, |(_, product)| product.leaving(scattered, media))
+    }
+
+    fn is_even(&self) -> bool {
+        self.products().all(|(_, product)| product.is_even())
+    }
+}
+
 /// The member that a number from 0 to 1 picks by shares, and what is left of the number.
 fn pick(
     members: &[(f64, Arc<dyn Bsdf>)],
@@ -238,9 +309,13 @@ fn pick(
 
 #[cfg(test)]
 impl super::contract::Examples for Mixture {
+    const MEDIA: bool = true;
+
     fn examples() -> Vec<Self> {
+        use super::cosine_power::CosinePower;
         use super::interface::Interface;
 
+        let power = |n| Arc::new(CosinePower::new(0.6, n, true, false).expect("sound")) as Arc<dyn Bsdf>;
         let table = |a: f64, b: f64| Table::new(vec![0.0, 1.5], vec![500.0], vec![a, b]).expect("sound");
         let mirror = |r, t| Arc::new(Mirror::new(r, t).expect("at most 1")) as Arc<dyn Bsdf>;
         let diffuse = |r, t| Arc::new(Lambertian::new(r, t).expect("at most 1")) as Arc<dyn Bsdf>;
@@ -263,6 +338,12 @@ impl super::contract::Examples for Mixture {
             vec![
                 (0.4, Arc::new(Interface) as Arc<dyn Bsdf>),
                 (0.6, diffuse(constant(0.3), constant(0.6))),
+            ],
+            // Two products that are not even.
+            vec![
+                (0.5, power(2.0)),
+                (0.4, power(5.0)),
+                (0.1, mirror(constant(0.7), constant(0.0))),
             ],
         ]
         .map(|members| Self::new(members).expect("at most 1"))

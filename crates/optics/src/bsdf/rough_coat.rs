@@ -1,13 +1,15 @@
 //! A rough clear coat over a diffuse base: satin and matt paint.
 
 use std::f64::consts::FRAC_1_PI;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use etendue_math::Vec3;
 use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
-use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
+use super::albedo::ByHeight;
+use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine, proposed};
+use super::parts::{Parts, Product};
 use super::rough_interface::{RoughFacets, above, from_side};
 use crate::table::Table;
 
@@ -19,9 +21,13 @@ use crate::table::Table;
 /// for a smooth coat `[Saunderson1942]`.
 #[derive(Debug)]
 pub struct RoughCoat {
-    rough: RoughFacets,
+    rough: Arc<RoughFacets>,
     index: f64,
     base: Table,
+    /// The same on a black base; None if that is what it is.
+    coat: Option<Arc<dyn Bsdf>>,
+    /// R(θ) and its mean, seen from a medium of index 1; None if R depends on azimuth.
+    usual: Arc<OnceLock<Option<(ByHeight, f64)>>>,
 }
 
 const FACTS: Facts = Facts {
@@ -43,10 +49,23 @@ impl RoughCoat {
         if !Table::are_shares(std::slice::from_ref(&base)) || base.depends_on_angle() {
             return Err("a base whose reflectance is no share or depends on angle".into());
         }
+        let rough = Arc::new(RoughFacets::new(alpha, ggx, false)?);
+        let usual = Arc::default();
+        let coat = (!base.is_zero()).then(|| {
+            Arc::new(Self {
+                rough: Arc::clone(&rough),
+                index,
+                base: Table::constant(0.0),
+                coat: None,
+                usual: Arc::clone(&usual),
+            }) as Arc<dyn Bsdf>
+        });
         Ok(Self {
-            rough: RoughFacets::new(alpha, ggx)?,
+            rough,
             index,
             base,
+            coat,
+            usual,
         })
     }
 
@@ -65,14 +84,26 @@ impl RoughCoat {
         self.index / media.seen_from(incident)[0]
     }
 
+    /// R(θ) and its mean, if they are tabled for this ratio.
+    fn usual(&self, ratio: f64) -> Option<&(ByHeight, f64)> {
+        let usual = (ratio == self.index).then(|| self.usual.get_or_init(|| self.rough.reflected_once(ratio)));
+        usual.and_then(Option::as_ref)
+    }
+
     /// R(θ).
     fn mirrored(&self, direction: Vec3, ratio: f64) -> f64 {
-        self.rough.once(direction, ratio)[0].clamp(0.0, 1.0)
+        match self.usual(ratio) {
+            Some((table, _)) => table.at(direction),
+            None => self.rough.once(direction, ratio)[0].clamp(0.0, 1.0),
+        }
     }
 
     /// Of light within the coat on its way to the base: the share that leaves it at last, and 1 − R.
     fn leaves(&self, ratio: f64, wavelength: f64) -> [f64; 2] {
-        let let_in = 1.0 - self.rough.once_of_diffuse(ratio)[0];
+        let mean = self
+            .usual(ratio)
+            .map_or_else(|| self.rough.once_of_diffuse(ratio)[0], |(_, mean)| *mean);
+        let let_in = 1.0 - mean;
         let (rho, out) = (self.base.at(1.0, wavelength), let_in / (ratio * ratio));
         // Nothing of lower index than the surroundings lets out more than all.
         let out = out.min(1.0);
@@ -107,12 +138,41 @@ impl Bsdf for RoughCoat {
             return 0.0;
         }
         let ratio = self.ratio(incident, media);
+        let coat = self
+            .rough
+            .reflected(above(front, incident), above(front, scattered), ratio);
+        if self.coat.is_none() {
+            return coat;
+        }
         let [there, back] = [incident, scattered].map(|d| 1.0 - self.mirrored(d, ratio));
+        let [leaves, let_in] = self.leaves(ratio, media.wavelength);
+        coat + there * back * FRAC_1_PI * leaves / let_in
+    }
+
+    /// As any BSDF does, but what the coat does to the direction of the line of sight is looked up once.
+    fn incoming_light(&self, incident: Vec3, scattered: Vec3, media: &Media) -> (f64, f64) {
+        let front = incident.z > 0.0;
+        if front != (scattered.z > 0.0) {
+            return (0.0, proposed(incident, 0.0, 0.0));
+        }
+        let ratio = self.ratio(incident, media);
+        let [there, back] = [incident, scattered].map(|d| self.mirrored(d, ratio));
         let [leaves, let_in] = self.leaves(ratio, media.wavelength);
         let coat = self
             .rough
             .reflected(above(front, incident), above(front, scattered), ratio);
-        coat + there * back * FRAC_1_PI * leaves / let_in
+        let f = coat + (1.0 - there) * (1.0 - back) * FRAC_1_PI * leaves / let_in;
+        (
+            f,
+            proposed(incident, f * incident.z.abs(), back + (1.0 - back) * leaves),
+        )
+    }
+
+    fn parts(&self) -> Option<Parts<'_>> {
+        self.coat.as_ref().map(|coat| Parts {
+            product: self,
+            rest: Some(coat),
+        })
     }
 
     fn draw(&self, incident: Vec3, _transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3 {
@@ -141,8 +201,27 @@ impl Bsdf for RoughCoat {
     }
 }
 
+impl Product for RoughCoat {
+    fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2] {
+        let ratio = self.ratio(incident, media);
+        let let_in = 1.0 - self.mirrored(incident, ratio);
+        [let_in * self.leaves(ratio, media.wavelength)[0], 0.0]
+    }
+
+    fn leaving(&self, scattered: Vec3, media: &Media) -> f64 {
+        let ratio = self.ratio(scattered, media);
+        (1.0 - self.mirrored(scattered, ratio)) / self.leaves(ratio, media.wavelength)[1]
+    }
+
+    fn is_even(&self) -> bool {
+        false
+    }
+}
+
 #[cfg(test)]
 impl super::contract::Examples for RoughCoat {
+    const MEDIA: bool = true;
+
     fn examples() -> Vec<Self> {
         [([0.5, 0.5], 2.4, 0.0), ([0.7, 0.4], 1.8, 1.0)]
             .map(|(alpha, index, base)| Self::new(alpha, true, index, Table::constant(base)).expect("sound"))
@@ -178,6 +257,28 @@ mod tests {
                 assert!((a - b).abs() < 2e-4, "{rho} {height}: {a} {b}");
                 assert!(rho < 1.0 || (a - 1.0).abs() < 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn the_table_for_an_index_of_1_is_that_of_any_index() {
+        let of = |index| RoughCoat::new([0.3, 0.3], true, index, Table::constant(0.7)).expect("sound");
+        let (air, twofold) = (of(1.5), of(3.0));
+        let twice = Media {
+            front: 2.0,
+            back: 2.0,
+            ..AIR
+        };
+        let d = |z: f64, x: f64| Vec3::new(x, (1.0 - z * z - x * x).sqrt(), z);
+        for (incident, scattered) in [(d(0.8, 0.1), d(0.3, -0.7)), (d(-0.05, 0.9), d(-0.6, 0.2))] {
+            let a = air.evaluate(incident, scattered, &AIR);
+            let b = twofold.evaluate(incident, scattered, &twice);
+            assert!((a - b).abs() < 1e-6 && a > 0.0, "{a} {b}");
+            let [a, b] = [
+                air.shares(incident, &AIR).diffuse[0],
+                twofold.shares(incident, &twice).diffuse[0],
+            ];
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
         }
     }
 

@@ -14,7 +14,7 @@ use etendue_math::special::ln;
 use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
-use super::albedo::{Albedo, LOWEST};
+use super::albedo::{Albedo, ByHeight, LOWEST};
 use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
 use super::facets::Facets;
 use crate::fresnel::fresnel;
@@ -63,6 +63,8 @@ pub fn from_side(front: bool, d: Vec3) -> Vec3 {
 #[derive(Debug)]
 pub struct RoughFacets {
     facets: Facets,
+    /// Whether it is asked what passes; else nothing does.
+    through: bool,
     /// By the ratio of the index on the other side to that on the side of the light.
     tables: Vec<OnceLock<Known>>,
 }
@@ -83,32 +85,36 @@ struct Known {
 impl RoughFacets {
     /// # Errors
     /// If a roughness is out of range.
-    pub fn new(alpha: [f64; 2], ggx: bool) -> Result<Self, String> {
+    pub fn new(alpha: [f64; 2], ggx: bool, through: bool) -> Result<Self, String> {
         Ok(Self {
             facets: Facets::new(alpha, ggx)?,
+            through,
             tables: (0..=2 * STEPS).map(|_| OnceLock::new()).collect(),
         })
     }
 
-    /// What a facet sends to the other side and what it mirrors, for light that it meets in an index of 1.
-    fn of_facet(facets: &Facets, i: Vec3, h: Vec3, more: f64, ratio: f64) -> [f64; 2] {
+    /// What a facet mirrors, or sends to the other side, for light that it meets in an index of 1.
+    fn one_way(facets: &Facets, i: Vec3, h: Vec3, more: f64, ratio: f64, through: bool) -> f64 {
         let cosine = i.dot(h);
         let f = fresnel(cosine, 1.0, ratio);
-        let hidden = facets.hidden(i);
-        let mut shares = [0.0; 2];
-        let o = mirrored(i, h);
-        if o.z > 0.0 {
-            shares[0] = f.reflectance * more * o.z * Facets::seen_by_both(i.z, o.z, [hidden, facets.hidden(o)]);
-        }
-        if f.reflectance < 1.0 {
-            let o = Self::refracted(i, h, cosine, f.cosine, ratio);
-            if o.z < 0.0 {
-                let up = Vec3::new(o.x, o.y, -o.z);
-                let seen = Facets::seen_through(i.z, up.z, [hidden, facets.hidden(up)]);
-                shares[1] = (1.0 - f.reflectance) * more * seen / i.z;
+        if !through {
+            let o = mirrored(i, h);
+            if o.z <= 0.0 {
+                return 0.0;
             }
+            let hidden = [facets.hidden(i), facets.hidden(o)];
+            return f.reflectance * more * o.z * Facets::seen_by_both(i.z, o.z, hidden);
         }
-        shares
+        if f.reflectance >= 1.0 {
+            return 0.0;
+        }
+        let o = Self::refracted(i, h, cosine, f.cosine, ratio);
+        if o.z >= 0.0 {
+            return 0.0;
+        }
+        let up = Vec3::new(o.x, o.y, -o.z);
+        let seen = Facets::seen_through(i.z, up.z, [facets.hidden(i), facets.hidden(up)]);
+        (1.0 - f.reflectance) * more * seen / i.z
     }
 
     fn refracted(i: Vec3, h: Vec3, cosine: f64, across: f64, ratio: f64) -> Vec3 {
@@ -122,7 +128,14 @@ impl RoughFacets {
             let facets = &self.facets;
             let albedo = Albedo::new(facets.turns(), |d| {
                 let i = above(true, d);
-                let shares = over_facets(facets, i, |h, more| Self::of_facet(facets, i, h, more, ratio));
+                let share = |h, more, way| {
+                    if way && !self.through {
+                        0.0
+                    } else {
+                        Self::one_way(facets, i, h, more, ratio, way)
+                    }
+                };
+                let shares = over_facets(facets, i, |h, more| [false, true].map(|way| share(h, more, way)));
                 // The quadrature may find more than 1 by its error.
                 let scale = 1.0 / f64::max(1.0, shares[0] + shares[1]);
                 shares.map(|share| share * scale)
@@ -150,6 +163,14 @@ impl RoughFacets {
         }
         let b = of(self.known(cell + 1));
         std::array::from_fn(|k| a[k] + t * (b[k] - a[k]))
+    }
+
+    /// The share that is reflected by one facet, tabled for one ratio, and its mean over diffuse light; None if it depends on
+    /// azimuth.
+    pub fn reflected_once(&self, ratio: f64) -> Option<(ByHeight, f64)> {
+        let at = |z: f64| self.once(Vec3::new((1.0 - z * z).max(0.0).sqrt(), 0.0, z), ratio)[0];
+        let table = || ByHeight::new(|z| at(z).clamp(0.0, 1.0));
+        (!self.facets.turns()).then(|| (table(), self.once_of_diffuse(ratio)[0]))
     }
 
     /// Shares that are reflected and transmitted by one facet.
@@ -199,16 +220,17 @@ impl RoughFacets {
         for _ in 0..TRIES {
             let drawn = self.facets.draw(i, pair);
             let (h, chance) = (drawn.h, more.draw());
-            if i.dot(h) > 0.0 {
-                let shares = Self::of_facet(&self.facets, i, h, drawn.more, ratio);
-                if chance * drawn.most < shares[usize::from(through)] {
-                    return Some(if through {
-                        let cosine = i.dot(h);
-                        Self::refracted(i, h, cosine, fresnel(cosine, 1.0, ratio).cosine, ratio)
-                    } else {
-                        mirrored(i, h)
-                    });
-                }
+            // The cheapest first: no more is mirrored than Fresnel's part.
+            let cosine = i.dot(h);
+            if cosine > 0.0
+                && (through || chance < fresnel(cosine, 1.0, ratio).reflectance)
+                && chance * drawn.most < Self::one_way(&self.facets, i, h, drawn.more, ratio, through)
+            {
+                return Some(if through {
+                    Self::refracted(i, h, cosine, fresnel(cosine, 1.0, ratio).cosine, ratio)
+                } else {
+                    mirrored(i, h)
+                });
             }
             pair = more.pair();
         }
@@ -250,7 +272,7 @@ impl RoughInterface {
     /// If a roughness is out of range.
     pub fn new(alpha: [f64; 2], ggx: bool) -> Result<Self, String> {
         Ok(Self {
-            rough: RoughFacets::new(alpha, ggx)?,
+            rough: RoughFacets::new(alpha, ggx, true)?,
         })
     }
 
@@ -362,6 +384,8 @@ impl Bsdf for RoughInterface {
 
 #[cfg(test)]
 impl super::contract::Examples for RoughInterface {
+    const MEDIA: bool = true;
+
     fn examples() -> Vec<Self> {
         [([0.6, 0.6], true), ([0.5, 0.5], false), ([0.9, 0.6], true)]
             .map(|(alpha, ggx)| Self::new(alpha, ggx).expect("sound"))

@@ -1,6 +1,7 @@
 //! How the slices of a table of scattered light go together: between angles and azimuths of incidence.
 
 use std::f64::consts::FRAC_1_PI;
+use std::sync::Arc;
 
 use etendue_math::Vec3;
 use etendue_math::trig::{atan_eighths, sin_cos_turns};
@@ -35,7 +36,7 @@ pub(super) struct Lobes {
 #[derive(Clone, Debug)]
 pub(super) struct Lobe {
     azimuth: f64,
-    slices: Vec<Grid>,
+    slices: Arc<[Grid]>,
     /// Sines of incidence, rising, between which what follows is linear.
     sines: Vec<f64>,
     guide: Guide,
@@ -91,7 +92,7 @@ impl Row {
         let of = |pick: fn(&Slice) -> f64| Cubic::new(&squares, &self.slices.iter().map(pick).collect::<Vec<_>>());
         let mut lobe = Lobe {
             azimuth: self.azimuth,
-            slices,
+            slices: slices.into(),
             sines: Vec::new(),
             guide: Guide::default(),
             blends: Vec::new(),
@@ -104,7 +105,7 @@ impl Row {
 impl Lobe {
     /// Tables how light is shared, in steps that are halved until everything is linear within them.
     fn fill(&mut self, share: &Cubic, floor: &Cubic) {
-        let slices = std::mem::take(&mut self.slices);
+        let slices = Arc::clone(&self.slices);
         let count = slices.len();
         // From 0 to the first slice, from each to the next, from the last to 1.
         let mut ends: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
@@ -159,7 +160,6 @@ impl Lobe {
                 }
             }
         }
-        self.slices = slices;
         self.guide = Guide::new(&self.sines);
     }
 
@@ -238,6 +238,22 @@ impl Blend {
 }
 
 impl Lobes {
+    /// Without the floor of any slice; None if there is nothing else.
+    pub(super) fn without_floor(&self) -> Option<Self> {
+        let mut rows = self.rows.clone();
+        for blend in rows.iter_mut().flat_map(|row| &mut row.blends) {
+            blend.shares[2] = 0.0;
+        }
+        let left = rows.iter().flat_map(|row| &row.blends).any(|blend| blend.share() > 0.0);
+        left.then_some(Self { rows })
+    }
+
+    /// Whether any slice has a floor.
+    pub(super) fn has_floor(&self) -> bool {
+        let mut blends = self.rows.iter().flat_map(|row| &row.blends);
+        blends.any(|blend| blend.shares[2] > 0.0)
+    }
+
     /// The only row, if there is one.
     pub(super) fn lone(&self) -> Option<&Lobe> {
         match &self.rows[..] {
@@ -286,6 +302,12 @@ impl<'a> Lit<'a> {
     pub(super) fn share(&self) -> f64 {
         self.there()
             .fold(0.0, |sum, (_, part, blend)| sum + part * blend.share())
+    }
+
+    /// Of the flux, in the floor.
+    pub(super) fn floor(&self) -> f64 {
+        self.there()
+            .fold(0.0, |sum, (_, part, blend)| sum + part * blend.shares[2])
     }
 
     /// f for light that leaves towards a point of the plane of direction cosines.

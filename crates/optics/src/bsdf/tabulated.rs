@@ -12,12 +12,14 @@
 //! **Drawing** is exact: a slice by its share, a point of its grid by the inverse of its distribution in the plane of direction
 //! cosines, where area is projected solid angle, and again if the point lies outside the unit circle.
 
+use std::sync::Arc;
+
 use etendue_math::Vec3;
 use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
 use super::contract::{Bsdf, Component, Drawn, Facts, Media, Shares, by_cosine};
-
+use super::parts::{Parts, Product};
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lit, Lobe, Lobes, Way};
 
@@ -28,11 +30,17 @@ pub struct Side {
     pub sheets: Vec<(f64, [Option<Way>; 2])>,
 }
 
+/// For each wavelength the tables of both ways.
+type Sheets = Vec<(f64, [Option<Lobes>; 2])>;
+
 /// A table of scattered light.
 #[derive(Clone, Debug)]
 pub struct Tabulated {
-    sides: [Vec<(f64, [Option<Lobes>; 2])>; 2],
+    sides: [Sheets; 2],
     facts: Facts,
+    /// Whether any slice has a floor; and the same without it, if anything is left.
+    floor: bool,
+    lobes: Option<Arc<dyn Bsdf>>,
 }
 
 impl Tabulated {
@@ -42,9 +50,25 @@ impl Tabulated {
         let sides = [front, back].map(Side::lobes);
         let [front, back] = sides;
         let sides = [front?, back?];
+        let all = || sides.iter().flatten().flat_map(|(_, ways)| ways).flatten();
+        let floor = all().any(Lobes::has_floor);
+        let lobes = floor.then(|| {
+            sides.each_ref().map(|sheets| {
+                let without = |ways: &[Option<Lobes>; 2]| ways.each_ref().map(|way| way.as_ref()?.without_floor());
+                sheets.iter().map(|(at, ways)| (*at, without(ways))).collect::<Sheets>()
+            })
+        });
+        let lobes = lobes.filter(|sides| sides.iter().flatten().flat_map(|(_, ways)| ways).any(Option::is_some));
+        let lobes = lobes.map(|sides| Arc::new(Self::of(sides, false, None)) as Arc<dyn Bsdf>);
+        Ok(Self::of(sides, floor, lobes))
+    }
+
+    fn of(sides: [Sheets; 2], floor: bool, lobes: Option<Arc<dyn Bsdf>>) -> Self {
         let diffuse = [0, 1].map(|way| sides.iter().flatten().any(|(_, ways)| ways[way].is_some()));
-        Ok(Self {
+        Self {
             sides,
+            floor,
+            lobes,
             facts: Facts {
                 specular: [false; 2],
                 diffuse,
@@ -53,7 +77,7 @@ impl Tabulated {
                 constant: None,
                 fresnel: false,
             },
-        })
+        }
     }
 
     /// The tables next to a wavelength, each with its part.
@@ -146,8 +170,7 @@ fn placed(
 }
 
 impl Side {
-    #[allow(clippy::type_complexity, reason = "the same as in the field")]
-    fn lobes(&self) -> Result<Vec<(f64, [Option<Lobes>; 2])>, String> {
+    fn lobes(&self) -> Result<Sheets, String> {
         if self
             .sheets
             .windows(2)
@@ -201,6 +224,13 @@ impl Bsdf for Tabulated {
         ways.iter().flatten().map(|(lit, part)| part * lit.at(r, turn)).sum()
     }
 
+    fn parts(&self) -> Option<Parts<'_>> {
+        self.floor.then_some(Parts {
+            product: self,
+            rest: self.lobes.as_ref(),
+        })
+    }
+
     fn draw(&self, incident: Vec3, transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3 {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;
@@ -242,6 +272,17 @@ impl Bsdf for Tabulated {
             }
             _ => Drawn::Absorbed,
         }
+    }
+}
+
+/// The floors.
+impl Product for Tabulated {
+    fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2] {
+        let incidence = Incidence::new(incident);
+        [false, true].map(|way| {
+            let ways = self.lit(&incidence, incident.z > 0.0, way, media.wavelength);
+            ways.iter().flatten().map(|(lit, part)| part * lit.floor()).sum()
+        })
     }
 }
 

@@ -12,6 +12,8 @@ use super::kinds;
 use super::lambertian::Lambertian;
 use super::mirror::Mirror;
 use super::mixture::Mixture;
+use super::rough_coat::RoughCoat;
+use crate::table::Table;
 
 /// Equal media, and others: less in front, more in front.
 const MEDIA: [Media; 3] = [
@@ -41,18 +43,19 @@ fn direction(height: f64, turn: f64) -> Vec3 {
     Vec3::new(across * c, across * s, height)
 }
 
-/// Every example in all media, with all directions.
+/// Every example with all directions, in all media if these matter for it, else in each with some of them.
 fn every(mut check: impl FnMut(&Example, &dyn Bsdf, &Media, Vec3)) {
     let mut count = 0;
     for example in kinds().iter().flatten() {
-        for media in &MEDIA {
-            for (number, height) in HEIGHTS.into_iter().enumerate() {
+        for (first, media) in MEDIA.iter().enumerate() {
+            let some = |(number, _): &(usize, f64)| example.media || number % MEDIA.len() == first;
+            for (number, height) in HEIGHTS.into_iter().enumerate().filter(some) {
                 check(example, &*example.bsdf, media, direction(height, 0.137 * number as f64));
                 count += 1;
             }
         }
     }
-    assert!(count >= 4 * MEDIA.len() * HEIGHTS.len());
+    assert!(count >= 40 * HEIGHTS.len());
 }
 
 /// Cells of a hemisphere: bands of height, sectors of azimuth.
@@ -250,6 +253,58 @@ fn the_density_integrates_to_the_shares_and_energy_is_kept() {
             "{name}"
         );
     });
+}
+
+/// f of the product, and the shares that it scatters.
+fn product(bsdf: &dyn Bsdf, incident: Vec3, scattered: Vec3, media: &Media) -> Option<(f64, [f64; 2])> {
+    let product = bsdf.parts()?.product;
+    let shares = product.arriving(incident, media);
+    let transmitted = (incident.z > 0.0) != (scattered.z > 0.0);
+    Some((
+        shares[usize::from(transmitted)] * product.leaving(scattered, media) / PI,
+        shares,
+    ))
+}
+
+#[test]
+fn product_and_rest_are_all() {
+    let satin = RoughCoat::new([0.5, 0.3], true, 1.8, Table::constant(0.7)).expect("sound");
+    let white = Lambertian::new(Table::constant(0.8), Table::constant(0.1)).expect("sound");
+    let mixed: [Arc<dyn Bsdf>; 2] = [Arc::new(satin), Arc::new(white)];
+    let [one, other] = [[0.6, 0.0], [0.5, 0.4]].map(|weights| {
+        let members = weights.into_iter().zip(mixed.clone()).collect();
+        Arc::new(Mixture::new(members).expect("at most 1")) as Arc<dyn Bsdf>
+    });
+    let (mut taken, mut left, mut uneven) = (0, 0, 0);
+    for bsdf in kinds()
+        .iter()
+        .flatten()
+        .map(|example| &example.bsdf)
+        .chain([&one, &other])
+    {
+        let Some(parts) = bsdf.parts() else { continue };
+        taken += 1;
+        left += usize::from(parts.rest.is_some());
+        uneven += usize::from(!parts.product.is_even());
+        for media in &MEDIA {
+            for [a, b] in HEIGHTS.iter().flat_map(|a| HEIGHTS.map(|b| [*a, b])) {
+                let (incident, scattered) = (direction(a, 0.137 + 0.2 * b), direction(b, 0.711 - 0.3 * a));
+                let (mut f, mut shares) = product(&**bsdf, incident, scattered, media).expect("has parts");
+                if let Some(rest) = parts.rest {
+                    f += rest.evaluate(incident, scattered, media);
+                    let own = rest.shares(incident, media).diffuse;
+                    shares = [shares[0] + own[0], shares[1] + own[1]];
+                }
+                let whole = bsdf.evaluate(incident, scattered, media);
+                assert!((f - whole).abs() <= 1e-12 * (1.0 + whole), "{bsdf:?}: {f} {whole}");
+                let expected = bsdf.shares(incident, media).diffuse;
+                let off = (0..2).map(|side| (shares[side] - expected[side]).abs());
+                assert!(off.fold(0.0, f64::max) < 1e-12, "{bsdf:?}: {shares:?} {expected:?}");
+                assert!(!parts.product.is_even() || parts.product.leaving(scattered, media) == 1.0);
+            }
+        }
+    }
+    assert!(taken > 12 && left > 5 && uneven > 4, "{taken} {left} {uneven}");
 }
 
 #[test]

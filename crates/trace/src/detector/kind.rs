@@ -4,6 +4,7 @@ use etendue_geometry::Face;
 use etendue_math::Vec3;
 
 use crate::events::{EventReservoir, ScatterEvent};
+use crate::exitance_cells::FacePoint;
 use crate::guide::Arrival;
 use crate::medium_cache::MediumCache;
 use crate::ray_state::RayState;
@@ -13,11 +14,17 @@ use crate::scene::Scene;
 
 /// What a detector has to be told of, besides rays that pass its face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "one for each thing that there is to be told"
+)]
 pub struct Wants {
     /// Light that leaves the scene.
     pub escapes: bool,
     /// Light that meets diffuse surfaces.
     pub scatters: bool,
+    /// How much of it each sends out.
+    pub exitance: bool,
     /// How bright the source of each ray is.
     pub brightness: bool,
 }
@@ -27,6 +34,7 @@ impl Wants {
     pub const ESCAPES: Self = Self {
         escapes: true,
         scatters: false,
+        exitance: false,
         brightness: false,
     };
 
@@ -34,6 +42,15 @@ impl Wants {
     pub const SCATTERS: Self = Self {
         escapes: false,
         scatters: true,
+        exitance: false,
+        brightness: false,
+    };
+
+    /// How much diffuse surfaces send out.
+    pub const EXITANCE: Self = Self {
+        escapes: false,
+        scatters: false,
+        exitance: true,
         brightness: false,
     };
 
@@ -43,6 +60,7 @@ impl Wants {
         Self {
             escapes: self.escapes || other.escapes,
             scatters: self.scatters || other.scatters,
+            exitance: self.exitance || other.exitance,
             brightness: self.brightness || other.brightness,
         }
     }
@@ -145,4 +163,7 @@ pub trait Kind {
 
     /// A ray meets a diffuse surface.
     fn scatter(&self, _scatter: &mut Scatter<'_>, _out: &mut Recorded) {}
+
+    /// A ray meets a sheet that sends light back from this side, with the share of its product (see `Parts`).
+    fn sheet(&self, _scene: &Scene, _place: FacePoint, _share: f64, _state: &RayState, _out: &mut Recorded) {}
 }

@@ -10,7 +10,7 @@ use etendue_sampling::ordered::BATCH;
 use etendue_sampling::philox::{Pairs, fill_pairs};
 
 use super::block_trace::BlockTrace;
-use super::lambertian_sheet::{LambertianSheet, SheetRays};
+use super::lambertian_sheet::{LambertianSheet, SheetRay, SheetRays};
 use super::queue::RayQueue;
 use super::run::Run;
 use super::scattering_sheet::ScatteringSheet;
@@ -18,6 +18,7 @@ use super::sorter::{Sheet, Sorter, sheets};
 use crate::dealing::Dealing;
 use crate::detector::Detector;
 use crate::events::depth;
+use crate::exitance_cells::FacePoint;
 use crate::ledger::{Fate, Loss};
 use crate::medium_cache::MediumCache;
 use crate::mis::SourceLuminance;
@@ -117,7 +118,7 @@ impl<'a> BatchTrace<'a> {
     fn batch(&mut self, batch: u64) {
         let (scene, run) = (self.block.scene, self.block.run);
         let mut emitted = RayBatch::default();
-        self.first = batch * BATCH;
+        self.first = self.dealing.first(batch);
         for (number, range) in self.dealing.batch(batch).into_iter().enumerate() {
             let source = &scene.sources[number];
             let count = self.dealing.count(number);
@@ -296,6 +297,8 @@ impl<'a> BatchTrace<'a> {
     fn scatter(&mut self, sheet: ScatteringSheet<'_>, which: &[u32], now: &RayQueue, hits: &Hits, next: &mut RayQueue) {
         let BlockTrace {
             scene,
+            detectors,
+            wants,
             media,
             states,
             out,
@@ -304,8 +307,10 @@ impl<'a> BatchTrace<'a> {
         let [numbers, turns] = &self.numbers;
         self.sheet_rays.gather(now, hits, which);
         let face = &scene.face_set.faces()[sheet.face as usize];
-        self.sheet_rays.bounce_each(face, |k, who, d, normal| {
-            let RayState { flux, wavelength, .. } = states[who as usize];
+        self.sheet_rays.bounce_each(face, |k, ray| {
+            let SheetRay { d, normal, .. } = *ray;
+            let state = &mut states[ray.who as usize];
+            let RayState { flux, wavelength, .. } = *state;
             let n = media.at(scene, 0, wavelength).n;
             // Not so if it is NaN, either.
             if n > 0.0 {
@@ -314,6 +319,19 @@ impl<'a> BatchTrace<'a> {
                     front: n,
                     back: n,
                 };
+                if wants.exitance {
+                    let place = FacePoint {
+                        face: sheet.face,
+                        part: ray.part,
+                        front: d.dot(normal) < 0.0,
+                        point: ray.point,
+                    };
+                    let share = sheet.product(d, normal, around);
+                    for (detector, out) in detectors.iter().zip(&mut out.detectors) {
+                        detector.sheet(scene, place, share, state, out);
+                    }
+                    state.scattered = true;
+                }
                 let bounced = sheet.bounced(d, normal, around, [numbers[k], turns[k]]);
                 if bounced.is_none() {
                     out.ledger.book(Fate::OnFace(sheet.face), flux);

@@ -27,8 +27,9 @@ pub struct LambertianSheet {
 /// The faces of a scene that rays are bounced off many at a time.
 #[must_use]
 pub fn lambertian_sheets(scene: &Scene, wants: Wants) -> Vec<LambertianSheet> {
-    // Detectors of scattered light and absorbing surroundings want to know of every scatter by itself.
-    if wants.scatters || scene.media[0].absorption.range() != [0.0, 0.0] {
+    // Detectors of scattered light and absorbing surroundings want to know of every scatter by itself; who sums what sheets send
+    // out is told by other ones.
+    if wants.scatters || wants.exitance || scene.media[0].absorption.range() != [0.0, 0.0] {
         return Vec::new();
     }
     let faces = scene.face_set.faces().iter().zip(&scene.roles).zip(0..);
@@ -54,6 +55,21 @@ impl LambertianSheet {
     pub fn absorbs(self, number: f64) -> bool {
         number >= self.mirrored + self.scattered
     }
+}
+
+/// A ray where it meets a face.
+#[derive(Clone, Copy, Debug)]
+pub struct SheetRay {
+    /// Number of its state.
+    pub who: u32,
+    /// The part of the face.
+    pub part: u32,
+    /// \[mm\].
+    pub point: Vec3,
+    /// Along which it came.
+    pub d: Vec3,
+    /// Of the front.
+    pub normal: Vec3,
 }
 
 /// Rays of a block that meet one face, gathered. Structure of arrays.
@@ -84,14 +100,21 @@ impl SheetRays {
         turn(sheet, numbers, &self.normal, &mut self.d);
     }
 
-    /// Turns the lines to the face into those from there, as `bounced` says for each (its state, its direction, the normal);
-    /// those for which there is none are left out.
-    pub fn bounce_each(&mut self, face: &Face, mut bounced: impl FnMut(usize, u32, Vec3, Vec3) -> Option<Vec3>) {
+    /// Turns the lines to the face into those from there, as `bounced` says for each; those for which there is none are left
+    /// out.
+    pub fn bounce_each(&mut self, face: &Face, mut bounced: impl FnMut(usize, &SheetRay) -> Option<Vec3>) {
         surface_points(face, &mut self.o, &self.d, &self.t, &self.part, &mut self.normal);
         let at = |lists: &Vectors, k: usize| Vec3::new(lists[0][k], lists[1][k], lists[2][k]);
         let mut place = 0;
         for k in 0..self.who.len() {
-            let Some(d) = bounced(k, self.who[k], at(&self.d, k), at(&self.normal, k)) else {
+            let ray = SheetRay {
+                who: self.who[k],
+                part: self.part[k],
+                point: at(&self.o, k),
+                d: at(&self.d, k),
+                normal: at(&self.normal, k),
+            };
+            let Some(d) = bounced(k, &ray) else {
                 continue;
             };
             // No later than where it is: the rays move up.

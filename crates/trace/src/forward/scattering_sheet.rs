@@ -33,7 +33,9 @@ pub fn scattering_sheets(scene: &Scene, wants: Wants) -> Vec<ScatteringSheet<'_>
             let Act::Optical(finish) = role.act else { return None };
             let bsdf = &*scene.finishes[finish as usize];
             let known = bsdf.facts();
-            let back = !known.specular[1] && !known.diffuse[1];
+            // Who sums what sheets send out wants to know whether a ray was mirrored before.
+            let mirrors = known.specular[0] && wants.exitance;
+            let back = !known.specular[1] && !known.diffuse[1] && !mirrors;
             (role.solid == 0 && back && !face.shape.is_smooth()).then_some(ScatteringSheet {
                 face: index,
                 bsdf,
@@ -49,6 +51,13 @@ impl ScatteringSheet<'_> {
     #[must_use]
     pub fn bounced(&self, d: Vec3, normal: Vec3, media: Media, numbers: [f64; 2]) -> Option<Vec3> {
         Surface::new(self.bsdf, media, [normal; 2], self.axis).bounced(d, numbers)
+    }
+
+    /// The share of light along `d` that its product sends back (see `Parts`).
+    #[inline]
+    #[must_use]
+    pub fn product(&self, d: Vec3, normal: Vec3, media: Media) -> f64 {
+        Surface::new(self.bsdf, media, [normal; 2], self.axis).product(d)
     }
 }
 

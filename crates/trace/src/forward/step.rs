@@ -89,7 +89,7 @@ impl BlockTrace<'_> {
         let Some(met) = met.map_err(|loss| Fate::Lost(loss, interaction.face))? else {
             return Ok(((interaction.point, d, interaction.origin_faces), interaction.after));
         };
-        if self.wants.scatters && met.bsdf().facts().is_diffuse() {
+        if (self.wants.scatters || self.wants.exitance) && met.bsdf().facts().is_diffuse() {
             self.tell_of_scatter(&met, state);
         }
         let Some((component, d, stack)) = met.sample([number, turn]) else {

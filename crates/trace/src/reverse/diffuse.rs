@@ -3,6 +3,7 @@
 
 use etendue_geometry::hits::{Hits, TIE};
 use etendue_math::Vec3;
+use etendue_optics::bsdf::Bsdf;
 
 use super::method::LeftOut;
 use super::path_block::{Branch, Connection, PathBlock, Seen};
@@ -14,6 +15,14 @@ use crate::transmittance::transmittance;
 
 /// Sources up to this number are all connected to at the first diffuse scatter; of more, one is drawn by its flux.
 const FEW: usize = 8;
+
+/// What is known of the light that a diffuse surface sends out.
+pub(super) enum Known<'a> {
+    Nothing,
+    All,
+    /// All but the light of this BSDF.
+    But(&'a dyn Bsdf),
+}
 
 /// How the directions are spread in which paths go on from a diffuse surface.
 struct Spread<'a> {
@@ -35,12 +44,12 @@ impl Spread<'_> {
 }
 
 impl PathBlock<'_> {
-    /// Takes what a diffuse surface is known to send back along the branch; false if that is not known.
-    pub(super) fn end(&mut self, branch: &Branch, event: &SurfaceEvent<'_>) -> bool {
-        let (interaction, facts) = (event.interaction(), event.bsdf().facts());
-        if branch.scatters == 0 || self.known.is_empty() || !(facts.is_diffuse() && facts.lambertian) {
-            return false;
-        }
+    /// Takes what a diffuse surface is known to send back along the branch.
+    pub(super) fn end<'b>(&mut self, branch: &Branch, event: &SurfaceEvent<'b>) -> Known<'b> {
+        let Some(parts) = event.parts().filter(|_| branch.scatters > 0 && !self.known.is_empty()) else {
+            return Known::Nothing;
+        };
+        let interaction = event.interaction();
         let path = &mut self.paths[branch.path as usize];
         let place = FacePoint {
             face: interaction.face,
@@ -51,10 +60,9 @@ impl PathBlock<'_> {
         // What light that came through smooth surfaces does from here on is left to the light image, if there is one.
         let all = !(self.method.left == LeftOut::Caustics && branch.direct);
         let light = self.known[path.pass].at(self.lit.scene, place, branch.travelled, path.line, all);
-        if let Some(light) = light {
-            path.sum[0] += branch.weight * light;
-        }
-        light.is_some()
+        let Some(light) = light else { return Known::Nothing };
+        path.sum[0] += branch.weight * light * event.leaving(parts);
+        parts.rest.map_or(Known::All, |rest| Known::But(&**rest))
     }
 
     /// A diffuse scatter: connections to sources, and one direction that is drawn. `boost` makes up for the chance that

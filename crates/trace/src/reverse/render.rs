@@ -41,10 +41,11 @@ pub fn render(
     survey: Option<&ExitanceSurvey>,
     passes: Range<u32>,
 ) -> Vec<Pixel> {
+    let lines = view.pixels() as u64 * u64::from(method.paths);
     let known: Vec<ExitanceCache<'_>> = survey
         .iter()
         .filter(|survey| survey.patches() > 0)
-        .flat_map(|survey| passes.clone().map(|pass| survey.exitance(lit, pass)))
+        .flat_map(|survey| passes.clone().map(|pass| survey.exitance(lit, pass, lines)))
         .collect();
     let mut pixels = vec![Pixel::default(); view.pixels()];
     let each = (passes.len() * method.paths as usize).max(1);

@@ -4,6 +4,7 @@ use etendue_geometry::hits::{Hits, TIE};
 use etendue_geometry::surface_points::fill;
 use etendue_lightfield::leave::Sights;
 
+use super::diffuse::Known;
 use super::method::LeftOut;
 use super::path_block::{Branch, PathBlock, Seen};
 use crate::interaction::interaction_of;
@@ -11,6 +12,10 @@ use crate::scatter::{SPLIT, SurfaceEvent};
 
 /// Diffuse scatters before a path may be ended by chance.
 const SURE: u32 = 3;
+
+/// How many times its share the rest of a surface whose light is known in part is followed: more lines of less weight err less,
+/// down to where the light before it errs as much. Of 1, 2, 4 and 8 it did best for satin paint and for a table.
+const REST: f64 = 4.0;
 
 impl PathBlock<'_> {
     pub(super) fn step(&mut self, hits: &Hits, i: usize) {
@@ -132,7 +137,16 @@ impl PathBlock<'_> {
             met[1] |= branch.direct && is_diffuse;
         }
         let aimed = self.paths[branch.path as usize].aimed;
-        let diffuse = !aimed && is_diffuse && !self.end(branch, event);
+        // What scatters light that is still to be looked for.
+        let (known, left) = if aimed || !is_diffuse {
+            (false, None)
+        } else {
+            match self.end(branch, event) {
+                Known::Nothing => (false, Some(*event)),
+                Known::All => (true, None),
+                Known::But(rest) => (true, Some(event.of(rest))),
+            }
+        };
         // Chains of smooth surfaces branch; everything else is drawn.
         if branch.seen == Seen::Smooth && branch.weight > SPLIT {
             for (transmitted, share) in [(false, smooth[0]), (true, smooth[1])] {
@@ -140,22 +154,22 @@ impl PathBlock<'_> {
                     go(self, transmitted, branch.weight * share, false);
                 }
             }
-            if diffuse {
-                self.scatter(branch, event, 1.0);
+            if let Some(left) = &left {
+                self.scatter(branch, left, 1.0);
             }
             return;
         }
         // What goes on is drawn by the shares of the flux; radiance carries its factor (n₁/n₂)² besides. Whatever the diffuse
         // share is from here, light may be scattered to here from elsewhere.
-        let scattered = if diffuse {
-            (shares.diffuse[0] + shares.diffuse[1]).max(0.05)
-        } else {
-            0.0
-        };
+        let scattered = left.map_or(0.0, |left| {
+            let diffuse = if known { left.shares().diffuse } else { shares.diffuse };
+            (diffuse[0] + diffuse[1]).max(0.05)
+        });
         let [mirrored, refracted] = shares.specular;
         let total = mirrored + refracted + scattered;
-        let mortal = branch.scatters > SURE || branch.weight <= SPLIT;
-        let alive = if mortal { total.min(1.0) } else { 1.0 };
+        let mortal = branch.scatters > SURE || branch.weight <= SPLIT || known;
+        let alive = if known { REST * total } else { total };
+        let alive = if mortal { alive.min(1.0) } else { 1.0 };
         let number = self.paths[branch.path as usize].numbers.draw();
         if total <= 0.0 || number >= alive {
             return;
@@ -166,8 +180,8 @@ impl PathBlock<'_> {
             go(self, false, branch.weight * boost, true);
         } else if number < mirrored + refracted {
             go(self, true, branch.weight * smooth[1] / refracted * boost, true);
-        } else if diffuse {
-            self.scatter(branch, event, boost / scattered);
+        } else if let Some(left) = &left {
+            self.scatter(branch, left, boost / scattered);
         }
     }
 }
