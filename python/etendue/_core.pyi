@@ -436,9 +436,16 @@ def batch_size() -> int:
     """Rays of a batch."""
 
 def work_unit(
-    scene: Scene, rays: int, seed: int, most_events: int, first: int, last: int, threads: int | None = None
+    scene: Scene,
+    rays: int,
+    seed: int,
+    most_events: int,
+    first: int,
+    last: int,
+    threads: int | None = None,
+    each: int | None = None,
 ) -> _WorkSums:
-    """Traces batches ``first..last`` of a run of `rays` rays.
+    """Traces batches ``first..last`` of a run of `rays` rays; batches have ``batch_size()`` rays, or `each`.
 
     Of the ledger each entry is (flux, rays), by source, face, medium or reason. Tallies are of each detector: (Σ w, Σ w²,
     rays that contributed) of its cells, by rays without copies, and (cell, unit, Σ w) of rays with copies; `emitted` is the

@@ -55,7 +55,7 @@ def test_what_is_seen_from_everywhere_is_the_flux() -> None:
     for i, j in nodes:
         pole, g = j in {0, 6}, far.gamma[j]
         solid = float(far.node_solid_angle[:, j].sum() if pole else far.node_solid_angle[i, j])
-        count = 6 + int(150 * solid * far.values[i, j] / far.flux)
+        count = 6 + int(100 * solid * far.values[i, j] / far.flux)
         thetas = np.degrees(np.arccos(rng.uniform(*np.cos(np.radians([min(g + 30, 180), max(g - 30, 0)])), 40 * count)))
         thetas = thetas[rng.random(thetas.size) < 1.0 - np.abs(thetas - g) / 30.0][:count]
         phis = rng.uniform(0, 360, count) if pole else far.c[i] + rng.triangular(-60, 0, 60, count)

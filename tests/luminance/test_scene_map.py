@@ -276,6 +276,7 @@ def test_rings_through_a_collecting_surface() -> None:
     assert abs((cone.values - reverse.values)[lit].sum()) < LARGEST_Z * total
 
 
+@pytest.mark.slow
 def test_a_beam_on_paper() -> None:
     """L = ρ E/π with E = Φ cos α/A within the spot: lines of sight do not find it, rays forwards do."""
     tilt, radius, flux = math.radians(20), 6.0, 10.0

@@ -7,6 +7,7 @@ use etendue_geometry::origin_faces::OriginFaces;
 use etendue_math::Vec3;
 use etendue_sampling::ordered::{BATCH, inside};
 use etendue_trace::camera_connection;
+use etendue_trace::dealing::Dealing;
 use etendue_trace::detector::Detector;
 use etendue_trace::events::{DEEPEST, EventReservoir, WORDS};
 use etendue_trace::forward::batch::trails;
@@ -19,7 +20,7 @@ use etendue_trace::records::{Cell, CollectedRay, Contribution};
 use etendue_trace::reverse::method::{LeftOut, Method, Pixel};
 use etendue_trace::reverse::render::render;
 use etendue_trace::tallies::{Tally, TraceSums};
-use etendue_trace::work_unit::work_unit as core_work_unit;
+use etendue_trace::work_unit::work_unit_of;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -129,10 +130,10 @@ fn open<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Vec<Opened<'py>>> {
     scene.sets().iter().map(|s| Opened::new(s.bind(py))).collect()
 }
 
-/// Traces batches `first..last` of a run of `rays` rays: a work unit.
+/// Traces batches `first..last` of a run of `rays` rays: a work unit. Batches have `batch_size()` rays, or `each`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
-#[pyo3(signature = (scene, rays, seed, most_events, first, last, threads=None))]
+#[pyo3(signature = (scene, rays, seed, most_events, first, last, threads=None, each=None))]
 pub fn work_unit<'py>(
     py: Python<'py>,
     scene: &Scene,
@@ -142,8 +143,10 @@ pub fn work_unit<'py>(
     first: u64,
     last: u64,
     threads: Option<usize>,
+    each: Option<u64>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    if first > last || last > rays.div_ceil(BATCH) {
+    let each = each.unwrap_or(BATCH).clamp(1, BATCH);
+    if first > last || last > rays.div_ceil(each) {
         return Err(PyValueError::new_err(format!("batches {first}..{last} of {rays} rays")));
     }
     let opened = open(py, scene)?;
@@ -166,7 +169,8 @@ pub fn work_unit<'py>(
             light_samplers,
             stop: Some(stop),
         };
-        let work = || core_work_unit(core, scene.detectors(), &run, batches.clone());
+        let dealing = Dealing::of(core, rays, &sets).in_batches_of(each);
+        let work = || work_unit_of(core, scene.detectors(), &run, &dealing, batches.clone());
         inside(threads.unwrap_or(0), work)
     })?;
     opened.iter().try_for_each(Opened::check)?;

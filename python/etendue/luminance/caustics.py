@@ -25,8 +25,15 @@ GOLDEN = 0x9E3779B97F4A7C15
 RUN = 1 << 44
 """More rays than any pilot takes: the run whose first batches it traces."""
 
-MOST_BATCHES = 4
-"""Batches of rays of a pilot at most; it stops earlier when enough has been found, or rays go to and fro for long."""
+BATCH = 1 << 13
+"""Rays of a batch of a pilot: few, so that all threads have some."""
+
+STEP = 8
+"""Batches of a pilot at a time."""
+
+MOST_STEPS = 4
+"""Steps of a pilot at most; it stops earlier when enough has been found, or rays go to and fro for long, or nothing is found
+by more rays than the map has lines of sight."""
 
 ENOUGH = 1 << 13
 """Arrivals at diffuse surfaces, and as many contributions to an image, that are enough for a pilot."""
@@ -180,18 +187,19 @@ def plan(
     images = [{"kind": "image", "view": view, "complement": True, "shared": float(pixels)} for view in views]
     core = core_scene({**record, "detectors": [*images, {"kind": "arrivals"}]})
     dealing = Dealing.of(record["sources"], RUN)
-    batch, batches, segments, arrivals = _core.batch_size(), 0, 0, []
+    batches, segments, arrivals = 0, 0, []
     sums = [np.zeros((3, view["columns"] * view["rows"])) for view in views]
-    while batches < MOST_BATCHES and segments < MOST_SEGMENTS:
-        traced = _core.work_unit(core, RUN, seed, most_events, batches, batches + 1, threads)
+    while batches < MOST_STEPS * STEP and segments < MOST_SEGMENTS:
+        traced = _core.work_unit(core, RUN, seed, most_events, batches, batches + STEP, threads, BATCH)
         cells = (dealing.added(*dealing.nothing(tally), tally, RUN)[0] for tally in traced["tallies"])
         sums = [total + [part.sum(axis=0) for part in found] for total, found in zip(sums, cells, strict=False)]
         arrivals.append(traced["arrivals"])
         segments += traced["ledger"]["segments"]
-        batches += 1
-        if min(sum(map(len, arrivals)), *(total[2].sum() for total in sums)) >= ENOUGH:
+        batches += STEP
+        least = min(total[2].sum() for total in sums)
+        if min(sum(map(len, arrivals)), least) >= ENOUGH or (least == 0 and batches * BATCH >= lines * pixels):
             break
-    done = batches * batch
+    done = batches * BATCH
     found = np.concatenate(arrivals)
     guide = _core.Guide(core, found) if len(found) else None
     if rays is not None:
