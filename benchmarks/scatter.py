@@ -7,7 +7,8 @@
 
 3. With `--peers` (needs `pyradiance` and `mitsuba`): the same BRDF through `pabopto2bsdf` and `bsdf2klems`; and the map of
    the chamber from 55°, 126 × 63 pixels, with a satin paint beside Mitsuba's `roughplastic` of the same reflectance at 20°
-   (`scalar_rgb`, `path`): 1/(variance · time), the variance that of a pixel over independent runs.
+   (`scalar_rgb`, `path`), and its light image beside `ptracer`: 1/(variance · time), the variance that of a pixel over
+   independent runs.
 
 python benchmarks/scatter.py [--rays 1e6] [--peers]
 """
@@ -196,6 +197,22 @@ def mitsuba_row() -> None:
     for name, gather in (("etendue", False), ("etendue, gather", True)):
         own, own_mean = efficiency(lambda seed, gather=gather: ours(seed, gather=gather))
         row(f"satin chamber from 55°: {name}", f"{own:.1f} /s", f"{own / peer:.2f} × mitsuba, mean {own_mean:.3g}")
+
+    # Forwards: rays from the lamps, each scatter connected to the eye.
+    particles = mi.load_dict({"type": "ptracer", "max_depth": -1, "rr_depth": 100})
+    eyes = {"name": "eye", "theta": 55, "phi": 0, "distance": 1000,
+            "screen": {"width": 50, "height": 25, "columns": 126, "rows": 63}}  # fmt: skip
+    seen = scene.replace(observers=[eyes], detectors=[{"kind": "image", "name": "image", "observer": "eye"}])
+
+    def image(seed: int) -> Array:
+        return np.nan_to_num(np.asarray(et.trace(seen, rays=1e6, seed=seed).images["image"].values)) * 1e-6
+
+    peer, their_mean = efficiency(
+        lambda seed: np.asarray(mi.render(theirs, integrator=particles, seed=seed, spp=64))[..., 0]
+    )
+    row("satin chamber, light image: mitsuba ptracer", f"{peer:.2f} /s", f"mean {their_mean:.3g} cd/mm²")
+    own, own_mean = efficiency(image)
+    row("satin chamber, light image: etendue", f"{own:.2f} /s", f"{own / peer:.2f} × mitsuba, mean {own_mean:.3g}")
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,13 @@ import numpy as np
 import pytest
 from etendue import _core
 from etendue.errors import ArgumentError, FormatError, SceneWarning, UnknownNameError
-from etendue.tracing import TraceWarning
+from etendue.tracing import TraceWarning, running, work
 from etendue.tracing.result import TraceResult
-from etendue.tracing.work import BATCHES
 from oracles.results import bits
 from oracles.verdicts import LARGEST_Z
+
+BATCHES = 8
+"""Batches of a round here: with fewer than usual a trace of several rounds is short."""
 
 ONE_ROUND = BATCHES * _core.batch_size()
 
@@ -42,11 +45,19 @@ def luminaire(**more: Any) -> et.Scene:
             {"name": "desk", "kind": "illuminance", "width": 40, "height": 30, "columns": 3, "rows": 2, "at": [0, 0, 30],
              "toward": [0, 0, -1]},
             {"name": "eye", "kind": "image", "observer": "side"},
-            {"name": "scatter", "kind": "scatter", "most": 150_000},
+            {"name": "scatter", "kind": "scatter", "most": 64_000},
         ],
         "observers": [{"name": "side", "theta": 80, "phi": 190, "distance": 200, "target": [9, 0, 5], "screen": screen}],
     }  # fmt: skip
     return et.Scene(**(keys | more))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _short_rounds() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (work, running):
+            patch.setattr(module, "BATCHES", BATCHES)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +137,8 @@ def test_the_ledger_closes_and_names_everything(rounds: list[TraceResult]) -> No
         assert ledger.imbalance < 1e-12
         assert ledger.lost == ()
         assert list(ledger.emitted) == ["led", "pilot"]
-        assert ledger.emitted["led"].flux == pytest.approx(90, rel=1e-6)
+        # Of rays there are whole numbers.
+        assert ledger.emitted["led"].flux == pytest.approx(90, rel=1e-5)
         assert ledger.by_surface["wall"].flux > 1
         assert ledger.by_medium["tinted"].flux > 1
         assert ledger.by_medium["air"].rays == 0
