@@ -8,7 +8,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import pytest
-from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.errors import ArgumentError, FormatError, UnsupportedFormatError
 from etendue.formats.bsdf import read_bsdf_data
 from etendue.quantities.bsdf_data import direction
 from oracles.bsdf_files import COATED, SCATTERING, SIMPLE
@@ -186,3 +186,62 @@ def test_mistakes(tmp_path: Path, text: str, old: str, new: str, said: str) -> N
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(FormatError, match=said):
         read_bsdf_data(path)
+
+
+COLOURED = et.bsdf.Mixed(
+    specular_reflectance={"angle": [10, 80], "wavelength": [450, 650], "values": [[0.05, 0.1], [0.3, 0.2]]},
+    specular_transmittance={"angle": [0, 30, 90], "values": [0.2, 0.1, 0.0]},
+    diffuse_reflectance={"wavelength": [400, 500, 700], "values": [0.3, 0.2, 0.35]},
+    diffuse_transmittance=0.15,
+)
+
+
+@pytest.mark.parametrize("extension", [".scattering", ".coated", ".simplescattering"])
+def test_shares_are_written_and_read(tmp_path: Path, extension: str) -> None:
+    """At nodes, between them and beyond them, for each of the four ways of light."""
+    bsdf = {
+        ".scattering": COLOURED,
+        ".coated": COLOURED.replace(diffuse_reflectance=0.0, diffuse_transmittance=0.0),
+        ".simplescattering": et.bsdf.Mixed(
+            specular_reflectance=0.05, specular_transmittance=0.1, diffuse_reflectance=0.3, diffuse_transmittance=0.45
+        ),
+    }[extension]
+    assert et.write_bsdf(tmp_path / f"x{extension}", bsdf) == ()
+    again = et.read_bsdf(tmp_path / f"x{extension}")
+    assert et.write_bsdf(tmp_path / f"y{extension}", again) == ()
+    twice = et.read_bsdf(tmp_path / f"y{extension}")
+    for theta in (0.0, 7.0, 30.0, 55.0, 85.0):
+        for wavelength in (390.0, 450.0, 520.0, 700.0):
+            for way in ("reflectance", "transmittance", "regular_reflectance", "regular_transmittance"):
+                one, *others = (float(getattr(b, way)(theta, wavelength=wavelength)) for b in (bsdf, again, twice))
+                assert others == pytest.approx([one, one], abs=1e-11), (theta, wavelength, way)
+    for complaint in again.complaints:
+        assert "straight on" in str(complaint)
+
+
+@pytest.mark.parametrize(
+    "white", [{"reflectance": 0.8}, {"reflectance": 0.0, "transmittance": 0.6}, {"reflectance": 0.0}]
+)
+def test_simple_surfaces_of_one_side(tmp_path: Path, white: dict[str, float]) -> None:
+    bsdf = et.bsdf.Lambertian(**white)
+    et.write_bsdf(tmp_path / "x.simplescattering", bsdf)
+    again = et.read_bsdf(tmp_path / "x.simplescattering")
+    for way in ("reflectance", "transmittance", "regular_reflectance"):
+        assert float(getattr(again, way)(30.0)) == pytest.approx(float(getattr(bsdf, way)(30.0)), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "bsdf", "said"),
+    [
+        ("x.coated", et.bsdf.Lambertian(reflectance=0.5), r"write it as \.scattering"),
+        ("x.simplescattering", COLOURED, "the same shares at all angles"),
+        ("x.scattering", et.bsdf.Gaussian(peak=1.0, sigma=0.2), r"\.anisotropicbsdf"),
+        ("x.coated", et.bsdf.Interface(), "more than that"),
+    ],
+)
+def test_what_shares_cannot_hold_is_refused_and_nothing_is_left(
+    tmp_path: Path, name: str, bsdf: et.Bsdf, said: str
+) -> None:
+    with pytest.raises(ArgumentError, match=said):
+        et.write_bsdf(tmp_path / name, bsdf)
+    assert not list(tmp_path.iterdir())

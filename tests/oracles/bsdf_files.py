@@ -136,4 +136,4 @@ READ_ONLY: dict[str, Callable[[], bytes]] = {
     "speos-scattering": SCATTERING.encode,
     "speos-simple": SIMPLE.encode,
 }
-"""A file of each format that étendue does not write."""
+"""A file of each format that étendue writes no table in."""

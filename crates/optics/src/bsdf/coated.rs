@@ -7,8 +7,7 @@ use etendue_math::Vec3;
 use etendue_math::special::ln;
 use etendue_sampling::more_numbers::MoreNumbers;
 
-use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
-use super::parts::{Parts, Product};
+use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, Shares, by_cosine};
 use crate::fresnel::fresnel;
 use crate::table::Table;
 

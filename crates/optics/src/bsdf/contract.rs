@@ -17,15 +17,19 @@
 //! [`seen`](Bsdf::seen) says how much of the radiance behind a mirrored or refracted line of sight is seen;
 //! [`incoming`](Bsdf::incoming), [`draw_incoming`](Bsdf::draw_incoming) and [`incoming_pdf`](Bsdf::incoming_pdf) propose
 //! directions that diffuse light may come from. Whoever takes one weighs it by f |cos θᵢ| over its density.
+//!
+//! **Taken apart.** Many BSDFs have a part f = a(incident) l(scattered)/π: Lambertian light, that under a clear coat, the floor of
+//! a table. What it sends out anywhere is known as soon as the light that arrives is summed with the weights a, wherever it came
+//! from. Whoever knows this sum needs to look for the light of the rest only: [`Parts`].
 
 use std::f64::consts::FRAC_1_PI;
 use std::fmt::Debug;
+use std::sync::Arc;
 
 use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::warp::part_of;
 
-use super::parts::Parts;
 use crate::table::Table;
 
 /// What lies on both sides of a surface, for light of one wavelength.
@@ -326,6 +330,33 @@ pub trait Bsdf: Debug + Send + Sync {
             ANYWHERE
         }
     }
+}
+
+/// The part of a BSDF that is a(incident) l(scattered)/π.
+pub trait Product {
+    /// a: the shares of light from `incident` that it scatters back, and to the other side.
+    fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2];
+
+    /// l: its luminance towards `scattered` over that of Lambertian light of the same flux on the same side; its mean over
+    /// projected solid angle is 1.
+    #[inline]
+    fn leaving(&self, _scattered: Vec3, _media: &Media) -> f64 {
+        1.0
+    }
+
+    /// Whether l is 1 in all directions.
+    fn is_even(&self) -> bool {
+        true
+    }
+}
+
+/// The diffuse part of a BSDF, taken apart.
+#[derive(Clone, Copy)]
+pub struct Parts<'a> {
+    /// The product.
+    pub product: &'a dyn Product,
+    /// The rest of the diffuse light, if there is any.
+    pub rest: Option<&'a Arc<dyn Bsdf>>,
 }
 
 /// The part of the light of lobes that is looked for where nothing says that it comes from.

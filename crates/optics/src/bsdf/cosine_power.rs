@@ -9,8 +9,7 @@ use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::more_numbers::MoreNumbers;
 
 use super::albedo::Albedo;
-use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
-use super::parts::{Parts, Product};
+use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, Shares, by_cosine};
 
 /// f = peak · cosⁿ α, α being the angle from an axis, and 0 beyond 90°; from both sides alike.
 #[derive(Clone, Debug)]

@@ -4,8 +4,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Facts, Media, Shares};
-use super::parts::{Parts, Product};
+use super::contract::{Bsdf, Facts, Media, Parts, Product, Shares};
 use crate::table::Table;
 
 /// Cosines of the angle of incidence at which is asked how much light may come from a side.

@@ -5,10 +5,9 @@ use std::sync::Arc;
 use etendue_math::Vec3;
 use etendue_sampling::warp::part_of;
 
-use super::contract::{Bsdf, Facts, Media, Parameters, Shares};
+use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, Shares};
 use super::lambertian::Lambertian;
 use super::mirror::Mirror;
-use super::parts::{Parts, Product};
 use crate::table::Table;
 
 /// A sum of BSDFs, each times a weight.

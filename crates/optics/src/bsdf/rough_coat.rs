@@ -8,8 +8,7 @@ use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
 use super::albedo::ByHeight;
-use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine, proposed};
-use super::parts::{Parts, Product};
+use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, Shares, by_cosine, proposed};
 use super::rough_interface::{RoughFacets, above, from_side};
 use crate::table::Table;
 

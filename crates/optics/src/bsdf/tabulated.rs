@@ -18,8 +18,7 @@ use etendue_math::Vec3;
 use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
-use super::contract::{Bsdf, Component, Drawn, Facts, Media, Shares, by_cosine};
-use super::parts::{Parts, Product};
+use super::contract::{Bsdf, Component, Drawn, Facts, Media, Parts, Product, Shares, by_cosine};
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lit, Lobe, Lobes, Way};
 

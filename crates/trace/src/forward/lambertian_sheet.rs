@@ -6,14 +6,13 @@ use etendue_geometry::Face;
 use etendue_geometry::hits::Hits;
 use etendue_geometry::surface_points::{Vectors, fill, gather, surface_points};
 use etendue_math::Vec3;
+use etendue_optics::bsdf::Facts;
 use etendue_optics::fresnel::reflect;
 use etendue_optics::source::surface::about;
 use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
 use super::queue::RayQueue;
-use crate::detector::Wants;
-use crate::scene::{Act, Scene};
 
 /// How a sheet that many rays are bounced off at once shares out light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,31 +23,18 @@ pub struct LambertianSheet {
     scattered: f64,
 }
 
-/// The faces of a scene that rays are bounced off many at a time.
-#[must_use]
-pub fn lambertian_sheets(scene: &Scene, wants: Wants) -> Vec<LambertianSheet> {
-    // Detectors of scattered light and absorbing surroundings want to know of every scatter by itself; who sums what sheets send
-    // out is told by other ones.
-    if wants.scatters || wants.exitance || scene.media[0].absorption.range() != [0.0, 0.0] {
-        return Vec::new();
-    }
-    let faces = scene.face_set.faces().iter().zip(&scene.roles).zip(0..);
-    faces
-        .filter_map(|((face, role), index)| {
-            let Act::Optical(finish) = role.act else { return None };
-            let known = scene.finishes[finish as usize].facts();
-            let [mirrored, through, scattered, behind] = known.constant?;
-            let sheet = role.solid == 0 && known.lambertian && through == 0.0 && behind == 0.0;
-            (sheet && !face.shape.is_smooth()).then_some(LambertianSheet {
-                face: index,
-                mirrored,
-                scattered,
-            })
-        })
-        .collect()
-}
-
 impl LambertianSheet {
+    /// A face with these properties; None if it is another kind of sheet.
+    #[must_use]
+    pub fn of(face: u32, facts: &Facts) -> Option<Self> {
+        let [mirrored, through, scattered, behind] = facts.constant?;
+        (facts.lambertian && through == 0.0 && behind == 0.0).then_some(Self {
+            face,
+            mirrored,
+            scattered,
+        })
+    }
+
     /// Whether the light that this number stands for is absorbed.
     #[inline(always)]
     #[must_use]
@@ -175,7 +161,7 @@ mod tests {
     use crate::interaction::interaction_of;
     use crate::medium_cache::MediumCache;
     use crate::scatter::SurfaceEvent;
-    use crate::scene::SceneFace;
+    use crate::scene::{Scene, SceneFace};
     use crate::solid_stack::SolidStack;
 
     /// A sheet that stands askew.
@@ -224,8 +210,7 @@ mod tests {
         });
         for shape in [disk, ball] {
             let scene = sheet(shape);
-            let found = lambertian_sheets(&scene, Wants::default());
-            assert_eq!(found.len(), 1);
+            let plain = LambertianSheet::of(0, scene.finishes[0].facts()).expect("a plain wall");
             let (stream, rays) = (Stream::new(8, 9), 4000_u32);
             let mut queue = RayQueue::default();
             let mut numbers = [Vec::new(), Vec::new()];
@@ -253,7 +238,7 @@ mod tests {
             let own = numbers
                 .each_ref()
                 .map(|list| which.iter().map(|i| list[*i as usize]).collect::<Vec<f64>>());
-            gathered.bounce(&scene.face_set.faces()[0], found[0], &own);
+            gathered.bounce(&scene.face_set.faces()[0], plain, &own);
             let mut media = MediumCache::new(&scene);
             let mut counts = [0; 4];
             for (k, i) in which.iter().enumerate() {

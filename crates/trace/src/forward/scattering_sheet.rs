@@ -6,9 +6,7 @@
 use etendue_math::Vec3;
 use etendue_optics::bsdf::{Bsdf, Media};
 
-use crate::detector::Wants;
 use crate::scatter::Surface;
-use crate::scene::{Act, Scene};
 
 /// A sheet that mirrors and scatters light back, or absorbs it.
 #[derive(Clone, Copy, Debug)]
@@ -20,32 +18,15 @@ pub struct ScatteringSheet<'a> {
     axis: Option<Vec3>,
 }
 
-/// The faces of a scene off which rays are bounced many at a time, besides plain walls.
-#[must_use]
-pub fn scattering_sheets(scene: &Scene, wants: Wants) -> Vec<ScatteringSheet<'_>> {
-    // Detectors of scattered light and absorbing surroundings want to know of every scatter by itself.
-    if wants.scatters || scene.media[0].absorption.range() != [0.0, 0.0] {
-        return Vec::new();
+impl<'a> ScatteringSheet<'a> {
+    /// A face with this BSDF, and the direction that its first axis follows; None if it lets light through.
+    #[must_use]
+    pub fn of(face: u32, bsdf: &'a dyn Bsdf, axis: Option<Vec3>) -> Option<Self> {
+        let facts = bsdf.facts();
+        let back = !facts.specular[1] && !facts.diffuse[1];
+        back.then_some(Self { face, bsdf, axis })
     }
-    let faces = scene.face_set.faces().iter().zip(&scene.roles).zip(0..);
-    faces
-        .filter_map(|((face, role), index)| {
-            let Act::Optical(finish) = role.act else { return None };
-            let bsdf = &*scene.finishes[finish as usize];
-            let known = bsdf.facts();
-            // Who sums what sheets send out wants to know whether a ray was mirrored before.
-            let mirrors = known.specular[0] && wants.exitance;
-            let back = !known.specular[1] && !known.diffuse[1] && !mirrors;
-            (role.solid == 0 && back && !face.shape.is_smooth()).then_some(ScatteringSheet {
-                face: index,
-                bsdf,
-                axis: scene.axes[index as usize],
-            })
-        })
-        .collect()
-}
 
-impl ScatteringSheet<'_> {
     /// The direction of a ray after it met the sheet, from two random numbers; None: absorbed. `normal` is that of the front.
     #[inline]
     #[must_use]
@@ -72,7 +53,7 @@ mod tests {
     use etendue_geometry::origin_faces::OriginFaces;
     use etendue_geometry::shape::{Quadric, Shape};
     use etendue_math::Frame;
-    use etendue_optics::bsdf::{Lobe, Mixture, Profile};
+    use etendue_optics::bsdf::{Lambertian, Lobe, Mixture, Profile};
     use etendue_optics::medium::{Index, Medium};
     use etendue_optics::source::surface::about;
     use etendue_optics::table::{Curve, Table};
@@ -82,17 +63,19 @@ mod tests {
     use crate::interaction::interaction_of;
     use crate::medium_cache::MediumCache;
     use crate::scatter::SurfaceEvent;
-    use crate::scene::SceneFace;
+    use crate::scene::{Scene, SceneFace};
     use crate::solid_stack::SolidStack;
 
-    /// A ball that mirrors a fifth, scatters about the mirrored direction with an axis along which the lobe is narrow, and
-    /// absorbs the rest.
+    /// A ball that mirrors a fifth, scatters about the mirrored direction with an axis along which the lobe is narrow, and evenly,
+    /// the less the steeper light comes, and absorbs the rest.
     fn ball() -> Scene {
         let [mirrored, none] = [0.2, 0.0].map(Table::constant);
         let mirror = Mixture::of_shares([mirrored, none.clone()], [none.clone(), none]).expect("at most 1");
         let profile = Profile::Gaussian { peak: 1.0, sigma: 0.15 };
         let lobe = Lobe::elliptical(profile, 3.0, false, false).expect("sound");
-        let parts: Vec<(f64, Arc<dyn Bsdf>)> = vec![(1.0, mirror), (1.0, Arc::new(lobe))];
+        let falling = Table::new(vec![0.0, 1.5], vec![500.0], vec![0.3, 0.1]).expect("sound");
+        let white = Lambertian::new(falling, Table::constant(0.0)).expect("at most 1");
+        let parts: Vec<(f64, Arc<dyn Bsdf>)> = vec![(1.0, mirror), (1.0, Arc::new(lobe)), (1.0, Arc::new(white))];
         let both: Arc<dyn Bsdf> = Arc::new(Mixture::new(parts).expect("at most 1"));
         let shape = Shape::Quadric(Quadric {
             r2: 1.0,
@@ -130,8 +113,7 @@ mod tests {
     #[test]
     fn a_bounce_is_what_the_surface_event_comes_to() {
         let scene = ball();
-        let sheets = scattering_sheets(&scene, Wants::default());
-        assert_eq!(sheets.len(), 1);
+        let sheet = ScatteringSheet::of(0, &*scene.finishes[0], scene.axes[0]).expect("nothing passes");
         let (stream, rays) = (Stream::new(5, 6), 3000_u32);
         let mut queue = RayQueue::default();
         for i in 0..rays {
@@ -164,8 +146,11 @@ mod tests {
                 back: 1.0,
             };
             let front = if met.front { met.side } else { -met.side };
-            let found = sheets[0].bounced(d, front, around, [number, turn]);
+            let found = sheet.bounced(d, front, around, [number, turn]);
             assert_eq!(found, expected.map(|(_, d, _)| d));
+            let known = event.arriving(event.parts().expect("a Lambertian part"));
+            assert_eq!([sheet.product(d, front, around), 0.0], known);
+            assert!(known[0] > 0.1 && known[0] < 0.3);
             ends[expected.map_or(0, |(component, ..)| 1 + usize::from(component.is_specular()))] += 1;
         }
         assert!(ends.iter().all(|count| *count > 100), "{ends:?}");

@@ -1,13 +1,14 @@
 //! Rays sorted by what comes next.
 
+use etendue_geometry::Face;
 use etendue_geometry::hits::Hits;
 
-use super::lambertian_sheet::{LambertianSheet, lambertian_sheets};
+use super::lambertian_sheet::LambertianSheet;
 use super::queue::RayQueue;
-use super::scattering_sheet::{ScatteringSheet, scattering_sheets};
+use super::scattering_sheet::ScatteringSheet;
 use crate::buckets::Buckets;
 use crate::detector::Wants;
-use crate::scene::Scene;
+use crate::scene::{Act, Role, Scene};
 use crate::solid_stack::SolidStack;
 
 /// A face off which many rays are bounced at once.
@@ -29,16 +30,32 @@ impl Sheet<'_> {
     }
 }
 
-/// The faces of a scene off which rays are bounced many at a time.
+/// The faces of a scene off which rays are bounced many at a time: flat shaded sheets that let nothing through.
 #[must_use]
 pub fn sheets(scene: &Scene, wants: Wants) -> Vec<Sheet<'_>> {
-    let plain: Vec<_> = lambertian_sheets(scene, wants);
-    let others = scattering_sheets(scene, wants);
-    let others = others
-        .into_iter()
-        .filter(|other| plain.iter().all(|sheet| sheet.face != other.face))
-        .map(Sheet::Scattering);
-    plain.iter().copied().map(Sheet::Lambertian).chain(others).collect()
+    // Detectors of scattered light and absorbing surroundings want to know of every scatter by itself.
+    if wants.scatters || scene.media[0].absorption.range() != [0.0, 0.0] {
+        return Vec::new();
+    }
+    let faces = scene.face_set.faces().iter().zip(&scene.roles).zip(0..);
+    let sheet = |((face, role), index): ((&Face, &Role), u32)| {
+        let Act::Optical(finish) = role.act else { return None };
+        if role.solid != 0 || face.shape.is_smooth() {
+            return None;
+        }
+        let bsdf = &*scene.finishes[finish as usize];
+        let known = bsdf.facts();
+        if wants.exitance {
+            // Who sums what sheets send out is told by those of any finish, unless a ray may have been mirrored before.
+            let plain = !known.specular[0];
+            let sheet = plain.then(|| ScatteringSheet::of(index, bsdf, scene.axes[index as usize]));
+            return sheet.flatten().map(Sheet::Scattering);
+        }
+        LambertianSheet::of(index, known)
+            .map(Sheet::Lambertian)
+            .or_else(|| ScatteringSheet::of(index, bsdf, scene.axes[index as usize]).map(Sheet::Scattering))
+    };
+    faces.filter_map(sheet).collect()
 }
 
 /// Sorts the rays of a queue by what comes next.

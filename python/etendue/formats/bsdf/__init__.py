@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from etendue.errors import FormatError, UnknownNameError, UnsupportedFormatError
+from etendue.errors import ArgumentError, FormatError, UnknownNameError, UnsupportedFormatError
 from etendue.formats.bsdf import (
     astm,
     bird,
@@ -26,7 +26,7 @@ from etendue.formats.bsdf import (
     tracepro,
     zemax,
 )
-from etendue.formats.bsdf.bsdf_format import SNIFFED_BYTES, BsdfFormat
+from etendue.formats.bsdf.bsdf_format import SNIFFED_BYTES, BsdfFormat, ShareTables
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import as_path, require_readable
 from etendue.formats.output import atomic_output
@@ -172,3 +172,41 @@ def write_bsdf_data(path: str | os.PathLike[str], data: BsdfData, format: str | 
         raise FormatError(path, "layout", f"the table does not fit {form.title}", "Write it by write_bsdf.")
     with atomic_output(path) as temporary, temporary.open("w+b") as stream:
         return form.write(data, stream)
+
+
+def write_bsdf_shares(path: str | os.PathLike[str], shares: ShareTables, format: str | None = None) -> None:
+    """Write shares of mirrored and Lambertian light in a format that holds no tables.
+
+    Parameters
+    ----------
+    path : path
+        Appears whole or not at all.
+    shares : ShareTables
+        By angle and wavelength.
+    format : str, optional
+        One of `BSDF_FORMATS`; by the extension if left out.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such format.
+    ArgumentError
+        If the format cannot hold them.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> import numpy as np
+    >>> mirrored = np.array([[[0.9], [0.95]], [[0.0], [0.0]]])
+    >>> mirror = ShareTables("mirror", np.array([0.0, 90.0]), np.array([555.0]), mirrored, 0.0 * mirrored)
+    >>> with TemporaryDirectory() as folder:
+    ...     write_bsdf_shares(Path(folder) / "mirror.coated", mirror)
+    ...     read_bsdf_data(Path(folder) / "mirror.coated").components[0]["specular_reflectance"]["values"]
+    [0.9, 0.95]
+    """
+    path = as_path(path)
+    form = bsdf_format(path, format)
+    if form.write_shares is None:
+        raise ArgumentError(f"{form.title} holds tables: write them by write_bsdf.")
+    with atomic_output(path) as temporary, temporary.open("w+b") as stream:
+        form.write_shares(shares, stream)

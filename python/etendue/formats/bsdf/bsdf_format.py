@@ -37,6 +37,28 @@ class Tabulated(Protocol):
         ...
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class ShareTables:
+    """Shares of light that is mirrored, goes straight on, or is scattered evenly to each side.
+
+    Parameters
+    ----------
+    name : str
+    angle : array
+        Angles of incidence [°], rising.
+    wavelength : array
+        [nm], rising.
+    specular, diffuse : array, shape (2, angles, wavelengths)
+        Reflected and transmitted.
+    """
+
+    name: str
+    angle: Array
+    wavelength: Array
+    specular: Array
+    diffuse: Array
+
+
 @dataclasses.dataclass(frozen=True)
 class BsdfFormat:
     """A format of BSDF files.
@@ -58,7 +80,10 @@ class BsdfFormat:
     tabulate : callable, optional
         A BSDF in the layout of this format.
     write : callable, optional
-        Writes data of that layout; None: the format is read only. Returns what is lost, in sentences.
+        Writes data of that layout; None: the format holds no tables, or is read only. Returns what is lost, in sentences.
+    write_shares : callable, optional
+        Writes shares of mirrored and Lambertian light, for formats that hold no tables. Raises ArgumentError for what they
+        cannot hold.
     """
 
     name: str
@@ -69,6 +94,7 @@ class BsdfFormat:
     fits: Callable[[BsdfData], bool] | None = None
     tabulate: Callable[[Tabulated], BsdfData] | None = None
     write: Callable[[BsdfData, BinaryIO], tuple[str, ...]] | None = None
+    write_shares: Callable[[ShareTables, BinaryIO], None] | None = None
 
 
 SNIFFED_BYTES = 4096

@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
-from etendue.formats.bsdf.bsdf_format import BsdfFormat
-from etendue.formats.bsdf.speos_shares import mixed, next_angle, require_end, share, sizes, words_after_lines
+from etendue.errors import ArgumentError
+from etendue.formats.bsdf.bsdf_format import BsdfFormat, ShareTables
+from etendue.formats.bsdf.speos_shares import (
+    head,
+    mixed,
+    next_angle,
+    per_cent,
+    require_end,
+    share,
+    sizes,
+    whole_range,
+    words_after_lines,
+)
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.report import Complaint
 
@@ -43,4 +55,17 @@ def read(path: Path) -> BsdfData:
     return BsdfData((), tuple(components), name=name, complaints=tuple(complaints))
 
 
-FORMAT = BsdfFormat("speos-coated", "Speos coated surface", (".coated",), recognise, read)
+def write_shares(shares: ShareTables, stream: BinaryIO) -> None:
+    """Write mirrored and transmitted light, the same for both polarisations."""
+    if shares.diffuse.any():
+        raise ArgumentError("a Speos coated surface holds no scattered light: write it as .scattering")
+    whole = whole_range(shares)
+    lines = [*head(START, "v1.0", shares.name), f"{whole.angle.size} {whole.wavelength.size}"]
+    lines.append("\t" + "\t\t".join(f"{nm:.12g}" for nm in whole.wavelength))
+    for i, angle in enumerate(whole.angle):
+        both = per_cent(whole.specular[:, i].T)
+        lines += [f"{angle:.12g}\t{both}", f"\t{both}"]
+    stream.write(("\n".join(lines) + "\n").encode())
+
+
+FORMAT = BsdfFormat("speos-coated", "Speos coated surface", (".coated",), recognise, read, write_shares=write_shares)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
-from etendue.formats.bsdf.bsdf_format import BsdfFormat
+from etendue.formats.bsdf.bsdf_format import BsdfFormat, ShareTables
 from etendue.formats.bsdf.speos_shares import (
     gaussian,
+    head,
     mixed,
     next_angle,
+    per_cent,
     require_end,
     share,
     sizes,
+    whole_range,
     width,
     words_after_lines,
 )
@@ -71,4 +75,18 @@ def read(path: Path) -> BsdfData:
     return BsdfData(tuple(slices), tuple(mixed(angle, wavelength, names)), name=name)
 
 
-FORMAT = BsdfFormat("speos-scattering", "Speos scattering surface", (".scattering",), recognise, read)
+def write_shares(shares: ShareTables, stream: BinaryIO) -> None:
+    """Write specular and Lambertian light; no Gaussian lobe."""
+    whole = whole_range(shares)
+    lines = [*head(START, "v1.0", shares.name), f"{whole.angle.size} {whole.wavelength.size}"]
+    lines.append("\t" + "\t\t".join(f"{nm:.12g}" for nm in whole.wavelength))
+    none = np.zeros_like(whole.specular[:, 0])
+    for i, angle in enumerate(whole.angle):
+        parts = (whole.specular[:, i], whole.diffuse[:, i], none, none, none)
+        lines += [(f"{angle:.12g}" if k == 0 else "") + "\t" + per_cent(part.T) for k, part in enumerate(parts)]
+    stream.write(("\n".join(lines) + "\n").encode())
+
+
+FORMAT = BsdfFormat(
+    "speos-scattering", "Speos scattering surface", (".scattering",), recognise, read, write_shares=write_shares
+)

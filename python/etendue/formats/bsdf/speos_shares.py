@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue.formats.bsdf.bsdf_format import ShareTables
 from etendue.formats.bsdf.tokens import Tokens
 from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
 
@@ -65,6 +66,28 @@ def next_angle(tokens: Tokens, before: float) -> float:
     if not before < value <= 0.5 * 180.0:
         tokens.refuse("angles of incidence do not rise within 0 to 90°")
     return value
+
+
+def head(start: bytes, version: str, name: str) -> list[str]:
+    """The first two lines of a file: its kind, and a comment."""
+    return [f"{start.decode()} {version}", " ".join(name.split()) or "BSDF"]
+
+
+def per_cent(values: npt.ArrayLike) -> str:
+    """Shares as words of a line."""
+    return "\t".join(f"{WHOLE * value:.12g}" for value in np.ravel(values))
+
+
+def whole_range(shares: ShareTables) -> ShareTables:
+    """The same from 0 to 90°: beyond the first and the last angle shares do not change."""
+    angle = np.unique(np.concatenate([[0.0, 0.5 * 180.0], np.clip(shares.angle, 0.0, 0.5 * 180.0)]))
+
+    def at(values: Array) -> Array:
+        columns = values.reshape(2, shares.angle.size, -1)
+        found = [[np.interp(angle, shares.angle, column) for column in way.T] for way in columns]
+        return np.swapaxes(np.array(found), 1, 2)
+
+    return ShareTables(shares.name, angle, shares.wavelength, at(shares.specular), at(shares.diffuse))
 
 
 def share(tokens: Tokens, what: str) -> float:

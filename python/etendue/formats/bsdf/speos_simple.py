@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
-from etendue.errors import UnsupportedFormatError
-from etendue.formats.bsdf.bsdf_format import BsdfFormat
-from etendue.formats.bsdf.speos_shares import gaussian, mixed, require_end, share, width, words_after_lines
+from etendue.errors import ArgumentError, UnsupportedFormatError
+from etendue.formats.bsdf.bsdf_format import BsdfFormat, ShareTables
+from etendue.formats.bsdf.speos_shares import (
+    gaussian,
+    head,
+    mixed,
+    per_cent,
+    require_end,
+    share,
+    width,
+    words_after_lines,
+)
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
 
 START = b"OPTIS - Simple scattering surface file"
@@ -68,4 +78,32 @@ def _absorber(slices: list[BsdfSlice]) -> tuple[dict[str, str], ...]:
     return () if slices else ({"kind": "absorber"},)
 
 
-FORMAT = BsdfFormat("speos-simple", "Speos simple scattering surface", (".simplescattering",), recognise, read)
+def write_shares(shares: ShareTables, stream: BinaryIO) -> None:
+    """Write shares that are the same at all angles and wavelengths; no Gaussian lobe."""
+    parts = np.array([shares.specular, shares.diffuse]).reshape(2, 2, -1)
+    if np.ptp(parts, axis=2).any():
+        raise ArgumentError(
+            "a Speos simple scattering surface has the same shares at all angles: write it as .scattering"
+        )
+    specular, diffuse = parts[..., 0]
+    ways = specular + diffuse
+    total = float(ways.sum())
+    lambertian = [part / way if way > 0.0 else 0.0 for part, way in zip(diffuse, ways, strict=True)]
+    lines = head(START, "v2.0", shares.name)
+    if ways.all():
+        values = per_cent([1.0 - total, *lambertian, 0.0, 0.0])
+        lines += [MODES[2], values, "0 0", "0", per_cent(ways[0] / total)]
+    else:
+        way = int(ways[1] > 0.0)
+        lines += [MODES[way], per_cent([1.0 - total, lambertian[way], 0.0]) + "\t0"]
+    stream.write(("\n".join(lines) + "\n").encode())
+
+
+FORMAT = BsdfFormat(
+    "speos-simple",
+    "Speos simple scattering surface",
+    (".simplescattering",),
+    recognise,
+    read,
+    write_shares=write_shares,
+)
