@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import etendue as et
@@ -28,6 +29,13 @@ Array = npt.NDArray[np.float64]
 THETAS = (5.0, 60.0)
 SCHEMES = {"first scheme: U, V": "direction-cosines", "second scheme: about the specular": "specular-centred"}
 THESIS = {"direction-cosines": ("67 %", "75 %"), "specular-centred": ("99.5 %", "91.4 %")}
+
+
+LOWEST = -1.5
+"""Lowest lg f that is shown."""
+
+POINTS = "#8fd3ff"
+"""Colour of the points of a table's grid."""
 
 
 def scanned(theta: float) -> tuple[Array, Array]:
@@ -95,6 +103,33 @@ def draw_edge(path: Path) -> None:
     save(figure, path)
 
 
+def draw_schemes(path: Path, tables: Mapping[str, et.BsdfTable]) -> None:
+    """B.2, B.5 and B.6: what each scheme makes of the scans in U, V, and some points of the grid of the table."""
+    figure = new_figure(9.6, 8.0)
+    turns = np.radians(np.arange(0.0, 360.0, 10.0))
+    for line, (title, method) in enumerate(SCHEMES.items()):
+        for column, theta in enumerate(THETAS):
+            axes = figure.add_subplot(2, 2, 2 * line + column + 1)
+            incident, scattered = direction(theta, 180.0), scanned(theta)[0]
+            low, high = (-1.15, 1.15) if column == 0 else (-1.95, 0.25)
+            u, v = np.meshgrid(np.linspace(-1.1, 1.1, 241), np.linspace(low, high, 241))
+            towards = harvey_shack.directions(incident, np.hypot(u, v), np.degrees(np.arctan2(v, u)))
+            there = ~np.isnan(towards[..., 2])
+            f = np.full(u.shape, np.nan)
+            f[there] = tables[method].evaluate(incident, towards[there])
+            shown = np.log10(np.maximum(f, 10.0**LOWEST))
+            picture = axes.pcolormesh(u, v, shown, cmap="magma", vmin=LOWEST, rasterized=True)
+            rim(axes, theta)
+            for r in np.geomspace(1e-3, 2.0, 99)[58::10]:
+                kept = r < harvey_shack.farthest(theta, np.degrees(turns))
+                axes.plot(r * np.cos(turns[kept]), r * np.sin(turns[kept]), ".", ms=2, color=POINTS)
+            axes.plot(*planar(theta, scattered[::3]), ".", ms=2.5, color="white")
+            axes.set(title=f"{title}, {theta:g}°", xlabel="U" if line else "")
+            axes.set_ylabel("V" if not column else "")
+            figure.colorbar(picture, ax=axes, label="lg f [1/sr]", shrink=0.8)
+    save(figure, path)
+
+
 def illuminance(table: et.Bsdf, theta: float, rays: float) -> tuple[Array, float]:
     """E of a hemisphere of 1 m about a sample that gets 1 lm [lx], on 91 × 91 cells seen from above; and its flux."""
     beam = {
@@ -127,6 +162,7 @@ def main() -> None:
     draw_edge(folder / "appendix-b-edge.png")
     scans = all_scans()
     tables = {method: et.BsdfTable.from_scans(scans, method) for method in SCHEMES.values()}
+    draw_schemes(folder / "appendix-b-schemes.png", tables)
     figure = new_figure(9.6, 8.4)
     rows = []
     for line, (title, method) in enumerate(SCHEMES.items()):

@@ -10,7 +10,7 @@ import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RUNS = {
-    "appendix_b.py": (["--rays", "50000"], 3),
+    "appendix_b.py": (["--rays", "50000"], 4),
     "chapter_2.py": (["--rays", "200000", "--seeds", "4"], 4),
     "chapter_4.py": (["--lines", "4"], 6),
     "dome_led.py": (["--rays", "100000"], 2),
