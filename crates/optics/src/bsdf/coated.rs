@@ -22,6 +22,8 @@ pub struct Coated {
     index: f64,
     base: Table,
     facts: Facts,
+    /// What the coat lets out of diffuse light from within into a medium of index 1.
+    usual: f64,
 }
 
 /// Reflectance of a smooth surface for diffuse light from the side of the lower index, m being the ratio of both
@@ -62,7 +64,12 @@ impl Coated {
             constant: None,
             fresnel: false,
         };
-        Some(Self { index, base, facts })
+        Some(Self {
+            index,
+            base,
+            facts,
+            usual: let_out(index),
+        })
     }
 
     /// From `index` and `base_reflectance`.
@@ -81,9 +88,18 @@ impl Coated {
         fresnel(cosine, outside, self.index).reflectance
     }
 
+    /// The share of diffuse light from within that the coat lets out.
+    fn lets_out(&self, outside: f64) -> f64 {
+        if outside == 1.0 {
+            self.usual
+        } else {
+            let_out(self.index / outside)
+        }
+    }
+
     /// Of light within the coat on its way to the base: the share that leaves it at last.
     fn leaves(&self, outside: f64, wavelength: f64) -> f64 {
-        let (rho, out) = (self.base.at(1.0, wavelength), let_out(self.index / outside));
+        let (rho, out) = (self.base.at(1.0, wavelength), self.lets_out(outside));
         rho * out / (1.0 - rho * (1.0 - out))
     }
 }
@@ -145,7 +161,7 @@ impl Product for Coated {
     fn leaving(&self, scattered: Vec3, media: &Media) -> f64 {
         let [outside, _] = media.seen_from(scattered);
         let m = self.index / outside;
-        (1.0 - self.mirrored(scattered.z.abs(), outside)) / (m * m * let_out(m))
+        (1.0 - self.mirrored(scattered.z.abs(), outside)) / (m * m * self.lets_out(outside))
     }
 
     fn is_even(&self) -> bool {
