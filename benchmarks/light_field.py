@@ -45,7 +45,7 @@ class Family:
 
     def ray_set(self, rays: int, seed: int) -> et.RaySet:
         """Rays of equal flux, in memory."""
-        x, d = self.source.rays(rays, seed)
+        x, d = self.source.rays(rays, seed=seed)
         return et.RaySet(x, d, np.full(rays, self.source.total_flux / rays))
 
 
@@ -69,8 +69,8 @@ class Judge:
 
     def __init__(self, source: Any, surface: Surface) -> None:
         self.source, self.surface = source, surface
-        self.points, self.directions = source.rays(TESTS, 99)
-        self.truth = np.log(source.luminance(self.points, self.directions) / source.total_flux)
+        self.points, self.directions = source.rays(TESTS, seed=99)
+        self.truth = np.log(source.luminance(points=self.points, directions=self.directions) / source.total_flux)
         self.even = 1e6 / (np.pi * surface.area)
 
     def excess(self, luminance: Array, flux: float) -> float:
@@ -87,7 +87,7 @@ class Judge:
         for k in range(points):
             at = (indices + (0.5 / points + k * steps) % 1.0) / n
             x, d = _core.rays_of_part(part, np.ascontiguousarray(at))
-            means += self.source.luminance(x + 1e-9 * d, d) / points
+            means += self.source.luminance(points=x + 1e-9 * d, directions=d) / points
         met, at = _core.cross_parts([part], np.ascontiguousarray(self.points), np.ascontiguousarray(self.directions))
         cell = np.minimum((at * n).astype(int), n - 1)
         seen = np.where(met >= 0, means.reshape((n,) * 4)[tuple(cell.T)], 0.0)
@@ -105,7 +105,7 @@ def coverage(field: LightField, source: Any, cells: int = 20_000, points: int = 
     for k in range(points):
         at = np.ascontiguousarray((index + (0.5 / points + k * steps) % 1.0) / shape)
         x, d = _core.rays_of_part(chart, at)
-        sums[0] += source.luminance(x + 1e-9 * d, d) / points
+        sums[0] += source.luminance(points=x + 1e-9 * d, directions=d) / points
         sums[1:] += np.array(field.core.at(0, at)) * (1e6 / points)
     lit = sums[0] > 0
     deviation = np.abs(sums[1] - sums[0])[lit] / sums[2][lit]

@@ -90,7 +90,7 @@ def true_pixels(source: Any, observer: et.Observer, screen: et.Screen, fine: int
         y = middle + within * (screen.height / screen.rows)
         points = np.asarray(observer.target) + (y[:, None, None] * up + x[:, None] * right).reshape(-1, 3)
         sight = observer.position - points
-        seen = source.luminance(points, sight / np.linalg.norm(sight, axis=1)[:, None])
+        seen = source.luminance(points=points, directions=sight / np.linalg.norm(sight, axis=1)[:, None])
         values[row] = seen.reshape(fine, screen.columns, fine).mean(axis=(0, 2))
     return values
 

@@ -100,6 +100,7 @@ class _Part(TypedDict):
     y: Sequence[float]
     z: Sequence[float]
     size: Sequence[float]
+    focus: Sequence[float]
 
 class _FieldPart(TypedDict):
     part: _Part
@@ -354,8 +355,7 @@ def index_sums(
 def count_rays(
     source: _Source,
     parts: Sequence[_Part],
-    depths: Sequence[int],
-    fine: Sequence[int],
+    grids: Sequence[tuple[Sequence[int], Sequence[int]]],
     held_out: float,
     kept: float,
     seed: int,
@@ -363,6 +363,8 @@ def count_rays(
     progress: _Progress | None = None,
 ) -> _Counts:
     """One pass: (Σ w, Σ w²) per cell of three grids; cells by fold (fitted, held out), part, coordinates.
+
+    For each part the halvings of the four coordinates, and those of the fine grids over place and direction.
 
     Where all rays have one weight, the first of each pair counts rays and the second is None.
     """

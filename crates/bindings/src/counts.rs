@@ -1,6 +1,6 @@
 //! Étendue counts of a ray source.
 
-use etendue_lightfield::counts::{CHANCES, Plan, Sums, count};
+use etendue_lightfield::counts::{CHANCES, PartGrids, Plan, Sums, count};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -26,13 +26,12 @@ fn sums(py: Python<'_>, sums: Sums) -> (Bound<'_, PyAny>, Option<Bound<'_, PyArr
 /// (fitted, held out), part, coordinates; beside them the kept rays, the rays not met, and the tally.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
-#[pyo3(signature = (source, parts, depths, fine, held_out, kept, seed, threads=None, progress=None))]
+#[pyo3(signature = (source, parts, grids, held_out, kept, seed, threads=None, progress=None))]
 pub fn count_rays<'py>(
     py: Python<'py>,
     source: &Bound<'py, PyAny>,
     parts: Vec<Part>,
-    depths: [u32; 4],
-    fine: [u32; 2],
+    grids: Vec<([u32; 4], [u32; 2])>,
     held_out: f64,
     kept: f64,
     seed: u64,
@@ -47,22 +46,23 @@ pub fn count_rays<'py>(
     let chances = |share: f64| (share.clamp(0.0, 1.0) * f64::from(CHANCES)).round() as u32;
     let plan = Plan {
         parts: parts.iter().map(Part::core).collect::<PyResult<_>>()?,
-        depths,
-        fine,
+        grids: grids
+            .iter()
+            .map(|(depths, fine)| PartGrids {
+                depths: *depths,
+                fine: *fine,
+            })
+            .collect(),
         held_out: chances(held_out),
         kept: chances(kept.min(held_out)),
         seed,
     };
-    if !plan.is_countable() {
-        return Err(PyValueError::new_err(format!(
-            "grids of depths {depths:?} and {fine:?} are too large"
-        )));
-    }
     let counts = with_source(source, |source| {
         interruptible(py, threads, progress, |threads, tick| {
             count(source, &plan, threads, tick)
         })
-    })?;
+    })?
+    .ok_or_else(|| PyValueError::new_err("these grids do not fit the parts, or have too many cells"))?;
     let result = PyDict::new(py);
     result.set_item("grid", sums(py, counts.grid))?;
     result.set_item("space", sums(py, counts.space))?;

@@ -1,6 +1,6 @@
 //! Carrier surfaces and the coordinates of rays on them.
 
-use etendue_lightfield::surface::{CarrierPart, Shape};
+use etendue_lightfield::surface::{CarrierPart, Focus, Shape};
 use etendue_math::{Frame, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -16,6 +16,7 @@ pub struct Part {
     y: [f64; 3],
     z: [f64; 3],
     size: [f64; 2],
+    focus: [f64; 4],
 }
 
 impl Part {
@@ -23,7 +24,11 @@ impl Part {
     pub fn core(&self) -> PyResult<CarrierPart> {
         let [a, b] = self.size;
         let shape = match self.shape.as_str() {
-            "rectangle" => Shape::Rectangle { width: a, height: b },
+            "rectangle" => Shape::Rectangle {
+                width: a,
+                height: b,
+                focus: Focus(self.focus),
+            },
             "disk" => Shape::Disk { radius: a },
             "hemisphere" => Shape::Hemisphere { radius: a },
             "tube" => Shape::Tube { radius: a, height: b },

@@ -20,15 +20,29 @@ pub const PURPOSE_HOLD_OUT: u64 = 0x484F_4C44;
 /// Chances are counted in these parts of one.
 pub const CHANCES: u32 = 1 << 16;
 
+/// Halvings of the coordinates of one part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PartGrids {
+    /// Of each of the four, in the grid over all of them.
+    pub depths: [u32; 4],
+    /// In the fine grids: over the place, over the direction.
+    pub fine: [u32; 2],
+}
+
+impl PartGrids {
+    /// Halvings of each of the three grids together.
+    fn bits(&self) -> [u32; 3] {
+        [self.depths.iter().sum(), 2 * self.fine[0], 2 * self.fine[1]]
+    }
+}
+
 /// What to count.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The charts, in the order in which rays are offered to them.
     pub parts: Vec<CarrierPart>,
-    /// Halvings of each of the four coordinates.
-    pub depths: [u32; 4],
-    /// Halvings of each coordinate of the fine grids: over the place, over the direction.
-    pub fine: [u32; 2],
+    /// The grids of each.
+    pub grids: Vec<PartGrids>,
     /// Rays held out, in parts of [`CHANCES`].
     pub held_out: u32,
     /// Rays kept with their coordinates, in parts of [`CHANCES`]; at most `held_out`: they are among those.
@@ -37,21 +51,39 @@ pub struct Plan {
     pub seed: u64,
 }
 
-impl Plan {
-    fn sizes(&self) -> [usize; 3] {
-        let [space, direction] = self.fine.map(|d| 1 << (2 * d));
-        [1 << self.depths.iter().sum::<u32>(), space, direction]
-    }
+/// Halvings of each coordinate by which a cell is found; those of a coarser grid are among them.
+const FINEST: u32 = 16;
 
-    /// Whether every cell of every grid has a number of 32 bits.
-    #[must_use]
-    pub fn is_countable(&self) -> bool {
-        let bits = [self.depths.iter().sum::<u32>(), 2 * self.fine[0], 2 * self.fine[1]];
-        let cells = |b: u32| (b < 32).then(|| (1_u64 << b) * 2 * self.parts.len() as u64);
-        let deep = self.depths.iter().chain(&self.fine).all(|d| *d <= 16);
-        deep && bits
-            .into_iter()
-            .all(|b| cells(b).is_some_and(|n| u32::try_from(n).is_ok()))
+/// Where the cells of each part begin in each of the three grids, and how many cells there are.
+#[derive(Clone, Debug)]
+struct Starts {
+    /// In the first fold.
+    parts: Vec<[u32; 3]>,
+    /// Of one fold.
+    total: [u32; 3],
+}
+
+impl Plan {
+    /// None if a part has no grids, or a cell no number of 32 bits.
+    fn starts(&self) -> Option<Starts> {
+        if self.grids.len() != self.parts.len() {
+            return None;
+        }
+        let (mut parts, mut total) = (Vec::with_capacity(self.parts.len()), [0_u32; 3]);
+        for grids in &self.grids {
+            if grids.depths.iter().chain(&grids.fine).any(|d| *d > FINEST) {
+                return None;
+            }
+            parts.push(total);
+            for (sum, bits) in total.iter_mut().zip(grids.bits()) {
+                *sum = sum.checked_add(1_u32.checked_shl(bits)?)?;
+            }
+        }
+        // Both folds have them.
+        total
+            .iter()
+            .all(|n| n.checked_mul(2).is_some())
+            .then_some(Starts { parts, total })
     }
 }
 
@@ -132,7 +164,8 @@ struct Found {
 /// Where the rays of a block cross the surface.
 struct Scratch {
     at: Coordinates,
-    cells: [Vec<u32>; 3],
+    /// Cells along each coordinate, of 2^FINEST.
+    cells: [Vec<u32>; 4],
 }
 
 impl Default for Scratch {
@@ -145,16 +178,13 @@ impl Default for Scratch {
 }
 
 impl Found {
-    fn collect(&mut self, plan: &Plan, sizes: [usize; 3], first: u64, batch: &RayBatch, scratch: &mut Scratch) {
+    fn collect(&mut self, plan: &Plan, starts: &Starts, first: u64, batch: &RayBatch, scratch: &mut Scratch) {
         self.tally.add_block(batch);
         let chances = chances(plan.seed, first, batch.len);
         let Scratch { at, cells } = scratch;
         carry(&plan.parts, batch, at);
-        cells_of(plan.depths, plan.fine, &at.values, batch.len, cells);
+        finest_cells(&at.values, batch.len, cells);
         let [s1, s2, a, b] = &at.values;
-        let parts = u32::try_from(plan.parts.len()).unwrap_or(0);
-        #[allow(clippy::cast_possible_truncation, reason = "the plan is countable")]
-        let sizes = sizes.map(|n| n as u32);
         for list in &mut self.cells {
             list.reserve(batch.len);
         }
@@ -169,9 +199,11 @@ impl Found {
                 self.unmet_flux += weight;
                 continue;
             }
-            let block = u32::from(u32::from(chances[i]) < plan.held_out) * parts + part;
-            for k in 0..3 {
-                self.cells[k].push(block * sizes[k] + cells[k][i]);
+            let fold = u32::from(u32::from(chances[i]) < plan.held_out);
+            let finest = cells.each_ref().map(|c| c[i]);
+            let own = cells_in(plan.grids[part as usize], finest);
+            for (k, list) in self.cells.iter_mut().enumerate() {
+                list.push(fold * starts.total[k] + starts.parts[part as usize][k] + own[k]);
             }
             self.weights.push(weight);
             if u32::from(chances[i]) < plan.kept {
@@ -186,20 +218,30 @@ impl Found {
     }
 }
 
-/// The cells of a block's coordinates in the grid and in the two finer ones.
+/// The cells of a block's coordinates, each in the finest grid.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn cells_of(depths: [u32; 4], fine: [u32; 2], at: &[Vec<f64>; 4], len: usize, out: &mut [Vec<u32>; 3]) {
-    let shape = depths.map(|d| f64::from(d).exp2());
-    let sides = fine.map(|d| f64::from(d).exp2());
-    let [s1, s2, a, b] = at.each_ref().map(|v| &v[..len]);
-    let [grid, space, direction] = out.each_mut().map(|v| &mut v[..len]);
-    for i in 0..len {
-        let c1 = cell(s1[i], shape[0]) << depths[1] | cell(s2[i], shape[1]);
-        let c2 = c1 << depths[2] | cell(a[i], shape[2]);
-        grid[i] = c2 << depths[3] | cell(b[i], shape[3]);
-        space[i] = cell(s1[i], sides[0]) << fine[0] | cell(s2[i], sides[0]);
-        direction[i] = cell(a[i], sides[1]) << fine[1] | cell(b[i], sides[1]);
+fn finest_cells(at: &[Vec<f64>; 4], len: usize, out: &mut [Vec<u32>; 4]) {
+    let cells = f64::from(FINEST).exp2();
+    for (values, numbers) in at.iter().zip(out) {
+        let (values, numbers) = (&values[..len], &mut numbers[..len]);
+        for i in 0..len {
+            numbers[i] = cell(values[i], cells);
+        }
     }
+}
+
+/// The cells of a ray in the three grids of its part.
+#[inline]
+fn cells_in(grids: PartGrids, finest: [u32; 4]) -> [u32; 3] {
+    let joined = |axes: std::ops::Range<usize>, depths: [u32; 4]| {
+        axes.fold(0_u32, |c, k| c << depths[k] | finest[k] >> (FINEST - depths[k]))
+    };
+    let [place, direction] = grids.fine;
+    [
+        joined(0..4, grids.depths),
+        joined(0..2, [place; 4]),
+        joined(2..4, [direction; 4]),
+    ]
 }
 
 /// The cell of a coordinate from 0 to 1, both included; any cell if it is none.
@@ -231,15 +273,15 @@ fn chances(seed: u64, first: u64, len: usize) -> Vec<u16> {
 /// Counts all rays of a source on a surface.
 ///
 /// Every sum runs in ray order, so its bits do not depend on the number of threads. Memory: the grids, twice 12 bytes per
-/// ray of a round of batches, and the kept rays. Ends early if `progress` breaks.
+/// ray of a round of batches, and the kept rays. Ends early if `progress` breaks. None if the plan is not countable.
 pub fn count(
     source: &impl RaySource,
     plan: &Plan,
     threads: usize,
     progress: impl FnMut(u64) -> ControlFlow<()>,
-) -> Counts {
-    let sizes = plan.sizes();
-    let [grid, space, direction] = sizes.map(|n| Sums::Equal(vec![0; 2 * plan.parts.len() * n]));
+) -> Option<Counts> {
+    let starts = plan.starts()?;
+    let [grid, space, direction] = starts.total.map(|n| Sums::Equal(vec![0; 2 * n as usize]));
     let mut counts = Counts {
         grid,
         space,
@@ -255,7 +297,7 @@ pub fn count(
         let mut found = Found::default();
         let mut scratch = Scratch::default();
         source.for_each_block(range, |first, batch| {
-            found.collect(plan, sizes, first, batch, &mut scratch);
+            found.collect(plan, &starts, first, batch, &mut scratch);
         });
         found
     };
@@ -285,7 +327,7 @@ pub fn count(
     if !equal {
         counts.weight = None;
     }
-    counts
+    Some(counts)
 }
 
 #[cfg(test)]
@@ -316,11 +358,15 @@ mod tests {
         length_scale: 1.0,
     };
 
+    const GRIDS: PartGrids = PartGrids {
+        depths: [2, 3, 2, 1],
+        fine: [4, 3],
+    };
+
     fn plan() -> Plan {
         Plan {
             parts: zoo(),
-            depths: [2, 3, 2, 1],
-            fine: [4, 3],
+            grids: vec![GRIDS; zoo().len()],
             held_out: CHANCES / 10,
             kept: CHANCES / 100,
             seed: 3,
@@ -329,7 +375,7 @@ mod tests {
 
     fn run(bytes: &[u8], threads: usize) -> Counts {
         let table = RayTable::new(bytes, LAYOUT).expect("valid");
-        count(&table, &plan(), threads, |_| ControlFlow::Continue(()))
+        count(&table, &plan(), threads, |_| ControlFlow::Continue(())).expect("countable")
     }
 
     #[test]
@@ -341,11 +387,11 @@ mod tests {
             let Sums::Equal(numbers) = sums else {
                 panic!("equal weights")
             };
-            assert_eq!(numbers.len(), 2 * 4 * size);
+            assert_eq!(numbers.len(), 2 * zoo().len() * size);
             let total: u64 = numbers.iter().map(|c| u64::from(*c)).sum();
             assert_eq!(total + counts.unmet_rays, u64::from(n));
             // Held out: a tenth, within four standard deviations of a binomial.
-            let out: u32 = numbers[4 * size..].iter().sum();
+            let out: u32 = numbers[zoo().len() * size..].iter().sum();
             let (mean, deviation) = (0.1 * total as f64, (0.09 * total as f64).sqrt());
             assert!((f64::from(out) - mean).abs() < 4.0 * deviation + 1.0, "{out} {mean}");
         }
@@ -388,21 +434,57 @@ mod tests {
     }
 
     #[test]
+    fn parts_may_have_grids_of_their_own() {
+        // Cells of a coarser grid hold what their cells of a finer one hold together.
+        let bytes = bytes(50_000, |_| 1.0);
+        let table = RayTable::new(&bytes, LAYOUT).expect("valid");
+        let coarse = PartGrids {
+            depths: [1, 2, 0, 1],
+            fine: [2, 1],
+        };
+        let mixed = Plan {
+            grids: vec![GRIDS, coarse, GRIDS, coarse, coarse],
+            ..plan()
+        };
+        let found = count(&table, &mixed, 2, |_| ControlFlow::Continue(())).expect("countable");
+        let finer = run(&bytes, 2);
+        let (Sums::Equal(found), Sums::Equal(finer)) = (&found.grid, &finer.grid) else {
+            panic!("equal weights")
+        };
+        let fold = 2 * 256 + 3 * 16;
+        assert_eq!(found.len(), 2 * fold);
+        for held_out in [0, 1] {
+            let (mine, whole) = (
+                &found[held_out * fold..][..fold],
+                &finer[held_out * 5 * 256..][..5 * 256],
+            );
+            assert_eq!(mine[..256], whole[..256]);
+            let mut expected = [0; 16];
+            for (cell, n) in whole[256..512].iter().enumerate() {
+                // Coordinates of 2, 3, 2 and 1 halvings, of which 1, 2, 0 and 1 are kept.
+                let [i, j, l] = [cell >> 6, (cell >> 3) & 7, cell & 1];
+                expected[(i >> 1) << 3 | (j >> 1) << 1 | l] += n;
+            }
+            assert_eq!(mine[256..272], expected);
+        }
+    }
+
+    #[test]
     fn absurd_plans_are_told() {
-        assert!(plan().is_countable());
-        assert!(
-            !Plan {
+        let refused = |grids: Vec<PartGrids>| {
+            let table = RayTable::new(&[], LAYOUT).expect("valid");
+            count(&table, &Plan { grids, ..plan() }, 1, |_| ControlFlow::Continue(())).is_none()
+        };
+        let parts = zoo().len();
+        assert!(!refused(vec![GRIDS; parts]));
+        assert!(refused(vec![GRIDS; parts - 1]));
+        assert!(refused(vec![
+            PartGrids {
                 depths: [8, 8, 8, 8],
-                ..plan()
-            }
-            .is_countable()
-        );
-        assert!(
-            !Plan {
-                fine: [40, 2],
-                ..plan()
-            }
-            .is_countable()
-        );
+                ..GRIDS
+            };
+            parts
+        ]));
+        assert!(refused(vec![PartGrids { fine: [40, 2], ..GRIDS }; parts]));
     }
 }

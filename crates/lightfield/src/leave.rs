@@ -3,10 +3,10 @@
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
-use crate::surface::{CarrierPart, Shape};
+use crate::surface::{CarrierPart, Focus, Shape};
 
-/// Distance along a line at which it leaves a part, and the cosine of its angle with the normal there; the distance is NaN if
-/// it does not.
+/// Distance along a line at which it leaves a part, and the cosine under which the part's area is seen from where the line
+/// begins; the distance is NaN if it does not leave it.
 type Left = (f64, f64);
 
 /// A part as lines leave it, in its own coordinates.
@@ -22,15 +22,20 @@ fn left(met: bool, t: f64, cosine: f64) -> Left {
 struct Rectangle {
     width: f64,
     height: f64,
+    focus: Focus,
 }
 
 impl Leave for Rectangle {
     #[inline(always)]
     fn leave(&self, o: Vec3, d: Vec3) -> Left {
         let t = -o.z / d.z;
-        let (x, y) = ((o.x + t * d.x) / self.width + 0.5, (o.y + t * d.y) / self.height + 0.5);
+        let there = t + self.focus.at(d.z) / d.z;
+        let (x, y) = (
+            (o.x + there * d.x) / self.width + 0.5,
+            (o.y + there * d.y) / self.height + 0.5,
+        );
         let inside = (0.0..=1.0).contains(&x) & (0.0..=1.0).contains(&y);
-        left((d.z > 0.0) & inside, t, d.z)
+        left((d.z > 0.0) & inside, t, self.focus.seen(d.z, o.z))
     }
 }
 
@@ -95,14 +100,15 @@ pub struct Sights<'a> {
 }
 
 impl CarrierPart {
-    /// How far from `position` the line along `direction` leaves the part, and the cosine of its angle with the normal there;
-    /// None if it does not.
+    /// How far from `position` the line along `direction` leaves the part, and the cosine under which its area is seen from
+    /// there: that of the angle with the normal, and where the depth changes with direction what makes
+    /// cosine · area / distance² the solid angle. None if it does not.
     #[inline]
     #[must_use]
     pub fn leaves(&self, position: Vec3, direction: Vec3) -> Option<(f64, f64)> {
         let (o, d) = self.localise(position, direction);
         let (t, cosine) = match self.shape {
-            Shape::Rectangle { width, height } => Rectangle { width, height }.leave(o, d),
+            Shape::Rectangle { width, height, focus } => Rectangle { width, height, focus }.leave(o, d),
             Shape::Disk { radius } => Disk { radius }.leave(o, d),
             Shape::Hemisphere { radius } => Hemisphere { radius }.leave(o, d),
             Shape::Tube { radius, height } => Tube { radius, height }.leave(o, d),
@@ -121,7 +127,9 @@ impl CarrierPart {
             z: frame.direction_to_world(own.z),
         };
         match self.shape {
-            Shape::Rectangle { width, height } => mark(&Rectangle { width, height }, &placed, sights, marks),
+            Shape::Rectangle { width, height, focus } => {
+                mark(&Rectangle { width, height, focus }, &placed, sights, marks);
+            }
             Shape::Disk { radius } => mark(&Disk { radius }, &placed, sights, marks),
             Shape::Hemisphere { radius } => mark(&Hemisphere { radius }, &placed, sights, marks),
             Shape::Tube { radius, height } => mark(&Tube { radius, height }, &placed, sights, marks),

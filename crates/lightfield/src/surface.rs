@@ -10,15 +10,89 @@ use etendue_math::{Frame, Vec3};
 use etendue_sampling::warp::{disk_to_square, square_to_disk};
 use multiversion::multiversion;
 
+/// The depth at which light of each inclination is sharp: a cubic in 1 − cos θ, from its constant term on \[mm\].
+///
+/// It moves places by a function of the direction only, so that étendue stays what it is. Theory eq. 42.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Focus(pub [f64; 4]);
+
+impl Focus {
+    /// The height at which lines of this direction cosine along z have their places.
+    #[inline(always)]
+    #[must_use]
+    pub fn at(&self, cosine: f64) -> f64 {
+        let [a, b, c, d] = self.0;
+        let lean = 1.0 - cosine;
+        a + lean * (b + lean * (c + lean * d))
+    }
+
+    /// What takes the place of the cosine of a line in cosine · area / distance², the solid angle under which an area of
+    /// places is seen from `height` above the plane, the distance being that to the plane.
+    ///
+    /// With the slope m of the line, x' = x - (h - ζ) m; ζ changes with m, so that the determinant of dx'/dm is
+    /// (h - ζ)² (1 + ζ' c (1 - c²)/(h - ζ)), and dm = dΩ/c³.
+    #[inline(always)]
+    #[must_use]
+    pub fn seen(&self, cosine: f64, height: f64) -> f64 {
+        let above = height - self.at(cosine);
+        let nearer = if above == 0.0 { 1.0 } else { height / above };
+        cosine * nearer * nearer / self.stretch(cosine, above)
+    }
+
+    /// The second factor of that determinant.
+    #[inline(always)]
+    fn stretch(&self, cosine: f64, above: f64) -> f64 {
+        let [_, b, c, d] = self.0;
+        let lean = 1.0 - cosine;
+        let slope = -(b + lean * (2.0 * c + lean * 3.0 * d));
+        // On the surface itself nothing is seen of it.
+        if above == 0.0 {
+            1.0
+        } else {
+            1.0 + slope * cosine * (1.0 - cosine * cosine) / above
+        }
+    }
+
+    /// The cosine of the line from a place to a point `across` beside it and `height` above the plane; None if there is none.
+    fn aim(&self, across: f64, height: f64) -> Option<f64> {
+        let cosine_of = |slope: f64| 1.0 / (1.0 + slope * slope).sqrt();
+        let mut slope = across / (height - self.at(1.0));
+        for _ in 0..AIM_STEPS {
+            let cosine = cosine_of(slope);
+            let above = height - self.at(cosine);
+            let step = (across - above * slope) / (above * self.stretch(cosine, above));
+            slope += step;
+            if !(slope >= 0.0 && above > 0.0) {
+                return None;
+            }
+            if step.abs() <= 1e-14 * (1.0 + slope) {
+                return Some(cosine_of(slope));
+            }
+        }
+        None
+    }
+
+    /// The largest height of a place above or below the plane.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        self.0.iter().map(|f| f.abs()).sum()
+    }
+}
+
+/// Newton steps towards the direction in which a place is seen: a handful suffice where the depth changes little.
+const AIM_STEPS: usize = 32;
+
 /// The shape of a part in its frame; lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// In the plane z = 0, centred, emitting towards +z.
+    /// About the plane z = 0, centred, emitting towards +z.
     Rectangle {
         /// Along x.
         width: f64,
         /// Along y.
         height: f64,
+        /// Height above the plane at which the place of a line is taken, by its direction.
+        focus: Focus,
     },
     /// In the plane z = 0, centred, emitting towards +z.
     Disk {
@@ -74,8 +148,8 @@ fn departure(inside: bool, place: (f64, f64), p: f64, q: f64) -> Departure {
 }
 
 #[inline(always)]
-fn cross_rectangle(width: f64, height: f64, o: Vec3, d: Vec3) -> Departure {
-    let t = -o.z / d.z;
+fn cross_rectangle(width: f64, height: f64, focus: Focus, o: Vec3, d: Vec3) -> Departure {
+    let t = (focus.at(d.z) - o.z) / d.z;
     let place = ((o.x + t * d.x) / width + 0.5, (o.y + t * d.y) / height + 0.5);
     departure(d.z > 0.0, place, d.x, d.y)
 }
@@ -149,18 +223,19 @@ impl CarrierPart {
     pub fn area(&self) -> f64 {
         use std::f64::consts::PI;
         match self.shape {
-            Shape::Rectangle { width, height } => width * height,
+            Shape::Rectangle { width, height, .. } => width * height,
             Shape::Disk { radius } => PI * radius * radius,
             Shape::Hemisphere { radius } => 2.0 * PI * radius * radius,
             Shape::Tube { radius, height } => 2.0 * PI * radius * height,
         }
     }
 
-    /// Largest distance of a point of the part from the origin of its frame \[mm\].
+    /// Largest distance of a place of the part from the origin of its frame \[mm\]. Where the depth of places changes with
+    /// direction, lines near the horizon may cross the plane farther out.
     #[must_use]
     pub fn reach(&self) -> f64 {
         match self.shape {
-            Shape::Rectangle { width, height } => 0.5 * width.hypot(height),
+            Shape::Rectangle { width, height, focus } => (0.5 * width.hypot(height)).hypot(focus.reach()),
             Shape::Disk { radius } | Shape::Hemisphere { radius } => radius,
             Shape::Tube { radius, height } => radius.hypot(0.5 * height),
         }
@@ -178,13 +253,49 @@ impl CarrierPart {
         matches!(self.shape, Shape::Tube { .. })
     }
 
+    /// A point of the line of direction `k` that leaves the part at a place, and the cosine of its angle with the normal.
+    #[must_use]
+    pub fn leaving(&self, place: [f64; 2], k: Vec3) -> (Vec3, f64) {
+        let (point, normal) = self.ray(place, [0.5, 0.5]);
+        let cosine = k.dot(normal);
+        match self.shape {
+            Shape::Rectangle { focus, .. } => (point + normal * focus.at(cosine), cosine),
+            _ => (point, cosine),
+        }
+    }
+
+    /// Where the line that leaves at a place and goes to `p` leaves the part, and the cosine by which the area of its place is
+    /// seen from `p`; None if there is no such line.
+    ///
+    /// The cosine holds the change of depth with direction, so that cosine · area / distance² is the solid angle.
+    #[must_use]
+    pub fn seen_from(&self, place: [f64; 2], p: Vec3) -> Option<(Vec3, f64)> {
+        let (point, normal) = self.ray(place, [0.5, 0.5]);
+        let away = p - point;
+        match self.shape {
+            Shape::Rectangle { focus, .. } if focus != Focus::default() => {
+                let height = away.dot(normal);
+                let across = away - normal * away.dot(normal);
+                let cosine = focus.aim(across.length(), height)?;
+                let seen = focus.seen(cosine, height);
+                let sharp = point + normal * focus.at(cosine);
+                let k = (p - sharp).normalized();
+                (seen > 0.0 && height > 0.0).then_some((p - k * (height / cosine), seen))
+            }
+            _ => {
+                let cosine = away.dot(normal) / away.length();
+                (cosine > 0.0).then_some((point, cosine))
+            }
+        }
+    }
+
     /// Where the line through `position` along `direction` leaves the part.
     #[inline]
     #[must_use]
     pub fn cross(&self, position: Vec3, direction: Vec3) -> Departure {
         let (o, d) = self.localise(position, direction);
         match self.shape {
-            Shape::Rectangle { width, height } => cross_rectangle(width, height, o, d),
+            Shape::Rectangle { width, height, focus } => cross_rectangle(width, height, focus, o, d),
             Shape::Disk { radius } => cross_disk(radius, o, d),
             Shape::Hemisphere { radius } => cross_hemisphere(radius, o, d),
             Shape::Tube { radius, height } => cross_tube(radius, height, o, d),
@@ -207,10 +318,13 @@ impl CarrierPart {
         let (p, q) = square_to_disk(direction[0], direction[1]);
         let up = (1.0 - p * p - q * q).max(0.0).sqrt();
         let (point, k) = match self.shape {
-            Shape::Rectangle { width, height } => (
-                Vec3::new((s1 - 0.5) * width, (s2 - 0.5) * height, 0.0),
-                Vec3::new(p, q, up),
-            ),
+            Shape::Rectangle { width, height, focus } => {
+                let k = Vec3::new(p, q, up);
+                let sharp = Vec3::new((s1 - 0.5) * width, (s2 - 0.5) * height, focus.at(up));
+                // Along the horizon nothing meets the plane.
+                let back = if up > 0.0 { sharp.z / up } else { 0.0 };
+                (sharp - k * back, k)
+            }
             Shape::Disk { radius } => {
                 let (x, y) = square_to_disk(s1, s2);
                 (Vec3::new(x * radius, y * radius, 0.0), Vec3::new(p, q, up))
@@ -266,7 +380,9 @@ pub fn carry(parts: &[CarrierPart], batch: &RayBatch, out: &mut Coordinates) {
     out.part[..n].fill(Coordinates::NONE);
     for (index, part) in (0_u32..).zip(parts) {
         match part.shape {
-            Shape::Rectangle { width, height } => carry_rectangle(part, (width, height), index, batch, out),
+            Shape::Rectangle { width, height, focus } => {
+                carry_rectangle(part, (width, height), focus, index, batch, out);
+            }
             Shape::Disk { radius } => carry_disk(part, radius, index, batch, out),
             Shape::Hemisphere { radius } => carry_hemisphere(part, radius, index, batch, out),
             Shape::Tube { radius, height } => carry_tube(part, (radius, height), index, batch, out),
@@ -275,8 +391,21 @@ pub fn carry(parts: &[CarrierPart], batch: &RayBatch, out: &mut Coordinates) {
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn carry_rectangle(part: &CarrierPart, size: (f64, f64), index: u32, batch: &RayBatch, out: &mut Coordinates) {
-    carry_part(part, |o, d| cross_rectangle(size.0, size.1, o, d), index, batch, out);
+fn carry_rectangle(
+    part: &CarrierPart,
+    size: (f64, f64),
+    focus: Focus,
+    index: u32,
+    batch: &RayBatch,
+    out: &mut Coordinates,
+) {
+    carry_part(
+        part,
+        |o, d| cross_rectangle(size.0, size.1, focus, o, d),
+        index,
+        batch,
+        out,
+    );
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
@@ -336,12 +465,18 @@ pub(crate) mod tests {
             Shape::Rectangle {
                 width: 2.5,
                 height: 1.5,
+                focus: Focus::default(),
             },
             Shape::Disk { radius: 1.3 },
             Shape::Hemisphere { radius: 1.7 },
             Shape::Tube {
                 radius: 0.8,
                 height: 2.2,
+            },
+            Shape::Rectangle {
+                width: 2.5,
+                height: 1.5,
+                focus: Focus([-0.1, 0.3, -0.2, 0.15]),
             },
         ]
         .map(|shape| CarrierPart { frame, shape })
@@ -377,6 +512,56 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn places_are_seen_where_their_lines_leave_and_under_their_solid_angle() {
+        // The solid angle of a small square of places, by the directions to its corners, against cosine · area / distance².
+        for part in zoo() {
+            let mut seen = 0;
+            for [s1, s2, a, b] in lattice(500) {
+                let place = [0.05 + 0.9 * s1, 0.05 + 0.9 * s2];
+                if ((2.0 * place[0] - 1.0).abs() - (2.0 * place[1] - 1.0).abs()).abs() < 1e-3 {
+                    continue; // a kink of the concentric map
+                }
+                let normal = part.ray(place, [0.5, 0.5]).1;
+                let (x, k) = part.ray([0.5, 0.5], [a, b]);
+                let p = x + k * 7.0;
+                let Some((point, cosine)) = part.seen_from(place, p) else {
+                    continue;
+                };
+                let away = p - point;
+                let distance = away.length();
+                let k = away * (1.0 / distance); // whose length the solid angle counts from the plane
+                let crossing = part.cross(p, k);
+                if !crossing.met || k.dot(normal) < 0.05 {
+                    continue; // another side of a curved part, or seen edge-on
+                }
+                seen += 1;
+                let (left, own) = part.leaving(place, k);
+                let beside = (left - point) - k * (left - point).dot(k);
+                assert!(beside.length() < 1e-12 && (own - k.dot(normal)).abs() < 1e-12);
+                for (found, given) in crossing.place.iter().zip(place) {
+                    assert!((found - given).abs() < 1e-9, "{part:?} {found} {given}");
+                }
+                let step = 1e-5;
+                let towards = |u: f64, v: f64| {
+                    let point = part
+                        .seen_from([place[0] + u * step, place[1] + v * step], p)
+                        .expect("near")
+                        .0;
+                    (p - point).normalized()
+                };
+                let (du, dv) = (
+                    towards(1.0, 0.0) - towards(-1.0, 0.0),
+                    towards(0.0, 1.0) - towards(0.0, -1.0),
+                );
+                let angle = du.cross(dv).length() / (4.0 * step * step);
+                let expected = cosine * part.area() / (distance * distance);
+                assert!((angle / expected - 1.0).abs() < 1e-4, "{part:?} {angle} {expected}");
+            }
+            assert!(seen > 100, "{part:?} {seen}");
+        }
+    }
+
+    #[test]
     fn a_line_leaves_where_it_crosses() {
         for part in zoo() {
             let mut missed = 0;
@@ -388,7 +573,15 @@ pub(crate) mod tests {
                     // The same square root as above.
                     let error = 1e-12 * (1.0 + along.abs()) / cosine.max(1e-6);
                     assert!((t + along).abs() < error, "{part:?} {t} {along}");
-                    assert!((cosine - normal.dot(k)).abs() < error, "{part:?} {cosine}");
+                    let focused = matches!(part.shape, Shape::Rectangle { focus, .. } if focus != Focus::default());
+                    let expected = match focused {
+                        false => normal.dot(k),
+                        true if along > 0.0 && normal.dot(k) > 0.3 => {
+                            part.seen_from([s1, s2], x + k * along).expect("far enough").1
+                        }
+                        true => cosine, // nothing is seen from behind, or a place in several directions
+                    };
+                    assert!((cosine - expected).abs() < error, "{part:?} {cosine}");
                 }
                 // Lines beside it: the two agree on which are met.
                 let aside = x + Vec3::new(s1 - 0.4, b - 0.5, a - 0.3) * 60.0;

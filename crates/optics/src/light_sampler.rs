@@ -20,7 +20,7 @@ pub struct SourceHit {
     pub luminance: f64,
     /// Its standard deviation, for sources that know one.
     pub deviation: f64,
-    /// Cosine of the angle of emission.
+    /// Cosine of the angle of emission, or what takes its place where the area is seen under another solid angle.
     pub cosine: f64,
     /// Density, by area, with which [`LightSample::pick`] picks this point \[1/mm²\].
     pub density: f64,
@@ -214,9 +214,10 @@ impl LightSampler {
             ((cell / n2) as f64 + numbers.draw()) / n1 as f64,
             ((cell % n2) as f64 + numbers.draw()) / n2 as f64,
         ];
-        let (point, normal) = part.part.ray(place, [0.5, 0.5]);
-        let (distance2, cosine) = towards(point, normal, p)?;
-        let crossing = part.part.cross(point, (p - point) * (1.0 / distance2.sqrt()));
+        let (point, cosine) = part.part.seen_from(place, p)?;
+        let away = p - point;
+        let distance2 = away.dot(away);
+        let crossing = part.part.cross(point, away * (1.0 / distance2.sqrt()));
         if !crossing.met {
             return None;
         }

@@ -17,12 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.lightfield.candidate import FINE_POSITIONS, grow_symmetric, product_bases, unit_field
+from etendue.lightfield.candidate import FINE_POSITIONS, PartEstimate, base_of, grow_part, images_of
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.etendue_density import core_part
-from etendue.lightfield.surfaces import Part
 from etendue.lightfield.symmetry import order, sum_of_images
-from etendue.lightfield.trees import ELSEWHERE, POSITIONS, Base, Tree, grow, grow_moved
+from etendue.lightfield.trees import ELSEWHERE, Base, Tree, grow, grow_moved
 
 STRATA = 12
 """Classes by either feature: about 7000 of a million cells in each."""
@@ -56,44 +55,41 @@ class Masses:
         return certainty.ravel(), np.log(np.maximum(spread, 1e-6)).ravel()
 
 
-def calibrate(
-    chart: Part,
-    counts: PartCounts,
-    base: Base,
-    tree: Tree,
-    concentration: float,
-    symmetry: str,
-    seed: int,
-    threads: int | None,
-) -> Tree:
-    """The tree with calibrated standard deviations."""
-    found = _masses(counts.grid, base, tree, threads)
-    known, known_base = _elsewhere(counts, base, concentration, symmetry, threads)
-    drawn = _draw(known, counts, known_base, symmetry, seed)
-    again = base if base.name == "uniform" else product_bases([drawn], threads, symmetry)[0]
-    second = grow_symmetric(drawn.grid, again, concentration, threads, POSITIONS, symmetry)
-    retried = _masses(drawn.grid, again, second, threads)
-    shown = _shown(chart, again, second, threads)
-    factors = _factors(retried, np.abs(shown - known) / np.maximum(retried.deviation, _tiny(known)), found)
-    cells = base.cells(tree.ratio.shape)
-    deviation = np.divide(found.deviation * factors, cells, out=np.zeros_like(cells), where=cells > 0)
-    return dataclasses.replace(tree, deviation=deviation)
+def calibrate(found: PartEstimate, counts: PartCounts, symmetry: str, seed: int, threads: int | None) -> Tree:
+    """The tree of an estimate with calibrated standard deviations."""
+    own = _masses(found, counts.grid, threads)
+    known, within = _elsewhere(found, counts, symmetry, threads)
+    drawn = _draw(known, counts, within, symmetry, seed)
+    images = images_of(drawn, found.chart, threads, symmetry) if _uses_images(found) else found.images
+    again = grow_part(drawn, found.chart, found.recipe, images, found.concentration, threads, symmetry)
+    retried = _masses(again, drawn.grid, threads)
+    errors = np.abs(_shown(again, threads) - known) / np.maximum(retried.deviation, _tiny(known))
+    factors = _factors(retried, errors, own)
+    # What a cell is off by, as a share of what it shows, is what the ratio is off by.
+    shown = _shown(found, threads)
+    relative = np.divide(own.deviation * factors, shown, out=np.zeros_like(shown), where=shown > 0)
+    return dataclasses.replace(found.tree, deviation=relative * found.tree.ratio)
 
 
-def _shown(chart: Part, base: Base, tree: Tree, threads: int | None) -> FloatArray:
+def _uses_images(estimate: PartEstimate) -> bool:
+    return estimate.recipe != "uniform" or estimate.chart.hole > 0.0
+
+
+def _shown(estimate: PartEstimate, threads: int | None) -> FloatArray:
     """The share of each cell in the flux of the field that users are shown."""
-    field = _core.LightField([core_part(chart.core(), unit_field(base, tree))])
-    means = field.cell_means(0, threads)[0].reshape(tree.ratio.shape)
+    field = _core.LightField([core_part(estimate.chart.core(), estimate.unit)])
+    means = field.cell_means(0, threads)[0].reshape(estimate.tree.ratio.shape)
     shares: FloatArray = means / means.sum()
     return shares
 
 
-def _masses(counts: Sums, base: Base, tree: Tree, threads: int | None) -> Masses:
-    """Masses with the posterior deviations of the ratio and, where the base came from the data, of its margins."""
-    cells = base.cells(tree.ratio.shape)
-    mean = tree.ratio * cells
-    variance = (tree.deviation * cells) ** 2
-    if base.name == "product":
+def _masses(estimate: PartEstimate, counts: Sums, threads: int | None) -> Masses:
+    """What cells show, with the relative deviations of the tree and, where images are used, of its margins."""
+    tree = estimate.tree
+    mean = _shown(estimate, threads)
+    relative = np.divide(tree.deviation, tree.ratio, out=np.zeros_like(tree.ratio), where=tree.ratio > 0)
+    variance = (mean * relative) ** 2
+    if _uses_images(estimate):
         for axes, shape in (((2, 3), (slice(None), slice(None), None, None)), ((0, 1), (None, None))):
             margin = grow(counts.map(np.sum, axes), Base(), 1.0, threads)
             variance = variance + (mean * (margin.deviation / margin.ratio)[shape]) ** 2
@@ -101,23 +97,30 @@ def _masses(counts: Sums, base: Base, tree: Tree, threads: int | None) -> Masses
 
 
 def _elsewhere(
-    counts: PartCounts, base: Base, concentration: float, symmetry: str, threads: int | None
+    found: PartEstimate, counts: PartCounts, symmetry: str, threads: int | None
 ) -> tuple[FloatArray, Base]:
-    """The masses that a grid in another position finds, with its base measure in place of the given one."""
+    """The masses that a grid in another position finds, and the fine densities within its cells."""
     shape = counts.grid.weight.shape
     shift = tuple(round(share * n) for share, n in zip(ELSEWHERE, shape, strict=True))
-    moved = base
-    if base.name == "product":
+    if _uses_images(found):
         # Edges of the margins, too, are found anew: on the old grid they would lie where its boxes end.
         fine = [
             sums.map(np.roll, _fine_steps(s, n, sums.weight.shape[0]), (0, 1))
             for sums, s, n in ((counts.space, shift[:2], shape[:2]), (counts.direction, shift[2:], shape[2:]))
         ]
-        there = product_bases([PartCounts(counts.grid, *fine)], threads, positions=KNOWN_POSITIONS)[0]
-        moved = there.rolled(tuple(-s for s in shift), shape)
-    tree = grow_moved(counts.grid, moved, shift, concentration, threads)
-    mass = sum_of_images(tree.ratio * moved.cells(shape), symmetry)
-    return mass / mass.sum(), moved
+        whole = dataclasses.replace(found.chart, hole=0.0)
+        there = images_of(PartCounts(counts.grid, *fine), whole, threads, positions=KNOWN_POSITIONS)
+        images = there.rolled(tuple(-s for s in shift), shape)
+        if found.images.space is not None and images.space is not None:
+            # The rolled image is floored; where nothing can be, nothing is drawn.
+            images = Base(np.where(found.images.space > 0, images.space, 0.0), images.direction)
+    else:
+        images = found.images
+    base = base_of(found.chart, found.recipe, images)
+    tree = grow_moved(counts.grid, base, shift, found.concentration, threads)
+    known = PartEstimate(found.chart, found.recipe, images, found.concentration, tree)
+    mass = sum_of_images(_shown(known, threads), symmetry)
+    return mass / mass.sum(), Base(known.unit.space, known.unit.direction)
 
 
 def _fine_steps(shift: tuple[int, ...], shape: tuple[int, ...], fine: int) -> list[int]:
@@ -145,7 +148,9 @@ def _refine(coarse: FloatArray, fine: FloatArray | None, generator: np.random.Ge
     (rows, columns), n = coarse.shape, fine.shape[0]
     blocks = fine.reshape(rows, n // rows, columns, n // columns).transpose(0, 2, 1, 3)
     shares = blocks.reshape(rows * columns, -1)
-    dealt = generator.multinomial(coarse.astype(np.int64).ravel(), shares / shares.sum(axis=1, keepdims=True))
+    sums = shares.sum(axis=1, keepdims=True)
+    shares = np.where(sums > 0, shares / np.where(sums > 0, sums, 1.0), 1.0 / shares.shape[1])
+    dealt = generator.multinomial(coarse.astype(np.int64).ravel(), shares)
     back = dealt.reshape(rows, columns, n // rows, n // columns).transpose(0, 2, 1, 3)
     refined: FloatArray = back.reshape(n, n).astype(np.float64)
     return refined

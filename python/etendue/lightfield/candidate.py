@@ -1,9 +1,11 @@
-"""One way to explain the counts: a base measure and a tree for each part; and how well it predicts held-out rays."""
+"""One way to explain the counts: images, a base measure and a tree for each part; and how well it predicts held-out rays."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,47 +13,77 @@ from etendue import _core
 from etendue.denoising.shifted_trees import LATTICE
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
 from etendue.lightfield.etendue_density import PartField, core_part
+from etendue.lightfield.marginals import scaled
 from etendue.lightfield.nodes import node_values
+from etendue.lightfield.surfaces import Part
 from etendue.lightfield.symmetry import order, sum_of_images
 from etendue.lightfield.trees import POSITIONS, Base, Tree, grow_averaged, log_evidence
 
 CONCENTRATIONS = {"uniform": (1.0, 3.0, 10.0), "product": (10.0, 30.0, 100.0)}
 """Concentrations c among which the evidence chooses, by base measure: one that was taken from the data is believed more."""
 
+IMAGE_CONCENTRATION = 3.0
+"""That of the trees of images: from 1 to 10 their errors differ by some hundredths."""
+
 FLOOR = 1e-3
-"""Share of a uniform density in the factors of a product base: where they are wrongly dark, the data can still say so."""
+"""Share of a uniform density in the images: where they are wrongly dark, the data can still say so."""
 
 MIXED_IN = 1e-4
 """Least share of the even density in every score, so that one cell that is wrongly dark cannot decide it."""
 
 FINE_POSITIONS = tuple((k * LATTICE[0] % 1.0, k * LATTICE[1] % 1.0) for k in range(16))
-"""Positions of the fine grids over which the factors of a product base are averaged: evenly spread."""
+"""Positions of the fine grids over which images are averaged: evenly spread."""
 
 
-def uniform_bases(counts: Sequence[PartCounts]) -> tuple[Base, ...]:
-    """Nothing is known beforehand: every cell has the same luminance."""
-    return tuple(Base() for _ in counts)
+class Recipe(NamedTuple):
+    """How a part's light is estimated.
+
+    Parameters
+    ----------
+    product : bool
+        Whether the tree's base measure is the product of the images over place and direction; if not, it is uniform.
+    scaled : bool
+        Whether the field's marginals are made those of the images.
+    """
+
+    product: bool
+    scaled: bool
 
 
-def product_bases(
-    counts: Sequence[PartCounts],
+RECIPES: dict[str, Recipe] = {
+    "uniform": Recipe(product=False, scaled=False),
+    "scaled": Recipe(product=False, scaled=True),
+    "product": Recipe(product=True, scaled=True),
+}
+"""By name, the simplest first. Images are sharp where place and direction go apart, the tree where they do not."""
+
+
+def images_of(
+    counts: PartCounts,
+    chart: Part,
     threads: int | None,
     symmetry: str = "none",
     positions: Sequence[tuple[float, ...]] = FINE_POSITIONS,
-) -> tuple[Base, ...]:
-    """Exitance times intensity: what the fine counts over place and over direction tell, each by itself.
+) -> Base:
+    """Densities over the place and over the direction: what the fine counts tell, each by itself.
 
-    Either is a tree of its own, averaged over positions of the fine grid.
+    Either is a tree of its own, averaged over positions of the fine grid. Where the part has a hole, nothing is left.
     """
+    if counts.space.rays == 0:
+        return Base()
 
     def density(sums: Sums) -> FloatArray:
-        found = grow_symmetric(sums, Base(), 1.0, threads, positions, symmetry).ratio
+        found = grow_symmetric(sums, Base(), IMAGE_CONCENTRATION, threads, positions, symmetry).ratio
         lifted: FloatArray = found * (1.0 - FLOOR) + FLOOR
         return lifted
 
-    return tuple(
-        Base(density(part.space), density(part.direction)) if part.space.rays > 0 else Base() for part in counts
-    )
+    return Base(density(counts.space) * _outside(counts.space.weight.shape[0], chart.hole), density(counts.direction))
+
+
+def _outside(n: int, hole: float) -> FloatArray:
+    """1 at the centres of those of n × n cells that lie outside a hole of this share of the sides, 0 within."""
+    beside = np.abs((np.arange(n) + 0.5) / n - 0.5) >= hole / 2.0
+    return (beside[:, None] | beside[None, :]).astype(np.float64)
 
 
 def grow_symmetric(
@@ -68,34 +100,67 @@ def grow_symmetric(
     return dataclasses.replace(tree, ratio=ratio, deviation=deviation)
 
 
-def unit_field(base: Base, tree: Tree) -> PartField:
-    """What a tree on a base measure tells of a part's light, up to a factor."""
-    ratio, deviation = (node_values(v).astype(np.float32) for v in (tree.ratio, tree.deviation))
-    return PartField(ratio, deviation, base.space, base.direction, 1.0)
+@dataclasses.dataclass(frozen=True, eq=False)
+class PartEstimate:
+    """What is found of the light of one part.
+
+    Parameters
+    ----------
+    chart : Part
+    recipe : str
+        A name in `RECIPES`.
+    images : Base
+        Over place and direction.
+    concentration : float
+    tree : Tree
+        On the recipe's base measure.
+    """
+
+    chart: Part
+    recipe: str
+    images: Base
+    concentration: float
+    tree: Tree
+
+    @property
+    def base(self) -> Base:
+        """The base measure of the tree."""
+        return base_of(self.chart, self.recipe, self.images)
+
+    @functools.cached_property
+    def unit(self) -> PartField:
+        """The field, up to a factor."""
+        ratio, deviation = (node_values(v).astype(np.float32) for v in (self.tree.ratio, self.tree.deviation))
+        field = PartField(ratio, deviation, self.base.space, self.base.direction, 1.0)
+        if RECIPES[self.recipe].scaled or self.chart.hole:
+            return scaled(field, self.images, self.chart.shape == "tube")
+        return field
+
+    def field(self, flux: float) -> PartField:
+        """The field with this flux."""
+        integral = _core.LightField([core_part(self.chart.core(), self.unit)]).flux()[0]
+        return dataclasses.replace(self.unit, level=flux / integral)
+
+
+def base_of(chart: Part, recipe: str, images: Base) -> Base:
+    """The base measure of a recipe's tree; around a hole it is that of the images, which know of it."""
+    return images if RECIPES[recipe].product or chart.hole else Base()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Candidate:
-    """Base measure, concentration and tree of each part."""
+    """An estimate of each part's light, all by one recipe."""
 
-    bases: tuple[Base, ...]
-    concentrations: tuple[float, ...]
-    trees: tuple[Tree, ...]
+    parts: tuple[PartEstimate, ...]
 
     @property
     def log_evidence(self) -> float:
-        """Against the base measures, summed over the parts."""
-        return sum(tree.log_evidence for tree in self.trees)
+        """Of the trees against their base measures, summed over the parts."""
+        return sum(part.tree.log_evidence for part in self.parts)
 
     def fields(self, counts: EtendueCounts) -> tuple[PartField, ...]:
         """The parts' fields, each with the flux that was counted on it."""
-        charts = counts.surface.parts()
-        fields = []
-        for chart, base, tree, flux in zip(charts, self.bases, self.trees, counts.part_flux, strict=True):
-            unit = unit_field(base, tree)
-            integral = _core.LightField([core_part(chart.core(), unit)]).flux()[0]
-            fields.append(dataclasses.replace(unit, level=flux / integral))
-        return tuple(fields)
+        return tuple(part.field(flux) for part, flux in zip(self.parts, counts.part_flux, strict=True))
 
     def score(self, counts: EtendueCounts) -> Score:
         """Ln of the density in étendue [1/(mm² sr)] at the held-out rays; see `score_densities`."""
@@ -171,30 +236,61 @@ def _standard_error(values: FloatArray, weights: FloatArray) -> float:
     return float(np.sqrt(np.sum((weights * (values - mean)) ** 2)) / weights.sum())
 
 
+def all_images(
+    counts: EtendueCounts,
+    fold: Fold,
+    threads: int | None,
+    positions: Sequence[tuple[float, ...]] = FINE_POSITIONS,
+) -> tuple[Base, ...]:
+    """The images of each part, from the counts of a fold; see `images_of`."""
+    parts = zip(counts[fold], counts.surface.parts(), strict=True)
+    return tuple(images_of(part, chart, threads, counts.symmetry, positions) for part, chart in parts)
+
+
 def choose_concentrations(
-    counts: Sequence[PartCounts], bases: tuple[Base, ...], threads: int | None
+    counts: EtendueCounts, recipe: str, images: Sequence[Base], threads: int | None
 ) -> tuple[float, ...]:
-    """For each part the concentration of greatest evidence."""
+    """For each part the concentration of greatest evidence, on the rays that are fitted."""
 
     def choose(part: PartCounts, base: Base) -> float:
         options = CONCENTRATIONS[base.name]
         evidence = [log_evidence(part.grid, base, c, threads) for c in options]
         return options[int(np.argmax(evidence))]
 
-    return tuple(choose(part, base) for part, base in zip(counts, bases, strict=True))
+    charts = counts.surface.parts()
+    return tuple(
+        choose(part, base_of(chart, recipe, own))
+        for part, chart, own in zip(counts["fitted"], charts, images, strict=True)
+    )
 
 
 def grow_candidate(
     counts: EtendueCounts,
     fold: Fold,
-    bases: tuple[Base, ...],
+    recipe: str,
+    images: Sequence[Base],
     concentrations: Sequence[float],
     threads: int | None,
     positions: Sequence[tuple[float, ...]] = POSITIONS,
 ) -> Candidate:
-    """The candidate's trees, on the counts of a fold, averaged over positions of the grid."""
-    trees = [
-        grow_symmetric(part.grid, base, c, threads, positions, counts.symmetry)
-        for part, base, c in zip(counts[fold], bases, concentrations, strict=True)
-    ]
-    return Candidate(bases, tuple(concentrations), tuple(trees))
+    """The candidate of a recipe on the counts of a fold, its trees averaged over positions of the grid."""
+    parts = zip(counts[fold], counts.surface.parts(), images, concentrations, strict=True)
+    return Candidate(
+        tuple(grow_part(part, chart, recipe, own, c, threads, counts.symmetry, positions) for part, chart, own, c in parts)
+    )
+
+
+def grow_part(
+    counts: PartCounts,
+    chart: Part,
+    recipe: str,
+    images: Base,
+    concentration: float,
+    threads: int | None,
+    symmetry: str,
+    positions: Sequence[tuple[float, ...]] = POSITIONS,
+) -> PartEstimate:
+    """The estimate of one part."""
+    base = base_of(chart, recipe, images)
+    tree = grow_symmetric(counts.grid, base, concentration, threads, positions, symmetry)
+    return PartEstimate(chart, recipe, images, concentration, tree)

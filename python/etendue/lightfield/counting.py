@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -16,7 +17,11 @@ from etendue.lightfield.surfaces import Surface
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 
 FloatArray = npt.NDArray[np.float64]
+Depths = tuple[int, int, int, int]
 Fold = Literal["fitted", "held out", "all"]
+
+DEEPEST = 16
+"""Halvings of a coordinate that the core finds cells by."""
 
 MOST_CELLS = 1 << 26
 """Cells of all parts together: a gigabyte for the weighted sums of both folds."""
@@ -45,6 +50,12 @@ class Sums:
             return total
         return total**2 / float(self.squared.sum())
 
+    def plus(self, other: Sums) -> Sums:
+        """Those of both."""
+        if self.squared is None or other.squared is None:
+            return Sums(self.weight + other.weight, None)
+        return Sums(self.weight + other.weight, self.squared + other.squared)
+
     def map(self, change: Callable[..., FloatArray], *arguments: object) -> Sums:
         """Both sums, changed alike by a function of an array and further arguments."""
         return Sums(change(self.weight, *arguments), None if self.squared is None else change(self.squared, *arguments))
@@ -57,6 +68,27 @@ class PartCounts:
     grid: Sums
     space: Sums
     direction: Sums
+
+
+@dataclasses.dataclass(frozen=True)
+class PartGrids:
+    """How fine the grids of one part are.
+
+    Parameters
+    ----------
+    depths : tuple of 4 ints
+        2^depth cells along each of s₁, s₂, a, b; all have the same étendue π A / cells.
+    fine : tuple of 2 ints
+        2^depth cells along s₁ and s₂, and along a and b, of the finer grids over place and direction alone.
+    """
+
+    depths: Depths = (5, 5, 5, 5)
+    fine: tuple[int, int] = (8, 6)
+
+    @property
+    def cells(self) -> int:
+        """Of the grid over all four."""
+        return 1 << sum(self.depths)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,8 +117,8 @@ class EtendueCounts:
     ----------
     surface : Surface
         With all its dimensions.
-    depths : tuple of int
-        Halvings of s₁, s₂, a and b.
+    grids : tuple of PartGrids
+        Those of each part.
     folds : dict
         Per fold the counts of each part.
     some_held_out : HeldOutRays
@@ -106,7 +138,7 @@ class EtendueCounts:
     """
 
     surface: Surface
-    depths: tuple[int, int, int, int]
+    grids: tuple[PartGrids, ...]
     folds: dict[Fold, tuple[PartCounts, ...]]
     some_held_out: HeldOutRays
     flux_per_weight: float
@@ -129,8 +161,7 @@ class EtendueCounts:
 def count_rays(
     rays: RayStream,
     surface: Surface,
-    depths: tuple[int, int, int, int] = (5, 5, 5, 5),
-    fine: tuple[int, int] = (8, 6),
+    grids: PartGrids | Sequence[PartGrids] = PartGrids(),
     *,
     held_out: float = 0.1,
     keep: int = 1 << 18,
@@ -146,10 +177,8 @@ def count_rays(
         Any number of rays.
     surface : Surface
         Open dimensions are taken from the rays.
-    depths : tuple of int
-        2^depth cells along each of s₁, s₂, a, b; all have the same étendue π A / cells.
-    fine : tuple of int
-        2^depth cells along s₁ and s₂, and along a and b, of the finer grids over place and direction alone.
+    grids : PartGrids or sequence of them
+        For all parts, or for each.
     held_out : float
         Share of the rays, 0 to ½, that is counted apart; which, hangs on the number of the ray and the seed.
     keep : int
@@ -169,7 +198,7 @@ def count_rays(
     Examples
     --------
     >>> import etendue as et
-    >>> counts = count_rays(et.RingSource(rays=100_000), et.Disk(radius=30), depths=(3, 3, 3, 3))
+    >>> counts = count_rays(et.RingSource(rays=100_000), et.Disk(radius=30), PartGrids((3, 3, 3, 3)))
     >>> [round(flux, 9) for flux in counts.part_flux], counts.unmet_rays
     ([600.0], 0)
     """
@@ -177,17 +206,21 @@ def count_rays(
     parts = surface.parts()
     if not rays.has_position:
         raise ArgumentError("these rays have no positions (a far-field set), so no surface can carry them.")
-    if not all(0 <= d <= 16 for d in (*depths, *fine)) or len(parts) << sum(depths) > MOST_CELLS:
+    grids = (grids,) * len(parts) if isinstance(grids, PartGrids) else tuple(grids)
+    if len(grids) != len(parts):
+        raise ArgumentError(f"{len(grids)} grids for the {len(parts)} parts of {surface.spec}; give one for each.")
+    deepest = [d for g in grids for d in (*g.depths, *g.fine)]
+    if not all(0 <= d <= DEEPEST for d in deepest) or sum(g.cells for g in grids) > MOST_CELLS:
+        told = ", ".join(f"{g.depths} and {g.fine}" for g in dict.fromkeys(grids))
         raise ArgumentError(
-            f"grids of depths {depths} and {fine} on {len(parts)} parts; give depths from 0 to 16 that make at most "
+            f"grids of depths {told} on {len(parts)} parts; give depths from 0 to {DEEPEST} that make at most "
             f"{MOST_CELLS:,} cells."
         )
     share = min(1.0, keep / max(len(rays), 1))
     raw = _core.count_rays(
         rays.core_source(),
         [p.core() for p in parts],
-        depths,
-        fine,
+        [(g.depths, g.fine) for g in grids],
         held_out,
         share,
         seed,
@@ -196,7 +229,7 @@ def count_rays(
     )
     tally = Tally.from_core(raw["tally"])
     scale = rays.accept_tally(tally)
-    folds = _folds(raw, len(parts), depths, fine)
+    folds = _folds(raw, grids)
     counted = sum(float(c.grid.weight.sum()) for c in folds["all"])
     if counted == 0.0:
         raise ArgumentError(
@@ -204,7 +237,7 @@ def count_rays(
         )
     return EtendueCounts(
         surface=surface,
-        depths=depths,
+        grids=grids,
         folds=folds,
         some_held_out=HeldOutRays(raw["kept_part"], raw["kept"], raw["kept_weight"]),
         flux_per_weight=scale * (1.0 if raw["weight"] is None else raw["weight"]),
@@ -216,38 +249,37 @@ def count_rays(
     )
 
 
-def _folds(
-    raw: _core._Counts, parts: int, depths: tuple[int, int, int, int], fine: tuple[int, int]
-) -> dict[Fold, tuple[PartCounts, ...]]:
+def _folds(raw: _core._Counts, grids: tuple[PartGrids, ...]) -> dict[Fold, tuple[PartCounts, ...]]:
     """The core's flat arrays as sums per fold and part, each with the shape of its grid."""
-    shapes = {
-        "grid": tuple(1 << d for d in depths),
-        "space": (1 << fine[0],) * 2,
-        "direction": (1 << fine[1],) * 2,
-    }
+    names: tuple[Literal["grid", "space", "direction"], ...] = ("grid", "space", "direction")
+    shapes = [
+        [tuple(1 << d for d in g.depths) for g in grids],
+        [(1 << g.fine[0],) * 2 for g in grids],
+        [(1 << g.fine[1],) * 2 for g in grids],
+    ]
 
-    def sums(name: Literal["grid", "space", "direction"]) -> Sums:
+    def cut(values: npt.NDArray[np.generic], of_parts: list[tuple[int, ...]]) -> list[list[FloatArray]]:
+        """Per fold and part."""
+        ends = np.cumsum([math.prod(shape) for shape in of_parts])[:-1]
+        return [
+            [piece.reshape(shape).astype(np.float64) for piece, shape in zip(np.split(fold, ends), of_parts, strict=True)]
+            for fold in np.split(values, 2)
+        ]
+
+    def sums(name: Literal["grid", "space", "direction"], of_parts: list[tuple[int, ...]]) -> list[list[Sums]]:
         weight, squared = raw[name]
-        shape = (2, parts, *shapes[name])
-        return Sums(weight.reshape(shape).astype(np.float64), None if squared is None else squared.reshape(shape))
+        weights = cut(weight, of_parts)
+        if squared is None:
+            return [[Sums(w, None) for w in fold] for fold in weights]
+        both = zip(weights, cut(squared, of_parts), strict=True)
+        return [[Sums(w, s) for w, s in zip(*fold, strict=True)] for fold in both]
 
-    grid, space, direction = sums("grid"), sums("space"), sums("direction")
-
-    def fold(pick: Callable[..., FloatArray]) -> tuple[PartCounts, ...]:
-        return tuple(PartCounts(*(s.map(pick, part) for s in (grid, space, direction))) for part in range(parts))
-
-    return {"fitted": fold(_fitted), "held out": fold(_held_out), "all": fold(_all)}
-
-
-def _fitted(sums: FloatArray, part: int) -> FloatArray:
-    chosen: FloatArray = sums[0, part]
-    return chosen
-
-
-def _held_out(sums: FloatArray, part: int) -> FloatArray:
-    chosen: FloatArray = sums[1, part]
-    return chosen
-
-
-def _all(sums: FloatArray, part: int) -> FloatArray:
-    return _fitted(sums, part) + _held_out(sums, part)
+    counted = [sums(name, of_parts) for name, of_parts in zip(names, shapes, strict=True)]
+    fitted, held_out = (
+        tuple(PartCounts(*three) for three in zip(*(kind[fold] for kind in counted), strict=True)) for fold in (0, 1)
+    )
+    together = tuple(
+        PartCounts(*(a.plus(b) for a, b in ((f.grid, h.grid), (f.space, h.space), (f.direction, h.direction))))
+        for f, h in zip(fitted, held_out, strict=True)
+    )
+    return {"fitted": fitted, "held out": held_out, "all": together}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
 import numpy as np
@@ -11,45 +11,52 @@ import numpy as np
 from etendue.errors import ArgumentError
 from etendue.lightfield.calibration import calibrate
 from etendue.lightfield.candidate import (
+    FINE_POSITIONS,
+    RECIPES,
     Candidate,
+    PartEstimate,
     Score,
+    all_images,
     choose_concentrations,
     grow_candidate,
-    product_bases,
     score_densities,
-    uniform_bases,
 )
-from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, count_rays
+from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, PartGrids, count_rays
 from etendue.lightfield.etendue_density import EtendueDensity, FitReport
 from etendue.lightfield.expected_loss import loss_of_gamma
+from etendue.lightfield.focusing import focused
 from etendue.lightfield.pilot_sample import check_near_field, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
-from etendue.lightfield.surfaces import Surface
+from etendue.lightfield.surfaces import Plane, Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry
-from etendue.lightfield.trees import POSITIONS, Base, Tree
+from etendue.lightfield.trees import POSITIONS
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
-
-Depths = tuple[int, int, int, int]
 
 PILOT_RAYS = 1 << 20
 """Rays on which the shape of the grid and the concentrations are chosen."""
 
-FINEST = 8
-"""Halvings of the fine grids over place and over direction for sets of 65 536 rays and more: 256 × 256 cells each."""
+FINEST = 9
+"""Halvings of the fine grids over place and over direction for sets of 262 144 rays and more: 512 × 512 cells each."""
+
+FINEST_DIRECTION = 8
+"""Halvings of the fine grids over direction, whose images are never as sharp."""
 
 SHAPES = (-2, -1, 0, 1, 2)
 """Halvings per coordinate that the place may lend to the direction."""
 
+FEW = 1.0 / 16.0
+"""Share of the rays of the part that has the most below which a part gets a grid of its own."""
+
 LEAD = 3.0
-"""Standard errors by which the score of a product base must lead to be taken."""
+"""Standard errors by which the score of a recipe must lead a simpler one's to be taken."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """What was chosen before all rays are counted: halvings of the grid, and concentrations by base measure and part."""
+    """What was chosen before all rays are counted: the grids of each part, and concentrations by recipe and part."""
 
-    depths: Depths
+    grids: tuple[PartGrids, ...]
     concentrations: dict[str, tuple[float, ...]]
 
 
@@ -72,10 +79,9 @@ def fit_light_field(
             raise ArgumentError(f"surface is {surface!r}; give a Surface, or 'auto'. For text there is parse_surface.")
         choice = choose_surface(rays, seed=seed, threads=threads)
         surface, notes = choice.surface, choice.notes
-    surface = surface.sized_for(rays)
+    surface = focused(surface, rays, seed, threads) if isinstance(surface, Plane) else surface.sized_for(rays)
     plan = make_plan(rays, surface, depths, seed, threads)
-    fine = fine_depths(len(rays), plan.depths)
-    counts = count_rays(rays, surface, plan.depths, fine, seed=seed, threads=threads, progress=progress)
+    counts = count_rays(rays, surface, plan.grids, seed=seed, threads=threads, progress=progress)
     if symmetry == "auto":
         symmetry = proven_symmetry(counts)
         told = "no symmetry is borne out" if symmetry == "none" else f"the rays bear out the symmetry {symmetry}"
@@ -101,48 +107,61 @@ def default_bits(rays: int) -> int:
     return 16 if rays < 30_000 else 20 if rays < 5_000_000 else 22 if rays < 200_000_000 else 24
 
 
-def fine_depths(rays: int, depths: Depths) -> tuple[int, int]:
-    """Halvings of the fine grids: about one ray in each cell suffices, and none is coarser than the grid itself."""
-    wanted = min(FINEST, max(rays, 1).bit_length() // 2)
-    return max(wanted, *depths[:2]), max(wanted, *depths[2:])
+def grids_for(rays: int, depths: Depths) -> PartGrids:
+    """The grids of a part with so many rays: fine ones have about one in each cell, and are not coarser than the others."""
+    wanted = max(rays, 1).bit_length() // 2
+    place, direction = min(FINEST, wanted), min(FINEST_DIRECTION, wanted)
+    return PartGrids(depths, (max(place, *depths[:2]), max(direction, *depths[2:])))
 
 
 def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: int, threads: int | None) -> Plan:
     """Choose, on some of the rays, what predicts held-out rays best: the shape of the grid unless it is given.
 
-    From the even shape the search goes on as long as the score rises, on the base measure that is the better one there.
-    The grids compared have a quarter of the cells of the one to be filled: what is gained by finer cells along one axis
-    and lost by coarser ones along another shows in them, too.
+    From the even shape the search goes on as long as the score rises, by the recipe that is the best one there. The grids
+    compared have a quarter of the cells of the one to be filled: what is gained by finer cells along one axis and lost by
+    coarser ones along another shows in them, too. Parts with few rays have grids of their own, no larger than these fill.
     """
     some = pilot_sample(rays, PILOT_RAYS)
     bits = default_bits(len(rays))
-    lends = (0,) if depths else SHAPES
-    options = {lend: depths or _depths(min(bits, 20) - 2, lend) for lend in lends}
-    fine = fine_depths(len(some), tuple(max(axis) for axis in zip(*options.values(), strict=True)))
-    counts = count_rays(some, surface, options[0], fine, seed=seed, threads=threads)
-    bases = {
-        "uniform": uniform_bases(counts["fitted"]),
-        "product": product_bases(counts["fitted"], threads, counts.symmetry),
-    }
-    concentrations = {name: choose_concentrations(counts["fitted"], b, threads) for name, b in bases.items()}
+    first_look = count_rays(some, surface, PartGrids((1, 1, 1, 1), (1, 1)), seed=seed, threads=threads)
+    shares = np.array([part.grid.rays for part in first_look["all"]]) / first_look.rays
+    few = shares < FEW * shares.max()
 
-    def score(counts: EtendueCounts, name: str) -> float:
-        candidate = grow_candidate(counts, "fitted", bases[name], concentrations[name], threads, POSITIONS[:1])
-        return candidate.score(counts).mean
+    def grids(number: int, own: Depths) -> tuple[PartGrids, ...]:
+        return tuple(
+            grids_for(round(share * number), depths_for(round(share * number)) if is_few and depths is None else own)
+            for share, is_few in zip(shares, few, strict=True)
+        )
 
+    def counted(own: Depths) -> EtendueCounts:
+        return count_rays(some, surface, grids(len(some), own), seed=seed, threads=threads)
+
+    def score(counts: EtendueCounts, recipe: str, c: Sequence[float]) -> float:
+        return grow_candidate(counts, "fitted", recipe, images, c, threads, POSITIONS[:1]).score(counts).mean
+
+    best = 0
+    trial = counted(depths or _depths(min(bits, 20) - 2, best))
+    images = all_images(trial, "fitted", threads, FINE_POSITIONS[:4])
+    concentrations = {name: choose_concentrations(trial, name, images, threads) for name in RECIPES}
     if depths:
-        return Plan(depths, concentrations)
-    first = {name: score(counts, name) for name in bases}
-    name = max(first, key=lambda name: first[name])
-    best, reached = 0, first[name]
+        return Plan(grids(len(rays), depths), concentrations)
+    first = {name: score(trial, name, concentrations[name]) for name in RECIPES}
+    recipe = max(first, key=lambda name: first[name])
+    reached = first[recipe]
     for step in (1, -1):
-        while best * step >= 0 and best + step in options:
-            trial = count_rays(some, surface, options[best + step], fine, seed=seed, threads=threads)
-            tried = score(trial, name)
+        while best * step >= 0 and best + step in SHAPES:
+            trial = counted(_depths(min(bits, 20) - 2, best + step))
+            tried = score(trial, recipe, concentrations[recipe])
             if tried <= reached:
                 break
             best, reached = best + step, tried
-    return Plan(_depths(bits, best), concentrations)
+    return Plan(grids(len(rays), _depths(bits, best)), concentrations)
+
+
+def depths_for(rays: int) -> Depths:
+    """An even grid for a part with few rays: about as many cells as rays, and at most those that others have."""
+    bits = 4 * max(2, (max(rays, 1).bit_length() + 1) // 4)
+    return _depths(min(bits, default_bits(rays)), 0)
 
 
 def _depths(bits: int, lend: int) -> Depths:
@@ -152,30 +171,27 @@ def _depths(bits: int, lend: int) -> Depths:
 
 
 def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, threads: int | None) -> EtendueDensity:
-    """The field of counted rays: base measures compared on the held-out rays, the better one grown on all."""
-
-    def bases(name: str, fold: Fold) -> tuple[Base, ...]:
-        return (
-            uniform_bases(counts[fold]) if name == "uniform" else product_bases(counts[fold], threads, counts.symmetry)
-        )
-
+    """The field of counted rays: recipes compared on the held-out rays, the best one followed with all."""
+    images = all_images(counts, "fitted", threads)
     scores: dict[str, Score] = {}
-    for name in ("uniform", "product"):
-        concentrations = plan.concentrations[name]
-        candidate = grow_candidate(counts, "fitted", bases(name, "fitted"), concentrations, threads, POSITIONS[:1])
-        scores[name] = candidate.score(counts)
-    lead, error = scores["product"].lead(scores["uniform"])
-    name = "product" if lead > LEAD * error else "uniform"
-    score = scores[name]
-    final = grow_candidate(counts, "all", bases(name, "all"), plan.concentrations[name], threads)
-    final = dataclasses.replace(final, trees=tuple(_calibrated(counts, final, seed, threads)))
+    for name in RECIPES:
+        c = plan.concentrations[name]
+        scores[name] = grow_candidate(counts, "fitted", name, images, c, threads, POSITIONS[:1]).score(counts)
+    recipe = next(iter(RECIPES))
+    for name in RECIPES:
+        lead, error = scores[name].lead(scores[recipe])
+        if lead > LEAD * error:
+            recipe = name
+    score, c = scores[recipe], plan.concentrations[recipe]
+    final = grow_candidate(counts, "all", recipe, all_images(counts, "all", threads), c, threads)
+    final = Candidate(tuple(_calibrated(counts, final, seed, threads)))
     histogram = score_densities(counts, _histogram(counts))
     report = FitReport(
         rays=counts.rays,
         unmet_rays=counts.unmet_rays,
         unmet_flux=counts.unmet_flux,
-        bases=tuple(base.name for base in final.bases),
-        concentrations=final.concentrations,
+        bases=tuple(part.recipe for part in final.parts),
+        concentrations=tuple(part.concentration for part in final.parts),
         log_evidence=final.log_evidence,
         score=score.mean,
         score_error=score.error,
@@ -194,17 +210,17 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
     )
 
 
-def _calibrated(counts: EtendueCounts, candidate: Candidate, seed: int, threads: int | None) -> Iterator[Tree]:
-    """The trees with error bars that also hold the Poisson error of the part's flux."""
-    charts = counts.surface.parts()
-    parts = zip(charts, counts["all"], candidate.bases, candidate.trees, candidate.concentrations, strict=True)
-    for chart, part, base, tree, concentration in parts:
+def _calibrated(
+    counts: EtendueCounts, candidate: Candidate, seed: int, threads: int | None
+) -> Iterator[PartEstimate]:
+    """The estimates with error bars that also hold the Poisson error of the part's flux."""
+    for found, part in zip(candidate.parts, counts["all"], strict=True):
         if part.grid.rays == 0:
-            yield tree
+            yield found
             continue
-        calibrated = calibrate(chart, part, base, tree, concentration, counts.symmetry, seed, threads)
-        deviation = np.sqrt(calibrated.deviation**2 + tree.ratio**2 * order(counts.symmetry) / part.grid.rays)
-        yield dataclasses.replace(tree, deviation=deviation)
+        tree = calibrate(found, part, counts.symmetry, seed, threads)
+        deviation = np.sqrt(tree.deviation**2 + tree.ratio**2 * order(counts.symmetry) / part.grid.rays)
+        yield dataclasses.replace(found, tree=dataclasses.replace(tree, deviation=deviation))
 
 
 def _histogram(counts: EtendueCounts) -> FloatArray:
@@ -224,8 +240,9 @@ def _histogram(counts: EtendueCounts) -> FloatArray:
 def _effective_cells(counts: EtendueCounts, candidate: Candidate) -> float:
     """2 N Σ m (ψ(k + 1) - ln k) over the cells, k = (L/σ)², m their share of the flux; theory eq. 41."""
     total = 0.0
-    for part, base, tree in zip(counts["all"], candidate.bases, candidate.trees, strict=True):
-        space, direction = base.masses(tree.ratio.shape)
+    for part, found in zip(counts["all"], candidate.parts, strict=True):
+        tree = found.tree
+        space, direction = found.base.masses(tree.ratio.shape)
         mass = tree.ratio * space[:, :, None, None] * direction[None, None]
         sure = np.divide(tree.ratio, tree.deviation, out=np.full_like(tree.ratio, np.inf), where=tree.deviation > 0)
         rays = part.grid.rays / order(counts.symmetry)

@@ -15,12 +15,11 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.candidate import (
     MIXED_IN,
     Score,
+    all_images,
     grow_candidate,
-    product_bases,
-    uniform_bases,
 )
-from etendue.lightfield.counting import EtendueCounts, FloatArray, count_rays
-from etendue.lightfield.fitting import fine_depths
+from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, count_rays
+from etendue.lightfield.fitting import grids_for
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import pilot_sample, selected_rays
 from etendue.lightfield.symmetry import fold
@@ -232,19 +231,21 @@ def law_of_gains(rays: FloatArray, gains: FloatArray, covariance: npt.NDArray[np
 
 def _count(field: LightField, rays: RaySet, seed: int, threads: int | None) -> EtendueCounts:
     """The rays in the cells of the field."""
-    s1, s2, a, b = (n.bit_length() - 1 for n in field.parts[0].ratio.shape)
-    fine = fine_depths(len(rays), (s1, s2, a, b))
-    return count_rays(rays, field.surface, (s1, s2, a, b), fine, held_out=0.0, seed=seed, threads=threads)
+
+    def depths(shape: tuple[int, ...]) -> Depths:
+        s1, s2, a, b = (n.bit_length() - 1 for n in shape)
+        return (s1, s2, a, b)
+
+    grids = [grids_for(len(rays), depths(part.ratio.shape)) for part in field.parts]
+    return count_rays(rays, field.surface, grids, held_out=0.0, seed=seed, threads=threads)
 
 
 def _refit(field: LightField, counts: EtendueCounts, threads: int | None) -> LightField:
     """The field of other rays, with everything chosen as it was for this one, and a flux of 1."""
     if field.report.symmetry != "none":
         counts = fold(counts, field.report.symmetry)
-    everything = counts["all"]
-    product = "product" in field.report.bases
-    bases = product_bases(everything, threads, counts.symmetry) if product else uniform_bases(everything)
-    parts = grow_candidate(counts, "all", bases, field.report.concentrations, threads).fields(counts)
+    recipe, images = field.report.bases[0], all_images(counts, "all", threads)
+    parts = grow_candidate(counts, "all", recipe, images, field.report.concentrations, threads).fields(counts)
     flux = sum(counts.part_flux)
     return field.replace(parts=tuple(dataclasses.replace(part, level=part.level / flux) for part in parts))
 

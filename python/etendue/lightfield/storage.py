@@ -59,6 +59,9 @@ CONTINUOUS, LINES = "continuous", "lines"
 
 MOST_WAVELENGTHS = 1 << 20
 
+LATER = ("focus", "hole")
+"""Attributes of a part that files of before they were kept lack."""
+
 FACTORS = ("space", "direction")
 """Datasets that a part may have beside its ratio and deviation."""
 
@@ -245,11 +248,12 @@ def _surface(group: Node) -> Surface:
     kind = SURFACES[group.text("name")]
     hints = get_type_hints(kind)
     known = [f.name for f in dataclasses.fields(kind) if f.name in group.node.attrs]
+    sizes = kind.sizes()
     dimensions = {
         name: group.truth(name)
         if hints[name] is bool
-        else group.numbers(name, (kind.CENTRE_SIZE,)).tolist()
-        if name == "centre"
+        else group.numbers(name, (sizes[name],)).tolist()
+        if name in sizes
         else group.number(name)
         for name in known
     }
@@ -269,6 +273,8 @@ def _parts(group: Node, surface: Surface) -> tuple[tuple[PartField, ...], list[f
     for index, chart in enumerate(charts):
         part = group.group(str(index))
         for name, value in _chart(chart).items():
+            if name in LATER and name not in part.node.attrs:
+                continue
             stored = part.text(name) if isinstance(value, str) else part.numbers(name, np.shape(value))
             agrees = stored == value if isinstance(value, str) else np.allclose(stored, value, rtol=1e-12, atol=1e-12)
             if not agrees:

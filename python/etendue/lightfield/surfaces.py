@@ -18,6 +18,10 @@ from etendue.quantities.ray_stream import RayStream
 
 FloatArray = npt.NDArray[np.float64]
 Shape = Literal["rectangle", "disk", "hemisphere", "tube"]
+Focus = tuple[float, float, float, float]
+
+FLAT: Focus = (0.0, 0.0, 0.0, 0.0)
+"""The focus of a part whose places lie in its plane whatever the direction."""
 
 PILOT_RAYS = 1 << 18
 """Rays looked at to size a surface that was given without its dimensions."""
@@ -48,6 +52,12 @@ class Part:
         Orthonormal, right-handed x, y, z. z is the normal of a flat part, the pole of a hemisphere, the axis of a tube.
     size : tuple of float
         [mm] (width along x, height along y) of a rectangle, (radius, 0) of a disk or hemisphere, (radius, height) of a tube.
+    focus : tuple of 4 floats
+        Of a rectangle: the height above it at which the places of light under θ are taken, f₀ + f₁ (1 - cos θ) +
+        f₂ (1 - cos θ)² + f₃ (1 - cos θ)³ [mm]. Rays start on the rectangle's plane all the same. Places that are shifted by
+        direction alone leave étendue what it is: theory eq. 42.
+    hole : float
+        Share of both sides, about the middle, within which no ray is left for this part, as others take them first.
 
     Examples
     --------
@@ -60,6 +70,8 @@ class Part:
     centre: tuple[float, float, float]
     axes: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
     size: tuple[float, float]
+    focus: Focus = FLAT
+    hole: float = 0.0
 
     @property
     def area(self) -> float:
@@ -83,7 +95,7 @@ class Part:
     def core(self) -> _core._Part:
         """The part as the compiled core takes it."""
         x, y, z = self.axes
-        return {"shape": self.shape, "centre": self.centre, "x": x, "y": y, "z": z, "size": self.size}
+        return {"shape": self.shape, "centre": self.centre, "x": x, "y": y, "z": z, "size": self.size, "focus": self.focus}
 
 
 WORLD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -122,8 +134,14 @@ class Surface(abc.ABC):
                 raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give finite lengths in mm.")
             if field.name in LENGTHS and not (isinstance(numbers, float) and numbers > 0):
                 raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give a length above 0 mm.")
-            if field.name == "centre" and len(np.atleast_1d(numbers)) != self.CENTRE_SIZE:
-                raise ArgumentError(f"{type(self).__name__}: centre is {value!r}; give {self.CENTRE_SIZE} coordinates.")
+            wanted = self.sizes().get(field.name, 1)
+            if np.size(numbers) != wanted:
+                raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give {_counted(wanted)}.")
+
+    @classmethod
+    def sizes(cls) -> dict[str, int]:
+        """How many numbers the dimensions have that have more than one."""
+        return {"centre": cls.CENTRE_SIZE, "focus": len(FLAT)}
 
     @property
     def open_dimensions(self) -> tuple[str, ...]:
@@ -156,11 +174,17 @@ class Surface(abc.ABC):
         return f"{self.NAME}:" + ",".join(
             f"{f.name}={_text(getattr(self, f.name))}"
             for f in dataclasses.fields(self)
-            if getattr(self, f.name) is not None
+            if getattr(self, f.name) is not None and not (f.name == "frames" and self.closed("frames") == 0)
         )
 
 
-LENGTHS = {"width", "height", "depth", "radius", "window"}
+LENGTHS = {"width", "height", "depth", "radius", "window", "rest"}
+
+MOST_FRAMES = 16
+
+
+def _counted(numbers: int) -> str:
+    return "one number" if numbers == 1 else f"{numbers} numbers"
 
 
 def _text(value: object) -> str:
@@ -171,7 +195,11 @@ def _text(value: object) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Plane(Surface):
-    """A rectangle in a plane of constant z that emits towards +Z.
+    """A rectangle in a plane of constant z that emits towards +Z, and frames about it for what lies farther out.
+
+    Light that leaves the plane need not be sharp there: a die under a window or a lens is seen at a depth that changes with
+    the angle. `focus` says at which, so that one image of the die serves all directions. Frames, each twice as large as
+    the one within, carry what little light comes from beside it, so that the rectangle can be as small as the die.
 
     Parameters
     ----------
@@ -181,16 +209,26 @@ class Plane(Surface):
         Along X and Y [mm]; None: as large as the rays need.
     centre : tuple of float, optional
         (x, y) of the middle [mm]; None: from the rays.
+    focus : tuple of 4 floats, optional
+        Height above the plane at which light is sharp that leaves under θ, by powers of 1 - cos θ from the constant on [mm];
+        None: 0 for all, but `LightField.fit` finds it.
+    frames : int
+        0 to 16.
+    rest : float, optional
+        Radius of a sphere about the middle [mm] that takes up all other lines: light that heads downwards, or comes from far
+        beside. None: it is not in the field.
 
     Raises
     ------
     ArgumentError
-        If a number is not finite, or a length is not above 0.
+        If a number is not finite, a length is not above 0, or there are no such frames.
 
     Examples
     --------
     >>> Plane(z=0.5, width=4, height=3, centre=(0, 0)).area
     12.0
+    >>> [part.size for part in Plane(z=0, width=4, height=3, centre=(0, 0), frames=2).parts()]
+    [(4.0, 3.0), (8.0, 6.0), (16.0, 12.0)]
     """
 
     NAME = "plane"
@@ -198,20 +236,40 @@ class Plane(Surface):
     width: float | None = None
     height: float | None = None
     centre: tuple[float, float] | None = None
+    focus: Focus | None = None
+    frames: int = 0
+    rest: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (float(self.frames).is_integer() and 0 <= self.frames <= MOST_FRAMES):
+            raise ArgumentError(f"Plane: frames is {self.frames!r}; give a whole number from 0 to {MOST_FRAMES}.")
+        object.__setattr__(self, "frames", int(self.frames))
+
+    @property
+    def open_dimensions(self) -> tuple[str, ...]:
+        """All that are None but the focus, which is then flat, and the rest, which is then left out."""
+        return tuple(name for name in super().open_dimensions if name not in ("focus", "rest"))
 
     def parts(self) -> tuple[Part, ...]:
-        """One rectangle."""
-        size = (self.closed("width"), self.closed("height"))
-        centre = self.centre
-        if centre is None:
+        """The rectangle, then the frames from within, then both halves of the sphere."""
+        width, height = self.closed("width"), self.closed("height")
+        if self.centre is None:
             raise ArgumentError("Plane: centre is open; state it, or call sized_for(rays).")
-        return (Part("plane", "rectangle", (*centre, self.z), WORLD, size),)
+        centre, focus = (*self.centre, self.z), self.focus or FLAT
+        window = Part("plane", "rectangle", centre, WORLD, (width, height), focus)
+        frames = (
+            Part(f"frame {k}", "rectangle", centre, WORLD, (width * 2**k, height * 2**k), focus, 0.5)
+            for k in range(1, self.frames + 1)
+        )
+        beyond = () if self.rest is None else Sphere(self.rest, centre).parts()
+        return (window, *frames, *beyond)
 
     def sized_for(self, rays: RayStream) -> Plane:
         """The smallest rectangle that the rays' lines cross, but for strays far off."""
         if not self.open_dimensions:
             return self
-        hits = _hits_upwards(rays, self.z, "Plane")
+        hits = _hits_upwards(rays, self.z, "Plane", self.focus or FLAT)
         spans = [_span(v, c) for v, c in zip(hits.T, self.centre or (None, None), strict=True)]
         centre = tuple((low + high) / 2 for low, high in spans)
         width, height = ((high - low) * (1 + SLACK) for low, high in spans)
@@ -524,7 +582,7 @@ SURFACES: Mapping[str, type[Surface]] = {
 
 
 def parse_surface(text: str) -> Surface:
-    """The surface that ``name:key=value,key=value`` describes; coordinates of a centre are parted by slashes.
+    """The surface that ``name:key=value,key=value`` describes; numbers of a centre or a focus are parted by slashes.
 
     Raises
     ------
@@ -565,7 +623,7 @@ def _value(text: str, key: str, value: str) -> float | bool | tuple[float, ...]:
         numbers = tuple(float(v) for v in value.split("/"))
     except ValueError:
         raise ArgumentError(f"surface {text!r}: {key} is {value!r}; give a number in mm.") from None
-    if key == "centre":
+    if key in Surface.sizes():
         return numbers
     if len(numbers) != 1:
         raise ArgumentError(f"surface {text!r}: {key} is {value!r}; give one number in mm.")
@@ -578,13 +636,15 @@ def _places_and_directions(rays: RayStream) -> tuple[FloatArray, FloatArray]:
     return some.position, some.direction
 
 
-def _hits_upwards(rays: RayStream, z: float, name: str) -> FloatArray:
-    """Where the lines of rays that head towards +Z cross a height [mm], shape (m, 2)."""
+def _hits_upwards(rays: RayStream, z: float, name: str, focus: Focus = FLAT) -> FloatArray:
+    """Places on a height, taken at its focus, of rays that head towards +Z [mm], shape (m, 2)."""
     position, direction = _places_and_directions(rays)
     up = direction[:, 2] > 0
     if not up.any():
         raise ArgumentError(f"{name}: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
-    hits: FloatArray = position[up] + ((z - position[up, 2]) / direction[up, 2])[:, None] * direction[up]
+    x, k = position[up], direction[up]
+    sharp = z + np.polynomial.polynomial.polyval(1.0 - k[:, 2], focus)
+    hits: FloatArray = x + ((sharp - x[:, 2]) / k[:, 2])[:, None] * k
     return hits[:, :2]
 
 

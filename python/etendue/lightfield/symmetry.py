@@ -71,8 +71,8 @@ def fold(counts: EtendueCounts, symmetry: str) -> EtendueCounts:
     Examples
     --------
     >>> import etendue as et
-    >>> from etendue.lightfield.counting import count_rays
-    >>> counts = count_rays(et.RingSource(rays=10_000), et.Disk(radius=30), (3, 3, 2, 2))
+    >>> from etendue.lightfield.counting import PartGrids, count_rays
+    >>> counts = count_rays(et.RingSource(rays=10_000), et.Disk(radius=30), PartGrids((3, 3, 2, 2)))
     >>> folded = fold(counts, "mirror-x")
     >>> bool(folded["all"][0].grid.rays == 2 * counts["all"][0].grid.rays), round(folded.part_flux[0], 6)
     (True, 600.0)
@@ -145,11 +145,11 @@ def _images(counts: EtendueCounts, symmetry: str) -> tuple[Image, ...]:
             "and domes can."
         )
     square = all(chart.shape != "rectangle" or math.isclose(*chart.size, rel_tol=1e-9) for chart in charts)
-    rows, columns, a, b = counts.depths
-    if symmetry == "c4" and not (square and rows == columns and a == b):
+    even = all(g.depths[0] == g.depths[1] and g.depths[2] == g.depths[3] for g in counts.grids)
+    if symmetry == "c4" and not (square and even):
         raise ArgumentError(
             f"a quarter-turn needs a square surface and square grids, not {counts.surface.spec} with depths "
-            f"{counts.depths}; state equal width and height, or take a disk."
+            f"{counts.grids[0].depths}; state equal width and height, or take a disk."
         )
     return SYMMETRIES[symmetry]
 

@@ -41,8 +41,7 @@ fn of_part(field: &PartField, k: Vec3, side: u32) -> f64 {
     let mut sum = 0.0;
     for i in 0..side {
         for j in 0..side {
-            let (point, normal) = field.part.ray([middle(i), middle(j)], [0.5, 0.5]);
-            let cosine = k.dot(normal);
+            let (point, cosine) = field.part.leaving([middle(i), middle(j)], k);
             if cosine > 0.0 {
                 // Along k from the inside: the line leaves the part at this very point.
                 let crossing = field.part.cross(point, k);
@@ -79,7 +78,7 @@ mod tests {
             let found = intensity(&LightField { parts: vec![field] }, &[[k.x, k.y, k.z]], 200, 2, None)[0];
             let expected = 3.0
                 * match part.shape {
-                    crate::surface::Shape::Rectangle { width, height } => width * height * theta.cos(),
+                    crate::surface::Shape::Rectangle { width, height, .. } => width * height * theta.cos(),
                     crate::surface::Shape::Disk { .. } => part.area() * theta.cos(),
                     crate::surface::Shape::Hemisphere { radius } => {
                         std::f64::consts::PI * radius * radius * (1.0 + theta.cos()) / 2.0

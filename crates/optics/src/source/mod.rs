@@ -95,7 +95,8 @@ pub struct Source {
 }
 
 impl Source {
-    /// A box in the world that holds every start point; not finite for ray sets, which are not looked through for it.
+    /// A box in the world that holds every start point; not finite for ray sets, which are not looked through for it. Of a
+    /// light field it holds the places of its parts.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         let face = |shape: Shape| {
@@ -112,7 +113,6 @@ impl Source {
             Emitter::Surface(surface) => face(surface.shape().0.clone()),
             Emitter::Point(_) => Bounds::of([self.frame.origin]).widened(f64::EPSILON * self.frame.origin.length()),
             Emitter::Field(sampler) => {
-                // A part reaches no farther from its origin than this in any direction.
                 let boxes = sampler.field().parts.iter().map(|part| {
                     let centre = self.frame.point_to_world(part.part.frame.origin);
                     Bounds::of([centre]).widened(part.part.reach() * (1.0 + 1e-9))

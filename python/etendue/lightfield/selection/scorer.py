@@ -12,13 +12,23 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.lightfield.candidate import MIXED_IN, Score
-from etendue.lightfield.counting import FloatArray, Sums
-from etendue.lightfield.etendue_density import PartField, core_part
+from etendue.lightfield.candidate import FINE_POSITIONS, MIXED_IN, PartEstimate, Score, grow_part, images_of
+from etendue.lightfield.counting import FloatArray, PartCounts, Sums
+from etendue.lightfield.etendue_density import core_part
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
 from etendue.lightfield.surfaces import Part
-from etendue.lightfield.trees import Base, grow
+from etendue.lightfield.trees import POSITIONS, Base
 from etendue.quantities.ray_set import RaySet
+
+TREES_ALONE = ("uniform",)
+WITH_IMAGES = ("uniform", "scaled")
+"""Recipes that a score may use, with the same tree."""
+
+IMAGE_SHAPE = (128, 128, 32, 32)
+"""Cells of the images over place and over direction."""
+
+IMAGE_POSITIONS = FINE_POSITIONS[:2]
+"""Positions over which they are averaged."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -96,12 +106,14 @@ class SurfaceScorer:
         """In which fold each ray is held out."""
         return np.random.default_rng(self.seed).permutation(len(self.flux)) % self.settings.folds
 
-    def score_all(self, surfaces: Sequence[tuple[Sequence[Part], Grid]]) -> list[HeldOutScore]:
+    def score_all(
+        self, surfaces: Sequence[tuple[Sequence[Part], Grid]], recipes: Sequence[str] = TREES_ALONE
+    ) -> list[HeldOutScore]:
         """The score of each of several surfaces, each on its grid; see `score`."""
         with ThreadPoolExecutor(self.threads) as pool:
-            return list(pool.map(lambda both: self.score(*both), surfaces))
+            return list(pool.map(lambda both: self.score(*both, recipes), surfaces))
 
-    def score(self, parts: Sequence[Part], grid: Grid) -> HeldOutScore:
+    def score(self, parts: Sequence[Part], grid: Grid, recipes: Sequence[str] = TREES_ALONE) -> HeldOutScore:
         """The score of a surface of these parts.
 
         Parameters
@@ -110,53 +122,76 @@ class SurfaceScorer:
             In the order in which a ray is offered to them.
         grid : tuple of int
             Halvings of each coordinate of the place, and of each of the direction.
+        recipes : sequence of str
+            `TREES_ALONE`, or `WITH_IMAGES`: of those the one that predicts better counts.
         """
         owner, coordinates = _core.cross_parts([part.core() for part in parts], self.position, self.direction)
         shape = (1 << grid[0],) * 2 + (1 << grid[1],) * 2
         cell = np.zeros(len(owner), np.intp)
         for axis, n in enumerate(shape):
             cell = cell * n + np.minimum((coordinates[:, axis] * n).astype(np.intp), n - 1)
+        fine = np.minimum((coordinates * IMAGE_SHAPE).astype(np.intp), np.array(IMAGE_SHAPE) - 1)
+        pixels = (fine[:, 0] * IMAGE_SHAPE[1] + fine[:, 1], fine[:, 2] * IMAGE_SHAPE[3] + fine[:, 3])
         folds = range(1 if len(owner) >= self.one_fold_from else self.settings.folds)
-        values = [self._held_out(parts, owner, cell, shape, self.fold == fold) for fold in folds]
-        weights = [self.flux[self.fold == fold] for fold in folds]
+        values = [self._held_out(parts, owner, (cell, *pixels), shape, self.fold == fold, recipes) for fold in folds]
+        weights = np.concatenate([self.flux[self.fold == fold] for fold in folds])
         unmet = float(self.flux[owner < 0].sum() / self.flux.sum())
-        return HeldOutScore(Score(np.concatenate(values), np.concatenate(weights)), unmet)
+        scores = [Score(np.concatenate(of_recipe), weights) for of_recipe in zip(*values, strict=True)]
+        return HeldOutScore(max(scores, key=lambda score: score.mean), unmet)
 
     def _held_out(
         self,
         parts: Sequence[Part],
         owner: npt.NDArray[np.int64],
-        cell: npt.NDArray[np.intp],
+        cells: tuple[npt.NDArray[np.intp], ...],
         shape: tuple[int, ...],
         out: npt.NDArray[np.bool_],
-    ) -> FloatArray:
-        """Ln of the density at the rays that are held out, by a field of the others."""
-        fields = []
+        recipes: Sequence[str],
+    ) -> list[FloatArray]:
+        """Ln of the density at the rays that are held out, by the fields of the others that each recipe makes."""
+        estimates = []
         for index, part in enumerate(parts):
             mine = (owner == index) & ~out
             if mine.any():
-                fields.append(self._field(part, cell[mine], self.flux[mine], shape))
+                of_part = self._estimate(part, [c[mine] for c in cells], self.flux[mine], shape, recipes)
+                estimates.append((of_part, mine))
         met = float(self.flux[(owner >= 0) & ~out].sum())
         unmet = max(1.0 - met / float(self.flux[~out].sum()), MIXED_IN)
-        density = np.zeros(int(out.sum()))
-        if fields:
-            # Where a line leaves two parts, the light of both counts.
-            light = _core.LightField(fields).luminance(self.position[out], self.direction[out], 1)[0]
-            density = light / met
-        values: FloatArray = np.log((1.0 - unmet) * density + unmet * self.even)
+        values = []
+        for recipe in recipes:
+            density = np.zeros(int(out.sum()))
+            fields = [
+                core_part(e.chart.core(), dataclasses.replace(e, recipe=recipe).field(float(self.flux[mine].sum())))
+                for e, mine in estimates
+            ]
+            if fields:
+                # Where a line leaves two parts, the light of both counts.
+                light = _core.LightField(fields).luminance(self.position[out], self.direction[out], 1)[0]
+                density = light / met
+            values.append(np.log((1.0 - unmet) * density + unmet * self.even))
         return values
 
-    def _field(
-        self, part: Part, cell: npt.NDArray[np.intp], flux: FloatArray, shape: tuple[int, ...]
-    ) -> _core._FieldPart:
-        """The light of one part, with the flux of its rays."""
-        n = math.prod(shape)
-        if flux.min() == flux.max():
-            sums = Sums(np.bincount(cell, minlength=n).reshape(shape).astype(np.float64), None)
-        else:
-            first, second = (np.bincount(cell, w, n).reshape(shape).astype(np.float64) for w in (flux, flux**2))
-            sums = Sums(first, second)
-        ratio = grow(sums, Base(), self.settings.concentration, 1).ratio.astype(np.float32)
-        unit = PartField(ratio, np.zeros_like(ratio), None, None, 1.0)
-        integral = _core.LightField([core_part(part.core(), unit)]).flux()[0]
-        return core_part(part.core(), dataclasses.replace(unit, level=float(flux.sum()) / integral))
+    def _estimate(
+        self,
+        part: Part,
+        cells: Sequence[npt.NDArray[np.intp]],
+        flux: FloatArray,
+        shape: tuple[int, ...],
+        recipes: Sequence[str],
+    ) -> PartEstimate:
+        """What the rays of one part tell of its light: a tree that does not know of the images, and the images."""
+        shapes = (shape, IMAGE_SHAPE[:2], IMAGE_SHAPE[2:])
+        counts = PartCounts(*(_sums(c, flux, s) for c, s in zip(cells, shapes, strict=True)))
+        needed = part.hole > 0.0 or recipes != TREES_ALONE
+        images = images_of(counts, part, 1, positions=IMAGE_POSITIONS) if needed else Base()
+        return grow_part(
+            counts, part, "uniform", images, self.settings.concentration, 1, "none", positions=POSITIONS[:1]
+        )
+
+
+def _sums(cell: npt.NDArray[np.intp], flux: FloatArray, shape: tuple[int, ...]) -> Sums:
+    n = math.prod(shape)
+    if flux.min() == flux.max():
+        return Sums(np.bincount(cell, minlength=n).reshape(shape).astype(np.float64), None)
+    first, second = (np.bincount(cell, w, n).reshape(shape).astype(np.float64) for w in (flux, flux**2))
+    return Sums(first, second)

@@ -8,9 +8,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from etendue.errors import ArgumentError
+from etendue.lightfield.focusing import focused_about
 from etendue.lightfield.pilot_sample import FEWEST, even_density, pilot_sample
 from etendue.lightfield.selection.line_search import golden_section, round_numbers_near
-from etendue.lightfield.selection.scorer import HeldOutScore, SurfaceScorer
+from etendue.lightfield.selection.scorer import WITH_IMAGES, HeldOutScore, SurfaceScorer
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
 from etendue.lightfield.selection.trial_surfaces import FLATS, TrialSurfaces
 from etendue.lightfield.surfaces import SLACK, Box, Disk, Dome, Plane, Surface
@@ -136,6 +137,7 @@ class _Search:
 
     def __init__(self, rays: RaySet, seed: int, threads: int | None, settings: SelectionSettings) -> None:
         self.settings = settings
+        self.rays = rays
         self.trials = TrialSurfaces(rays, seed, settings)
         even = even_density(rays)
         self.scorer = SurfaceScorer.of(rays, even, seed, threads, settings.one_fold_from, settings)
@@ -154,6 +156,8 @@ class _Search:
             z, depths = self.depth()
             flats = trials.flats(z)
             kinds += [[s for s in flats if isinstance(s, kind)] for kind in (Plane, Disk)]
+            sharp = focused_about(z, self.rays, self.scorer.threads)
+            kinds += [] if sharp is None else [[sharp]]
             kinds += [trials.hemispheres(z), trials.domes(z)]
         kinds += filter(None, [trials.spheres(), trials.cylinders(), [Box().sized_for(trials.rays)]])
         finalists = self.finals([self.best(kind) for kind in kinds])
@@ -178,7 +182,7 @@ class _Search:
 
         def scored(pairs: list[tuple[Surface, Grid]]) -> dict[tuple[Surface, Grid], HeldOutScore]:
             grids = [(surface.parts(), (place - self.less, turn - self.less)) for surface, (place, turn) in pairs]
-            return dict(zip(pairs, self.scorer.score_all(grids), strict=True))
+            return dict(zip(pairs, self.scorer.score_all(grids, WITH_IMAGES), strict=True))
 
         seen = scored([(surface, grid) for surface in surfaces for grid in finer])
         best = {s: max(finer, key=lambda grid: seen[s, grid].score.mean) for s in surfaces}

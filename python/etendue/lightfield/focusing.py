@@ -1,0 +1,327 @@
+"""Where the light of a plane is sharp: the depth for each inclination, and the window about the brightest place.
+
+A die under a window or a lens is seen at a depth that changes with the angle. One image of it serves all directions once
+each ray's place is taken at the depth of its own inclination. Theory section 14.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import gaussian_filter
+
+from etendue.lightfield.counting import FloatArray
+from etendue import _core
+from etendue.lightfield.pilot_sample import even_density, pilot_sample, selected_rays
+from etendue.lightfield.selection.scorer import WITH_IMAGES, SurfaceScorer
+from etendue.lightfield.surfaces import FLAT, MOST_FRAMES, SLACK, STRAY, Focus, Plane, Sphere
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import RayStream
+
+Bools = npt.NDArray[np.bool_]
+
+RAYS = 1 << 16
+"""Rays by which the depths are found. Their errors are far below a cell of the finest image that as many rays can fill."""
+
+FEWEST = 2000
+"""Rays below which a plane stays as it is: a ring of them would show no image."""
+
+RINGS = 10
+"""Rings of inclination with as many rays each, whose depths are found one by one."""
+
+SIDE = 128
+"""Cells along a side of the images that are compared."""
+
+BLUR = 1.2
+"""Width of the Gaussian that smooths them [cells]."""
+
+FLOOR = 0.02
+"""Share of an even image in each of them, so that a stray cannot decide."""
+
+COARSE, FINE = 12, 6
+"""Steps to either side in which a depth is first sought, in units of one 80th of the window; then about it, of a third of
+that."""
+
+ROUNDS = 3
+"""Times that all rings are registered to the image of all of them."""
+
+PROOF = 16.0
+"""Gain of the logarithm of the likelihood of the rays that a focus must bring to be taken: two for each ring, or more."""
+
+GRAZING = 0.02
+"""Least direction cosine of the rays that are asked: the depth of others moves their places without end."""
+
+MIDDLE = (0.1, 0.9)
+"""Quantiles of the places along an axis that hold what is bright, whatever lies beside it."""
+
+ROOM = 1.8
+"""Sides of the window, against the distance of these quantiles: an even square or disk needs 1.25 to 1.5."""
+
+GRIDS = ((4, 4), (5, 3), (6, 2))
+"""Grids on which fields in a focus and in a flat one are compared: halvings of each coordinate of place and direction."""
+
+ENOUGH = 0.9995
+"""Share of the rays within the outermost frame."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Rays:
+    """Rays that head upwards: where they cross the plane [mm], their slopes, what they lean, and ring and half of each."""
+
+    place: FloatArray
+    slope: FloatArray
+    lean: FloatArray
+    ring: npt.NDArray[np.intp]
+    half: Bools
+
+    def at(self, depth: FloatArray | float) -> FloatArray:
+        """Their places at heights above the plane [mm]."""
+        moved: FloatArray = self.place + np.multiply(depth, self.slope.T).T
+        return moved
+
+
+def focused(plane: Plane, rays: RayStream, seed: int = 1, threads: int | None = None) -> Plane:
+    """The plane with what it leaves open: its focus, and if its size is open too, a window and frames about it.
+
+    The focus that makes the image of the source sharpest is taken if held-out rays bear out that the field, too, is better
+    in it; images alone do not tell how well place and direction go apart.
+
+    Parameters
+    ----------
+    plane : Plane
+        What it states stays. A focus is stated by its four coefficients, all 0 for a flat one.
+    rays : RayStream
+        With positions; few are read.
+    seed : int
+        Of which rays are held out.
+    threads : int, optional
+        All cores if None.
+
+    Returns
+    -------
+    Plane
+        With all its dimensions. The focus stays None where none is proven to be better than a flat one.
+
+    Raises
+    ------
+    ArgumentError
+        If no ray heads towards +Z.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> plane = focused(et.Plane(z=0), et.RingSource(rays=20_000))
+    >>> plane.focus is None, plane.frames, round(plane.width)
+    (True, 0, 60)
+    """
+    some = pilot_sample(rays, RAYS)
+    up = some.direction[:, 2] > GRAZING
+    enough = np.count_nonzero(up) >= FEWEST
+    open_size = plane.width is None and plane.height is None and plane.centre is None
+
+    def sized(focus: Focus | None) -> Plane:
+        own = dataclasses.replace(plane, focus=focus)
+        return _windowed(own, rays) if open_size and enough else own.sized_for(rays)
+
+    if plane.focus is not None or not enough:
+        return sized(plane.focus)
+    focus = _focus(_rays(some.position[up], some.direction[up], plane.z))
+    flat = sized(None)
+    if focus is None:
+        return flat
+    bent = sized(focus)
+    scorer = SurfaceScorer.of(some, even_density(some), seed, threads)
+    scores = scorer.score_all([(p.parts(), grid) for p in (flat, bent) for grid in GRIDS], WITH_IMAGES)
+    own, other = (max(s, key=lambda score: score.score.mean) for s in (scores[: len(GRIDS)], scores[len(GRIDS) :]))
+    return bent if other.leads(own) else flat
+
+
+def focused_about(z: float, rays: RaySet, threads: int | None = None) -> Plane | None:
+    """A focused plane near a depth that takes up all rays; None if no window is smaller than what all rays need.
+
+    It lies where light along the horizon is sharp, so that rays start near their places.
+    """
+    plane = focused(Plane(z=z), rays, threads=threads)
+    if plane.focus is None and plane.frames == 0:
+        return None
+    if plane.focus is not None:
+        shift = sum(plane.focus)
+        focus = (plane.focus[0] - shift, *plane.focus[1:])
+        plane = dataclasses.replace(plane, z=plane.z + shift, focus=focus)
+    parts = [part.core() for part in plane.parts()]
+    unmet = _core.cross_parts(parts, rays.position, rays.direction)[0] < 0
+    if float(rays.flux[unmet].sum()) <= STRAY * rays.total_flux or plane.centre is None:
+        return plane
+    around = Sphere(centre=(*plane.centre, plane.z)).sized_for(selected_rays(rays, unmet))
+    return dataclasses.replace(plane, rest=around.radius)
+
+
+def _rays(position: FloatArray, direction: FloatArray, z: float) -> _Rays:
+    slope = direction[:, :2] / direction[:, 2:]
+    lean = 1.0 - direction[:, 2]
+    # Ranks, so that rays of one inclination are dealt to rings as well.
+    ring = np.empty(len(lean), np.intp)
+    ring[np.argsort(lean, kind="stable")] = np.arange(len(lean)) * RINGS // len(lean)
+    half = np.random.default_rng(1).random(len(lean)) < 0.5
+    return _Rays(position[:, :2] + (z - position[:, 2:]) * slope, slope, lean, ring, half)
+
+
+@dataclasses.dataclass(frozen=True)
+class _View:
+    """The square in which images are compared."""
+
+    centre: FloatArray
+    side: float
+
+    def cells(self, place: FloatArray) -> tuple[npt.NDArray[np.intp], Bools]:
+        """The cell of each place, and whether it lies in the square."""
+        index = np.floor(((place - self.centre) / self.side + 0.5) * SIDE).astype(np.intp)
+        inside = ((index >= 0) & (index < SIDE)).all(axis=1)
+        index = np.clip(index, 0, SIDE - 1)
+        return index[:, 0] * SIDE + index[:, 1], inside
+
+    def densities(self, place: FloatArray, half: Bools) -> tuple[FloatArray, FloatArray]:
+        """Smooth images of the rays in the second half and in the first, each for those of the other; mean 1 if all are in."""
+        cell, inside = self.cells(place)
+
+        def image(which: Bools) -> FloatArray:
+            counts = np.bincount(cell[which & inside], minlength=SIDE**2).reshape(SIDE, SIDE)
+            smooth: FloatArray = gaussian_filter(counts.astype(np.float64), BLUR).ravel()
+            return smooth * (SIDE**2 / max(np.count_nonzero(which), 1))
+
+        return image(~half), image(half)
+
+    def log_likelihoods(self, place: FloatArray, half: Bools, images: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Ln of the density of each ray in the image of the other half."""
+        cell, inside = self.cells(place)
+        seen = np.where(half, images[0][cell], images[1][cell]) * inside
+        values: FloatArray = np.log((1.0 - FLOOR) * seen + FLOOR)
+        return values
+
+
+def _focus(rays: _Rays) -> Focus | None:
+    """The focus by powers of the lean, or None for a flat one."""
+    view, about = _waist(rays)
+    step = view.side / 80.0
+    depths = about + step * np.arange(-COARSE, COARSE + 1)
+    whole, own = np.zeros(len(depths)), np.zeros((len(depths), RINGS))
+    members = [np.flatnonzero(rays.ring == ring) for ring in range(RINGS)]
+    for i, depth in enumerate(depths):
+        place = rays.at(depth)
+        whole[i] = view.log_likelihoods(place, rays.half, view.densities(place, rays.half)).sum()
+        for ring, mine in enumerate(members):
+            images = view.densities(place[mine], rays.half[mine])
+            own[i, ring] = view.log_likelihoods(place[mine], rays.half[mine], images).sum()
+    one = float(_peaks(depths, whole[:, None])[0][0])
+    constant: Focus = (one, 0.0, 0.0, 0.0)
+    curved = _fitted(rays, *_peaks(depths, own))
+    for _ in range(ROUNDS):
+        curved = _registered(rays, view, curved, step / 3.0)
+    scores = {focus: _score(rays, view, focus) for focus in (FLAT, constant, curved)}
+    best = FLAT
+    for focus in (constant, curved):
+        if scores[focus] > scores[best] + PROOF:
+            best = focus
+    return None if best == FLAT else best
+
+
+def _waist(rays: _Rays) -> tuple[_View, float]:
+    """Where the bundle is narrowest: the square about it, and its height above the plane [mm]."""
+    narrow = rays.lean < 0.5
+
+    def spans(depth: float) -> FloatArray:
+        low, high = np.quantile(rays.place[narrow] + depth * rays.slope[narrow], MIDDLE, axis=0)
+        widths: FloatArray = high - low
+        return widths
+
+    extent = float(spans(0.0).max())
+    # Between the depths at which the spread has grown for sure; each round looks closer.
+    low, high = -2.0 * extent, 2.0 * extent
+    about = 0.0
+    for _ in range(4):
+        grid = np.linspace(low, high, 33)
+        about = float(grid[np.argmin([np.log(np.maximum(spans(z), 1e-300)).sum() for z in grid])])
+        reach = (high - low) / 16.0
+        low, high = about - reach, about + reach
+    place = rays.at(about)
+    low_corner, high_corner = np.quantile(place, MIDDLE, axis=0)
+    side = 2.0 * float((high_corner - low_corner).max())
+    return _View((low_corner + high_corner) / 2.0, max(side, 1e-9)), about
+
+
+def _peaks(depths: FloatArray, scores: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The depth of the maximum of each column by the parabola through three points, and how sharp it is [1/mm²]."""
+    at, columns = np.clip(scores.argmax(axis=0), 1, len(depths) - 2), np.arange(scores.shape[1])
+    before, here, after = scores[at - 1, columns], scores[at, columns], scores[at + 1, columns]
+    bend = np.maximum(2.0 * here - before - after, 1e-9)
+    step = depths[1] - depths[0]
+    return depths[at] + step * np.clip(0.5 * (after - before) / bend, -1.0, 1.0), bend / step**2
+
+
+def _fitted(rays: _Rays, depth: FloatArray, weight: FloatArray) -> Focus:
+    """The cubic in the lean through the depths of the rings, each believed as much as its maximum is sharp."""
+    lean = np.array([rays.lean[rays.ring == ring].mean() for ring in range(RINGS)])
+    scale = np.sqrt(weight / weight.max())
+    matrix = np.polynomial.polynomial.polyvander(lean, 3) * scale[:, None]
+    # Held to the straight line by a little, where few rings say anything.
+    mean = float(np.average(depth, weights=weight))
+    ridge = 1e-3 * np.diag([0.0, 0.0, 1.0, 1.0])
+    found = np.linalg.lstsq(np.vstack([matrix, ridge]), np.append((depth - mean) * scale, np.zeros(4)), rcond=None)[0]
+    found[0] += mean
+    a, b, c, d = (float(v) for v in found)
+    return (a, b, c, d)
+
+
+def _heights(rays: _Rays, focus: Focus) -> FloatArray:
+    values: FloatArray = np.polynomial.polynomial.polyval(rays.lean, focus)
+    return values
+
+
+def _registered(rays: _Rays, view: _View, focus: Focus, step: float) -> Focus:
+    """Each ring moved to where the image of all rays predicts it best."""
+    heights = _heights(rays, focus)
+    images = view.densities(rays.at(heights), rays.half)
+    steps = step * np.arange(-FINE, FINE + 1)
+    scores = np.array(
+        [
+            np.bincount(
+                rays.ring, view.log_likelihoods(rays.at(heights + dz), rays.half, images), minlength=RINGS
+            )
+            for dz in steps
+        ]
+    )
+    moved, weight = _peaks(steps, scores)
+    lean = np.array([rays.lean[rays.ring == ring].mean() for ring in range(RINGS)])
+    return _fitted(rays, np.polynomial.polynomial.polyval(lean, focus) + moved, weight)
+
+
+def _score(rays: _Rays, view: _View, focus: Focus) -> float:
+    place = rays.at(_heights(rays, focus))
+    return float(view.log_likelihoods(place, rays.half, view.densities(place, rays.half)).sum())
+
+
+def _windowed(plane: Plane, rays: RayStream) -> Plane:
+    """The rectangle about what is bright, and frames until almost all rays are in."""
+    whole = plane.sized_for(rays)
+    some = pilot_sample(rays, RAYS)
+    up = some.direction[:, 2] > 0.0
+    direction, position = some.direction[up], some.position[up]
+    z = plane.z + np.polynomial.polynomial.polyval(1.0 - direction[:, 2], plane.focus or FLAT)
+    place = position[:, :2] + ((z - position[:, 2]) / direction[:, 2])[:, None] * direction[:, :2]
+    low, high = np.quantile(place, MIDDLE, axis=0)
+    middle, sides = (low + high) / 2.0, ROOM * (high - low)
+    everything = np.array([whole.closed("width"), whole.closed("height")])
+    if not (sides > 0.0).all() or (sides >= everything / 2.0**0.5).all():
+        return whole
+    sides = np.maximum(sides, sides.max() / 16.0)
+    frames = 0
+    while frames < MOST_FRAMES // 2:
+        if np.mean((np.abs(place - middle) <= sides * 2.0**frames / 2.0).all(axis=1)) >= ENOUGH:
+            break
+        frames += 1
+    width, height = (float(side) * (1.0 + SLACK) for side in sides)
+    return dataclasses.replace(
+        plane, width=width, height=height, centre=(float(middle[0]), float(middle[1])), frames=frames
+    )

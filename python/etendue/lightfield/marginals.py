@@ -1,0 +1,84 @@
+"""Marginals of a light field that are those of its images: iterative proportional scaling of its factors."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from etendue.lightfield.counting import FloatArray
+from etendue.lightfield.etendue_density import PartField
+from etendue.lightfield.nodes import node_values
+from etendue.lightfield.trees import Base
+
+SWEEPS = 2
+"""Times that both marginals are set. Each sweep spoils the other one by ever less."""
+
+LARGEST_FACTOR = 50.0
+"""By which the density at a place or a direction may change in one step: what is dark in the tree stays finite."""
+
+
+def scaled(part: PartField, images: Base, wraps: bool) -> PartField:
+    """The field times one function of the place and one of the direction, so that its marginals are the images.
+
+    The tree's boxes see the place coarsely, an image by itself sees it finely. Of all fields with the marginals of the
+    images the one that is scaled to them is the nearest to the tree's in relative entropy [Csiszar1975]_.
+
+    Parameters
+    ----------
+    part : PartField
+        With any factors.
+    images : Base
+        Wanted densities over the place and over the direction, none of them None.
+    wraps : bool
+        Whether the first coordinate closes upon itself.
+
+    Examples
+    --------
+    >>> ratio = np.ones((2, 2, 1, 1), np.float32)
+    >>> flat = PartField(ratio, ratio, None, None, 1.0)
+    >>> image = np.array([[1.0, 3.0], [2.0, 2.0]])
+    >>> scaled(flat, Base(image, np.ones((1, 1))), False).space.tolist()
+    [[0.5, 1.5], [1.0, 1.0]]
+    """
+    if images.space is None or images.direction is None:
+        return part
+    wanted = (_nodes(images.space), _nodes(images.direction))
+    n1, n2, n3, n4 = part.ratio.shape
+    place = (_tents(len(wanted[0]), n1, wraps), _tents(len(wanted[0]), n2, False))
+    turn = (_tents(len(wanted[1]), n3, False), _tents(len(wanted[1]), n4, False))
+    ratio = part.ratio.reshape(n1 * n2, n3 * n4)
+    space, direction = (np.ones_like(w) for w in wanted)
+    for _ in range(SWEEPS):
+        aims = (turn[0].T @ direction @ turn[1]).ravel() / direction.size
+        space = _set(wanted[0], place[0] @ (ratio @ aims).reshape(n1, n2) @ place[1].T)
+        places = (place[0].T @ space @ place[1]).ravel() / space.size
+        direction = _set(wanted[1], turn[0] @ (places @ ratio).reshape(n3, n4) @ turn[1].T)
+    aims = (turn[0].T @ direction @ turn[1]).ravel() / direction.size
+    space = _set(wanted[0], place[0] @ (ratio @ aims).reshape(n1, n2) @ place[1].T)
+    return dataclasses.replace(part, space=space / space.mean(), direction=direction / direction.mean())
+
+
+def _nodes(image: FloatArray) -> FloatArray:
+    """Values at cell centres between which a factor is linear."""
+    values: FloatArray = node_values(image)
+    return values
+
+
+def _set(wanted: FloatArray, found: FloatArray) -> FloatArray:
+    """The factor that makes the marginal found the one wanted."""
+    level = wanted.mean() / max(float(found.mean()), np.finfo(np.float64).tiny)
+    most = level * LARGEST_FACTOR
+    factor = np.divide(wanted, found, out=np.full_like(wanted, most), where=found > wanted / most)
+    return np.where(wanted > 0, factor, 0.0)
+
+
+def _tents(fine: int, coarse: int, wraps: bool) -> FloatArray:
+    """Weights of the coarse cells' tents at the centres of fine cells, (fine, coarse)."""
+    at = (np.arange(fine) + 0.5) / fine * coarse - 0.5
+    lower = np.floor(at).astype(np.intp)
+    weights = np.zeros((fine, coarse))
+    for cell, weight in ((lower, 1.0 - (at - lower)), (lower + 1, at - lower)):
+        inside = cell % coarse if wraps else np.clip(cell, 0, coarse - 1)
+        np.add.at(weights, (np.arange(fine), inside), weight)
+    return weights
