@@ -16,12 +16,12 @@ from typing import Any
 
 import etendue as et
 import numpy as np
-from etendue.lightfield.candidate import grow_candidate, product_bases, uniform_bases
+from etendue.lightfield.candidate import all_images, grow_candidate
 from etendue.lightfield.counting import EtendueCounts, count_rays
 from etendue.lightfield.etendue_density import PartField
-from etendue.lightfield.fitting import fine_depths
+from etendue.lightfield.fitting import grids_for
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.trees import grow, log_evidence
+from etendue.lightfield.trees import Base, grow, log_evidence
 from etendue.units import MM2_PER_M2
 from light_field import Family, families
 from timing import best, timed
@@ -84,9 +84,10 @@ def count_in_numpy(rays: et.RaySet, fine: tuple[int, int], equal: bool) -> list[
 def counting(radii: tuple[float, ...], flux: tuple[float, ...], rays: int, repeats: int) -> None:
     """Rays of concentric rings into 2²⁰ cells, from a file and from memory."""
     equal = len(radii) == 1
-    kind, fine = "equal" if equal else "unequal", fine_depths(rays, DEPTHS)
+    kind, grids = "equal" if equal else "unequal", grids_for(rays, DEPTHS)
+    fine = grids.fine
     some = et.RingSource(radii, flux, rays=min(rays, 2_000_000)).ray_set()
-    ours = count_rays(some, RINGS, DEPTHS, fine)["all"][0]
+    ours = count_rays(some, RINGS, grids)["all"][0]
     for mine, theirs in zip((ours.grid, ours.space, ours.direction), count_in_numpy(some, fine, equal), strict=True):
         # A coordinate within rounding of an edge may fall to either side.
         if np.abs(theirs - mine.weight.ravel()).sum() > 1e-5 * theirs.sum():
@@ -99,7 +100,7 @@ def counting(radii: tuple[float, ...], flux: tuple[float, ...], rays: int, repea
         held = et.RingSource(radii, flux, rays=rays).ray_set()
         for place, source in (("a TM-25 file", et.read_rays(path)), ("memory (f64)", held)):
             for threads, cores in CORES:
-                rate = rays / best(lambda s=source, t=threads: count_rays(s, RINGS, DEPTHS, fine, threads=t), repeats)
+                rate = rays / best(lambda s=source, t=threads: count_rays(s, RINGS, grids, threads=t), repeats)
                 title = f"{kind} rays from {place}, {cores}"
                 row(title, f"{rate / 1e6:.1f} M rays/s", rate / COUNTING_BAR, rate / peer)
 
@@ -107,7 +108,7 @@ def counting(radii: tuple[float, ...], flux: tuple[float, ...], rays: int, repea
 def growing(counts: EtendueCounts, repeats: int) -> None:
     """The tree of 32⁴ cells, from counts: posterior and evidence."""
     grid = counts["all"][0].grid
-    for base in (*uniform_bases(counts["all"]), *product_bases(counts["all"], None)):
+    for base in (Base(), all_images(counts, "all", None)[0]):
         for threads, cores in CORES:
             for title, job in (("posterior", grow), ("evidence alone", log_evidence)):
                 seconds = best(lambda job=job, base=base, threads=threads: job(grid, base, 10.0, threads), repeats)
@@ -181,21 +182,18 @@ def looking(field: LightField, extent: float, target: tuple[float, float, float]
 
 def drawing(counts: EtendueCounts, fitted: LightField, rays: int, repeats: int) -> None:
     """Rays drawn from fields of either base, and the bytes of their files."""
-    candidates = (
-        (uniform_bases(counts["all"]), 3.0),
-        (product_bases(counts["all"], None), 30.0),
-    )
-    for bases, concentration in candidates:
-        grown = grow_candidate(counts, "all", bases, [concentration] * len(bases), None)
+    images = all_images(counts, "all", None)
+    for recipe, concentration in (("uniform", 3.0), ("product", 30.0)):
+        grown = grow_candidate(counts, "all", recipe, images, [concentration] * len(images), None)
         field = fitted.replace(surface=counts.surface, parts=grown.fields(counts))
         stream = rays / best(lambda field=field: field.rays(rays).pass_over(), repeats)
         held = rays / best(lambda field=field: field.sample(rays), repeats)
-        row(f"drawing from 32⁴ cells, {grown.base_name} base, as a stream", f"{stream / 1e6:.1f} M rays/s")
-        row(f"drawing from 32⁴ cells, {grown.base_name} base, into memory", f"{held / 1e6:.1f} M rays/s")
+        row(f"drawing from 32⁴ cells, {recipe} recipe, as a stream", f"{stream / 1e6:.1f} M rays/s")
+        row(f"drawing from 32⁴ cells, {recipe} recipe, into memory", f"{held / 1e6:.1f} M rays/s")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "field.h5"
             field.save(path)
-            row(f"file of 32⁴ cells, {grown.base_name} base", f"{path.stat().st_size / 1e3:,.0f} kB")
+            row(f"file of 32⁴ cells, {recipe} recipe", f"{path.stat().st_size / 1e3:,.0f} kB")
 
 
 def fitting(family: Family, rays: et.RaySet) -> LightField:
@@ -227,7 +225,7 @@ def main() -> None:
     counting((10.0, 20.0, 30.0), (300.0, 200.0, 100.0), options.rays, options.repeats)
     family = families()[options.family]
     rays = family.ray_set(options.fit_rays, 1)
-    counts = count_rays(rays, family.surface, DEPTHS, fine_depths(len(rays), DEPTHS))
+    counts = count_rays(rays, family.surface, grids_for(len(rays), DEPTHS))
     growing(counts, options.repeats)
     field = fitting(family, rays)
     x0, x1, y0, y1 = family.source.extent

@@ -24,7 +24,7 @@ SMALL = 5_000_000
 
 JOBS = {
     "cone": 'et.luminance_map(rays, et.Observer(30, 40, 1000), et.Screen(70, 70, 128, 128), method="cone").rays.sum()',
-    "count": "count_rays(rays, plane, (5, 5, 5, 5), (8, 8)).rays",
+    "count": "count_rays(rays, plane, PartGrids((5, 5, 5, 5), (8, 8))).rays",
     "fit": "et.LightField.fit(rays, plane, depths=(5, 5, 5, 5)).report.rays",
 }
 """What is done, by --method; each gives the number of rays that the result rests on."""
@@ -32,7 +32,7 @@ JOBS = {
 JOB = """
 import sys, threading, time, warnings
 import etendue as et
-from etendue.lightfield.counting import count_rays
+from etendue.lightfield.counting import PartGrids, count_rays
 warnings.simplefilter("ignore")
 def anonymous():
     with open("/proc/self/status") as status:

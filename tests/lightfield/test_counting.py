@@ -8,7 +8,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
-from etendue.lightfield.counting import count_rays
+from etendue.lightfield.counting import PartGrids, count_rays
 
 
 def concentric(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -36,7 +36,7 @@ def test_a_plane_holds_what_numpy_counts(weighted: bool) -> None:
     w = np.random.default_rng(6).uniform(0.5, 2, n) if weighted else np.full(n, 0.25)
     rays = rays_of(n, w)
     plane = et.Plane(z=0.2, width=3, height=2, centre=(0.3, 0.1))
-    counts = count_rays(rays, plane, (2, 3, 2, 1), (4, 3), held_out=0.2)
+    counts = count_rays(rays, plane, PartGrids((2, 3, 2, 1), (4, 3)), held_out=0.2)
     x, k = rays.position, rays.direction
     hit = x + ((0.2 - x[:, 2]) / k[:, 2])[:, None] * k
     s = (hit[:, :2] - [0.3, 0.1]) / [3, 2] + 0.5
@@ -62,7 +62,7 @@ def test_a_plane_holds_what_numpy_counts(weighted: bool) -> None:
 
 def test_parts_share_the_rays_and_nothing_is_lost() -> None:
     rays = rays_of(30_000)
-    counts = count_rays(rays, et.Dome(radius=1.5, window=0.8), (2, 2, 2, 2))
+    counts = count_rays(rays, et.Dome(radius=1.5, window=0.8), PartGrids((2, 2, 2, 2)))
     assert sum(counts.part_flux) + counts.unmet_flux == pytest.approx(rays.total_flux, rel=1e-12)
     assert all(flux > 0 for flux in counts.part_flux)
     assert counts.some_held_out.coordinates.shape == (len(counts.some_held_out.part), 4)
@@ -70,7 +70,7 @@ def test_parts_share_the_rays_and_nothing_is_lost() -> None:
 
 def test_kept_rays_are_held_out_rays() -> None:
     rays = rays_of(50_000)
-    counts = count_rays(rays, et.Disk(radius=2), (2, 2, 2, 2), held_out=0.1)
+    counts = count_rays(rays, et.Disk(radius=2), PartGrids((2, 2, 2, 2)), held_out=0.1)
     kept, _ = np.histogramdd(counts.some_held_out.coordinates, bins=(4,) * 4, range=[(0, 1)] * 4)
     np.testing.assert_array_equal(kept, counts["held out"][0].grid.weight)
 
@@ -78,13 +78,13 @@ def test_kept_rays_are_held_out_rays() -> None:
 def test_the_scale_of_relative_fluxes_is_that_of_the_set() -> None:
     rays = rays_of(1000)
     half = rays.thin(2, seed=1)[0] if hasattr(rays, "thin") else rays
-    counts = count_rays(half, et.Sphere(radius=30), (1, 1, 1, 1))
+    counts = count_rays(half, et.Sphere(radius=30), PartGrids((1, 1, 1, 1)))
     assert sum(counts.part_flux) == pytest.approx(half.total_flux, rel=1e-12)
 
 
 def test_bits_do_not_depend_on_threads() -> None:
     rays = rays_of(200_000, np.random.default_rng(7).uniform(1, 2, 200_000))
-    one, seven = (count_rays(rays, et.Dome(radius=1.5), (3, 3, 3, 3), threads=t) for t in (1, 7))
+    one, seven = (count_rays(rays, et.Dome(radius=1.5), PartGrids((3, 3, 3, 3)), threads=t) for t in (1, 7))
     for a, b in zip(one["all"], seven["all"], strict=True):
         assert a.grid.weight.tobytes() == b.grid.weight.tobytes()
     assert one.unmet_flux == seven.unmet_flux
@@ -93,10 +93,10 @@ def test_bits_do_not_depend_on_threads() -> None:
 def test_what_cannot_be_counted_is_refused() -> None:
     rays = rays_of(100)
     with pytest.raises(ArgumentError, match="depths"):
-        count_rays(rays, et.Disk(radius=1), (9, 9, 9, 9))
+        count_rays(rays, et.Disk(radius=1), PartGrids((9, 9, 9, 9)))
     with pytest.raises(ArgumentError, match="none of 100 rays meets"):
-        count_rays(rays, et.Plane(z=1e6, width=1e-3, height=1e-3, centre=(0, 0)), (2, 2, 2, 2))
+        count_rays(rays, et.Plane(z=1e6, width=1e-3, height=1e-3, centre=(0, 0)), PartGrids((2, 2, 2, 2)))
     broken = et.RaySet([[0, 0, 0], [np.nan, 0, 0]], [[0, 0, 1], [0, 0, 1.0]], [1.0, 1.0])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        assert count_rays(broken, et.Disk(radius=1), (1, 1, 1, 1)).rays == 1
+        assert count_rays(broken, et.Disk(radius=1), PartGrids((1, 1, 1, 1))).rays == 1

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 from etendue import _core
 from etendue.errors import ArgumentError
-from etendue.lightfield.counting import count_rays
+from etendue.lightfield.counting import PartGrids, count_rays
 from etendue.lightfield.field_rays import FieldRays
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Surface
@@ -193,7 +193,7 @@ def test_lines_are_as_frequent_as_they_are_bright(which: str) -> None:
 def test_rays_leave_their_surface(which: str) -> None:
     """But for one in a million of those that graze it, whose crossing rounding may lose."""
     field = make_field(SURFACES[which], seed=4)
-    counts = count_rays(field.rays(500_000), field.surface, (2, 2, 2, 2), (4, 4))
+    counts = count_rays(field.rays(500_000), field.surface, PartGrids((2, 2, 2, 2), (4, 4)))
     assert counts.unmet_rays <= 3
     assert sum(counts.part_flux) + counts.unmet_flux == pytest.approx(field.total_flux, rel=1e-12)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield import fitting
-from etendue.lightfield.counting import count_rays
+from etendue.lightfield.counting import PartGrids, count_rays
 from etendue.lightfield.symmetry import SYMMETRIES, fold, proven_symmetry
 from oracles.sources import LimbDarkenedDisk
 from oracles.verdicts import assert_covers
@@ -43,7 +43,7 @@ def rays_of(n: int, seed: int, slope: float = 0.4) -> tuple[np.ndarray, np.ndarr
 def test_folded_counts_are_those_of_all_images_of_the_rays(name: str, surface: et.Plane) -> None:
     x, k = rays_of(4000, 1)
     k[:1000, 2] *= -1  # some go down: the lower half of a sphere has its own chart
-    folded = fold(count_rays(et.RaySet(x, k, np.ones(len(x))), surface, DEPTHS), name)
+    folded = fold(count_rays(et.RaySet(x, k, np.ones(len(x))), surface, PartGrids(DEPTHS)), name)
     copies = [(x, k)]
     copies += [
         tuple(np.column_stack([*move(v[:, 0], v[:, 1]), v[:, 2]]) for v in (x, k))  # type: ignore[misc]
@@ -52,7 +52,7 @@ def test_folded_counts_are_those_of_all_images_of_the_rays(name: str, surface: e
     everything = et.RaySet(
         np.concatenate([c[0] for c in copies]), np.concatenate([c[1] for c in copies]), np.ones(len(x) * len(copies))
     )
-    expected = count_rays(everything, surface, DEPTHS)
+    expected = count_rays(everything, surface, PartGrids(DEPTHS))
     for a, b in zip(folded["all"], expected["all"], strict=True):
         # Rays on the border of a cell may fall to either side.
         assert np.abs(a.grid.weight - b.grid.weight).sum() <= 4
@@ -136,7 +136,7 @@ def test_error_bars_of_folded_fields_cover_the_truth() -> None:
 def test_an_asymmetry_of_two_per_cent_is_seen_with_a_million_rays() -> None:
     x, k = rays_of(1_000_000, 2, slope=0.02)
     plane = et.Plane(z=0, width=2, height=2, centre=(0, 0))
-    found = proven_symmetry(count_rays(et.RaySet(x, k, np.ones(len(x))), plane, DEPTHS))
+    found = proven_symmetry(count_rays(et.RaySet(x, k, np.ones(len(x))), plane, PartGrids(DEPTHS)))
     assert found == "mirror-y"
 
 
@@ -144,14 +144,16 @@ def test_without_any_symmetry_none_is_found() -> None:
     x, k = rays_of(100_000, 3)
     x[:, 1] += 0.3 * (x[:, 0] > 0)
     rays = et.RaySet(x, k, np.ones(len(x)))
-    assert proven_symmetry(count_rays(rays, et.Plane(z=0, width=4, height=4, centre=(0, 0)), DEPTHS)) == "none"
+    assert (
+        proven_symmetry(count_rays(rays, et.Plane(z=0, width=4, height=4, centre=(0, 0)), PartGrids(DEPTHS))) == "none"
+    )
 
 
 def test_symmetries_that_cannot_be_are_refused() -> None:
     rays = et.RaySet(*rays_of(100, 4), np.ones(100))
     with pytest.raises(UnknownNameError, match="Did you mean 'mirror-x'"):
-        fold(count_rays(rays, et.Disk(radius=2), DEPTHS), "miror-x")
+        fold(count_rays(rays, et.Disk(radius=2), PartGrids(DEPTHS)), "miror-x")
     with pytest.raises(ArgumentError, match="cannot carry"):
-        fold(count_rays(rays, et.Cylinder(radius=2, bottom=-1, top=1), DEPTHS), "c2")
+        fold(count_rays(rays, et.Cylinder(radius=2, bottom=-1, top=1), PartGrids(DEPTHS)), "c2")
     with pytest.raises(ArgumentError, match="quarter-turn"):
-        fold(count_rays(rays, et.Plane(z=0, width=4, height=3, centre=(0, 0)), DEPTHS), "c4")
+        fold(count_rays(rays, et.Plane(z=0, width=4, height=3, centre=(0, 0)), PartGrids(DEPTHS)), "c4")

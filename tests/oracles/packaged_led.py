@@ -14,11 +14,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Distribution = Callable[[Array, Array], Array]
 
 MM2 = 1e-6
 """Square millimetre in square metres."""
@@ -92,16 +94,16 @@ class PackagedLed:
 
     @staticmethod
     def _of_strays(p: Array, q: Array) -> Array:
-        return np.ones_like(p)
+        return 1.0 + 0.0 * (p + q)
 
     @staticmethod
-    def _projected(of: object) -> float:
+    def _projected(of: Distribution) -> float:
         """∫ of a direction distribution over p, q: Gauss in the cosine, equal steps in azimuth."""
         x, w = np.polynomial.legendre.leggauss(64)
         cosine, w = (x + 1) / 2, w / 2
         turn = 2 * np.pi * (np.arange(64) + 0.5) / 64
         sine = np.sqrt(1 - cosine**2)[:, None]
-        values = of(sine * np.cos(turn), sine * np.sin(turn))  # type: ignore[operator]
+        values = of(sine * np.cos(turn), sine * np.sin(turn))
         return float((w * cosine) @ values.mean(axis=1) * 2 * np.pi)
 
     # --- places ---------------------------------------------------------------------------------------------------------
@@ -179,12 +181,12 @@ class PackagedLed:
         return x + along[:, None] * k, k
 
     @staticmethod
-    def _directions(rng: np.random.Generator, n: int, distribution: object) -> Array:
+    def _directions(rng: np.random.Generator, n: int, distribution: Distribution) -> Array:
         found = np.zeros((0, 3))
         while len(found) < n:
             r, turn = np.sqrt(rng.random(2 * n + 64)), 2 * np.pi * rng.random(2 * n + 64)
             p, q = r * np.cos(turn), r * np.sin(turn)
-            keep = rng.random(len(p)) * 1.5 < distribution(p, q)  # type: ignore[operator]
+            keep = rng.random(len(p)) * 1.5 < distribution(p, q)
             p, q = p[keep], q[keep]
             found = np.concatenate([found, np.stack([p, q, np.sqrt(np.maximum(1 - p * p - q * q, 1e-12))], axis=1)])
         return found[:n]

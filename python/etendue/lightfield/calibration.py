@@ -96,9 +96,7 @@ def _masses(estimate: PartEstimate, counts: Sums, threads: int | None) -> Masses
     return Masses(mean, np.sqrt(variance))
 
 
-def _elsewhere(
-    found: PartEstimate, counts: PartCounts, symmetry: str, threads: int | None
-) -> tuple[FloatArray, Base]:
+def _elsewhere(found: PartEstimate, counts: PartCounts, symmetry: str, threads: int | None) -> tuple[FloatArray, Base]:
     """The masses that a grid in another position finds, and the fine densities within its cells."""
     shape = counts.grid.weight.shape
     shift = tuple(round(share * n) for share, n in zip(ELSEWHERE, shape, strict=True))
@@ -119,7 +117,10 @@ def _elsewhere(
     base = base_of(found.chart, found.recipe, images)
     tree = grow_moved(counts.grid, base, shift, found.concentration, threads)
     known = PartEstimate(found.chart, found.recipe, images, found.concentration, tree)
-    mass = sum_of_images(_shown(known, threads), symmetry)
+    # What the rays cannot tell from darkness may be dark: with k = (mean/deviation)² rays' worth of knowledge, k/(k + 1) is
+    # left of it. The estimate itself has no cell darker than its prior, and so would find its errors there too small.
+    unsure = np.divide(tree.deviation, tree.ratio, out=np.zeros_like(tree.ratio), where=tree.ratio > 0) ** 2
+    mass = sum_of_images(_shown(known, threads) / (1.0 + unsure), symmetry)
     return mass / mass.sum(), Base(known.unit.space, known.unit.direction)
 
 

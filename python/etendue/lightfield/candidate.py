@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +22,8 @@ from etendue.lightfield.trees import POSITIONS, Base, Tree, grow_averaged, log_e
 CONCENTRATIONS = {"uniform": (1.0, 3.0, 10.0), "product": (10.0, 30.0, 100.0)}
 """Concentrations c among which the evidence chooses, by base measure: one that was taken from the data is believed more."""
 
-IMAGE_CONCENTRATION = 3.0
-"""That of the trees of images: from 1 to 10 their errors differ by some hundredths."""
+IMAGE_CONCENTRATIONS = (1.0, 3.0, 10.0)
+"""Those among which the evidence chooses for the trees of images."""
 
 FLOOR = 1e-3
 """Share of a uniform density in the images: where they are wrongly dark, the data can still say so."""
@@ -73,7 +73,8 @@ def images_of(
         return Base()
 
     def density(sums: Sums) -> FloatArray:
-        found = grow_symmetric(sums, Base(), IMAGE_CONCENTRATION, threads, positions, symmetry).ratio
+        c = max(IMAGE_CONCENTRATIONS, key=lambda c: log_evidence(sums, Base(), c, threads))
+        found = grow_symmetric(sums, Base(), c, threads, positions, symmetry).ratio
         lifted: FloatArray = found * (1.0 - FLOOR) + FLOOR
         return lifted
 
@@ -157,6 +158,10 @@ class Candidate:
     def log_evidence(self) -> float:
         """Of the trees against their base measures, summed over the parts."""
         return sum(part.tree.log_evidence for part in self.parts)
+
+    def by(self, recipe: str) -> Candidate:
+        """The same trees by another recipe with the same base measure."""
+        return Candidate(tuple(dataclasses.replace(part, recipe=recipe) for part in self.parts))
 
     def fields(self, counts: EtendueCounts) -> tuple[PartField, ...]:
         """The parts' fields, each with the flux that was counted on it."""
@@ -247,10 +252,34 @@ def all_images(
     return tuple(images_of(part, chart, threads, counts.symmetry, positions) for part, chart in parts)
 
 
+def grow_candidates(
+    counts: EtendueCounts, images: Sequence[Base], concentrations: Mapping[str, Sequence[float]], threads: int | None
+) -> dict[str, Candidate]:
+    """The candidate of every recipe on the rays that are fitted, with trees in one position; equal trees are grown once."""
+    grown: dict[bool, Candidate] = {}
+    candidates = {}
+    for name, recipe in RECIPES.items():
+        if recipe.product not in grown:
+            c = concentrations[name]
+            grown[recipe.product] = grow_candidate(counts, "fitted", name, images, c, threads, POSITIONS[:1])
+        candidates[name] = grown[recipe.product].by(name)
+    return candidates
+
+
 def choose_concentrations(
+    counts: EtendueCounts, images: Sequence[Base], threads: int | None
+) -> dict[str, tuple[float, ...]]:
+    """By recipe for each part the concentration of greatest evidence, on the rays that are fitted."""
+    chosen: dict[bool, tuple[float, ...]] = {}
+    for name, recipe in RECIPES.items():
+        if recipe.product not in chosen:
+            chosen[recipe.product] = _of_greatest_evidence(counts, name, images, threads)
+    return {name: chosen[recipe.product] for name, recipe in RECIPES.items()}
+
+
+def _of_greatest_evidence(
     counts: EtendueCounts, recipe: str, images: Sequence[Base], threads: int | None
 ) -> tuple[float, ...]:
-    """For each part the concentration of greatest evidence, on the rays that are fitted."""
 
     def choose(part: PartCounts, base: Base) -> float:
         options = CONCENTRATIONS[base.name]
@@ -276,7 +305,9 @@ def grow_candidate(
     """The candidate of a recipe on the counts of a fold, its trees averaged over positions of the grid."""
     parts = zip(counts[fold], counts.surface.parts(), images, concentrations, strict=True)
     return Candidate(
-        tuple(grow_part(part, chart, recipe, own, c, threads, counts.symmetry, positions) for part, chart, own, c in parts)
+        tuple(
+            grow_part(part, chart, recipe, own, c, threads, counts.symmetry, positions) for part, chart, own, c in parts
+        )
     )
 
 

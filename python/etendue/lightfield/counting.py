@@ -251,18 +251,15 @@ def count_rays(
 
 def _folds(raw: _core._Counts, grids: tuple[PartGrids, ...]) -> dict[Fold, tuple[PartCounts, ...]]:
     """The core's flat arrays as sums per fold and part, each with the shape of its grid."""
-    names: tuple[Literal["grid", "space", "direction"], ...] = ("grid", "space", "direction")
-    shapes = [
-        [tuple(1 << d for d in g.depths) for g in grids],
-        [(1 << g.fine[0],) * 2 for g in grids],
-        [(1 << g.fine[1],) * 2 for g in grids],
-    ]
 
     def cut(values: npt.NDArray[np.generic], of_parts: list[tuple[int, ...]]) -> list[list[FloatArray]]:
         """Per fold and part."""
         ends = np.cumsum([math.prod(shape) for shape in of_parts])[:-1]
         return [
-            [piece.reshape(shape).astype(np.float64) for piece, shape in zip(np.split(fold, ends), of_parts, strict=True)]
+            [
+                piece.reshape(shape).astype(np.float64)
+                for piece, shape in zip(np.split(fold, ends), of_parts, strict=True)
+            ]
             for fold in np.split(values, 2)
         ]
 
@@ -274,7 +271,11 @@ def _folds(raw: _core._Counts, grids: tuple[PartGrids, ...]) -> dict[Fold, tuple
         both = zip(weights, cut(squared, of_parts), strict=True)
         return [[Sums(w, s) for w, s in zip(*fold, strict=True)] for fold in both]
 
-    counted = [sums(name, of_parts) for name, of_parts in zip(names, shapes, strict=True)]
+    counted = (
+        sums("grid", [tuple(1 << d for d in g.depths) for g in grids]),
+        sums("space", [(1 << g.fine[0],) * 2 for g in grids]),
+        sums("direction", [(1 << g.fine[1],) * 2 for g in grids]),
+    )
     fitted, held_out = (
         tuple(PartCounts(*three) for three in zip(*(kind[fold] for kind in counted), strict=True)) for fold in (0, 1)
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Literal
 
 import numpy as np
@@ -19,6 +19,7 @@ from etendue.lightfield.candidate import (
     all_images,
     choose_concentrations,
     grow_candidate,
+    grow_candidates,
     score_densities,
 )
 from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, PartGrids, count_rays
@@ -29,7 +30,7 @@ from etendue.lightfield.pilot_sample import check_near_field, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Plane, Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry
-from etendue.lightfield.trees import POSITIONS
+from etendue.lightfield.trees import POSITIONS, Base
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 
@@ -47,6 +48,13 @@ SHAPES = (-2, -1, 0, 1, 2)
 
 FEW = 1.0 / 16.0
 """Share of the rays of the part that has the most below which a part gets a grid of its own."""
+
+FEWEST_BITS, MOST_PILOT_BITS = 16, 20
+"""Halvings in all of the grids that are compared, in steps of 4. Where images tell most, few cells do as well as many, in
+a sixteenth of the time; sets of very many rays may fill more than the pilot's."""
+
+LEAST_LEAD = 1e-3
+"""[nat per ray] A smaller lead of a finer grid shows in no map."""
 
 LEAD = 3.0
 """Standard errors by which the score of a recipe must lead a simpler one's to be taken."""
@@ -117,9 +125,10 @@ def grids_for(rays: int, depths: Depths) -> PartGrids:
 def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: int, threads: int | None) -> Plan:
     """Choose, on some of the rays, what predicts held-out rays best: the shape of the grid unless it is given.
 
-    From the even shape the search goes on as long as the score rises, by the recipe that is the best one there. The grids
-    compared have a quarter of the cells of the one to be filled: what is gained by finer cells along one axis and lost by
-    coarser ones along another shows in them, too. Parts with few rays have grids of their own, no larger than these fill.
+    From an even shape the search goes on as long as the score rises, by the recipe that is the best one there; then from
+    its best shape with sixteen times the cells, as long as these predict better for sure. The grids compared have a quarter
+    of the cells of the one to be filled: what is gained by finer cells along one axis and lost by coarser ones along another
+    shows in them, too. Parts with few rays have grids of their own, no larger than these fill.
     """
     some = pilot_sample(rays, PILOT_RAYS)
     bits = default_bits(len(rays))
@@ -136,26 +145,52 @@ def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: in
     def counted(own: Depths) -> EtendueCounts:
         return count_rays(some, surface, grids(len(some), own), seed=seed, threads=threads)
 
-    def score(counts: EtendueCounts, recipe: str, c: Sequence[float]) -> float:
-        return grow_candidate(counts, "fitted", recipe, images, c, threads, POSITIONS[:1]).score(counts).mean
-
-    best = 0
-    trial = counted(depths or _depths(min(bits, 20) - 2, best))
-    images = all_images(trial, "fitted", threads, FINE_POSITIONS[:4])
-    concentrations = {name: choose_concentrations(trial, name, images, threads) for name in RECIPES}
     if depths:
-        return Plan(grids(len(rays), depths), concentrations)
-    first = {name: score(trial, name, concentrations[name]) for name in RECIPES}
-    recipe = max(first, key=lambda name: first[name])
-    reached = first[recipe]
+        trial = counted(depths)
+        return Plan(grids(len(rays), depths), choose_concentrations(trial, _pilot_images(trial, threads), threads))
+    chosen = _search(counted, min(bits, FEWEST_BITS), 0, threads)
+    while chosen.bits < min(bits, MOST_PILOT_BITS):
+        finer = _search(counted, chosen.bits + 4, chosen.lend, threads)
+        lead, error = finer.score.lead(chosen.score)
+        if lead <= max(LEAD * error, LEAST_LEAD):
+            break
+        chosen = finer
+    if chosen.bits == MOST_PILOT_BITS:
+        chosen = dataclasses.replace(chosen, bits=bits)
+    return Plan(grids(len(rays), _depths(chosen.bits, chosen.lend)), chosen.concentrations)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Shape:
+    """A shape of the grid, what is best on it, and how well that predicts."""
+
+    bits: int
+    lend: int
+    concentrations: dict[str, tuple[float, ...]]
+    score: Score
+
+
+def _search(counted: Callable[[Depths], EtendueCounts], bits: int, lend: int, threads: int | None) -> _Shape:
+    """The best shape of a grid of so many halvings, from one shape on as long as the score rises."""
+    trial = counted(_depths(bits - 2, lend))
+    images = _pilot_images(trial, threads)
+    concentrations = choose_concentrations(trial, images, threads)
+    scores = {name: c.score(trial) for name, c in grow_candidates(trial, images, concentrations, threads).items()}
+    recipe = max(scores, key=lambda name: scores[name].mean)
+    best, reached = lend, scores[recipe]
     for step in (1, -1):
-        while best * step >= 0 and best + step in SHAPES:
-            trial = counted(_depths(min(bits, 20) - 2, best + step))
-            tried = score(trial, recipe, concentrations[recipe])
-            if tried <= reached:
+        while (best - lend) * step >= 0 and best + step in SHAPES:
+            trial = counted(_depths(bits - 2, best + step))
+            c = concentrations[recipe]
+            tried = grow_candidate(trial, "fitted", recipe, images, c, threads, POSITIONS[:1]).score(trial)
+            if tried.mean <= reached.mean:
                 break
             best, reached = best + step, tried
-    return Plan(grids(len(rays), _depths(bits, best)), concentrations)
+    return _Shape(bits, best, concentrations, reached)
+
+
+def _pilot_images(counts: EtendueCounts, threads: int | None) -> tuple[Base, ...]:
+    return all_images(counts, "fitted", threads, FINE_POSITIONS[:4])
 
 
 def depths_for(rays: int) -> Depths:
@@ -173,10 +208,8 @@ def _depths(bits: int, lend: int) -> Depths:
 def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, threads: int | None) -> EtendueDensity:
     """The field of counted rays: recipes compared on the held-out rays, the best one followed with all."""
     images = all_images(counts, "fitted", threads)
-    scores: dict[str, Score] = {}
-    for name in RECIPES:
-        c = plan.concentrations[name]
-        scores[name] = grow_candidate(counts, "fitted", name, images, c, threads, POSITIONS[:1]).score(counts)
+    candidates = grow_candidates(counts, images, plan.concentrations, threads)
+    scores = {name: candidate.score(counts) for name, candidate in candidates.items()}
     recipe = next(iter(RECIPES))
     for name in RECIPES:
         lead, error = scores[name].lead(scores[recipe])
@@ -210,9 +243,7 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
     )
 
 
-def _calibrated(
-    counts: EtendueCounts, candidate: Candidate, seed: int, threads: int | None
-) -> Iterator[PartEstimate]:
+def _calibrated(counts: EtendueCounts, candidate: Candidate, seed: int, threads: int | None) -> Iterator[PartEstimate]:
     """The estimates with error bars that also hold the Poisson error of the part's flux."""
     for found, part in zip(candidate.parts, counts["all"], strict=True):
         if part.grid.rays == 0:

@@ -10,13 +10,13 @@ import dataclasses
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter
 
-from etendue.lightfield.counting import FloatArray
 from etendue import _core
+from etendue.denoising.fourier_plane import blurred
+from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.pilot_sample import even_density, pilot_sample, selected_rays
 from etendue.lightfield.selection.scorer import WITH_IMAGES, SurfaceScorer
-from etendue.lightfield.surfaces import FLAT, MOST_FRAMES, SLACK, STRAY, Focus, Plane, Sphere
+from etendue.lightfield.surfaces import FLAT, MOST_FRAMES, SLACK, STRAY, Focus, Plane, Sphere, hits_upwards
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 
@@ -161,9 +161,8 @@ def focused_about(z: float, rays: RaySet, threads: int | None = None) -> Plane |
 def _rays(position: FloatArray, direction: FloatArray, z: float) -> _Rays:
     slope = direction[:, :2] / direction[:, 2:]
     lean = 1.0 - direction[:, 2]
-    # Ranks, so that rays of one inclination are dealt to rings as well.
-    ring = np.empty(len(lean), np.intp)
-    ring[np.argsort(lean, kind="stable")] = np.arange(len(lean)) * RINGS // len(lean)
+    # By rank, so that rays of one inclination are dealt to rings as well.
+    ring = np.argsort(np.argsort(lean, kind="stable"), kind="stable") * RINGS // len(lean)
     half = np.random.default_rng(1).random(len(lean)) < 0.5
     return _Rays(position[:, :2] + (z - position[:, 2:]) * slope, slope, lean, ring, half)
 
@@ -178,18 +177,19 @@ class _View:
     def cells(self, place: FloatArray) -> tuple[npt.NDArray[np.intp], Bools]:
         """The cell of each place, and whether it lies in the square."""
         index = np.floor(((place - self.centre) / self.side + 0.5) * SIDE).astype(np.intp)
-        inside = ((index >= 0) & (index < SIDE)).all(axis=1)
+        inside: Bools = np.all((index >= 0) & (index < SIDE), axis=1)
         index = np.clip(index, 0, SIDE - 1)
         return index[:, 0] * SIDE + index[:, 1], inside
 
     def densities(self, place: FloatArray, half: Bools) -> tuple[FloatArray, FloatArray]:
-        """Smooth images of the rays in the second half and in the first, each for those of the other; mean 1 if all are in."""
+        """Smooth images of the rays in either half, each for those of the other, the first half's first; mean 1."""
         cell, inside = self.cells(place)
 
         def image(which: Bools) -> FloatArray:
             counts = np.bincount(cell[which & inside], minlength=SIDE**2).reshape(SIDE, SIDE)
-            smooth: FloatArray = gaussian_filter(counts.astype(np.float64), BLUR).ravel()
-            return smooth * (SIDE**2 / max(np.count_nonzero(which), 1))
+            rays = max(int(np.count_nonzero(which)), 1)
+            smooth: FloatArray = np.maximum(blurred(counts.astype(np.float64), BLUR), 0.0).ravel() * (SIDE**2 / rays)
+            return smooth
 
         return image(~half), image(half)
 
@@ -205,7 +205,7 @@ def _focus(rays: _Rays) -> Focus | None:
     """The focus by powers of the lean, or None for a flat one."""
     view, about = _waist(rays)
     step = view.side / 80.0
-    depths = about + step * np.arange(-COARSE, COARSE + 1)
+    depths = about + step * np.arange(-COARSE, COARSE + 1.0)
     whole, own = np.zeros(len(depths)), np.zeros((len(depths), RINGS))
     members = [np.flatnonzero(rays.ring == ring) for ring in range(RINGS)]
     for i, depth in enumerate(depths):
@@ -268,27 +268,23 @@ def _fitted(rays: _Rays, depth: FloatArray, weight: FloatArray) -> Focus:
     # Held to the straight line by a little, where few rings say anything.
     mean = float(np.average(depth, weights=weight))
     ridge = 1e-3 * np.diag([0.0, 0.0, 1.0, 1.0])
-    found = np.linalg.lstsq(np.vstack([matrix, ridge]), np.append((depth - mean) * scale, np.zeros(4)), rcond=None)[0]
-    found[0] += mean
-    a, b, c, d = (float(v) for v in found)
-    return (a, b, c, d)
+    wanted = np.append((depth - mean) * scale, np.zeros(4))
+    a, b, c, d = (float(v) for v in np.linalg.lstsq(np.vstack([matrix, ridge]), wanted, rcond=None)[0])
+    return (mean + a, b, c, d)
 
 
 def _heights(rays: _Rays, focus: Focus) -> FloatArray:
-    values: FloatArray = np.polynomial.polynomial.polyval(rays.lean, focus)
-    return values
+    return np.asarray(np.polynomial.polynomial.polyval(rays.lean, focus), dtype=np.float64)
 
 
 def _registered(rays: _Rays, view: _View, focus: Focus, step: float) -> Focus:
     """Each ring moved to where the image of all rays predicts it best."""
     heights = _heights(rays, focus)
     images = view.densities(rays.at(heights), rays.half)
-    steps = step * np.arange(-FINE, FINE + 1)
+    steps = step * np.arange(-FINE, FINE + 1.0)
     scores = np.array(
         [
-            np.bincount(
-                rays.ring, view.log_likelihoods(rays.at(heights + dz), rays.half, images), minlength=RINGS
-            )
+            np.bincount(rays.ring, view.log_likelihoods(rays.at(heights + dz), rays.half, images), minlength=RINGS)
             for dz in steps
         ]
     )
@@ -305,12 +301,8 @@ def _score(rays: _Rays, view: _View, focus: Focus) -> float:
 def _windowed(plane: Plane, rays: RayStream) -> Plane:
     """The rectangle about what is bright, and frames until almost all rays are in."""
     whole = plane.sized_for(rays)
-    some = pilot_sample(rays, RAYS)
-    up = some.direction[:, 2] > 0.0
-    direction, position = some.direction[up], some.position[up]
-    z = plane.z + np.polynomial.polynomial.polyval(1.0 - direction[:, 2], plane.focus or FLAT)
-    place = position[:, :2] + ((z - position[:, 2]) / direction[:, 2])[:, None] * direction[:, :2]
-    low, high = np.quantile(place, MIDDLE, axis=0)
+    place = hits_upwards(rays, plane.z, "Plane", plane.focus or FLAT)
+    low, high = np.asarray(np.quantile(place, MIDDLE, axis=0), dtype=np.float64)
     middle, sides = (low + high) / 2.0, ROOM * (high - low)
     everything = np.array([whole.closed("width"), whole.closed("height")])
     if not (sides > 0.0).all() or (sides >= everything / 2.0**0.5).all():

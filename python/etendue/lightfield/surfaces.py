@@ -95,7 +95,15 @@ class Part:
     def core(self) -> _core._Part:
         """The part as the compiled core takes it."""
         x, y, z = self.axes
-        return {"shape": self.shape, "centre": self.centre, "x": x, "y": y, "z": z, "size": self.size, "focus": self.focus}
+        return {
+            "shape": self.shape,
+            "centre": self.centre,
+            "x": x,
+            "y": y,
+            "z": z,
+            "size": self.size,
+            "focus": self.focus,
+        }
 
 
 WORLD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -269,7 +277,7 @@ class Plane(Surface):
         """The smallest rectangle that the rays' lines cross, but for strays far off."""
         if not self.open_dimensions:
             return self
-        hits = _hits_upwards(rays, self.z, "Plane", self.focus or FLAT)
+        hits = hits_upwards(rays, self.z, "Plane", self.focus or FLAT)
         spans = [_span(v, c) for v, c in zip(hits.T, self.centre or (None, None), strict=True)]
         centre = tuple((low + high) / 2 for low, high in spans)
         width, height = ((high - low) * (1 + SLACK) for low, high in spans)
@@ -315,7 +323,7 @@ class Disk(Surface):
         """The smallest disk that the rays' lines cross, but for strays far off."""
         if not self.open_dimensions:
             return self
-        hits = _hits_upwards(rays, self.z, "Disk")
+        hits = hits_upwards(rays, self.z, "Disk")
         return dataclasses.replace(self, radius=_reach(np.hypot(*(hits - self.centre).T)))
 
 
@@ -636,8 +644,21 @@ def _places_and_directions(rays: RayStream) -> tuple[FloatArray, FloatArray]:
     return some.position, some.direction
 
 
-def _hits_upwards(rays: RayStream, z: float, name: str, focus: Focus = FLAT) -> FloatArray:
-    """Places on a height, taken at its focus, of rays that head towards +Z [mm], shape (m, 2)."""
+def hits_upwards(rays: RayStream, z: float, name: str, focus: Focus = FLAT) -> FloatArray:
+    """Places on a height, taken at its focus, of rays that head towards +Z [mm], shape (m, 2).
+
+    Raises
+    ------
+    ArgumentError
+        If there are no such rays.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> rays = et.RaySet([[0, 0, 0], [0, 0, 0]], [[0.6, 0, 0.8], [0, 0, -1]], [1, 1])
+    >>> hits_upwards(rays, 4.0, "Plane").tolist()
+    [[3.0, 0.0]]
+    """
     position, direction = _places_and_directions(rays)
     up = direction[:, 2] > 0
     if not up.any():

@@ -20,6 +20,8 @@ from etendue.lightfield.surfaces import Part
 from etendue.lightfield.trees import POSITIONS, Base
 from etendue.quantities.ray_set import RaySet
 
+Cells = npt.NDArray[np.intp]
+
 TREES_ALONE = ("uniform",)
 WITH_IMAGES = ("uniform", "scaled")
 """Recipes that a score may use, with the same tree."""
@@ -29,6 +31,44 @@ IMAGE_SHAPE = (128, 128, 32, 32)
 
 IMAGE_POSITIONS = FINE_POSITIONS[:2]
 """Positions over which they are averaged."""
+
+
+FEW = 1.0 / 16.0
+"""Share of the rays of the part that has the most below which a part is scored on coarser grids."""
+
+COARSER = 4
+"""By how much along each coordinate."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Shapes:
+    """Cells along the coordinates of a part: of the tree, of the image over place and of that over direction."""
+
+    grid: tuple[int, ...]
+    space: tuple[int, ...]
+    direction: tuple[int, ...]
+
+    @classmethod
+    def of(cls, grid: Grid, *, few: bool) -> _Shapes:
+        place, turn = grid
+        step = COARSER if few else 1
+        tree = tuple(max(n // step, 2) for n in (1 << place, 1 << place, 1 << turn, 1 << turn))
+        images = tuple(n // step for n in IMAGE_SHAPE)
+        return cls(tree, images[:2], images[2:])
+
+    def cells(self, coordinates: FloatArray) -> tuple[Cells, Cells, Cells]:
+        """The cell of each ray in each of the three."""
+
+        def numbered(axes: slice, shape: tuple[int, ...]) -> Cells:
+            index = np.minimum((coordinates[:, axes] * shape).astype(np.intp), np.array(shape) - 1)
+            numbers: Cells = np.ravel_multi_index(tuple(index.T), shape)
+            return numbers
+
+        return (
+            numbered(slice(0, 4), self.grid),
+            numbered(slice(0, 2), self.space),
+            numbered(slice(2, 4), self.direction),
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -111,7 +151,7 @@ class SurfaceScorer:
     ) -> list[HeldOutScore]:
         """The score of each of several surfaces, each on its grid; see `score`."""
         with ThreadPoolExecutor(self.threads) as pool:
-            return list(pool.map(lambda both: self.score(*both, recipes), surfaces))
+            return list(pool.map(lambda both: self.score(both[0], both[1], recipes), surfaces))
 
     def score(self, parts: Sequence[Part], grid: Grid, recipes: Sequence[str] = TREES_ALONE) -> HeldOutScore:
         """The score of a surface of these parts.
@@ -126,14 +166,11 @@ class SurfaceScorer:
             `TREES_ALONE`, or `WITH_IMAGES`: of those the one that predicts better counts.
         """
         owner, coordinates = _core.cross_parts([part.core() for part in parts], self.position, self.direction)
-        shape = (1 << grid[0],) * 2 + (1 << grid[1],) * 2
-        cell = np.zeros(len(owner), np.intp)
-        for axis, n in enumerate(shape):
-            cell = cell * n + np.minimum((coordinates[:, axis] * n).astype(np.intp), n - 1)
-        fine = np.minimum((coordinates * IMAGE_SHAPE).astype(np.intp), np.array(IMAGE_SHAPE) - 1)
-        pixels = (fine[:, 0] * IMAGE_SHAPE[1] + fine[:, 1], fine[:, 2] * IMAGE_SHAPE[3] + fine[:, 3])
+        met = np.bincount(owner[owner >= 0], minlength=len(parts))
+        shapes = [_Shapes.of(grid, few=bool(n < FEW * met.max())) for n in met]
+        cells = [shape.cells(coordinates[owner == index]) for index, shape in enumerate(shapes)]
         folds = range(1 if len(owner) >= self.one_fold_from else self.settings.folds)
-        values = [self._held_out(parts, owner, (cell, *pixels), shape, self.fold == fold, recipes) for fold in folds]
+        values = [self._held_out(parts, owner, cells, shapes, self.fold == fold, recipes) for fold in folds]
         weights = np.concatenate([self.flux[self.fold == fold] for fold in folds])
         unmet = float(self.flux[owner < 0].sum() / self.flux.sum())
         scores = [Score(np.concatenate(of_recipe), weights) for of_recipe in zip(*values, strict=True)]
@@ -143,8 +180,8 @@ class SurfaceScorer:
         self,
         parts: Sequence[Part],
         owner: npt.NDArray[np.int64],
-        cells: tuple[npt.NDArray[np.intp], ...],
-        shape: tuple[int, ...],
+        cells: Sequence[tuple[Cells, Cells, Cells]],
+        shapes: Sequence[_Shapes],
         out: npt.NDArray[np.bool_],
         recipes: Sequence[str],
     ) -> list[FloatArray]:
@@ -153,8 +190,9 @@ class SurfaceScorer:
         for index, part in enumerate(parts):
             mine = (owner == index) & ~out
             if mine.any():
-                of_part = self._estimate(part, [c[mine] for c in cells], self.flux[mine], shape, recipes)
-                estimates.append((of_part, mine))
+                own = mine[owner == index]
+                picked = tuple(c[own] for c in cells[index])
+                estimates.append((self._estimate(part, picked, self.flux[mine], shapes[index], recipes), mine))
         met = float(self.flux[(owner >= 0) & ~out].sum())
         unmet = max(1.0 - met / float(self.flux[~out].sum()), MIXED_IN)
         values = []
@@ -174,14 +212,13 @@ class SurfaceScorer:
     def _estimate(
         self,
         part: Part,
-        cells: Sequence[npt.NDArray[np.intp]],
+        cells: Sequence[Cells],
         flux: FloatArray,
-        shape: tuple[int, ...],
+        shapes: _Shapes,
         recipes: Sequence[str],
     ) -> PartEstimate:
         """What the rays of one part tell of its light: a tree that does not know of the images, and the images."""
-        shapes = (shape, IMAGE_SHAPE[:2], IMAGE_SHAPE[2:])
-        counts = PartCounts(*(_sums(c, flux, s) for c, s in zip(cells, shapes, strict=True)))
+        counts = PartCounts(*(_sums(c, flux, s) for c, s in zip(cells, dataclasses.astuple(shapes), strict=True)))
         needed = part.hole > 0.0 or recipes != TREES_ALONE
         images = images_of(counts, part, 1, positions=IMAGE_POSITIONS) if needed else Base()
         return grow_part(
@@ -189,7 +226,7 @@ class SurfaceScorer:
         )
 
 
-def _sums(cell: npt.NDArray[np.intp], flux: FloatArray, shape: tuple[int, ...]) -> Sums:
+def _sums(cell: Cells, flux: FloatArray, shape: tuple[int, ...]) -> Sums:
     n = math.prod(shape)
     if flux.min() == flux.max():
         return Sums(np.bincount(cell, minlength=n).reshape(shape).astype(np.float64), None)
