@@ -120,7 +120,7 @@ def _elsewhere(found: PartEstimate, counts: PartCounts, symmetry: str, threads: 
     # What the rays cannot tell from darkness may be dark: with k = (mean/deviation)² rays' worth of knowledge, k/(k + 1) is
     # left of it. The estimate itself has no cell darker than its prior, and so would find its errors there too small.
     unsure = np.divide(tree.deviation, tree.ratio, out=np.zeros_like(tree.ratio), where=tree.ratio > 0) ** 2
-    mass = sum_of_images(_shown(known, threads) / (1.0 + unsure), symmetry)
+    mass = sum_of_images(_shown(known, threads) / (1.0 + unsure) ** 2, symmetry)
     return mass / mass.sum(), Base(known.unit.space, known.unit.direction)
 
 
