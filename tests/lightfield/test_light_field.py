@@ -56,10 +56,10 @@ def test_it_beats_the_grid_of_the_thesis_by_far_whatever_its_threshold(
 
 
 @pytest.mark.slow
-def test_the_product_base_is_taken_for_a_film_and_not_for_an_entangled_source() -> None:
+def test_images_are_used_for_a_disk_and_do_no_harm_to_an_entangled_source() -> None:
     source = LimbDarkenedDisk()
     field = LightField.fit(rays_of(source, 30_000), et.Plane(z=0), depths=DEPTHS)
-    assert field.report.bases == ("product",)
+    assert field.report.bases[0] in {"scaled", "product"}
     # Light from two spots in two opposite directions: neither exitance nor intensity knows which goes with which.
     rng = np.random.default_rng(2)
     side = rng.choice([-1.0, 1.0], 30_000)

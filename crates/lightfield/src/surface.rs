@@ -12,7 +12,7 @@ use multiversion::multiversion;
 
 /// The depth at which light of each inclination is sharp: a cubic in 1 − cos θ, from its constant term on \[mm\].
 ///
-/// It moves places by a function of the direction only, so that étendue stays what it is. Theory eq. 42.
+/// It moves places by a function of the direction only, so that étendue stays what it is. Theory eq. 41.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Focus(pub [f64; 4]);
 
@@ -30,7 +30,7 @@ impl Focus {
     /// places is seen from `height` above the plane, the distance being that to the plane.
     ///
     /// With the slope m of the line, x' = x - (h - ζ) m; ζ changes with m, so that the determinant of dx'/dm is
-    /// (h - ζ)² (1 + ζ' c (1 - c²)/(h - ζ)), and dm = dΩ/c³.
+    /// (h - ζ)² (1 + ζ' c (1 - c²)/(h - ζ)), and dm = dΩ/c³: theory eq. 42.
     #[inline(always)]
     #[must_use]
     pub fn seen(&self, cosine: f64, height: f64) -> f64 {

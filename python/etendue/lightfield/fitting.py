@@ -12,7 +12,6 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.calibration import calibrate
 from etendue.lightfield.candidate import (
     FINE_POSITIONS,
-    RECIPES,
     Candidate,
     PartEstimate,
     Score,
@@ -57,7 +56,7 @@ LEAST_LEAD = 1e-3
 """[nat per ray] A smaller lead of a finer grid shows in no map."""
 
 LEAD = 3.0
-"""Standard errors by which the score of a recipe must lead a simpler one's to be taken."""
+"""Standard errors by which the score of a finer grid must lead a coarser one's to be taken."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -210,11 +209,7 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
     images = all_images(counts, "fitted", threads)
     candidates = grow_candidates(counts, images, plan.concentrations, threads)
     scores = {name: candidate.score(counts) for name, candidate in candidates.items()}
-    recipe = next(iter(RECIPES))
-    for name in RECIPES:
-        lead, error = scores[name].lead(scores[recipe])
-        if lead > LEAD * error:
-            recipe = name
+    recipe = max(scores, key=lambda name: scores[name].mean)
     score, c = scores[recipe], plan.concentrations[recipe]
     final = grow_candidate(counts, "all", recipe, all_images(counts, "all", threads), c, threads)
     final = Candidate(tuple(_calibrated(counts, final, seed, threads)))
@@ -269,7 +264,7 @@ def _histogram(counts: EtendueCounts) -> FloatArray:
 
 
 def _effective_cells(counts: EtendueCounts, candidate: Candidate) -> float:
-    """2 N Σ m (ψ(k + 1) - ln k) over the cells, k = (L/σ)², m their share of the flux; theory eq. 41."""
+    """2 N Σ m (ψ(k + 1) - ln k) over the cells, k = (L/σ)², m their share of the flux; theory eq. 43."""
     total = 0.0
     for part, found in zip(counts["all"], candidate.parts, strict=True):
         tree = found.tree

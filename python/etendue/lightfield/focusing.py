@@ -142,6 +142,12 @@ def focused_about(z: float, rays: RaySet, threads: int | None = None) -> Plane |
     """A focused plane near a depth that takes up all rays; None if no window is smaller than what all rays need.
 
     It lies where light along the horizon is sharp, so that rays start near their places.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> focused_about(0.0, et.RingSource(rays=20_000).ray_set()) is None        # a disk on a plane is sharp as it is
+    True
     """
     plane = focused(Plane(z=z), rays, threads=threads)
     if plane.focus is None and plane.frames == 0:

@@ -55,7 +55,7 @@ class Part:
     focus : tuple of 4 floats
         Of a rectangle: the height above it at which the places of light under θ are taken, f₀ + f₁ (1 - cos θ) +
         f₂ (1 - cos θ)² + f₃ (1 - cos θ)³ [mm]. Rays start on the rectangle's plane all the same. Places that are shifted by
-        direction alone leave étendue what it is: theory eq. 42.
+        direction alone leave étendue what it is: theory eq. 41.
     hole : float
         Share of both sides, about the middle, within which no ray is left for this part, as others take them first.
 
@@ -144,7 +144,8 @@ class Surface(abc.ABC):
                 raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give a length above 0 mm.")
             wanted = self.sizes().get(field.name, 1)
             if np.size(numbers) != wanted:
-                raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give {_counted(wanted)}.")
+                numbers_of = "coordinates" if field.name == "centre" else "numbers" if wanted > 1 else "number"
+                raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give {wanted} {numbers_of}.")
 
     @classmethod
     def sizes(cls) -> dict[str, int]:
@@ -189,10 +190,6 @@ class Surface(abc.ABC):
 LENGTHS = {"width", "height", "depth", "radius", "window", "rest"}
 
 MOST_FRAMES = 16
-
-
-def _counted(numbers: int) -> str:
-    return "one number" if numbers == 1 else f"{numbers} numbers"
 
 
 def _text(value: object) -> str:
