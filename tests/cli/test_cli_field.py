@@ -185,8 +185,8 @@ def test_info_describes_fields_beside_rays_and_damage(run: Run, folder: Path) ->
     assert watts["flux_unit"] == "W"
     people = run("info", folder / "dome.h5", folder / "short.h5")
     assert people.status == 1
-    assert "window: 4 × 2 × 2 × 4 cells, product base" in people.out
-    assert "dome: 4 × 2 × 2 × 4 cells, uniform base" in people.out
+    assert "window: 4 × 2 × 2 × 4 cells, tree on the product of the images" in people.out
+    assert "dome: 4 × 2 × 2 × 4 cells, tree alone" in people.out
     assert "short.h5" in people.err
 
 

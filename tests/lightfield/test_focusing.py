@@ -260,3 +260,8 @@ def test_bad_planes_are_told() -> None:
     ):
         with pytest.raises(et.ArgumentError, match=told):
             et.Plane(z=0, **keys)  # type: ignore[arg-type]
+
+
+def test_pixels_of_patches_need_a_flat_plane(rays: et.RaySet) -> None:
+    with pytest.raises(et.ArgumentError, match="without focus and frames"):
+        et.GriddedSource.fit(rays, SMALL, pixel=0.5, threshold=5)

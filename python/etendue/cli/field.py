@@ -105,12 +105,20 @@ def print_field(field: LightField) -> None:
         say(f"  {note}")
 
 
+RECIPES_TOLD = {
+    "uniform": "tree alone",
+    "scaled": "tree scaled to the images of place and direction",
+    "product": "tree on the product of the images of place and direction",
+}
+"""What the names of recipes mean."""
+
+
 def _grids(field: LightField) -> list[str]:
-    """Cells, base measure and concentration of each part."""
+    """Cells, recipe and concentration of each part, and how fine its images are."""
     charts, report = field.surface.parts(), field.report
     lines = []
     for chart, part, base, concentration in zip(charts, field.parts, report.bases, report.concentrations, strict=True):
         name = f"{chart.name}: " if len(charts) > 1 else ""
         cells = " × ".join(str(n) for n in part.ratio.shape)
-        lines.append(f"{name}{cells} cells, {base} base, concentration {concentration:g}")
+        lines.append(f"{name}{cells} cells, {RECIPES_TOLD[base]}, concentration {concentration:g}")
     return lines

@@ -7,6 +7,7 @@ each ray's place is taken at the depth of its own inclination. Theory section 14
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ from etendue.denoising.fourier_plane import blurred
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.pilot_sample import even_density, pilot_sample, selected_rays
 from etendue.lightfield.selection.scorer import WITH_IMAGES, SurfaceScorer
-from etendue.lightfield.surfaces import FLAT, MOST_FRAMES, SLACK, STRAY, Focus, Plane, Sphere, hits_upwards
+from etendue.lightfield.surfaces import FLAT, MOST_FRAMES, STRAY, Focus, Plane, Sphere, hits_upwards
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 
@@ -153,9 +154,10 @@ def focused_about(z: float, rays: RaySet, threads: int | None = None) -> Plane |
     if plane.focus is None and plane.frames == 0:
         return None
     if plane.focus is not None:
-        shift = sum(plane.focus)
-        focus = (plane.focus[0] - shift, *plane.focus[1:])
-        plane = dataclasses.replace(plane, z=plane.z + shift, focus=focus)
+        unit = _unit(plane.closed("width"))
+        shift = round(sum(plane.focus) / unit) * unit
+        a, b, c, d = plane.focus
+        plane = dataclasses.replace(plane, z=plane.z + shift, focus=(round((a - shift) / unit) * unit, b, c, d))
     parts = [part.core() for part in plane.parts()]
     unmet = _core.cross_parts(parts, rays.position, rays.direction)[0] < 0
     if float(rays.flux[unmet].sum()) <= STRAY * rays.total_flux or plane.centre is None:
@@ -230,7 +232,9 @@ def _focus(rays: _Rays) -> Focus | None:
     for focus in (constant, curved):
         if scores[focus] > scores[best] + PROOF:
             best = focus
-    return None if best == FLAT else best
+    unit = _unit(view.side)
+    a, b, c, d = (round(f / unit) * unit for f in best)
+    return None if best == FLAT else (a, b, c, d)
 
 
 def _waist(rays: _Rays) -> tuple[_View, float]:
@@ -319,7 +323,12 @@ def _windowed(plane: Plane, rays: RayStream) -> Plane:
         if np.mean((np.abs(place - middle) <= sides * 2.0**frames / 2.0).all(axis=1)) >= ENOUGH:
             break
         frames += 1
-    width, height = (float(side) * (1.0 + SLACK) for side in sides)
-    return dataclasses.replace(
-        plane, width=width, height=height, centre=(float(middle[0]), float(middle[1])), frames=frames
-    )
+    unit = _unit(float(sides.max()))
+    width, height = (math.ceil(side / unit) * unit for side in sides)
+    centre = (round(middle[0] / unit) * unit, round(middle[1] / unit) * unit)
+    return dataclasses.replace(plane, width=width, height=height, centre=centre, frames=frames)
+
+
+def _unit(length: float) -> float:
+    """A power of ten that is a few ten-thousandths of a length: what is found is not known to less."""
+    return 10.0 ** (math.floor(math.log10(length)) - 4)

@@ -250,5 +250,5 @@ def _facts(diagnostics: Diagnostics) -> Iterator[str]:
     yield f"{style.grouped(f'{report.effective_cells:.0f}')} effective degrees of freedom"
     yield f"error bars predict a relative error of {style.percent(100 * diagnostics.expected_error)} at a ray"
     yield f"99 % of the flux in {style.plain(float(f'{curve.etendue_of(0.99):.3g}'))} mm² sr"
-    yield f"base measure {', '.join(report.bases)}"
+    yield f"recipe {', '.join(dict.fromkeys(report.bases))}"
     yield Path(diagnostics.source).name

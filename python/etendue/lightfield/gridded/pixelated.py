@@ -12,7 +12,7 @@ import numpy as np
 from etendue.errors import ArgumentError
 from etendue.lightfield.gridded.curved_pixels import CylindricalPixels, SphericalPixels
 from etendue.lightfield.gridded.pixels import Array, Cells, Indices, Pixelation, SquarePixels
-from etendue.lightfield.surfaces import Part, Surface
+from etendue.lightfield.surfaces import FLAT, Part, Surface
 
 MOST_PIXELS = 1 << 26
 """Pixels of a surface, lit or not: a quarter of a gigabyte for their numbers."""
@@ -65,6 +65,10 @@ class PixelatedSurface:
         if not (math.isfinite(pixel) and pixel > 0.0):
             raise ArgumentError(f"pixel is {pixel!r}; give the side of a pixel in mm, above 0.")
         parts = surface.parts()
+        if any(part.focus != FLAT or part.hole > 0.0 for part in parts):
+            raise ArgumentError(
+                f"pixels lie on surfaces without focus and frames, and {surface.spec} has them; state it without."
+            )
         if parallels is not None:
             parallels = operator.index(parallels)
             if parallels < 1:
