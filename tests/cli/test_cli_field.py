@@ -87,6 +87,7 @@ def test_fit_is_the_fit_of_the_api_and_tells_all_of_it(run: Run, folder: Path, t
     assert other["score"] != facts["score"]
 
 
+@pytest.mark.slow
 def test_fit_for_people_says_the_same_and_info_says_it_again(run: Run, folder: Path, tmp_path: Path) -> None:
     outcome = run("fit", folder / "led.tm25ray", "-o", "led.h5", "--surface", "disk:radius=9,centre=1/0", *GRID[2:])
     assert outcome.status == 0, outcome.err

@@ -115,19 +115,15 @@ def test_strays_do_not_size_the_window(rays: et.RaySet) -> None:
 
 
 @pytest.mark.slow
-def test_the_automatic_surface_is_sharp_and_takes_up_all_light(automatic: et.LightField) -> None:
-    assert automatic.surface.NAME == "plane"
-    assert automatic.surface.focus is not None  # type: ignore[attr-defined]
-    assert automatic.report.unmet_rays < 1e-4 * RAYS
-    assert automatic.total_flux == pytest.approx(LED.total_flux, rel=1e-4)
-
-
-@pytest.mark.slow
 def test_the_field_is_as_sharp_as_the_smoother_that_is_told_the_plane(
     rays: et.RaySet, automatic: et.LightField
 ) -> None:
     """Drawn rays of the field on a plane that it was never told, against the project's smoother on the counts of that very
     plane, and against the best Gaussian, whose width knows the answer."""
+    assert isinstance(automatic.surface, et.Plane)
+    assert automatic.surface.focus is not None
+    assert automatic.report.unmet_rays < 1e-4 * RAYS
+    assert automatic.total_flux == pytest.approx(LED.total_flux, rel=1e-4)
     cells, drawn = 100, 2_000_000
     truth = LED.exitance(z=PLANE, side=LED.side, cells=cells, directions=16) / LED.total_flux
     ours = automatic.sample(drawn, seed=5)

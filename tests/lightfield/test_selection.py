@@ -104,6 +104,7 @@ def test_a_film_of_few_details_is_found_by_its_rim(seed: int) -> None:
 # --- lamps that shine all round ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_globe_is_a_sphere() -> None:
     globe = Globe()
     choice = choose_surface(rays_of(*scattered(*globe.rays(N, seed=1), 3.0)))
@@ -259,6 +260,7 @@ def test_a_beam_keeps_its_cross_section(towards: tuple[float, float, float]) -> 
     assert (surface.width, surface.height, surface.z) == pytest.approx((2.0, 1.2, 4.0), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_light_towards_minus_z_gets_a_closed_surface_and_a_hint() -> None:
     position, direction = led_lines(5000)
     choice = choose_surface(rays_of(position * [1, -1, -1], direction * [1, -1, -1]))
@@ -282,6 +284,7 @@ def test_too_few_rays_say_what_to_do() -> None:
 # --- the scorer ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weighted", [False, True])
 def test_no_surface_predicts_better_than_the_truth(weighted: bool) -> None:
     """Gibbs' inequality: the densities add up to one. And the right surface comes close."""

@@ -76,6 +76,7 @@ def test_a_symmetric_source_is_found_and_its_errors_shrink() -> None:
     assert (np.abs(value - rays.luminance(3, 4)) < 4 * error).all()
 
 
+@pytest.mark.slow
 def test_what_a_field_was_folded_by_is_known_and_kept(tmp_path: Path) -> None:
     rays = et.RaySet(*rays_of(4000, 5), np.ones(4000))
     plane = et.Plane(z=0, width=2, height=2, centre=(0, 0))
