@@ -35,7 +35,7 @@ def fresnel_transmittance(*, cosine_outside: Array, index: float) -> Array:
     return 1 - (across**2 + along**2) / 2
 
 
-def die_image(columns: int, rows: int) -> Array:
+def die_image(*, columns: int, rows: int) -> Array:
     """A turned die with a gradient, dark contact fingers, a bond pad and grains of phosphor: luminance, at most 1."""
     y, x = np.mgrid[0:rows, 0:columns]
     x, y = (x + 0.5) / columns - 0.5, (y + 0.5) / rows - 0.5
@@ -78,7 +78,7 @@ class PackagedLed:
     @functools.cached_property
     def image(self) -> Array:
         """Row along y from below, column along x."""
-        return die_image(self.pixels, self.pixels)
+        return die_image(columns=self.pixels, rows=self.pixels)
 
     # --- directions: p and q to luminance, at most 1.31 -------------------------------------------------------------
 

@@ -39,7 +39,7 @@ def scaled(part: PartField, images: Base, wraps: bool) -> PartField:
     >>> flat = PartField(ratio, ratio, None, None, 1.0)
     >>> image = np.array([[1.0, 3.0], [2.0, 2.0]])
     >>> scaled(flat, Base(image, np.ones((1, 1))), False).space.tolist()
-    [[0.5, 1.5], [1.0, 1.0]]
+    [[0.328125, 1.671875], [1.046875, 0.953125]]
     """
     if images.space is None or images.direction is None:
         return part
