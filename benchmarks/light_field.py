@@ -101,14 +101,15 @@ def coverage(field: LightField, source: Any, cells: int = 20_000, points: int = 
     rng = np.random.default_rng(3)
     index = rng.integers(0, shape, (cells, 4))
     steps = np.array([0.856675, 0.733892, 0.628707, 0.538597])
-    sums = np.zeros((3, cells))
+    errors = np.reshape(field.core.cell_means(0)[1], part.ratio.shape)[tuple(index.T)] * 1e6
+    sums = np.zeros((2, cells))
     for k in range(points):
         at = np.ascontiguousarray((index + (0.5 / points + k * steps) % 1.0) / shape)
         x, d = _core.rays_of_part(chart, at)
         sums[0] += source.luminance(points=x + 1e-9 * d, directions=d) / points
-        sums[1:] += np.array(field.core.at(0, at)) * (1e6 / points)
+        sums[1] += field.core.at(0, at)[0] * (1e6 / points)
     lit = sums[0] > 0
-    deviation = np.abs(sums[1] - sums[0])[lit] / sums[2][lit]
+    deviation = np.abs(sums[1] - sums[0])[lit] / errors[lit]
     return float((deviation < 1).mean()), float((deviation < 2).mean())
 
 

@@ -110,6 +110,10 @@ class _FieldPart(TypedDict):
     space: _Floats | None
     direction: _Floats | None
     level: float
+    space_error: _Floats | None
+    direction_error: _Floats | None
+    cells_left: Sequence[float]
+    within_left: Sequence[float]
 
 class _Counts(TypedDict):
     grid: tuple[npt.NDArray[np.uint32] | _Floats, _Floats | None]

@@ -20,6 +20,7 @@ import pytest
 from docs.pages import ROOT, blocks
 from etendue.errors import FormatError
 from etendue.lightfield import surfaces
+from etendue.lightfield.etendue_density import FineErrors, PartField
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import as_stored, is_field_file
 from etendue.quantities.provenance import Provenance
@@ -40,6 +41,15 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return paths
 
 
+def assert_same_values(one: PartField | FineErrors, other: PartField | FineErrors) -> None:
+    """All arrays and numbers of both."""
+    for field in dataclasses.fields(one):
+        x, y = getattr(one, field.name), getattr(other, field.name)
+        assert (x is None) == (y is None)
+        assert isinstance(x, FineErrors) or np.array_equal(x, y)
+        assert getattr(x, "dtype", None) == getattr(y, "dtype", None)
+
+
 def assert_same(one: LightField, other: LightField) -> None:
     """Both fields in every bit; NaN in a report is like NaN."""
     assert (one.surface, one.flux_unit, one.provenance, one.notes) == (
@@ -47,11 +57,8 @@ def assert_same(one: LightField, other: LightField) -> None:
     )  # fmt: skip
     assert repr(one.report) == repr(other.report)
     for a, b in zip(one.parts, other.parts, strict=True):
-        for field in dataclasses.fields(a):
-            x, y = getattr(a, field.name), getattr(b, field.name)
-            assert (x is None) == (y is None)
-            assert np.array_equal(x, y)
-            assert getattr(x, "dtype", None) == getattr(y, "dtype", None)
+        assert_same_values(a, b)
+        assert_same_values(a.errors, b.errors)
 
 
 def lines_across(field: LightField, n: int = 4000) -> tuple[Any, Any]:

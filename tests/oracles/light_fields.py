@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from etendue.lightfield.etendue_density import FitReport, PartField
+from etendue.lightfield.etendue_density import FineErrors, FitReport, PartField
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, Surface
 from etendue.quantities.provenance import Provenance
@@ -40,7 +40,9 @@ def make_field(
         deviation = (ratio * rng.uniform(0.02, 1.5, cells)).astype(np.float32)
         sides = (None, None) if factors is None else factors
         space, direction = (None if n is None else rng.gamma(2.0, 0.5, (n, n)) for n in sides)
-        parts.append(PartField(ratio, deviation, space, direction, 3.7 / (1 + index)))
+        within = [None if n is None else rng.uniform(0.0, 0.3, (max(n // 2, 1),) * 2) for n in sides]
+        errors = FineErrors(*within, (1.0, 0.9, 0.75), (1.0, 0.5))
+        parts.append(PartField(ratio, deviation, space, direction, 3.7 / (1 + index), errors))
     count = len(parts)
     report = FitReport(
         rays=2**40 + 1,

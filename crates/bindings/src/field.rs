@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use etendue_lightfield::field::draw::{FieldRays as CoreRays, Sampler};
 use etendue_lightfield::field::intensity::intensity;
 use etendue_lightfield::field::look::{along, look};
-use etendue_lightfield::field::{Factor, LightField as CoreField, PartField, Reading};
+use etendue_lightfield::field::{Averaging, Factor, FineErrors, LightField as CoreField, PartField, Reading};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -25,6 +25,10 @@ pub struct FieldPart<'py> {
     space: Option<PyReadonlyArray2<'py, f64>>,
     direction: Option<PyReadonlyArray2<'py, f64>>,
     level: f64,
+    space_error: Option<PyReadonlyArray2<'py, f64>>,
+    direction_error: Option<PyReadonlyArray2<'py, f64>>,
+    cells_left: Vec<f64>,
+    within_left: Vec<f64>,
 }
 
 impl FieldPart<'_> {
@@ -47,6 +51,21 @@ impl FieldPart<'_> {
             Some(values) => Factor::new(values.shape()[0], values.as_slice()?.to_vec(), wraps)
                 .ok_or_else(|| refuse("a factor needs n × n values, n a power of two, finite and not negative")),
         };
+        let mut errors = FineErrors::none();
+        for (own, values, wraps) in [
+            (&mut errors.space, &self.space_error, part.wraps()),
+            (&mut errors.direction, &self.direction_error, false),
+        ] {
+            if values.is_some() {
+                *own = factor(values.as_ref(), wraps)?;
+            }
+        }
+        for (own, left) in [
+            (&mut errors.cells, &self.cells_left),
+            (&mut errors.within, &self.within_left),
+        ] {
+            *own = Averaging::new(left.clone()).ok_or_else(|| refuse("what averaging leaves lies from 0 to 1"))?;
+        }
         Ok(PartField {
             part,
             cells: self.cells,
@@ -54,6 +73,7 @@ impl FieldPart<'_> {
             space: factor(self.space.as_ref(), part.wraps())?,
             direction: factor(self.direction.as_ref(), false)?,
             level: self.level,
+            errors,
         })
     }
 }

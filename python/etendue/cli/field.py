@@ -74,6 +74,7 @@ def describe_field(field: LightField) -> dict[str, Any]:
         "luminous_efficacy": None if field.spectrum is None else field.spectrum.luminous_efficacy,
         **dataclasses.asdict(report),
         "lead_over_histogram": report.score - report.histogram_score,
+        "resolution": dataclasses.asdict(field.resolution()),
         "source": field.provenance.source,
         "notes": list(field.notes),
     }
@@ -98,6 +99,7 @@ def print_field(field: LightField) -> None:
         ("degrees of freedom", f"{report.effective_cells:,.0f}, effective"),
         ("held-out score", f"{report.score:.4f} ± {report.score_error:.4f} nat per ray"),
         ("", f"{ahead:+.4f} against the equal-étendue histogram"),
+        ("resolves", field.resolution().summary()),
     ]
     for label, value in rows:
         say(f"  {label:<22} {value}")

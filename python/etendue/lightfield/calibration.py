@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.lightfield.candidate import FINE_POSITIONS, PartEstimate, base_of, grow_part, images_of
+from etendue.lightfield.candidate import FINE_POSITIONS, Images, PartEstimate, base_of, grow_part, images_of
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
-from etendue.lightfield.etendue_density import core_part
+from etendue.lightfield.etendue_density import FineErrors, core_part
 from etendue.lightfield.symmetry import order, sum_of_images
 from etendue.lightfield.trees import ELSEWHERE, Base, Tree, grow, grow_moved
 
@@ -35,6 +36,19 @@ FEWEST = 50
 KNOWN_POSITIONS = FINE_POSITIONS[:4]
 """Positions over which the margins of the known field are averaged: so few that they are less smooth than an estimate."""
 
+IN_COMMON = 0.5
+"""Share of the variance of errors that no averaging takes away. The edges of the known field lie between cells; those of the
+truth, which do not, err on one side over many cells."""
+
+DARK = 1e-12
+"""Share of the largest mean below which cells are all as dark."""
+
+BRIGHT = 0.01
+"""Share of the largest mean from which on squares tell how errors average out."""
+
+FINEST_ERRORS = 256
+"""Cells along either side of the errors within cells."""
+
 PURPOSE = 0x424F_4F54
 """Keeps the random numbers of the trial apart from all others."""
 
@@ -48,27 +62,95 @@ class Masses:
 
     def features(self) -> tuple[FloatArray, FloatArray]:
         """What the trust in a cell hangs on: logarithms of its relative deviation, and of the relative spread around."""
-        mean = np.maximum(self.mean, np.finfo(np.float64).tiny)
+        mean = np.maximum(self.mean, DARK * max(float(self.mean.max()), np.finfo(np.float64).tiny / DARK))
         certainty = np.log(np.maximum(self.deviation / mean, 1e-12))
         average = _around(mean)
         spread = np.sqrt(np.maximum(_around(mean**2) - average**2, 0.0)) / mean
         return certainty.ravel(), np.log(np.maximum(spread, 1e-6)).ravel()
 
 
-def calibrate(found: PartEstimate, counts: PartCounts, symmetry: str, seed: int, threads: int | None) -> Tree:
-    """The tree of an estimate with calibrated standard deviations."""
+def calibrate(
+    found: PartEstimate, counts: PartCounts, symmetry: str, seed: int, threads: int | None
+) -> tuple[Tree, FineErrors]:
+    """The tree of an estimate with calibrated standard deviations, and what errors there are beside them."""
     own = _masses(found, counts.grid, threads)
     known, within = _elsewhere(found, counts, symmetry, threads)
     drawn = _draw(known, counts, within, symmetry, seed)
     images = images_of(drawn, found.chart, threads, symmetry) if _uses_images(found) else found.images
     again = grow_part(drawn, found.chart, found.recipe, images, found.concentration, threads, symmetry)
     retried = _masses(again, drawn.grid, threads)
-    errors = np.abs(_shown(again, threads) - known) / np.maximum(retried.deviation, _tiny(known))
-    factors = _factors(retried, errors, own)
+    errors = _shown(again, threads) - known
+    factors, tried = _factors(retried, np.abs(errors) / np.maximum(retried.deviation, _tiny(known)), own)
+    left = _left(errors, retried.deviation * tried, known, known.shape[0] // 2)
     # What a cell is off by, as a share of what it shows, is what the ratio is off by.
     shown = _shown(found, threads)
     relative = np.divide(own.deviation * factors, shown, out=np.zeros_like(shown), where=shown > 0)
-    return dataclasses.replace(found.tree, deviation=relative * found.tree.ratio)
+    tree = dataclasses.replace(found.tree, deviation=relative * found.tree.ratio)
+    if not _uses_images(found):
+        return tree, FineErrors(cells_left=left)
+    (place, turn), (place_again, turn_again) = _margins(found.images), _margins(images)
+    space, within_left = _within(place, place_again, within.space, known.shape[:2])
+    direction, _ = _within(turn, turn_again, within.direction, known.shape[2:])
+    return tree, FineErrors(space, direction, left, within_left)
+
+
+def _margins(images: Images) -> tuple[Masses, Masses]:
+    """The densities over place and direction with their deviations."""
+    space, direction, of_space, of_direction = dataclasses.astuple(images)
+    return Masses(space, of_space), Masses(direction, of_direction)
+
+
+def _within(
+    found: Masses, again: Masses, known: FloatArray | None, cells: tuple[int, ...]
+) -> tuple[FloatArray | None, tuple[float, ...]]:
+    """Relative deviations of a density against its mean over each cell, and what averaging leaves of them.
+
+    Whether the mean is right is a question of the cells' own errors.
+    """
+    n = len(found.mean)
+    if known is None or n <= max(cells):
+        return None, (1.0,)
+    shown, true = _shape(again.mean, cells), _shape(known, cells)
+    errors = np.divide(shown - true, shown, out=np.zeros_like(shown), where=shown > 0) * again.mean
+    factors, tried = _factors(again, np.abs(errors) / np.maximum(again.deviation, _tiny(again.mean)), found)
+    left = _left(errors, again.deviation * tried, again.mean, n // max(cells) // 2)
+    variance = (
+        np.divide(found.deviation * factors, found.mean, out=np.zeros_like(found.mean), where=found.mean > 0) ** 2
+    )
+    side = min(n, FINEST_ERRORS)
+    averaged = variance.reshape(side, n // side, side, n // side).mean(axis=(1, 3))
+    return np.sqrt(averaged), left
+
+
+def _shape(density: FloatArray, cells: tuple[int, ...]) -> FloatArray:
+    """A density over its mean in each cell; 1 where that is 0."""
+    n, (rows, columns) = len(density), cells
+    mean = density.reshape(rows, n // rows, columns, n // columns).mean(axis=(1, 3))
+    level = mean.repeat(n // rows, axis=0).repeat(n // columns, axis=1)
+    shape: FloatArray = np.divide(density, level, out=np.ones_like(density), where=level > 0)
+    return shape
+
+
+def _left(errors: FloatArray, deviation: FloatArray, mean: FloatArray, largest: int) -> tuple[float, ...]:
+    """What is left of calibrated deviations where errors are averaged over 1, 2, 4, … cells along the first two axes."""
+    left, side = [1.0], 2
+    first = _width(np.sort(np.abs(errors / np.maximum(deviation, _tiny(mean)))[mean > BRIGHT * mean.max()]))
+    while side <= min(largest, *(n // 2 for n in mean.shape[:2])):
+        e, d, m = (_squares(values, side) for values in (errors, deviation, mean))
+        lit = m > BRIGHT * m.max()
+        share = (
+            min(_width(np.sort(np.abs(e[lit]) / np.maximum(d[lit], _tiny(mean)))) / first, 1.0) if first > 0 else 1.0
+        )
+        left.append(min(math.sqrt(IN_COMMON + (1.0 - IN_COMMON) * share**2), left[-1]))
+        side *= 2
+    return tuple(left)
+
+
+def _squares(values: FloatArray, side: int) -> FloatArray:
+    """Sums over squares of the first two axes."""
+    rows, columns, *rest = values.shape
+    sums: FloatArray = values.reshape(rows // side, side, columns // side, side, *rest).sum(axis=(1, 3))
+    return sums
 
 
 def _uses_images(estimate: PartEstimate) -> bool:
@@ -116,7 +198,7 @@ def _elsewhere(found: PartEstimate, counts: PartCounts, symmetry: str, threads: 
         images = found.images
     base = base_of(found.chart, found.recipe, images)
     tree = grow_moved(counts.grid, base, shift, found.concentration, threads)
-    known = PartEstimate(found.chart, found.recipe, images, found.concentration, tree)
+    known = PartEstimate(found.chart, found.recipe, Images(images.space, images.direction), found.concentration, tree)
     # What the rays cannot tell from darkness may be dark: with k = (mean/deviation)² rays' worth of knowledge, k/(k + 1) is
     # left of it. The estimate itself has no cell darker than its prior, and so would find its errors there too small.
     unsure = np.divide(tree.deviation, tree.ratio, out=np.zeros_like(tree.ratio), where=tree.ratio > 0) ** 2
@@ -157,8 +239,8 @@ def _refine(coarse: FloatArray, fine: FloatArray | None, generator: np.random.Ge
     return refined
 
 
-def _factors(tried: Masses, errors: FloatArray, found: Masses) -> FloatArray:
-    """Factor for the deviation of each found cell: that which the errors of the tried cells of its class show."""
+def _factors(tried: Masses, errors: FloatArray, found: Masses) -> tuple[FloatArray, FloatArray]:
+    """Factors for the deviations of the found and of the tried cells: what the errors of the tried ones of a class show."""
     features = tried.features()
     edges = [np.quantile(f, np.linspace(0, 1, STRATA + 1)[1:-1]) for f in features]
     classes, targets = _classes(features, edges), _classes(found.features(), edges)
@@ -170,7 +252,8 @@ def _factors(tried: Masses, errors: FloatArray, found: Masses) -> FloatArray:
         if stop - start >= FEWEST:
             table[index] = _width(ranked[start:stop])
     factors: FloatArray = table[targets].reshape(found.mean.shape)
-    return factors
+    own: FloatArray = table[classes].reshape(tried.mean.shape)
+    return factors, own
 
 
 def _width(ranked: FloatArray) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from etendue import _core
 from etendue.denoising.shifted_trees import LATTICE
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
-from etendue.lightfield.etendue_density import PartField, core_part
+from etendue.lightfield.etendue_density import FineErrors, PartField, core_part
 from etendue.lightfield.marginals import scaled
 from etendue.lightfield.nodes import node_values
 from etendue.lightfield.surfaces import Part
@@ -58,27 +58,40 @@ RECIPES: dict[str, Recipe] = {
 """By name, the simplest first. Images are sharp where place and direction go apart, the tree where they do not."""
 
 
+@dataclasses.dataclass(frozen=True)
+class Images(Base):
+    """Densities over the place and over the direction, with their standard deviations."""
+
+    space_deviation: FloatArray | None = None
+    direction_deviation: FloatArray | None = None
+
+    def densities(self) -> tuple[FloatArray, FloatArray]:
+        """Both densities; 1 where there were no rays to tell."""
+        one = np.ones((1, 1))
+        return one if self.space is None else self.space, one if self.direction is None else self.direction
+
+
 def images_of(
     counts: PartCounts,
     chart: Part,
     threads: int | None,
     symmetry: str = "none",
     positions: Sequence[tuple[float, ...]] = FINE_POSITIONS,
-) -> Base:
+) -> Images:
     """Densities over the place and over the direction: what the fine counts tell, each by itself.
 
     Either is a tree of its own, averaged over positions of the fine grid. Where the part has a hole, nothing is left.
     """
     if counts.space.rays == 0:
-        return Base()
+        return Images()
 
-    def density(sums: Sums) -> FloatArray:
+    def density(sums: Sums) -> tuple[FloatArray, FloatArray]:
         c = max(IMAGE_CONCENTRATIONS, key=lambda c: log_evidence(sums, Base(), c, threads))
-        found = grow_symmetric(sums, Base(), c, threads, positions, symmetry).ratio
-        lifted: FloatArray = found * (1.0 - FLOOR) + FLOOR
-        return lifted
+        found = grow_symmetric(sums, Base(), c, threads, positions, symmetry)
+        return found.ratio * (1.0 - FLOOR) + FLOOR, found.deviation
 
-    return Base(density(counts.space) * _outside(counts.space.weight.shape[0], chart.hole), density(counts.direction))
+    (space, of_space), (direction, of_direction) = density(counts.space), density(counts.direction)
+    return Images(space * _outside(len(space), chart.hole), direction, of_space, of_direction)
 
 
 def _outside(n: int, hole: float) -> FloatArray:
@@ -110,18 +123,21 @@ class PartEstimate:
     chart : Part
     recipe : str
         A name in `RECIPES`.
-    images : Base
+    images : Images
         Over place and direction.
     concentration : float
     tree : Tree
         On the recipe's base measure.
+    errors : FineErrors
+        Beside those of the tree.
     """
 
     chart: Part
     recipe: str
-    images: Base
+    images: Images
     concentration: float
     tree: Tree
+    errors: FineErrors = dataclasses.field(default_factory=FineErrors)
 
     @property
     def base(self) -> Base:
@@ -132,7 +148,7 @@ class PartEstimate:
     def unit(self) -> PartField:
         """The field, up to a factor."""
         ratio, deviation = (node_values(v).astype(np.float32) for v in (self.tree.ratio, self.tree.deviation))
-        field = PartField(ratio, deviation, self.base.space, self.base.direction, 1.0)
+        field = PartField(ratio, deviation, self.base.space, self.base.direction, 1.0, self.errors)
         if RECIPES[self.recipe].scaled or self.chart.hole:
             return scaled(field, self.images, self.chart.shape == "tube")
         return field
@@ -246,14 +262,14 @@ def all_images(
     fold: Fold,
     threads: int | None,
     positions: Sequence[tuple[float, ...]] = FINE_POSITIONS,
-) -> tuple[Base, ...]:
+) -> tuple[Images, ...]:
     """The images of each part, from the counts of a fold; see `images_of`."""
     parts = zip(counts[fold], counts.surface.parts(), strict=True)
     return tuple(images_of(part, chart, threads, counts.symmetry, positions) for part, chart in parts)
 
 
 def grow_candidates(
-    counts: EtendueCounts, images: Sequence[Base], concentrations: Mapping[str, Sequence[float]], threads: int | None
+    counts: EtendueCounts, images: Sequence[Images], concentrations: Mapping[str, Sequence[float]], threads: int | None
 ) -> dict[str, Candidate]:
     """The candidate of every recipe on the rays that are fitted, with trees in one position; equal trees are grown once."""
     grown: dict[bool, Candidate] = {}
@@ -267,7 +283,7 @@ def grow_candidates(
 
 
 def choose_concentrations(
-    counts: EtendueCounts, images: Sequence[Base], threads: int | None
+    counts: EtendueCounts, images: Sequence[Images], threads: int | None
 ) -> dict[str, tuple[float, ...]]:
     """By recipe for each part the concentration of greatest evidence, on the rays that are fitted."""
     chosen: dict[bool, tuple[float, ...]] = {}
@@ -278,7 +294,7 @@ def choose_concentrations(
 
 
 def _of_greatest_evidence(
-    counts: EtendueCounts, recipe: str, images: Sequence[Base], threads: int | None
+    counts: EtendueCounts, recipe: str, images: Sequence[Images], threads: int | None
 ) -> tuple[float, ...]:
 
     def choose(part: PartCounts, base: Base) -> float:
@@ -297,7 +313,7 @@ def grow_candidate(
     counts: EtendueCounts,
     fold: Fold,
     recipe: str,
-    images: Sequence[Base],
+    images: Sequence[Images],
     concentrations: Sequence[float],
     threads: int | None,
     positions: Sequence[tuple[float, ...]] = POSITIONS,
@@ -315,7 +331,7 @@ def grow_part(
     counts: PartCounts,
     chart: Part,
     recipe: str,
-    images: Base,
+    images: Images,
     concentration: float,
     threads: int | None,
     symmetry: str,

@@ -18,6 +18,7 @@ from etendue.lightfield.etendue_density import FitReport, PartField
 from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.forecast import Forecast, Predicted, make_forecast
 from etendue.lightfield.light_field import LightField
+from etendue.lightfield.resolution import Resolution
 from etendue.lightfield.trees import Base
 from etendue.quantities.ray_stream import RayStream, checked_threads
 from etendue.units import LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
@@ -75,6 +76,8 @@ class Diagnostics:
         None if no rays were given.
     source : str
         Where the rays came from.
+    resolution : Resolution
+        What the field resolves.
     """
 
     surface: str
@@ -86,6 +89,7 @@ class Diagnostics:
     spots: tuple[UncertainSpot, ...]
     forecast: Forecast | None
     source: str
+    resolution: Resolution
 
     @property
     def learning(self) -> Forecast | None:
@@ -109,6 +113,7 @@ class Diagnostics:
             f"relative error at a ray by the error bars {self.expected_error:.1%}",
             f"half of the flux in {half:.4g} mm² sr, 99 % in {most:.4g} of {curve.total_etendue:.4g} mm² sr",
             f"peak {curve.luminance[0]:.4g} {unit}",
+            f"resolves {self.resolution.summary()}",
         ]
         if self.forecast is not None:
             lines += _forecast_lines(self.forecast)
@@ -142,6 +147,7 @@ class Diagnostics:
             "forecast": forecast,
             "learning": forecast,  # its name until version 0.2
             "source": self.source,
+            "resolution": dataclasses.asdict(self.resolution),
         }
 
 
@@ -209,6 +215,7 @@ def diagnose(
         spots=tuple(_spots(field, losses, spots)),
         forecast=forecast,
         source=field.provenance.source,
+        resolution=field.resolution(seed=seed, threads=threads),
     )
 
 

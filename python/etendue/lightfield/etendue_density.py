@@ -21,6 +21,28 @@ from etendue.units import FLUX_UNITS, MM2_PER_M2, FluxUnit
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class FineErrors:
+    """What is known of a part's errors beside those of its cells: within the cells, and of averages over pixels.
+
+    Parameters
+    ----------
+    space, direction : array, shape (n, n), or None
+        Relative standard deviation of B_s against its mean over a cell, at the centres of fine cells, bilinear between
+        them, and the same of B_d; None: 0.
+    cells_left : tuple of float
+        What is left of the standard deviation of cells where their errors are averaged over squares of 1, 2, 4, … cells
+        along either side of the place.
+    within_left : tuple of float
+        The same for `space`, in its own cells.
+    """
+
+    space: FloatArray | None = None
+    direction: FloatArray | None = None
+    cells_left: tuple[float, ...] = (1.0,)
+    within_left: tuple[float, ...] = (1.0,)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class PartField:
     """The light that leaves one part: L = level · B_s(s₁, s₂) · B_d(a, b) · r(s₁, s₂, a, b), theory eq. 38.
 
@@ -36,6 +58,8 @@ class PartField:
         B_d, likewise.
     level : float
         [flux unit/(mm² sr)]
+    errors : FineErrors
+        Beside `deviation`.
     """
 
     ratio: npt.NDArray[np.float32]
@@ -43,6 +67,7 @@ class PartField:
     space: FloatArray | None
     direction: FloatArray | None
     level: float
+    errors: FineErrors = dataclasses.field(default_factory=FineErrors)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -228,6 +253,10 @@ def core_part(chart: _core._Part, part: PartField) -> _core._FieldPart:
         "space": part.space,
         "direction": part.direction,
         "level": part.level,
+        "space_error": part.errors.space,
+        "direction_error": part.errors.direction,
+        "cells_left": part.errors.cells_left,
+        "within_left": part.errors.within_left,
     }
 
 

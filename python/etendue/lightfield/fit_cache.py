@@ -232,7 +232,7 @@ def _name(rays: RayStream, surface: Surface | Literal["auto"], threads: int | No
 def _program() -> str:
     """A digest of the program that fits: of the core and of this package's files."""
     digest = hashlib.blake2b(digest_size=20)
-    files = [Path(_core.__file__), *sorted(Path(__file__).parent.glob("*.py"))]
+    files = [Path(_core.__file__), *sorted(Path(__file__).parent.rglob("*.py"))]
     for path in files:
         digest.update(path.name.encode() + hashlib.blake2b(path.read_bytes()).digest())
     return digest.hexdigest()

@@ -13,6 +13,7 @@ from etendue.lightfield.calibration import calibrate
 from etendue.lightfield.candidate import (
     FINE_POSITIONS,
     Candidate,
+    Images,
     PartEstimate,
     Score,
     all_images,
@@ -29,7 +30,7 @@ from etendue.lightfield.pilot_sample import check_near_field, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Plane, Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry
-from etendue.lightfield.trees import POSITIONS, Base
+from etendue.lightfield.trees import POSITIONS
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 
@@ -127,17 +128,18 @@ def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: in
     From an even shape the search goes on as long as the score rises, by the recipe that is the best one there; then from
     its best shape with sixteen times the cells, as long as these predict better for sure. The grids compared have a quarter
     of the cells of the one to be filled: what is gained by finer cells along one axis and lost by coarser ones along another
-    shows in them, too. Parts with few rays have grids of their own, no larger than these fill.
+    shows in them, too. Parts with few rays have grids of their own, no larger than these fill; where the grid is given, only
+    those of a plane, whose frames are found and not stated.
     """
     some = pilot_sample(rays, PILOT_RAYS)
     bits = default_bits(len(rays))
     first_look = count_rays(some, surface, PartGrids((1, 1, 1, 1), (1, 1)), seed=seed, threads=threads)
     shares = np.array([part.grid.rays for part in first_look["all"]]) / first_look.rays
-    few = shares < FEW * shares.max()
+    few = (shares < FEW * shares.max()) & (depths is None or isinstance(surface, Plane))
 
     def grids(number: int, own: Depths) -> tuple[PartGrids, ...]:
         return tuple(
-            grids_for(round(share * number), depths_for(round(share * number)) if is_few and depths is None else own)
+            grids_for(round(share * number), depths_for(round(share * number)) if is_few else own)
             for share, is_few in zip(shares, few, strict=True)
         )
 
@@ -188,7 +190,7 @@ def _search(counted: Callable[[Depths], EtendueCounts], bits: int, lend: int, th
     return _Shape(bits, best, concentrations, reached)
 
 
-def _pilot_images(counts: EtendueCounts, threads: int | None) -> tuple[Base, ...]:
+def _pilot_images(counts: EtendueCounts, threads: int | None) -> tuple[Images, ...]:
     return all_images(counts, "fitted", threads, FINE_POSITIONS[:4])
 
 
@@ -244,9 +246,9 @@ def _calibrated(counts: EtendueCounts, candidate: Candidate, seed: int, threads:
         if part.grid.rays == 0:
             yield found
             continue
-        tree = calibrate(found, part, counts.symmetry, seed, threads)
+        tree, errors = calibrate(found, part, counts.symmetry, seed, threads)
         deviation = np.sqrt(tree.deviation**2 + tree.ratio**2 * order(counts.symmetry) / part.grid.rays)
-        yield dataclasses.replace(found, tree=dataclasses.replace(tree, deviation=deviation))
+        yield dataclasses.replace(found, tree=dataclasses.replace(tree, deviation=deviation), errors=errors)
 
 
 def _histogram(counts: EtendueCounts) -> FloatArray:

@@ -139,7 +139,7 @@ def focused(plane: Plane, rays: RayStream, seed: int = 1, threads: int | None = 
     return bent if other.leads(own) else flat
 
 
-def focused_about(z: float, rays: RaySet, threads: int | None = None) -> Plane | None:
+def focused_about(z: float, rays: RaySet, seed: int = 1, threads: int | None = None) -> Plane | None:
     """A focused plane near a depth that takes up all rays; None if no window is smaller than what all rays need.
 
     It lies where light along the horizon is sharp, so that rays start near their places.
@@ -150,7 +150,7 @@ def focused_about(z: float, rays: RaySet, threads: int | None = None) -> Plane |
     >>> focused_about(0.0, et.RingSource(rays=20_000).ray_set()) is None        # a disk on a plane is sharp as it is
     True
     """
-    plane = focused(Plane(z=z), rays, threads=threads)
+    plane = focused(Plane(z=z), rays, seed, threads)
     if plane.focus is None and plane.frames == 0:
         return None
     if plane.focus is not None:

@@ -11,6 +11,7 @@ from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.lightfield.far_field import field_intensity
 from etendue.lightfield.field_rays import FieldRays
 from etendue.lightfield.fitting import fit_light_field
+from etendue.lightfield.resolution import Resolution, resolution
 from etendue.lightfield.storage import load_field, save_field
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
@@ -121,6 +122,20 @@ class LightField(EtendueDensity, InNotebook):
         """
         return field_intensity(self, c_planes, gamma_step, threads)
 
+    def resolution(self, *, seed: int = 1, threads: int | None = None) -> Resolution:
+        """What the field resolves: the pitch of spots, in mm and in degrees, that it would show with half their contrast.
+
+        See `etendue.lightfield.resolution.resolution`.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> field = et.LightField.fit(et.RingSource(rays=4000), et.Disk(radius=30), depths=(3, 3, 2, 2))
+        >>> field.resolution().place_limit
+        'rays'
+        """
+        return resolution(self, seed=seed, threads=threads)
+
     @staticmethod
     def fit(
         rays: RayStream,
@@ -143,12 +158,13 @@ class LightField(EtendueDensity, InNotebook):
         rays : RayStream
             Any number of rays, of equal or unequal flux.
         surface : Surface or "auto"
-            Where the light is carried to, along the rays; ``"auto"``: the surface that predicts held-out rays best.
+            Where the light is carried to, along the rays; ``"auto"``: the surface that predicts held-out rays best. Of a
+            plane the focus is found where it is left out, and, if all its dimensions are, a window with frames about it.
         symmetry : str
             A symmetry of the source about the surface's axis, which multiplies its rays: ``"none"``, ``"mirror-x"``,
             ``"mirror-y"``, ``"mirror-xy"``, ``"c2"``, ``"c4"``, or ``"auto"``: one of them if the rays bear it out.
         depths : tuple of int, optional
-            2^depth cells along s₁, s₂, a and b; None: chosen.
+            2^depth cells along s₁, s₂, a and b, but on frames with few rays; None: chosen.
         seed : int
             Decides which rays are held out.
         threads : int, optional

@@ -27,7 +27,7 @@ def scaled(part: PartField, images: Base, wraps: bool) -> PartField:
     Parameters
     ----------
     part : PartField
-        With any factors.
+        Its factors are replaced: a product of other ones times the ratio is scaled to the same field.
     images : Base
         Wanted densities over the place and over the direction, none of them None.
     wraps : bool
@@ -57,6 +57,42 @@ def scaled(part: PartField, images: Base, wraps: bool) -> PartField:
     aims = (turn[0].T @ direction @ turn[1]).ravel() / direction.size
     space = _set(wanted[0], place[0] @ (ratio @ aims).reshape(n1, n2) @ place[1].T)
     return dataclasses.replace(part, space=space / space.mean(), direction=direction / direction.mean())
+
+
+def marginals(part: PartField, sides: tuple[int, int], wraps: bool) -> tuple[FloatArray, FloatArray]:
+    """Densities of a field over the place and over the direction, at the centres of fine cells, mean 1.
+
+    Parameters
+    ----------
+    part : PartField
+        Of any level.
+    sides : tuple of int
+        Fine cells along either side, over place and over direction; as many as the factors have, where there are any.
+    wraps : bool
+        Whether s₁ closes upon itself.
+
+    Returns
+    -------
+    tuple of array, shapes (n, n) and (m, m)
+
+    Examples
+    --------
+    >>> ratio = np.arange(1, 17, dtype=np.float32).reshape(2, 2, 2, 2)
+    >>> space, direction = marginals(PartField(ratio, ratio, None, None, 1.0), (2, 2), False)
+    >>> space.shape, round(float(space.mean()), 12), bool(space[0, 0] < space[1, 1])
+    ((2, 2), 1.0, True)
+    """
+    n1, n2, n3, n4 = part.ratio.shape
+    space = np.ones((sides[0],) * 2) if part.space is None else part.space
+    direction = np.ones((sides[1],) * 2) if part.direction is None else part.direction
+    place = (_tents(len(space), n1, wraps), _tents(len(space), n2, False))
+    turn = (_tents(len(direction), n3, False), _tents(len(direction), n4, False))
+    ratio = part.ratio.reshape(n1 * n2, n3 * n4).astype(np.float64)
+    aims = (turn[0].T @ direction @ turn[1]).ravel()
+    places = (place[0].T @ space @ place[1]).ravel()
+    over_place = space * (place[0] @ (ratio @ aims).reshape(n1, n2) @ place[1].T)
+    over_direction = direction * (turn[0] @ (places @ ratio).reshape(n3, n4) @ turn[1].T)
+    return over_place / over_place.mean(), over_direction / over_direction.mean()
 
 
 def _nodes(image: FloatArray) -> FloatArray:

@@ -24,7 +24,7 @@ from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.strict_json import strict_json
 from etendue.lightfield.counting import MOST_CELLS
-from etendue.lightfield.etendue_density import EtendueDensity, FitReport, PartField
+from etendue.lightfield.etendue_density import EtendueDensity, FineErrors, FitReport, PartField
 from etendue.lightfield.rounding import digits_for, rounded
 from etendue.lightfield.surfaces import SURFACES, Part, Surface
 from etendue.lightfield.symmetry import SYMMETRIES
@@ -64,6 +64,12 @@ LATER = ("focus", "hole")
 
 FACTORS = ("space", "direction")
 """Datasets that a part may have beside its ratio and deviation."""
+
+ERRORS = ("space_error", "direction_error")
+"""Likewise: errors within cells."""
+
+LEFT = ("cells_left", "within_left")
+"""Attributes of a part, absent in files of before they were kept: what averaging leaves of errors."""
 
 DEFLATE = 9
 SAME_FLUX = 1e-9
@@ -137,7 +143,10 @@ def _rounded_part(part: PartField) -> PartField:
     deviation = rounded(deviation, DEVIATION_DIGITS)
     ratio = rounded(ratio, digits_for(ratio, deviation / np.float32(STEPS), FEWEST_DIGITS))
     space, direction = (None if f is None else rounded(f, FACTOR_DIGITS) for f in (part.space, part.direction))
-    return PartField(ratio, deviation, space, direction, part.level)
+    own = part.errors
+    place, turn = (None if e is None else rounded(e, DEVIATION_DIGITS) for e in (own.space, own.direction))
+    errors = FineErrors(place, turn, own.cells_left, own.within_left)
+    return PartField(ratio, deviation, space, direction, part.level, errors)
 
 
 # --- writing ---------------------------------------------------------------------------------------------------------
@@ -157,11 +166,14 @@ def _write(file: Any, field: EtendueDensity) -> None:
     for index, (chart, part, flux) in enumerate(zip(field.surface.parts(), field.parts, field.part_flux, strict=True)):
         group = parts.create_group(str(index))
         put(group, **_chart(chart), level=float(part.level), flux=flux)
+        put(group, cells_left=part.errors.cells_left, within_left=part.errors.within_left)
         _put_array(group, "ratio", part.ratio, "luminance / (level * space * direction) at the centres of equal cells")
         _put_array(group, "deviation", part.deviation, "standard deviation of ratio")
         for name, factor, meaning in (
             ("space", part.space, "factor of luminance over the place, at the centres of equal cells"),
             ("direction", part.direction, "factor of luminance over the direction, at the centres of equal cells"),
+            ("space_error", part.errors.space, "relative standard deviation of space against its mean over a cell"),
+            ("direction_error", part.errors.direction, "relative standard deviation of direction, likewise"),
         ):
             if factor is not None:
                 _put_array(group, name, factor, meaning)
@@ -319,7 +331,7 @@ def _provenance(file: Node) -> Provenance:
 def _arrays(group: Node) -> dict[str, Any]:
     """The datasets of a part, with 2^k cells along each of their axes; not read yet."""
     arrays = {name: group.dataset(name, np.dtype("<f4"), 4) for name in ("ratio", "deviation")}
-    arrays |= {name: group.dataset(name, np.dtype("<f8"), 2) for name in FACTORS if name in group.node}
+    arrays |= {name: group.dataset(name, np.dtype("<f8"), 2) for name in (*FACTORS, *ERRORS) if name in group.node}
     for name, data in arrays.items():
         if not all(n > 0 and n & (n - 1) == 0 for n in data.shape) or data.size > MOST_CELLS:
             raise group.error(f"dataset {name!r}", f"shape {data.shape}, expected powers of two, {MOST_CELLS} at most")
@@ -335,5 +347,17 @@ def _part(group: Node, arrays: Mapping[str, Any]) -> PartField:
     for name, array in values.items():
         if not (np.isfinite(array).all() and (array >= 0).all()):
             raise group.error(f"dataset {name!r}", "a value that is negative or not finite")
-    space, direction = (values.get(name) for name in FACTORS)
-    return PartField(values["ratio"], values["deviation"], space, direction, group.number("level"))
+    space, direction, of_space, of_direction = (values.get(name) for name in (*FACTORS, *ERRORS))
+    cells_left, within_left = (_left(group, name) for name in LEFT)
+    errors = FineErrors(of_space, of_direction, cells_left, within_left)
+    return PartField(values["ratio"], values["deviation"], space, direction, group.number("level"), errors)
+
+
+def _left(group: Node, name: str) -> tuple[float, ...]:
+    """What averaging leaves of errors: shares."""
+    if name not in group.node.attrs:
+        return (1.0,)
+    left: tuple[float, ...] = tuple(group.numbers(name, None).tolist())
+    if not left or not all(0.0 <= share <= 1.0 for share in left):
+        raise group.error(f"attribute {name!r}", f"{left}, expected shares from 0 to 1")
+    return left

@@ -24,9 +24,14 @@ impl Factor {
     /// The constant 1.
     #[must_use]
     pub fn one() -> Self {
+        Self::constant(1.0)
+    }
+
+    /// A constant.
+    pub(super) fn constant(value: f64) -> Self {
         Self {
             n: 1,
-            values: vec![1.0],
+            values: vec![value],
             wraps: false,
         }
     }

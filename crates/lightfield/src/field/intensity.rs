@@ -57,7 +57,7 @@ fn of_part(field: &PartField, k: Vec3, side: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::Factor;
+    use crate::field::{Factor, FineErrors};
     use crate::surface::tests::zoo;
 
     #[test]
@@ -71,6 +71,7 @@ mod tests {
                 space: Factor::one(),
                 direction: Factor::one(),
                 level: 3.0,
+                errors: FineErrors::none(),
             };
             let (theta, phi) = (0.7_f64, 2.1_f64);
             let local = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use etendue_math::Vec3;
 
+use super::errors::FineErrors;
 use super::factor::Factor;
 use super::tent::Tent;
 use crate::surface::CarrierPart;
@@ -23,6 +24,16 @@ pub struct PartField {
     pub direction: Factor,
     /// Luminance where all factors and the ratio are 1.
     pub level: f64,
+    /// Errors within cells, and of averages.
+    pub errors: FineErrors,
+}
+
+/// Luminance with its errors by their kind: each kind has neighbours of its own with which it errs together.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Parsed {
+    pub value: f64,
+    /// Standard deviations: of the cells, of the place within a cell, of the direction within one.
+    pub deviations: [f64; 3],
 }
 
 /// Luminance with its standard deviation.
@@ -30,7 +41,7 @@ pub struct PartField {
 pub struct Reading {
     /// The mean.
     pub value: f64,
-    /// Its standard deviation: cells side by side err together, so that those of the tents add up.
+    /// Its standard deviation.
     pub deviation: f64,
 }
 
@@ -39,6 +50,17 @@ impl PartField {
     #[inline]
     #[must_use]
     pub fn at(&self, place: [f64; 2], direction: [f64; 2]) -> Reading {
+        let Parsed { value, deviations } = self.parsed(place, direction);
+        let variance: f64 = deviations.iter().map(|d| d * d).sum();
+        Reading {
+            value,
+            deviation: variance.sqrt(),
+        }
+    }
+
+    /// The same with the kinds of errors apart. Cells side by side err together, so that those of the tents add up.
+    #[inline]
+    pub(super) fn parsed(&self, place: [f64; 2], direction: [f64; 2]) -> Parsed {
         let wraps = self.part.wraps();
         let [n1, n2, n3, n4] = self.cells;
         let (x, y) = (Tent::at(place[0], n1, wraps), Tent::at(place[1], n2, false));
@@ -57,9 +79,11 @@ impl PartField {
         }
         let [mean, deviation] = sum;
         let base = self.level * self.space.at(place) * self.direction.at(direction);
-        Reading {
-            value: base * mean,
-            deviation: base * deviation,
+        let value = base * mean;
+        let place = value * self.errors.space.at(place);
+        Parsed {
+            value,
+            deviations: [base * deviation, place, value * self.errors.direction.at(direction)],
         }
     }
 }
@@ -74,7 +98,8 @@ pub struct LightField {
 impl LightField {
     /// The luminance along a line: what leaves each part that the line leaves adds up.
     ///
-    /// A ray was counted on one part only, the first that its line leaves; so the sum counts no light twice.
+    /// A ray was counted on one part only, the first that its line leaves; so the sum counts no light twice, and parts err
+    /// apart from one another.
     #[inline]
     #[must_use]
     pub fn luminance(&self, point: Vec3, direction: Vec3) -> Reading {
@@ -84,7 +109,7 @@ impl LightField {
             if crossing.met {
                 let reading = field.at(crossing.place, crossing.direction);
                 sum.value += reading.value;
-                sum.deviation += reading.deviation;
+                sum.deviation = sum.deviation.hypot(reading.deviation);
             }
         }
         sum
@@ -116,6 +141,7 @@ pub(crate) mod tests {
             space: Factor::new(8, values(8, 5), part.wraps()).expect("sound"),
             direction: Factor::new(4, values(4, 3), false).expect("sound"),
             level: 2.0,
+            errors: FineErrors::none(),
         }
     }
 
@@ -135,6 +161,21 @@ pub(crate) mod tests {
             let plain = field.at([s1, s2], [a, b]).value;
             let product = plain * rough.space.at([s1, s2]) * rough.direction.at([a, b]);
             assert!((rough.at([s1, s2], [a, b]).value - product).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn errors_within_cells_add_their_squares() {
+        let plain = rough(0);
+        let mut field = plain.clone();
+        let values = (0..16_u8).map(|i| f64::from(i) * 0.05).collect::<Vec<_>>();
+        field.errors.space = Factor::new(4, values.clone(), false).expect("sound");
+        field.errors.direction = Factor::new(4, values, false).expect("sound");
+        for [s1, s2, a, b] in lattice(100) {
+            let (without, with) = (plain.at([s1, s2], [a, b]), field.at([s1, s2], [a, b]));
+            let own = [field.errors.space.at([s1, s2]), field.errors.direction.at([a, b])].map(|d| d * with.value);
+            let squares = without.deviation.powi(2) + own[0].powi(2) + own[1].powi(2);
+            assert!(with.value == without.value && (with.deviation.powi(2) - squares).abs() < 1e-12 * (1.0 + squares));
         }
     }
 

@@ -9,7 +9,7 @@ use etendue_geometry::ray_batch::BLOCK;
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 
-use super::light_field::{LightField, Reading, stopped};
+use super::light_field::{LightField, Parsed, PartField, Reading, stopped};
 use crate::surface::{Coordinates, carry};
 use crate::view::View;
 
@@ -19,8 +19,8 @@ const CHUNK: usize = 256;
 /// Mean luminance of each pixel and its standard deviation, row by row; the same bits for any number of threads.
 ///
 /// The average runs over `samples` points, at most [`BLOCK`], of a rank-1 lattice in the pixel: of all point sets that
-/// small its shadows on rows, columns and slanted edges are the most even. Deviations of the points add up, as they err
-/// together. Once `stop` is set, the rest is left out.
+/// small its shadows on rows, columns and slanted edges are the most even. Points of a part err together as far as the
+/// place that they spread over is small, and parts apart from one another. Once `stop` is set, the rest is left out.
 #[must_use]
 pub fn look(field: &LightField, view: &View, samples: u32, threads: usize, stop: Option<&AtomicBool>) -> Vec<Reading> {
     let points = lattice(samples);
@@ -57,14 +57,69 @@ fn see(field: &LightField, view: &View, first: usize, points: &[[f64; 2]], pixel
         carry(std::slice::from_ref(&part.part), &batch, &mut at);
         let [s1, s2, a, b] = &at.values;
         for (pixel, start) in pixels.iter_mut().zip((0..).step_by(points.len())) {
+            let mut sums = PixelSums::default();
             for i in start..start + points.len() {
                 if at.part[i] != Coordinates::NONE {
-                    let reading = part.at([s1[i], s2[i]], [a[i], b[i]]);
-                    pixel.value += share * reading.value;
-                    pixel.deviation += share * reading.deviation;
+                    let place = [s1[i], s2[i]];
+                    sums.add(part.part.wraps(), place, &part.parsed(place, [a[i], b[i]]));
                 }
             }
+            pixel.value += share * sums.value;
+            pixel.deviation = pixel.deviation.hypot(share * sums.deviation(part));
         }
+    }
+}
+
+/// What the points of a pixel amount to on one part.
+#[derive(Default)]
+struct PixelSums {
+    points: f64,
+    value: f64,
+    deviations: [f64; 3],
+    /// Where the first point is, and how far the others lie from it: sums and sums of squares.
+    first: [f64; 2],
+    away: [f64; 2],
+    squares: [f64; 2],
+}
+
+impl PixelSums {
+    #[inline]
+    fn add(&mut self, wraps: bool, place: [f64; 2], read: &Parsed) {
+        if self.points == 0.0 {
+            self.first = place;
+        }
+        self.points += 1.0;
+        self.value += read.value;
+        for axis in 0..2 {
+            let mut away = place[axis] - self.first[axis];
+            if wraps && axis == 0 {
+                away -= away.round();
+            }
+            self.away[axis] += away;
+            self.squares[axis] += away * away;
+        }
+        for (sum, d) in self.deviations.iter_mut().zip(read.deviations) {
+            *sum += d;
+        }
+    }
+
+    /// Standard deviation of the sum of values: what is left of each kind of error on the area of places that the points
+    /// spread over. A pixel sees a part along nearly one direction, in which all its points err together.
+    fn deviation(&self, part: &PartField) -> f64 {
+        if self.points == 0.0 {
+            return 0.0;
+        }
+        // Even points on a side of length l have the variance l²/12.
+        let side = |axis: usize| {
+            let mean = self.away[axis] / self.points;
+            (12.0 * (self.squares[axis] / self.points - mean * mean).max(0.0)).sqrt()
+        };
+        let area = side(0) * side(1);
+        let of_cells = part.errors.cells.left(area * (part.cells[0] * part.cells[1]) as f64);
+        let fine = part.errors.space.side() as f64;
+        let within = part.errors.within.left(area * fine * fine);
+        let [cells, place, direction] = self.deviations;
+        (cells * of_cells).hypot(place * within).hypot(direction)
     }
 }
 
@@ -146,6 +201,7 @@ const fn gcd(a: u32, b: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::errors::Averaging;
     use crate::field::light_field::tests::rough;
 
     fn view() -> View {
@@ -197,6 +253,41 @@ mod tests {
             sum += field.luminance(point, (v.observer - point).normalized()).value / 16.0;
         }
         assert!((coarse[pixel].value / sum - 1.0).abs() < 1e-12 && sum > 0.0);
+    }
+
+    #[test]
+    fn errors_of_large_pixels_average_out() {
+        // One part, seen from above: pixels of a known number of cells.
+        let mut field = LightField { parts: vec![rough(0)] };
+        let whole = look(&field, &view(), 16, 1, None);
+        let v = view();
+        let (x, k) = (v.target, (v.observer - v.target).normalized());
+        let place = |u: f64, w: f64| field.parts[0].part.cross(x + v.right * u + v.up * w, k).place;
+        let [origin, right, up] = [place(0.0, 0.0), place(4.0 / 40.0, 0.0), place(0.0, 3.0 / 30.0)];
+        let area = (right[0] - origin[0]).abs() * (up[1] - origin[1]).abs();
+        let left = 0.25;
+        let curve = (0..40)
+            .map(|doublings| if doublings == 0 { 1.0 } else { left })
+            .collect();
+        field.parts[0].errors.cells = Averaging::new(curve).expect("sound");
+        let few = look(&field, &view(), 16, 1, None);
+        // Pixels smaller than a cell err as their points do.
+        assert!(area * 8.0 < 1.0);
+        assert!(whole.iter().zip(&few).all(|(a, b)| a == b));
+        let coarse = View {
+            columns: 2,
+            rows: 2,
+            ..view()
+        };
+        let mut plain = field.clone();
+        plain.parts[0].errors.cells = Averaging::none();
+        for (a, b) in look(&field, &coarse, 256, 1, None)
+            .iter()
+            .zip(look(&plain, &coarse, 256, 1, None))
+        {
+            assert!(a.value == b.value && (a.deviation < 0.99 * b.deviation || b.deviation == 0.0));
+            assert!(a.deviation >= left * b.deviation * (1.0 - 1e-12));
+        }
     }
 
     #[test]

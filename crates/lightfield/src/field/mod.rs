@@ -6,11 +6,13 @@
 
 pub mod cells;
 pub mod draw;
+pub mod errors;
 pub mod factor;
 pub mod intensity;
 mod light_field;
 pub mod look;
 pub mod tent;
 
+pub use errors::{Averaging, FineErrors};
 pub use factor::Factor;
 pub use light_field::{LightField, PartField, Reading};

@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.lightfield.candidate import FINE_POSITIONS, MIXED_IN, PartEstimate, Score, grow_part, images_of
+from etendue.lightfield.candidate import FINE_POSITIONS, MIXED_IN, Images, PartEstimate, Score, grow_part, images_of
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.etendue_density import core_part
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
 from etendue.lightfield.surfaces import Part
-from etendue.lightfield.trees import POSITIONS, Base
+from etendue.lightfield.trees import POSITIONS
 from etendue.quantities.ray_set import RaySet
 
 Cells = npt.NDArray[np.intp]
@@ -220,7 +220,7 @@ class SurfaceScorer:
         """What the rays of one part tell of its light: a tree that does not know of the images, and the images."""
         counts = PartCounts(*(_sums(c, flux, s) for c, s in zip(cells, dataclasses.astuple(shapes), strict=True)))
         needed = part.hole > 0.0 or recipes != TREES_ALONE
-        images = images_of(counts, part, 1, positions=IMAGE_POSITIONS) if needed else Base()
+        images = images_of(counts, part, 1, positions=IMAGE_POSITIONS) if needed else Images()
         return grow_part(
             counts, part, "uniform", images, self.settings.concentration, 1, "none", positions=POSITIONS[:1]
         )

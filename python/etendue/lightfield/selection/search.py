@@ -77,6 +77,8 @@ def choose_surface(
 
     - a rectangle and a disk, at the depth at which the source is sharpest, if no more than half the light heads
       towards −Z;
+    - a rectangle about what is bright, in the focus that suits each inclination, with frames for what lies beside it and a
+      sphere for all other lines;
     - a hemisphere that all rays come out of, about the centre of the smallest ball that their lines pass, or of the
       sphere on which they start, whichever is the smaller;
     - a dome about the same centre: a window at the depth of the rectangle, and a hemisphere for what does not pass it;
@@ -156,7 +158,7 @@ class _Search:
             z, depths = self.depth()
             flats = trials.flats(z)
             kinds += [[s for s in flats if isinstance(s, kind)] for kind in (Plane, Disk)]
-            sharp = focused_about(z, self.rays, self.scorer.threads)
+            sharp = focused_about(z, self.rays, trials.seed, self.scorer.threads)
             kinds += [] if sharp is None else [[sharp]]
             kinds += [trials.hemispheres(z), trials.domes(z)]
         kinds += filter(None, [trials.spheres(), trials.cylinders(), [Box().sized_for(trials.rays)]])

@@ -1,0 +1,80 @@
+"""The pitch that a field says it resolves, against rays of sources that have spots of such a pitch."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from etendue.lightfield.resolution import Resolution
+
+Array = npt.NDArray[np.float64]
+
+SIDE = 10.0
+"""Of the source [mm], whose middle is off the axis."""
+
+MIDDLE = (0.7, -0.4)
+RAYS = 30_000
+PLANE = et.Plane(z=0, width=12.0, height=12.0, centre=(0.5, -0.3), focus=(0, 0, 0, 0))
+
+
+def spotted(*, pitch: float | None, seed: int, rays: int = RAYS) -> et.RaySet:
+    """A square that sends light upwards by the cosine law, with spots (1 + cos)(1 + cos) of this pitch, or even."""
+    rng = np.random.default_rng(seed)
+
+    def along() -> Array:
+        x = rng.uniform(-SIDE / 2, SIDE / 2, 6 * rays)
+        if pitch is not None:
+            x = x[rng.uniform(0, 2, len(x)) < 1 + np.cos(2 * np.pi * x / pitch)]
+        return x[:rays]
+
+    position = np.column_stack([along() + MIDDLE[0], along() + MIDDLE[1], np.zeros(rays)])
+    sine, phi = np.sqrt(rng.random(rays)), rng.uniform(0, 2 * np.pi, rays)
+    direction = np.column_stack([sine * np.cos(phi), sine * np.sin(phi), np.sqrt(1 - sine**2)])
+    return et.RaySet(position, direction, np.full(rays, 100.0 / rays))
+
+
+def contrast(field: et.LightField, *, pitch: float) -> float:
+    """What the field shows of the spots, seen along the normal: the worse of the cosines along x and y."""
+    n = 600
+    offset = ((np.arange(n) + 0.5) / n - 0.5) * SIDE
+    x, y = np.meshgrid(offset, offset)
+    points = np.column_stack([x.ravel() + MIDDLE[0], y.ravel() + MIDDLE[1], np.zeros(n * n)])
+    seen = field.luminance(points, np.tile([0.0, 0.0, 1.0], (n * n, 1)))[0].reshape(n, n)
+    wave = np.cos(2 * np.pi * offset / pitch)
+    # A cosine on a flat ground has the projection ½.
+    return 2.0 * min(float((seen @ wave).sum()), float((seen.T @ wave).sum())) / float(seen.sum())
+
+
+@pytest.fixture(scope="module")
+def stated() -> Resolution:
+    return et.LightField.fit(spotted(pitch=None, seed=1), PLANE).resolution()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1.6, 1 / 1.6])
+def test_spots_come_back_as_stated(stated: Resolution, factor: float) -> None:
+    """Coarser spots with more than half of their contrast, finer ones with less: in fields fitted to rays of their own."""
+    pitch = stated.place * factor
+    field = et.LightField.fit(spotted(pitch=pitch, seed=2), PLANE)
+    shown = contrast(field, pitch=pitch)
+    assert shown > 0.5 if factor > 1 else shown < 0.5
+
+
+@pytest.mark.slow
+def test_more_rays_resolve_more(stated: Resolution) -> None:
+    many = et.LightField.fit(spotted(pitch=None, seed=1, rays=4 * RAYS), PLANE).resolution()
+    assert many.place < stated.place
+    assert many.direction < stated.direction
+    assert (many.part, many.place_limit) == (stated.part, stated.place_limit) == ("plane", "rays")
+
+
+@pytest.mark.slow
+def test_the_same_on_any_threads_and_in_words(stated: Resolution) -> None:
+    field = et.LightField.fit(spotted(pitch=None, seed=3, rays=5000), PLANE)
+    one, two = (dataclasses.astuple(field.resolution(threads=threads)) for threads in (1, 2))
+    assert one == two
+    assert f"{stated.place:.2g} mm" in stated.summary()
+    assert "more rays would resolve more" in stated.summary()
