@@ -47,6 +47,7 @@ def image(*, position: Array, direction: Array, cells: int) -> Array:
     return np.histogram2d(y, x, bins=cells, range=[[-LED.side / 2, LED.side / 2]] * 2)[0]
 
 
+@pytest.mark.slow
 def test_the_oracle_has_the_luminance_of_its_rays() -> None:
     """Σ of flux/L over rays is the étendue that they fill: of each sixteenth of the strays' square π times its area."""
     n = 400_000
@@ -252,7 +253,9 @@ def test_a_focused_field_lights_a_wall_as_its_rays_do(small: et.LightField) -> N
     """Lines of sight that meet a wall connect to places of the field, whose area is seen under another solid angle than that
     of a flat one; rays forwards know nothing of that."""
     # The errors of the field itself are the same for both.
-    known = small.replace(parts=tuple(dataclasses.replace(p, deviation=0 * p.deviation) for p in small.parts))
+    known = small.replace(
+        parts=tuple(dataclasses.replace(p, deviation=0 * p.deviation, errors=FineErrors()) for p in small.parts)
+    )
     wall = {"name": "wall", "shape": {"kind": "rectangle", "width": 5, "height": 4}, "at": [0.5, 0.2, 0.8]}
     eye = {"name": "eye", "theta": 150, "phi": 40, "distance": 300, "target": [0.5, 0.2, 0.8]}
     scene = et.Scene(

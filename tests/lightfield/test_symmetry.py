@@ -12,6 +12,7 @@ import pytest
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield import fitting
 from etendue.lightfield.counting import PartGrids, count_rays
+from etendue.lightfield.etendue_density import FineErrors
 from etendue.lightfield.symmetry import SYMMETRIES, fold, proven_symmetry
 from oracles.sources import LimbDarkenedDisk
 from oracles.verdicts import assert_covers
@@ -98,7 +99,9 @@ def test_images_of_a_ray_tell_nothing_more_of_the_flux(
 ) -> None:
     """Were the shares of all cells certain, every error bar would be that of the flux: √Σw² / Σw of the rays themselves."""
     monkeypatch.setattr(
-        fitting, "calibrate", lambda found, *_: dataclasses.replace(found.tree, deviation=0 * found.tree.ratio)
+        fitting,
+        "calibrate",
+        lambda found, *_: (dataclasses.replace(found.tree, deviation=0 * found.tree.ratio), FineErrors()),
     )
     weights = np.random.default_rng(7).gamma(2.0, 1.0, 4000) if weighted else np.ones(4000)
     rays = et.RaySet(*rays_of(4000, 6), weights)

@@ -151,13 +151,18 @@ def write_rays(
     UnknownNameError
         If there is no such format.
     ArgumentError
-        If the extension belongs to none or to several, there are no rays, or they have no position and the format
-        needs one.
+        If the extension belongs to none or to several, there are no rays or more than the format holds, or they have no
+        position and the format needs one.
     """
     path = Path(path)
     chosen = _format_named(format) if format is not None else _format_for(path)
     if len(rays) == 0:
         raise ArgumentError(f"{path}: there are no rays to write.")
+    if chosen.most_rays is not None and len(rays) > chosen.most_rays:
+        raise ArgumentError(
+            f"{path}: {len(rays):,} rays of {rays.provenance.source}; a file of the format {chosen.title} holds at most "
+            f"{chosen.most_rays:,}. Draw fewer (RaySet.subset) or write TM-25."
+        )
     if not (rays.has_position or chosen.far_field):
         able = ", ".join(f.name for f in RAY_FORMATS if f.far_field)
         raise ArgumentError(

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from etendue.errors import ArgumentError, FormatError
+from etendue.errors import FormatError
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, stored_records
 from etendue.formats.rays.shared import (
     RayColour,
@@ -40,6 +40,8 @@ COLUMNS = range(7, 13)
 """Columns per ray that occur."""
 
 MAX_RAYS = 2**31 - 1
+"""Largest number of rays that the header's signed 32-bit number can say."""
+
 RECORDS = 5
 SHORT_RECORD = 28
 LENGTH_UNITS = {
@@ -188,18 +190,7 @@ def _offsets(path: Path, header: _Header, columns: int) -> tuple[list[int], list
 
 
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:
-    """Write an ASAP binary ray file with seven columns, in millimetres.
-
-    Raises
-    ------
-    ArgumentError
-        If there are more rays than the header's signed 32-bit number can say.
-    """
-    if len(rays) > MAX_RAYS:
-        raise ArgumentError(
-            f"{rays.provenance.source}: {len(rays):,} rays; an ASAP file holds at most {MAX_RAYS:,}. "
-            "Draw fewer (RaySet.subset) or write TM-25."
-        )
+    """Write an ASAP binary ray file with seven columns, in millimetres."""
     dtype = np.dtype([("position", "<f4", 3), ("direction", "<f4", 3), ("flux", "<f4")])
     with path.open("wb") as file:
         file.write(bytes(RECORDS * SHORT_RECORD))
@@ -224,5 +215,5 @@ def _header_bytes(rays: RayStream, count: int, total: float) -> bytes:
     ))  # fmt: skip
 
 
-FORMAT = RayFormat("asap", "ASAP binary ray file", (".dis",), recognise, read, write)
+FORMAT = RayFormat("asap", "ASAP binary ray file", (".dis",), recognise, read, write, most_rays=MAX_RAYS)
 """ASAP binary ray files."""

@@ -89,6 +89,8 @@ class RayFormat:
         Whether it would write this set in watts because in lumens it cannot hold all that is known of the rays.
     value_bytes : int
         Bytes that a number takes at least: those of a float, or of a digit and what parts it from the next.
+    most_rays : int, optional
+        Rays that a file holds at most, where the format or its own program has such a limit.
     """
 
     name: str
@@ -100,6 +102,7 @@ class RayFormat:
     far_field: bool = False
     wants_watts: Callable[[RayStream], bool] = lambda _rays: False
     value_bytes: int = 4
+    most_rays: int | None = None
 
     def least_size(self, rays: RayStream) -> int:
         """Bytes that a file of these rays has at least."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from etendue.errors import ArgumentError, FormatError
+from etendue.errors import FormatError
 from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, stored_records
 from etendue.formats.rays.shared import (
     Colour,
@@ -154,18 +154,7 @@ def _record(kind: int) -> np.dtype[Any]:
 
 
 def write(rays: RayStream, path: Path) -> tuple[str, ...]:
-    """Write a Zemax binary source file in millimetres: spectral (``.sdf``) if the rays have wavelengths and watts.
-
-    Raises
-    ------
-    ArgumentError
-        If there are more than 4e9 rays, which OpticStudio does not read.
-    """
-    if len(rays) > MAX_RAYS:
-        raise ArgumentError(
-            f"{rays.provenance.source}: {len(rays):,} rays; a Zemax file holds at most {MAX_RAYS:,}. "
-            "Draw fewer (RaySet.subset) or write TM-25."
-        )
+    """Write a Zemax binary source file in millimetres: spectral (``.sdf``) if the rays have wavelengths and watts."""
     colour = RayColour.of(rays)
     spectral = colour.kind is Colour.PER_RAY and rays.flux_unit == "W"
     kind = SPECTRAL if spectral else FLUX_ONLY
@@ -207,5 +196,7 @@ def _header(rays: RayStream, kind: int, count: int, total: float, wavelength: fl
     )  # fmt: skip
 
 
-FORMAT = RayFormat("zemax", "Zemax binary source file", (".dat", ".sdf"), recognise, read, write)
+FORMAT = RayFormat(
+    "zemax", "Zemax binary source file", (".dat", ".sdf"), recognise, read, write, most_rays=MAX_RAYS
+)
 """Zemax OpticStudio binary source files."""
