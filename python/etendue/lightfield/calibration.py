@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -70,14 +71,28 @@ class Masses:
 
 
 def calibrate(
-    found: PartEstimate, counts: PartCounts, symmetry: str, seed: int, threads: int | None
+    found: PartEstimate,
+    counts: PartCounts,
+    symmetry: str,
+    seed: int,
+    threads: int | None,
+    step: Callable[[], None] = lambda: None,
 ) -> tuple[Tree, FineErrors]:
-    """The tree of an estimate with calibrated standard deviations, and what errors there are beside them."""
+    """The tree of an estimate with calibrated standard deviations, and what errors there are beside them.
+
+    `step` is called four times as the work goes on.
+    """
+    step()
     own = _masses(found, counts.grid, threads)
     known, within = _elsewhere(found, counts, symmetry, threads)
+    step()
     drawn = _draw(known, counts, within, symmetry, seed)
-    images = images_of(drawn, found.chart, threads, symmetry) if _uses_images(found) else found.images
+    images = (
+        images_of(drawn, found.chart, threads, symmetry, like=found.images) if _uses_images(found) else found.images
+    )
+    step()
     again = grow_part(drawn, found.chart, found.recipe, images, found.concentration, threads, symmetry)
+    step()
     retried = _masses(again, drawn.grid, threads)
     errors = _shown(again, threads) - known
     factors, tried = _factors(retried, np.abs(errors) / np.maximum(retried.deviation, _tiny(known)), own)
@@ -96,8 +111,12 @@ def calibrate(
 
 def _margins(images: Images) -> tuple[Masses, Masses]:
     """The densities over place and direction with their deviations."""
-    space, direction, of_space, of_direction = dataclasses.astuple(images)
-    return Masses(space, of_space), Masses(direction, of_direction)
+
+    def masses(density: FloatArray, deviation: FloatArray | None) -> Masses:
+        return Masses(density, np.zeros_like(density) if deviation is None else deviation)
+
+    space, direction = images.densities()
+    return masses(space, images.space_deviation), masses(direction, images.direction_deviation)
 
 
 def _within(
@@ -189,7 +208,7 @@ def _elsewhere(found: PartEstimate, counts: PartCounts, symmetry: str, threads: 
             for sums, s, n in ((counts.space, shift[:2], shape[:2]), (counts.direction, shift[2:], shape[2:]))
         ]
         whole = dataclasses.replace(found.chart, hole=0.0)
-        there = images_of(PartCounts(counts.grid, *fine), whole, threads, positions=KNOWN_POSITIONS)
+        there = images_of(PartCounts(counts.grid, *fine), whole, threads, positions=KNOWN_POSITIONS, like=found.images)
         images = there.rolled(tuple(-s for s in shift), shape)
         if found.images.space is not None and images.space is not None:
             # The rolled image is floored; where nothing can be, nothing is drawn.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -60,10 +61,11 @@ RECIPES: dict[str, Recipe] = {
 
 @dataclasses.dataclass(frozen=True)
 class Images(Base):
-    """Densities over the place and over the direction, with their standard deviations."""
+    """Densities over the place and over the direction, with their standard deviations and the trees' concentrations."""
 
     space_deviation: FloatArray | None = None
     direction_deviation: FloatArray | None = None
+    concentrations: tuple[float, float] | None = None
 
     def densities(self) -> tuple[FloatArray, FloatArray]:
         """Both densities; 1 where there were no rays to tell."""
@@ -77,21 +79,28 @@ def images_of(
     threads: int | None,
     symmetry: str = "none",
     positions: Sequence[tuple[float, ...]] = FINE_POSITIONS,
+    like: Images | None = None,
 ) -> Images:
     """Densities over the place and over the direction: what the fine counts tell, each by itself.
 
-    Either is a tree of its own, averaged over positions of the fine grid. Where the part has a hole, nothing is left.
+    Either is a tree of its own, averaged over positions of the fine grid. Where the part has a hole, nothing is left. The
+    concentrations are those of greatest evidence, or those of other images of the same light.
     """
     if counts.space.rays == 0:
         return Images()
 
-    def density(sums: Sums) -> tuple[FloatArray, FloatArray]:
-        c = max(IMAGE_CONCENTRATIONS, key=lambda c: log_evidence(sums, Base(), c, threads))
+    def concentration(sums: Sums) -> float:
+        return max(IMAGE_CONCENTRATIONS, key=lambda c: log_evidence(sums, Base(), c, threads))
+
+    def density(sums: Sums, c: float) -> tuple[FloatArray, FloatArray]:
         found = grow_symmetric(sums, Base(), c, threads, positions, symmetry)
         return found.ratio * (1.0 - FLOOR) + FLOOR, found.deviation
 
-    (space, of_space), (direction, of_direction) = density(counts.space), density(counts.direction)
-    return Images(space * _outside(len(space), chart.hole), direction, of_space, of_direction)
+    known = None if like is None else like.concentrations
+    of_place, of_turn = known or (concentration(counts.space), concentration(counts.direction))
+    (space, of_space), (direction, of_direction) = density(counts.space, of_place), density(counts.direction, of_turn)
+    inside = space * _outside(len(space), chart.hole)
+    return Images(inside, direction, of_space, of_direction, (of_place, of_turn))
 
 
 def _outside(n: int, hole: float) -> FloatArray:
@@ -262,10 +271,11 @@ def all_images(
     fold: Fold,
     threads: int | None,
     positions: Sequence[tuple[float, ...]] = FINE_POSITIONS,
+    like: Sequence[Images] | None = None,
 ) -> tuple[Images, ...]:
     """The images of each part, from the counts of a fold; see `images_of`."""
-    parts = zip(counts[fold], counts.surface.parts(), strict=True)
-    return tuple(images_of(part, chart, threads, counts.symmetry, positions) for part, chart in parts)
+    parts = zip(counts[fold], counts.surface.parts(), like or itertools.repeat(None), strict=False)
+    return tuple(images_of(part, chart, threads, counts.symmetry, positions, other) for part, chart, other in parts)
 
 
 def grow_candidates(

@@ -25,6 +25,7 @@ from etendue.lightfield.candidate import (
 from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, PartGrids, count_rays
 from etendue.lightfield.etendue_density import EtendueDensity, FitReport
 from etendue.lightfield.expected_loss import loss_of_gamma
+from etendue.lightfield.fit_progress import FitProgress, Step
 from etendue.lightfield.focusing import focused
 from etendue.lightfield.pilot_sample import check_near_field, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
@@ -42,6 +43,9 @@ FINEST = 9
 
 FINEST_DIRECTION = 8
 """Halvings of the fine grids over direction, whose images are never as sharp."""
+
+PILOT_FINEST = 8
+"""The same where shapes of the grid are compared: how sharp the images are is the same for all of them."""
 
 SHAPES = (-2, -1, 0, 1, 2)
 """Halvings per coordinate that the place may lend to the direction."""
@@ -81,23 +85,28 @@ def fit_light_field(
     """See `LightField.fit`."""
     threads = checked_threads(threads)
     check_near_field(rays)
+    told = FitProgress(progress, len(rays), isinstance(surface, str))
     notes: tuple[str, ...] = ()
     if isinstance(surface, str):
         if surface != "auto":
             raise ArgumentError(f"surface is {surface!r}; give a Surface, or 'auto'. For text there is parse_surface.")
-        choice = choose_surface(rays, seed=seed, threads=threads)
+        told.begin("surface")
+        choice = choose_surface(rays, seed=seed, threads=threads, step=told.step)
         surface, notes = choice.surface, choice.notes
+    told.begin("focus")
     surface = focused(surface, rays, seed, threads) if isinstance(surface, Plane) else surface.sized_for(rays)
-    plan = make_plan(rays, surface, depths, seed, threads)
-    counts = count_rays(rays, surface, plan.grids, seed=seed, threads=threads, progress=progress)
+    told.begin("grid")
+    plan = make_plan(rays, surface, depths, seed, threads, told.step)
+    counts = count_rays(rays, surface, plan.grids, seed=seed, threads=threads, progress=told.counted)
     if symmetry == "auto":
         symmetry = proven_symmetry(counts)
-        told = "no symmetry is borne out" if symmetry == "none" else f"the rays bear out the symmetry {symmetry}"
-        notes = (*notes, f"{told} (χ² of counts and images, 1e-3)")
+        found = "no symmetry is borne out" if symmetry == "none" else f"the rays bear out the symmetry {symmetry}"
+        notes = (*notes, f"{found} (χ² of counts and images, 1e-3)")
     if symmetry != "none":
         counts = fold(counts, symmetry)
-    field = fit_counts(rays, counts, plan, seed, threads)
+    field = fit_counts(rays, counts, plan, seed, threads, told)
     spectrum = rays.total_spectrum(threads=threads)
+    told.end()
     return field.replace(notes=(*notes, *field.notes, *notes_of_rays(rays)), spectrum=spectrum)
 
 
@@ -115,14 +124,21 @@ def default_bits(rays: int) -> int:
     return 16 if rays < 30_000 else 20 if rays < 5_000_000 else 22 if rays < 200_000_000 else 24
 
 
-def grids_for(rays: int, depths: Depths) -> PartGrids:
+def grids_for(rays: int, depths: Depths, finest: int = FINEST) -> PartGrids:
     """The grids of a part with so many rays: fine ones have about one in each cell, and are not coarser than the others."""
     wanted = max(rays, 1).bit_length() // 2
-    place, direction = min(FINEST, wanted), min(FINEST_DIRECTION, wanted)
+    place, direction = min(finest, wanted), min(finest, FINEST_DIRECTION, wanted)
     return PartGrids(depths, (max(place, *depths[:2]), max(direction, *depths[2:])))
 
 
-def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: int, threads: int | None) -> Plan:
+def make_plan(
+    rays: RayStream,
+    surface: Surface,
+    depths: Depths | None,
+    seed: int,
+    threads: int | None,
+    step: Step = lambda: None,
+) -> Plan:
     """Choose, on some of the rays, what predicts held-out rays best: the shape of the grid unless it is given.
 
     From an even shape the search goes on as long as the score rises, by the recipe that is the best one there; then from
@@ -137,25 +153,24 @@ def make_plan(rays: RayStream, surface: Surface, depths: Depths | None, seed: in
     shares = np.array([part.grid.rays for part in first_look["all"]]) / first_look.rays
     few = (shares < FEW * shares.max()) & (depths is None or isinstance(surface, Plane))
 
-    def grids(number: int, own: Depths) -> tuple[PartGrids, ...]:
+    def grids(number: int, own: Depths, finest: int = FINEST) -> tuple[PartGrids, ...]:
         return tuple(
-            grids_for(round(share * number), depths_for(round(share * number)) if is_few else own)
+            grids_for(round(share * number), depths_for(round(share * number)) if is_few else own, finest)
             for share, is_few in zip(shares, few, strict=True)
         )
 
     def counted(own: Depths) -> EtendueCounts:
-        return count_rays(some, surface, grids(len(some), own), seed=seed, threads=threads)
+        step()
+        return count_rays(some, surface, grids(len(some), own, PILOT_FINEST), seed=seed, threads=threads)
 
     if depths:
         trial = counted(depths)
         return Plan(grids(len(rays), depths), choose_concentrations(trial, _pilot_images(trial, threads), threads))
     chosen = _search(counted, min(bits, FEWEST_BITS), 0, threads)
     while chosen.bits < min(bits, MOST_PILOT_BITS):
-        finer = _search(counted, chosen.bits + 4, chosen.lend, threads)
-        lead, error = finer.score.lead(chosen.score)
-        if lead <= max(LEAD * error, LEAST_LEAD):
+        if not _leads(_finer_score(counted, chosen, threads), chosen.score):
             break
-        chosen = finer
+        chosen = _search(counted, chosen.bits + 4, chosen.lend, threads)
     if chosen.bits == MOST_PILOT_BITS:
         chosen = dataclasses.replace(chosen, bits=bits)
     return Plan(grids(len(rays), _depths(chosen.bits, chosen.lend)), chosen.concentrations)
@@ -190,6 +205,18 @@ def _search(counted: Callable[[Depths], EtendueCounts], bits: int, lend: int, th
     return _Shape(bits, best, concentrations, reached)
 
 
+def _finer_score(counted: Callable[[Depths], EtendueCounts], chosen: _Shape, threads: int | None) -> Score:
+    """What a grid of the same shape with sixteen times the cells predicts, by the recipe that is best there."""
+    trial = counted(_depths(chosen.bits + 2, chosen.lend))
+    grown = grow_candidates(trial, _pilot_images(trial, threads), chosen.concentrations, threads)
+    return max((c.score(trial) for c in grown.values()), key=lambda score: score.mean)
+
+
+def _leads(finer: Score, coarser: Score) -> bool:
+    lead, error = finer.lead(coarser)
+    return lead > max(LEAD * error, LEAST_LEAD)
+
+
 def _pilot_images(counts: EtendueCounts, threads: int | None) -> tuple[Images, ...]:
     return all_images(counts, "fitted", threads, FINE_POSITIONS[:4])
 
@@ -206,15 +233,20 @@ def _depths(bits: int, lend: int) -> Depths:
     return (place, place, direction, direction)
 
 
-def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, threads: int | None) -> EtendueDensity:
+def fit_counts(
+    rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, threads: int | None, told: FitProgress
+) -> EtendueDensity:
     """The field of counted rays: recipes compared on the held-out rays, the best one followed with all."""
-    images = all_images(counts, "fitted", threads)
+    told.begin("recipe")
+    images = all_images(counts, "fitted", threads, FINE_POSITIONS[:4])
     candidates = grow_candidates(counts, images, plan.concentrations, threads)
     scores = {name: candidate.score(counts) for name, candidate in candidates.items()}
     recipe = max(scores, key=lambda name: scores[name].mean)
     score, c = scores[recipe], plan.concentrations[recipe]
-    final = grow_candidate(counts, "all", recipe, all_images(counts, "all", threads), c, threads)
-    final = Candidate(tuple(_calibrated(counts, final, seed, threads)))
+    told.begin("field")
+    final = grow_candidate(counts, "all", recipe, all_images(counts, "all", threads, like=images), c, threads)
+    told.begin("errors")
+    final = Candidate(tuple(_calibrated(counts, final, seed, threads, told.step)))
     histogram = score_densities(counts, _histogram(counts))
     report = FitReport(
         rays=counts.rays,
@@ -240,13 +272,15 @@ def fit_counts(rays: RayStream, counts: EtendueCounts, plan: Plan, seed: int, th
     )
 
 
-def _calibrated(counts: EtendueCounts, candidate: Candidate, seed: int, threads: int | None) -> Iterator[PartEstimate]:
+def _calibrated(
+    counts: EtendueCounts, candidate: Candidate, seed: int, threads: int | None, step: Step
+) -> Iterator[PartEstimate]:
     """The estimates with error bars that also hold the Poisson error of the part's flux."""
     for found, part in zip(candidate.parts, counts["all"], strict=True):
         if part.grid.rays == 0:
             yield found
             continue
-        tree, errors = calibrate(found, part, counts.symmetry, seed, threads)
+        tree, errors = calibrate(found, part, counts.symmetry, seed, threads, step)
         deviation = np.sqrt(tree.deviation**2 + tree.ratio**2 * order(counts.symmetry) / part.grid.rays)
         yield dataclasses.replace(found, tree=dataclasses.replace(tree, deviation=deviation), errors=errors)
 

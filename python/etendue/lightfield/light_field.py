@@ -170,7 +170,8 @@ class LightField(EtendueDensity, InNotebook):
         threads : int, optional
             All cores if None. The result has the same bits for any number.
         progress : callable, optional
-            Called with the number of rays done.
+            Called with rising numbers of rays, up to all of them, as the fit goes on; its other stages count as the rays
+            that might be read meanwhile.
 
         Raises
         ------

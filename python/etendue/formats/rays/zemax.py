@@ -196,7 +196,5 @@ def _header(rays: RayStream, kind: int, count: int, total: float, wavelength: fl
     )  # fmt: skip
 
 
-FORMAT = RayFormat(
-    "zemax", "Zemax binary source file", (".dat", ".sdf"), recognise, read, write, most_rays=MAX_RAYS
-)
+FORMAT = RayFormat("zemax", "Zemax binary source file", (".dat", ".sdf"), recognise, read, write, most_rays=MAX_RAYS)
 """Zemax OpticStudio binary source files."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -67,7 +67,12 @@ class SurfaceChoice:
 
 
 def choose_surface(
-    rays: RayStream, *, seed: int = 1, threads: int | None = None, settings: SelectionSettings = DEFAULT
+    rays: RayStream,
+    *,
+    seed: int = 1,
+    threads: int | None = None,
+    settings: SelectionSettings = DEFAULT,
+    step: Callable[[], None] = lambda: None,
 ) -> SurfaceChoice:
     """The surface on which the light field predicts held-out rays best; of several as good, the simplest.
 
@@ -100,6 +105,8 @@ def choose_surface(
         All cores if None. The choice is the same for any number.
     settings : SelectionSettings
         How many rays are used, on which grids, and what counts as better.
+    step : callable
+        Called again and again, with nothing, as the search goes on.
 
     Raises
     ------
@@ -119,7 +126,7 @@ def choose_surface(
         raise ArgumentError(
             f"{len(some)} rays with flux are too few to choose a surface by; state one, such as surface='sphere'."
         )
-    return _Search(some, seed, threads, settings).choice()
+    return _Search(some, seed, threads, settings, step).choice()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -137,8 +144,10 @@ class _Scored:
 class _Search:
     """The surfaces that are tried, and the two scorers: one with some of the rays for the search, one with all."""
 
-    def __init__(self, rays: RaySet, seed: int, threads: int | None, settings: SelectionSettings) -> None:
-        self.settings = settings
+    def __init__(
+        self, rays: RaySet, seed: int, threads: int | None, settings: SelectionSettings, step: Callable[[], None]
+    ) -> None:
+        self.settings, self.step = settings, step
         self.rays = rays
         self.trials = TrialSurfaces(rays, seed, settings)
         even = even_density(rays)
@@ -173,6 +182,7 @@ class _Search:
 
     def best(self, kind: Sequence[Surface]) -> Surface:
         """Of surfaces of one kind the best; of those that meet enough of the flux, if there are any."""
+        self.step()
         scores = self.coarse_scorer.score_all([(surface.parts(), self.settings.coarse_grid) for surface in kind])
         tried = [_Scored(surface, score) for surface, score in zip(kind, scores, strict=True)]
         able = [t for t in tried if t.held_out.unmet <= self.most_unmet]
@@ -183,6 +193,7 @@ class _Search:
         finer = dict(self.settings.kind_grids)
 
         def scored(pairs: list[tuple[Surface, Grid]]) -> dict[tuple[Surface, Grid], HeldOutScore]:
+            self.step()
             grids = [(surface.parts(), (place - self.less, turn - self.less)) for surface, (place, turn) in pairs]
             return dict(zip(pairs, self.scorer.score_all(grids, WITH_IMAGES), strict=True))
 
@@ -213,6 +224,7 @@ class _Search:
         grid = (settings.depth_grid[0] - self.less, settings.depth_grid[1] - self.less)
 
         def score(z: float) -> float:
+            self.step()
             seen[z] = self.scorer.score(trials.flat(kind, within, z, trials.few).parts(), grid)
             return seen[z].score.mean
 
@@ -243,6 +255,7 @@ class _Search:
         low, high = float(places[at - 1]), float(places[at + 1])
 
         def score(z: float) -> float:
+            self.step()
             return self.coarse_scorer.score(trials.nested(z), settings.coarse_grid).score.mean
 
         return golden_section(score, low, high, settings.depth_window * (high - low)), high - low
