@@ -118,6 +118,7 @@ def test_fit_for_people_says_the_same_and_info_says_it_again(run: Run, folder: P
     [
         (("--surface", "plane:z=0.5", *GRID[2:]), {"surface": Plane(z=0.5)}),
         (("--flux", "500lm", *GRID), {}),
+        (("--max-resolution", "2.5", *GRID), {"max_resolution": 2.5}),
     ],
 )
 def test_fit_takes_surface_and_flux(run: Run, folder: Path, tmp_path: Path, options: Any, changes: Any) -> None:

@@ -8,6 +8,8 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
+from etendue.errors import ArgumentError
+from etendue.lightfield.fitting import finest_for
 from etendue.lightfield.resolution import Resolution
 
 Array = npt.NDArray[np.float64]
@@ -78,3 +80,26 @@ def test_the_same_on_any_threads_and_in_words(stated: Resolution) -> None:
     assert one == two
     assert f"{stated.place:.2g} mm" in stated.summary()
     assert "more rays would resolve more" in stated.summary()
+
+
+def test_the_finest_cells_are_as_asked() -> None:
+    """2^k cells along a side of 12 mm; what is finer than the finest grid is told."""
+    for side, halvings in ((12 / 4096, 12), (12 / 1000, 10), (12 / 1024, 10), (7.0, 1), (40.0, 1)):
+        assert finest_for(PLANE, side) == (halvings, ())
+    finest, (told,) = finest_for(PLANE, 1e-3)
+    assert finest == 12
+    assert "0.00293 mm" in told
+    assert finest_for(PLANE, None) == (9, ())
+    for wrong in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ArgumentError, match="max_resolution"):
+            et.LightField.fit(spotted(pitch=None, seed=1, rays=100), PLANE, max_resolution=wrong)
+
+
+@pytest.mark.slow
+def test_spots_finer_than_the_cells_that_are_asked_for_are_lost() -> None:
+    rays = spotted(pitch=1.0, seed=5)
+    shown = [
+        contrast(et.LightField.fit(rays, PLANE, depths=(2, 2, 2, 2), max_resolution=side), pitch=1.0)
+        for side in (None, 0.8)
+    ]
+    assert shown[0] > 0.5 > shown[1]

@@ -40,6 +40,14 @@ def fit(
             "--depths", help="Halvings of the grid along s₁, s₂, a and b; chosen if not given.", metavar="N,N,N,N"
         ),
     ] = None,
+    max_resolution: Annotated[
+        float | None,
+        typer.Option(
+            "--max-resolution",
+            help="Side of the finest cells over place [mm], for sets of very many rays; 1/512 of the surface if not given.",
+            metavar="MM",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option("--seed", help="Decides which rays are held out.")] = 1,
     threads: Threads = None,
     flux: Flux = None,
@@ -59,7 +67,14 @@ def fit(
     started = time.perf_counter()
     with progress_bar("rays", len(rays)) as progress:
         field = LightField.fit(
-            rays, carrier, symmetry=symmetry, depths=grid, seed=seed, threads=threads, progress=progress
+            rays,
+            carrier,
+            symmetry=symmetry,
+            depths=grid,
+            max_resolution=max_resolution,
+            seed=seed,
+            threads=threads,
+            progress=progress,
         )
     seconds = time.perf_counter() - started
     field.save(output)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator
 from typing import Literal
 
@@ -44,6 +45,9 @@ FINEST = 9
 FINEST_DIRECTION = 8
 """Halvings of the fine grids over direction, whose images are never as sharp."""
 
+MOST_FINEST = 12
+"""Halvings of the fine grid over place that may be asked for: 4096 × 4096 cells, which take some gigabytes."""
+
 PILOT_FINEST = 8
 """The same where shapes of the grid are compared: how sharp the images are is the same for all of them."""
 
@@ -78,12 +82,15 @@ def fit_light_field(
     *,
     symmetry: str = "none",
     depths: Depths | None = None,
+    max_resolution: float | None = None,
     seed: int = 1,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> EtendueDensity:
     """See `LightField.fit`."""
     threads = checked_threads(threads)
+    if max_resolution is not None and not 0.0 < max_resolution < math.inf:
+        raise ArgumentError(f"max_resolution is {max_resolution}; give the side of the finest cells, a length in mm.")
     check_near_field(rays)
     told = FitProgress(progress, len(rays), isinstance(surface, str))
     notes: tuple[str, ...] = ()
@@ -96,7 +103,8 @@ def fit_light_field(
     told.begin("focus")
     surface = focused(surface, rays, seed, threads) if isinstance(surface, Plane) else surface.sized_for(rays)
     told.begin("grid")
-    plan = make_plan(rays, surface, depths, seed, threads, told.step)
+    finest, not_so_fine = finest_for(surface, max_resolution)
+    plan = make_plan(rays, surface, depths, seed, threads, finest, told.step)
     counts = count_rays(rays, surface, plan.grids, seed=seed, threads=threads, progress=told.counted)
     if symmetry == "auto":
         symmetry = proven_symmetry(counts)
@@ -107,7 +115,25 @@ def fit_light_field(
     field = fit_counts(rays, counts, plan, seed, threads, told)
     spectrum = rays.total_spectrum(threads=threads)
     told.end()
-    return field.replace(notes=(*notes, *field.notes, *notes_of_rays(rays)), spectrum=spectrum)
+    return field.replace(notes=(*notes, *not_so_fine, *field.notes, *notes_of_rays(rays)), spectrum=spectrum)
+
+
+def finest_for(surface: Surface, max_resolution: float | None) -> tuple[int, tuple[str, ...]]:
+    """Halvings of the fine grid over place such that cells of the first part have this side [mm], or the finest there are.
+
+    And what is to be said of it, where a coarser one has to do.
+    """
+    if max_resolution is None:
+        return FINEST, ()
+    side = math.sqrt(surface.parts()[0].area)
+    wanted = max(math.ceil(math.log2(side / max_resolution) - 1e-9), 1)
+    if wanted <= MOST_FINEST:
+        return wanted, ()
+    told = (
+        f"cells of {max_resolution:g} mm would be more than {2**MOST_FINEST:,} × {2**MOST_FINEST:,} on "
+        f"{surface.spec}: they have {side / 2**MOST_FINEST:.3g} mm; state a smaller surface for finer ones"
+    )
+    return MOST_FINEST, (told,)
 
 
 def notes_of_rays(rays: RayStream) -> tuple[str, ...]:
@@ -137,6 +163,7 @@ def make_plan(
     depths: Depths | None,
     seed: int,
     threads: int | None,
+    finest: int = FINEST,
     step: Step = lambda: None,
 ) -> Plan:
     """Choose, on some of the rays, what predicts held-out rays best: the shape of the grid unless it is given.
@@ -153,7 +180,7 @@ def make_plan(
     shares = np.array([part.grid.rays for part in first_look["all"]]) / first_look.rays
     few = (shares < FEW * shares.max()) & (depths is None or isinstance(surface, Plane))
 
-    def grids(number: int, own: Depths, finest: int = FINEST) -> tuple[PartGrids, ...]:
+    def grids(number: int, own: Depths, finest: int = finest) -> tuple[PartGrids, ...]:
         return tuple(
             grids_for(round(share * number), depths_for(round(share * number)) if is_few else own, finest)
             for share, is_few in zip(shares, few, strict=True)

@@ -18,8 +18,9 @@ from etendue.lightfield.candidate import (
     all_images,
     grow_candidate,
 )
-from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, count_rays
-from etendue.lightfield.fitting import grids_for
+from etendue.lightfield.counting import EtendueCounts, FloatArray, PartGrids, count_rays
+from etendue.lightfield.etendue_density import PartField
+from etendue.lightfield.fitting import FINEST, grids_for
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import pilot_sample, selected_rays
 from etendue.lightfield.symmetry import fold
@@ -232,11 +233,12 @@ def law_of_gains(rays: FloatArray, gains: FloatArray, covariance: npt.NDArray[np
 def _count(field: LightField, rays: RaySet, seed: int, threads: int | None) -> EtendueCounts:
     """The rays in the cells of the field."""
 
-    def depths(shape: tuple[int, ...]) -> Depths:
-        s1, s2, a, b = (n.bit_length() - 1 for n in shape)
-        return (s1, s2, a, b)
+    def grids_of(part: PartField) -> PartGrids:
+        s1, s2, a, b = (n.bit_length() - 1 for n in part.ratio.shape)
+        finest = FINEST if part.space is None else max(FINEST, len(part.space).bit_length() - 1)
+        return grids_for(len(rays), (s1, s2, a, b), finest)
 
-    grids = [grids_for(len(rays), depths(part.ratio.shape)) for part in field.parts]
+    grids = [grids_of(part) for part in field.parts]
     return count_rays(rays, field.surface, grids, held_out=0.0, seed=seed, threads=threads)
 
 

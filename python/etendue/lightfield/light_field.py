@@ -143,6 +143,7 @@ class LightField(EtendueDensity, InNotebook):
         *,
         symmetry: str = "none",
         depths: tuple[int, int, int, int] | None = None,
+        max_resolution: float | None = None,
         seed: int = 1,
         threads: int | None = None,
         progress: Progress | None = None,
@@ -165,6 +166,9 @@ class LightField(EtendueDensity, InNotebook):
             ``"mirror-y"``, ``"mirror-xy"``, ``"c2"``, ``"c4"``, or ``"auto"``: one of them if the rays bear it out.
         depths : tuple of int, optional
             2^depth cells along s₁, s₂, a and b, but on frames with few rays; None: chosen.
+        max_resolution : float, optional
+            Side of the finest cells over place [mm]: at most 4096 × 4096 on the surface or, of a plane with frames, on its
+            window, and no more than there are rays. None: 512 × 512. What the field then resolves, `resolution` tells.
         seed : int
             Decides which rays are held out.
         threads : int, optional
@@ -181,7 +185,14 @@ class LightField(EtendueDensity, InNotebook):
             If there is no such symmetry.
         """
         density = fit_light_field(
-            rays, surface, symmetry=symmetry, depths=depths, seed=seed, threads=threads, progress=progress
+            rays,
+            surface,
+            symmetry=symmetry,
+            depths=depths,
+            max_resolution=max_resolution,
+            seed=seed,
+            threads=threads,
+            progress=progress,
         )
         return LightField(**density.content())
 
