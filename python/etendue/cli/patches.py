@@ -9,13 +9,14 @@ import typer
 
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.options import Flux, Json, Unit
-from etendue.cli.terminal import complain, one_of, print_json, progress_bar, say
+from etendue.cli.terminal import complain, one_of, print_json, progress_bar, say, whole_numbers
 from etendue.formats.output import atomic_output
 from etendue.formats.patch_folder import PATCH_FORMATS, check_patch_folder
 from etendue.formats.rays import read_rays
 from etendue.formats.scenes import SCENES
 from etendue.goniophotometry.threshold_sweep import THRESHOLDS, threshold_sweep
 from etendue.lightfield.gridded.gridded_source import GriddedSource
+from etendue.lightfield.gridded.pixelated import CENTRES
 from etendue.lightfield.surfaces import parse_surface
 from etendue.plot.threshold_picture import plot_threshold_sweep
 
@@ -27,12 +28,24 @@ def patches(
         str, typer.Option("--surface", help="Carrier surface: plane:z=0, disk:radius=11.5, dome:radius=1.264 …")
     ] = "plane:z=0",
     pixel: Annotated[float, typer.Option("--pixel", help="Side of the squares on flat parts, in mm.")] = 1.0,
+    centre_on: Annotated[
+        str,
+        typer.Option(
+            "--centre-on", help="What of the squares lies at the centre, or at x = y = 0: corner, pixel or auto."
+        ),
+    ] = "auto",
     threshold: Annotated[
         float, typer.Option("--threshold", help="Largest flux error E of a patch, in percent (thesis eq. 3.3).")
     ] = 0.021,
     parallels: Annotated[
         int | None, typer.Option("--parallels", help="Cut a hemisphere into (2N-1)² cells; from --pixel if not given.")
     ] = None,
+    coarsest: Annotated[
+        str, typer.Option("--coarsest", help="Δθ and Δφ that are tried first, in degrees.", metavar="N,N")
+    ] = "30,90",
+    finest: Annotated[
+        str, typer.Option("--finest", help="Δθ and Δφ that are tried last, in degrees.", metavar="N,N")
+    ] = "1,1",
     format: Annotated[str, typer.Option("--format", help="Of the intensity files: ies or ldt.")] = "ies",
     scene: Annotated[
         list[str] | None, typer.Option("--scene", help="Add a scene: radiance or mitsuba; several are allowed.")
@@ -47,17 +60,32 @@ def patches(
 ) -> None:
     """Sample a ray file into patches, each with an intensity distribution of its own: thesis 3.2 and 3.3."""
     one_of(format, PATCH_FORMATS, "--format")
+    at = one_of(centre_on, CENTRES, "--centre-on")
+    first = whole_numbers(coarsest, 2, "--coarsest", "30,90")
+    last = whole_numbers(finest, 2, "--finest", "1,1")
     scenes = [one_of(name, SCENES, "--scene") for name in scene or []]
     carrier = parse_surface(surface)
     rays = in_unit(with_flux(read_rays(file), flux), unit)
     check_patch_folder(output, rays.flux_unit, format, scenes)
     with progress_bar("rays", len(rays)) as progress:
-        source = GriddedSource.fit(rays, carrier, pixel, threshold, parallels, progress)
+        source = GriddedSource.fit(
+            rays,
+            carrier,
+            pixel,
+            threshold,
+            parallels,
+            progress,
+            centre_on=at,
+            coarsest_bins=(first[0], first[1]),
+            finest_bins=(last[0], last[1]),
+        )
     swept = None
     if sweep:
         thresholds = sorted({*THRESHOLDS, threshold} - {0.0}, reverse=True)
         with progress_bar("thresholds", len(rays)) as progress:
-            swept = threshold_sweep(rays, carrier, pixel, thresholds, parallels, seed=seed, progress=progress)
+            swept = threshold_sweep(
+                rays, carrier, pixel, thresholds, parallels, centre_on=at, seed=seed, progress=progress
+            )
     source.save_patches(output, format, scenes)
     if swept is not None:
         with atomic_output(output / "sweep.csv") as temporary:

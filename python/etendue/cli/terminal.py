@@ -10,7 +10,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import typer
@@ -211,7 +211,10 @@ def _from_float(text: str | int) -> int:
     return int(rounded)
 
 
-def one_of(value: str, known: Iterable[str], option: str) -> str:
+Name = TypeVar("Name", bound=str)
+
+
+def one_of(value: str, known: Iterable[Name], option: str) -> Name:
     """The value of an option that has a few.
 
     Raises
@@ -220,9 +223,10 @@ def one_of(value: str, known: Iterable[str], option: str) -> str:
         If it is none of them; suggests the nearest.
     """
     known = list(known)
-    if value not in known:
-        raise typer.BadParameter(str(UnknownNameError(f"value of {option}", value, known)))
-    return value
+    for name in known:
+        if name == value:
+            return name
+    raise typer.BadParameter(str(UnknownNameError(f"value of {option}", value, known)))
 
 
 def check_folder(path: Path) -> None:

@@ -17,8 +17,8 @@ from etendue.goniophotometry.comparison import compare_intensities
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.fitting import Batches, Bins, LitPixels, all_batches, fill_bins, lit_pixels, patches_of
-from etendue.lightfield.gridded.gridded_source import GriddedSource, check_threshold
-from etendue.lightfield.gridded.pixelated import PixelatedSurface
+from etendue.lightfield.gridded.gridded_source import GriddedSource, check_threshold, pixels_for
+from etendue.lightfield.gridded.pixelated import CentreOn, PixelatedSurface
 from etendue.lightfield.gridded.sampling import RECORD
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity_nodes import check_steps
@@ -46,6 +46,7 @@ def threshold_sweep(
     thresholds: Sequence[float] = THRESHOLDS,
     parallels: int | None = None,
     *,
+    centre_on: CentreOn = "auto",
     c_planes: int = 36,
     gamma_step: float = 2.5,
     seed: int = 1,
@@ -61,7 +62,7 @@ def threshold_sweep(
 
     Parameters
     ----------
-    rays, surface, pixel, parallels
+    rays, surface, pixel, parallels, centre_on
         As of `GriddedSource.fit`.
     thresholds : sequence of float
         [%]
@@ -98,7 +99,7 @@ def threshold_sweep(
     if not 0 <= operator.index(seed) < 2**64:
         raise ArgumentError(f"threshold_sweep: seed {seed}; give 0 to 2^64 - 1.")
     check_steps(c_planes, gamma_step)  # refuses what is no grid before the work begins
-    pixels = PixelatedSurface.cut(surface.sized_for(rays), pixel, parallels)
+    pixels = pixels_for(rays, surface, pixel, parallels, centre_on)
     passes = 6
     first = None if progress is None else lambda done: progress(done // passes)
     reference = intensity_distribution(rays, c_planes, gamma_step, progress=first)
@@ -143,9 +144,8 @@ class _Models:
     @classmethod
     def of(cls, batches: Batches, pixels: PixelatedSurface, thresholds: Sequence[float]) -> _Models:
         lit = lit_pixels(batches, pixels)
-        errors = angular.quadrature_errors(lit.rings)
-        steps = np.stack([angular.first_within(errors, threshold) for threshold in thresholds])
-        wanted = (steps[:, None, :] == np.arange(len(angular.SEQUENCE))[:, None]).any(axis=0)
+        steps = np.stack([angular.first_within(lit.errors, threshold) for threshold in thresholds])
+        wanted = (steps[:, None, :] == np.arange(len(lit.sequence))[:, None]).any(axis=0)
         return cls(lit, fill_bins(batches, lit, wanted), steps)
 
     def source(self, number: int, rays: RayStream, pixel: float, threshold: float) -> GriddedSource:

@@ -7,9 +7,12 @@ is a block of them. No bin edge is ever computed in floating point twice.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
+from etendue.errors import ArgumentError
 from etendue.quantities.patches import AngularGrid
 
 Array = npt.NDArray[np.float64]
@@ -22,17 +25,49 @@ COARSEST = (30, 90)
 """Δθ and Δφ of the first iteration [°]."""
 
 
-def _sequence() -> tuple[AngularGrid, ...]:
-    """Steps that divide the quarter and the circle, k-th with k-th; the shorter list stays at its last step, 1°."""
-    thetas, phis = (
-        [step for step in range(first, 0, -1) if whole % step == 0]
-        for first, whole in zip(COARSEST, (90, 360), strict=True)
-    )
-    thetas += [thetas[-1]] * (len(phis) - len(thetas))
+FINEST = (1, 1)
+"""Those of the last one [°], "a predefined minimum value"."""
+
+WHOLE = (90, 360)
+"""What Δθ and Δφ divide [°]."""
+
+
+def sequence(coarsest: Sequence[int] = COARSEST, finest: Sequence[int] = FINEST) -> tuple[AngularGrid, ...]:
+    """Steps that divide the quarter and the circle, k-th with k-th; the shorter list stays at its last step.
+
+    Parameters
+    ----------
+    coarsest, finest : sequence of int, length 2
+        Δθ and Δφ of the first and of the last iteration, whole degrees.
+
+    Raises
+    ------
+    ArgumentError
+        If one of them does not divide 90° or 360°, or the finest is above the coarsest.
+
+    Examples
+    --------
+    >>> [(grid.theta_step, grid.phi_step) for grid in sequence((18, 60), (9, 36))]
+    [(18, 60), (15, 45), (10, 40), (9, 36)]
+    """
+    lists = []
+    for name, whole, first, last in zip(("Δθ", "Δφ"), WHOLE, coarsest, finest, strict=True):
+        steps = [step for step in range(whole, 0, -1) if whole % step == 0]
+        for told, step in (("coarsest", first), ("finest", last)):
+            if step not in steps:
+                able = ", ".join(map(str, steps))
+                raise ArgumentError(
+                    f"{told} bins: {name} is {step}°, which does not divide {whole}°; give one of {able}."
+                )
+        if last > first:
+            raise ArgumentError(f"the finest bins have {name} = {last}°, more than the coarsest, {first}°.")
+        lists.append([step for step in steps if last <= step <= first])
+    longest = max(map(len, lists))
+    thetas, phis = (steps + steps[-1:] * (longest - len(steps)) for steps in lists)
     return tuple(AngularGrid(*pair) for pair in zip(thetas, phis, strict=True))
 
 
-SEQUENCE = _sequence()
+SEQUENCE = sequence()
 """Step 4h: (30°, 90°), (18°, 72°), (15°, 60°) … (1°, 18°), (1°, 15°) … (1°, 1°)."""
 
 
@@ -153,17 +188,19 @@ def quadrature_factors(grid: AngularGrid) -> Array:
     return factors
 
 
-def quadrature_errors(rings: Array) -> Array:
+def quadrature_errors(rings: Array, grids: Sequence[AngularGrid] = SEQUENCE) -> Array:
     """Step 4g: E [%] of every step of the sequence, eq. 3.3, from the flux of the rings alone.
 
     Parameters
     ----------
     rings : array, shape (n, RINGS)
         Flux of each patch in each half degree of θ.
+    grids : sequence of AngularGrid
+        The steps.
 
     Returns
     -------
-    array, shape (n, len(SEQUENCE))
+    array, shape (n, len(grids))
         NaN for patches without flux.
 
     Examples
@@ -173,9 +210,9 @@ def quadrature_errors(rings: Array) -> Array:
     >>> quadrature_errors(lambertian[None])[0, [0, 1, 5, 20]].round(4).tolist()
     [3.0126, 1.1787, 0.1364, 0.0038]
     """
-    factors = np.stack([quadrature_factors(grid) for grid in SEQUENCE], axis=1)
+    factors = np.stack([quadrature_factors(grid) for grid in grids], axis=1)
     flux = rings.sum(axis=1, keepdims=True)
-    error = np.full((len(rings), len(SEQUENCE)), np.nan)
+    error = np.full((len(rings), len(grids)), np.nan)
     off = np.abs(np.einsum("nr,rs->ns", rings, factors) - flux)
     np.divide(100.0 * off, flux, out=error, where=flux > 0.0)
     return error

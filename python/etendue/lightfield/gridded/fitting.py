@@ -17,7 +17,7 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
 from etendue.lightfield.gridded.pixels import Array, Cells, Indices
-from etendue.quantities.patches import Patches
+from etendue.quantities.patches import AngularGrid, Patches
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, RayBatch, RayStream
 from etendue.units import FluxUnit
@@ -80,12 +80,20 @@ class LitPixels:
     rings : array, shape (n, RINGS)
         Their flux in each half degree of θ [flux unit].
     account : Account
+    sequence : tuple of AngularGrid
+        Angular bins that are tried one after the other.
     """
 
     surface: PixelatedSurface
     pixel: Indices
     rings: Array
     account: Account
+    sequence: tuple[AngularGrid, ...] = angular.SEQUENCE
+
+    @functools.cached_property
+    def errors(self) -> Array:
+        """E [%] of each pixel at every step, shape (n, len(sequence))."""
+        return angular.quadrature_errors(self.rings, self.sequence)
 
     @functools.cached_property
     def cells(self) -> Cells:
@@ -119,7 +127,9 @@ class _Accumulator:
         np.add.at(self.rings.reshape(-1), self.slot[pixel].astype(np.intp) * angular.RINGS + ring, flux)
 
 
-def lit_pixels(batches: Batches, surface: PixelatedSurface) -> LitPixels:
+def lit_pixels(
+    batches: Batches, surface: PixelatedSurface, sequence: tuple[AngularGrid, ...] = angular.SEQUENCE
+) -> LitPixels:
     """The first pass: steps 3, 4a and 4d for half degrees of θ.
 
     Raises
@@ -145,7 +155,7 @@ def lit_pixels(batches: Batches, surface: PixelatedSurface) -> LitPixels:
             "Look at the rays with `etendue info`, and choose a surface around the source."
         )
     order = np.argsort(found.pixels)
-    return LitPixels(surface, found.pixels[order], found.rings[order], account)
+    return LitPixels(surface, found.pixels[order], found.rings[order], account, sequence)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -154,19 +164,22 @@ class Bins:
 
     Parameters
     ----------
-    start : array of int, shape (len(SEQUENCE), n)
+    start : array of int, shape (steps, n)
         Where the bins of a pixel begin in `flux`, for each step; -1 for steps that it was not counted in.
     flux : array
         Of all bins [flux unit].
+    sequence : tuple of AngularGrid
+        The steps.
     """
 
     start: Indices
     flux: Array
+    sequence: tuple[AngularGrid, ...]
 
     def of(self, step: int, slot: int) -> Array:
         """Flux of the bins of a pixel in one of its steps, shape (bins,)."""
         first = self.start[step, slot]
-        return self.flux[first : first + angular.SEQUENCE[step].bins]
+        return self.flux[first : first + self.sequence[step].bins]
 
 
 def fill_bins(batches: Batches, lit: LitPixels, wanted: Array) -> Bins:
@@ -178,7 +191,7 @@ def fill_bins(batches: Batches, lit: LitPixels, wanted: Array) -> Bins:
         The rays.
     lit : LitPixels
         From the first pass; rays of other pixels are passed over.
-    wanted : array of bool, shape (len(SEQUENCE), n)
+    wanted : array of bool, shape (len(lit.sequence), n)
         The steps of each pixel.
 
     Raises
@@ -186,7 +199,7 @@ def fill_bins(batches: Batches, lit: LitPixels, wanted: Array) -> Bins:
     ArgumentError
         If the bins would not fit into memory.
     """
-    sizes = wanted * np.array([grid.bins for grid in angular.SEQUENCE])[:, None]
+    sizes = wanted * np.array([grid.bins for grid in lit.sequence])[:, None]
     total = int(sizes.sum())
     if total > MOST_BINS:
         raise ArgumentError(
@@ -200,9 +213,9 @@ def fill_bins(batches: Batches, lit: LitPixels, wanted: Array) -> Bins:
         for step in steps:
             first = np.where(slot < 0, -1, start[step, slot])
             used = first >= 0
-            index = first[used] + angular.bin_of(angular.SEQUENCE[step], ring[used], sector[used])
+            index = first[used] + angular.bin_of(lit.sequence[step], ring[used], sector[used])
             np.add.at(flux, index, batch.flux[used])
-    return Bins(start, flux)
+    return Bins(start, flux, lit.sequence)
 
 
 def patches_of(lit: LitPixels, bins: Bins, steps: Indices, flux_unit: FluxUnit, provenance: Provenance) -> Patches:
@@ -221,14 +234,13 @@ def patches_of(lit: LitPixels, bins: Bins, steps: Indices, flux_unit: FluxUnit, 
     provenance : Provenance
         Of the result.
     """
-    grids = [angular.SEQUENCE[step] for step in steps]
+    grids = [lit.sequence[step] for step in steps]
     start = np.concatenate([[0], np.cumsum([grid.shape[0] * grid.shape[1] for grid in grids])])
     values = np.zeros(start[-1])
     for slot, grid in enumerate(grids):  # one by one: the bins may be most of the memory there is
         table = angular.intensities(grid, bins.of(int(steps[slot]), slot))
         values[start[slot] : start[slot + 1]] = table.ravel()
     cells, surface = lit.cells, lit.surface
-    errors = angular.quadrature_errors(lit.rings)
     return Patches(
         shapes=tuple(pixels.SHAPE for pixels in surface.pixels),
         parts=tuple(pixels.part.name for pixels in surface.pixels),
@@ -238,7 +250,7 @@ def patches_of(lit: LitPixels, bins: Bins, steps: Indices, flux_unit: FluxUnit, 
         flux=lit.rings.sum(axis=1),
         theta_step=np.array([grid.theta_step for grid in grids]),
         phi_step=np.array([grid.phi_step for grid in grids]),
-        error=errors[np.arange(len(steps)), steps],
+        error=lit.errors[np.arange(len(steps)), steps],
         start=start,
         values=values,
         flux_unit=flux_unit,

@@ -16,7 +16,7 @@ from etendue.errors import ArgumentError
 from etendue.formats.patch_folder import write_patch_folder
 from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.fitting import Account, all_batches, fill_bins, lit_pixels, patches_of
-from etendue.lightfield.gridded.pixelated import PixelatedSurface
+from etendue.lightfield.gridded.pixelated import CentreOn, PixelatedSurface
 from etendue.lightfield.gridded.pixels import Array
 from etendue.lightfield.gridded.sampling import RECORD, sampled_records
 from etendue.lightfield.gridded.summing import summed_intensity
@@ -50,6 +50,8 @@ class GriddedSource:
         Δd [mm].
     threshold : float
         Of E [%].
+    centre_on : {"auto", "corner", "pixel"}
+        What of the squares lies at the origin of their lattice.
     stated_flux : float, optional
         Total flux [`flux_unit`] that overrides that of the rays on patches; see `emitting`.
 
@@ -77,6 +79,7 @@ class GriddedSource:
     account: Account
     pixel: float
     threshold: float
+    centre_on: CentreOn = "auto"
     stated_flux: float | None = None
 
     def __repr__(self) -> str:
@@ -93,12 +96,17 @@ class GriddedSource:
         threshold: float = 0.021,
         parallels: int | None = None,
         progress: Progress | None = None,
+        *,
+        centre_on: CentreOn = "auto",
+        coarsest_bins: tuple[int, int] = angular.COARSEST,
+        finest_bins: tuple[int, int] = angular.FINEST,
     ) -> GriddedSource:
         """Sample rays into surface sources.
 
         Every pixel of the surface gets the intensities of its own rays in angular bins, which are made finer, step by
-        step from Δθ = 30° and Δφ = 90° to 1° and 1°, until the flux that eq. 3.2 integrates from them agrees with that of
-        the rays. The rays are read twice, in batches; memory holds 1.4 kB for each lit pixel, and the bins.
+        step from Δθ = 30° and Δφ = 90° to 1° and 1° unless others are stated, until the flux that eq. 3.2 integrates from
+        them agrees with that of the rays. The rays are read twice, in batches; memory holds 1.4 kB for each lit pixel, and
+        the bins.
 
         Parameters
         ----------
@@ -114,6 +122,13 @@ class GriddedSource:
             N, that divide a hemisphere into (2N - 1)² cells. None: as many as give cells the area of Δd² most nearly.
         progress : callable, optional
             Called with the number of rays done, counted over both passes together.
+        centre_on : {"auto", "corner", "pixel"}
+            What of the squares on flat parts lies at the centre that the surface states, or at the origin of x and y where
+            it states none, so that no ray moves them: a corner, or the middle of a pixel. 23 × 23 mm are 576 squares of
+            1 mm about a corner, and 529 about a pixel. ``"auto"``: a pixel where it makes a whole number of squares fit,
+            as here, else a corner.
+        coarsest_bins, finest_bins : tuple of int
+            Δθ and Δφ of the first and of the last step, whole degrees that divide 90° and 360°.
 
         Returns
         -------
@@ -121,6 +136,8 @@ class GriddedSource:
 
         Raises
         ------
+        UnknownNameError
+            If `centre_on` is something else.
         ArgumentError
             If a number is out of its domain, the rays have no positions or no near field, none of them leaves the surface,
             or there are too many pixels or bins.
@@ -128,12 +145,13 @@ class GriddedSource:
         check_threshold(threshold)
         check_near_field(rays)
         batches = all_batches(rays, 2, progress)
-        lit = lit_pixels(batches, PixelatedSurface.cut(surface.sized_for(rays), pixel, parallels))
-        steps = angular.first_within(angular.quadrature_errors(lit.rings), threshold)
-        bins = fill_bins(batches, lit, steps == np.arange(len(angular.SEQUENCE))[:, None])
+        sequence = angular.sequence(coarsest_bins, finest_bins)
+        lit = lit_pixels(batches, pixels_for(rays, surface, pixel, parallels, centre_on), sequence)
+        steps = angular.first_within(lit.errors, threshold)
+        bins = fill_bins(batches, lit, steps == np.arange(len(sequence))[:, None])
         step = f"sampled on {lit.surface.surface.spec}, pixel {pixel:g} mm, threshold {threshold:g} %"
         patches = patches_of(lit, bins, steps, rays.flux_unit, rays.provenance.then(step))
-        return cls(lit.surface, patches, lit.account, float(pixel), float(threshold))
+        return cls(lit.surface, patches, lit.account, float(pixel), float(threshold), centre_on)
 
     @property
     def flux_unit(self) -> FluxUnit:
@@ -327,6 +345,7 @@ class GriddedSource:
         return {
             "surface": self.surface.surface.spec,
             "pixel": self.pixel,
+            "centre_on": self.centre_on,
             "parallels": self.surface.parallels,
             "threshold": self.threshold,
             "flux": self.total_flux,
@@ -357,6 +376,20 @@ class GriddedSource:
             If the folder cannot be written or holds something else, or the format does not know the unit of flux.
         """
         write_patch_folder(folder, self.patches, self.facts, format, scenes, self.factor)
+
+
+def pixels_for(
+    rays: RayStream, surface: Surface, pixel: float, parallels: int | None, centre_on: CentreOn = "auto"
+) -> PixelatedSurface:
+    """The pixels of a surface whose open dimensions are those of the rays: squares lie where no ray moves them.
+
+    Raises
+    ------
+    UnknownNameError, ArgumentError
+        As of `PixelatedSurface.cut`.
+    """
+    origin = (0.0, 0.0, 0.0) if getattr(surface, "centre", None) is None else None
+    return PixelatedSurface.cut(surface.sized_for(rays), pixel, parallels, centre_on=centre_on, origin=origin)
 
 
 def check_threshold(threshold: float) -> None:

@@ -6,13 +6,17 @@ import dataclasses
 import math
 import operator
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 
-from etendue.errors import ArgumentError
+from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.gridded.curved_pixels import CylindricalPixels, SphericalPixels
-from etendue.lightfield.gridded.pixels import Array, Cells, Indices, Pixelation, SquarePixels
+from etendue.lightfield.gridded.pixels import SLACK, Array, Cells, Indices, Pixelation, SquarePixels, flat_size
 from etendue.lightfield.surfaces import FLAT, Part, Surface
+
+CentreOn = Literal["auto", "corner", "pixel"]
+CENTRES: tuple[CentreOn, ...] = ("auto", "corner", "pixel")
 
 MOST_PIXELS = 1 << 26
 """Pixels of a surface, lit or not: a quarter of a gigabyte for their numbers."""
@@ -44,7 +48,15 @@ class PixelatedSurface:
     pixels: tuple[Pixelation, ...]
 
     @classmethod
-    def cut(cls, surface: Surface, pixel: float, parallels: int | None) -> PixelatedSurface:
+    def cut(
+        cls,
+        surface: Surface,
+        pixel: float,
+        parallels: int | None,
+        *,
+        centre_on: CentreOn = "auto",
+        origin: tuple[float, float, float] | None = None,
+    ) -> PixelatedSurface:
         """Cut every part.
 
         Parameters
@@ -56,14 +68,23 @@ class PixelatedSurface:
             allow.
         parallels : int, optional
             N, of each hemisphere. None: the number whose cells have the area nearest to Δd².
+        centre_on : {"auto", "corner", "pixel"}
+            What of the squares on flat parts lies at the origin of their lattice. ``"auto"``: along a side of a whole
+            number of squares what makes them fit, else a corner.
+        origin : tuple of float, optional
+            Any point above or below that origin [mm]; the centre of each part if None.
 
         Raises
         ------
+        UnknownNameError
+            If `centre_on` is something else.
         ArgumentError
             If a size is out of its domain, or there would be too many pixels.
         """
         if not (math.isfinite(pixel) and pixel > 0.0):
             raise ArgumentError(f"pixel is {pixel!r}; give the side of a pixel in mm, above 0.")
+        if centre_on not in CENTRES:
+            raise UnknownNameError("place of the lattice", centre_on, CENTRES)
         parts = surface.parts()
         if any(part.focus != FLAT or part.hole > 0.0 for part in parts):
             raise ArgumentError(
@@ -78,7 +99,7 @@ class PixelatedSurface:
         # Looked at first: of an absurdly small pixel not even the number can be counted.
         longest = max((max(p.size) for p in parts if parallels is None or p.shape != "hemisphere"), default=0.0)
         if longest / pixel < MOST_PIXELS:
-            pixels = tuple(_cut(part, pixel, parallels) for part in parts)
+            pixels = tuple(_cut(part, pixel, parallels, centre_on, origin) for part in parts)
             if sum(p.count for p in pixels) <= MOST_PIXELS:
                 return cls(surface, pixels)
         raise ArgumentError(
@@ -168,14 +189,31 @@ class PixelatedSurface:
         return result
 
 
-def _cut(part: Part, pixel: float, parallels: int | None) -> Pixelation:
+def _cut(
+    part: Part, pixel: float, parallels: int | None, centre_on: CentreOn, origin: tuple[float, float, float] | None
+) -> Pixelation:
     match part.shape:
         case "rectangle" | "disk":
-            return SquarePixels(part, pixel)
+            return SquarePixels(part, pixel, _corner(part, pixel, centre_on, origin))
         case "hemisphere":
             return SphericalPixels(part, _nearest_parallels(part.area, pixel) if parallels is None else parallels)
         case "tube":
             return CylindricalPixels(part, pixel)
+
+
+def _corner(
+    part: Part, pixel: float, centre_on: CentreOn, origin: tuple[float, float, float] | None
+) -> tuple[float, float]:
+    """A corner of the lattice in the axes of a flat part [mm]."""
+    at = np.zeros(2) if origin is None else np.array(part.axes)[:2] @ (np.array(origin) - part.centre)
+    if centre_on == "auto":
+        squares = np.array(flat_size(part)) / pixel
+        whole = np.abs(squares - np.round(squares)) <= SLACK * squares
+        about_pixel = whole & (np.round(squares) % 2 == 1) if origin is None else np.zeros(2, dtype=bool)
+    else:
+        about_pixel = np.full(2, centre_on == "pixel")
+    x, y = (at + np.where(about_pixel, 0.5 * pixel, 0.0)) % pixel
+    return float(x), float(y)
 
 
 def _nearest_parallels(area: float, pixel: float) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-import math
+import functools
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +19,10 @@ from etendue.lightfield.surfaces import Part
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
+
+SLACK = 1e-9
+"""Share of a square by which a part may exceed the lattice: sums and quotients of sizes in mm are off by less than 1e-12 of
+the number of squares, of which there are at most 1e4 or so along a side."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,9 +112,21 @@ class Pixelation(abc.ABC):
         return world
 
 
+def flat_size(part: Part) -> tuple[float, float]:
+    """Width and height of a rectangle or disk [mm].
+
+    Examples
+    --------
+    >>> from etendue.lightfield.surfaces import Disk
+    >>> flat_size(Disk(radius=2).parts()[0])
+    (4.0, 4.0)
+    """
+    return part.size if part.shape == "rectangle" else (2 * part.size[0], 2 * part.size[0])
+
+
 @dataclasses.dataclass(frozen=True)
 class SquarePixels(Pixelation):
-    """A flat part cut into squares, with a corner of the grid at its centre.
+    """A flat part cut into squares of one lattice.
 
     Squares that the edge of the part cuts stay whole, as in the thesis: the disk of section 3.3.3 touches 368 of them.
 
@@ -120,29 +136,37 @@ class SquarePixels(Pixelation):
         A rectangle or a disk.
     side : float
         Δd [mm].
+    corner : tuple of float
+        Where a corner of the lattice lies, x and y in the part's own axes [mm].
 
     Examples
     --------
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.surfaces import Disk, Plane
     >>> pixels = SquarePixels(Disk(radius=1.264).parts()[0], 0.125)
     >>> pixels.count, pixels.cells(np.array([0])).centre.round(4).tolist()
     (484, [[-1.3125, -1.3125, 0.0]])
+    >>> plane = Plane(z=0, width=23, height=23, centre=(0, 0)).parts()[0]
+    >>> SquarePixels(plane, 1.0).count, SquarePixels(plane, 1.0, (0.5, 0.5)).count
+    (576, 529)
     """
 
     SHAPE = "square"
     side: float
+    corner: tuple[float, float] = (0.0, 0.0)
 
-    @property
-    def half_counts(self) -> tuple[int, int]:
-        """Squares from the centre to the edge, along x and y."""
-        width, height = self.part.size if self.part.shape == "rectangle" else (2 * self.part.size[0],) * 2
-        return math.ceil(width / 2 / self.side), math.ceil(height / 2 / self.side)
+    @functools.cached_property
+    def lattice(self) -> tuple[Indices, Indices]:
+        """Number of the first square along x and y, counted from `corner`, and how many there are."""
+        half, corner = np.array(flat_size(self.part)) / 2, np.array(self.corner)
+        first = np.floor((-half - corner) / self.side + SLACK)
+        last = np.ceil((half - corner) / self.side - SLACK)
+        return first.astype(np.intp), np.maximum(last - first, 1).astype(np.intp)
 
     @property
     def count(self) -> int:
         """Pixels, lit or not."""
-        columns, rows = self.half_counts
-        return 4 * columns * rows
+        columns, rows = self.lattice[1]
+        return int(columns) * int(rows)
 
     def crossing(self, position: Array, direction: Array) -> tuple[Array, Bools]:
         """See `Pixelation`."""
@@ -162,14 +186,13 @@ class SquarePixels(Pixelation):
 
     def index(self, point: Array) -> Indices:
         """See `Pixelation`."""
-        columns, rows = self.half_counts
+        first, count = self.lattice
         with np.errstate(invalid="ignore"):
-            reached = np.isfinite(point).all(axis=1)
-            reached &= (np.abs(point[:, 0]) <= columns * self.side) & (np.abs(point[:, 1]) <= rows * self.side)
-        i, j = (np.floor(np.where(reached, point[:, k], 0.0) / self.side).astype(np.intp) for k in (0, 1))
+            steps = (point[:, :2] - self.corner) / self.side - first
+            reached = np.all((steps >= -SLACK) & (steps <= count + SLACK), axis=1)
         # The far edge of the last square belongs to it.
-        i, j = np.minimum(i + columns, 2 * columns - 1), np.minimum(j + rows, 2 * rows - 1)
-        return np.where(reached, i * (2 * rows) + j, -1)
+        i, j = np.clip(np.floor(np.where(reached[:, None], steps, 0.0)).astype(np.intp), 0, count - 1).T
+        return np.where(reached, i * count[1] + j, -1)
 
     def axes(self, pixel: Indices) -> Array:
         """See `Pixelation`."""
@@ -177,9 +200,7 @@ class SquarePixels(Pixelation):
 
     def cells(self, pixel: Indices) -> Cells:
         """See `Pixelation`."""
-        columns, rows = self.half_counts
-        i, j = np.divmod(pixel, 2 * rows)
-        middle = np.stack([i - columns + 0.5, j - rows + 0.5, np.zeros(len(pixel))], axis=1) * self.side
+        middle = self._points(pixel, np.full((len(pixel), 2), 0.5))
         corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * (self.side / 2)
         outlines = self.to_world(middle[:, None, :] + corners)
         area = np.full(len(pixel), self.side**2)
@@ -189,7 +210,11 @@ class SquarePixels(Pixelation):
     def on_pixels(self, pixel: Indices, direction: Array, normal: Array, rng: np.random.Generator) -> Array:
         """See `Pixelation`."""
         del direction, normal  # the cosine is the same all over a flat pixel
-        columns, rows = self.half_counts
-        i, j = np.divmod(pixel, 2 * rows)
-        u, v = rng.random((2, len(pixel)))
-        return self.to_world(np.stack([i - columns + u, j - rows + v, np.zeros(len(pixel))], axis=1) * self.side)
+        return self.to_world(self._points(pixel, rng.random((2, len(pixel))).T))
+
+    def _points(self, pixel: Indices, within: Array) -> Array:
+        """Points of squares, 0 to 1 along either side, in the part's own axes."""
+        first, count = self.lattice
+        number = np.stack(np.divmod(pixel, count[1]), axis=1)
+        flat = (first + number + within) * self.side + self.corner
+        return np.column_stack([flat, np.zeros(len(pixel))])
