@@ -10,15 +10,20 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from etendue.errors import ArgumentError, UnknownNameError
-from etendue.formats.intensity import INTENSITY_FORMATS
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.formats.intensity import INTENSITY_FORMATS, read_intensity
 from etendue.formats.output_folder import atomic_folder, check_output_folder
 from etendue.formats.scenes import SCENES
 from etendue.formats.strict_json import strict_json
-from etendue.quantities.patches import Patches
+from etendue.quantities.patches import AngularGrid, Patches
 
 MANIFEST = "manifest.json"
-KIND, VERSION = "etendue patches", 1
+KIND, VERSION = "etendue patches", 2
+
+REWRITE = "Write the folder again with `etendue patches`."
 
 PATCH_FORMATS = {"ies": "lm63", "ldt": "eulumdat"}
 """What the intensity files can be, by extension."""
@@ -105,6 +110,95 @@ def write_patch_folder(
         (temporary / MANIFEST).write_text(_manifest(head, rows), encoding="utf-8")
 
 
+@dataclasses.dataclass(frozen=True)
+class PatchFolder:
+    """What a folder of patches says.
+
+    Parameters
+    ----------
+    path : Path
+        Of the manifest.
+    facts : dict
+        Of the whole.
+    rows : tuple of dict
+        Of each patch.
+    tables : tuple of array, shape (rows, columns)
+        Intensities of each patch at the nodes of its grid [cd or W/sr].
+    """
+
+    path: Path
+    facts: dict[str, Any]
+    rows: tuple[dict[str, Any], ...]
+    tables: tuple[npt.NDArray[np.float64], ...]
+
+    def of(self, row: int | None, key: str, kind: type | tuple[type, ...]) -> Any:
+        """A value of the whole, or of a patch, that must be there and of a kind.
+
+        Raises
+        ------
+        FormatError
+            If it is not.
+        """
+        values = self.facts if row is None else self.rows[row]
+        place = key if row is None else f"patches[{row}].{key}"
+        if key not in values or not isinstance(values[key], kind) or isinstance(values[key], bool):
+            raise FormatError(self.path, place, f"{values.get(key, 'nothing')!r:.60}", REWRITE)
+        return values[key]
+
+
+def read_patch_folder(folder: str | os.PathLike[str]) -> PatchFolder:
+    """A folder that `write_patch_folder` wrote.
+
+    Raises
+    ------
+    FormatError
+        If the manifest or one of the files that it names is missing or damaged.
+    """
+    folder = Path(folder)
+    path = folder / MANIFEST
+    try:
+        found = strict_json(path.read_bytes())
+    except OSError as error:
+        raise FormatError(path, "file", error.strerror or str(error), REWRITE) from error
+    except (RecursionError, ValueError) as error:
+        raise FormatError(path, "text", str(error)[:80], REWRITE) from error
+    if not isinstance(found, dict) or found.get("kind") != KIND:
+        raise FormatError(path, "kind", f"no {KIND}", "Give a folder that `etendue patches` made.")
+    if found.get("version") != VERSION:
+        known = f"this program reads version {VERSION}"
+        raise FormatError(path, "version", f"{found.get('version')!r:.20}; {known}", REWRITE)
+    rows = found.pop("patches", None)
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) for row in rows):
+        raise FormatError(path, "patches", "no list of patches", REWRITE)
+    head = PatchFolder(path, found, tuple(rows), ())
+    return dataclasses.replace(head, tables=tuple(_table(head, i) for i in range(len(rows))))
+
+
+def _table(head: PatchFolder, i: int) -> npt.NDArray[np.float64]:
+    """The table of a patch, at the nodes of its grid."""
+    name = head.of(i, "file", str)
+    folder = head.path.parent
+    if not (folder / name).resolve().is_relative_to(folder.resolve()):
+        raise FormatError(head.path, f"patches[{i}].file", f"{name!r:.60} is outside of the folder", REWRITE)
+    steps = head.of(i, "theta_step", int), head.of(i, "phi_step", int)
+    if not all(step > 0 and whole % step == 0 for step, whole in zip(steps, (90, 360), strict=True)):
+        raise FormatError(head.path, f"patches[{i}]", f"steps of {steps[0]}° and {steps[1]}°", REWRITE)
+    grid = AngularGrid(*steps)
+    try:
+        table = read_intensity(folder / name)
+    except OSError as error:
+        raise FormatError(folder / name, "file", error.strerror or str(error), REWRITE) from error
+    values = np.asarray(table.values, dtype=np.float64).T
+    if values.shape == (grid.shape[0], grid.shape[1] + 1):  # C = 360° beside 0°
+        values = values[:, :-1]
+    rows = min(len(values), grid.shape[0])
+    fits = values.shape[1] == grid.shape[1] and np.allclose(table.gamma[:rows], grid.theta[:rows], atol=1e-6)
+    if not fits or rows < grid.shape[0]:
+        found = f"{len(table.c)} planes C and {len(table.gamma)} angles γ"
+        raise FormatError(folder / name, "angles", f"{found} instead of {grid.shape[1]} and {grid.shape[0]}", REWRITE)
+    return np.ascontiguousarray(values[:rows])
+
+
 def _manifest(head: Mapping[str, Any], rows: Iterable[Mapping[str, Any]]) -> str:
     """JSON with one line for each patch, for people who look into it."""
     text = json.dumps(head, ensure_ascii=False, indent=1, allow_nan=False).removesuffix("\n}")
@@ -121,6 +215,7 @@ def _rows(patches: Patches, format: str) -> Iterator[dict[str, Any]]:
             "file": f"lids/{i + 1:06d}.{format}",
             "part": patches.parts[patches.part[i]],
             "shape": patches.shape(i),
+            "pixel": int(patches.pixel[i]),
             "centre": patches.centre[i].tolist(),
             "x": x,
             "y": y,

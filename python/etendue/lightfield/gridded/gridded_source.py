@@ -18,6 +18,7 @@ from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.fitting import Account, all_batches, fill_bins, lit_pixels, patches_of
 from etendue.lightfield.gridded.pixelated import CentreOn, PixelatedSurface
 from etendue.lightfield.gridded.pixels import Array
+from etendue.lightfield.gridded.reading import read_gridded
 from etendue.lightfield.gridded.sampling import RECORD, sampled_records
 from etendue.lightfield.gridded.summing import summed_intensity
 from etendue.lightfield.pilot_sample import check_near_field
@@ -50,8 +51,6 @@ class GriddedSource:
         Δd [mm].
     threshold : float
         Of E [%].
-    centre_on : {"auto", "corner", "pixel"}
-        What of the squares lies at the origin of their lattice.
     stated_flux : float, optional
         Total flux [`flux_unit`] that overrides that of the rays on patches; see `emitting`.
 
@@ -79,7 +78,6 @@ class GriddedSource:
     account: Account
     pixel: float
     threshold: float
-    centre_on: CentreOn = "auto"
     stated_flux: float | None = None
 
     def __repr__(self) -> str:
@@ -151,7 +149,39 @@ class GriddedSource:
         bins = fill_bins(batches, lit, steps == np.arange(len(sequence))[:, None])
         step = f"sampled on {lit.surface.surface.spec}, pixel {pixel:g} mm, threshold {threshold:g} %"
         patches = patches_of(lit, bins, steps, rays.flux_unit, rays.provenance.then(step))
-        return cls(lit.surface, patches, lit.account, float(pixel), float(threshold), centre_on)
+        return cls(lit.surface, patches, lit.account, float(pixel), float(threshold))
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike[str]) -> GriddedSource:
+        """The source that `save_patches` wrote.
+
+        Parameters
+        ----------
+        folder : path
+            With a manifest and the intensity files that it names.
+
+        Returns
+        -------
+        GriddedSource
+            Tables have the digits of the intensity files. If a scene factor was stated, it is that of the manifest.
+
+        Raises
+        ------
+        FormatError
+            If the manifest or an intensity file is damaged, missing, or does not fit the others.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import etendue as et
+        >>> grid = GriddedSource.fit(et.RingSource(rays=20_000), et.Disk(radius=30), pixel=20, threshold=2.1)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     grid.save_patches(f"{folder}/patches")
+        ...     again = GriddedSource.load(f"{folder}/patches")
+        >>> len(again.patches) == len(grid.patches), round(again.total_flux, 6)
+        (True, 600.0)
+        """
+        return cls(**read_gridded(folder))
 
     @property
     def flux_unit(self) -> FluxUnit:
@@ -345,7 +375,8 @@ class GriddedSource:
         return {
             "surface": self.surface.surface.spec,
             "pixel": self.pixel,
-            "centre_on": self.centre_on,
+            "centre_on": self.surface.centre_on,
+            "origin": self.surface.origin,
             "parallels": self.surface.parallels,
             "threshold": self.threshold,
             "flux": self.total_flux,

@@ -32,6 +32,8 @@ class PixelatedSurface:
         Without open dimensions.
     pixels : tuple of Pixelation
         One for each part.
+    centre_on, origin
+        As of `cut`.
 
     Examples
     --------
@@ -46,6 +48,8 @@ class PixelatedSurface:
 
     surface: Surface
     pixels: tuple[Pixelation, ...]
+    centre_on: CentreOn = "auto"
+    origin: tuple[float, float, float] | None = None
 
     @classmethod
     def cut(
@@ -101,7 +105,7 @@ class PixelatedSurface:
         if longest / pixel < MOST_PIXELS:
             pixels = tuple(_cut(part, pixel, parallels, centre_on, origin) for part in parts)
             if sum(p.count for p in pixels) <= MOST_PIXELS:
-                return cls(surface, pixels)
+                return cls(surface, pixels, centre_on, origin)
         raise ArgumentError(
             f"more than {MOST_PIXELS:,} pixels on {surface.spec}; give a larger pixel than {pixel:g} mm."
         )
