@@ -41,7 +41,7 @@ def test_manifest_and_files_say_the_same(source: GriddedSource, tmp_path: Path, 
     source.save_patches(tmp_path / "p", format)
     manifest = json.loads((tmp_path / "p" / "manifest.json").read_text("utf-8"))
     rows, patches = manifest["patches"], source.patches
-    assert (manifest["kind"], manifest["version"], manifest["flux_unit"]) == ("etendue patches", 1, "lm")
+    assert (manifest["kind"], manifest["version"], manifest["flux_unit"]) == ("etendue patches", 2, "lm")
     assert (manifest["surface"], manifest["parallels"]) == ("dome:radius=1.264,z=0,window=0.7,centre=0/0", 4)
     assert manifest["flux"] == source.total_flux == pytest.approx(sum(row["flux"] for row in rows))
     assert manifest["account"]["rays"] == 20_000

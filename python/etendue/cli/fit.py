@@ -44,7 +44,7 @@ def fit(
         float | None,
         typer.Option(
             "--max-resolution",
-            help="Side of the finest cells over place [mm], for sets of very many rays; 1/512 of the surface if not given.",
+            help="Side of the finest cells over place in mm, for sets of very many rays; 1/512 of the surface if not given.",
             metavar="MM",
         ),
     ] = None,

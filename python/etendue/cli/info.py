@@ -1,4 +1,4 @@
-"""``etendue info``: what is in a ray or intensity file, and what is wrong with it; a light field; a trace; a map."""
+"""``etendue info``: what is in a ray, intensity, field, patch, trace or map file, and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from etendue.errors import ArgumentError, EtendueError
 from etendue.formats.intensity import detect_intensity_format, read_intensity
 from etendue.formats.maps import is_map_file, read_any_map
 from etendue.formats.maps.map_format import AnyMap
+from etendue.formats.patch_folder import is_patch_folder
 from etendue.formats.rays import detect_format, read_rays
+from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import is_field_file
 from etendue.quantities.illuminance_map import IlluminanceMap
@@ -30,14 +32,14 @@ from etendue.scene.step_files import StepBody
 from etendue.tracing.result import TraceResult
 from etendue.tracing.storage import is_result_file
 
-Found = dict[str, Any] | LightField | TraceResult | Intensity | AnyMap | list[StepBody]
+Found = dict[str, Any] | LightField | GriddedSource | TraceResult | Intensity | AnyMap | list[StepBody]
 
 
 def info(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Ray and intensity files of any format, light fields, results of traces, maps, STEP files."
+            help="Ray and intensity files of any format, light fields, patches, results of traces, maps, STEP files."
         ),
     ],
     photometry: Annotated[
@@ -65,6 +67,10 @@ def info(
             if isinstance(facts, LightField):
                 say(f"{file}: light field, {file.stat().st_size / 1000:,.1f} kB")
                 print_field(facts)
+            elif isinstance(facts, GriddedSource):
+                say(f"{file}: {len(facts.patches):,} patches on {facts.surface.surface.spec}")
+                for note in facts.notes:
+                    say(f"  {note}")
             elif isinstance(facts, Intensity):
                 say(f"{file}: intensity, {file.stat().st_size / 1000:,.1f} kB")
                 print_intensity(facts)
@@ -86,6 +92,8 @@ def info(
 
 
 def _opened(path: Path, photometry: str | None) -> Found:
+    if is_patch_folder(path):
+        return GriddedSource.load(path)
     if detect_intensity_format(path) is not None:
         return read_intensity(path, photometry)
     if photometry is not None:
@@ -103,6 +111,9 @@ def _opened(path: Path, photometry: str | None) -> Found:
 def _facts(path: Path, found: Found) -> dict[str, Any]:
     if isinstance(found, LightField):
         return {"file": path, "format": "light field", "bytes": path.stat().st_size} | describe_field(found)
+    if isinstance(found, GriddedSource):
+        size = {"patches": len(found.patches), "flux_unit": found.flux_unit}
+        return {"file": path, "format": "patches"} | size | found.facts
     if isinstance(found, Intensity):
         told = {"complaints": [complaint.to_dict() for complaint in found.complaints]}
         return {"file": path, "bytes": path.stat().st_size} | summary(found) | told

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,8 +20,10 @@ from etendue.formats.intensity import (
     write_intensity,
 )
 from etendue.formats.maps import PICTURE_EXTENSIONS
+from etendue.formats.patch_folder import is_patch_folder
 from etendue.formats.rays.refused import INTENSITY_FILE
 from etendue.goniophotometry.far_field import intensity_distribution
+from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
 from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
@@ -32,7 +35,10 @@ from etendue.quantities.spectrum import Spectrum
 
 def intensity(
     file: Annotated[
-        Path, typer.Argument(help="A ray file of any format, a light field, or an IES, EULUMDAT, TM-33 or GLDF file.")
+        Path,
+        typer.Argument(
+            help="A ray file of any format, a light field, patches, or an IES, EULUMDAT, TM-33 or GLDF file."
+        ),
     ],
     output: Annotated[
         list[Path] | None,
@@ -63,11 +69,15 @@ def intensity(
     kind: Annotated[str, typer.Option("--kind", help="Picture: polar or cartesian.")] = "polar",
     json: Json = False,
 ) -> None:
-    """Far-field intensity of rays, of a light field or of an intensity file: in figures, as a file, as a picture."""
+    """Far-field intensity of rays, a light field, patches or an intensity file: in figures, as a file, as a picture."""
     outputs = output or []
     one_of(kind, INTENSITY_KINDS, "--kind")
     check_outputs(outputs, (*INTENSITY_EXTENSIONS, *PICTURE_EXTENSIONS))
-    if detect_intensity_format(file) is None:
+    if is_patch_folder(file):
+        _refuse(file, "ray and intensity files", {"--photometry": photometry, "--flux": flux, "--unit": unit})
+        patches = GriddedSource.load(file)
+        result, complaints = patches.intensity(c_planes or 36, gamma_step or 2.5), list(patches.notes)
+    elif detect_intensity_format(file) is None:
         if photometry is not None:
             raise typer.BadParameter(f"--photometry: for intensity files, and {file} is none")
         check_steps(c_planes, gamma_step)
@@ -80,9 +90,7 @@ def intensity(
         complaints = complaints_of(source)
     else:
         given = {"--c-planes": c_planes, "--gamma-step": gamma_step, "--flux": flux, "--unit": unit}
-        needless = [option for option, value in given.items() if value is not None]
-        if needless:
-            raise typer.BadParameter(f"{', '.join(needless)}: for ray files and light fields, and {file} is neither")
+        _refuse(file, "ray files and light fields", given)
         result = read_intensity(file, photometry)
         complaints = [str(c) for c in result.complaints]
     shown = result.mirrored() if mirror else result
@@ -101,6 +109,13 @@ def intensity(
     print_intensity(shown)
     for path in outputs:
         say(f"  {path}")
+
+
+def _refuse(file: Path, kinds: str, given: Mapping[str, object]) -> None:
+    """Refuse options that belong to other kinds of files."""
+    needless = [option for option, value in given.items() if value is not None]
+    if needless:
+        raise typer.BadParameter(f"{', '.join(needless)}: for {kinds}, and {file} is neither")
 
 
 def _source(file: Path, flux: str | None, unit: str | None) -> RaySet | LightField:

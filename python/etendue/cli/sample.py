@@ -1,4 +1,4 @@
-"""``etendue sample``: as many rays as wanted from a light field."""
+"""``etendue sample``: as many rays as wanted from a light field, or from patches."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ import typer
 
 from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, progress_bar, say
 from etendue.errors import ArgumentError
+from etendue.formats.patch_folder import is_patch_folder
 from etendue.formats.rays import RAY_FORMATS, write_rays
+from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
+from etendue.quantities.ray_stream import RayStream
 
 
 def sample(
-    file: Annotated[Path, typer.Argument(help="A light field written by étendue.")],
+    file: Annotated[Path, typer.Argument(help="A light field or a folder of patches written by étendue.")],
     rays: Annotated[
         int, typer.Option("-n", "--rays", help="Number of rays, e.g. 1e8.", parser=count(), metavar="NUMBER")
     ],
@@ -25,15 +28,21 @@ def sample(
     seed: Annotated[int, typer.Option("--seed", help="Decides which rays are drawn.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Draw rays of equal flux from a light field, exactly as it is read out; they stream to disk."""
+    """Draw rays of equal flux from a light field or from patches, exactly as these are read out; they stream to disk."""
     if format is not None:
         one_of(format, [f.name for f in RAY_FORMATS], "--format")
     for path in output:
         check_folder(path)
         if format is None:
             _check_extension(path)
-    field = LightField.load(file)
-    stream = field.rays(rays, seed)
+    source: LightField | GriddedSource
+    stream: RayStream
+    if is_patch_folder(file):
+        source = GriddedSource.load(file)
+        stream = source.sample(rays, seed)
+    else:
+        source = LightField.load(file)
+        stream = source.rays(rays, seed)
     losses: list[str] = []
     for path in output:
         with progress_bar(path.name, rays) as progress:
@@ -42,10 +51,10 @@ def sample(
     if json:
         facts = {"file": file, "outputs": output, "rays": rays, "seed": seed}
         print_json(
-            facts | {"total_flux": stream.total_flux, "flux_unit": stream.flux_unit, "notes": [*field.notes, *losses]}
+            facts | {"total_flux": stream.total_flux, "flux_unit": stream.flux_unit, "notes": [*source.notes, *losses]}
         )
         return
-    for note in (*field.notes, *losses):
+    for note in (*source.notes, *losses):
         complain(f"note: {note}")
     for path in output:
         say(f"{path}: {rays:,} rays, {stream.total_flux:.7g} {stream.flux_unit}")

@@ -188,6 +188,8 @@ def _table(head: PatchFolder, i: int) -> npt.NDArray[np.float64]:
         table = read_intensity(folder / name)
     except OSError as error:
         raise FormatError(folder / name, "file", error.strerror or str(error), REWRITE) from error
+    except ArgumentError as error:  # a folder, or a pipe
+        raise FormatError(folder / name, "file", str(error), REWRITE) from error
     values = np.asarray(table.values, dtype=np.float64).T
     if values.shape == (grid.shape[0], grid.shape[1] + 1):  # C = 360° beside 0°
         values = values[:, :-1]

@@ -163,7 +163,7 @@ class GriddedSource:
         Returns
         -------
         GriddedSource
-            Tables have the digits of the intensity files. If a scene factor was stated, it is that of the manifest.
+            Tables have the digits of the intensity files; flux and factor are those of the manifest.
 
         Raises
         ------
@@ -418,6 +418,12 @@ def pixels_for(
     ------
     UnknownNameError, ArgumentError
         As of `PixelatedSurface.cut`.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> pixels_for(et.RingSource(rays=5000), et.Plane(z=0), 5.0, None).count       # the rings are 60 mm wide
+    144
     """
     origin = (0.0, 0.0, 0.0) if getattr(surface, "centre", None) is None else None
     return PixelatedSurface.cut(surface.sized_for(rays), pixel, parallels, centre_on=centre_on, origin=origin)
