@@ -27,6 +27,17 @@ def read_gridded(folder: str | os.PathLike[str]) -> dict[str, Any]:
     ------
     FormatError
         As of `GriddedSource.load`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import etendue as et
+    >>> from pathlib import Path
+    >>> source = et.GriddedSource.fit(et.RingSource(rays=5000), et.Plane(z=0), 20.0, 2.1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     source.save_patches(Path(folder) / "rings")
+    ...     len(read_gridded(Path(folder) / "rings")["patches"]) == len(source.patches)
+    True
     """
     found = read_patch_folder(folder)
     pixel, threshold = (float(found.of(None, key, (int, float))) for key in ("pixel", "threshold"))
