@@ -35,6 +35,7 @@ __all__ = [
     "look_at_events",
     "look_at_scene",
     "losses",
+    "polya_average",
     "polya_evidence",
     "polya_posterior",
     "rays_of_part",
@@ -393,6 +394,20 @@ def polya_posterior(
 
     `weight_squared` None: `weight` counts points. `base` None: uniform; an array: the mass of each cell; a sequence of
     (axes, masses): the product of factors over successive axes.
+    """
+
+def polya_average(
+    depths: Sequence[int],
+    weight: _Floats,
+    weight_squared: _Floats | None,
+    base: Sequence[tuple[int, _Floats]] | None,
+    concentration: float,
+    positions: Sequence[Sequence[int]],
+    threads: int | None = None,
+) -> tuple[_Floats, _Floats, list[float]]:
+    """Averages over trees whose cells are moved cyclically by so many steps along each axis: as `polya_posterior`.
+
+    Means of the mean and of the mean square over the trees, their cells moved back, and ln evidence of each tree.
     """
 
 def polya_evidence(

@@ -1,6 +1,6 @@
 //! The optional Pólya tree.
 
-use etendue_lightfield::polya::{Base, Data, Grid, log_evidence, posterior};
+use etendue_lightfield::polya::{Base, Data, Grid, average, log_evidence, posterior};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -9,12 +9,26 @@ use crate::run::stoppable;
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 type Moments<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64);
+type Averages<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Vec<f64>);
 
 /// A base measure as Python hands it over: the mass of each cell, or the factors of a product, each with its number of axes.
 #[derive(FromPyObject)]
 pub enum Masses<'py> {
     Cells(Floats<'py>),
     Factors(Vec<(usize, Floats<'py>)>),
+}
+
+impl Masses<'_> {
+    /// The factors of a product; none of a table of cells.
+    fn factors(&self) -> PyResult<Vec<(usize, &[f64])>> {
+        match self {
+            Self::Cells(_) => Ok(Vec::new()),
+            Self::Factors(factors) => factors
+                .iter()
+                .map(|(axes, mass)| Ok((*axes, mass.as_slice()?)))
+                .collect(),
+        }
+    }
 }
 
 struct Problem {
@@ -28,10 +42,7 @@ impl Problem {
         let factors = match masses {
             None => Vec::new(),
             Some(Masses::Cells(mass)) => vec![(depths.len(), mass.as_slice()?)],
-            Some(Masses::Factors(factors)) => factors
-                .iter()
-                .map(|(axes, mass)| Ok((*axes, mass.as_slice()?)))
-                .collect::<PyResult<Vec<_>>>()?,
+            Some(product) => product.factors()?,
         };
         let base = if factors.is_empty() {
             Base::uniform()
@@ -74,6 +85,45 @@ pub fn polya_posterior<'py>(
             stop: Some(stop),
         };
         posterior(&grid, &data, concentration, threads.unwrap_or(0))
+    })?;
+    Ok((
+        PyArray1::from_vec(py, result.ratio),
+        PyArray1::from_vec(py, result.ratio_squared),
+        result.log_evidence,
+    ))
+}
+
+/// Averages of trees whose cells are moved cyclically by some steps along each axis: mean of mass over base mass per cell, mean of
+/// its square, and ln evidence of each tree.
+#[pyfunction]
+#[pyo3(signature = (depths, weight, weight_squared, base, concentration, positions, threads=None))]
+#[allow(clippy::too_many_arguments, reason = "one per name in Python")]
+pub fn polya_average<'py>(
+    py: Python<'py>,
+    depths: Vec<u32>,
+    weight: Floats<'py>,
+    weight_squared: Option<Floats<'py>>,
+    base: Option<Vec<(usize, Floats<'py>)>>,
+    concentration: f64,
+    positions: Vec<Vec<usize>>,
+    threads: Option<usize>,
+) -> PyResult<Averages<'py>> {
+    let weight = weight.as_slice()?;
+    let squared = weight_squared.as_ref().map(PyReadonlyArray1::as_slice).transpose()?;
+    let base = base.map(Masses::Factors);
+    let Problem { grid, base: own } = Problem::new(depths, weight, squared, base.as_ref())?;
+    if positions.is_empty() || positions.iter().any(|p| p.len() != grid.depths().len()) {
+        return Err(PyValueError::new_err("give positions with one number of steps per axis"));
+    }
+    let factors = base.as_ref().map(Masses::factors).transpose()?.unwrap_or_default();
+    let result = stoppable(py, |stop| {
+        let data = Data {
+            weight,
+            squared,
+            base: &own,
+            stop: Some(stop),
+        };
+        average(&grid, &data, &factors, concentration, &positions, threads.unwrap_or(0))
     })?;
     Ok((
         PyArray1::from_vec(py, result.ratio),

@@ -128,14 +128,18 @@ def grow_averaged(
     A dyadic grid knows edges best where its own coarse boxes end. Averaging takes that preference away, and what the
     trees differ by shows in the deviation. The evidence is that of the mixture of the trees, each with the same share.
     """
-    mean, square = np.zeros(counts.weight.shape), np.zeros(counts.weight.shape)
-    evidence = []
-    for position in positions:
-        shift = tuple(round(share * n) for share, n in zip(position, counts.weight.shape, strict=True))
-        tree = grow_moved(counts, base, shift, concentration, threads)
-        evidence.append(tree.log_evidence)
-        mean += tree.ratio / len(positions)
-        square += (tree.deviation**2 + tree.ratio**2) / len(positions)
+    shape = counts.weight.shape
+    shifts = [tuple(round(share * n) for share, n in zip(position, shape, strict=True)) for position in positions]
+    if sum(_depths(counts)) <= TILE_BITS:
+        mean, square, evidence = _core.polya_average(*_problem(counts, base), concentration, shifts, threads)
+        mean, square = mean.reshape(shape), square.reshape(shape)
+    else:
+        mean, square, evidence = np.zeros(shape), np.zeros(shape), []
+        for shift in shifts:
+            tree = grow_moved(counts, base, shift, concentration, threads)
+            evidence.append(tree.log_evidence)
+            mean += tree.ratio / len(shifts)
+            square += (tree.deviation**2 + tree.ratio**2) / len(shifts)
     highest = max(evidence)
     mixed = highest + math.log(sum(math.exp(e - highest) for e in evidence) / len(evidence))
     return Tree(mean, np.sqrt(np.maximum(square - mean**2, 0.0)), mixed)

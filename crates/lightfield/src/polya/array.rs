@@ -1,5 +1,5 @@
-//! Arrays of many megabytes that are filled once and dropped: in large pages where the system has them, as half of a
-//! tree's time on two threads would otherwise go into fetching small ones.
+//! Arrays of many megabytes that are filled once and dropped: in large pages where the system has them, and used again by the
+//! next array, as half of a tree's time on two threads would otherwise go into fetching and clearing pages.
 
 use std::ops::{Deref, DerefMut};
 
@@ -8,6 +8,41 @@ use memmap2::MmapMut;
 
 /// Bytes from which large pages are asked for: some of those that most systems have.
 const LARGE: usize = 1 << 22;
+
+/// Memory of arrays that are no longer needed, for those to come.
+#[derive(Default)]
+pub(super) struct Workspace {
+    spare: Vec<MmapMut>,
+}
+
+impl Workspace {
+    /// An array of so many numbers that are yet to be written: they may be anything.
+    pub fn array<T: Pod>(&mut self, len: usize) -> Array<T> {
+        let bytes = len * size_of::<T>();
+        if bytes >= LARGE {
+            let fitting = (0..self.spare.len()).filter(|i| self.spare[*i].len() >= bytes);
+            if let Some(index) = fitting.min_by_key(|i| self.spare[*i].len()) {
+                let memory = Memory::Pages(self.spare.swap_remove(index));
+                return Array { memory, len };
+            }
+        }
+        Array::zeros(len)
+    }
+
+    /// An array with these numbers.
+    pub fn copy<T: Pod>(&mut self, values: &[T]) -> Array<T> {
+        let mut array = self.array(values.len());
+        array.copy_from_slice(values);
+        array
+    }
+
+    /// Takes an array that is no longer needed.
+    pub fn keep<T>(&mut self, array: Array<T>) {
+        if let Memory::Pages(map) = array.memory {
+            self.spare.push(map);
+        }
+    }
+}
 
 /// An array of zeros to begin with.
 pub(super) struct Array<T> {
@@ -25,13 +60,6 @@ impl<T: Pod> Array<T> {
     pub fn zeros(len: usize) -> Self {
         let memory = pages(len * size_of::<T>()).map_or_else(|| Memory::Heap(vec![T::zeroed(); len]), Memory::Pages);
         Self { memory, len }
-    }
-
-    /// A copy.
-    pub fn copy(values: &[T]) -> Self {
-        let mut array = Self::zeros(values.len());
-        array.copy_from_slice(values);
-        array
     }
 }
 
@@ -83,7 +111,17 @@ mod tests {
             let mut array = Array::<f64>::zeros(len);
             assert!(array.len() == len && array.iter().all(|v| *v == 0.0));
             array.iter_mut().for_each(|v| *v = 1.5);
-            assert!(*Array::copy(&array) == *array);
+            assert!(*Workspace::default().copy(&array) == *array);
         }
+    }
+
+    #[test]
+    fn memory_is_used_again() {
+        let mut workspace = Workspace::default();
+        let first = workspace.array::<f64>(LARGE);
+        let place = first.as_ptr().cast::<u8>();
+        workspace.keep(first);
+        assert!(workspace.array::<f32>(LARGE / 2).as_ptr().cast() == place && workspace.spare.is_empty());
+        assert!(workspace.array::<f32>(LARGE).len() == LARGE);
     }
 }

@@ -143,9 +143,11 @@ impl Factor {
             out.copy_from_slice(&table[start..start + n]);
         } else if n >> low_bits == 0 {
             out.fill(table[(first >> low_bits) & mask]);
+        } else if low_bits == 0 {
+            out.chunks_exact_mut(own.boxes).for_each(|o| o.copy_from_slice(table));
         } else {
-            for (i, o) in out.iter_mut().enumerate() {
-                *o = table[((first + i) >> low_bits) & mask];
+            for (i, run) in out.chunks_exact_mut(1 << low_bits).enumerate() {
+                run.fill(table[((first >> low_bits) + i) & mask]);
             }
         }
     }
@@ -162,10 +164,10 @@ fn shares(grid: &Grid, mass: &[f64]) -> Table {
         let mut total = Vec::new();
         for step in &level.splits {
             let (mut lower, mut upper) = (vec![0.0; level.boxes], vec![0.0; level.boxes]);
-            step.halves(&masses[step.level], 0, &mut lower, &mut upper);
+            let (lower, upper) = step.halves(&masses[step.level], 0, &mut lower, &mut upper);
             let share = |(l, u): (&f64, &f64)| if l + u > 0.0 { l / (l + u) } else { 0.5 };
-            shares[id].push(lower.iter().zip(&upper).map(share).collect::<Vec<f64>>());
-            total = lower.iter().zip(&upper).map(|(l, u)| l + u).collect();
+            shares[id].push(lower.iter().zip(upper).map(share).collect::<Vec<f64>>());
+            total = lower.iter().zip(upper).map(|(l, u)| l + u).collect();
         }
         masses[id] = total;
     }

@@ -141,63 +141,70 @@ impl Level {
 }
 
 impl Step {
-    /// Copies the lower and upper halves of boxes `first..first + n` out of the finer level's array.
+    /// The lower and upper halves of boxes `first..first + n` in the finer level's array: where they lie, or gathered into the
+    /// buffers, which are n long.
     ///
     /// `first` must be a multiple of n, and n a power of two.
     #[inline(always)]
-    pub fn halves<T: Copy>(self, finer: &[T], first: usize, lower: &mut [T], upper: &mut [T]) {
+    pub fn halves<'a, T: Copy>(
+        self,
+        finer: &'a [T],
+        first: usize,
+        lower: &'a mut [T],
+        upper: &'a mut [T],
+    ) -> (&'a [T], &'a [T]) {
         let n = lower.len();
         let block = self.block;
         if block >= n {
             let start = 2 * (first & !(block - 1)) + (first & (block - 1));
-            lower.copy_from_slice(&finer[start..start + n]);
-            upper.copy_from_slice(&finer[start + block..start + block + n]);
-        } else if block == 1 {
-            for ((pair, l), u) in finer[2 * first..2 * (first + n)].chunks_exact(2).zip(lower).zip(upper) {
-                (*l, *u) = (pair[0], pair[1]);
-            }
-        } else {
-            let pairs = finer[2 * first..2 * (first + n)].chunks_exact(2 * block);
-            for ((pair, l), u) in pairs
-                .zip(lower.chunks_exact_mut(block))
-                .zip(upper.chunks_exact_mut(block))
-            {
-                l.copy_from_slice(&pair[..block]);
-                u.copy_from_slice(&pair[block..]);
+            return (&finer[start..start + n], &finer[start + block..start + block + n]);
+        }
+        let pairs = &finer[2 * first..2 * (first + n)];
+        match block {
+            1 => part::<1, T>(pairs, lower, upper),
+            2 => part::<2, T>(pairs, lower, upper),
+            4 => part::<4, T>(pairs, lower, upper),
+            8 => part::<8, T>(pairs, lower, upper),
+            16 => part::<16, T>(pairs, lower, upper),
+            _ => {
+                let places = lower.chunks_exact_mut(block).zip(upper.chunks_exact_mut(block));
+                for (pair, (l, u)) in pairs.chunks_exact(2 * block).zip(places) {
+                    l.copy_from_slice(&pair[..block]);
+                    u.copy_from_slice(&pair[block..]);
+                }
             }
         }
+        (lower, upper)
     }
 
-    /// Copies, for boxes `first..first + n`, the entries of the boxes they are halves of, out of the coarser level's array.
+    /// For boxes `first..first + n`, the entries of the boxes they are halves of, in the coarser level's array: where they lie,
+    /// or gathered into the buffer, which is n long.
     #[inline(always)]
-    pub fn wholes<T: Copy>(self, coarser: &[T], first: usize, out: &mut [T]) {
-        let n = out.len();
+    pub fn wholes<'a, T: Copy>(self, coarser: &'a [T], first: usize, buffer: &'a mut [T]) -> &'a [T] {
+        let n = buffer.len();
         let block = self.block;
         if block >= n {
             let start = ((first & !(2 * block - 1)) >> 1) + (first & (block - 1));
-            out.copy_from_slice(&coarser[start..start + n]);
-        } else {
-            let wholes = coarser[first / 2..usize::midpoint(first, n)].chunks_exact(block);
-            for (whole, pair) in wholes.zip(out.chunks_exact_mut(2 * block)) {
-                pair[..block].copy_from_slice(whole);
-                pair[block..].copy_from_slice(whole);
-            }
+            return &coarser[start..start + n];
         }
+        self.double(&coarser[first / 2..usize::midpoint(first, n)], buffer);
+        buffer
     }
 
-    /// Copies, for boxes `first..first + n`, the entries of the other halves.
+    /// Entries of the wholes of 2 n boxes, each given to both halves; n must be more than a block.
     #[inline(always)]
-    pub fn siblings<T: Copy>(self, same: &[T], first: usize, out: &mut [T]) {
-        let n = out.len();
-        let block = self.block;
-        if block >= n {
-            let start = first ^ block;
-            out.copy_from_slice(&same[start..start + n]);
-        } else {
-            let pairs = same[first..first + n].chunks_exact(2 * block);
-            for (pair, o) in pairs.zip(out.chunks_exact_mut(2 * block)) {
-                o[..block].copy_from_slice(&pair[block..]);
-                o[block..].copy_from_slice(&pair[..block]);
+    pub fn double<T: Copy>(self, wholes: &[T], halves: &mut [T]) {
+        match self.block {
+            1 => doubled::<1, T>(wholes, halves),
+            2 => doubled::<2, T>(wholes, halves),
+            4 => doubled::<4, T>(wholes, halves),
+            8 => doubled::<8, T>(wholes, halves),
+            16 => doubled::<16, T>(wholes, halves),
+            block => {
+                for (whole, pair) in wholes.chunks_exact(block).zip(halves.chunks_exact_mut(2 * block)) {
+                    pair[..block].copy_from_slice(whole);
+                    pair[block..].copy_from_slice(whole);
+                }
             }
         }
     }
@@ -209,6 +216,28 @@ impl Step {
         for start in (0..n).step_by(run) {
             visit(start..start + run, (first + start) & self.block != 0);
         }
+    }
+}
+
+/// Blocks of B entries dealt out in turn. Of known length, they are moved in registers, not by calls.
+#[inline(always)]
+fn part<const B: usize, T: Copy>(pairs: &[T], lower: &mut [T], upper: &mut [T]) {
+    let (pairs, _) = pairs.as_chunks::<B>();
+    let (lower, _) = lower.as_chunks_mut::<B>();
+    let (upper, _) = upper.as_chunks_mut::<B>();
+    for (pair, (l, u)) in pairs.chunks_exact(2).zip(lower.iter_mut().zip(upper)) {
+        (*l, *u) = (pair[0], pair[1]);
+    }
+}
+
+/// Each block of B entries twice.
+#[inline(always)]
+fn doubled<const B: usize, T: Copy>(wholes: &[T], halves: &mut [T]) {
+    let (wholes, _) = wholes.as_chunks::<B>();
+    let (halves, _) = halves.as_chunks_mut::<B>();
+    for (whole, pair) in wholes.iter().zip(halves.chunks_exact_mut(2)) {
+        pair[0] = *whole;
+        pair[1] = *whole;
     }
 }
 
@@ -224,15 +253,15 @@ mod tests {
     }
 
     #[test]
-    fn halves_wholes_and_siblings_agree_with_index_arithmetic() {
-        let grid = Grid::new(vec![3, 2, 4]).expect("small");
+    fn halves_and_wholes_agree_with_index_arithmetic() {
+        let grid = Grid::new(vec![3, 2, 5]).expect("small");
         for level in grid.levels() {
             for step in &level.splits {
                 let finer: Vec<usize> = (0..2 * level.boxes).collect();
                 for n in (0..).map(|k| 1 << k).take_while(|n| *n <= level.boxes) {
                     for first in (0..level.boxes).step_by(n) {
                         let (mut lower, mut upper) = (vec![0; n], vec![0; n]);
-                        step.halves(&finer, first, &mut lower, &mut upper);
+                        let (lower, upper) = step.halves(&finer, first, &mut lower, &mut upper);
                         for i in 0..n {
                             let (high, low) = ((first + i) / step.block, (first + i) % step.block);
                             assert_eq!(lower[i], 2 * high * step.block + low);
@@ -245,15 +274,13 @@ mod tests {
                 let coarser: Vec<usize> = (0..level.boxes).collect();
                 for n in (1..).map(|k| 1 << k).take_while(|n| *n <= 2 * level.boxes) {
                     for first in (0..2 * level.boxes).step_by(n) {
-                        let (mut wholes, mut siblings) = (vec![0; n], vec![0; n]);
-                        back.wholes(&coarser, first, &mut wholes);
-                        back.siblings(&finer, first, &mut siblings);
+                        let mut wholes = vec![0; n];
+                        let wholes = back.wholes(&coarser, first, &mut wholes);
                         let mut upper = vec![false; n];
                         back.sides(first, n, |run, side| upper[run].fill(side));
                         for i in 0..n {
                             let (high, low) = ((first + i) / (2 * back.block), (first + i) % back.block);
                             assert_eq!(wholes[i], high * back.block + low);
-                            assert_eq!(siblings[i], (first + i) ^ back.block);
                             assert_eq!(upper[i], (first + i) & back.block != 0);
                         }
                     }

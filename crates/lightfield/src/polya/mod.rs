@@ -6,9 +6,10 @@
 //! with its posterior probability, and no bin width is ever chosen. `[WongMa2010]`, `[Hutter2005]`; theory eqs. 29 to 32.
 //!
 //! `grid`: the lattice of boxes. `base`: what the tree falls back on. `kernel`: the arithmetic. `data`: what it is fitted to. `tree`: the sweeps. `posterior`: what comes out.
-//! `array`: their memory.
+//! `average`: of trees on a grid that is moved. `array`: their memory.
 
 mod array;
+mod average;
 mod base;
 mod data;
 mod grid;
@@ -16,6 +17,7 @@ mod kernel;
 mod posterior;
 mod tree;
 
+pub use average::{Average, average};
 pub use base::Base;
 pub use data::Data;
 pub use grid::Grid;

@@ -1,7 +1,9 @@
 //! The posterior of the tree, and its evidence.
 
 use etendue_sampling::ordered;
+use rayon::ThreadPool;
 
+use super::array::{Array, Workspace};
 use super::data::Data;
 use super::grid::Grid;
 use super::tree::{ascend, descend};
@@ -26,16 +28,30 @@ pub struct Posterior {
 #[must_use]
 pub fn posterior(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> Posterior {
     assert!(data.fits(grid), "one entry per cell");
+    ordered::beside(threads, |pool| {
+        let ([ratio, ratio_squared], log_evidence) = grown(grid, data, c, pool, &mut Workspace::default());
+        Posterior {
+            ratio: ratio.to_vec(),
+            ratio_squared: ratio_squared.to_vec(),
+            log_evidence,
+        }
+    })
+}
+
+/// Both moments of the ratio, and the evidence.
+pub(super) fn grown(
+    grid: &Grid,
+    data: &Data<'_>,
+    c: f64,
+    pool: Option<&ThreadPool>,
+    workspace: &mut Workspace,
+) -> ([Array<f64>; 2], f64) {
     let data = &data.simplified();
-    let ((ratio, ratio_squared), log_evidence) = ordered::beside(threads, |pool| {
-        let evidence = ascend(grid, data, c, true, pool);
-        (descend(grid, data, c, &evidence, pool), evidence.log_root)
-    });
-    Posterior {
-        ratio,
-        ratio_squared,
-        log_evidence,
-    }
+    let evidence = ascend(grid, data, c, true, pool, workspace);
+    let moments = descend(grid, data, c, &evidence, pool, workspace);
+    let log_root = evidence.log_root;
+    evidence.give(workspace);
+    (moments, log_root)
 }
 
 /// The evidence alone, which costs less than half.
@@ -46,7 +62,9 @@ pub fn posterior(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> Poster
 pub fn log_evidence(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> f64 {
     assert!(data.fits(grid), "one entry per cell");
     let data = &data.simplified();
-    ordered::beside(threads, |pool| ascend(grid, data, c, false, pool).log_root)
+    ordered::beside(threads, |pool| {
+        ascend(grid, data, c, false, pool, &mut Workspace::default()).log_root
+    })
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::array::Array;
+use super::array::{Array, Workspace};
 use super::base::{SplitTerms, Splits};
 use super::data::{CHUNK, Data};
 use super::grid::{Grid, Level};
@@ -23,6 +23,14 @@ pub(super) struct Evidence {
     pub log_root: f64,
 }
 
+impl Evidence {
+    /// Gives its memory back.
+    pub fn give(self, workspace: &mut Workspace) {
+        self.weight.into_iter().chain(self.effective).for_each(|a| workspace.keep(a));
+        self.splits.into_iter().for_each(|a| workspace.keep(a));
+    }
+}
+
 /// One chunk of a level's arrays to be filled.
 struct UpTask<'a> {
     level: &'a Level,
@@ -33,29 +41,69 @@ struct UpTask<'a> {
     splits: Vec<&'a mut [f32]>,
 }
 
+/// Room for the numbers of a chunk.
+type Row = [f64; CHUNK];
+
+/// What the work on a chunk needs room for; made once per thread, as clearing it takes time.
+struct Scratch {
+    rows: [Row; 12],
+    /// As many rows as there are axes, one after the other.
+    terms: Vec<f64>,
+    split: [f32; CHUNK],
+}
+
+impl Scratch {
+    fn new(axes: usize) -> Self {
+        Self {
+            rows: [[0.0; CHUNK]; 12],
+            terms: vec![0.0; axes * CHUNK],
+            split: [0.0; CHUNK],
+        }
+    }
+}
+
 /// Runs tasks until it is stopped, side by side if that is worth it: in the pool, or on the caller's thread.
-fn each<T: Send>(pool: Option<&ThreadPool>, stop: Option<&AtomicBool>, tasks: Vec<T>, work: impl Fn(T) + Sync + Send) {
-    let work = |task| {
+fn each<T: Send>(
+    pool: Option<&ThreadPool>,
+    stop: Option<&AtomicBool>,
+    axes: usize,
+    tasks: Vec<T>,
+    work: impl Fn(&mut Scratch, T) + Sync + Send,
+) {
+    let work = |scratch: &mut Scratch, task| {
         if !stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
-            work(task);
+            work(scratch, task);
         }
     };
     match pool {
-        Some(pool) if tasks.len() > 8 => pool.install(|| tasks.into_par_iter().for_each(work)),
-        _ => tasks.into_iter().for_each(work),
+        Some(pool) if tasks.len() > 8 => {
+            pool.install(|| tasks.into_par_iter().for_each_init(|| Scratch::new(axes), work));
+        }
+        _ => {
+            let mut scratch = Scratch::new(axes);
+            tasks.into_iter().for_each(|task| work(&mut scratch, task));
+        }
     }
 }
 
 /// From the cells to the root: sums, evidence and, if `keep`, the probabilities of the splits.
-pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, pool: Option<&ThreadPool>) -> Evidence {
+pub(super) fn ascend(
+    grid: &Grid,
+    data: &Data<'_>,
+    c: f64,
+    keep: bool,
+    pool: Option<&ThreadPool>,
+    workspace: &mut Workspace,
+) -> Evidence {
     let (levels, layers) = (grid.levels(), grid.layers());
     let none = || layers.iter().map(|_| Array::default()).collect::<Vec<_>>();
     let (mut weight, mut squared, mut log_r, mut effective) = (none(), none(), none(), none());
     let mut splits: Vec<_> = layers.iter().map(|_| Array::default()).collect();
     let last = layers.len() - 1;
-    weight[last] = Array::copy(data.weight);
-    squared[last] = data.squared.map(Array::copy).unwrap_or_default();
-    log_r[last] = Array::zeros(grid.cells());
+    weight[last] = workspace.copy(data.weight);
+    squared[last] = data.squared.map(|w2| workspace.copy(w2)).unwrap_or_default();
+    log_r[last] = workspace.array(grid.cells());
+    log_r[last].fill(0.0);
     if data.has_equal_halves() {
         add_log_gamma(c, data.weight, &mut log_r[last]);
     }
@@ -66,10 +114,10 @@ pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, pool: Opt
             .iter()
             .map(|id| levels[*id].boxes * levels[*id].splits.len())
             .sum();
-        let mut w = Array::zeros(boxes);
-        let mut w2 = Array::zeros(if data.squared.is_some() { boxes } else { 0 });
-        let mut r = Array::zeros(boxes);
-        let mut q = Array::zeros(if keep { of_splits } else { 0 });
+        let mut w = workspace.array(boxes);
+        let mut w2 = workspace.array(if data.squared.is_some() { boxes } else { 0 });
+        let mut r = workspace.array(boxes);
+        let mut q = workspace.array(if keep { of_splits } else { 0 });
         let mut tasks = Vec::with_capacity(boxes / CHUNK + layer.len());
         let (mut weights, mut second, mut logs, mut rest) = (&mut w[..], &mut w2[..], &mut r[..], &mut q[..]);
         for id in layer {
@@ -100,18 +148,20 @@ pub(super) fn ascend(grid: &Grid, data: &Data<'_>, c: f64, keep: bool, pool: Opt
             squared: &squared[depth + 1],
             log_r: &log_r[depth + 1],
         };
-        each(pool, data.stop, tasks, |task| {
-            ascend_chunk(data, (c, &split_terms), &finer, task);
+        each(pool, data.stop, grid.depths().len(), tasks, |scratch, task| {
+            ascend_chunk(data, (c, &split_terms), &finer, scratch, task);
         });
         if data.squared.is_some() {
-            effective[depth] = Array::zeros(boxes);
+            effective[depth] = workspace.array(boxes);
             for ((e, w), w2) in effective[depth].iter_mut().zip(&*w).zip(&*w2) {
                 *e = if *w2 > 0.0 { w * w / w2 } else { 0.0 };
             }
         }
         (weight[depth], squared[depth], log_r[depth], splits[depth]) = (w, w2, r, q);
         // Boxes of the finer layer have been asked for the last time.
-        (squared[depth + 1], log_r[depth + 1]) = (Array::default(), Array::default());
+        for array in [&mut squared[depth + 1], &mut log_r[depth + 1]] {
+            workspace.keep(std::mem::take(array));
+        }
     }
     let mut log_root = log_r[0][0];
     if data.has_equal_halves() {
@@ -135,21 +185,25 @@ struct Finer<'a> {
     log_r: &'a [f64],
 }
 
-fn ascend_chunk(data: &Data<'_>, prior: (f64, &SplitTerms), finer: &Finer<'_>, task: UpTask<'_>) {
+fn ascend_chunk(
+    data: &Data<'_>,
+    prior: (f64, &SplitTerms),
+    finer: &Finer<'_>,
+    scratch: &mut Scratch,
+    task: UpTask<'_>,
+) {
     let (c, split_terms) = prior;
     let level = task.level;
     let (first, n) = (task.first, task.weight.len());
-    let mut buffer = [[0.0; CHUNK]; 5];
-    let [lower, upper, r0, r1, share] = buffer.each_mut().map(|b| &mut b[..n]);
+    let rows = scratch.rows.each_mut().map(|row| &mut row[..n]);
+    let [b0, b1, b2, b3, count, prior, log_lower, log_upper, share, whole_gamma, scaled_lower, scaled_upper] = rows;
     let step = level.splits[0];
-    step.halves(finer.levels[step.level].of(finer.weight), first, lower, upper);
+    let (lower, upper) = step.halves(finer.levels[step.level].of(finer.weight), first, b0, b1);
     add(task.weight, lower, upper);
     if data.squared.is_some() {
-        step.halves(finer.levels[step.level].of(finer.squared), first, lower, upper);
+        let (lower, upper) = step.halves(finer.levels[step.level].of(finer.squared), first, b0, b1);
         add(task.squared, lower, upper);
     }
-    let mut count = [0.0; CHUNK];
-    let count = &mut count[..n];
     count.copy_from_slice(task.weight);
     if data.squared.is_some() {
         for (m, w2) in count.iter_mut().zip(&*task.squared) {
@@ -159,30 +213,33 @@ fn ascend_chunk(data: &Data<'_>, prior: (f64, &SplitTerms), finer: &Finer<'_>, t
     // Less than two points say nothing about a split: every term of the evidence is its prior, and they sum to one.
     if count.iter().all(|n| *n <= 1.0) {
         #[allow(clippy::cast_possible_truncation, reason = "a simple fraction")]
-        let prior = (super::kernel::SPLIT / level.splits.len() as f64) as f32;
-        task.splits.into_iter().for_each(|q| q.fill(prior));
+        let each = (super::kernel::SPLIT / level.splits.len() as f64) as f32;
+        task.splits.into_iter().for_each(|q| q.fill(each));
+        task.log_r.fill(0.0);
         if data.has_equal_halves() {
             add_log_gamma(c, count, task.log_r);
         }
         return;
     }
-    let mut terms = vec![0.0; n * level.splits.len()];
-    let mut of_base = [[0.0; CHUNK]; 4];
-    let [prior, log_lower, log_upper, whole_gamma] = of_base.each_mut().map(|b| &mut b[..n]);
+    let terms = &mut scratch.terms[..n * level.splits.len()];
     if !data.has_equal_halves() {
         log_gamma(c, count, whole_gamma);
     }
     for (step, term) in level.splits.iter().zip(terms.chunks_exact_mut(n)) {
-        step.halves(finer.levels[step.level].of(finer.log_r), first, r0, r1);
+        let (r0, r1) = step.halves(finer.levels[step.level].of(finer.log_r), first, b0, b1);
         add(term, r0, r1);
         if !data.has_equal_halves() {
-            step.halves(finer.levels[step.level].of(finer.weight), first, lower, upper);
-            if data.squared.is_some() {
-                for ((l, u), n) in lower.iter_mut().zip(&mut *upper).zip(&*count) {
-                    let scale = if *l + *u > 0.0 { n / (*l + *u) } else { 0.0 };
-                    (*l, *u) = (*l * scale, *u * scale);
+            let (lower, upper) = step.halves(finer.levels[step.level].of(finer.weight), first, b2, b3);
+            let (lower, upper) = if data.squared.is_some() {
+                for (i, n) in count.iter().enumerate() {
+                    let sum = lower[i] + upper[i];
+                    let scale = if sum > 0.0 { n / sum } else { 0.0 };
+                    (scaled_lower[i], scaled_upper[i]) = (lower[i] * scale, upper[i] * scale);
                 }
-            }
+                (&*scaled_lower, &*scaled_upper)
+            } else {
+                (lower, upper)
+            };
             let mut splits = Splits {
                 share: &mut *share,
                 terms: [&mut *prior, &mut *log_lower, &mut *log_upper],
@@ -198,13 +255,13 @@ fn ascend_chunk(data: &Data<'_>, prior: (f64, &SplitTerms), finer: &Finer<'_>, t
             add_log_bayes(c, &trial, term);
         }
     }
-    let whole = r0;
+    let whole = b0;
     if data.has_equal_halves() {
         whole_term(c, level.splits.len() as f64, count, whole);
     } else {
         whole.fill((super::kernel::SPLIT / level.splits.len() as f64).ln());
     }
-    join(&mut terms, whole, task.log_r);
+    join(terms, whole, task.log_r);
     for (q, term) in task.splits.into_iter().zip(terms.chunks_exact(n)) {
         for (q, t) in q.iter_mut().zip(term) {
             // Rounded down, so that they never add up to more than one; what is missing stops at the box.
@@ -247,15 +304,15 @@ pub(super) fn descend(
     c: f64,
     evidence: &Evidence,
     pool: Option<&ThreadPool>,
-) -> (Vec<f64>, Vec<f64>) {
+    workspace: &mut Workspace,
+) -> [Array<f64>; 2] {
     let levels = grid.levels();
     let mut coarser = Moments::default();
     for layer in grid.layers() {
         let boxes = layer.iter().map(|id| levels[*id].boxes).sum();
-        let zeros = || [Array::zeros(boxes), Array::zeros(boxes)];
         let mut own = Moments {
-            flow: zeros(),
-            total: zeros(),
+            flow: [workspace.array(boxes), workspace.array(boxes)],
+            total: [workspace.array(boxes), workspace.array(boxes)],
         };
         let mut tasks = Vec::with_capacity(boxes / CHUNK + layer.len());
         let mut flow = own.flow.each_mut().map(|f| &mut f[..]);
@@ -272,13 +329,14 @@ pub(super) fn descend(
                 });
             }
         }
-        each(pool, data.stop, tasks, |task| {
-            descend_chunk(levels, data, c, evidence, &coarser, task);
+        each(pool, data.stop, levels[0].halvings.len(), tasks, |scratch, task| {
+            descend_chunk(levels, data, c, evidence, &coarser, scratch, task);
         });
-        coarser = own;
+        let above = std::mem::replace(&mut coarser, own);
+        above.flow.into_iter().chain(above.total).for_each(|a| workspace.keep(a));
     }
-    let [mean, square] = coarser.total;
-    (mean.to_vec(), square.to_vec())
+    coarser.flow.into_iter().for_each(|a| workspace.keep(a));
+    coarser.total
 }
 
 fn descend_chunk(
@@ -287,34 +345,30 @@ fn descend_chunk(
     c: f64,
     evidence: &Evidence,
     coarser: &Moments,
+    scratch: &mut Scratch,
     task: DownTask<'_>,
 ) {
     let level = task.level;
     let ([flow_mean, flow_square], [total_mean, total_square]) = (task.flow, task.total);
     let (first, n) = (task.first, flow_mean.len());
-    let own = level.of(&evidence.weight[level.layer]);
-    let mut buffer = [[0.0; CHUNK]; 6];
-    let [share, half, whole, mean, square, scratch] = buffer.each_mut().map(|b| &mut b[..n]);
-    let mut split = [0.0_f32; CHUNK];
-    let split = &mut split[..n];
-    if level.origins.is_empty() {
-        flow_mean.fill(1.0);
-        flow_square.fill(1.0);
-    }
+    let own = &level.of(&evidence.weight[level.layer])[first..first + n];
+    let [share, half, gathered, whole, mean, square, ..] = scratch.rows.each_mut().map(|row| &mut row[..n]);
+    let split = &mut scratch.split[..n];
+    let start = if level.origins.is_empty() { 1.0 } else { 0.0 };
+    flow_mean.fill(start);
+    flow_square.fill(start);
     for step in &level.origins {
         let above = &levels[step.level];
-        half.copy_from_slice(&own[first..first + n]);
-        step.siblings(own, first, whole);
-        for (w, h) in whole.iter_mut().zip(&*half) {
-            *w += h;
-        }
-        if data.squared.is_some() {
-            step.wholes(above.of(&evidence.effective[above.layer]), first, scratch);
-            for ((h, w), e) in half.iter_mut().zip(&mut *whole).zip(&*scratch) {
-                *h = if *w > 0.0 { e * (*h / *w) } else { 0.0 };
-                *w = *e;
+        let whole = step.wholes(above.of(&evidence.weight[above.layer]), first, whole);
+        let (half, whole) = if data.squared.is_some() {
+            let effective = step.wholes(above.of(&evidence.effective[above.layer]), first, gathered);
+            for (i, h) in half.iter_mut().enumerate() {
+                *h = if whole[i] > 0.0 { effective[i] * (own[i] / whole[i]) } else { 0.0 };
             }
-        }
+            (&*half, effective)
+        } else {
+            (own, whole)
+        };
         if data.base.is_uniform() {
             share.fill(0.5);
         } else {
@@ -325,16 +379,13 @@ fn descend_chunk(
             .iter()
             .position(|s| s.axis == step.axis)
             .expect("each origin has its split");
-        step.wholes(above.of_split(&evidence.splits[above.layer], way), first, split);
-        step.wholes(above.of(&coarser.flow[0]), first, mean);
-        step.wholes(above.of(&coarser.flow[1]), first, square);
         let flow = Flow {
             share,
             half,
             whole,
-            split,
-            mean,
-            square,
+            split: step.wholes(above.of_split(&evidence.splits[above.layer], way), first, split),
+            mean: step.wholes(above.of(&coarser.flow[0]), first, mean),
+            square: step.wholes(above.of(&coarser.flow[1]), first, square),
         };
         add_flow(c, &flow, flow_mean, flow_square);
     }
@@ -356,8 +407,8 @@ fn descend_chunk(
         let above = &levels[step.level];
         let next = above.splits.iter().map(|s| s.axis).min();
         if next == Some(step.axis) {
-            step.wholes(above.of(&coarser.total[0]), first, mean);
-            step.wholes(above.of(&coarser.total[1]), first, square);
+            let mean = step.wholes(above.of(&coarser.total[0]), first, mean);
+            let square = step.wholes(above.of(&coarser.total[1]), first, square);
             for i in 0..n {
                 total_mean[i] += mean[i];
                 total_square[i] += square[i];
@@ -369,20 +420,14 @@ fn descend_chunk(
 /// The base share of each of the boxes `first..` in the box it is half of along the step's axis.
 fn half_shares(data: &Data<'_>, above: &Level, step: super::grid::Step, first: usize, share: &mut [f64]) {
     let n = share.len();
-    let mut lower = [0.0; CHUNK];
     if step.block >= n {
         let start = ((first & !(2 * step.block - 1)) >> 1) + (first & (step.block - 1));
         data.base.lower_shares(above, step.axis, start, share);
     } else {
+        let mut lower = [0.0; CHUNK];
         let lower = &mut lower[..n / 2];
         data.base.lower_shares(above, step.axis, first / 2, lower);
-        for (whole, pair) in lower
-            .chunks_exact(step.block)
-            .zip(share.chunks_exact_mut(2 * step.block))
-        {
-            pair[..step.block].copy_from_slice(whole);
-            pair[step.block..].copy_from_slice(whole);
-        }
+        step.double(lower, share);
     }
     step.sides(first, n, |run, is_upper| {
         if is_upper {
