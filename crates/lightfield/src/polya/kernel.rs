@@ -79,17 +79,21 @@ pub fn join(terms: &mut [f64], whole: &[f64], log_r: &mut [f64]) {
             *t = if *v > *t { *v } else { *t };
         }
     }
+    // Against the largest term, that of no split among them.
+    for ((t, w), s) in top.iter_mut().zip(whole).zip(&mut *sum) {
+        let highest = if *t + w > log_stop { *t + w } else { log_stop };
+        *s = exp(log_stop - highest);
+        *t = w - highest;
+    }
     for split in terms.chunks_exact_mut(n) {
         for ((v, t), s) in split.iter_mut().zip(&*top).zip(&mut *sum) {
-            *v = exp(*v - t);
+            *v = exp(*v + t);
             *s += *v;
         }
     }
     for (((r, w), t), s) in log_r.iter_mut().zip(whole).zip(&*top).zip(&mut *sum) {
-        let split = t + w + ln(*s);
-        let larger = if split > log_stop { split } else { log_stop };
-        *r = larger + ln(1.0 + exp(-(split - log_stop).abs()));
-        *s = exp(split - *r) / *s;
+        *r = w - t + ln(*s);
+        *s = 1.0 / *s;
     }
     for split in terms.chunks_exact_mut(n) {
         for (v, s) in split.iter_mut().zip(&*sum) {

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use multiversion::multiversion;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -185,6 +186,7 @@ struct Finer<'a> {
     log_r: &'a [f64],
 }
 
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn ascend_chunk(
     data: &Data<'_>,
     prior: (f64, &SplitTerms),
@@ -339,6 +341,7 @@ pub(super) fn descend(
     coarser.total
 }
 
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn descend_chunk(
     levels: &[Level],
     data: &Data<'_>,
