@@ -113,7 +113,9 @@ pub fn polya_average<'py>(
     let base = base.map(Masses::Factors);
     let Problem { grid, base: own } = Problem::new(depths, weight, squared, base.as_ref())?;
     if positions.is_empty() || positions.iter().any(|p| p.len() != grid.depths().len()) {
-        return Err(PyValueError::new_err("give positions with one number of steps per axis"));
+        return Err(PyValueError::new_err(
+            "give positions with one number of steps per axis",
+        ));
     }
     let factors = base.as_ref().map(Masses::factors).transpose()?.unwrap_or_default();
     let result = stoppable(py, |stop| {

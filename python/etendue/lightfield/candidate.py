@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -279,12 +279,17 @@ def all_images(
 
 
 def grow_candidates(
-    counts: EtendueCounts, images: Sequence[Images], concentrations: Mapping[str, Sequence[float]], threads: int | None
+    counts: EtendueCounts,
+    images: Sequence[Images],
+    concentrations: Mapping[str, Sequence[float]],
+    threads: int | None,
+    recipes: Iterable[str] = tuple(RECIPES),
 ) -> dict[str, Candidate]:
-    """The candidate of every recipe on the rays that are fitted, with trees in one position; equal trees are grown once."""
+    """The candidates of recipes on the rays that are fitted, with trees in one position; equal trees are grown once."""
     grown: dict[bool, Candidate] = {}
     candidates = {}
-    for name, recipe in RECIPES.items():
+    for name in recipes:
+        recipe = RECIPES[name]
         if recipe.product not in grown:
             c = concentrations[name]
             grown[recipe.product] = grow_candidate(counts, "fitted", name, images, c, threads, POSITIONS[:1])

@@ -13,6 +13,7 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.calibration import calibrate
 from etendue.lightfield.candidate import (
     FINE_POSITIONS,
+    RECIPES,
     Candidate,
     Images,
     PartEstimate,
@@ -70,10 +71,21 @@ LEAD = 3.0
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """What was chosen before all rays are counted: the grids of each part, and concentrations by recipe and part."""
+    """What was chosen before all rays are counted.
+
+    Parameters
+    ----------
+    grids : tuple of PartGrids
+        Those of each part.
+    concentrations : dict
+        By recipe, of each part.
+    recipes : tuple of str
+        Those that some of the rays leave open: one, if it leads the others for sure.
+    """
 
     grids: tuple[PartGrids, ...]
     concentrations: dict[str, tuple[float, ...]]
+    recipes: tuple[str, ...] = tuple(RECIPES)
 
 
 def fit_light_field(
@@ -200,7 +212,7 @@ def make_plan(
         chosen = _search(counted, chosen.bits + 4, chosen.lend, threads)
     if chosen.bits == MOST_PILOT_BITS:
         chosen = dataclasses.replace(chosen, bits=bits)
-    return Plan(grids(len(rays), _depths(chosen.bits, chosen.lend)), chosen.concentrations)
+    return Plan(grids(len(rays), _depths(chosen.bits, chosen.lend)), chosen.concentrations, chosen.recipes)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -211,6 +223,7 @@ class _Shape:
     lend: int
     concentrations: dict[str, tuple[float, ...]]
     score: Score
+    recipes: tuple[str, ...]
 
 
 def _search(counted: Callable[[Depths], EtendueCounts], bits: int, lend: int, threads: int | None) -> _Shape:
@@ -229,7 +242,7 @@ def _search(counted: Callable[[Depths], EtendueCounts], bits: int, lend: int, th
             if tried.mean <= reached.mean:
                 break
             best, reached = best + step, tried
-    return _Shape(bits, best, concentrations, reached)
+    return _Shape(bits, best, concentrations, reached, _not_beaten(scores))
 
 
 def _finer_score(counted: Callable[[Depths], EtendueCounts], chosen: _Shape, threads: int | None) -> Score:
@@ -237,6 +250,12 @@ def _finer_score(counted: Callable[[Depths], EtendueCounts], chosen: _Shape, thr
     trial = counted(_depths(chosen.bits + 2, chosen.lend))
     grown = grow_candidates(trial, _pilot_images(trial, threads), chosen.concentrations, threads)
     return max((c.score(trial) for c in grown.values()), key=lambda score: score.mean)
+
+
+def _not_beaten(scores: dict[str, Score]) -> tuple[str, ...]:
+    """Recipes that the best one does not lead for sure, itself among them."""
+    best = max(scores.values(), key=lambda score: score.mean)
+    return tuple(name for name, score in scores.items() if not _leads(best, score))
 
 
 def _leads(finer: Score, coarser: Score) -> bool:
@@ -266,7 +285,7 @@ def fit_counts(
     """The field of counted rays: recipes compared on the held-out rays, the best one followed with all."""
     told.begin("recipe")
     images = all_images(counts, "fitted", threads, FINE_POSITIONS[:4])
-    candidates = grow_candidates(counts, images, plan.concentrations, threads)
+    candidates = grow_candidates(counts, images, plan.concentrations, threads, plan.recipes)
     scores = {name: candidate.score(counts) for name, candidate in candidates.items()}
     recipe = max(scores, key=lambda name: scores[name].mean)
     score, c = scores[recipe], plan.concentrations[recipe]

@@ -26,6 +26,9 @@ Bools = npt.NDArray[np.bool_]
 RAYS = 1 << 16
 """Rays by which the depths are found. Their errors are far below a cell of the finest image that as many rays can fill."""
 
+WAIST_RAYS = 1 << 13
+"""Rays by whose spread the depth is sought where the bundle is narrowest; the rings then start from there."""
+
 FEWEST = 2000
 """Rays below which a plane stays as it is: a ring of them would show no image."""
 
@@ -239,10 +242,12 @@ def _focus(rays: _Rays) -> Focus | None:
 
 def _waist(rays: _Rays) -> tuple[_View, float]:
     """Where the bundle is narrowest: the square about it, and its height above the plane [mm]."""
-    narrow = rays.lean < 0.5
+    narrow = np.flatnonzero(rays.lean < 0.5)
+    narrow = narrow[:: max(len(narrow) // WAIST_RAYS, 1)]
+    own_place, own_slope = rays.place[narrow], rays.slope[narrow]
 
     def spans(depth: float) -> FloatArray:
-        low, high = np.quantile(rays.place[narrow] + depth * rays.slope[narrow], MIDDLE, axis=0)
+        low, high = np.quantile(own_place + depth * own_slope, MIDDLE, axis=0)
         widths: FloatArray = high - low
         return widths
 

@@ -140,7 +140,12 @@ fn roll(values: &[f64], sizes: &[usize], steps: &[usize], mut visit: impl FnMut(
     let shift = steps[outer.len()] % row;
     let mut index = vec![0; outer.len()];
     for values in values.chunks_exact(*row) {
-        let to = index.iter().zip(outer).zip(steps).fold(0, |to, ((i, n), s)| to * n + (i + s) % n) * row;
+        let to = index
+            .iter()
+            .zip(outer)
+            .zip(steps)
+            .fold(0, |to, ((i, n), s)| to * n + (i + s) % n)
+            * row;
         let (stay, wrap) = values.split_at(row - shift);
         visit(to + shift, stay);
         if shift > 0 {
@@ -187,10 +192,19 @@ mod tests {
             let sizes: Vec<usize> = depths.iter().map(|d| 1 << d).collect();
             let cells = grid.cells();
             let (space, direction) = (
-                numbers(sizes[0] * sizes[1], 1).iter().map(|v| v + 1.0).collect::<Vec<_>>(),
-                numbers(sizes[2] * sizes[3], 2).iter().map(|v| v + 0.5).collect::<Vec<_>>(),
+                numbers(sizes[0] * sizes[1], 1)
+                    .iter()
+                    .map(|v| v + 1.0)
+                    .collect::<Vec<_>>(),
+                numbers(sizes[2] * sizes[3], 2)
+                    .iter()
+                    .map(|v| v + 0.5)
+                    .collect::<Vec<_>>(),
             );
-            let (weight, squared) = (numbers(cells, 4), numbers(cells, 4).iter().map(|w| 1.3 * w).collect::<Vec<_>>());
+            let (weight, squared) = (
+                numbers(cells, 4),
+                numbers(cells, 4).iter().map(|w| 1.3 * w).collect::<Vec<_>>(),
+            );
             let positions = [vec![0, 0, 0, 0], vec![1, 3, 2, 1]];
             let data = Data {
                 weight: &weight,
@@ -201,7 +215,13 @@ mod tests {
             let factors = [(2, &space[..]), (2, &direction[..])];
             let found = average(&grid, &data, &factors, 3.0, &positions, 2);
             let again = average(&grid, &data, &factors, 3.0, &positions, 1);
-            let bits = |a: &Average| a.ratio.iter().chain(&a.ratio_squared).map(|v| v.to_bits()).collect::<Vec<_>>();
+            let bits = |a: &Average| {
+                a.ratio
+                    .iter()
+                    .chain(&a.ratio_squared)
+                    .map(|v| v.to_bits())
+                    .collect::<Vec<_>>()
+            };
             assert!(bits(&found) == bits(&again) && found.log_evidence == again.log_evidence);
             let mut mean = vec![0.0; cells];
             for (k, steps) in positions.iter().enumerate() {

@@ -27,7 +27,10 @@ pub(super) struct Evidence {
 impl Evidence {
     /// Gives its memory back.
     pub fn give(self, workspace: &mut Workspace) {
-        self.weight.into_iter().chain(self.effective).for_each(|a| workspace.keep(a));
+        self.weight
+            .into_iter()
+            .chain(self.effective)
+            .for_each(|a| workspace.keep(a));
         self.splits.into_iter().for_each(|a| workspace.keep(a));
     }
 }
@@ -198,7 +201,20 @@ fn ascend_chunk(
     let level = task.level;
     let (first, n) = (task.first, task.weight.len());
     let rows = scratch.rows.each_mut().map(|row| &mut row[..n]);
-    let [b0, b1, b2, b3, count, prior, log_lower, log_upper, share, whole_gamma, scaled_lower, scaled_upper] = rows;
+    let [
+        b0,
+        b1,
+        b2,
+        b3,
+        count,
+        prior,
+        log_lower,
+        log_upper,
+        share,
+        whole_gamma,
+        scaled_lower,
+        scaled_upper,
+    ] = rows;
     let step = level.splits[0];
     let (lower, upper) = step.halves(finer.levels[step.level].of(finer.weight), first, b0, b1);
     add(task.weight, lower, upper);
@@ -335,7 +351,11 @@ pub(super) fn descend(
             descend_chunk(levels, data, c, evidence, &coarser, scratch, task);
         });
         let above = std::mem::replace(&mut coarser, own);
-        above.flow.into_iter().chain(above.total).for_each(|a| workspace.keep(a));
+        above
+            .flow
+            .into_iter()
+            .chain(above.total)
+            .for_each(|a| workspace.keep(a));
     }
     coarser.flow.into_iter().for_each(|a| workspace.keep(a));
     coarser.total
@@ -366,7 +386,11 @@ fn descend_chunk(
         let (half, whole) = if data.squared.is_some() {
             let effective = step.wholes(above.of(&evidence.effective[above.layer]), first, gathered);
             for (i, h) in half.iter_mut().enumerate() {
-                *h = if whole[i] > 0.0 { effective[i] * (own[i] / whole[i]) } else { 0.0 };
+                *h = if whole[i] > 0.0 {
+                    effective[i] * (own[i] / whole[i])
+                } else {
+                    0.0
+                };
             }
             (&*half, effective)
         } else {
