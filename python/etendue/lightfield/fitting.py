@@ -112,8 +112,10 @@ def fit_light_field(
         told.begin("surface")
         choice = choose_surface(rays, seed=seed, threads=threads, step=told.step)
         surface, notes = choice.surface, choice.notes
-    told.begin("focus")
-    surface = focused(surface, rays, seed, threads) if isinstance(surface, Plane) else surface.sized_for(rays)
+        # The search has tried a focus, and has taken it or not.
+    else:
+        told.begin("focus")
+        surface = focused(surface, rays, seed, threads) if isinstance(surface, Plane) else surface.sized_for(rays)
     told.begin("grid")
     finest, not_so_fine = finest_for(surface, max_resolution)
     plan = make_plan(rays, surface, depths, seed, threads, finest, told.step)

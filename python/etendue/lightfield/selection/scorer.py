@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.lightfield.candidate import FINE_POSITIONS, MIXED_IN, Images, PartEstimate, Score, grow_part, images_of
+from etendue.lightfield.candidate import FINE_POSITIONS, MIXED_IN, Images, Score, grow_part, images_of
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.etendue_density import core_part
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
@@ -40,35 +40,18 @@ COARSER = 4
 """By how much along each coordinate."""
 
 
-@dataclasses.dataclass(frozen=True)
-class _Shapes:
-    """Cells along the coordinates of a part: of the tree, of the image over place and of that over direction."""
+def _tree_shape(grid: Grid, *, few: bool) -> tuple[int, ...]:
+    """Cells of a tree along the coordinates of a part."""
+    place, turn = grid
+    step = COARSER if few else 1
+    return tuple(max(n // step, 2) for n in (1 << place, 1 << place, 1 << turn, 1 << turn))
 
-    grid: tuple[int, ...]
-    space: tuple[int, ...]
-    direction: tuple[int, ...]
 
-    @classmethod
-    def of(cls, grid: Grid, *, few: bool) -> _Shapes:
-        place, turn = grid
-        step = COARSER if few else 1
-        tree = tuple(max(n // step, 2) for n in (1 << place, 1 << place, 1 << turn, 1 << turn))
-        images = tuple(n // step for n in IMAGE_SHAPE)
-        return cls(tree, images[:2], images[2:])
-
-    def cells(self, coordinates: FloatArray) -> tuple[Cells, Cells, Cells]:
-        """The cell of each ray in each of the three."""
-
-        def numbered(axes: slice, shape: tuple[int, ...]) -> Cells:
-            index = np.minimum((coordinates[:, axes] * shape).astype(np.intp), np.array(shape) - 1)
-            numbers: Cells = np.ravel_multi_index(tuple(index.T), shape)
-            return numbers
-
-        return (
-            numbered(slice(0, 4), self.grid),
-            numbered(slice(0, 2), self.space),
-            numbered(slice(2, 4), self.direction),
-        )
+def _numbered(coordinates: FloatArray, axes: slice, shape: tuple[int, ...]) -> Cells:
+    """The cell of each ray along some of its coordinates."""
+    index = np.minimum((coordinates[:, axes] * shape).astype(np.intp), np.array(shape) - 1)
+    numbers: Cells = np.ravel_multi_index(tuple(index.T), shape)
+    return numbers
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -150,8 +133,20 @@ class SurfaceScorer:
         self, surfaces: Sequence[tuple[Sequence[Part], Grid]], recipes: Sequence[str] = TREES_ALONE
     ) -> list[HeldOutScore]:
         """The score of each of several surfaces, each on its grid; see `score`."""
+        # What the grids of a surface share is made once.
+        by_parts: dict[tuple[Part, ...], list[int]] = {}
+        for number, (parts, _) in enumerate(surfaces):
+            by_parts.setdefault(tuple(parts), []).append(number)
         with ThreadPoolExecutor(self.threads) as pool:
-            return list(pool.map(lambda both: self.score(both[0], both[1], recipes), surfaces))
+            found = pool.map(
+                lambda one: self._score(one[0], [surfaces[number][1] for number in one[1]], recipes), by_parts.items()
+            )
+            scores = {
+                n: s
+                for numbers, own in zip(by_parts.values(), found, strict=True)
+                for n, s in zip(numbers, own, strict=True)
+            }
+        return [scores[number] for number in range(len(surfaces))]
 
     def score(self, parts: Sequence[Part], grid: Grid, recipes: Sequence[str] = TREES_ALONE) -> HeldOutScore:
         """The score of a surface of these parts.
@@ -165,23 +160,72 @@ class SurfaceScorer:
         recipes : sequence of str
             `TREES_ALONE`, or `WITH_IMAGES`: of those the one that predicts better counts.
         """
+        return self._score(parts, [grid], recipes)[0]
+
+    def _score(self, parts: Sequence[Part], grids: Sequence[Grid], recipes: Sequence[str]) -> list[HeldOutScore]:
+        """The scores of a surface on several grids."""
         owner, coordinates = _core.cross_parts([part.core() for part in parts], self.position, self.direction)
         met = np.bincount(owner[owner >= 0], minlength=len(parts))
-        shapes = [_Shapes.of(grid, few=bool(n < FEW * met.max())) for n in met]
-        cells = [shape.cells(coordinates[owner == index]) for index, shape in enumerate(shapes)]
         folds = range(1 if len(owner) >= self.one_fold_from else self.settings.folds)
-        values = [self._held_out(parts, owner, cells, shapes, self.fold == fold, recipes) for fold in folds]
         weights = np.concatenate([self.flux[self.fold == fold] for fold in folds])
         unmet = float(self.flux[owner < 0].sum() / self.flux.sum())
-        scores = [Score(np.concatenate(of_recipe), weights) for of_recipe in zip(*values, strict=True)]
-        return HeldOutScore(max(scores, key=lambda score: score.mean), unmet)
+        few = [bool(n < FEW * met.max()) for n in met]
+        images = self._images(parts, owner, coordinates, few, folds, recipes)
+        found = []
+        for grid in grids:
+            shapes = [_tree_shape(grid, few=is_few) for is_few in few]
+            cells = [_numbered(coordinates[owner == index], slice(0, 4), shape) for index, shape in enumerate(shapes)]
+            values = [
+                self._held_out(parts, owner, cells, shapes, own, self.fold == fold, recipes)
+                for fold, own in zip(folds, images, strict=True)
+            ]
+            scores = [Score(np.concatenate(of_recipe), weights) for of_recipe in zip(*values, strict=True)]
+            found.append(HeldOutScore(max(scores, key=lambda score: score.mean), unmet))
+        return found
+
+    def _images(
+        self,
+        parts: Sequence[Part],
+        owner: npt.NDArray[np.int64],
+        coordinates: FloatArray,
+        few: Sequence[bool],
+        folds: Sequence[int],
+        recipes: Sequence[str],
+    ) -> list[list[Images]]:
+        """For each fold the images of each part, by the rays that are not held out.
+
+        Their concentrations are those of greatest evidence in the first fold.
+        """
+        found: list[list[Images]] = [[Images() for _ in parts] for _ in folds]
+        for index, part in enumerate(parts):
+            if part.hole == 0.0 and recipes == TREES_ALONE:
+                continue
+            mine = owner == index
+            shape = tuple(n // (COARSER if few[index] else 1) for n in IMAGE_SHAPE)
+            own = coordinates[mine]
+            cells = [_numbered(own, axes, shape[axes]) for axes in (slice(0, 2), slice(2, 4))]
+            first: Images | None = None
+            for fold, images in zip(folds, found, strict=True):
+                fitted = self.fold[mine] != fold
+                if not fitted.any():
+                    continue
+                flux = self.flux[mine][fitted]
+                space, direction = (
+                    _sums(c[fitted], flux, shape[axes])
+                    for c, axes in zip(cells, (slice(0, 2), slice(2, 4)), strict=True)
+                )
+                counts = PartCounts(space, space, direction)
+                images[index] = images_of(counts, part, 1, positions=IMAGE_POSITIONS, like=first)
+                first = first or images[index]
+        return found
 
     def _held_out(
         self,
         parts: Sequence[Part],
         owner: npt.NDArray[np.int64],
-        cells: Sequence[tuple[Cells, Cells, Cells]],
-        shapes: Sequence[_Shapes],
+        cells: Sequence[Cells],
+        shapes: Sequence[tuple[int, ...]],
+        images: Sequence[Images],
         out: npt.NDArray[np.bool_],
         recipes: Sequence[str],
     ) -> list[FloatArray]:
@@ -190,17 +234,19 @@ class SurfaceScorer:
         for index, part in enumerate(parts):
             mine = (owner == index) & ~out
             if mine.any():
-                own = mine[owner == index]
-                picked = tuple(c[own] for c in cells[index])
-                estimates.append((self._estimate(part, picked, self.flux[mine], shapes[index], recipes), mine))
+                own, flux = mine[owner == index], self.flux[mine]
+                counts = _sums(cells[index][own], flux, shapes[index])
+                # A tree that does not know of the images.
+                c, alone = self.settings.concentration, PartCounts(counts, counts, counts)
+                estimate = grow_part(alone, part, "uniform", images[index], c, 1, "none", positions=POSITIONS[:1])
+                estimates.append((estimate, float(flux.sum())))
         met = float(self.flux[(owner >= 0) & ~out].sum())
         unmet = max(1.0 - met / float(self.flux[~out].sum()), MIXED_IN)
         values = []
         for recipe in recipes:
             density = np.zeros(int(out.sum()))
             fields = [
-                core_part(e.chart.core(), dataclasses.replace(e, recipe=recipe).field(float(self.flux[mine].sum())))
-                for e, mine in estimates
+                core_part(e.chart.core(), dataclasses.replace(e, recipe=recipe).field(flux)) for e, flux in estimates
             ]
             if fields:
                 # Where a line leaves two parts, the light of both counts.
@@ -208,22 +254,6 @@ class SurfaceScorer:
                 density = light / met
             values.append(np.log((1.0 - unmet) * density + unmet * self.even))
         return values
-
-    def _estimate(
-        self,
-        part: Part,
-        cells: Sequence[Cells],
-        flux: FloatArray,
-        shapes: _Shapes,
-        recipes: Sequence[str],
-    ) -> PartEstimate:
-        """What the rays of one part tell of its light: a tree that does not know of the images, and the images."""
-        counts = PartCounts(*(_sums(c, flux, s) for c, s in zip(cells, dataclasses.astuple(shapes), strict=True)))
-        needed = part.hole > 0.0 or recipes != TREES_ALONE
-        images = images_of(counts, part, 1, positions=IMAGE_POSITIONS) if needed else Images()
-        return grow_part(
-            counts, part, "uniform", images, self.settings.concentration, 1, "none", positions=POSITIONS[:1]
-        )
 
 
 def _sums(cell: Cells, flux: FloatArray, shape: tuple[int, ...]) -> Sums:
