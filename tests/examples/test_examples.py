@@ -15,6 +15,7 @@ RUNS = {
     "chapter_4.py": (["--lines", "4"], 6),
     "dome_led.py": (["--rays", "100000"], 2),
     "first_picture.py": (["--rays", "500000", "--output", "picture.png"], 1),
+    "half_against_half.py": ([], 1),
     "how_many_rays.py": ([], 1),
     "narrow_beam.py": (["--rays", "50000"], 3),
     "remote_phosphor.py": (["--rays", "20000"], 3),
