@@ -133,7 +133,7 @@ impl LightSampler {
                     if crossing.t > 0.0 && cosine > 0.0 {
                         visit(SourceHit {
                             t: crossing.t,
-                            luminance: surface.luminance(cosine) * source.flux,
+                            luminance: surface.luminance(-k, cosine) * source.flux,
                             deviation: 0.0,
                             cosine,
                             density: 1.0 / surface.area(),
@@ -177,9 +177,10 @@ impl LightSampler {
                 }
                 let (point, normal) = surface.draw_point(numbers);
                 let (distance2, cosine) = towards(point, normal, p)?;
+                let luminance = surface.luminance((p - point) * (1.0 / distance2.sqrt()), cosine);
                 Some(LightSample {
                     point: source.frame.point_to_world(point),
-                    irradiance: source.flux * surface.luminance(cosine) * cosine * surface.area() / distance2,
+                    irradiance: source.flux * luminance * cosine * surface.area() / distance2,
                     deviation: 0.0,
                     density: distance2 / (cosine * surface.area()),
                 })

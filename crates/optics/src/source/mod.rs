@@ -1,8 +1,9 @@
 //! Sources: what emits rays, where it stands, how much flux it has and of which wavelengths.
 
+mod intensity_table;
 pub mod numbers;
-mod point;
 mod rings;
+
 pub mod surface;
 
 use std::ops::Range;
@@ -17,10 +18,10 @@ use etendue_lightfield::field::draw::{FieldRays, Sampler};
 use etendue_math::{Frame, Vec3};
 use etendue_sampling::philox::{Pairs, Stream, fill_fours};
 
+pub use intensity_table::IntensityTable;
 pub use numbers::Numbers;
-pub use point::PointSource;
 pub use rings::{Ring, RingSource};
-pub use surface::SurfaceSource;
+pub use surface::{Pattern, SurfaceSource};
 
 /// The purpose under which the first four numbers of each ray of a traced source are drawn (see [`Pairs::new`]); each source
 /// has one of its own.
@@ -51,7 +52,7 @@ pub enum Emitter {
     /// An emitting surface.
     Surface(SurfaceSource),
     /// A point with an intensity distribution.
-    Point(PointSource),
+    Point(IntensityTable),
     /// Parallel light along +z from a piece of the plane z = 0.
     Beam(AreaSampler),
 }
