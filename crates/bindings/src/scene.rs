@@ -19,6 +19,7 @@ use crate::detector::detector;
 use crate::far_field::FarField;
 use crate::field::LightField;
 use crate::finish::finish;
+use crate::patches::patches;
 use crate::scene_values::{Dict, face, frame, get, inner, list, optional, refuse, shape};
 
 fn part(dict: &Bound<'_, PyDict>) -> PyResult<SceneFace> {
@@ -94,7 +95,7 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
             }
             let pattern = match optional(dict, "exponent")? {
                 Some(exponent) => Pattern::CosinePower(exponent),
-                None => Pattern::Table(intensity_table(dict)?),
+                None => Pattern::Table(Box::new(intensity_table(dict)?)),
             };
             let surface = SurfaceSource::new(shape(&inner(dict, "shape")?)?, flip, pattern);
             Emitter::Surface(surface.ok_or_else(|| {
@@ -102,6 +103,7 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
             })?)
         }
         "point" => Emitter::Point(intensity_table(dict)?),
+        "patches" => Emitter::Patches(Arc::new(patches(dict)?)),
         "beam" => Emitter::beam(&shape(&inner(dict, "shape")?)?)
             .ok_or_else(|| refuse("a beam needs a flat shape of finite area"))?,
         other => return Err(refuse(format!("no source is called {other}"))),

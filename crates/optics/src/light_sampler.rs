@@ -116,7 +116,7 @@ impl LightSampler {
                     part.part.mark(&source.frame, sights, marks);
                 }
             }
-            Emitter::Surface(_) => marks.fill(true),
+            Emitter::Surface(_) | Emitter::Patches(_) => marks.fill(true),
             Emitter::Rays { .. } | Emitter::Point(_) | Emitter::Beam(_) => {}
         }
     }
@@ -162,6 +162,17 @@ impl LightSampler {
                     }
                 }
             }
+            Emitter::Patches(patches) => patches.leaving(p, -k, |light| {
+                if light.luminance > 0.0 && light.t < 0.0 && -light.t <= reach {
+                    visit(SourceHit {
+                        t: -light.t,
+                        luminance: light.luminance * source.flux,
+                        deviation: 0.0,
+                        cosine: light.cosine,
+                        density: light.density,
+                    });
+                }
+            }),
             Emitter::Rays { .. } | Emitter::Point(_) | Emitter::Beam(_) => {}
         }
     }
@@ -183,6 +194,16 @@ impl LightSampler {
                     irradiance: source.flux * luminance * cosine * surface.area() / distance2,
                     deviation: 0.0,
                     density: distance2 / (cosine * surface.area()),
+                })
+            }
+            Emitter::Patches(patches) => {
+                let (point, light) = patches.pick(p, numbers)?;
+                let per_area = light.cosine / (light.t * light.t);
+                Some(LightSample {
+                    point: source.frame.point_to_world(point),
+                    irradiance: source.flux * light.luminance * per_area / light.density,
+                    deviation: 0.0,
+                    density: light.density / per_area,
                 })
             }
             Emitter::Field(sampler) => self.pick_field(sampler.field(), source, p, numbers),

@@ -2,6 +2,7 @@
 
 mod intensity_table;
 pub mod numbers;
+pub mod patches;
 mod rings;
 
 pub mod surface;
@@ -20,6 +21,7 @@ use etendue_sampling::philox::{Pairs, Stream, fill_fours};
 
 pub use intensity_table::IntensityTable;
 pub use numbers::Numbers;
+pub use patches::PatchSource;
 pub use rings::{Ring, RingSource};
 pub use surface::{Pattern, SurfaceSource};
 
@@ -53,6 +55,8 @@ pub enum Emitter {
     Surface(SurfaceSource),
     /// A point with an intensity distribution.
     Point(IntensityTable),
+    /// Patches of a carrier surface with intensity tables.
+    Patches(Arc<PatchSource>),
     /// Parallel light along +z from a piece of the plane z = 0.
     Beam(AreaSampler),
 }
@@ -120,6 +124,7 @@ impl Source {
                 });
                 boxes.fold(Bounds::EMPTY, Bounds::union)
             }
+            Emitter::Patches(patches) => patches.bounds(&self.frame),
             Emitter::Beam(_) | Emitter::Rays { .. } => {
                 Bounds::of([f64::NEG_INFINITY, f64::INFINITY].map(|v| Vec3::new(v, v, v)))
             }
@@ -211,6 +216,7 @@ impl Source {
             }
             Emitter::Surface(surface) => self.draw(source, range, count, seed, batch, |n| surface.draw(n)),
             Emitter::Point(point) => self.draw(source, range, count, seed, batch, |n| (Vec3::default(), point.draw(n))),
+            Emitter::Patches(patches) => self.draw(source, range, count, seed, batch, |n| patches.draw(n)),
             Emitter::Beam(area) => self.draw(source, range, count, seed, batch, |n| {
                 (area.draw(&mut || n.draw()).0, Vec3::new(0.0, 0.0, 1.0))
             }),

@@ -16,7 +16,7 @@ pub enum Pattern {
     /// With intensity ∝ cosⁿθ about its normal.
     CosinePower(f64),
     /// By a table without light beyond γ = 90°, on flat surfaces: γ from the normal on the emitting side, C0 along local x.
-    Table(IntensityTable),
+    Table(Box<IntensityTable>),
 }
 
 /// A surface of any shape; each element of its area emits the same flux in the same pattern.
