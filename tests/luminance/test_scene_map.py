@@ -468,17 +468,3 @@ def test_options_belong_to_their_sources() -> None:
         look_at_scene(et.Scene(), [(eye, screen)], PathTracing())
     with pytest.raises(ArgumentError, match="give an observer"):
         et.luminance_map(scene, screen=screen)
-
-
-@pytest.mark.slow
-def test_a_gridded_source_is_seen_as_the_rays_it_draws() -> None:
-    """Its patches have no luminance that a line of sight could meet: a light field is fitted to its rays."""
-    rings = et.RingSource(rays=200_000)
-    gridded = et.GriddedSource.fit(rings, et.Disk(radius=30), pixel=5.0, threshold=5.0)
-    place: dict[str, Any] = {"at": [1, 2, 3], "toward": [0.1, 0, 1]}
-    scene = et.Scene(sources=[{"kind": "gridded", "gridded": gridded, "draws": 5_000, "seed": 4, **place}])
-    drawn = et.Scene(sources=[{"kind": "rays", "rays": gridded.sample(5_000, 4), "flux": gridded.total_flux, **place}])
-    eye, screen = et.Observer(20, 30, 1000), et.Screen(72, 72, 6, 6)
-    one, other = (et.luminance_map(s, eye, screen, rays_per_pixel=16) for s in (scene, drawn))
-    assert one.values.max() > 0
-    np.testing.assert_allclose(one.values, other.values, rtol=1e-12)

@@ -17,21 +17,21 @@ def forwards_and_backwards_agree(
     media: Mapping[str, Any] | None = None,
     below: bool = False,
     sharp: float = 0.05,
+    lamp: Mapping[str, Any] | None = None,
 ) -> None:
     """χ² of the difference over 16 pixels, at a significance of 1e-4; both are as `sharp` in each pixel, together.
 
     A small lamp stands above the origin, or below it, and shines on it; the observer looks at the origin from above, at 50°.
+    It is a Lambertian disk, or what `lamp` says.
     """
     side = -1 if below else 1
     screen = {"width": 24, "height": 24, "columns": 4, "rows": 4}
     scene = et.Scene(
         sources=[
             {
-                "kind": "surface",
-                "shape": {"kind": "disk", "radius": 1.5},
+                **(lamp or {"kind": "surface", "shape": {"kind": "disk", "radius": 1.5}, "flux": 100}),
                 "at": [4, 2, 9 * side],
                 "toward": [-0.3, -0.1, -side],
-                "flux": 100,
             }
         ],
         surfaces=list(surfaces),

@@ -251,7 +251,7 @@ def test_rings_are_annuli_with_their_own_flux() -> None:
         ({"kind": "rings", "radii": [2, 1], "flux": [1, 1]}, "must rise"),
         ({"kind": "beam", "shape": {"kind": "plane"}, "flux": 1}, "unknown kind 'plane'"),
         ({"kind": "beam", "shape": {"kind": "sphere", "radius": 1}, "flux": 1}, "unknown kind 'sphere'"),
-        ({"kind": "gridded", "file": "a"}, "'surface' belongs to 'file'"),
+        ({"kind": "gridded", "surface": "plane:z=0", "gridded": None}, "'file' is missing"),
         ({"kind": "gridded", "file": "a", "surface": "plain:z=0"}, "unknown .*'plain'"),
         ({"kind": "surface", "shape": DISK, "flux": 0}, "must be greater than 0"),
         ({"kind": "surface", "shape": DISK, "flux": 1, "exponent": -1}, "must be at least 0"),

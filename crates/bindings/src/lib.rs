@@ -13,6 +13,7 @@ mod field;
 mod finish;
 mod glints;
 mod guide;
+mod patches;
 mod polya;
 mod ray_index;
 mod run;

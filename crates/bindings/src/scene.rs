@@ -6,7 +6,7 @@ use etendue_math::Vec3;
 use etendue_optics::bsdf::Bsdf;
 use etendue_optics::light_sampler::LightSampler;
 use etendue_optics::medium::{Index, Medium};
-use etendue_optics::source::{Emitter, PointSource, Source, SpectralLines, SurfaceSource};
+use etendue_optics::source::{Emitter, IntensityTable, Pattern, Source, SpectralLines, SurfaceSource};
 use etendue_optics::table::Curve;
 use etendue_trace::detector::{Detector, Intensity};
 use etendue_trace::lit_scene::light_samplers;
@@ -19,6 +19,7 @@ use crate::detector::detector;
 use crate::far_field::FarField;
 use crate::field::LightField;
 use crate::finish::finish;
+use crate::patches::patches;
 use crate::scene_values::{Dict, face, frame, get, inner, list, optional, refuse, shape};
 
 fn part(dict: &Bound<'_, PyDict>) -> PyResult<SceneFace> {
@@ -92,14 +93,17 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
                     "an emitting surface cannot be cut by half spaces; cut it by z and r, or make it a mesh",
                 ));
             }
-            let surface = SurfaceSource::new(shape(&inner(dict, "shape")?)?, flip, get(dict, "exponent")?);
-            Emitter::Surface(surface.ok_or_else(|| refuse("an emitting surface needs a finite area and exponent"))?)
+            let pattern = match optional(dict, "exponent")? {
+                Some(exponent) => Pattern::CosinePower(exponent),
+                None => Pattern::Table(Box::new(intensity_table(dict)?)),
+            };
+            let surface = SurfaceSource::new(shape(&inner(dict, "shape")?)?, flip, pattern);
+            Emitter::Surface(surface.ok_or_else(|| {
+                refuse("an emitting surface needs a finite area and exponent; one with a table is flat")
+            })?)
         }
-        "point" => {
-            let rows: Vec<Vec<f64>> = get(dict, "values")?;
-            let point = PointSource::new(get(dict, "c")?, get(dict, "gamma")?, &rows.concat());
-            Emitter::Point(point.ok_or_else(|| refuse("not an intensity distribution with flux"))?)
-        }
+        "point" => Emitter::Point(intensity_table(dict)?),
+        "patches" => Emitter::Patches(Arc::new(patches(dict)?)),
         "beam" => Emitter::beam(&shape(&inner(dict, "shape")?)?)
             .ok_or_else(|| refuse("a beam needs a flat shape of finite area"))?,
         other => return Err(refuse(format!("no source is called {other}"))),
@@ -114,6 +118,13 @@ fn source<'py>(dict: &Bound<'py, PyDict>, sets: &mut Vec<Py<PyAny>>) -> PyResult
         flux,
         spectrum: lines(get(dict, "wavelengths")?, &get::<Vec<f64>>(dict, "shares")?)?,
     })
+}
+
+/// The intensity distribution of a source.
+fn intensity_table(dict: Dict<'_, '_>) -> PyResult<IntensityTable> {
+    let rows: Vec<Vec<f64>> = get(dict, "values")?;
+    let table = IntensityTable::new(get(dict, "c")?, get(dict, "gamma")?, &rows.concat());
+    table.ok_or_else(|| refuse("not an intensity distribution with flux"))
 }
 
 /// A spectrum from its wavelengths and their shares of the flux.

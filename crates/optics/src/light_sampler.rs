@@ -116,7 +116,7 @@ impl LightSampler {
                     part.part.mark(&source.frame, sights, marks);
                 }
             }
-            Emitter::Surface(_) => marks.fill(true),
+            Emitter::Surface(_) | Emitter::Patches(_) => marks.fill(true),
             Emitter::Rays { .. } | Emitter::Point(_) | Emitter::Beam(_) => {}
         }
     }
@@ -133,7 +133,7 @@ impl LightSampler {
                     if crossing.t > 0.0 && cosine > 0.0 {
                         visit(SourceHit {
                             t: crossing.t,
-                            luminance: surface.luminance(cosine) * source.flux,
+                            luminance: surface.luminance(-k, cosine) * source.flux,
                             deviation: 0.0,
                             cosine,
                             density: 1.0 / surface.area(),
@@ -162,6 +162,17 @@ impl LightSampler {
                     }
                 }
             }
+            Emitter::Patches(patches) => patches.leaving(p, -k, |light| {
+                if light.luminance > 0.0 && light.t < 0.0 && -light.t <= reach {
+                    visit(SourceHit {
+                        t: -light.t,
+                        luminance: light.luminance * source.flux,
+                        deviation: 0.0,
+                        cosine: light.cosine,
+                        density: light.density,
+                    });
+                }
+            }),
             Emitter::Rays { .. } | Emitter::Point(_) | Emitter::Beam(_) => {}
         }
     }
@@ -177,11 +188,22 @@ impl LightSampler {
                 }
                 let (point, normal) = surface.draw_point(numbers);
                 let (distance2, cosine) = towards(point, normal, p)?;
+                let luminance = surface.luminance((p - point) * (1.0 / distance2.sqrt()), cosine);
                 Some(LightSample {
                     point: source.frame.point_to_world(point),
-                    irradiance: source.flux * surface.luminance(cosine) * cosine * surface.area() / distance2,
+                    irradiance: source.flux * luminance * cosine * surface.area() / distance2,
                     deviation: 0.0,
                     density: distance2 / (cosine * surface.area()),
+                })
+            }
+            Emitter::Patches(patches) => {
+                let (point, light) = patches.pick(p, numbers)?;
+                let per_area = light.cosine / (light.t * light.t);
+                Some(LightSample {
+                    point: source.frame.point_to_world(point),
+                    irradiance: source.flux * light.luminance * per_area / light.density,
+                    deviation: 0.0,
+                    density: light.density / per_area,
                 })
             }
             Emitter::Field(sampler) => self.pick_field(sampler.field(), source, p, numbers),

@@ -13,7 +13,7 @@ use etendue_geometry::shape::{Flat, Outline, Quadric, Shape};
 use etendue_math::{Frame, Vec3};
 use etendue_optics::bsdf::{Bsdf, Lambertian};
 use etendue_optics::medium::{Index, Medium};
-use etendue_optics::source::{Emitter, Source, SurfaceSource};
+use etendue_optics::source::{Emitter, Pattern, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_sampling::ordered::{BATCH, inside};
 use etendue_trace::forward::run::Run;
@@ -76,7 +76,7 @@ fn scene() -> Result<Scene, String> {
     for (x, y) in [(10.0, 0.0), (-10.0, 0.0), (0.0, 10.0), (0.0, -10.0)] {
         parts.push(part(disk(2.5), at(x, y, 5e-4), 1));
         sources.push(Source {
-            emitter: Emitter::Surface(SurfaceSource::new(disk(2.5), false, 1.0).expect("finite")),
+            emitter: Emitter::Surface(SurfaceSource::new(disk(2.5), false, Pattern::CosinePower(1.0)).expect("finite")),
             frame: at(x, y, 1e-3),
             flux: 0.96,
             spectrum: vec![(555.0, 1.0)],

@@ -9,7 +9,7 @@ use etendue_lightfield::View;
 use etendue_math::{Frame, Vec3};
 use etendue_optics::bsdf::{Bsdf, Interface, Mixture};
 use etendue_optics::medium::{Index, Medium};
-use etendue_optics::source::{Emitter, Source, SurfaceSource};
+use etendue_optics::source::{Emitter, Pattern, Source, SurfaceSource};
 use etendue_optics::table::{Curve, Table};
 use etendue_sampling::ordered::inside;
 use etendue_trace::camera_connection::look_at_events;
@@ -91,7 +91,7 @@ fn scatter([mirrored, refracted, back, through]: [f64; 4]) -> Arc<dyn Bsdf> {
 
 fn lamp(shape: Shape, frame: Frame, flux: f64) -> Source {
     Source {
-        emitter: Emitter::Surface(SurfaceSource::new(shape, false, 1.0).expect("finite")),
+        emitter: Emitter::Surface(SurfaceSource::new(shape, false, Pattern::CosinePower(1.0)).expect("finite")),
         frame,
         flux,
         spectrum: vec![(500.0, 0.4), (600.0, 1.0)],

@@ -289,6 +289,8 @@ class _Spread:
 def with_fields(scene: Scene, threads: int | None = None, *, cache: bool = True) -> tuple[Scene, list[str]]:
     """The scene with a light field in the place of each ray set, which has no luminance that could be seen; and notes.
 
+    The patches of gridded sources have one of their own.
+
     Raises
     ------
     SceneError, ArgumentError, FormatError, OSError
@@ -296,16 +298,15 @@ def with_fields(scene: Scene, threads: int | None = None, *, cache: bool = True)
     """
     sources, notes = [], []
     for i, source in enumerate(scene.sources):
-        if not isinstance(source, Rays | Gridded):
-            sources.append(source)
+        if not isinstance(source, Rays):
+            sources.append(source.seen(scene.files) if isinstance(source, Gridded) else source)
             continue
         name = source.name or f"sources[{i}]"
-        rays = source.as_rays(scene.files) if isinstance(source, Gridded) else source
-        field, surface, share = _fitted(rays, scene, threads, cache=cache)
+        field, surface, share = _fitted(source, scene, threads, cache=cache)
         sources.append(field)
         lost = f"; {share:.2%} of the flux does not come from it" if share > 1e-4 else ""
         notes.append(f"{name}: a light field on {surface} was fitted to its rays{lost}")
-        notes += [f"{name}: {note}" for note in (rays.rays.notes if rays.rays is not None else ())]
+        notes += [f"{name}: {note}" for note in (source.rays.notes if source.rays is not None else ())]
     return scene.replace(sources=tuple(sources)), notes
 
 

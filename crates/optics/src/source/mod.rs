@@ -1,8 +1,10 @@
 //! Sources: what emits rays, where it stands, how much flux it has and of which wavelengths.
 
+mod intensity_table;
 pub mod numbers;
-mod point;
+pub mod patches;
 mod rings;
+
 pub mod surface;
 
 use std::ops::Range;
@@ -17,10 +19,11 @@ use etendue_lightfield::field::draw::{FieldRays, Sampler};
 use etendue_math::{Frame, Vec3};
 use etendue_sampling::philox::{Pairs, Stream, fill_fours};
 
+pub use intensity_table::IntensityTable;
 pub use numbers::Numbers;
-pub use point::PointSource;
+pub use patches::PatchSource;
 pub use rings::{Ring, RingSource};
-pub use surface::SurfaceSource;
+pub use surface::{Pattern, SurfaceSource};
 
 /// The purpose under which the first four numbers of each ray of a traced source are drawn (see [`Pairs::new`]); each source
 /// has one of its own.
@@ -51,7 +54,9 @@ pub enum Emitter {
     /// An emitting surface.
     Surface(SurfaceSource),
     /// A point with an intensity distribution.
-    Point(PointSource),
+    Point(IntensityTable),
+    /// Patches of a carrier surface with intensity tables.
+    Patches(Arc<PatchSource>),
     /// Parallel light along +z from a piece of the plane z = 0.
     Beam(AreaSampler),
 }
@@ -119,6 +124,7 @@ impl Source {
                 });
                 boxes.fold(Bounds::EMPTY, Bounds::union)
             }
+            Emitter::Patches(patches) => patches.bounds(&self.frame),
             Emitter::Beam(_) | Emitter::Rays { .. } => {
                 Bounds::of([f64::NEG_INFINITY, f64::INFINITY].map(|v| Vec3::new(v, v, v)))
             }
@@ -210,6 +216,7 @@ impl Source {
             }
             Emitter::Surface(surface) => self.draw(source, range, count, seed, batch, |n| surface.draw(n)),
             Emitter::Point(point) => self.draw(source, range, count, seed, batch, |n| (Vec3::default(), point.draw(n))),
+            Emitter::Patches(patches) => self.draw(source, range, count, seed, batch, |n| patches.draw(n)),
             Emitter::Beam(area) => self.draw(source, range, count, seed, batch, |n| {
                 (area.draw(&mut || n.draw()).0, Vec3::new(0.0, 0.0, 1.0))
             }),

@@ -7,27 +7,42 @@ use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::warp::square_to_annulus;
 use multiversion::multiversion;
 
+use super::intensity_table::IntensityTable;
 use super::numbers::Numbers;
 
-/// A surface of any shape; each element of its area emits with intensity ∝ cosⁿθ about its normal.
+/// In which directions each element of a surface emits.
+#[derive(Clone, Debug)]
+pub enum Pattern {
+    /// With intensity ∝ cosⁿθ about its normal.
+    CosinePower(f64),
+    /// By a table without light beyond γ = 90°, on flat surfaces: γ from the normal on the emitting side, C0 along local x.
+    Table(Box<IntensityTable>),
+}
+
+/// A surface of any shape; each element of its area emits the same flux in the same pattern.
 #[derive(Clone, Debug)]
 pub struct SurfaceSource {
     shape: Shape,
     flipped: bool,
     sampler: AreaSampler,
-    exponent: f64,
+    pattern: Pattern,
 }
 
 impl SurfaceSource {
-    /// None if the shape has no finite area, or the exponent is negative or not finite.
+    /// None if the shape has no finite area, or the exponent is negative or not finite, or a table belongs to a shape that is
+    /// not flat or has light beyond 90°.
     #[must_use]
-    pub fn new(shape: Shape, flipped: bool, exponent: f64) -> Option<Self> {
+    pub fn new(shape: Shape, flipped: bool, pattern: Pattern) -> Option<Self> {
         let sampler = AreaSampler::new(&shape)?;
-        (exponent >= 0.0 && exponent.is_finite()).then_some(Self {
+        let sound = match &pattern {
+            Pattern::CosinePower(exponent) => *exponent >= 0.0 && exponent.is_finite(),
+            Pattern::Table(table) => matches!(shape, Shape::Flat(_)) && table.is_in_front(),
+        };
+        sound.then_some(Self {
             shape,
             flipped,
             sampler,
-            exponent,
+            pattern,
         })
     }
 
@@ -43,16 +58,28 @@ impl SurfaceSource {
         self.sampler.area()
     }
 
-    /// Luminance per unit of flux at an angle of emission with this cosine \[1/(mm² sr)\]: (n + 1)/(2π A) cosⁿ⁻¹θ.
+    /// Luminance per unit of flux of the light that leaves along a unit vector, at an angle to the normal with this cosine
+    /// \[1/(mm² sr)\]: I(γ, C)/(A cos θ), which is (n + 1)/(2π A) cosⁿ⁻¹θ for a power of the cosine.
     #[inline]
     #[must_use]
-    pub fn luminance(&self, cosine: f64) -> f64 {
-        let scale = (self.exponent + 1.0) / (2.0 * std::f64::consts::PI * self.sampler.area());
-        if self.exponent == 1.0 {
-            scale
-        } else {
-            scale * cosine.powf(self.exponent - 1.0)
+    pub fn luminance(&self, direction: Vec3, cosine: f64) -> f64 {
+        match &self.pattern {
+            Pattern::CosinePower(exponent) => {
+                let scale = (exponent + 1.0) / (2.0 * std::f64::consts::PI * self.sampler.area());
+                if *exponent == 1.0 {
+                    scale
+                } else {
+                    scale * cosine.powf(exponent - 1.0)
+                }
+            }
+            Pattern::Table(table) => table.intensity(self.turned(direction)) / (self.sampler.area() * cosine),
         }
+    }
+
+    /// Between local coordinates and those of the emitting side: half a turn about x for the back.
+    #[inline]
+    fn turned(&self, d: Vec3) -> Vec3 {
+        if self.flipped { Vec3::new(d.x, -d.y, -d.z) } else { d }
     }
 
     /// Whether no point of the surface can send light to `p`, as far as that is easy to tell.
@@ -81,7 +108,7 @@ impl SurfaceSource {
         let Shape::Flat(flat) = &self.shape else { return false };
         let sign = if self.flipped { -1.0 } else { 1.0 };
         match flat.outline {
-            _ if self.exponent != 1.0 => return false,
+            _ if !matches!(self.pattern, Pattern::CosinePower(1.0)) => return false,
             Outline::Annulus { inner, outer } => draw_annulus([inner, outer], sign, numbers, position, direction),
             Outline::Rectangle { width, height } => draw_rectangle([width, height], sign, numbers, position, direction),
             Outline::Whole | Outline::Polygon { .. } => return false,
@@ -89,16 +116,20 @@ impl SurfaceSource {
         true
     }
 
-    /// A ray with density ∝ cosⁿθ.
+    /// A ray with the density of the intensity.
     #[must_use]
     pub fn draw(&self, numbers: &mut Numbers) -> (Vec3, Vec3) {
         let (point, normal) = self.draw_point(numbers);
+        let exponent = match &self.pattern {
+            Pattern::CosinePower(exponent) => *exponent,
+            Pattern::Table(table) => return (point, self.turned(table.draw(numbers))),
+        };
         // ∫ cosⁿθ sin θ dθ from 0: 1 − cosⁿ⁺¹θ is uniform.
         let (u, turn) = (numbers.draw(), numbers.draw());
-        let cosine = if self.exponent == 1.0 {
+        let cosine = if exponent == 1.0 {
             (1.0 - u).sqrt()
         } else {
-            (1.0 - u).powf(1.0 / (self.exponent + 1.0))
+            (1.0 - u).powf(1.0 / (exponent + 1.0))
         };
         (point, about(normal, cosine, turn))
     }
@@ -194,7 +225,7 @@ mod tests {
         });
         let rays = 200_000;
         for (exponent, flipped) in [(0.0, false), (1.0, true), (3.5, false)] {
-            let source = SurfaceSource::new(sphere.clone(), flipped, exponent).expect("sound");
+            let source = SurfaceSource::new(sphere.clone(), flipped, Pattern::CosinePower(exponent)).expect("sound");
             let (mut first, mut second, mut side) = (0.0, 0.0, [0.0; 2]);
             for i in 0..rays {
                 let mut numbers = Numbers::new(Stream::new(5, 6), i, 0);
@@ -220,7 +251,7 @@ mod tests {
             let n = 20_000;
             let sum: f64 = (0..n)
                 .map(|i| (f64::from(i) + 0.5) / f64::from(n))
-                .map(|c| source.luminance(c) * c * 2.0 * std::f64::consts::PI / f64::from(n))
+                .map(|c| source.luminance(Vec3::default(), c) * c * 2.0 * std::f64::consts::PI / f64::from(n))
                 .sum();
             assert!((sum * source.area() - 1.0).abs() < 1e-6);
         }

@@ -12,12 +12,12 @@ from pydantic.json_schema import SkipJsonSchema
 from etendue.description.files import Files
 from etendue.description.values import Positive
 from etendue.errors import ArgumentError
-from etendue.formats.intensity import read_intensity
 from etendue.formats.rays import read_rays
 from etendue.lightfield.light_field import LightField
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
+from etendue.scene.sources.intensity_tables import check_origin, has_table, read_table, table_record
 from etendue.scene.sources.source import Emitter, Record, Source
 from etendue.units import FluxUnit
 
@@ -198,31 +198,17 @@ class Point(Source):
 
     @model_validator(mode="after")
     def _has_flux(self) -> Self:
-        given = self.file is not None or self.intensity is not None
-        if self.file is not None and self.intensity is not None:
-            raise ValueError("'file' and 'intensity' are both given; use one")
-        if self.photometry is not None and self.file is None:
-            raise ValueError("'photometry' names one of the distributions of a file; give 'file'")
-        if not given and self.flux is None:
+        check_origin(self)
+        if not has_table(self) and self.flux is None:
             raise ValueError("'flux' is missing; only a file could tell it")
-        if given and self.flux_unit is not None:
-            raise ValueError("'flux_unit' is the file's own; leave it out")
         return self
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The table and its flux."""
-        table = self.intensity
-        if self.file is not None:
-            table = read_intensity(files.find(self.file), self.photometry)
-        if table is None:
+        if has_table(self):
+            table = read_table(self, files)
+        else:
             table = Intensity(np.zeros(1), np.array([0.0, 180.0]), np.ones((1, 2)), flux_unit=self.flux_unit or "lm")
-        if (table.values < 0.0).any() or not table.flux > 0.0:
-            raise ArgumentError("the intensity is negative somewhere, or 0 everywhere")
-        record = {
-            "kind": "point",
-            "gamma": np.radians(table.gamma),
-            "c": np.radians(table.c),
-            "values": np.array(table.values),
-            "flux": table.flux if self.flux is None else self.flux,
-        }
+        flux = table.flux if self.flux is None else self.flux
+        record = {"kind": "point", **table_record(table), "flux": flux}
         return (Emitter(record, table.flux_unit, table.luminaire.get("spectrum")),)

@@ -11,33 +11,38 @@ from pydantic.json_schema import SkipJsonSchema
 
 from etendue.description.files import Files
 from etendue.description.values import AsCount, Index, Length, Positive
+from etendue.errors import ArgumentError
+from etendue.formats.patch_folder import is_patch_folder
 from etendue.formats.rays import read_rays
+from etendue.lightfield.gridded.core_patches import core_patches
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.surfaces import parse_surface
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
 from etendue.scene.placement import Placement
-from etendue.scene.sources.from_files import Rays
 from etendue.scene.sources.source import Emitter, Source
 
 
 class Gridded(Source):
-    """Rays drawn from the patches of a `GriddedSource`: a ray file sampled on a surface, pixel by pixel.
+    """The patches of a `GriddedSource`: a ray file sampled on a surface, pixel by pixel.
+
+    A trace takes rays that are drawn from the patches. Lines of sight of a map read the table of the patch that they meet,
+    L = I(θ, φ) / (A cos θ), also behind optics.
 
     Parameters
     ----------
     file : path
-        A ray file.
+        A ray file, or a folder that `GriddedSource.save_patches` or ``etendue patches`` wrote.
     surface : str
-        The carrier surface as on the command line, for example ``"plane:z=0"``.
+        For a ray file: the carrier surface as on the command line, for example ``"plane:z=0"``.
     pixel : number
-        Side of the pixels [mm].
+        For a ray file: side of the pixels [mm].
     threshold : number
-        Largest error of the flux of a pixel [%].
+        For a ray file: largest error of the flux of a pixel [%].
     gridded : GriddedSource
         In Python, instead of these four.
     draws : int
-        Rays that are drawn, all of the same flux.
+        Rays that a trace draws, all of the same flux.
     seed : int
         Of the draws.
     flux : number, optional
@@ -67,21 +72,20 @@ class Gridded(Source):
             raise ValueError(
                 "'file' is missing" if self.file is None else "'file' and 'gridded' are both given; use one"
             )
-        if (self.file is None) != (self.surface is None):
+        if self.file is None and self.surface is not None:
             raise ValueError("'surface' belongs to 'file': the carrier surface, for example \"plane:z=0\"")
         if self.surface is not None:
             parse_surface(self.surface)
         return self
 
-    def as_rays(self, files: Files) -> Rays:
-        """The source as one of the rays that are drawn, in its place: what can be fitted and then seen."""
+    def seen(self, files: Files) -> SeenGridded:
+        """The source in its place, as lines of sight meet it."""
         gridded, known = self._gridded(files)
         place = {key: getattr(self, key) for key in (*Source.model_fields, *Placement.model_fields)}
         if known is not None and not self.states_colours:
             wavelengths, shares = known.lines(gridded.flux_unit)
             place["spectrum"] = tuple(zip(wavelengths.tolist(), shares.tolist(), strict=True))
-        drawn = gridded.sample(self.draws, self.seed)
-        return Rays(**place, rays=drawn, flux=gridded.emitted_flux, flux_unit=gridded.flux_unit)
+        return SeenGridded(**place, gridded=gridded)
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The rays that were drawn, with the flux of the rays on patches, which tables of coarse bins do not hold."""
@@ -94,9 +98,41 @@ class Gridded(Source):
     def _gridded(self, files: Files) -> tuple[GriddedSource, Spectrum | SpectralLines | None]:
         """The patches, and the spectrum of the rays that they were made of."""
         gridded, known = self.gridded, None
-        if self.file is not None and self.surface is not None:
-            rays = read_rays(files.find(self.file))
-            gridded = GriddedSource.fit(rays, parse_surface(self.surface), self.pixel, self.threshold)
-            known = rays.total_spectrum()
+        if self.file is not None:
+            path = files.find(self.file)
+            if is_patch_folder(path):
+                given = [key for key in ("surface", "pixel", "threshold") if key in self.model_fields_set]
+                if given:
+                    raise ArgumentError(
+                        f"file: {self.file} is a folder of patches, whose pixels are cut already; leave out "
+                        + " and ".join(map(repr, given))
+                    )
+                gridded = GriddedSource.load(path)
+            else:
+                if self.surface is None:
+                    raise ArgumentError(
+                        'surface: is missing; a ray file needs a carrier surface, for example "plane:z=0"'
+                    )
+                rays = read_rays(path)
+                gridded = GriddedSource.fit(rays, parse_surface(self.surface), self.pixel, self.threshold)
+                known = rays.total_spectrum()
         assert gridded is not None  # noqa: S101 - one of the two is given
         return (gridded if self.flux is None else gridded.emitting(self.flux)), known
+
+
+class SeenGridded(Gridded):
+    """A gridded source whose patches lines of sight meet; `Gridded.seen` makes it.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> grid = et.GriddedSource.fit(et.RingSource(rays=5000), et.Plane(z=0), 20.0, 2.1)
+    >>> SeenGridded(gridded=grid).emitters(Files())[0].record["kind"]
+    'patches'
+    """
+
+    def emitters(self, files: Files) -> tuple[Emitter, ...]:
+        """The patches with the flux of the rays on them, which tables of coarse bins do not hold."""
+        gridded, known = self._gridded(files)
+        record = {"kind": "patches", **core_patches(gridded.surface, gridded.patches), "flux": gridded.emitted_flux}
+        return (Emitter(record, gridded.flux_unit, known, flux_notes=(gridded.flux_note,)),)
