@@ -111,7 +111,7 @@ def threshold_sweep(
     for number, threshold in enumerate(thresholds):
         model = models.source(number, rays, pixel, threshold)
         far_field = compare_intensities(model.intensity(c_planes, gamma_step), reference)
-        score, score_error, held_out = _score(judged.source(number, rays, pixel, threshold), judges)
+        score, score_error, held_out = held_out_score(judged.source(number, rays, pixel, threshold), judges)
         flux, patches = model.total_flux, model.patches
         rows.append(
             {
@@ -180,7 +180,7 @@ def _gathered(batches: Batches, rays: RayStream) -> RaySet:
     return RaySet.from_records(spool(records(), RECORD), RaySetMeaning(flux_unit=rays.flux_unit))
 
 
-def _score(source: GriddedSource, judges: RaySet) -> tuple[float, float, int]:
+def held_out_score(source: GriddedSource, judges: RaySet) -> tuple[float, float, int]:
     """Mean of ln(density / uniform density) over rays on the surface, by their flux; its standard error; their number."""
     surface = source.surface
     # Luminance over flux is the density in étendue, 1 over the étendue of the surface the uniform one.

@@ -32,8 +32,8 @@ class Gridded(Source):
         The carrier surface as on the command line, for example ``"plane:z=0"``.
     pixel : number
         Side of the pixels [mm].
-    threshold : number
-        Largest error of the flux of a pixel [%].
+    threshold : number, optional
+        Largest error of the flux of a pixel [%]; what suits the number of rays if not given.
     gridded : GriddedSource
         In Python, instead of these four.
     draws : int
@@ -55,7 +55,7 @@ class Gridded(Source):
     file: Path | None = None
     surface: str | None = None
     pixel: Length = 1.0
-    threshold: Positive = 0.021
+    threshold: Positive | None = None
     gridded: SkipJsonSchema[InstanceOf[GriddedSource] | None] = None
     draws: Annotated[int, Ge(1), Le(1 << 31), AsCount] = 1_000_000
     seed: Index = 1
