@@ -1,8 +1,8 @@
 """Chapter 3 of the thesis with its number of rays: the gridded algorithm from 10⁵ to 10⁹ rays, beside light fields.
 
-    python examples/many_rays.py                      # 200 000 rays of each lamp, seconds
-    python examples/many_rays.py --full               # up to 10⁹: the numbers of docs/chapter-3.md, an hour and more
-    python examples/many_rays.py --full --lamp led    # one lamp: bare, film or led
+    python examples/many_rays.py                      # 40 000 rays of one lamp, seconds
+    python examples/many_rays.py --full               # the numbers of docs/chapter-3.md, half an hour
+    python examples/many_rays.py --full --lamp led --most 1e9
 
 The lamps are those of `remote_phosphor.py` and `dome_led.py`. Rays are traced, counted pixel by pixel in half degrees, and
 forgotten; from the counts follow the patches of every threshold. The counts are kept in the folder `--output`, and a run
@@ -26,7 +26,15 @@ from experiments import led, phosphor
 from experiments.differences import draw_cuts, draw_differences
 from experiments.gridded_counts import GriddedCounts, counted
 from experiments.panels import INK, LINES, QUICK, measures, noise, print_table
-from experiments.sweeping import ThresholdSweep, draw_sweeps, far_field, print_pixel_sweep, print_sweep, sweep
+from experiments.sweeping import (
+    THRESHOLDS,
+    ThresholdSweep,
+    draw_sweeps,
+    far_field,
+    print_pixel_sweep,
+    print_sweep,
+    sweep,
+)
 
 LAMPS = {"bare": "Remote phosphor (fig. 3.8)", "film": "The same under a film (fig. 3.9)", "led": "LED (fig. 3.13)"}
 MARKS = (10**5, 10**6, 10**7, 10**8, 10**9)
@@ -35,6 +43,13 @@ FIELDS = 10**7
 
 Depths = tuple[int, int, int, int] | None
 Seen = dict[str, list[et.LuminanceMap]]
+
+
+def power(rays: int) -> str:
+    """4·10⁸ for 400 000 000."""
+    digits, exponent = f"{rays:.0e}".split("e+")
+    raised = f"10{str(int(exponent)).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+    return raised if digits == "1" else f"{digits}·{raised}"
 
 
 def place(observer: et.Observer) -> str:
@@ -92,7 +107,7 @@ class Lamp:
             observers = [et.Observer(theta, 0, 1000) for theta in (0, 30, 60, 90)]
             screen, surface = et.Screen(2.5, 2.5, 50, 50), et.Dome(radius=led.CARRIER)
             return cls(
-                led.recorded(), surface, 0.125, 16, led.LOW_BOX, observers, screen, 1024, 0.01, 10**9, symmetric=False
+                led.recorded(), surface, 0.125, 16, led.LOW_BOX, observers, screen, 1024, 0.01, 10**8, symmetric=False
             )
         top, film = phosphor.TOP[name], name == "film"
         observers = [
@@ -123,7 +138,10 @@ def print_spread(lamp: Lamp, truth: list[et.LuminanceMap], rays: int, depths: De
         file = lamp.traced(rays, 900 + seed)
         suited = et.GriddedSource.fit(file, lamp.surface, lamp.pixel, parallels=lamp.parallels)
         field = et.LightField.fit(file, lamp.carrier, depths=depths)
-        seen = {"gridded, suited E": maps_of(lamp, suited), "field": et.luminance_map(field, lamp.observers, lamp.screen)}
+        seen = {
+            "gridded, suited E": maps_of(lamp, suited),
+            "field": et.luminance_map(field, lamp.observers, lamp.screen),
+        }
         for name, maps in seen.items():
             pairs = zip(maps, truth, strict=True)
             found.setdefault(name, []).append([[float(m) if m != "–" else np.nan for m in measures(*p)] for p in pairs])
@@ -136,7 +154,7 @@ def print_spread(lamp: Lamp, truth: list[et.LuminanceMap], rays: int, depths: De
     print_table(["", *map(place, lamp.observers)], rows)
 
 
-def print_storage(lamp: Lamp, source: et.GriddedSource, rays: int, folder: Path, depths: Depths) -> None:
+def print_storage(lamp: Lamp, source: et.GriddedSource, field: et.LightField, rays: int, folder: Path) -> None:
     """Bytes of the patches and of a light field beside those of the ray file, and how long their maps take."""
     shutil.rmtree(folder / "patches", ignore_errors=True)
     source.save_patches(folder / "patches")
@@ -145,11 +163,12 @@ def print_storage(lamp: Lamp, source: et.GriddedSource, rays: int, folder: Path,
     et.write_rays(folder / "some.tm25ray", file)
     ray_file = (folder / "some.tm25ray").stat().st_size / len(file) * rays
     (folder / "some.tm25ray").unlink()
-    field = et.LightField.fit(lamp.traced(FIELDS if depths is None else 10**5, 8), lamp.carrier, depths=depths)
     field.save(folder / "field.h5")
     held = (folder / "field.h5").stat().st_size
     print(f"\nray file of {rays:,} rays: {ray_file / 1e6:,.1f} MB (TM-25)")
-    print(f"{len(source.patches)} intensity files: {patches / 1e6:.1f} MB, 1/{ray_file / patches:,.0f} (thesis: 30 MB, 1/830)")
+    print(
+        f"{len(source.patches)} intensity files: {patches / 1e6:.1f} MB, 1/{ray_file / patches:,.0f} (thesis: 30 MB, 1/830)"
+    )
     print(f"light field: {held / 1e6:.1f} MB, 1/{ray_file / held:,.0f}")
     one = [lamp.observers[1]]
     start = time.perf_counter()
@@ -157,7 +176,9 @@ def print_storage(lamp: Lamp, source: et.GriddedSource, rays: int, folder: Path,
     middle = time.perf_counter()
     et.luminance_map(field, *one, lamp.screen)
     end = time.perf_counter()
-    print(f"a map of the patches takes {middle - start:.2f} s, of the light field {end - middle:.2f} s (thesis: 7 h and more)")
+    print(
+        f"a map of the patches takes {middle - start:.2f} s, of the light field {end - middle:.2f} s (thesis: 7 h and more)"
+    )
 
 
 def draw(name: str, lamp: Lamp, truth: list[et.LuminanceMap], seen: Seen, folder: Path) -> None:
@@ -189,13 +210,13 @@ def draw(name: str, lamp: Lamp, truth: list[et.LuminanceMap], seen: Seen, folder
             ]
             for label, maps in [*seen.items(), ("the lamp itself", truth)]
         }
-    draw_cuts(folder / f"{name}-cuts.png", panels, columns=min(2, len(panels)))
+    draw_cuts(folder / f"{name}-cuts.png", panels, columns=2 if name == "led" else len(panels))
 
 
 def experiment(name: str, options: argparse.Namespace) -> ThresholdSweep:
     """All of one lamp."""
     lamp, folder = Lamp.named(name), options.output
-    traced = lamp.rays // 4 if lamp.symmetric else lamp.rays
+    traced = options.most or (lamp.rays // 4 if lamp.symmetric else lamp.rays)
     marks = sorted({mark for mark in MARKS if mark <= traced} | {traced})
     depths: Depths = None
     if not options.full:
@@ -212,7 +233,9 @@ def experiment(name: str, options: argparse.Namespace) -> ThresholdSweep:
     seen: Seen = {}
     start = time.perf_counter()
     for mark in counted(counts, lamp.traced, marks, folder / f"{name}-counts"):
-        print(f"{mark:,} rays traced and counted after {time.perf_counter() - start:.0f} s, {counts.left:,} leave the lamp")
+        print(
+            f"{mark:,} rays traced and counted after {time.perf_counter() - start:.0f} s, {counts.left:,} leave the lamp"
+        )
         last = mark == marks[-1]
         all_rays = counts.mirrored() if lamp.symmetric and last else counts
         suited = suited_threshold(all_rays.lit.rays_per_patch)
@@ -220,45 +243,52 @@ def experiment(name: str, options: argparse.Namespace) -> ThresholdSweep:
             source = all_rays.source(threshold)
             maps = maps_of(lamp, source)
             told = f"gridded, {threshold:.2g} %, {source.patches.bins.mean():,.0f} bins"
-            rows.append([f"{all_rays.traced:.0e}", told, *cells(maps, truth)])
+            rows.append([power(all_rays.traced), told, *cells(maps, truth)])
             if threshold == lamp.best and last:
-                seen[f"gridded, {all_rays.traced:.0e} rays"] = maps
+                seen[f"gridded, {power(all_rays.traced)} rays"] = maps
                 best = source
         if mark <= FIELDS:
             field = et.LightField.fit(lamp.traced(mark, 10**6 + 2), lamp.carrier, depths=depths)
             maps = et.luminance_map(field, lamp.observers, lamp.screen)
-            rows.append([f"{mark:.0e}", "field", *cells(maps, truth)])
-            last_field = {f"field, {mark:.0e} rays": maps}
+            rows.append([power(mark), "field", *cells(maps, truth)])
+            last_field = {f"field, {power(mark)} rays": maps}
     print(f"\n{name}: NCC / NRMSE of eq. 3.6 / true NRMSE [%]\n")
     rows.append(["", "noise of the lamp's own map", *map(noise, truth)])
     print_table(["rays", "", *map(place, lamp.observers)], rows)
-    found = sweep(all_rays, file, judges)
-    print(f"\nthresholds with {all_rays.traced:,} rays; NCC and NRMSE of {judge:,} rays drawn against a file of as many\n")
+    found = sweep(all_rays, file, judges, THRESHOLDS if options.full else (2.1, 0.021))
+    print(
+        f"\nthresholds with {all_rays.traced:,} rays; NCC and NRMSE of {judge:,} rays drawn against a file of as many\n"
+    )
     print_sweep(found)
     again = compare_intensities(far_field(judges), far_field(file))
     print(f"a second ray file against the first: NCC {again.ncc:.3%}, NRMSE {again.nrmse_thesis:.3%}")
-    many = lamp.traced(4 * judge, 10**6 + 3)
-    print(f"\npixels with {4 * judge:,} rays\n")
-    sides = [lamp.pixel * 2.0**k for k in range(2, -3, -1)]
+    many = lamp.traced(4 * judge if options.full else judge, 10**6 + 3)
+    print(f"\npixels with {len(many):,} rays\n")
+    sides = [lamp.pixel * 2.0**k for k in (range(2, -3, -1) if options.full else range(2))]
     # Cells of the dome follow the squares.
     print_pixel_sweep(sides, lambda side: et.GriddedSource.fit(many, lamp.surface, side), file, judges)
     if options.full:
-        print_spread(lamp, truth, 4 * judge, depths)
-    print_storage(lamp, best, all_rays.left, folder, depths)
+        print_spread(lamp, truth, judge, depths)
+    print_storage(lamp, best, field, all_rays.left, folder)
     draw(name, lamp, truth, seen | last_field, folder)
     return found
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rays", type=int, default=200_000)
-    parser.add_argument("--lamp", choices=[*LAMPS, "all"], default="all")
-    parser.add_argument("--full", action="store_true", help="up to 10⁹ rays, a million to judge, fine grids, five seeds")
+    parser.add_argument("--rays", type=int, default=40_000)
+    parser.add_argument("--lamp", choices=LAMPS, help="one of them only; without --full it is bare")
+    parser.add_argument(
+        "--full", action="store_true", help="up to 10⁹ rays, a million to judge, fine grids, five seeds"
+    )
+    parser.add_argument(
+        "--most", type=lambda text: int(float(text)), help="rays that --full traces of each lamp, as 1e9"
+    )
     parser.add_argument("--output", type=Path, default=Path("many-rays"), help="folder for the figures and the counts")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    chosen = list(LAMPS) if options.lamp == "all" else [options.lamp]
-    sweeps = {f"{LAMPS[name]}": experiment(name, options) for name in chosen}
+    chosen = [options.lamp] if options.lamp else list(LAMPS) if options.full else ["bare"]
+    sweeps = {LAMPS[name]: experiment(name, options) for name in chosen}
     draw_sweeps(options.output / "thresholds.png", sweeps)
     print(f"\nfigures: {options.output}/")
 

@@ -1,16 +1,15 @@
-"""Maps beside a reference and their percentage differences (eq. 3.4), and cuts through maps: figures 3.3 to 3.7, 3.14, 3.15."""
+"""Maps beside a reference, their percentage differences (eq. 3.4), and cuts: figures 3.3 to 3.7, 3.10, 3.14 and 3.15."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import etendue as et
 import numpy as np
+from experiments.panels import FAINT, INK, new_figure, save, scale, show_map
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import MultipleLocator
-from experiments.panels import FAINT, INK, new_figure, save, scale, show_map
 
 GREATEST = 50.0
 """Of the colours of differences [%]."""
@@ -58,17 +57,17 @@ def draw_differences(
     save(made, path)
 
 
-Curve = tuple[str, Any, str]
-"""A cut with its label, and a colour; the first of a panel is drawn as a line, the others as points."""
-
-
-def draw_cuts(path: Path, panels: Mapping[str, Sequence[tuple[str, et.CrossSection, str, str]]], columns: int = 2) -> None:
+def draw_cuts(
+    path: Path, panels: Mapping[str, Sequence[tuple[str, et.CrossSection, str, str]]], columns: int = 2
+) -> None:
     """Cuts through maps: label, cut, format (``"-"`` for the steps of its pixels) and colour, panel by panel."""
     rows = -(-len(panels) // columns)
-    made = new_figure(4.3 * columns, 2.7 * rows + 0.4)
-    for axes, (title, curves) in zip(made.subplots(rows, columns, squeeze=False).flat, panels.items(), strict=False):
+    made = new_figure(3.6 * columns + 0.6, 2.7 * rows + 0.4)
+    thousand = max(np.nanmax(cut.values) for curves in panels.values() for _, cut, _, _ in curves) < 1e6
+    unit, name = (1e3, "10³") if thousand else (1e6, "10⁶")
+    for axes, (title, curves) in zip(made.subplots(rows, columns, squeeze=False).flat, panels.items(), strict=True):
         for label, cut, how, colour in curves:
-            values, edges = cut.values / 1e3, np.append(cut.position - cut.pitch / 2, cut.position[-1] + cut.pitch / 2)
+            values, edges = cut.values / unit, np.append(cut.position - cut.pitch / 2, cut.position[-1] + cut.pitch / 2)
             if how == "-":
                 axes.stairs(values, edges, baseline=None, color=colour, label=label, linewidth=1.2)
             else:
@@ -78,7 +77,7 @@ def draw_cuts(path: Path, panels: Mapping[str, Sequence[tuple[str, et.CrossSecti
         axes.tick_params(labelsize=8)
         axes.set_ylim(bottom=0.0)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.set_ylabel("luminance [10³ cd/m²]", fontsize=9)
+        axes.set_ylabel(f"luminance [{name} cd/m²]", fontsize=9)
     handles, labels = made.axes[0].get_legend_handles_labels()
     made.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=8)
     save(made, path)

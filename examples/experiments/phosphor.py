@@ -1,4 +1,4 @@
-"""A remote phosphor, bare or under a film of prisms: what section 3.2.3 of the thesis measured, here with nothing unknown."""
+"""A remote phosphor, bare or under a film of prisms: what section 3.2.3 of the thesis measured, here all known."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 from etendue.goniophotometry.comparison import compare_intensities
-from etendue.goniophotometry.threshold_sweep import THRESHOLDS, held_out_score
+from etendue.goniophotometry.threshold_sweep import held_out_score
 from etendue.plot.threshold_picture import plot_threshold_sweep
 from etendue.quantities.threshold_sweep import ThresholdSweep
 from experiments.gridded_counts import GriddedCounts
@@ -24,11 +24,12 @@ def far_field(rays: et.RaySet) -> et.Intensity:
 
 
 def judged(source: et.GriddedSource, file: et.RaySet, judges: et.RaySet) -> dict[str, float]:
-    """As many rays drawn from the patches as the file has, against the file; and the score of rays that the patches never saw.
+    """As many rays drawn from the patches as a file has, against the file; and the score of rays never seen.
 
     Parameters
     ----------
     source : GriddedSource
+        The patches.
     file : RaySet
         A ray file of the lamp; not the rays that the patches were made of.
     judges : RaySet
@@ -51,9 +52,9 @@ def judged(source: et.GriddedSource, file: et.RaySet, judges: et.RaySet) -> dict
     }
 
 
-def sweep(counts: GriddedCounts, file: et.RaySet, judges: et.RaySet) -> ThresholdSweep:
-    """Nine thresholds, from the same rays."""
-    rows = [judged(counts.source(threshold), file, judges) for threshold in THRESHOLDS]
+def sweep(counts: GriddedCounts, file: et.RaySet, judges: et.RaySet, thresholds: Sequence[float]) -> ThresholdSweep:
+    """One threshold after the other, from the same rays."""
+    rows = [judged(counts.source(threshold), file, judges) for threshold in thresholds]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     return ThresholdSweep(columns, len(counts.lit.pixel), counts.left, len(judges))
 
@@ -65,7 +66,8 @@ def print_sweep(found: ThresholdSweep) -> None:
         [
             [f"{e:g} %", f"{b:,.0f}", f"{n:.3%}", f"{r:.3%}", f"{s:.4f} ± {d:.4f}"]
             for e, b, n, r, s, d in zip(
-                *(found[name] for name in ("threshold", "bins", "ncc", "nrmse_thesis", "score", "score_error")), strict=True
+                *(found[name] for name in ("threshold", "bins", "ncc", "nrmse_thesis", "score", "score_error")),
+                strict=True,
             )
         ],
     )
