@@ -20,6 +20,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 from etendue.goniophotometry.comparison import compare_intensities
+from etendue.goniophotometry.threshold_sweep import THRESHOLDS
 from etendue.lightfield.gridded.gridded_source import suited_threshold
 from etendue.luminance.gridded_map import gridded_luminance_map
 from experiments import led, phosphor
@@ -27,7 +28,6 @@ from experiments.differences import draw_cuts, draw_differences
 from experiments.gridded_counts import GriddedCounts, counted
 from experiments.panels import INK, LINES, QUICK, measures, noise, print_table
 from experiments.sweeping import (
-    THRESHOLDS,
     ThresholdSweep,
     draw_sweeps,
     far_field,
@@ -40,6 +40,9 @@ LAMPS = {"bare": "Remote phosphor (fig. 3.8)", "film": "The same under a film (f
 MARKS = (10**5, 10**6, 10**7, 10**8, 10**9)
 FIELDS = 10**7
 """Light fields are fitted up to so many rays."""
+
+DIAGONAL = (0.5**0.5, -(0.5**0.5), 0.0)
+"""Normal of the plane x = y."""
 
 Depths = tuple[int, int, int, int] | None
 Seen = dict[str, list[et.LuminanceMap]]
@@ -80,8 +83,8 @@ class Lamp:
         Threshold [%] that the thesis found best.
     rays : int
         Most rays to be traced.
-    symmetric : bool
-        Whether the lamp is its own image in x = 0 and in y = 0: of the most rays, three in four are images then.
+    mirrors : tuple
+        Normals of planes in which the lamp is its own image: of the most rays, half, or three in four, are images.
     """
 
     scene: et.Scene
@@ -94,7 +97,7 @@ class Lamp:
     lines: int
     best: float
     rays: int
-    symmetric: bool
+    mirrors: tuple[tuple[float, float, float], ...]
 
     def traced(self, rays: int, seed: int) -> et.RaySet:
         """Rays that leave it."""
@@ -107,7 +110,17 @@ class Lamp:
             observers = [et.Observer(theta, 0, 1000) for theta in (0, 30, 60, 90)]
             screen, surface = et.Screen(2.5, 2.5, 50, 50), et.Dome(radius=led.CARRIER)
             return cls(
-                led.recorded(), surface, 0.125, 16, led.LOW_BOX, observers, screen, 1024, 0.01, 10**8, symmetric=False
+                led.recorded(),
+                surface,
+                0.125,
+                16,
+                led.LOW_BOX,
+                observers,
+                screen,
+                1024,
+                0.01,
+                10**9,
+                mirrors=(DIAGONAL,),
             )
         top, film = phosphor.TOP[name], name == "film"
         observers = [
@@ -118,7 +131,7 @@ class Lamp:
         plane = et.Plane(top, *phosphor.CARRIER[name], centre=(0, 0))
         carrier = phosphor.BOX if film else et.Plane(top, 24.2, 24.2, centre=(0, 0))
         how = (phosphor.lamp(name), plane, 1.0, None, carrier, observers, et.Screen(23, 23, 23, 23), 512)
-        return cls(*how, *((0.021, 4 * 10**8) if film else (2.1, 10**9)), symmetric=True)
+        return cls(*how, *((0.021, 4 * 10**8) if film else (2.1, 10**9)), mirrors=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 
 
 def maps_of(lamp: Lamp, source: et.GriddedSource) -> list[et.LuminanceMap]:
@@ -197,7 +210,10 @@ def draw(name: str, lamp: Lamp, truth: list[et.LuminanceMap], seen: Seen, folder
         panels = {
             place(lamp.observers[i]): [
                 ("the lamp itself", et.cross_section(truth[i], **along), "-", INK),
-                *((label, et.cross_section(maps[i], **along), *how) for (label, maps), how in zip(seen.items(), looks)),
+                *(
+                    (name, et.cross_section(seen[name][i], **along), *how)
+                    for name, how in zip(seen, looks, strict=True)
+                ),
             ]
             for i in shown
         }
@@ -216,7 +232,7 @@ def draw(name: str, lamp: Lamp, truth: list[et.LuminanceMap], seen: Seen, folder
 def experiment(name: str, options: argparse.Namespace) -> ThresholdSweep:
     """All of one lamp."""
     lamp, folder = Lamp.named(name), options.output
-    traced = options.most or (lamp.rays // 4 if lamp.symmetric else lamp.rays)
+    traced = options.most or lamp.rays // 2 ** len(lamp.mirrors)
     marks = sorted({mark for mark in MARKS if mark <= traced} | {traced})
     depths: Depths = None
     if not options.full:
@@ -237,7 +253,7 @@ def experiment(name: str, options: argparse.Namespace) -> ThresholdSweep:
             f"{mark:,} rays traced and counted after {time.perf_counter() - start:.0f} s, {counts.left:,} leave the lamp"
         )
         last = mark == marks[-1]
-        all_rays = counts.mirrored() if lamp.symmetric and last else counts
+        all_rays = counts.mirrored(*lamp.mirrors) if last else counts
         suited = suited_threshold(all_rays.lit.rays_per_patch)
         for threshold in sorted({lamp.best, *(() if suited == lamp.best else (suited,))}):
             source = all_rays.source(threshold)

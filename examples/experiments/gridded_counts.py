@@ -20,6 +20,7 @@ from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.fitting import Account, Bins, LitPixels, patches_of
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
 from etendue.quantities.provenance import Provenance
+from scipy.spatial import cKDTree
 
 CELLS = angular.RINGS * angular.SECTORS
 AT_ONCE = 1 << 22
@@ -73,16 +74,33 @@ class GriddedCounts:
             self.left += len(batch.flux)
         self.traced += traced
 
-    def mirrored(self) -> GriddedCounts:
-        """With the images of all rays in the planes x = 0 and y = 0: of a flat lamp that is symmetric in both."""
-        (squares,) = self.surface.pixels
-        columns, rows = squares.lattice[1]
-        flux = self.flux.reshape(columns, rows, angular.RINGS, angular.SECTORS)
-        # φ becomes 180° - φ, and -φ; sector s is that from s/2 to (s + 1)/2 degrees.
-        turned = (angular.SECTORS // 2 - 1 - np.arange(angular.SECTORS)) % angular.SECTORS
-        flux = flux + flux[::-1, :, :, turned]
-        flux += flux[:, ::-1, :, ::-1]
-        return GriddedCounts(self.surface, flux.reshape(-1, CELLS), 4 * self.traced, 4 * self.left, 4 * self.lost)
+    def mirrored(self, *normals: tuple[float, float, float]) -> GriddedCounts:
+        """With the images of all rays in planes through the origin, one after the other: of a lamp that is its own image.
+
+        Parameters
+        ----------
+        normals : tuple of float
+            Unit vectors. Pixels have to be images of pixels.
+        """
+        cells = self.surface.cells(np.arange(self.surface.count))
+        flux = self.flux
+        for normal in normals:
+            mirror = np.eye(3) - 2.0 * np.outer(normal, normal)
+            off, image = cKDTree(cells.centre).query(cells.centre @ mirror)
+            if off.max() > 1e-9:
+                raise ValueError(f"the image of a pixel is none, by {off.max():g} mm; give another plane.")
+            # A reflection turns φ round: it becomes that of the image of the x axis, less φ.
+            axis = np.einsum("nij,nj->ni", cells.axes[image], cells.axes[:, 0] @ mirror)
+            turn = np.rint(np.degrees(np.arctan2(axis[:, 1], axis[:, 0])) * 2.0).astype(np.intp)
+            images = np.zeros_like(flux)
+            for pixel in np.flatnonzero(flux.any(axis=1)):
+                # Sector s reaches from s/2 to (s + 1)/2 degrees.
+                sector = (turn[pixel] - 1 - np.arange(angular.SECTORS)) % angular.SECTORS
+                table = flux[pixel].reshape(angular.RINGS, angular.SECTORS)
+                images[image[pixel]] = table[:, sector].reshape(-1)
+            flux = flux + images
+        times = 2 ** len(normals)
+        return GriddedCounts(self.surface, flux, times * self.traced, times * self.left, times * self.lost)
 
     @functools.cached_property
     def lit(self) -> LitPixels:

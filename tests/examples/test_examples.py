@@ -15,6 +15,7 @@ RUNS = {
     "chapter_4.py": (["--lines", "4"], 6),
     "dome_led.py": (["--rays", "100000"], 2),
     "first_picture.py": (["--rays", "500000", "--output", "picture.png"], 1),
+    "many_rays.py": (["--rays", "20000"], 3),
     "narrow_beam.py": (["--rays", "50000"], 3),
     "remote_phosphor.py": (["--rays", "20000"], 3),
     "rings_traced.py": (["--rays", "1000000"], 1),
