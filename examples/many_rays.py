@@ -28,11 +28,11 @@ from experiments.differences import draw_cuts, draw_differences
 from experiments.gridded_counts import GriddedCounts, counted
 from experiments.panels import INK, LINES, QUICK, measures, noise, print_table
 from experiments.sweeping import (
-    ThresholdSweep,
-    draw_sweeps,
+    draw_sweep,
     far_field,
     print_pixel_sweep,
     print_sweep,
+    suitability,
     sweep,
 )
 
@@ -119,7 +119,7 @@ class Lamp:
                 screen,
                 1024,
                 0.01,
-                10**9,
+                4 * 10**8,
                 mirrors=(DIAGONAL,),
             )
         top, film = phosphor.TOP[name], name == "film"
@@ -229,12 +229,65 @@ def draw(name: str, lamp: Lamp, truth: list[et.LuminanceMap], seen: Seen, folder
     draw_cuts(folder / f"{name}-cuts.png", panels, columns=2 if name == "led" else len(panels))
 
 
-def experiment(name: str, options: argparse.Namespace) -> ThresholdSweep:
+@dataclasses.dataclass
+class Growth:
+    """What comes of more and more rays of a lamp.
+
+    Parameters
+    ----------
+    rows, suits : list
+        Of tables: measures of maps, and thresholds that suit the number of rays.
+    seen : dict
+        Maps of the patches of the most rays, and of the field of the most that it was fitted to.
+    counts, source, field
+        Of the same.
+    """
+
+    rows: list[list[str]] = dataclasses.field(default_factory=list)
+    suits: list[list[str]] = dataclasses.field(default_factory=list)
+    seen: Seen = dataclasses.field(default_factory=dict)
+    counts: GriddedCounts | None = None
+    source: et.GriddedSource | None = None
+    field: et.LightField | None = None
+
+
+def grown(
+    lamp: Lamp, truth: list[et.LuminanceMap], marks: list[int], judges: et.RaySet, folder: Path, depths: Depths
+) -> Growth:
+    """Patches and fields of as many rays as the marks say."""
+    found, start = Growth(), time.perf_counter()
+    counts = GriddedCounts.on(lamp.surface, lamp.pixel, lamp.parallels)
+    for mark in counted(counts, lamp.traced, marks, folder):
+        print(f"{mark:,} rays traced after {time.perf_counter() - start:.0f} s, {counts.left:,} leave the lamp")
+        found.counts = counts.mirrored(*lamp.mirrors) if mark == marks[-1] else counts
+        name = power(found.counts.traced)
+        suited = suited_threshold(found.counts.lit.rays_per_patch)
+        for threshold in sorted({lamp.best, suited}):
+            source = found.counts.source(threshold)
+            maps = maps_of(lamp, source)
+            bins = f"{source.patches.bins.mean():,.0f}"
+            found.rows.append([name, f"gridded, {threshold:.2g} %, {bins} bins", *cells(maps, truth)])
+            if threshold == lamp.best and mark == marks[-1]:
+                found.seen[f"gridded, {name} rays"] = maps
+                found.source = source
+        if mark > FIELDS:
+            continue
+        if depths is None:
+            found.suits.append([name, *suitability(counts, judges)])
+        found.field = et.LightField.fit(lamp.traced(mark, 10**6 + 2), lamp.carrier, depths=depths)
+        field = {f"field, {name} rays": et.luminance_map(found.field, lamp.observers, lamp.screen)}
+        found.rows.append([name, "field", *cells(*field.values(), truth)])
+    found.seen |= field
+    return found
+
+
+def experiment(name: str, options: argparse.Namespace) -> None:
     """All of one lamp."""
     lamp, folder = Lamp.named(name), options.output
     traced = options.most or lamp.rays // 2 ** len(lamp.mirrors)
     marks = sorted({mark for mark in MARKS if mark <= traced} | {traced})
     depths: Depths = None
+    judge = 10**6 if options.full else options.rays
     if not options.full:
         coarse = et.Screen(lamp.screen.width, lamp.screen.height, 23, 23)
         lamp = dataclasses.replace(lamp, lines=4, screen=coarse)
@@ -242,42 +295,24 @@ def experiment(name: str, options: argparse.Namespace) -> ThresholdSweep:
     print(f"\n# {name}\n")
     method = et.PathTracing(rays_per_pixel=lamp.lines)
     truth = et.luminance_map(lamp.scene, lamp.observers, lamp.screen, method=method)
-    counts = GriddedCounts.on(lamp.surface, lamp.pixel, lamp.parallels)
-    judge = 10**6 if options.full else options.rays
     file, judges = (lamp.traced(judge, 10**6 + i) for i in range(2))
-    rows: list[list[str]] = []
-    seen: Seen = {}
-    start = time.perf_counter()
-    for mark in counted(counts, lamp.traced, marks, folder / f"{name}-counts"):
-        print(
-            f"{mark:,} rays traced and counted after {time.perf_counter() - start:.0f} s, {counts.left:,} leave the lamp"
-        )
-        last = mark == marks[-1]
-        all_rays = counts.mirrored(*lamp.mirrors) if last else counts
-        suited = suited_threshold(all_rays.lit.rays_per_patch)
-        for threshold in sorted({lamp.best, *(() if suited == lamp.best else (suited,))}):
-            source = all_rays.source(threshold)
-            maps = maps_of(lamp, source)
-            told = f"gridded, {threshold:.2g} %, {source.patches.bins.mean():,.0f} bins"
-            rows.append([power(all_rays.traced), told, *cells(maps, truth)])
-            if threshold == lamp.best and last:
-                seen[f"gridded, {power(all_rays.traced)} rays"] = maps
-                best = source
-        if mark <= FIELDS:
-            field = et.LightField.fit(lamp.traced(mark, 10**6 + 2), lamp.carrier, depths=depths)
-            maps = et.luminance_map(field, lamp.observers, lamp.screen)
-            rows.append([power(mark), "field", *cells(maps, truth)])
-            last_field = {f"field, {power(mark)} rays": maps}
+    found = grown(lamp, truth, marks, judges, folder / f"{name}-counts", depths)
     print(f"\n{name}: NCC / NRMSE of eq. 3.6 / true NRMSE [%]\n")
-    rows.append(["", "noise of the lamp's own map", *map(noise, truth)])
-    print_table(["rays", "", *map(place, lamp.observers)], rows)
-    found = sweep(all_rays, file, judges, THRESHOLDS if options.full else (2.1, 0.021))
-    print(
-        f"\nthresholds with {all_rays.traced:,} rays; NCC and NRMSE of {judge:,} rays drawn against a file of as many\n"
+    print_table(
+        ["rays", "", *map(place, lamp.observers)],
+        [*found.rows, ["", "noise of the lamp's own map", *map(noise, truth)]],
     )
-    print_sweep(found)
+    if found.suits:
+        print(f"\n{name}: thresholds suited to the number of rays\n")
+        print_table(["rays", "per patch", "suited E", "its score", "best of nine", "its score", "0.021 %"], found.suits)
+    swept = sweep(found.counts, file, judges, THRESHOLDS if options.full else (2.1, 0.021))
+    print(f"\nthresholds with {found.counts.traced:,} rays; {judge:,} rays drawn against a file of as many\n")
+    print_sweep(swept)
     again = compare_intensities(far_field(judges), far_field(file))
     print(f"a second ray file against the first: NCC {again.ncc:.3%}, NRMSE {again.nrmse_thesis:.3%}")
+    draw_sweep(folder / f"{name}-thresholds.png", swept, LAMPS[name])
+    print_storage(lamp, found.source, found.field, found.counts.left, folder)
+    draw(name, lamp, truth, found.seen, folder)
     many = lamp.traced(4 * judge if options.full else judge, 10**6 + 3)
     print(f"\npixels with {len(many):,} rays\n")
     sides = [lamp.pixel * 2.0**k for k in (range(2, -3, -1) if options.full else range(2))]
@@ -285,9 +320,6 @@ def experiment(name: str, options: argparse.Namespace) -> ThresholdSweep:
     print_pixel_sweep(sides, lambda side: et.GriddedSource.fit(many, lamp.surface, side), file, judges)
     if options.full:
         print_spread(lamp, truth, judge, depths)
-    print_storage(lamp, best, field, all_rays.left, folder)
-    draw(name, lamp, truth, seen | last_field, folder)
-    return found
 
 
 def main() -> None:
@@ -304,8 +336,8 @@ def main() -> None:
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     chosen = [options.lamp] if options.lamp else list(LAMPS) if options.full else ["bare"]
-    sweeps = {LAMPS[name]: experiment(name, options) for name in chosen}
-    draw_sweeps(options.output / "thresholds.png", sweeps)
+    for name in chosen:
+        experiment(name, options)
     print(f"\nfigures: {options.output}/")
 
 

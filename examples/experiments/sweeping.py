@@ -8,7 +8,8 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 from etendue.goniophotometry.comparison import compare_intensities
-from etendue.goniophotometry.threshold_sweep import held_out_score
+from etendue.goniophotometry.threshold_sweep import THRESHOLDS, held_out_score
+from etendue.lightfield.gridded.gridded_source import suited_threshold
 from etendue.plot.threshold_picture import plot_threshold_sweep
 from etendue.quantities.threshold_sweep import ThresholdSweep
 from experiments.gridded_counts import GriddedCounts
@@ -59,6 +60,15 @@ def sweep(counts: GriddedCounts, file: et.RaySet, judges: et.RaySet, thresholds:
     return ThresholdSweep(columns, len(counts.lit.pixel), counts.left, len(judges))
 
 
+def suitability(counts: GriddedCounts, judges: et.RaySet) -> list[str]:
+    """How near the threshold that suits the number of rays is to the best, by the score of rays never seen."""
+    suited = suited_threshold(counts.lit.rays_per_patch)
+    score = {e: held_out_score(counts.source(e).as_printed, judges)[0] for e in (*THRESHOLDS, suited)}
+    best = max(THRESHOLDS, key=score.__getitem__)
+    told = [f"{suited:g} %", f"{score[suited]:.3f}", f"{best:g} %", f"{score[best]:.3f}", f"{score[0.021]:.3f}"]
+    return [f"{counts.lit.rays_per_patch:,.0f}", *told]
+
+
 def print_sweep(found: ThresholdSweep) -> None:
     """One row for each threshold."""
     print_table(
@@ -73,12 +83,10 @@ def print_sweep(found: ThresholdSweep) -> None:
     )
 
 
-def draw_sweeps(path: Path, sweeps: dict[str, ThresholdSweep]) -> None:
-    """Figures 3.8, 3.9 and 3.13, one beside the other."""
-    made = new_figure(5.2 * len(sweeps), 4.6)
-    panels = made.subplots(2, len(sweeps), squeeze=False)
-    for number, (title, found) in enumerate(sweeps.items()):
-        plot_threshold_sweep(found, ax=list(panels[:, number]), title=title)
+def draw_sweep(path: Path, found: ThresholdSweep, title: str) -> None:
+    """Figure 3.8, 3.9 or 3.13, and below it what it does not show."""
+    made = new_figure(5.4, 4.4)
+    plot_threshold_sweep(found, ax=list(made.subplots(2, 1)), title=title)
     save(made, path)
 
 

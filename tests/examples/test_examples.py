@@ -13,7 +13,7 @@ RUNS = {
     "appendix_b.py": (["--rays", "50000"], 4),
     "chapter_2.py": (["--rays", "200000", "--seeds", "4"], 4),
     "chapter_4.py": (["--lines", "4"], 6),
-    "dome_led.py": (["--rays", "100000"], 2),
+    "dome_led.py": (["--rays", "100000"], 3),
     "first_picture.py": (["--rays", "500000", "--output", "picture.png"], 1),
     "many_rays.py": (["--rays", "20000"], 3),
     "narrow_beam.py": (["--rays", "50000"], 3),
