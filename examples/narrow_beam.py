@@ -57,10 +57,16 @@ def square(flux: float) -> dict[str, Any]:
 def luminaires(near_field: et.RaySet, *, full: bool) -> dict[str, et.Scene]:
     """The lens before the LED itself, and before each model of it."""
     field = et.LightField.fit(near_field, led.LOW_BOX, depths=None if full else QUICK)
-    grid = et.GriddedSource.fit(near_field, et.Dome(radius=led.CARRIER), 0.125, 0.01, 16).as_printed
+    grid = et.GriddedSource.fit(near_field, et.Dome(radius=led.CARRIER), 0.125, parallels=16).as_printed
+    print(f"gridded: {grid.notes[0]}, E = {grid.threshold:g} %")
     models: dict[str, dict[str, Any]] = {
         "ray file": {"kind": "rays", "rays": near_field},
         "light field": {"kind": "light-field", "field": field},
+        **(
+            {"field, automatic": {"kind": "light-field", "field": et.LightField.fit(near_field, "auto")}}
+            if full
+            else {}
+        ),
         "gridded": {"kind": "gridded", "gridded": grid, "draws": len(near_field)},
         "Lambertian square": square(near_field.total_flux),
     }
@@ -169,7 +175,7 @@ def main() -> None:
     print_table(["θ", *seen[1:], "intensity: " + ", ".join(seen)], rows)
     drawn = scenes["the LED itself"].replace(name="Figure 3.16", detectors=[])
     et.draw_scene(drawn, options.output / "figure-3.16.png", section=["y=0"], rays=24, window=(-9.5, 9.5, -1.5, 20))
-    draw_profiles(options.output / "figure-3.17.png", {name: profiles[name] for name in list(profiles)[:5]})
+    draw_profiles(options.output / "figure-3.17.png", {name: profiles[name] for name in list(profiles)[:-1]})
     shown = [*seen[1:], seen[0]]
     pictures = [(f"θ = {o.theta:g}°", [maps[name][i] for name in shown]) for i, o in enumerate(OBSERVERS)]
     draw_maps(options.output / "narrow-beam.png", shown, pictures, kind="root")

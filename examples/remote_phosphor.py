@@ -13,23 +13,13 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from typing import Any
 
 import etendue as et
 import numpy as np
 from etendue.luminance.gridded_map import gridded_luminance_map
 from experiments import film
 from experiments.panels import LINES, QUICK, draw_maps, measures, new_figure, noise, print_table, save
-
-RADIUS, RIM, FLUX = 11.2, 0.7, 800.0
-"""Of the plate [mm]; luminance at its rim over that in the middle; flux that it sends out itself [lm]."""
-
-RINGS = 28
-EXPONENT = 1.05
-"""Intensity of the plate is as cosⁿ: 8 % below Lambert's law at 80°."""
-
-TOP = {"bare": 0.0, "film": 1.05}
-"""Height of the topmost surface [mm]: the plate, or the ridges of a film 1 mm thick."""
+from experiments.phosphor import BOX, CARRIER, FLUX, TOP, lamp
 
 OBSERVERS = [et.Observer(theta, phi, 1000) for phi in (0, 90) for theta in (0, 30, 60, 80)]
 """Of table 3.2. The prisms run along y: φ = 0° is across them."""
@@ -54,59 +44,16 @@ MAP = 23.0
 """Width and height of the maps [mm]."""
 
 
-def lamp(kind: str) -> et.Scene:
-    """The plate in its housing, bare or under the film, and the hemisphere that collects its rays."""
-    edges = np.linspace(0.0, RADIUS, RINGS + 1)
-    inner, outer = edges[:-1], edges[1:]
-    # The mean of 1 - (1 - rim) (r/R)² over a ring, times its area.
-    weight = (outer**2 - inner**2) * (1.0 - (1.0 - RIM) * (outer**2 + inner**2) / (2.0 * RADIUS**2))
-    flux = FLUX * weight / weight.sum()
-    rings: list[dict[str, Any]] = [
-        {
-            "name": f"ring {i + 1}",
-            "kind": "surface",
-            "shape": {"kind": "annulus", "inner_radius": inner[i], "outer_radius": outer[i]}
-            if i
-            else {"kind": "disk", "radius": outer[i]},
-            "exponent": EXPONENT,
-            "flux": flux[i],
-        }
-        for i in range(RINGS)
-    ]
-    rough = {"kind": "lambertian", "reflectance": 0.5, "transmittance": 0.5}
-    prisms = {
-        "name": "film",
-        "shape": {"kind": "prismatic-film", "width": 24, "height": 24, "thickness": 0.95, "pitch": 0.1},
-        "medium": {"index": 1.59},
-        # Cut edges are rough: light that the film guides to them comes out there.
-        "finishes": dict.fromkeys(("left", "right", "front", "back"), rough),
-        "at": [0, 0, 0.05],
-    }
-    phosphor = {
-        "name": "phosphor",
-        "shape": {"kind": "disk", "radius": RADIUS},
-        "finish": {"kind": "lambertian", "reflectance": 0.7},
-    }
-    housing = {
-        "name": "housing",
-        "shape": {"kind": "annulus", "inner_radius": RADIUS, "outer_radius": 50},
-        "finish": "absorber",
-    }
-    return et.Scene(
-        name=f"remote phosphor, {kind}",
-        sources=rings,
-        solids=[prisms] if kind == "film" else [],
-        surfaces=[phosphor, housing],
-        detectors=[{"name": "near field", "kind": "rays", "shape": {"kind": "hemisphere", "radius": 40}}],
-    )
-
-
 def sources(kind: str, rays: et.RaySet, depths: tuple[int, int, int, int] | None) -> dict[str, et.LightField]:
-    """Light fields: on the plane of the topmost surface, as the thesis has it, and on a box whose sides shine too."""
+    """Light fields: on the plane of the topmost surface, as the thesis has it; on a box whose sides shine too; automatic."""
     found = {"field, plane": et.LightField.fit(rays, et.Plane(TOP[kind], 24.2, 24.2, centre=(0, 0)), depths=depths)}
     if kind == "film":
-        box = et.Box(24.02, 24.02, TOP[kind], centre=(0, 0, TOP[kind] / 2))
-        found["field, box"] = et.LightField.fit(rays, box, depths=depths and (2, 2, 2, 2))  # six parts
+        found["field, box"] = et.LightField.fit(rays, BOX, depths=depths and (2, 2, 2, 2))  # six parts
+    if depths is None:
+        found["field, automatic"] = et.LightField.fit(rays, "auto")
+        print(f"    automatic: {found['field, automatic'].surface.spec}")
+    for name, field in found.items():
+        print(f"    {name}: score {field.report.score:.4f} ± {field.report.score_error:.4f} per ray")
     return found
 
 
@@ -131,8 +78,7 @@ def experiment(kind: str, options: argparse.Namespace) -> dict[float, dict[str, 
     middle = time.perf_counter()
     print(f"\n{kind}: {rays.total_flux:.1f} lm of {FLUX:g} lm leave it in {len(rays):,} rays of {options.rays:,}")
     fields = sources(kind, rays, None if options.full else QUICK)
-    # Pixels are cut from the centre of a plane: this one brings them in line with those of the maps.
-    plane = et.Plane(TOP[kind], 27, 27, centre=(0.5, 0.5))
+    plane = et.Plane(TOP[kind], *CARRIER[kind], centre=(0, 0))
     observers = [
         et.Observer(o.theta, o.phi, o.distance, target=(0, 0, TOP[kind]))
         for o in OBSERVERS

@@ -58,7 +58,12 @@ PARTS: dict[str, Any] = {
 """Keys of a scene."""
 
 
+def recorded() -> et.Scene:
+    """The LED, and a hemisphere close around it that records rays."""
+    detector = {"kind": "rays", "name": "near field", "shape": {"kind": "hemisphere", "radius": CARRIER}}
+    return et.Scene(name="dome LED", **PARTS, detectors=[detector])
+
+
 def ray_file(rays: int, seed: int = 1) -> et.RaySet:
     """The rays that leave the LED, where they cross the hemisphere around it."""
-    detector = {"kind": "rays", "name": "near field", "shape": {"kind": "hemisphere", "radius": CARRIER}}
-    return et.trace(et.Scene(name="dome LED", **PARTS, detectors=[detector]), rays=rays, seed=seed).rays.only
+    return et.trace(recorded(), rays=rays, seed=seed).rays.only

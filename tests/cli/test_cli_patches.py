@@ -36,3 +36,15 @@ def test_squares_and_steps_are_as_stated(run: Run, tmp_path: Path) -> None:
     wrong = run("patches", "a.tm25ray", "-o", "other", "--centre-on", "pixle")
     assert wrong.status == 2
     assert "pixel" in wrong.err
+
+
+def test_the_threshold_that_is_chosen_is_told(run: Run, tmp_path: Path) -> None:
+    position, direction = rays_aslant(2000)
+    et.write_rays(tmp_path / "a.tm25ray", et.RaySet(position, direction, np.ones(2000)))
+    chosen = et.GriddedSource.fit(et.read_rays(tmp_path / "a.tm25ray"), et.Plane(z=0), 0.7).threshold
+    assert (
+        f"threshold {chosen:g} %, chosen from the number of rays"
+        in run("patches", "a.tm25ray", "-o", "chosen", "--pixel", 0.7).out
+    )
+    assert et.GriddedSource.load(tmp_path / "chosen").threshold == chosen
+    assert "chosen" not in "".join(run("patches", "a.tm25ray", "-o", "b", "--threshold", 2, "--json").json["notes"])

@@ -35,8 +35,12 @@ def patches(
         ),
     ] = "auto",
     threshold: Annotated[
-        float, typer.Option("--threshold", help="Largest flux error E of a patch, in percent (thesis eq. 3.3).")
-    ] = 0.021,
+        float | None,
+        typer.Option(
+            "--threshold",
+            help="Largest flux error E of a patch, in percent (thesis eq. 3.3); what suits the number of rays if not given.",
+        ),
+    ] = None,
     parallels: Annotated[
         int | None, typer.Option("--parallels", help="Cut a hemisphere into (2N-1)² cells; from --pixel if not given.")
     ] = None,
@@ -81,7 +85,7 @@ def patches(
         )
     swept = None
     if sweep:
-        thresholds = sorted({*THRESHOLDS, threshold} - {0.0}, reverse=True)
+        thresholds = sorted({*THRESHOLDS, source.threshold} - {0.0}, reverse=True)
         with progress_bar("thresholds", len(rays)) as progress:
             swept = threshold_sweep(
                 rays, carrier, pixel, thresholds, parallels, centre_on=at, seed=seed, progress=progress

@@ -111,7 +111,7 @@ def threshold_sweep(
     for number, threshold in enumerate(thresholds):
         model = models.source(number, rays, pixel, threshold)
         far_field = compare_intensities(model.intensity(c_planes, gamma_step), reference)
-        score, score_error, held_out = _score(judged.source(number, rays, pixel, threshold), judges)
+        score, score_error, held_out = held_out_score(judged.source(number, rays, pixel, threshold), judges)
         flux, patches = model.total_flux, model.patches
         rows.append(
             {
@@ -180,8 +180,34 @@ def _gathered(batches: Batches, rays: RayStream) -> RaySet:
     return RaySet.from_records(spool(records(), RECORD), RaySetMeaning(flux_unit=rays.flux_unit))
 
 
-def _score(source: GriddedSource, judges: RaySet) -> tuple[float, float, int]:
-    """Mean of ln(density / uniform density) over rays on the surface, by their flux; its standard error; their number."""
+def held_out_score(source: GriddedSource, judges: RayStream) -> tuple[float, float, int]:
+    """Mean of ln(density / uniform density) over rays on the surface.
+
+    Parameters
+    ----------
+    source : GriddedSource
+        Patches.
+    judges : RayStream
+        Rays that the patches were not made of.
+
+    Returns
+    -------
+    float, float, int
+        The mean by flux [nat per ray], its standard error, and the number of rays.
+
+    Raises
+    ------
+    ArgumentError
+        If none of the rays is on the surface.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> grid = et.GriddedSource.fit(et.RingSource(rays=100_000), et.Disk(radius=30), pixel=10, threshold=5)
+    >>> score, error, rays = held_out_score(grid, et.RingSource(rays=20_000, seed=2))
+    >>> score > 0.1, rays
+    (True, 20000)
+    """
     surface = source.surface
     # Luminance over flux is the density in étendue, 1 over the étendue of the surface the uniform one.
     scale = surface.etendue / (source.table_flux * MM2_PER_M2)

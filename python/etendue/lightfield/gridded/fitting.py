@@ -95,6 +95,13 @@ class LitPixels:
         """E [%] of each pixel at every step, shape (n, len(sequence))."""
         return angular.quadrature_errors(self.rings, self.sequence)
 
+    @property
+    def rays_per_patch(self) -> float:
+        """Rays on the patch of a ray, in the mean over the flux: what noise depends on where the light is."""
+        flux = self.rings.sum(axis=1)
+        rays = self.account.rays - self.account.missed - self.account.hidden
+        return float(rays * (flux**2).sum() / flux.sum() ** 2)
+
     @functools.cached_property
     def cells(self) -> Cells:
         """What they look like."""

@@ -37,8 +37,8 @@ class Gridded(Source):
         For a ray file: the carrier surface as on the command line, for example ``"plane:z=0"``.
     pixel : number
         For a ray file: side of the pixels [mm].
-    threshold : number
-        For a ray file: largest error of the flux of a pixel [%].
+    threshold : number, optional
+        For a ray file: largest error of the flux of a pixel [%]; what suits the number of rays if not given.
     gridded : GriddedSource
         In Python, instead of these four.
     draws : int
@@ -60,7 +60,7 @@ class Gridded(Source):
     file: Path | None = None
     surface: str | None = None
     pixel: Length = 1.0
-    threshold: Positive = 0.021
+    threshold: Positive | None = None
     gridded: SkipJsonSchema[InstanceOf[GriddedSource] | None] = None
     draws: Annotated[int, Ge(1), Le(1 << 31), AsCount] = 1_000_000
     seed: Index = 1
