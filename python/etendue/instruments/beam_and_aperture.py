@@ -52,7 +52,9 @@ class Aperture:
         if self.shape not in get_args(Shape):
             raise UnknownNameError("shape of an aperture", self.shape, get_args(Shape))
         if self.shape == "ring" and not 0.0 < self.inner < self.diameter:
-            raise ArgumentError(f"a ring of {self.inner:g} to {self.diameter:g} mm; state inner_diameter below the outer one")
+            raise ArgumentError(
+                f"a ring of {self.inner:g} to {self.diameter:g} mm; state inner_diameter below the outer one"
+            )
         if self.shape != "ring" and self.inner != 0.0:
             raise ArgumentError(f"a {self.shape} has no inner diameter; aperture='ring' has")
 
@@ -136,7 +138,9 @@ class Beam:
         else:
             values = np.asarray(self.profile, np.float64)
             if values.ndim != 1 or values.size < 2 or not np.isfinite(values).all() or (values < 0.0).any():
-                raise ArgumentError("the profile of a beam is two or more values from the middle to the edge, none below 0")
+                raise ArgumentError(
+                    "the profile of a beam is two or more values from the middle to the edge, none below 0"
+                )
             if not values.any():
                 raise ArgumentError("the profile of a beam is 0 everywhere")
             object.__setattr__(self, "profile", tuple(values.tolist()))

@@ -88,10 +88,14 @@ class GoniometerScan:
                 continue
             values = np.array(given, np.float64)
             if values.ndim != 1 or values.shape != np.shape(self.angle) or not values.size:
-                raise ArgumentError(f"{name} has shape {values.shape}, the angles {np.shape(self.angle)}; give one for each")
+                raise ArgumentError(
+                    f"{name} has shape {values.shape}, the angles {np.shape(self.angle)}; give one for each"
+                )
             if not np.isfinite(values).all():
                 at = int(np.argmin(np.isfinite(values)))
-                raise ArgumentError(f"{name}: value {at + 1} is {values[at]}; leave out positions that were not measured")
+                raise ArgumentError(
+                    f"{name}: value {at + 1} is {values[at]}; leave out positions that were not measured"
+                )
             values.flags.writeable = False
             object.__setattr__(self, name, values)
         if (np.diff(self.angle) <= 0.0).any():
@@ -151,7 +155,9 @@ class GoniometerScan:
 
     def _per_bsdf(self) -> Array:
         if self.solid_angle is None:
-            raise ArgumentError("the solid angle of the aperture is not known, so that flux is no BSDF: state solid_angle")
+            raise ArgumentError(
+                "the solid angle of the aperture is not known, so that flux is no BSDF: state solid_angle"
+            )
         cosine = self.cosine
         if (cosine < 1e-9).any():
             raise ArgumentError("a detector in the plane of the sample measures no BSDF")
@@ -260,11 +266,15 @@ def read_goniometer_scan(path: str | os.PathLike[str]) -> GoniometerScan:
     if DIRECTIONS[0] in columns:
         incidence = float(columns["theta_i"][0])
         if np.ptp(columns["theta_i"]) > 0.0 or np.ptp(columns["phi_i"]) > 0.0:
-            raise FormatError(path, "column theta_i", "several incidences", "A scan in one plane has one: split the file.")
+            raise FormatError(
+                path, "column theta_i", "several incidences", "A scan in one plane has one: split the file."
+            )
         # Light goes on to the azimuth opposite to where it comes from.
         turned = np.radians(columns["phi_s"] - columns["phi_i"])
         if incidence > 0.0 and (np.abs(np.sin(turned)) > 1e-6).any() and (columns["theta_s"] > 0.0).any():
-            raise FormatError(path, "column phi_s", "directions outside the plane of incidence", "Give one plane alone.")
+            raise FormatError(
+                path, "column phi_s", "directions outside the plane of incidence", "Give one plane alone."
+            )
         theta = np.where(columns["theta_s"] > 90.0, 180.0 - columns["theta_s"], columns["theta_s"])
         behind = bool((columns["theta_s"] > 90.0).all())
         angle = -np.sign(np.cos(turned) + (theta == 0.0)) * theta

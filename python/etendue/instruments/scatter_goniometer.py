@@ -104,7 +104,9 @@ class ScatterGoniometer:
                 raise ArgumentError(f"{name} is {getattr(self, name)}; it is more than 0")
         reach = 0.5 * self.beam_diameter + Aperture(self.aperture, self.aperture_diameter, self.inner_diameter).reach
         if self.distance <= reach:
-            raise ArgumentError(f"a distance of {self.distance:g} mm: beam and aperture reach {reach:g} mm; move it away")
+            raise ArgumentError(
+                f"a distance of {self.distance:g} mm: beam and aperture reach {reach:g} mm; move it away"
+            )
         if not abs(self.divergence) < 45.0 or not 0.0 <= self.source_angle < 90.0:
             raise ArgumentError("a divergence is below 45°, and source_angle is from 0 to 90°")
         if self.photons is not None and not self.photons > 0.0:
@@ -235,7 +237,7 @@ class ScatterGoniometer:
             flux, error = self._counted(bsdf, theta, arms, rays, seed, behind=behind, fresh=fresh)
         else:
             flux, error = self._integrated(bsdf, theta, arms, behind=behind)
-        notes = ()
+        notes: tuple[str, ...] = ()
         if method == "trace" and not fresh and self.photons is None:
             notes = ("all positions count the same rays: neighbours err together",)
         return self._noisy(angle, flux, error, seed, incidence=theta, way=way, plane=plane, sample=True, notes=notes)
@@ -447,7 +449,8 @@ def _angles(middle: float, step: float, span: float) -> Array:
     if not 0.0 < step < 90.0 or not 0.0 < span <= 180.0 or span / step > MOST_POSITIONS:
         raise ArgumentError(f"steps of {step:g}° to {span:g}° on both sides; give a step and a span of more than 0")
     k = int(np.floor(span / step + 1e-9))
-    return np.asarray(middle + step * np.arange(-k, k + 1))
+    # 8.7 and not 8.700000000000001: files hold what people would write.
+    return np.round(middle + step * np.arange(-k, k + 1), 10)
 
 
 def _require_incidence(theta: float) -> None:
@@ -462,7 +465,9 @@ def _way(bsdf: Bsdf, way: Way | None) -> Way:
         return way
     mirrored, straight, back, through = bsdf.ways
     if (mirrored or back) and (straight or through):
-        raise ArgumentError("the sample reflects and transmits: say which is measured, way='transmitted' or 'reflected'")
+        raise ArgumentError(
+            "the sample reflects and transmits: say which is measured, way='transmitted' or 'reflected'"
+        )
     return "transmitted" if straight or through else "reflected"
 
 
