@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -67,8 +67,7 @@ def goniometer(
     how: Method = one_of(method, ("trace", "quadrature"), "--method")
     ways: tuple[Way, Way] = ("transmitted", "reflected")
     to = None if way is None else one_of(way, ways, "--way")
-    profiles: tuple[Literal["uniform"], Literal["gaussian"]] = ("uniform", "gaussian")
-    beam_profile = one_of(profile, profiles, "--profile")
+    one_of(profile, ("uniform", "gaussian"), "--profile")
     if output is not None:
         check_folder(output)
     instrument = ScatterGoniometer(
@@ -77,7 +76,7 @@ def goniometer(
         distance,
         aperture=one_of(aperture_shape, ("disk", "square", "ring"), "--aperture-shape"),
         inner_diameter=inner,
-        profile=beam_profile,
+        profile="gaussian" if profile == "gaussian" else "uniform",
         divergence=divergence,
         source_angle=source_angle,
         photons=photons,

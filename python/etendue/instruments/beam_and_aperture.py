@@ -15,13 +15,13 @@ Array = npt.NDArray[np.float64]
 Shape = Literal["disk", "square", "ring"]
 Profile = Literal["uniform", "gaussian"] | Sequence[float]
 
-RADII = 96
+RADII = 48
 """Rings in which profiles that are not uniform are drawn and added up."""
 
 CHORDS = 240
 """Chords on which beam and aperture overlap: kinks at their ends cost 1e-5."""
 
-SOURCE = (8, 16)
+SOURCE = (6, 12)
 """Points of the source of light: radii, and azimuths on each."""
 
 
@@ -231,7 +231,7 @@ class Beam:
                     middle = (distance * np.sin(a))[:, None] - sx
                     lengths = np.minimum(half, middle + wide) - np.maximum(-half, middle - wide)
                     found += sign * share * (np.maximum(lengths, 0.0) @ weight)
-        return found
+        return np.clip(found, 0.0, 1.0)
 
     def _disks(self) -> tuple[Array, Array]:
         """Even disks that add up to the profile: radii [mm] and shares of the flux, which may be negative."""

@@ -320,8 +320,28 @@ def detector_directions(angle: npt.ArrayLike, incidence: float, plane: Plane, *,
     return np.asarray(np.cos(a) * direction(incidence, 0.0, behind=behind) + np.sin(a) * np.array([0.0, 1.0, 0.0]))
 
 
+def summit(angle: Array, values: Array) -> float:
+    """The largest value of a smooth lobe, between positions: a parabola through the logarithms of the three highest.
+
+    Exact for a Gaussian wherever its middle is. At an end of the positions, or beside 0, the largest value itself.
+
+    Examples
+    --------
+    >>> angle = np.arange(-1.0, 1.01, 0.1)
+    >>> round(summit(angle, np.exp(-3.0 * (angle - 0.04) ** 2)), 6)
+    1.0
+    """
+    k = int(np.argmax(values))
+    if not 0 < k < values.size - 1 or values[k - 1 : k + 2].min() <= 0.0:
+        return float(values[k])
+    parabola = np.polyfit(angle[k - 1 : k + 2] - angle[k], np.log(values[k - 1 : k + 2]), 2)
+    if not parabola[0] < 0.0:
+        return float(values[k])
+    return float(np.exp(parabola[2] - parabola[1] ** 2 / (4.0 * parabola[0])))
+
+
 def full_width(angle: Array, values: Array) -> float:
-    """Full width at half maximum, linear between positions; NaN if there is no half on both sides.
+    """Full width at half of `summit`, linear between positions; NaN if there is no half on both sides.
 
     Examples
     --------
@@ -329,7 +349,7 @@ def full_width(angle: Array, values: Array) -> float:
     1.0
     """
     top = int(np.argmax(values))
-    half = 0.5 * float(values[top])
+    half = 0.5 * summit(angle, values)
     ends = []
     for order in (slice(top, None, -1) if top else slice(0, 1), slice(top, None)):
         a, v = angle[order], values[order]

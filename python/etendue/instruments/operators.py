@@ -58,10 +58,14 @@ class Operator:
             found += part.reshape((-1,) + (1,) * (values.ndim - 1)) * values[own]
         return found
 
-    def from_positions(self, values: Array) -> Array:
-        """Values at the positions as values at the nodes, both sides averaged; `values` of shape (n,) or (n, k)."""
+    def start(self, values: Array) -> Array:
+        """Where the iteration begins: of rings at the measured values, both sides averaged; of a slice at an even one.
+
+        The second is Richardson's own, which the thesis does not change; from the first, rings take fewer iterations.
+        `values` of shape (n,) or (n, k), the result (m,) or (m, k).
+        """
         if self.name == "slice":
-            return values
+            return np.ones_like(values) * np.maximum(values, 0.0).mean(axis=0)
         inner = self.nodes[self.nodes <= max(self.angle[-1], -self.angle[0])]
         columns = values.reshape(values.shape[0], -1).T
         found = []

@@ -13,7 +13,7 @@ Array = npt.NDArray[np.float64]
 MOST = 200
 """Iterations that are looked at: those of figs. 5.4 and 5.8."""
 
-DISTURBED = 0.01
+DISTURBED = 1e-3
 """By which share E may rise above the least so far before noise is what is being fitted."""
 
 LEVEL = 1e-3
@@ -42,7 +42,7 @@ class Course:
 def thesis(course: Course) -> tuple[int, str]:
     """The last minimum of E(i) before disturbances from noise: section 5.4.4.
 
-    Read so: of the minima one after the other, each lower than those before it; the first rise by more than 1 % above the
+    Read so: of the minima one after the other, each lower than those before it; the first rise by more than 0.1 % above the
     least so far is the disturbance. If E falls to the end, or has risen from the start, it is the last or the first one.
 
     Examples
