@@ -65,7 +65,7 @@ class Operator:
         `values` of shape (n,) or (n, k), the result (m,) or (m, k).
         """
         if self.name == "slice":
-            return np.ones_like(values) * np.maximum(values, 0.0).mean(axis=0)
+            return np.asarray(np.ones_like(values) * np.maximum(values, 0.0).mean(axis=0))
         inner = self.nodes[self.nodes <= max(self.angle[-1], -self.angle[0])]
         columns = values.reshape(values.shape[0], -1).T
         found = []
