@@ -15,8 +15,8 @@ from etendue.scatter.scans.files import SHADOW
 
 @pytest.mark.slow
 def test_the_real_scan_without_its_blank_is_the_published_table(samples: Path) -> None:
-    """In three bands of the angle from the normal the medians of f over the table's agree to 6 %; the signal is π f cosθ, and
-    without the cosine, or with the blank left in, they do not. Single values differ more: the publishers averaged and
+    """In three bands of the angle from the normal medians of f over the table's are 1 to 6 %. The signal is π f cosθ;
+    without the cosine, or with the blank left in, they are not. Single values differ more: the publishers averaged and
     filled in, and their lobes at 50 and 70° do not lean towards grazing as the scan does."""
     folder = samples / "bsdf"
     raw, blank = (folder / f"{name}_goniometer.xls" for name in ("AnoBlackEC1", "blank"))
