@@ -47,6 +47,7 @@ from etendue.plot import (
     plot_characteristic,
     plot_comparison,
     plot_cross_sections,
+    plot_deconvolution,
     plot_intensity,
     plot_map,
     plot_threshold_sweep,
@@ -67,6 +68,9 @@ from etendue.tracing.ledger import TraceWarning
 
 if TYPE_CHECKING:
     from etendue import scene
+    from etendue.instruments.deconvolution import Deconvolution, deconvolve
+    from etendue.instruments.goniometer_scan import GoniometerScan, read_goniometer_scan
+    from etendue.instruments.scatter_goniometer import ScatterGoniometer
     from etendue.scatter import models as bsdf
     from etendue.scatter.bsdf import Bsdf
     from etendue.scatter.files import read_bsdf, write_bsdf
@@ -83,11 +87,13 @@ __all__ = [
     "ChangedFileWarning",
     "Cone",
     "Cylinder",
+    "Deconvolution",
     "Disk",
     "Dome",
     "EtendueError",
     "FormatError",
     "FromField",
+    "GoniometerScan",
     "GriddedSource",
     "Hemisphere",
     "IlluminanceMap",
@@ -107,6 +113,7 @@ __all__ = [
     "RingSource",
     "Scans",
     "ScatterEvents",
+    "ScatterGoniometer",
     "Scene",
     "SceneError",
     "SceneWarning",
@@ -126,6 +133,7 @@ __all__ = [
     "combine_maps",
     "compare",
     "cross_section",
+    "deconvolve",
     "denoise_map",
     "diagnose",
     "draw_scene",
@@ -137,10 +145,12 @@ __all__ = [
     "plot_characteristic",
     "plot_comparison",
     "plot_cross_sections",
+    "plot_deconvolution",
     "plot_intensity",
     "plot_map",
     "plot_threshold_sweep",
     "read_bsdf",
+    "read_goniometer_scan",
     "read_illuminance_map",
     "read_intensity",
     "read_map",
@@ -172,10 +182,15 @@ InNotebook.pages = Pages(of=_page)
 LAZY = {
     "Bsdf": "etendue.scatter.table:Bsdf",
     "BsdfTable": "etendue.scatter.table:BsdfTable",
+    "Deconvolution": "etendue.instruments.deconvolution:Deconvolution",
+    "GoniometerScan": "etendue.instruments.goniometer_scan:GoniometerScan",
     "Scans": "etendue.scatter.scans.scans:Scans",
+    "ScatterGoniometer": "etendue.instruments.scatter_goniometer:ScatterGoniometer",
     "Scene": "etendue.scene:Scene",
     "bsdf": "etendue.scatter.models",
+    "deconvolve": "etendue.instruments.deconvolution:deconvolve",
     "read_bsdf": "etendue.scatter.files:read_bsdf",
+    "read_goniometer_scan": "etendue.instruments.goniometer_scan:read_goniometer_scan",
     "read_scans": "etendue.scatter.scans.files:read_scans",
     "scene": "etendue.scene",
     "write_bsdf": "etendue.scatter.files:write_bsdf",

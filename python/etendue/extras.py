@@ -37,6 +37,7 @@ EXTRAS: dict[str, Extra] = {
     "matplotlib": Extra("plot", "pictures", (".png", ".pdf")),
     "cascadio": Extra("step", "STEP files"),
     "scipy": Extra("scans", "interpolations of scattered points"),
+    "xlrd": Extra("xls", "workbooks of goniometers"),
     "xarray": Extra("xarray", "datasets of xarray"),
 }
 """By the name of the library."""

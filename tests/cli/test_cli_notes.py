@@ -106,6 +106,9 @@ def led_rays() -> et.RaySet:
     return et.RaySet(position, direction, rng.gamma(2.0, 0.01, n))
 
 
+DIFFUSER = et.bsdf.Gaussian(peak=500.0, sigma=0.015, way="transmitted")
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("notes")
@@ -128,6 +131,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         black = cone.replace(values=np.zeros(cone.values.shape), standard_error=np.zeros(cone.values.shape))
         black.save(place / "black.npz")
         et.write_intensity(place / "led.ies", intensity_distribution(spoilt, 4, 30))
+    (place / "diffuser.toml").write_text('kind = "gaussian"\npeak = 500.0\nsigma = 0.015\nway = "transmitted"\n')
+    et.ScatterGoniometer(photons=1e5).measure(DIFFUSER, step=0.5, span=5).save(place / "scan.csv")
+    et.ScatterGoniometer().instrument_function(0.1).save(place / "bare.csv")
     return place
 
 
@@ -282,6 +288,18 @@ def demo(_: Path) -> Iterator[Case]:
     yield Case(("demo", "--rays", 100_000, "-o", "out.png"), lmap.notes)
 
 
+def goniometer(place: Path) -> Iterator[Case]:
+    scan = et.ScatterGoniometer().measure(DIFFUSER, step=0.5, span=5, rays=20_000)
+    call = ("goniometer", place / "diffuser.toml", "--step", 0.5, "--span", 5, "--rays", 20_000, "-o", "out.csv")
+    yield Case(call, scan.notes)
+
+
+def deconvolve(place: Path) -> Iterator[Case]:
+    scan, bare = (et.read_goniometer_scan(place / name) for name in ("scan.csv", "bare.csv"))
+    call = ("deconvolve", place / "scan.csv", "--instrument", place / "bare.csv", "-o", "out.csv")
+    yield Case(call, et.deconvolve(scan, bare).notes)
+
+
 CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "demo": demo,
     "info": info,
@@ -295,6 +313,8 @@ CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "patches": patches,
     "filter": filter_,
     "compare": compare,
+    "goniometer": goniometer,
+    "deconvolve": deconvolve,
     "cache": None,  # a count of files and their size: nothing that has notes
 }
 """Of each verb: what it is called with, and what Python has to say of the same."""

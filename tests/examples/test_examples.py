@@ -13,6 +13,7 @@ RUNS = {
     "appendix_b.py": (["--rays", "50000"], 4),
     "chapter_2.py": (["--rays", "200000", "--seeds", "4"], 4),
     "chapter_4.py": (["--lines", "4"], 6),
+    "chapter_5.py": ([], 4),
     "dome_led.py": (["--rays", "100000"], 3),
     "first_picture.py": (["--rays", "500000", "--output", "picture.png"], 1),
     "half_against_half.py": ([], 1),

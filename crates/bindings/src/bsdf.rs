@@ -55,6 +55,22 @@ impl Bsdf {
         Arc::clone(&self.core)
     }
 
+    fn drawn(&self, n: usize, seed: u64, media: &Media, incident: impl Fn(usize) -> Vec3) -> Vec<f64> {
+        let stream = Stream::new(seed, 0);
+        let one = |k: usize| {
+            let [a, b, ..] = stream.uniforms(k as u64, 0);
+            let i = incident(k);
+            let d = match self.core.sample(i, media, [a, b]) {
+                Drawn::Absorbed => Vec3::new(f64::NAN, f64::NAN, f64::NAN),
+                Drawn::Mirrored => specular(i, media, None),
+                Drawn::Refracted(cosine) => specular(i, media, Some(cosine)),
+                Drawn::Scattered(d) => d,
+            };
+            [d.x, d.y, d.z]
+        };
+        (0..n).flat_map(one).collect()
+    }
+
     fn of_pairs<'py>(
         &self,
         py: Python<'py>,
@@ -133,20 +149,22 @@ impl Bsdf {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (media, [x, y, z]) = (self::media(media), incident);
         let incident = Vec3::new(x, y, z);
-        let found: Vec<f64> = py.detach(|| {
-            let stream = Stream::new(seed, 0);
-            let one = |k: usize| {
-                let [a, b, ..] = stream.uniforms(k as u64, 0);
-                let d = match self.core.sample(incident, &media, [a, b]) {
-                    Drawn::Absorbed => Vec3::new(f64::NAN, f64::NAN, f64::NAN),
-                    Drawn::Mirrored => specular(incident, &media, None),
-                    Drawn::Refracted(cosine) => specular(incident, &media, Some(cosine)),
-                    Drawn::Scattered(d) => d,
-                };
-                [d.x, d.y, d.z]
-            };
-            (0..n).flat_map(one).collect()
-        });
+        let found = py.detach(|| self.drawn(n, seed, &media, |_| incident));
+        let rows = Array2::from_shape_vec((n, 3), found).map_err(|e| refuse(e.to_string()))?;
+        Ok(rows.into_pyarray(py))
+    }
+
+    /// What becomes of one ray from each direction: the same numbers as `sample` has, ray by ray.
+    fn sample_each<'py>(
+        &self,
+        py: Python<'py>,
+        incident: Directions<'py>,
+        seed: u64,
+        media: [f64; 3],
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (incident, media) = (vectors(&incident)?, self::media(media));
+        let n = incident.len();
+        let found = py.detach(|| self.drawn(n, seed, &media, |k| incident[k]));
         let rows = Array2::from_shape_vec((n, 3), found).map_err(|e| refuse(e.to_string()))?;
         Ok(rows.into_pyarray(py))
     }

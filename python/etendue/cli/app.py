@@ -14,10 +14,12 @@ from etendue.cli import (
     cache,
     compare,
     convert,
+    deconvolve,
     demo,
     draw,
     filter_,
     fit,
+    goniometer,
     info,
     intensity,
     luminance,
@@ -60,6 +62,8 @@ VERBS: dict[str, Callable[..., None]] = {
     "patches": patches.patches,
     "filter": filter_.filter_,
     "compare": compare.compare,
+    "goniometer": goniometer.goniometer,
+    "deconvolve": deconvolve.deconvolve,
     "cache": cache.cache,
 }
 for _name, _verb in VERBS.items():

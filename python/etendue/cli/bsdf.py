@@ -162,7 +162,8 @@ def gloss(
 
 def fit(
     files: Annotated[
-        list[Path], typer.Argument(help="CSV files of scans: theta_i,phi_i,theta_s,phi_s,bsdf, or stages.")
+        list[Path],
+        typer.Argument(help="Scans: CSV of theta_i,phi_i,theta_s,phi_s,bsdf or of stages; .xls of the RT-300S."),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="The table, of any format that étendue writes.")],
     method: Annotated[
@@ -177,12 +178,17 @@ def fit(
     solid_angle: Annotated[
         float | None, typer.Option("--solid-angle", help="For stages: that of the aperture [sr].")
     ] = None,
+    blank: Annotated[
+        Path | None, typer.Option("--blank", help="For .xls: the scan without a sample, which is subtracted.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Make a table of goniometer scans, and say what they add up to."""
     one_of(method, METHODS, "--method")
     check_folder(output)
-    scans = read_scans(files, incident_flux=incident_flux, solid_angle=solid_angle, reflectance=reflectance)
+    scans = read_scans(
+        files, incident_flux=incident_flux, solid_angle=solid_angle, reflectance=reflectance, blank=blank
+    )
     table = BsdfTable.from_scans(scans, method)
     notes = list(write_bsdf(output, table))
     shares = {round(one.theta, 6): one.stated for one in table.data.slices}

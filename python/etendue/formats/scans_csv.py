@@ -17,6 +17,7 @@ from etendue.formats.rays.text_rows import number
 Array = npt.NDArray[np.float64]
 
 DIRECTIONS = ("theta_i", "phi_i", "theta_s", "phi_s", "bsdf")
+POSITIONS = ("angle", "flux")
 STAGES = ("alpha", "beta", "gamma", "delta", "flux")
 ERROR = "standard_error"
 LARGEST = 1 << 28
@@ -72,3 +73,17 @@ def read_columns(path: Path, layouts: Sequence[tuple[str, ...]]) -> dict[str, Ar
     if not rows:
         raise FormatError(path, f"line {lines[0][0]}", "no values follow", "Export the scan again.")
     return dict(zip(names, np.array(rows).T, strict=True))
+
+
+def read_remarks(path: Path) -> dict[str, str]:
+    """What a CSV file says in lines ``# name = value``, by name.
+
+    Parameters
+    ----------
+    path : Path
+        A file that `read_columns` has read.
+    """
+    with as_path(path).open("rb") as file:
+        text = decoded(path, file.read(LARGEST))
+    parts = [line.lstrip()[1:].partition("=") for line in text.splitlines() if line.lstrip().startswith("#")]
+    return {name.strip().casefold(): value.strip() for name, sign, value in parts if sign}

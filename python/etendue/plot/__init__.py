@@ -6,6 +6,7 @@ from etendue.plot.bsdf_picture import plot_bsdf
 from etendue.plot.characteristic_picture import plot_characteristic
 from etendue.plot.comparison_picture import plot_comparison
 from etendue.plot.cross_section_picture import plot_cross_sections
+from etendue.plot.deconvolution_picture import plot_deconvolution
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
 from etendue.plot.scene_picture import draw_scene
@@ -17,6 +18,7 @@ __all__ = [
     "plot_characteristic",
     "plot_comparison",
     "plot_cross_sections",
+    "plot_deconvolution",
     "plot_intensity",
     "plot_map",
     "plot_threshold_sweep",

@@ -175,8 +175,8 @@ class Bsdf(abc.ABC):
 
         Parameters
         ----------
-        incident : array_like, shape (3,)
-            Unit vector to where the rays come from.
+        incident : array_like, shape (3,) or (n, 3)
+            Unit vector to where the rays come from, or one for each ray.
         n : int
             How many.
         seed : int
@@ -193,13 +193,15 @@ class Bsdf(abc.ABC):
         Raises
         ------
         ArgumentError
-            If `incident` is not one unit vector, or `n` is negative.
+            If `incident` is neither one unit vector nor one for each ray, or `n` is negative.
         """
         direction = unit_vectors("incident", incident)
-        if direction.shape != (3,):
-            raise ArgumentError("rays are drawn for one incident direction at a time")
         if n < 0:
             raise ArgumentError(f"{n} rays cannot be drawn")
+        if direction.shape == (n, 3):
+            return self._compiled.sample_each(direction, seed, (wavelength, *media))
+        if direction.shape != (3,):
+            raise ArgumentError(f"{n} rays come from one direction, or from {n}; incident has shape {direction.shape}")
         return self._compiled.sample(tuple(direction.tolist()), n, seed, (wavelength, *media))
 
     def reflectance(

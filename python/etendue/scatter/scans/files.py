@@ -7,12 +7,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from etendue.errors import ArgumentError, FormatError
+from etendue.formats.rt300s import is_rt300s, read_rt300s
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, STAGES, read_columns
 from etendue.quantities.bsdf_data import direction
 from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction
 from etendue.scatter.scans.scans import Scans
+
+Array = npt.NDArray[np.float64]
+
+SHADOW = 7.5
+"""Angle between detector and light [°] below which the one is in the way of the other."""
 
 
 def read_scans(
@@ -21,21 +28,26 @@ def read_scans(
     incident_flux: str | os.PathLike[str] | None = None,
     solid_angle: float | None = None,
     reflectance: float | None = None,
+    blank: str | os.PathLike[str] | None = None,
 ) -> Scans:
-    r"""Read scans from CSV files, all of one sample.
+    r"""Read scans from files, all of one sample.
 
     Parameters
     ----------
     paths : sequence of path
         Each with the columns theta_i, phi_i, theta_s, phi_s [°] and bsdf [1/sr]: of the direction to where the light comes
         from and of the detector, azimuths from the x axis of the sample; or alpha, beta, gamma, delta [°] and flux, of the
-        stages. A column standard_error may follow, in the unit of the values.
+        stages. A column standard_error may follow, in the unit of the values. Or workbooks (.xls) of the goniometer
+        RT-300S, whose signal is π f |cos θ|; positions within `SHADOW` of the light, where the detector stands in its way,
+        are left out.
     incident_flux : path, optional
         For files of stages: a file of the same columns, whose mean flux is that on the sample.
     solid_angle : float, optional
         For files of stages: of the aperture [sr].
     reflectance : float, optional
         Of an integrating sphere.
+    blank : path, optional
+        For workbooks: of the same positions without a sample, subtracted.
 
     Raises
     ------
@@ -55,8 +67,17 @@ def read_scans(
     """
     if not paths:
         raise ArgumentError("no file of scans is given")
-    incident, scattered, values, errors = [], [], [], []
+    incident: list[Array] = []
+    scattered: list[Array] = []
+    values: list[Array] = []
+    errors: list[Array | None] = []
     for path in paths:
+        if is_rt300s(Path(path)):
+            i, s, f = _workbook(Path(path), None if blank is None else Path(blank))
+            for kept, part in ((incident, i), (scattered, s), (values, f)):
+                kept.append(part)
+            errors.append(None)
+            continue
         columns = read_columns(Path(path), (DIRECTIONS, STAGES))
         error = columns.get(ERROR)
         if DIRECTIONS[0] in columns:
@@ -88,3 +109,38 @@ def read_scans(
         np.concatenate([error for error in errors if error is not None]) if whole else None,
         reflectance,
     )
+
+
+def _workbook(path: Path, blank: Path | None) -> tuple[Array, Array, Array]:
+    """Incident and scattered directions and f of a workbook of the RT-300S.
+
+    Light comes from azimuth 180°. The instrument's azimuth of −90° with a positive angle of the receiver, and +90° with a
+    negative one, lie on the specular side.
+    """
+    columns = read_rt300s(path)
+    angles = [np.round(columns[name], 6) for name in ("azimuth", "incidence", "receive")]
+    signal = columns["rt"]
+    if blank is not None:
+        bare = read_rt300s(blank)
+        there = np.column_stack([np.round(bare[name], 6) for name in ("azimuth", "incidence", "receive")])
+        known = {tuple(row): value for row, value in zip(there.tolist(), bare["rt"].tolist(), strict=True)}
+        wanted = [tuple(row) for row in np.column_stack(angles).tolist()]
+        missing = [row for row in wanted if row not in known]
+        if missing:
+            raise FormatError(
+                blank,
+                "positions",
+                f"none at {missing[0]}",
+                f"A blank scan has all positions of {path}.",
+            )
+        signal = signal - np.array([known[row] for row in wanted])
+    azimuth, incidence, receive = angles
+    incident = direction(incidence, 180.0)
+    scattered = direction(np.abs(receive), azimuth + np.where(receive < 0.0, 270.0, 90.0))
+    lit = np.einsum("ij,ij->i", incident, scattered) < np.cos(np.radians(SHADOW))
+    f = signal / (np.pi * np.abs(scattered[:, 2]))
+    if (f[lit] < 0.0).any():
+        at = int(np.flatnonzero(lit & (f < 0.0))[0])
+        place = f"azimuth {azimuth[at]:g}°, incidence {incidence[at]:g}°, receive {receive[at]:g}°"
+        raise FormatError(path, place, f"a value of {f[at]:g}", "A BSDF is not below 0: subtract less.")
+    return incident[lit], scattered[lit], f[lit]

@@ -1,0 +1,130 @@
+"""``etendue goniometer``: a virtual measurement of a BSDF, or of the bare beam."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, say
+from etendue.instruments.goniometer_scan import Plane, Way
+from etendue.instruments.samples import read_sample
+from etendue.instruments.scatter_goniometer import SPAN, Method, ScatterGoniometer
+
+COLLIMATED = 0.0
+
+
+def goniometer(
+    sample: Annotated[
+        Path | None, typer.Argument(help="The sample: a finish in TOML (kind = …), or a file of scatter data.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The scan, .csv.")] = None,
+    no_sample: Annotated[bool, typer.Option("--no-sample", help="The bare beam: the instrument function.")] = False,
+    aperture: Annotated[
+        float, typer.Option("--aperture", help="Diameter of the aperture, or side of a square [mm].")
+    ] = 25.0,
+    aperture_shape: Annotated[str, typer.Option("--aperture-shape", help="disk, square or ring.")] = "disk",
+    inner: Annotated[float, typer.Option("--inner", help="Inner diameter of a ring [mm].")] = 0.0,
+    beam: Annotated[float, typer.Option("--beam", help="Diameter of the beam [mm].")] = 14.0,
+    profile: Annotated[
+        str, typer.Option("--profile", help="Irradiance over the beam: uniform or gaussian.")
+    ] = "uniform",
+    divergence: Annotated[
+        float, typer.Option("--divergence", help="Angle of the outermost rays with the axis [°]; negative: convergent.")
+    ] = COLLIMATED,
+    source_angle: Annotated[
+        float, typer.Option("--source-angle", help="Diameter of the source of light, seen from the sample [°].")
+    ] = COLLIMATED,
+    distance: Annotated[float, typer.Option("--distance", help="From the sample to the aperture [mm].")] = 886.0,
+    incidence: Annotated[float, typer.Option("--incidence", help="Angle of incidence [°].")] = 0.0,
+    step: Annotated[float, typer.Option("--step", help="Between positions [°].")] = 0.1,
+    span: Annotated[
+        float | None, typer.Option("--span", help=f"To which angle on both sides [°]; {SPAN:g} with a sample.")
+    ] = None,
+    plane: Annotated[str, typer.Option("--plane", help="Of the scan: in-plane or cross-plane.")] = "in-plane",
+    way: Annotated[
+        str | None, typer.Option("--way", help="transmitted or reflected, of a sample that does both.")
+    ] = None,
+    method: Annotated[str, typer.Option("--method", help="trace or quadrature.")] = "trace",
+    rays: Annotated[int, typer.Option("--rays", parser=count(), help="At each position.", metavar="N")] = 10**6,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Rays of its own for each position: ten times the work.")
+    ] = False,
+    photons: Annotated[
+        float | None,
+        typer.Option("--photons", help="As how many the whole beam is counted at a position: photon noise."),
+    ] = None,
+    dark: Annotated[float, typer.Option("--dark", help="Counts without light at a position.")] = 0.0,
+    drift: Annotated[float, typer.Option("--drift", help="By which share the beam changes during the scan.")] = 0.0,
+    seed: Annotated[int, typer.Option("--seed", help="Of rays and noise.")] = 1,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Measure a sample, or the bare beam, with a virtual goniometer."""
+    if (sample is None) != no_sample:
+        raise typer.BadParameter("give a sample, or --no-sample for the instrument function")
+    which: Plane = one_of(plane, ("in-plane", "cross-plane"), "--plane")
+    how: Method = one_of(method, ("trace", "quadrature"), "--method")
+    ways: tuple[Way, Way] = ("transmitted", "reflected")
+    to = None if way is None else one_of(way, ways, "--way")
+    one_of(profile, ("uniform", "gaussian"), "--profile")
+    if output is not None:
+        check_folder(output)
+    instrument = ScatterGoniometer(
+        beam,
+        aperture,
+        distance,
+        aperture=one_of(aperture_shape, ("disk", "square", "ring"), "--aperture-shape"),
+        inner_diameter=inner,
+        profile="gaussian" if profile == "gaussian" else "uniform",
+        divergence=divergence,
+        source_angle=source_angle,
+        photons=photons,
+        dark=dark,
+        drift=drift,
+    )
+    if sample is None:
+        scan = instrument.instrument_function(step, span, rays=rays if method == "trace" and fresh else None, seed=seed)
+    else:
+        scan = instrument.measure(
+            read_sample(sample),
+            incidence,
+            step,
+            rays,
+            seed,
+            span=SPAN if span is None else span,
+            plane=which,
+            way=to,
+            method=how,
+            fresh=fresh,
+        )
+    if output is not None:
+        scan.save(output)
+    facts = {
+        "output": output,
+        "sample": sample,
+        "positions": scan.angle.size,
+        "solid_angle": instrument.solid_angle,
+        "fwhm": scan.fwhm,
+        "notes": list(scan.notes),
+    }
+    facts |= (
+        {"peak_flux": scan.peak}
+        if sample is None
+        else {"peak": float(scan.bsdf.max()), "total_scatter": scan.total_scatter}
+    )
+    if json:
+        print_json(facts)
+        return
+    for note in scan.notes:
+        complain(f"note: {note}")
+    say(
+        f"{scan.angle.size} positions from {scan.angle[0]:g}° to {scan.angle[-1]:g}°, Ω = {instrument.solid_angle:.4g} sr"
+    )
+    if sample is None:
+        say(f"instrument function: full width at half maximum {scan.fwhm:.3f}°")
+    else:
+        say(f"peak {scan.bsdf.max():.5g} 1/sr, full width at half maximum {scan.fwhm:.3f}°")
+        say(f"total scatter {scan.total_scatter:.4f}, if the lobe is round and the scan reaches its end")
+    if output is not None:
+        say(f"{output}: written")

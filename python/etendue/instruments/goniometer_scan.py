@@ -1,0 +1,390 @@
+"""`GoniometerScan`: flux in the aperture of a detector that passes in front of a sample, or of the bare beam."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.formats.input import as_path
+from etendue.formats.output import atomic_output
+from etendue.formats.scans_csv import DIRECTIONS, ERROR, POSITIONS, read_columns, read_remarks
+from etendue.quantities.bsdf_data import direction
+from etendue.scatter.scans.scans import Scans
+
+Array = npt.NDArray[np.float64]
+Way = Literal["transmitted", "reflected"]
+Plane = Literal["in-plane", "cross-plane"]
+
+FINE = 16
+"""Parts of a step between positions in which the total scatter is added up."""
+
+SAME_STEP = 1e-3
+"""By which steps may differ, relative to the smallest, and still be the same: angles in files have few digits."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GoniometerScan:
+    """A scan in one plane: flux by angle of the detector, with its standard error.
+
+    Parameters
+    ----------
+    angle : array, shape (n,)
+        Of the detector [°], increasing: in the plane of incidence from the normal of the sample, positive on the side to
+        which the light goes; across it from the regular direction. Without a sample from the beam.
+    flux : array, shape (n,)
+        In the aperture, as a share of the flux of the beam, or in any other unit.
+    standard_error : array, shape (n,), optional
+        Of the flux, in its unit.
+    solid_angle : number, optional
+        Of the aperture [sr], by which flux becomes a BSDF.
+    incidence : number
+        Angle of incidence [°].
+    way : {"transmitted", "reflected"}
+        Where the light that is measured goes.
+    plane : {"in-plane", "cross-plane"}
+        In which the detector moves.
+    background : number
+        What the detector shows in the dark, in the unit of the flux: subtracted already.
+    sample : bool
+        Whether there was a sample in the beam.
+    notes : tuple of str
+        What is worth knowing.
+
+    Raises
+    ------
+    ArgumentError
+        If lengths differ, angles do not increase, or a value is not finite.
+
+    Examples
+    --------
+    >>> scan = GoniometerScan([-1.0, 0.0, 1.0], [1e-4, 5e-4, 1e-4], solid_angle=6.25e-4)
+    >>> scan.bsdf.round(3).tolist()
+    [0.16, 0.8, 0.16]
+    """
+
+    angle: Array
+    flux: Array
+    standard_error: Array | None = None
+    _: dataclasses.KW_ONLY
+    solid_angle: float | None = None
+    incidence: float = 0.0
+    way: Way = "transmitted"
+    plane: Plane = "in-plane"
+    background: float = 0.0
+    sample: bool = True
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("angle", "flux", "standard_error"):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            values = np.array(given, np.float64)
+            if values.ndim != 1 or values.shape != np.shape(self.angle) or not values.size:
+                raise ArgumentError(
+                    f"{name} has shape {values.shape}, the angles {np.shape(self.angle)}; give one for each"
+                )
+            if not np.isfinite(values).all():
+                at = int(np.argmin(np.isfinite(values)))
+                raise ArgumentError(
+                    f"{name}: value {at + 1} is {values[at]}; leave out positions that were not measured"
+                )
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+        if (np.diff(self.angle) <= 0.0).any():
+            at = int(np.argmax(np.diff(self.angle) <= 0.0))
+            raise ArgumentError(f"angles increase; after {self.angle[at]:g}° comes {self.angle[at + 1]:g}°")
+        if self.standard_error is not None and (self.standard_error < 0.0).any():
+            raise ArgumentError("standard errors are not negative")
+        if self.way not in get_args(Way):
+            raise UnknownNameError("way", self.way, get_args(Way))
+        if self.plane not in get_args(Plane):
+            raise UnknownNameError("plane", self.plane, get_args(Plane))
+        if self.solid_angle is not None and not self.solid_angle > 0.0:
+            raise ArgumentError(f"a solid angle of {self.solid_angle} sr; it is more than 0")
+        if not self.background >= 0.0:
+            raise ArgumentError(f"a background of {self.background}; it is not negative")
+
+    @property
+    def regular(self) -> float:
+        """The angle at which light arrives that is mirrored, or goes straight on [°]."""
+        return self.incidence if self.plane == "in-plane" and self.sample else 0.0
+
+    @property
+    def step(self) -> float:
+        """Smallest step between positions [°]."""
+        return float(np.diff(self.angle).min()) if self.angle.size > 1 else 0.0
+
+    @property
+    def gaps(self) -> tuple[tuple[float, float], ...]:
+        """Pairs of neighbouring positions between which others are missing [°]."""
+        steps = np.diff(self.angle)
+        wide = np.flatnonzero(steps > (1.0 + SAME_STEP) * self.step)
+        return tuple((float(self.angle[at]), float(self.angle[at + 1])) for at in wide)
+
+    @property
+    def cosine(self) -> Array:
+        """|cos θₛ| of the detector, shape (n,); 1 without a sample."""
+        if not self.sample:
+            return np.ones(self.angle.shape)
+        turned = 1.0 if self.plane == "in-plane" else np.cos(np.radians(self.incidence))
+        return np.asarray(np.abs(np.cos(np.radians(self.angle))) * turned)
+
+    @property
+    def bsdf(self) -> Array:
+        """F [1/sr] by eq. 5.1: flux over solid angle and |cos θₛ|, if the flux is a share of that of the beam.
+
+        Raises
+        ------
+        ArgumentError
+            If the solid angle is not known, or the detector stood in the plane of the sample.
+        """
+        return np.asarray(self.flux / self._per_bsdf())
+
+    @property
+    def bsdf_error(self) -> Array | None:
+        """Standard error of `bsdf`."""
+        return None if self.standard_error is None else np.asarray(self.standard_error / self._per_bsdf())
+
+    def _per_bsdf(self) -> Array:
+        if self.solid_angle is None:
+            raise ArgumentError(
+                "the solid angle of the aperture is not known, so that flux is no BSDF: state solid_angle"
+            )
+        cosine = self.cosine
+        if (cosine < 1e-9).any():
+            raise ArgumentError("a detector in the plane of the sample measures no BSDF")
+        return np.asarray(self.solid_angle * cosine)
+
+    @property
+    def peak(self) -> float:
+        """Largest flux."""
+        return float(self.flux.max())
+
+    @property
+    def fwhm(self) -> float:
+        """Full width at half maximum [°], linear between positions; NaN if the scan ends before.
+
+        Examples
+        --------
+        >>> GoniometerScan([-2.0, -1.0, 0.0, 1.0, 2.0], [0.0, 1.0, 2.0, 1.0, 0.0]).fwhm
+        2.0
+        """
+        return full_width(self.angle, self.flux)
+
+    @property
+    def total_scatter(self) -> float:
+        """Total integrated scatter of a lobe that is round about the regular direction: eq. 5.2, both sides averaged.
+
+        Cubic between the positions. Needs the solid angle.
+        """
+        return total_scatter(self.angle - self.regular, self.bsdf * self.cosine)
+
+    def scans(self) -> Scans:
+        """The same as values at pairs of directions, for `Bsdf.from_scans`; light comes from azimuth 180°.
+
+        Raises
+        ------
+        ArgumentError
+            If it is a scan without a sample or of transmitted light, or the solid angle is not known.
+        """
+        if not self.sample or self.way == "transmitted":
+            raise ArgumentError("scans for tables are of light that a sample reflects")
+        incident = np.tile(direction(self.incidence, 180.0), (self.angle.size, 1))
+        scattered = detector_directions(self.angle, self.incidence, self.plane, behind=False)
+        return Scans(incident, scattered, self.bsdf, self.bsdf_error)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a CSV file: angle, flux and standard error, and what else is known in lines that begin with ``#``.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written; it appears whole or not at all.
+
+        Examples
+        --------
+        >>> from tempfile import TemporaryDirectory
+        >>> with TemporaryDirectory() as folder:
+        ...     path = Path(folder) / "scan.csv"
+        ...     GoniometerScan([-1.0, 0.0], [0.25, 0.5], solid_angle=1e-3).save(path)
+        ...     back = read_goniometer_scan(path)
+        >>> back.flux.tolist(), back.solid_angle
+        ([0.25, 0.5], 0.001)
+        """
+        remarks = {
+            "incidence": self.incidence,
+            "way": self.way,
+            "plane": self.plane,
+            "sample": "yes" if self.sample else "no",
+            "background": self.background,
+        }
+        if self.solid_angle is not None:
+            remarks["solid_angle"] = self.solid_angle
+        names = [*POSITIONS, *([ERROR] if self.standard_error is not None else [])]
+        columns = [self.angle, self.flux, *([self.standard_error] if self.standard_error is not None else [])]
+        rows = [",".join(repr(float(value)) for value in row) for row in zip(*columns, strict=True)]
+        lines = [*(f"# {key} = {value}" for key, value in remarks.items()), ",".join(names), *rows]
+        with atomic_output(path) as temporary:
+            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def read_goniometer_scan(path: str | os.PathLike[str]) -> GoniometerScan:
+    r"""Read a scan in one plane from a CSV file.
+
+    Parameters
+    ----------
+    path : path
+        With the columns angle [°] and flux, as `GoniometerScan.save` writes them; or theta_i, phi_i, theta_s, phi_s [°] and
+        bsdf [1/sr] of a single incidence, all directions in its plane. A column standard_error may follow. Lines
+        ``# solid_angle = …`` and so on say what else is known.
+
+    Raises
+    ------
+    FormatError, OSError
+        If the file cannot be read; names the line.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "scan.csv"
+    ...     _ = path.write_text("angle;flux\n0.1;3\n0;4\n")
+    ...     read_goniometer_scan(path).flux.tolist()
+    [4.0, 3.0]
+    """
+    path = as_path(path)
+    columns = read_columns(path, (POSITIONS, DIRECTIONS))
+    known = _known(path, read_remarks(path))
+    if DIRECTIONS[0] in columns:
+        incidence = float(columns["theta_i"][0])
+        if np.ptp(columns["theta_i"]) > 0.0 or np.ptp(columns["phi_i"]) > 0.0:
+            raise FormatError(
+                path, "column theta_i", "several incidences", "A scan in one plane has one: split the file."
+            )
+        # Light goes on to the azimuth opposite to where it comes from.
+        turned = np.radians(columns["phi_s"] - columns["phi_i"])
+        if incidence > 0.0 and (np.abs(np.sin(turned)) > 1e-6).any() and (columns["theta_s"] > 0.0).any():
+            raise FormatError(
+                path, "column phi_s", "directions outside the plane of incidence", "Give one plane alone."
+            )
+        theta = np.where(columns["theta_s"] > 90.0, 180.0 - columns["theta_s"], columns["theta_s"])
+        behind = bool((columns["theta_s"] > 90.0).all())
+        angle = -np.sign(np.cos(turned) + (theta == 0.0)) * theta
+        flux = columns["bsdf"] * np.cos(np.radians(theta))
+        error = columns[ERROR] * np.cos(np.radians(theta)) if ERROR in columns else None
+        known = {"solid_angle": 1.0, "way": "transmitted" if behind else "reflected"} | known | {"incidence": incidence}
+    else:
+        angle, flux, error = columns["angle"], columns["flux"], columns.get(ERROR)
+    order = np.argsort(angle, kind="stable")
+    twice = np.flatnonzero(np.diff(angle[order]) == 0.0)
+    if twice.size:
+        raise FormatError(path, "angles", f"{angle[order][twice[0]]:g}° twice", "Give each position once.")
+    return GoniometerScan(angle[order], flux[order], None if error is None else error[order], **known)  # type: ignore[arg-type]
+
+
+def _known(path: Path, remarks: Mapping[str, str]) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for key in ("incidence", "background", "solid_angle"):
+        if key in remarks:
+            try:
+                found[key] = float(remarks[key])
+            except ValueError:
+                raise FormatError(path, f"# {key}", f"{remarks[key][:40]!r} is no number", "Mend the line.") from None
+    for key, choices in (("way", get_args(Way)), ("plane", get_args(Plane)), ("sample", ("yes", "no"))):
+        if key in remarks:
+            if remarks[key] not in choices:
+                raise FormatError(path, f"# {key}", f"{remarks[key][:40]!r}", f"It is one of {', '.join(choices)}.")
+            found[key] = remarks[key] == "yes" if key == "sample" else remarks[key]
+    return found
+
+
+def detector_directions(angle: npt.ArrayLike, incidence: float, plane: Plane, *, behind: bool) -> Array:
+    """Where the detector stands, shape (…, 3), light coming from azimuth 180°.
+
+    Examples
+    --------
+    >>> detector_directions([30.0], 30.0, "in-plane", behind=False).round(3).tolist()
+    [[0.5, 0.0, 0.866]]
+    """
+    if plane == "in-plane":
+        return direction(angle, 0.0, behind=behind)
+    a = np.radians(angle)[..., None]
+    return np.asarray(np.cos(a) * direction(incidence, 0.0, behind=behind) + np.sin(a) * np.array([0.0, 1.0, 0.0]))
+
+
+def summit(angle: Array, values: Array) -> float:
+    """The largest value of a smooth lobe, between positions: a parabola through the logarithms of the three highest.
+
+    Exact for a Gaussian wherever its middle is. At an end of the positions, or beside 0, the largest value itself.
+
+    Examples
+    --------
+    >>> angle = np.arange(-1.0, 1.01, 0.1)
+    >>> round(summit(angle, np.exp(-3.0 * (angle - 0.04) ** 2)), 6)
+    1.0
+    """
+    k = int(np.argmax(values))
+    if not 0 < k < values.size - 1 or values[k - 1 : k + 2].min() <= 0.0:
+        return float(values[k])
+    parabola = np.polyfit(angle[k - 1 : k + 2] - angle[k], np.log(values[k - 1 : k + 2]), 2)
+    if not parabola[0] < 0.0:
+        return float(values[k])
+    return float(np.exp(parabola[2] - parabola[1] ** 2 / (4.0 * parabola[0])))
+
+
+def full_width(angle: Array, values: Array) -> float:
+    """Full width at half of `summit`, linear between positions; NaN if there is no half on both sides.
+
+    Examples
+    --------
+    >>> full_width(np.array([-1.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
+    1.0
+    """
+    top = int(np.argmax(values))
+    half = 0.5 * summit(angle, values)
+    ends = []
+    for order in (slice(top, None, -1) if top else slice(0, 1), slice(top, None)):
+        a, v = angle[order], values[order]
+        below = np.flatnonzero(v < half)
+        if not below.size:
+            return float("nan")
+        k = int(below[0])
+        ends.append(float(a[k - 1] + (a[k] - a[k - 1]) * (v[k - 1] - half) / (v[k - 1] - v[k])))
+    return ends[1] - ends[0]
+
+
+def total_scatter(angle: Array, values: Array) -> float:
+    """π ∫ f cosθ |sin θ| dθ over both sides of a lobe (eq. 5.2 for the mean of both), `values` being f cosθ.
+
+    Cubic between the positions: the rule of trapezia is off by h² f(0)/12 at the middle, 2 % of a lobe of 0.5° in steps of
+    0.1°.
+
+    Examples
+    --------
+    >>> angle = np.arange(-90.0, 90.01, 1.0)
+    >>> round(total_scatter(angle, np.cos(np.radians(angle)) / np.pi), 5)
+    1.0
+    """
+    if angle.size < 2:
+        return 0.0
+    slope = np.gradient(values, angle)
+    inner = np.arange(FINE) / FINE
+    h = np.diff(angle)[:, None]
+    u = inner[None, :]
+    cubic = (
+        values[:-1, None] * (1 + 2 * u) * (1 - u) ** 2
+        + slope[:-1, None] * h * u * (1 - u) ** 2
+        + values[1:, None] * u * u * (3 - 2 * u)
+        + slope[1:, None] * h * u * u * (u - 1)
+    )
+    x = np.append((angle[:-1, None] + h * u).ravel(), angle[-1])
+    y = np.append(cubic.ravel(), values[-1])
+    return float(np.pi * np.trapezoid(y * np.abs(np.sin(np.radians(x))), np.radians(x)))

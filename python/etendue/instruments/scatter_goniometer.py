@@ -1,0 +1,476 @@
+"""`ScatterGoniometer`: a virtual instrument that measures a BSDF, by tracing its rays and by quadrature."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape
+from etendue.instruments.goniometer_scan import GoniometerScan, Plane, Way, detector_directions
+from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+from etendue.scatter.bsdf import Bsdf
+
+Array = npt.NDArray[np.float64]
+Method = Literal["trace", "quadrature"]
+
+BLOCK = 1 << 20
+"""Rays that are traced together; what a scan takes of memory does not grow with its rays."""
+
+FINENESS = ((5, 11), (4, 8))
+"""Nodes across beam and aperture, of the quadrature and of the coarser one that it is compared with."""
+
+SPAN = 9.0
+"""To which angles on both sides a scan goes if nothing is said [°]: 181 positions in steps of 0.1°."""
+
+MOST_POSITIONS = 1_000_000
+"""Of a scan."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ScatterGoniometer:
+    """A goniometer for scattered light: a beam on a sample, and an aperture on an arm about the middle of the spot.
+
+    Defaults are the instrument of section 5.4.1 of the thesis. Its solid angle of 6.25·10⁻⁴ sr is that of an aperture of
+    25.0 mm; section 1.3.2 states 25.4 mm, which has 6.45·10⁻⁴ sr.
+
+    Parameters
+    ----------
+    beam_diameter : number
+        Of the beam, across it [mm].
+    aperture_diameter : number
+        Of the aperture, or side of a square one [mm].
+    distance : number
+        From the middle of the spot to the aperture [mm].
+    aperture : {"disk", "square", "ring"}
+        Shape of the aperture.
+    inner_diameter : number
+        Of a ring [mm].
+    profile : {"uniform", "gaussian"} or numbers
+        Irradiance over the radius of the beam: even; falling to 1/e² at the edge; or values from the middle to the edge.
+    divergence : number
+        Angle of the outermost rays with the axis [°]; negative: convergent.
+    source_angle : number
+        Diameter of the source of light seen from the sample [°]: each point of the beam holds an even cone.
+    wavelength : number
+        In nm.
+    photons : number, optional
+        That the whole beam would be counted as at each position; None: there is no photon noise.
+    dark : number
+        Mean number of counts without light at each position, subtracted afterwards: the floor of the detector.
+    drift : number
+        By which share the beam has changed at the last position.
+
+    Raises
+    ------
+    ArgumentError
+        If a length or number is impossible.
+    UnknownNameError
+        If there is no such shape or profile.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> goniometer = et.ScatterGoniometer(beam_diameter=14, aperture_diameter=25, distance=886)
+    >>> round(goniometer.solid_angle * 1e4, 3), round(goniometer.instrument_function().fwhm, 2)
+    (6.253, 1.53)
+    >>> diffuser = et.bsdf.CosinePower(peak=2897, exponent=18204, way="transmitted")
+    >>> scan = goniometer.measure(diffuser, step=0.5, rays=10_000)
+    >>> round(scan.fwhm, 1)
+    1.6
+    """
+
+    beam_diameter: float = 14.0
+    aperture_diameter: float = 25.0
+    distance: float = 886.0
+    _: dataclasses.KW_ONLY
+    aperture: Shape = "disk"
+    inner_diameter: float = 0.0
+    profile: Profile = "uniform"
+    divergence: float = 0.0
+    source_angle: float = 0.0
+    wavelength: float = 550.0
+    photons: float | None = None
+    dark: float = 0.0
+    drift: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("beam_diameter", "aperture_diameter", "distance", "wavelength"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ArgumentError(f"{name} is {getattr(self, name)}; it is more than 0")
+        reach = 0.5 * self.beam_diameter + Aperture(self.aperture, self.aperture_diameter, self.inner_diameter).reach
+        if self.distance <= reach:
+            raise ArgumentError(
+                f"a distance of {self.distance:g} mm: beam and aperture reach {reach:g} mm; move it away"
+            )
+        if not abs(self.divergence) < 45.0 or not 0.0 <= self.source_angle < 90.0:
+            raise ArgumentError("a divergence is below 45°, and source_angle is from 0 to 90°")
+        if self.photons is not None and not self.photons > 0.0:
+            raise ArgumentError(f"{self.photons} photons; give more than 0, or None for no noise")
+        if self.dark < 0.0 or (self.dark and self.photons is None):
+            raise ArgumentError("dark counts are not negative, and need photons to be counted with")
+        if not self.drift > -1.0:
+            raise ArgumentError(f"a drift of {self.drift}; the beam keeps more than nothing")
+        object.__setattr__(self, "profile", self._beam.profile)
+
+    @property
+    def _beam(self) -> Beam:
+        return Beam(self.beam_diameter, self.profile, self.divergence, self.source_angle)
+
+    @property
+    def _aperture(self) -> Aperture:
+        return Aperture(self.aperture, self.aperture_diameter, self.inner_diameter)
+
+    @property
+    def solid_angle(self) -> float:
+        """Ω of the aperture, area over square of the distance [sr]."""
+        return self._aperture.area / self.distance**2
+
+    def instrument_function(
+        self, step: float = 0.1, span: float | None = None, *, rays: int | None = None, seed: int = 1
+    ) -> GoniometerScan:
+        """The bare beam, scanned: what the instrument shows of an infinitely sharp sample (S of section 5.3).
+
+        Parameters
+        ----------
+        step : number
+            Between positions [°].
+        span : number, optional
+            To which angle on both sides [°]; just beyond the last light if left out.
+        rays : int, optional
+            Traced instead of computed from the overlap of beam and aperture.
+        seed : int
+            The same seed gives the same rays, and the same noise.
+
+        Returns
+        -------
+        GoniometerScan
+            Flux as a share of that of the beam.
+
+        Raises
+        ------
+        ArgumentError
+            If step, span or rays are impossible.
+        """
+        if span is None:
+            grown = abs(1.0 + self.distance * np.tan(np.radians(self.divergence)) / (0.5 * self.beam_diameter))
+            reach = 0.5 * self.beam_diameter * grown + self._aperture.reach
+            reach += self.distance * np.tan(np.radians(0.5 * self.source_angle))
+            # Two positions more, where there is no light any more.
+            span = (np.ceil(np.degrees(np.arctan(reach / self.distance)) / step) + 2.0) * step if step > 0.0 else 1.0
+        angle = _angles(0.0, step, float(span))
+        if rays is None:
+            flux, error = self._beam.overlap(self._aperture, angle, self.distance), np.zeros(angle.shape)
+        else:
+            arms = detector_directions(angle, 0.0, "in-plane", behind=True)
+            flux, error = self._counted(None, 0.0, arms, rays, seed, behind=True, fresh=False)
+        return self._noisy(angle, flux, error, seed, incidence=0.0, way="transmitted", plane="in-plane", sample=False)
+
+    def measure(
+        self,
+        bsdf: Bsdf,
+        theta: float = 0.0,
+        step: float = 0.1,
+        rays: int = 10**6,
+        seed: int = 1,
+        *,
+        span: float = SPAN,
+        plane: Plane = "in-plane",
+        way: Way | None = None,
+        method: Method = "trace",
+        fresh: bool = False,
+    ) -> GoniometerScan:
+        """Measure a sample: the detector passes in one plane through the regular direction.
+
+        Parameters
+        ----------
+        bsdf : Bsdf
+            Of the sample; light meets its front from azimuth 180°.
+        theta : number
+            Angle of incidence [°].
+        step, span : number
+            Between positions, and from the regular direction to the last of them on both sides [°].
+        rays : int
+            At each position.
+        seed : int
+            The same seed gives the same rays, and the same noise.
+        plane : {"in-plane", "cross-plane"}
+            In which the detector moves.
+        way : {"transmitted", "reflected"}, optional
+            The light that is measured; need not be said of a sample that does only one.
+        method : {"trace", "quadrature"}
+            Rays drawn and counted; or integrals over beam and aperture, whose standard error is the difference from coarser
+            ones.
+        fresh : bool
+            Draw rays of its own for each position, as an instrument does, so that errors are independent. Otherwise all
+            positions count the same rays, which is as right at each of them and a tenth of the work, but neighbours err
+            together.
+
+        Returns
+        -------
+        GoniometerScan
+            Flux as a share of that of the beam.
+
+        Raises
+        ------
+        ArgumentError
+            If a number is impossible, or `way` is not said of a sample that transmits and reflects.
+        UnknownNameError
+            If there is no such plane, way or method.
+        """
+        if method not in get_args(Method):
+            raise UnknownNameError("method", method, get_args(Method))
+        if plane not in get_args(Plane):
+            raise UnknownNameError("plane", plane, get_args(Plane))
+        way = _way(bsdf, way)
+        _require_incidence(theta)
+        angle = _angles(theta if plane == "in-plane" else 0.0, step, span)
+        if plane == "in-plane":
+            angle = angle[np.abs(angle) < 90.0]
+        behind = way == "transmitted"
+        arms = detector_directions(angle, theta, plane, behind=behind)
+        if method == "trace":
+            flux, error = self._counted(bsdf, theta, arms, rays, seed, behind=behind, fresh=fresh)
+        else:
+            flux, error = self._integrated(bsdf, theta, arms, behind=behind)
+        notes: tuple[str, ...] = ()
+        if method == "trace" and not fresh and self.photons is None:
+            notes = ("all positions count the same rays: neighbours err together",)
+        return self._noisy(angle, flux, error, seed, incidence=theta, way=way, plane=plane, sample=True, notes=notes)
+
+    def measure_hemisphere(
+        self,
+        bsdf: Bsdf,
+        theta: float = 0.0,
+        step: float = 5.0,
+        rays: int = 10**6,
+        seed: int = 1,
+        *,
+        way: Way | None = None,
+        method: Method = "trace",
+    ) -> BsdfSlice:
+        """Measure a sample over a hemisphere, in even steps of the angle from the normal and of the azimuth.
+
+        Parameters are those of `measure`. The last position is half a step, at most 5°, above the plane of the sample.
+
+        Returns
+        -------
+        BsdfSlice
+            F [1/sr] by eq. 5.1 on a grid of azimuths and angles from the normal, with its standard error.
+        """
+        if method not in get_args(Method):
+            raise UnknownNameError("method", method, get_args(Method))
+        way = _way(bsdf, way)
+        _require_incidence(theta)
+        if not 0.5 <= step <= 30.0:
+            raise ArgumentError(f"steps of {step:g}° over a hemisphere; give 0.5 to 30°")
+        behind = way == "transmitted"
+        polar = np.arange(0.0, 90.0 - min(0.5 * step, 5.0) + 1e-9, step)
+        grid = PolarGrid("normal", polar, np.linspace(0.0, 360.0, max(round(360.0 / step), 3), endpoint=False))
+        arms = direction(polar[None, :], grid.azimuth[:, None], behind=behind)
+        flat = arms.reshape(-1, 3)
+        if method == "trace":
+            flux, error = self._counted(bsdf, theta, flat, rays, seed, behind=behind, fresh=False)
+        else:
+            flux, error = self._integrated(bsdf, theta, flat, behind=behind)
+        flux, error = self._with_noise(flux, error, seed)
+        per = self.solid_angle * np.abs(flat[:, 2])
+        shape = grid.shape
+        return BsdfSlice(
+            direction(theta, 180.0),
+            (flux / per).reshape(shape),
+            behind,
+            grid=grid,
+            wavelength=self.wavelength,
+            standard_error=(error / per).reshape(shape),
+        )
+
+    # --- the two ways ------------------------------------------------------------------------------------------------
+
+    def _rays(self, bsdf: Bsdf | None, theta: float, n: int, seed: tuple[int, ...]) -> tuple[Array, Array]:
+        """Where rays leave the sample [mm] and to where, shape (n, 3) each; NaN where they are absorbed."""
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((*seed, 0))))
+        points = self._beam.points(rng, n)
+        start, v = _into_the_sample(points, self._beam.tilts(points, rng), theta, across=bsdf is None)
+        if bsdf is None:
+            return start, v
+        number = int(np.random.SeedSequence((*seed, 1)).generate_state(1, np.uint64)[0])
+        incident = direction(theta, 180.0) if self._beam.collimated else -v
+        return start, bsdf.sample(incident, n, seed=number, wavelength=self.wavelength)
+
+    def _counted(
+        self, bsdf: Bsdf | None, theta: float, arms: Array, rays: int, seed: int, *, behind: bool, fresh: bool
+    ) -> tuple[Array, Array]:
+        if rays < 1:
+            raise ArgumentError(f"{rays} rays; draw at least one")
+        if seed < 0:
+            raise ArgumentError(f"a seed of {seed}; it is not negative")
+        hits = np.zeros(len(arms))
+        for block, n in enumerate(_blocks(rays)):
+            if fresh:
+                for k in range(len(arms)):
+                    start, to = self._rays(bsdf, theta, n, (seed, block, k + 1))
+                    hits[k : k + 1] += self._hits(start, to, arms[k : k + 1], behind=behind)
+            else:
+                start, to = self._rays(bsdf, theta, n, (seed, block, 0))
+                hits += self._hits(start, to, arms, behind=behind)
+        share = hits / rays
+        # Where no ray came, as if one had: the error of nothing is not nothing.
+        return share, np.sqrt(np.maximum(share, 1.0 / rays) * (1.0 - share) / rays)
+
+    def _hits(self, start: Array, to: Array, arms: Array, *, behind: bool) -> Array:
+        """How many rays get into the aperture at each position."""
+        aperture = self._aperture
+        leaving = to[:, 2] < 0.0 if behind else to[:, 2] > 0.0
+        farthest = float(np.sqrt(np.max(np.einsum("ij,ij->i", start, start), initial=0.0)))
+        # Two unit vectors differ by less than this if the one leads from the spot into the aperture at the other.
+        bound = 1.01 * (aperture.reach + farthest) / (self.distance - farthest)
+        # Along the widest spread of the positions, rays are put in order: each position looks at a stretch of them.
+        spread = np.ptp(arms, axis=0) if len(arms) > 1 else np.ones(3)
+        first = int(np.argmax(spread))
+        low, high = arms.min(axis=0) - bound, arms.max(axis=0) + bound
+        near = leaving
+        for k in range(3):
+            near = near & (to[:, k] >= low[k]) & (to[:, k] <= high[k])
+        chosen = np.flatnonzero(near)
+        if len(arms) > 1:
+            chosen = chosen[np.argsort(to[chosen, first], kind="stable")]
+        s, p = to[chosen].T.copy(), start[chosen].T.copy()
+        found = np.zeros(len(arms))
+        ends = (np.searchsorted(s[first], arms[:, first] + shift) for shift in (-bound, bound))
+        for k, (i, j) in enumerate(zip(*ends, strict=True)):
+            if j <= i:
+                continue
+            d, (t1, t2) = arms[k], _frame(arms[k])
+            sx, sy, sz, px, py, pz = (*s[:, i:j], *p[:, i:j])
+            along = (self.distance - (px * d[0] + py * d[1] + pz * d[2])) / (sx * d[0] + sy * d[1] + sz * d[2])
+            x, y, z = px + along * sx, py + along * sy, pz + along * sz
+            u, w = x * t1[0] + y * t1[1] + z * t1[2], x * t2[0] + y * t2[1] + z * t2[2]
+            found[k] = np.count_nonzero(aperture.holds(u, w) & (along > 0.0))
+        return found
+
+    def _integrated(self, bsdf: Bsdf, theta: float, arms: Array, *, behind: bool) -> tuple[Array, Array]:
+        fine, coarse = (self._quadrature(bsdf, theta, arms, *nodes) for nodes in FINENESS)
+        side = bsdf.regular_transmittance(theta) if behind else bsdf.regular_reflectance(theta)
+        straight = float(np.asarray(side))
+        if straight > 0.0:
+            regular = direction(theta, 0.0, behind=behind)
+            turned = np.degrees(2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(arms - regular, axis=1), 0.0, 1.0)))
+            fine = fine + straight * self._beam.overlap(self._aperture, turned, self.distance)
+            coarse = coarse + straight * self._beam.overlap(self._aperture, turned, self.distance)
+        return fine, np.abs(fine - coarse)
+
+    def _quadrature(self, bsdf: Bsdf, theta: float, arms: Array, beam: int, aperture: int) -> Array:
+        points, tilts, share = self._beam.nodes(beam)
+        start, v = _into_the_sample(points, tilts, theta, across=False)
+        offsets, area = self._aperture.nodes(aperture)
+        found = np.zeros(len(arms))
+        together = max(1, 400_000 // (len(points) * len(offsets)))
+        for at in range(0, len(arms), together):
+            d = arms[at : at + together]
+            frames = np.array([_frame(one) for one in d])
+            ends = self.distance * d[:, None] + np.einsum("na,iac->inc", offsets, frames)
+            off = ends[:, None] - start[None, :, None]
+            length = np.linalg.norm(off, axis=-1)
+            s = off / length[..., None]
+            incident = np.broadcast_to(-v[None, :, None], s.shape)
+            leaving = s[..., 2] * d[:, None, None, 2] > 0.0
+            f = np.zeros(leaving.shape)
+            f[leaving] = bsdf.evaluate(incident[leaving], s[leaving], wavelength=self.wavelength)
+            facing = np.einsum("ibnc,ic->ibn", s, d)
+            seen = f * np.abs(s[..., 2]) * facing / length**2
+            found[at : at + together] = np.einsum("b,ibn,n->i", share, seen, area)
+        return found
+
+    # --- the detector ------------------------------------------------------------------------------------------------
+
+    def _with_noise(self, flux: Array, error: Array, seed: int) -> tuple[Array, Array]:
+        drifted = 1.0 + self.drift * np.linspace(0.0, 1.0, flux.size)
+        flux, error = flux * drifted, error * drifted
+        if self.photons is None:
+            return flux, error
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 2))))
+        counts = rng.poisson(np.maximum(flux, 0.0) * self.photons + self.dark).astype(np.float64)
+        noise = np.sqrt(np.maximum(counts, 1.0)) / self.photons
+        return (counts - self.dark) / self.photons, np.hypot(error, noise)
+
+    def _noisy(
+        self,
+        angle: Array,
+        flux: Array,
+        error: Array,
+        seed: int,
+        *,
+        incidence: float,
+        way: Way,
+        plane: Plane,
+        sample: bool,
+        notes: tuple[str, ...] = (),
+    ) -> GoniometerScan:
+        flux, error = self._with_noise(flux, error, seed)
+        return GoniometerScan(
+            angle,
+            flux,
+            error,
+            solid_angle=self.solid_angle,
+            incidence=incidence,
+            way=way,
+            plane=plane,
+            background=0.0 if self.photons is None else self.dark / self.photons,
+            sample=sample,
+            notes=notes,
+        )
+
+
+def _into_the_sample(points: Array, tilts: Array, theta: float, *, across: bool) -> tuple[Array, Array]:
+    """Where rays meet the surface (or pass the plane across the beam) and their directions, shape (n, 3) each."""
+    c, s = np.cos(np.radians(theta)), np.sin(np.radians(theta))
+    axis, first, second = np.array([s, 0.0, -c]), np.array([c, 0.0, s]), np.array([0.0, 1.0, 0.0])
+    v = axis + tilts[:, :1] * first + tilts[:, 1:] * second
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    q = points[:, :1] * first + points[:, 1:] * second
+    if not across:
+        q = q - (q[:, 2] / v[:, 2])[:, None] * v
+    return q, v
+
+
+def _frame(arm: Array) -> tuple[Array, Array]:
+    """The axes of the aperture: in the plane of the arm and the normal, and across it."""
+    across = np.hypot(arm[0], arm[1])
+    x, y = (arm[0] / across, arm[1] / across) if across > 1e-12 else (1.0, 0.0)
+    return np.array([arm[2] * x, arm[2] * y, -across]), np.array([-y, x, 0.0])
+
+
+def _angles(middle: float, step: float, span: float) -> Array:
+    if not 0.0 < step < 90.0 or not 0.0 < span <= 180.0 or span / step > MOST_POSITIONS:
+        raise ArgumentError(f"steps of {step:g}° to {span:g}° on both sides; give a step and a span of more than 0")
+    k = int(np.floor(span / step + 1e-9))
+    # 8.7 and not 8.700000000000001: files hold what people would write.
+    return np.round(middle + step * np.arange(-k, k + 1), 10)
+
+
+def _require_incidence(theta: float) -> None:
+    if not 0.0 <= theta < 90.0:
+        raise ArgumentError(f"an angle of incidence of {theta:g}°; it is from 0 to below 90°")
+
+
+def _way(bsdf: Bsdf, way: Way | None) -> Way:
+    if way is not None:
+        if way not in get_args(Way):
+            raise UnknownNameError("way", way, get_args(Way))
+        return way
+    mirrored, straight, back, through = bsdf.ways
+    if (mirrored or back) and (straight or through):
+        raise ArgumentError(
+            "the sample reflects and transmits: say which is measured, way='transmitted' or 'reflected'"
+        )
+    return "transmitted" if straight or through else "reflected"
+
+
+def _blocks(rays: int) -> Iterator[int]:
+    for start in range(0, rays, BLOCK):
+        yield min(BLOCK, rays - start)

@@ -1,0 +1,52 @@
+"""The verbs of instruments: what they say, write and refuse."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.outcome import Run
+
+DIFFUSER = 'kind = "cosine-power"\npeak = 2897.0\nexponent = 18204\nway = "transmitted"\n'
+
+
+@pytest.mark.slow
+def test_a_diffuser_is_measured_and_comes_back(run: Run) -> None:
+    Path("diffuser.toml").write_text(DIFFUSER)
+    options = ("--aperture", "25.4", "--beam", "14", "--distance", "886", "--step", "0.1", "--span", "4")
+    told = run("goniometer", "diffuser.toml", *options, "--photons", "1e6", "--method", "quadrature", "-o", "scan.csv")
+    assert told.status == 0, told.err
+    assert "full width at half maximum 1.6" in told.out
+    bare = run("goniometer", "--no-sample", "--aperture", "25.4", "-o", "signature.csv", "--json")
+    assert json.loads(bare.out)["fwhm"] == pytest.approx(1.557, abs=2e-3)
+    outputs = ("-o", "true.csv", "-o", "true.png")
+    found = run("deconvolve", "scan.csv", "--instrument", "signature.csv", *outputs, "--json")
+    assert found.status == 0, found.err
+    facts = json.loads(found.out)
+    assert facts["peak_before"] < 1300
+    assert abs(facts["peak"] - 2897) < 4 * facts["peak_error"]
+    assert facts["fwhm"] == pytest.approx(1.0, abs=0.03)
+    assert facts["total_scatter"][1] == pytest.approx(facts["total_scatter"][0], rel=1e-6)
+    assert Path("true.png").stat().st_size > 10_000
+    assert "# stop = held-out" in Path("true.csv").read_text()
+    plain = run("deconvolve", "scan.csv", "--instrument", "signature.csv", "--stop", "12", "--operator", "slice")
+    assert "stop after 12 iterations" in plain.out
+
+
+def test_mistakes_are_told_and_nothing_is_written(run: Run) -> None:
+    Path("diffuser.toml").write_text(DIFFUSER.replace("exponent", "exponant"))
+    wrong = run("goniometer", "diffuser.toml", "-o", "scan.csv")
+    assert wrong.status == 1
+    assert "exponent" in wrong.err
+    assert run("goniometer", "-o", "scan.csv").status == 2
+    assert run("goniometer", "--no-sample", "--aperture-shape", "disc").status == 2
+    wide = "".join(f"{k / 10},{int(abs(k) < 60)}\n" for k in range(-80, 81))
+    Path("wide.csv").write_text("angle,flux\n" + wide)
+    Path("scan.csv").write_text("angle,flux\n" + "".join(f"{k / 10},{1 / (1 + k * k)}\n" for k in range(-50, 51)))
+    told = run("deconvolve", "scan.csv", "--instrument", "wide.csv", "-o", "true.csv")
+    assert told.status == 1
+    assert "scan to larger angles" in told.err
+    assert run("deconvolve", "scan.csv", "--instrument", "scan.csv", "--stop", "heldout").status == 2
+    assert not Path("true.csv").exists()
