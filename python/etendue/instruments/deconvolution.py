@@ -20,10 +20,10 @@ from etendue.instruments.stopping import MOST, NEEDS_COUNTS, RULES, Course
 Array = npt.NDArray[np.float64]
 Method = Literal["richardson-lucy", "matrix"]
 
-REPLICATES = 40
+REPLICATES = 32
 """Scans that error bands are made of."""
 
-FURTHER = 8
+FURTHER = 4
 """Times the iterations after which a lobe stands for the truth when errors are estimated."""
 
 THINNINGS = 4
