@@ -79,7 +79,7 @@ class Deconvolution:
     >>> import etendue as et
     >>> goniometer = et.ScatterGoniometer(photons=1e7)
     >>> sample = et.bsdf.CosinePower(peak=2897, exponent=18204, way="transmitted")
-    >>> scan = goniometer.measure(sample, span=3, method="quadrature")
+    >>> scan = goniometer.measure(sample, step=0.2, span=3, method="quadrature")
     >>> found = et.deconvolve(scan, goniometer.instrument_function(), replicates=8)
     >>> bool(scan.bsdf.max() < 1300 and found.peak > 2500)
     True
