@@ -163,7 +163,7 @@ def test_the_lobe_comes_back_better_than_by_the_rule_of_the_thesis(name: str) ->
 @pytest.mark.slow
 def test_error_bands_hold() -> None:
     """Over 24 scans of 10⁵ photons. Neighbours err together; what the stop leaves out is part of the error, estimated from
-    a lobe that was iterated further, which falls short: the share is below the 68 % of normal deviates, yet half at least."""
+    a lobe that was iterated further, which falls short: the share is below 68 %, yet half at least."""
     inside = []
     for name in ("SD2", "SD3"):
         exact = truth(name=name, angle=exact_scan(name).angle)
