@@ -99,6 +99,13 @@ class Deconvolution:
     operator: str
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Peak, width and stop."""
+        rule = self.stop.partition(":")[0]
+        return (
+            f"Deconvolution(peak={self.peak:.5g}, fwhm={self.fwhm:.4g}°, iterations={self.iterations}, stop={rule!r})"
+        )
+
     @property
     def peak(self) -> float:
         """Largest value, between positions too."""
