@@ -1,7 +1,8 @@
 """Chapter 5 of the thesis: a goniometer blurs narrow lobes, and how to see past it.
 
     python examples/chapter_5.py             # few scans, seconds
-    python examples/chapter_5.py --full      # a million fresh rays at each position, 20 seeds: docs/chapter-5.md
+    python examples/chapter_5.py --full      # 10⁴ iterations, all rules, 20 seeds: the tables of docs/chapter-5.md
+    python examples/chapter_5.py --fresh     # the four diffusers with fresh rays at each position, as the thesis has them
 
 Four virtual diffusers whose lobes are known, and two that stand in for the holographic ones, are measured by a virtual
 goniometer and deconvolved: by the rule of the thesis, by ours, and by matrix inversion.
@@ -22,6 +23,7 @@ import numpy.typing as npt
 from etendue.instruments.stopping import RULES
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
 from experiments.panels import FAINT, INK, LINES, new_figure, print_table, save
+from matplotlib.ticker import NullFormatter
 from scipy.optimize import brentq
 
 Array = npt.NDArray[np.float64]
@@ -138,7 +140,7 @@ def finish(made: object, path: Path) -> None:
     """Frames and letters as in other figures, and the file."""
     for axes in made.axes:  # type: ignore[attr-defined]
         axes.spines[["top", "right"]].set_visible(False)
-        axes.tick_params(labelsize=7, colors=FAINT)
+        axes.tick_params(which="both", labelsize=7, colors=FAINT)
         axes.title.set(size=9, color=INK)
     save(made, path)  # type: ignore[arg-type]
 
@@ -153,7 +155,7 @@ def by_every_rule(name: str, scan: et.GoniometerScan, bare: et.GoniometerScan) -
     return row
 
 
-def deconvolve_diffusers(output: Path, *, full: bool) -> None:
+def deconvolve_diffusers(output: Path, *, full: bool, fresh: bool) -> None:
     """Figs. 5.3, 5.4 and 5.5: 10⁴ iterations, E(i), and stops."""
     goniometer = et.ScatterGoniometer()
     bare = goniometer.instrument_function(0.1, rays=10**6)
@@ -162,7 +164,7 @@ def deconvolve_diffusers(output: Path, *, full: bool) -> None:
     panels, courses = made.subplots(2, 2), course.subplots(1, 4)
     for axes, under, name in zip(panels.ravel(), courses, STOPS, strict=True):
         start = time.perf_counter()
-        if full:
+        if fresh:
             scan = goniometer.measure(sample(name), span=5, seed=3, fresh=True)
         else:
             scan = noisy(goniometer.measure(sample(name), span=5, method="quadrature"), PHOTONS, 3)
@@ -190,6 +192,7 @@ def deconvolve_diffusers(output: Path, *, full: bool) -> None:
         error = thesis.error_function
         under.loglog(np.arange(1, error.size + 1), error / error.max(), color=LINES[0])
         under.axvline(thesis.iterations, color=LINES[1], ls="--", lw=0.8)
+        under.yaxis.set_minor_formatter(NullFormatter())
         under.set(xlabel="iteration i", title=f"{name}: stop {thesis.iterations}, printed {STOPS[name]}")
     panels[0, 0].legend(frameon=False, fontsize=7, loc="upper left")
     for axes in panels[:, 0]:
@@ -273,7 +276,8 @@ def four_apertures(output: Path, fwhm: float, seeds: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--full", action="store_true", help="fresh rays, 20 seeds")
+    parser.add_argument("--full", action="store_true", help="10⁴ iterations, all rules, 20 seeds")
+    parser.add_argument("--fresh", action="store_true", help="a million fresh rays at each position")
     parser.add_argument("--seeds", type=int, help="scans of each aperture")
     parser.add_argument("--output", type=Path, default=Path("chapter-5"), help="folder for the figures")
     options = parser.parse_args()
@@ -281,7 +285,7 @@ def main() -> None:
     seeds = options.seeds or (20 if options.full else 1)
     print_diffusers()
     print_instrument(options.output)
-    deconvolve_diffusers(options.output, full=options.full)
+    deconvolve_diffusers(options.output, full=options.full, fresh=options.fresh)
     for fwhm in (NARROW, WIDE) if options.full else (NARROW,):
         four_apertures(options.output, fwhm, seeds)
     print(f"\nfigures: {options.output}/")

@@ -153,6 +153,8 @@ WITHOUT_EXAMPLE = {
     "etendue.scatter.scans.interpolations": "tabulated shows how all are used",
     "etendue.scatter.models.rough.Rough": "what its kinds share; each has an example",
     "etendue.formats": "formats live on files: docs/how-to.md writes and reads them, the tests take them apart",
+    "etendue.instruments.operators": "steps of deconvolve; tests/instruments/test_deconvolution.py shows them",
+    "etendue.instruments.stopping": "rules that deconvolve names; tests/instruments/test_deconvolution.py shows them",
     "etendue.lightfield.etendue_density": "what LightField is made of, which shows it",
     "etendue.lightfield.selection.bounding": "a step of choose_surface",
     "etendue.lightfield.selection.scorer": "a step of choose_surface",

@@ -42,10 +42,17 @@ def illuminance() -> et.IlluminanceMap:
     return et.IlluminanceMap(np.eye(2), np.ones((2, 2)), np.ones((2, 2), dtype=np.int64), et.Screen(2, 1, 2, 2, "xy"))
 
 
+def scan() -> et.GoniometerScan:
+    angle = np.linspace(-5.0, 5.0, 41)
+    return et.GoniometerScan(angle, np.exp(-(angle**2)), notes=("by hand",))
+
+
 MAKERS: dict[str, Callable[[], Any]] = {
     **{type(surface).__name__: lambda surface=surface: surface for surface in SURFACES.values()},
     "Cone": lambda: et.Cone(acceptance="auto"),
+    "Deconvolution": lambda: et.deconvolve(scan(), et.GoniometerScan(scan().angle, scan().flux ** 4), stop=5),
     "FromField": lambda: et.FromField(surface=et.Disk(radius=30), samples=4),
+    "GoniometerScan": scan,
     "GriddedSource": lambda: et.GriddedSource.fit(rays(), et.Disk(radius=30), pixel=20, threshold=5),
     "IlluminanceMap": illuminance,
     "Intensity": lambda: et.intensity_distribution(rays()),
@@ -61,6 +68,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "Scene": scene,
     "Bsdf": lambda: et.BsdfTable(BsdfData(components=({"kind": "lambertian", "reflectance": 0.2},))),
     "BsdfTable": lambda: et.BsdfTable(BsdfData(components=({"kind": "gaussian", "peak": 3.0, "sigma": 0.2},))),
+    "ScatterGoniometer": lambda: et.ScatterGoniometer(profile=(1, 0.5), photons=1e6),
     "ScatterEvents": lambda: result().events["scatter"],
     "Screen": lambda: et.Screen(2, 1, 8, 4),
     "Spectrum": lambda: et.Spectrum([450.0, 650.0], [1.0, 0.5]),

@@ -61,6 +61,8 @@ def materials(tmp_path_factory: pytest.TempPathFactory) -> Path:
         parts=[{"kind": "lambertian", "reflectance": 0.1}, {"kind": "gaussian", "peak": 0.3, "sigma": 0.2}]
     )
     et.write_bsdf(folder / "vinyl.bsdf", vinyl)
+    lobe_of = 'kind = "cosine-power"\npeak = 2897.5\nexponent = 18204\nway = "transmitted"\n'
+    (folder / "diffuser.toml").write_text(lobe_of, encoding="utf-8")
     return folder
 
 

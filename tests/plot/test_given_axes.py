@@ -28,6 +28,12 @@ def sweep() -> ThresholdSweep:
     return ThresholdSweep(columns, patches=437, rays=10**6, held_out=10**5)
 
 
+def lobe() -> et.Deconvolution:
+    angle = np.linspace(-5.0, 5.0, 41)
+    scan = et.GoniometerScan(angle, np.exp(-(angle**2)))
+    return et.deconvolve(scan, et.GoniometerScan(angle, np.exp(-4.0 * angle**2)), stop=5)
+
+
 DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {
     "map": (1, lambda **given: et.plot_map(make_map(), **given)),
     "method": (1, lambda **given: make_map().plot(**given)),
@@ -37,6 +43,7 @@ DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {
     "comparison": (3, lambda **given: et.plot_comparison(et.compare(make_map(), make_map()), **given)),
     "threshold": (2, lambda **given: et.plot_threshold_sweep(sweep(), **given)),
     "characteristic": (2, lambda **given: et.plot_characteristic(et.diagnose(make_field(SURFACES["disk"])), **given)),
+    "deconvolution": (3, lambda **given: et.plot_deconvolution(lobe(), **given)),
     "bsdf": (3, lambda **given: et.plot_bsdf(et.bsdf.Gaussian(peak=3.0, sigma=0.2), **given)),
     "scene": (2, lambda **given: et.draw_scene(LENS, rays=0, **given)),
 }

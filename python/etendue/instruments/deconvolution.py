@@ -20,10 +20,10 @@ from etendue.instruments.stopping import MOST, NEEDS_COUNTS, RULES, Course
 Array = npt.NDArray[np.float64]
 Method = Literal["richardson-lucy", "matrix"]
 
-REPLICATES = 40
+REPLICATES = 32
 """Scans that error bands are made of."""
 
-FURTHER = 8
+FURTHER = 4
 """Times the iterations after which a lobe stands for the truth when errors are estimated."""
 
 THINNINGS = 4
@@ -79,7 +79,7 @@ class Deconvolution:
     >>> import etendue as et
     >>> goniometer = et.ScatterGoniometer(photons=1e7)
     >>> sample = et.bsdf.CosinePower(peak=2897, exponent=18204, way="transmitted")
-    >>> scan = goniometer.measure(sample, span=3, method="quadrature")
+    >>> scan = goniometer.measure(sample, step=0.2, span=3, method="quadrature")
     >>> found = et.deconvolve(scan, goniometer.instrument_function(), replicates=8)
     >>> bool(scan.bsdf.max() < 1300 and found.peak > 2500)
     True
@@ -98,6 +98,13 @@ class Deconvolution:
     error_function: Array
     operator: str
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Peak, width and stop."""
+        rule = self.stop.partition(":")[0]
+        return (
+            f"Deconvolution(peak={self.peak:.5g}, fwhm={self.fwhm:.4g}°, iterations={self.iterations}, stop={rule!r})"
+        )
 
     @property
     def peak(self) -> float:

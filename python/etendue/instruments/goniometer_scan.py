@@ -112,6 +112,12 @@ class GoniometerScan:
         if not self.background >= 0.0:
             raise ArgumentError(f"a background of {self.background}; it is not negative")
 
+    def __repr__(self) -> str:
+        """Positions, and what was measured."""
+        where = f"{self.angle.size} positions from {self.angle[0]:g} to {self.angle[-1]:g}°"
+        what = f"{self.way} at {self.incidence:g}°, {self.plane}" if self.sample else "no sample"
+        return f"GoniometerScan({where}, {what})"
+
     @property
     def regular(self) -> float:
         """The angle at which light arrives that is mirrored, or goes straight on [°]."""

@@ -119,10 +119,12 @@ class ScatterGoniometer:
 
     @property
     def _beam(self) -> Beam:
+        """What meets the sample."""
         return Beam(self.beam_diameter, self.profile, self.divergence, self.source_angle)
 
     @property
     def _aperture(self) -> Aperture:
+        """What stands in front of the detector."""
         return Aperture(self.aperture, self.aperture_diameter, self.inner_diameter)
 
     @property
