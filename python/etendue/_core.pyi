@@ -94,6 +94,7 @@ class _View(TypedDict):
 class _Cone(TypedDict):
     view: _View
     acceptances: Sequence[float]
+    disk: float | None
 
 class _Part(TypedDict):
     shape: str

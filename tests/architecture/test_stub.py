@@ -82,7 +82,7 @@ def test_cone_sums_want_every_key_and_come_back_in_the_stated_shapes() -> None:
         "eye": (0.0, 0.0, 9.0), "target": (0.0, 0.0, 0.0), "right": (1.0, 0.0, 0.0), "up": (0.0, 1.0, 0.0),
         "normal": (0.0, 0.0, 1.0), "width": 2.0, "height": 2.0, "columns": 3, "rows": 2,
     }  # fmt: skip
-    cone: Any = {"view": view, "acceptances": [0.1, 0.5, 1.0, 1.5]}
+    cone: Any = {"view": view, "acceptances": [0.1, 0.5, 1.0, 1.5], "disk": None}
     assert list(view) == keys("_View")
     assert list(cone) == keys("_Cone")
     ((flux, flux_squared, rays),), tally = _core.cone_sums(source(), [cone])

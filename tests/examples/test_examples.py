@@ -12,6 +12,8 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RUNS = {
     "appendix_b.py": (["--rays", "50000"], 4),
     "chapter_2.py": (["--rays", "200000", "--seeds", "4"], 4),
+    "chapter_2_details.py": ([], 2),
+    "chapter_3_drawings.py": ([], 4),
     "chapter_4.py": (["--lines", "4"], 6),
     "chapter_5.py": ([], 4),
     "dome_led.py": (["--rays", "100000"], 3),

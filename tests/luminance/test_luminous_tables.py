@@ -88,6 +88,7 @@ def _directions(rays: Array, table: et.Intensity) -> float:
     return float(((counts - expected) ** 2 / expected).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["front", "back"])
 def test_the_far_field_is_the_table(side: str) -> None:
     """Rays forwards, on a plane above the surface: their directions, and their places evenly over it."""

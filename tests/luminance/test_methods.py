@@ -90,6 +90,7 @@ FILES = {
 
 VALUES: dict[str, tuple[Any, tuple[str, ...]]] = {
     "acceptance": (8.0, ("--acceptance", "8")),
+    "observer_radius": (90.0, ("--observer-radius", "90")),
     "surface": (DISK, ("--surface", "disk:radius=30")),
     "samples": (4, ("--samples", "4")),
     "rays_per_pixel": (8, ("--rays-per-pixel", "8")),
@@ -104,8 +105,8 @@ FAST = {"cone": (), "lightfield": (), "pathtracing": ("rays_per_pixel",)}
 """Options that are always stated, so that a map takes no time."""
 
 TAKEN: dict[str, dict[str, tuple[str, ...]]] = {
-    "rays": {"cone": ("acceptance",), "lightfield": ("surface", "samples")},
-    "index": {"cone": ("acceptance",), "lightfield": ("surface", "samples")},
+    "rays": {"cone": ("acceptance", "observer_radius"), "lightfield": ("surface", "samples")},
+    "index": {"cone": ("acceptance", "observer_radius"), "lightfield": ("surface", "samples")},
     "field": {"lightfield": ("samples",)},
     "scene": {"pathtracing": ("rays_per_pixel", "until", "seed", "forward_rays", "gather")},
     "events": {"pathtracing": ("rays_per_pixel", "until", "seed", "gather")},

@@ -50,7 +50,7 @@ def test_a_line_of_sight_reads_what_the_gridded_source_says(grids: dict[str, et.
     origin, axes = np.array(frame[:3]), np.array(frame[3:]).reshape(3, 3)
     rng = np.random.default_rng(5)
     seen = 0
-    for _ in range(24):
+    for _ in range(12):
         # A point in the source, and an observer on the side that most light goes to.
         target = origin + (rng.random(3) * [1.6, 1.2, 0.5] - [0.4, 0.6, 0.0]) @ axes
         towards = (rng.normal(size=3) * [0.5, 0.5, 0.2] + [0.2, -0.1, 1.0]) @ axes
@@ -62,7 +62,7 @@ def test_a_line_of_sight_reads_what_the_gridded_source_says(grids: dict[str, et.
         (expected,) = grid.luminance([axes @ (target - origin)], [axes @ sight])
         assert lmap.values[0, 0] == pytest.approx(expected, rel=1e-9)
         seen += expected > 0.0
-    assert seen > 12
+    assert seen > 5
 
 
 def test_the_map_is_that_of_the_patches(grids: dict[str, et.GriddedSource]) -> None:
@@ -78,6 +78,7 @@ def test_the_map_is_that_of_the_patches(grids: dict[str, et.GriddedSource]) -> N
     assert any("multiplied by" in note for note in found.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", ["plane", "dome", "cylinder"])
 def test_rays_of_light_images_are_those_of_sample(grids: dict[str, et.GriddedSource], surface: str) -> None:
     """χ² of two samples over place and direction: the core's draws against `GriddedSource.sample`."""

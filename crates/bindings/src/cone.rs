@@ -16,6 +16,7 @@ use crate::view::View;
 pub struct Cone {
     view: View,
     acceptances: Vec<f64>,
+    disk: Option<f64>,
 }
 
 impl Cone {
@@ -24,6 +25,7 @@ impl Cone {
         CoreCone {
             view: self.view.core(),
             acceptances: self.acceptances.clone(),
+            disk: self.disk,
         }
     }
 

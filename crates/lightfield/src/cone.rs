@@ -7,6 +7,7 @@
 use std::ops::{ControlFlow, Range};
 
 use etendue_geometry::{PassAccount, RayBatch, RaySource};
+use etendue_math::Vec3;
 use etendue_sampling::ordered;
 use multiversion::multiversion;
 
@@ -40,6 +41,9 @@ pub struct Cone {
     pub view: View,
     /// Half-angles α, rising, each above 0 and at most π/2.
     pub acceptances: Vec<f64>,
+    /// Radius of the disk about the observer, facing the target, that a ray has to cross in place of the test of its angle
+    /// (fig. 2.2) \[mm\]. There is one acceptance then, that no such ray exceeds; it may go up to π.
+    pub disk: Option<f64>,
 }
 
 /// A seen ray: its pixel, the narrowest acceptance that sees it, its flux.
@@ -57,6 +61,8 @@ struct Prepared {
     cos_field: f64,
     /// cos α, falling.
     cosines: Vec<f64>,
+    /// Radius of the observer's disk, and the direction that it faces away from.
+    disk: Option<(f64, Vec3)>,
 }
 
 impl Prepared {
@@ -70,6 +76,9 @@ impl Prepared {
             axis: [axis.x, axis.y, axis.z],
             cos_field: bound.cos() - 1e-15,
             cosines: cone.acceptances.iter().map(|a| a.cos()).collect(),
+            disk: cone
+                .disk
+                .map(|radius| (radius, (cone.view.observer - cone.view.target).normalized())),
         }
     }
 
@@ -83,8 +92,16 @@ impl Prepared {
                 let Some(pixel) = self.view.pixel(batch.position(i), k) else {
                     continue;
                 };
-                let cos_theta = k.dot(self.view.to_eye(pixel));
-                if let Some(narrowest) = self.cosines.iter().position(|&limit| cos_theta > limit) {
+                let narrowest = if let Some((radius, away)) = self.disk {
+                    let ahead = k.dot(away);
+                    let to_plane = self.view.observer - batch.position(i);
+                    let off = k * (to_plane.dot(away) / ahead) - to_plane;
+                    (ahead > 0.0 && off.dot(off) < radius * radius).then_some(0)
+                } else {
+                    let cos_theta = k.dot(self.view.to_eye(pixel));
+                    self.cosines.iter().position(|&limit| cos_theta > limit)
+                };
+                if let Some(narrowest) = narrowest {
                     #[allow(clippy::cast_possible_truncation, reason = "there are a handful of acceptances")]
                     hits.push(Hit {
                         pixel,
@@ -156,7 +173,6 @@ pub fn cone_sums(
 mod tests {
     use super::*;
     use etendue_geometry::table::{Float, Layout, RayTable};
-    use etendue_math::Vec3;
 
     /// Rays of unequal flux that fan out from a slanted line: no symmetry, some seen, most not.
     fn bytes(n: u32) -> Vec<u8> {
@@ -207,6 +223,7 @@ mod tests {
         Cone {
             view,
             acceptances: vec![0.05, 0.2, 0.5],
+            disk: None,
         }
     }
 

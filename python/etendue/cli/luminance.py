@@ -110,6 +110,14 @@ def luminance(
             show_default=False,
         ),
     ] = None,
+    observer_radius: Annotated[
+        float | None,
+        typer.Option(
+            "--observer-radius",
+            help="For the cone: the observer is a disk of this radius in mm that faces the target.",
+            show_default=False,
+        ),
+    ] = None,
     surface: Annotated[
         str | None,
         typer.Option("--surface", help="Carrier surface of the light field, as for fit (auto).", show_default=False),
@@ -174,6 +182,7 @@ def luminance(
     one_of(scale, SCALES, "--scale")
     stated = {
         "acceptance": None if acceptance is None else _acceptance(acceptance),
+        "observer_radius": observer_radius,
         "surface": None if surface is None else surface_option(surface),
         "samples": samples,
         "rays_per_pixel": rays_per_pixel,

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.formats.rays.ray_index import RayIndex
+from etendue.luminance.observer_disk import disk_etendue
 from etendue.quantities.memory import require_memory
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
@@ -39,14 +40,23 @@ CELL_BYTES = 72
 
 @dataclasses.dataclass(frozen=True)
 class ConeView:
-    """An observer, his screen, and the acceptance half-angles [°], rising, under which rays are counted at once."""
+    """An observer, his screen, and the acceptance half-angles [°], rising, under which rays are counted at once.
+
+    With `disk` [mm] the observer is a disk of that radius instead, and the one acceptance is a bound of the angles to it.
+    """
 
     observer: Observer
     screen: Screen
     acceptances: tuple[float, ...]
+    disk: float | None = None
 
     def etendue(self) -> FloatArray:
-        """ΔΩ_o ΔA_p cos θ_p of eq. 2.3 (theory eq. 6) [m² sr], shape (acceptances, rows, columns)."""
+        """ΔΩ_o ΔA_p cos θ_p of eq. 2.3 (theory eq. 6) [m² sr], shape (acceptances, rows, columns).
+
+        Of a disk: ∫∫ cos θ dΩ dA over the pixel and the disk, without approximation.
+        """
+        if self.disk is not None:
+            return disk_etendue(self.observer, self.screen, self.disk)[None]
         apparent = self.screen.pixel_area / MM2_PER_M2 * self.screen.cosine(self.observer)
         solid_angles = np.array([cone_solid_angle(a) for a in self.acceptances])
         product: FloatArray = solid_angles[:, None, None] * apparent
@@ -124,4 +134,5 @@ def _core_cone(view: ConeView) -> _core._Cone:
     return {
         "view": view.screen.core_view(view.observer),
         "acceptances": [math.radians(a) for a in view.acceptances],
+        "disk": view.disk,
     }

@@ -8,6 +8,7 @@ from etendue.formats.rays.ray_index import RayIndex
 from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_acceptance, comparison_screen
 from etendue.luminance.cone import ConeEstimate, ConeView, cone_estimates
 from etendue.luminance.methods import Cone
+from etendue.luminance.observer_disk import check_disk, widest_angle
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally
@@ -21,6 +22,13 @@ def look_through_cone(
     progress: Progress | None = None,
 ) -> list[LuminanceMap]:
     """The maps of rays that head for the observers; see `luminance_map`."""
+    if how.observer_radius is not None:
+        radius = float(how.observer_radius)
+        for observer, screen in pairs:
+            check_disk(observer, screen, radius)
+        views = [ConeView(o, s, (widest_angle(o, s, radius),), radius) for o, s in pairs]
+        estimates, tally = cone_estimates(rays, views, threads, progress)
+        return [_map(rays, estimate, 0, tally, None) for estimate in estimates]
     if how.acceptance == "auto":
         return _automatic(rays, pairs, threads, progress)
     angle = float(how.acceptance)
@@ -51,9 +59,12 @@ def _map(
     dead = counts == 0
     values = np.where(dead, np.nan, estimate.luminance[index])
     error = np.where(dead, np.nan, np.sqrt(estimate.variance[index]))
-    angle = estimate.view.acceptances[index]
+    angle, disk = estimate.view.acceptances[index], estimate.view.disk
+    within = (
+        f"head for the observer within {angle:.4g}°" if disk is None else f"cross the observer's disk of {disk:.4g} mm"
+    )
     notes = [
-        f"{counts.sum():,} of {tally.rays:,} rays head for the observer within {angle:.4g}° through the screen",
+        f"{counts.sum():,} of {tally.rays:,} rays {within} through the screen",
         f"{int(dead.sum()):,} of {dead.size:,} pixels are dead (no ray): NaN",
     ]
     if isinstance(rays, RayIndex):
@@ -68,6 +79,7 @@ def _map(
         notes.append(choice.reason)
     notes += rays.notes
     method = "cone" if choice is None else "cone, automatic acceptance"
+    limit = f"acceptance {angle:.6g}°" if disk is None else f"observer of radius {disk:.6g} mm"
     return LuminanceMap(
         values=values,
         standard_error=error,
@@ -75,6 +87,6 @@ def _map(
         observer=estimate.view.observer,
         screen=estimate.view.screen,
         flux_unit=rays.flux_unit,
-        provenance=rays.provenance.then(f"luminance by {method}, acceptance {angle:.6g}°"),
+        provenance=rays.provenance.then(f"luminance by {method}, {limit}"),
         notes=tuple(notes),
     )

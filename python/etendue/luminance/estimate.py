@@ -47,6 +47,7 @@ class _AnyOptions(_Options, total=False):
 class _RayOptions(_Options, total=False):
     method: Cone | FromField | MethodName
     acceptance: Acceptance
+    observer_radius: float | None
     surface: Surface | Literal["auto"]
     samples: int | None
 
@@ -102,6 +103,7 @@ def luminance_map(
     *,
     method: AnyMethod | MethodName = "auto",
     acceptance: Acceptance = None,
+    observer_radius: float | None = None,
     surface: Surface | Literal["auto"] = "auto",
     samples: int | None = None,
     rays_per_pixel: int | None = None,
@@ -139,8 +141,8 @@ def luminance_map(
         [Audenaert2014]_; ``PathTracing(until=0.01)`` is for scenes and scatter events. ``"auto"``: the method that has the
         options which are stated beside it; without any, the light field for rays, the cone for rays that are indexed
         (`RayIndex`), which makes it a matter of milliseconds.
-    acceptance
-        Shorthand for an option of `Cone`.
+    acceptance, observer_radius
+        Shorthands for options of `Cone`.
     surface, samples
         Shorthands for options of `FromField`.
     rays_per_pixel, until, seed, forward_rays, gather
@@ -192,6 +194,7 @@ def luminance_map(
         source = open_source(source)
     options = {
         "acceptance": acceptance,
+        "observer_radius": observer_radius,
         "surface": None if surface == "auto" else surface,
         "samples": samples,
         "rays_per_pixel": rays_per_pixel,

@@ -66,11 +66,15 @@ class Cone(Method):
     acceptance : float or "auto"
         Half-angle α of the cone about the line from each pixel to the observer [°], above 0 and at most 90; ``"auto"``: the
         one of least estimated error, and the map's notes say why.
+    observer_radius : float, optional
+        Instead of an acceptance: the observer is a disk of this radius [mm] that faces the target, as in figure 2.2, and a
+        ray counts if it crosses the disk. How far α reaches then differs from pixel to pixel; the étendue between each
+        pixel and the disk is integrated, so that the luminance of a Lambertian source is found without a bias.
 
     Raises
     ------
     ArgumentError
-        If the acceptance is out of its domain, or an option is stated that another method has.
+        If both are stated, or the acceptance is out of its domain, or an option is stated that another method has.
     UnknownNameError
         If there is no such option.
 
@@ -84,6 +88,7 @@ class Cone(Method):
     """
 
     acceptance: float | Literal["auto"] = 1.5
+    observer_radius: float | None = None
 
     NAME: ClassVar[str] = "cone"
     SOURCES: ClassVar[str] = "rays"
@@ -93,6 +98,15 @@ class Cone(Method):
         if not (angle == "auto" or (isinstance(angle, numbers.Real) and 0.0 < float(angle) <= 90.0)):
             shown = repr(angle) if isinstance(angle, str) else f"{angle}°"
             raise ArgumentError(f"acceptance is {shown}; give a half-angle above 0° and at most 90°, or 'auto'.")
+        radius: Any = self.observer_radius
+        if radius is None:
+            return
+        if not (isinstance(radius, numbers.Real) and 0.0 < float(radius) < math.inf):
+            raise ArgumentError(
+                f"observer_radius is {radius!r}; give the radius of the observer's disk in mm, above 0."
+            )
+        if angle != type(self).acceptance:
+            raise ArgumentError("acceptance and observer_radius are both given; use one of them.")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -396,9 +410,9 @@ def choose_method(method: AnyMethod | str, stated: Mapping[str, Any], source: So
     Examples
     --------
     >>> choose_method("auto", {"acceptance": 3}, RAYS)
-    Cone(acceptance=3)
+    Cone(acceptance=3, observer_radius=None)
     >>> choose_method("auto", {}, INDEX), choose_method("auto", {}, EVENTS)
-    (Cone(acceptance=1.5), None)
+    (Cone(acceptance=1.5, observer_radius=None), None)
     """
     complaint = mismatch(method, stated, source)
     if complaint is not None:

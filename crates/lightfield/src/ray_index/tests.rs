@@ -153,6 +153,7 @@ fn cones() -> Vec<Cone> {
                             rows: 5,
                         },
                         acceptances: acceptances.iter().map(|a| a.to_radians()).collect(),
+                        disk: None,
                     });
                 }
             }

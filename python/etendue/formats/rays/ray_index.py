@@ -158,7 +158,7 @@ class RayIndex(RaySet):
         >>> import etendue as et
         >>> index = et.RayIndex.build(et.RingSource(rays=500_000))
         >>> view = et.Screen(70, 70, 4, 4).core_view(et.Observer(0, 0, 1000))
-        >>> [((flux, squares, rays), looked)] = index.cone_sums([{"view": view, "acceptances": [0.026]}])
+        >>> [((flux, squares, rays), looked)] = index.cone_sums([{"view": view, "acceptances": [0.026], "disk": None}])
         >>> rays.shape, looked < len(index) / 4
         ((1, 4, 4), True)
         """
