@@ -130,7 +130,16 @@ class Lamp:
         ]
         plane = et.Plane(top, *phosphor.CARRIER[name], centre=(0, 0))
         carrier = phosphor.BOX if film else et.Plane(top, 24.2, 24.2, centre=(0, 0))
-        how = (phosphor.lamp(name), plane, 1.0, None, carrier, observers, et.Screen(23, 23, 23, 23), 128 if film else 512)
+        how = (
+            phosphor.lamp(name),
+            plane,
+            1.0,
+            None,
+            carrier,
+            observers,
+            et.Screen(23, 23, 23, 23),
+            128 if film else 512,
+        )
         return cls(*how, *((0.021, 4 * 10**8) if film else (2.1, 10**9)), mirrors=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 
 
