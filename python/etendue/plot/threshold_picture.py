@@ -122,6 +122,7 @@ def _far_field(axes: Axes, sweep: ThresholdSweep) -> None:
         panel.yaxis.label.set_color(colour)
         panel.margins(y=0.12)
         panel.yaxis.set_major_locator(style.locator_for(PANEL))
+        panel.ticklabel_format(axis="y", useOffset=False)
     _over_threshold(axes, sweep)
     axes.set_xticklabels([])
     _mark(axes, threshold[sweep.best("ncc")], style.LINES[0], "")
@@ -152,6 +153,7 @@ def _score(axes: Axes, sweep: ThresholdSweep) -> None:
     axes.set_ylabel("held-out score [nat per ray]")
     axes.yaxis.label.set_color(colour)
     axes.yaxis.set_major_locator(style.locator_for(PANEL))
+    axes.ticklabel_format(axis="y", useOffset=False)
     axes.margins(y=0.12)
     _over_threshold(axes, sweep)
     axes.set_xlabel("threshold of E [%]")
@@ -162,7 +164,7 @@ def _score(axes: Axes, sweep: ThresholdSweep) -> None:
         _mark(axes, by_score, colour, "best NCC and score")
         return
     _mark(axes, by_ncc, style.LINES[0], "best NCC")
-    _mark(axes, by_score, colour, "best score")
+    _mark(axes, by_score, colour, "best score", height=0.14)
 
 
 def _over_threshold(axes: Axes, sweep: ThresholdSweep) -> None:
@@ -184,11 +186,11 @@ def _ticks(sweep: ThresholdSweep) -> npt.NDArray[np.intp]:
     return order[:: -(-len(order) // MOST_TICKS)]
 
 
-def _mark(axes: Axes, threshold: float, colour: str, label: str) -> None:
+def _mark(axes: Axes, threshold: float, colour: str, label: str, height: float = 0.04) -> None:
     axes.axvline(threshold, color=colour, linewidth=0.8, linestyle=(0, (2, 2)))
     left = axes.transData.transform((threshold, 0.0))[0] < axes.transAxes.transform((0.5, 0.0))[0]
     axes.annotate(
-        label, (threshold, 0.04), xycoords=("data", "axes fraction"), xytext=(4 if left else -4, 0),
+        label, (threshold, height), xycoords=("data", "axes fraction"), xytext=(4 if left else -4, 0),
         textcoords="offset points", ha="left" if left else "right", size=style.TICK_SIZE, color=colour,
     )  # fmt: skip
 
