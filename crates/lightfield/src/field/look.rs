@@ -90,8 +90,8 @@ impl PixelSums {
         }
         self.points += 1.0;
         self.value += read.value;
-        for axis in 0..2 {
-            let mut away = place[axis] - self.first[axis];
+        for (axis, at) in place.iter().enumerate() {
+            let mut away = at - self.first[axis];
             if wraps && axis == 0 {
                 away -= away.round();
             }

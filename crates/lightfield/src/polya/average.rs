@@ -83,7 +83,9 @@ pub fn average(
                 for steps in positions {
                     let (moments, log_evidence) = tree(steps, pool, &mut workspace);
                     sum.add(&moments, log_evidence, share, &sizes, steps);
-                    moments.into_iter().for_each(|m| workspace.keep(m));
+                    for moment in moments {
+                        workspace.keep(moment);
+                    }
                 }
             }
         }

@@ -45,12 +45,15 @@ struct UpTask<'a> {
     splits: Vec<&'a mut [f32]>,
 }
 
+/// Rows that a chunk needs.
+const ROWS: usize = 12;
+
 /// Room for the numbers of a chunk.
 type Row = [f64; CHUNK];
 
 /// What the work on a chunk needs room for; made once per thread, as clearing it takes time.
 struct Scratch {
-    rows: [Row; 12],
+    rows: Box<[Row; ROWS]>,
     /// As many rows as there are axes, one after the other.
     terms: Vec<f64>,
     split: [f32; CHUNK],
@@ -59,7 +62,7 @@ struct Scratch {
 impl Scratch {
     fn new(axes: usize) -> Self {
         Self {
-            rows: [[0.0; CHUNK]; 12],
+            rows: vec![[0.0; CHUNK]; ROWS].try_into().expect("as many"),
             terms: vec![0.0; axes * CHUNK],
             split: [0.0; CHUNK],
         }
@@ -85,7 +88,9 @@ fn each<T: Send>(
         }
         _ => {
             let mut scratch = Scratch::new(axes);
-            tasks.into_iter().for_each(|task| work(&mut scratch, task));
+            for task in tasks {
+                work(&mut scratch, task);
+            }
         }
     }
 }
