@@ -68,8 +68,8 @@ def whole_verbs() -> dict[str, Any]:
 def test_help_names_every_verb_with_what_it_does(run: Run) -> None:
     outcome = run("--help")
     assert outcome.status == 0
-    expected = "demo info convert fit luminance sample intensity trace draw patches filter compare cache bsdf"
-    assert set(verbs()) == set(expected.split())
+    expected = "demo info convert fit luminance sample intensity trace draw patches filter compare cache bsdf".split()
+    assert set(verbs()) == {*expected, "goniometer", "deconvolve"}
     for name, verb in verbs().items():
         assert f" {name} " in outcome.out
         assert verb.help
@@ -90,7 +90,18 @@ def test_help_of_a_verb_explains_every_option_and_argument(run: Run, name: str) 
 
 def test_every_verb_that_draws_random_numbers_takes_a_seed() -> None:
     seeded = {name for name, verb in verbs().items() if any("--seed" in p.opts for p in verb.params)}
-    assert seeded == {"demo", "convert", "draw", "fit", "luminance", "sample", "trace", "patches"}
+    assert seeded == {
+        "demo",
+        "convert",
+        "deconvolve",
+        "draw",
+        "fit",
+        "goniometer",
+        "luminance",
+        "sample",
+        "trace",
+        "patches",
+    }
 
 
 def test_version(run: Run) -> None:

@@ -22,25 +22,26 @@ def goniometer(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The scan, .csv.")] = None,
     no_sample: Annotated[bool, typer.Option("--no-sample", help="The bare beam: the instrument function.")] = False,
     aperture: Annotated[
-        float, typer.Option("--aperture", help="Diameter of the aperture, or side of a square [mm].")
+        float, typer.Option("--aperture", help="Diameter of the aperture, or side of a square in mm.")
     ] = 25.0,
     aperture_shape: Annotated[str, typer.Option("--aperture-shape", help="disk, square or ring.")] = "disk",
-    inner: Annotated[float, typer.Option("--inner", help="Inner diameter of a ring [mm].")] = 0.0,
-    beam: Annotated[float, typer.Option("--beam", help="Diameter of the beam [mm].")] = 14.0,
+    inner: Annotated[float, typer.Option("--inner", help="Inner diameter of a ring in mm.")] = 0.0,
+    beam: Annotated[float, typer.Option("--beam", help="Diameter of the beam in mm.")] = 14.0,
     profile: Annotated[
         str, typer.Option("--profile", help="Irradiance over the beam: uniform or gaussian.")
     ] = "uniform",
     divergence: Annotated[
-        float, typer.Option("--divergence", help="Angle of the outermost rays with the axis [°]; negative: convergent.")
+        float,
+        typer.Option("--divergence", help="Angle of the outermost rays with the axis in °; negative: convergent."),
     ] = COLLIMATED,
     source_angle: Annotated[
-        float, typer.Option("--source-angle", help="Diameter of the source of light, seen from the sample [°].")
+        float, typer.Option("--source-angle", help="Diameter of the source of light, seen from the sample in °.")
     ] = COLLIMATED,
-    distance: Annotated[float, typer.Option("--distance", help="From the sample to the aperture [mm].")] = 886.0,
-    incidence: Annotated[float, typer.Option("--incidence", help="Angle of incidence [°].")] = 0.0,
-    step: Annotated[float, typer.Option("--step", help="Between positions [°].")] = 0.1,
+    distance: Annotated[float, typer.Option("--distance", help="From the sample to the aperture in mm.")] = 886.0,
+    incidence: Annotated[float, typer.Option("--incidence", help="Angle of incidence in °.")] = 0.0,
+    step: Annotated[float, typer.Option("--step", help="Between positions in °.")] = 0.1,
     span: Annotated[
-        float | None, typer.Option("--span", help=f"To which angle on both sides [°]; {SPAN:g} with a sample.")
+        float | None, typer.Option("--span", help=f"To which angle in ° on both sides; {SPAN:g} with a sample.")
     ] = None,
     plane: Annotated[str, typer.Option("--plane", help="Of the scan: in-plane or cross-plane.")] = "in-plane",
     way: Annotated[

@@ -53,6 +53,8 @@ def check_patch_folder(
 
 def is_patch_folder(folder: Path) -> bool:
     """Whether a folder holds patches, by its manifest."""
+    if not folder.is_dir():
+        return False
     try:
         manifest = strict_json((folder / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, RecursionError, ValueError):
