@@ -57,7 +57,7 @@ def square(flux: float) -> dict[str, Any]:
 def luminaires(near_field: et.RaySet, *, full: bool) -> dict[str, et.Scene]:
     """The lens before the LED itself, and before each model of it."""
     field = et.LightField.fit(near_field, led.LOW_BOX, depths=None if full else QUICK)
-    grid = et.GriddedSource.fit(near_field, et.Dome(radius=led.CARRIER), 0.125, parallels=16).as_printed
+    grid = et.GriddedSource.fit(near_field, et.Dome(radius=led.CARRIER), 0.125, 0.01, 16).as_printed
     print(f"gridded: {grid.notes[0]}, E = {grid.threshold:g} %")
     models: dict[str, dict[str, Any]] = {
         "ray file": {"kind": "rays", "rays": near_field},
