@@ -2,6 +2,7 @@
 
     python examples/rings_traced.py              # four million rays and a coarse light field, a few seconds
     python examples/rings_traced.py --full       # twelve runs of ten million and a fine light field: docs/chapter-2.md
+    python examples/rings_traced.py --runs 28 --rays 50000000                   # as many as the thesis, five minutes
 
 The scene holds the rings and, just in front of them, a ray collecting surface. Forwards: the rays that crossed it go
 through the cone estimator and into a light field. Backwards: lines of sight are followed from the eye to the rings. All
