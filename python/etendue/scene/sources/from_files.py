@@ -199,8 +199,6 @@ class Point(Source):
     @model_validator(mode="after")
     def _has_flux(self) -> Self:
         check_origin(self)
-        if not has_table(self) and self.flux is None:
-            raise ValueError("'flux' is missing; only a file could tell it")
         return self
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:

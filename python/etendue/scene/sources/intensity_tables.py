@@ -50,7 +50,7 @@ def check_origin(source: TakesTable) -> None:
     Raises
     ------
     ValueError
-        If a distribution is given twice, or a key that belongs to another origin.
+        If a distribution is given twice, or a key that belongs to another origin, or nothing tells the flux.
 
     Examples
     --------
@@ -63,6 +63,8 @@ def check_origin(source: TakesTable) -> None:
         raise ValueError("'photometry' names one of the distributions of a file; give 'file'")
     if has_table(source) and source.flux_unit is not None:
         raise ValueError("'flux_unit' is the file's own; leave it out")
+    if not has_table(source) and source.flux is None:
+        raise ValueError("'flux' is missing; only a file could tell it")
 
 
 def read_table(source: TakesTable, files: Files) -> Intensity:

@@ -83,10 +83,7 @@ class Surface(Source):
     @model_validator(mode="after")
     def _one_pattern(self) -> Self:
         check_origin(self)
-        if not has_table(self):
-            if self.flux is None:
-                raise ValueError("'flux' is missing; only a file could tell it")
-        elif self.exponent is not None:
+        if has_table(self) and self.exponent is not None:
             raise ValueError("'exponent' and an intensity distribution are both given; use one")
         return self
 
