@@ -68,8 +68,11 @@ from etendue.tracing.ledger import TraceWarning
 
 if TYPE_CHECKING:
     from etendue import scene
+    from etendue.instruments.agreement import Agreement, agreement
     from etendue.instruments.deconvolution import Deconvolution, deconvolve
+    from etendue.instruments.detectors import Baffle, Detector
     from etendue.instruments.goniometer_scan import GoniometerScan, read_goniometer_scan
+    from etendue.instruments.revolved import revolved
     from etendue.instruments.scatter_goniometer import ScatterGoniometer
     from etendue.scatter import models as bsdf
     from etendue.scatter.bsdf import Bsdf
@@ -80,7 +83,9 @@ if TYPE_CHECKING:
     from etendue.scene import Scene
 
 __all__ = [
+    "Agreement",
     "ArgumentError",
+    "Baffle",
     "Box",
     "Bsdf",
     "BsdfTable",
@@ -88,6 +93,7 @@ __all__ = [
     "Cone",
     "Cylinder",
     "Deconvolution",
+    "Detector",
     "Disk",
     "Dome",
     "EtendueError",
@@ -127,6 +133,7 @@ __all__ = [
     "UnknownNameError",
     "UnsupportedFormatError",
     "WaitingWarning",
+    "agreement",
     "bsdf",
     "cache_content",
     "clear_cache",
@@ -156,6 +163,7 @@ __all__ = [
     "read_map",
     "read_rays",
     "read_scans",
+    "revolved",
     "scene",
     "threshold_sweep",
     "trace",
@@ -180,18 +188,23 @@ InNotebook.pages = Pages(of=_page)
 
 # Scenes and models are checked by pydantic, which takes as long to import as all the rest: only when somebody asks for one.
 LAZY = {
+    "Agreement": "etendue.instruments.agreement:Agreement",
+    "Baffle": "etendue.instruments.detectors:Baffle",
     "Bsdf": "etendue.scatter.table:Bsdf",
     "BsdfTable": "etendue.scatter.table:BsdfTable",
     "Deconvolution": "etendue.instruments.deconvolution:Deconvolution",
+    "Detector": "etendue.instruments.detectors:Detector",
     "GoniometerScan": "etendue.instruments.goniometer_scan:GoniometerScan",
     "Scans": "etendue.scatter.scans.scans:Scans",
     "ScatterGoniometer": "etendue.instruments.scatter_goniometer:ScatterGoniometer",
     "Scene": "etendue.scene:Scene",
+    "agreement": "etendue.instruments.agreement:agreement",
     "bsdf": "etendue.scatter.models",
     "deconvolve": "etendue.instruments.deconvolution:deconvolve",
     "read_bsdf": "etendue.scatter.files:read_bsdf",
     "read_goniometer_scan": "etendue.instruments.goniometer_scan:read_goniometer_scan",
     "read_scans": "etendue.scatter.scans.files:read_scans",
+    "revolved": "etendue.instruments.revolved:revolved",
     "scene": "etendue.scene",
     "write_bsdf": "etendue.scatter.files:write_bsdf",
 }
