@@ -1,4 +1,4 @@
-"""Section 5.6 of the thesis, figures 5.10 and 5.11: the luminance of a luminaire, its diffuser as it was measured and as it is.
+"""Section 5.6 of the thesis, figures 5.10 and 5.11: a luminaire with its diffuser as it was measured, and as it is.
 
     python examples/chapter_5_luminaire.py           # 50 × 50 pixels and few lines of sight, seconds
     python examples/chapter_5_luminaire.py --full    # 100 × 100 pixels, 10⁴ lines each: docs/chapter-5.md
@@ -69,7 +69,9 @@ def measure(replicates: int) -> Measured:
         again.append(et.revolved(drawn, found.values, middle=found.middle))
     print(f"iterations: {thesis.iterations} (slice, the thesis' rule), {ours.iterations} (rings, held-out counts)")
     for name, one in (("thesis' way", thesis), ("ours", ours)):
-        print(f"{name}: peak {one.peak:.0f} /sr, FWHM {one.fwhm:.3f}°; measured {scan.bsdf.max():.0f}, {scan.fwhm:.2f}°")
+        print(
+            f"{name}: peak {one.peak:.0f} /sr, FWHM {one.fwhm:.3f}°; measured {scan.bsdf.max():.0f}, {scan.fwhm:.2f}°"
+        )
     tables = [et.revolved(scan, one.values, middle=one.middle) for one in (thesis, ours, further)]
     return Measured(et.revolved(scan), *tables, again)
 
@@ -122,7 +124,10 @@ def print_maps(maps: Mapping[str, et.LuminanceMap], spread: Band) -> None:
         off = mean / float(truth.values.mean()) - 1
         row = [name, f"{top:.3g}", "" if printed is None else f"{printed[0]:.3g}", f"{mean:.4g} ± {error:.1g}"]
         row += ["" if printed is None else f"{printed[1]:.3g}"]
-        row += [f"{100 * (top / float(ours.values.max()) - 1):+.1f} %", f"{100 * (mean / ours.values.mean() - 1):+.1f} %"]
+        row += [
+            f"{100 * (top / float(ours.values.max()) - 1):+.1f} %",
+            f"{100 * (mean / ours.values.mean() - 1):+.1f} %",
+        ]
         row += ["", "", ""] if name == "truth" else [f"{100 * off:+.2f} %", *measures(lmap, truth)[::2]]
         rows.append(row)
     heads = ["", "maximum", "thesis", "mean [cd/m²]", "thesis", "maximum to L_W", "mean to L_W"]
@@ -136,8 +141,13 @@ def print_maps(maps: Mapping[str, et.LuminanceMap], spread: Band) -> None:
     error = np.sqrt(spread.ring**2 + sampling_error(truth)[1] ** 2 + sampling_error(ours)[1] ** 2)[lit]
     off = (by_ring(ours, ours.values) - by_ring(truth, truth.values))[lit] / error
     low = by_ring(maps["L_H"], maps["L_H"].values)[lit] / by_ring(truth, truth.values)[lit]
-    print(f"rings of 0.5 mm with light: {(np.abs(off) < 1).sum()} of {off.size} within one standard error of L_W, ", end="")
-    print(f"{(np.abs(off) < 2).sum()} within two; L_H is {100 * (low.min() - 1):+.0f} to {100 * (low.max() - 1):+.0f} %")
+    print(
+        f"rings of 0.5 mm with light: {(np.abs(off) < 1).sum()} of {off.size} within one standard error of L_W, ",
+        end="",
+    )
+    print(
+        f"{(np.abs(off) < 2).sum()} within two; L_H is {100 * (low.min() - 1):+.0f} to {100 * (low.max() - 1):+.0f} %"
+    )
 
 
 def draw(path: Path, maps: Mapping[str, et.LuminanceMap], spread: Band) -> None:
@@ -192,7 +202,9 @@ def main() -> None:
     options.output.mkdir(parents=True, exist_ok=True)
     pixels, usual, replicates = (100, 10_000, 16) if options.full else (50, 64, 4)
     lines = options.lines or usual
-    print(f"LED of {FLUX:g} lm, {SIDE:g} mm square, in the focus of a parabola of f = {FOCUS:g} mm, reflectance {REFLECTANCE:g},")
+    print(
+        f"LED of {FLUX:g} lm, {SIDE:g} mm square, in the focus of a parabola, f = {FOCUS:g} mm, reflectance {REFLECTANCE:g},"
+    )
     print(f"opening of {2 * RADIUS:g} mm, {HEIGHT:.2f} mm over the vertex; diffuser of {FWHM:g}°")
     measured = measure(replicates)
     maps = {

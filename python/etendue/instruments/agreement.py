@@ -88,7 +88,7 @@ def agreement(lobes: Sequence[GoniometerScan | Deconvolution], *, floor: float =
     >>> import etendue as et
     >>> sample = et.bsdf.Gaussian(peak=500, sigma=0.016, way="transmitted")
     >>> instruments = [et.ScatterGoniometer(14, d, 886) for d in (16, 25)]
-    >>> scans = [one.measure(sample, step=0.2, span=5, method="quadrature") for one in instruments]
+    >>> scans = [one.measure(sample, step=0.2, span=4, method="quadrature") for one in instruments]
     >>> found = [et.deconvolve(s, g.instrument_function(), replicates=0) for s, g in zip(scans, instruments)]
     >>> bool(et.agreement(scans).peak > 4 and et.agreement(found).peak < 0.1)
     True

@@ -46,8 +46,8 @@ class Detector:
 
     A flux Φ, as a share of the beam, and stray light Φ₀ give (Φ + Φ₀) · rate · T · t electrons behind a filter of
     transmittance T in t seconds, and the dark gives dark · t more. Their number is Poisson's, and the readout adds normal
-    noise. The time is that which fills the well to `fill`, behind the clearest filter that lets it be `shortest` or longer; at
-    most `longest`. With both the same, the time is fixed, and so is the filter: the first.
+    noise. The time is that which fills the well to `fill`, behind the clearest filter that lets it be `shortest` or longer,
+    and at most `longest`. With both the same, the time is fixed, and so is the filter: the first.
 
     Parameters
     ----------
@@ -120,8 +120,7 @@ class Detector:
         return self.full_well / math.sqrt(max(self.dark * self.shortest + self.read_noise**2, 1.0))
 
     def exposures(self, flux: npt.ArrayLike) -> tuple[Array, Array]:
-        """Times [s] and transmittances of filters for fluxes, shape (n,) each: an automatic exposure, whose search is part of
-        the pause."""
+        """Times [s] and transmittances of filters for fluxes, shape (n,) each: an automatic exposure, found in the pause."""
         share = np.asarray(flux, np.float64) + self.stray
         if self.shortest == self.longest:
             return np.full(share.shape, self.shortest), np.full(share.shape, float(self.filters[0]))
@@ -153,8 +152,8 @@ class Detector:
         --------
         >>> photometer = Detector(rate=1e16, full_well=1e13, read_noise=1e4, pause=1.0)
         >>> readings = photometer.read([1e-3, 1e-9], seed=2)
-        >>> readings.flux.round(12).tolist(), round(3600 * readings.hours, 3)
-        ([0.001, 1e-09], 2.2)
+        >>> [f"{one:.2g}" for one in readings.flux], round(3600 * readings.hours, 3)
+        (['0.001', '1e-09'], 2.2)
         """
         share = np.asarray(flux, np.float64)
         if share.ndim != 1 or not np.isfinite(share).all() or (share < 0.0).any():
@@ -192,7 +191,7 @@ class Baffle:
     >>> tuple(round(d, 1) for d in baffle.field(25.0, 886.0))  # of a sample at 886 mm
     (20.6, 192.1)
     >>> round(math.pi * 12.5**2 * math.pi / baffle.etendue(25.0))  # less of an even surrounding than without it
-    283
+    280
     """
 
     opening: float

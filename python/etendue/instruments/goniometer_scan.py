@@ -28,6 +28,9 @@ FINE = 16
 SAME_STEP = 1e-3
 """By which steps may differ, relative to the smallest, and still be the same: angles in files have few digits."""
 
+MOST_POSITIONS = 1_000_000
+"""Of a scan."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class GoniometerScan:
@@ -324,6 +327,15 @@ def detector_directions(angle: npt.ArrayLike, incidence: float, plane: Plane, *,
         return direction(angle, 0.0, behind=behind)
     a = np.radians(angle)[..., None]
     return np.asarray(np.cos(a) * direction(incidence, 0.0, behind=behind) + np.sin(a) * np.array([0.0, 1.0, 0.0]))
+
+
+def positions(middle: float, step: float, span: float) -> Array:
+    """Even positions [°] about a middle one, up to a span on both sides."""
+    if not 0.0 < step < 90.0 or not 0.0 < span <= 180.0 or span / step > MOST_POSITIONS:
+        raise ArgumentError(f"steps of {step:g}° to {span:g}° on both sides; give a step and a span of more than 0")
+    k = int(np.floor(span / step + 1e-9))
+    # 8.7 and not 8.700000000000001: files hold what people would write.
+    return np.round(middle + step * np.arange(-k, k + 1), 10)
 
 
 def summit(angle: Array, values: Array) -> float:
