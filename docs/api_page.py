@@ -27,7 +27,10 @@ GROUPS = {
         "IlluminanceMap", "read_illuminance_map",
     ),
     "Scatter": ("bsdf", "Bsdf", "BsdfTable", "Scans", "read_bsdf", "read_scans", "write_bsdf"),
-    "Instruments": ("ScatterGoniometer", "GoniometerScan", "read_goniometer_scan", "deconvolve", "Deconvolution"),
+    "Instruments": (
+        "ScatterGoniometer", "GoniometerScan", "read_goniometer_scan", "Detector", "Baffle", "deconvolve", "Deconvolution",
+        "revolved", "agreement", "Agreement",
+    ),
     "Intensity and spectra": ("intensity_distribution", "Intensity", "read_intensity", "write_intensity", "Spectrum"),
     "Pictures": (
         "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",

@@ -98,7 +98,13 @@ def told(name: str, readings: Readings, flux: Array, at: Array) -> list[str]:
 
 def draw(path: Path, found: Mapping[str, tuple[Array, Array, Mapping[str, Readings]]]) -> None:
     """Error and time of each position by its angle from the normal."""
-    shown = ("CCD, up to 60 s", "CCD, always 1 s, no filter", "photometer, no baffle", "photometer, baffle")
+    shown = (
+        "CCD, up to 60 s",
+        "CCD, always 1 s, no filter",
+        "photometer, no baffle",
+        "photometer, baffle",
+        "CCD, up to 2 h",
+    )
     made = new_figure(9.6, 5.6)
     grid = made.subplots(2, len(found), sharex=True, sharey="row")
     for column, (material, (at, flux, readings)) in zip(grid.T, found.items(), strict=True):
@@ -118,7 +124,7 @@ def draw(path: Path, found: Mapping[str, tuple[Array, Array, Mapping[str, Readin
     for axes in made.axes:
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(which="both", labelsize=7, colors=FAINT)
-    made.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    made.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False, fontsize=8)
     save(made, path)
 
 

@@ -46,6 +46,10 @@ class Agreement:
     mean: Array
     values: Array
 
+    def __repr__(self) -> str:
+        """All three."""
+        return f"Agreement(peak={self.peak:.3g} %, fwhm={self.fwhm:.3g} %, over_angles={self.over_angles:.3g} %)"
+
     @property
     def over_angles(self) -> float:
         """Root mean square of `values`: of f over the angles."""

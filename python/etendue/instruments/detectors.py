@@ -113,6 +113,7 @@ class Detector:
         given = np.asarray(self.filters, np.float64)
         if given.ndim != 1 or not given.size or not ((given > 0.0) & (given <= 1.0)).all():
             raise ArgumentError("filters are transmittances above 0, up to 1; give one at least")
+        object.__setattr__(self, "filters", tuple(given.tolist()))
 
     @property
     def dynamic_range(self) -> float:
