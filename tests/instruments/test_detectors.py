@@ -14,7 +14,7 @@ from oracles.verdicts import LARGEST_Z, assert_agree, assert_differ
 
 Array = npt.NDArray[np.float64]
 CCD = et.Detector(
-    1e9, 1e5, read_noise=15.0, dark=40.0, shortest=0.01, longest=20.0, filters=(1.0, 0.03), pause=2.0, stray=3e-8
+    1e9, 1e5, read_noise=60.0, dark=40.0, shortest=0.01, longest=20.0, filters=(1.0, 0.03), pause=2.0, stray=3e-8
 )
 
 
@@ -36,7 +36,7 @@ def test_readings_have_the_mean_and_the_variance_that_are_stated() -> None:
         found = CCD.read(many, seed=11)
         seconds, transmittance = CCD.exposures(many)
         gain = 1e9 * transmittance * seconds
-        error = np.sqrt((flux + 3e-8) * gain + 40.0 * seconds + 15.0**2) / gain
+        error = np.sqrt((flux + 3e-8) * gain + 40.0 * seconds + 60.0**2) / gain
         assert_agree(values=found.flux, expected=flux + 3e-8, standard_error=error)
         assert found.standard_error == pytest.approx(error, rel=0.3)
         assert found.seconds == pytest.approx(seconds + 2.0)
@@ -67,7 +67,7 @@ def test_too_much_light_is_told() -> None:
     # The least it can be.
     assert found.flux[1] == pytest.approx(1e9 / 1e11)
     assert photometer.dynamic_range == pytest.approx(1e9)
-    assert CCD.dynamic_range == pytest.approx(1e5 / math.sqrt(0.4 + 225))
+    assert CCD.dynamic_range == pytest.approx(1e5 / math.sqrt(0.4 + 3600))
 
 
 def test_the_same_seed_gives_the_same_readings() -> None:
