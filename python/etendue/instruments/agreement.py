@@ -38,6 +38,11 @@ class Agreement:
         Mean lobe [1/sr].
     values : array, shape (n,)
         Coefficient of variation of f at each angle.
+
+    Examples
+    --------
+    >>> Agreement(9.0, 4.0, np.arange(3.0), np.ones(3), np.array([6.0, 6.0, 6.0]))
+    Agreement(peak=9 %, fwhm=4 %, over_angles=6 %)
     """
 
     peak: float

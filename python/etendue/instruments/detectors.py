@@ -27,6 +27,11 @@ class Readings:
         From one position to the next, pause included.
     saturated : array of bool, shape (n,)
         Where there was more light than fits.
+
+    Examples
+    --------
+    >>> Detector(rate=1e12, full_well=1e9).read([1e-3, 0.5]).saturated.tolist()
+    [False, True]
     """
 
     flux: Array

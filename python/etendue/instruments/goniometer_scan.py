@@ -330,7 +330,13 @@ def detector_directions(angle: npt.ArrayLike, incidence: float, plane: Plane, *,
 
 
 def positions(middle: float, step: float, span: float) -> Array:
-    """Even positions [°] about a middle one, up to a span on both sides."""
+    """Even positions [°] about a middle one, up to a span on both sides.
+
+    Examples
+    --------
+    >>> positions(30.0, 2.5, 6.0).tolist()
+    [25.0, 27.5, 30.0, 32.5, 35.0]
+    """
     if not 0.0 < step < 90.0 or not 0.0 < span <= 180.0 or span / step > MOST_POSITIONS:
         raise ArgumentError(f"steps of {step:g}° to {span:g}° on both sides; give a step and a span of more than 0")
     k = int(np.floor(span / step + 1e-9))
