@@ -106,6 +106,7 @@ def test_info_imports_what_the_file_asks_for(tmp_path: Path) -> None:
     modules = program(arguments=["info", str(path)])
     assert libraries(modules) <= AT_TERMINALS | FOR_ARGUMENTS
     assert not {name.partition(".")[0] for name in modules} & set(NEVER)
+    assert "urllib.request" not in modules
     for part in ("scene", "scatter", "lightfield", "luminance", "tracing", "plot", "formats.rays", "formats.maps"):
         assert f"etendue.{part}" not in modules
     etendue.write_rays(tmp_path / "led.tm25ray", etendue.RingSource(rays=100).ray_set())

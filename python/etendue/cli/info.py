@@ -64,10 +64,11 @@ def _opened(path: Path, photometry: str | None) -> Found:
     """What the file is, looked for from what is quickly recognised to what is read to its end."""
     # Whoever asks for an intensity file waits for no light fields, scenes or traces to be imported.
     from etendue.formats.intensity import detect_intensity_format, read_intensity
-    from etendue.formats.patch_folder import is_patch_folder
 
-    if is_patch_folder(path):
-        return _patches(path)
+    if path.is_dir():
+        patches = _patches(path)
+        if patches is not None:
+            return patches
     if detect_intensity_format(path) is not None:
         return _intensity(path, read_intensity(path, photometry))
     if photometry is not None:
@@ -94,7 +95,11 @@ def _plainly(facts: dict[str, Any]) -> Found:
     return Found(facts, lambda: _print(facts))
 
 
-def _patches(path: Path) -> Found:
+def _patches(path: Path) -> Found | None:
+    from etendue.formats.patch_folder import is_patch_folder
+
+    if not is_patch_folder(path):
+        return None
     from etendue.lightfield.gridded.gridded_source import GriddedSource
 
     patches = GriddedSource.load(path)
