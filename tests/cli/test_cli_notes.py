@@ -301,12 +301,12 @@ def deconvolve(place: Path) -> Iterator[Case]:
 
 
 def goniophotometer(place: Path) -> Iterator[Case]:
-    gonio = et.NearFieldGoniophotometer((45, 90), camera_pixels=16, photometer_distance=200)
-    measured = gonio.measure(place / "scene.toml", samples=4)
-    options = ("--positions", "45,90", "--camera-pixels", 16, "--photometer-distance", 200, "--samples", 4)
+    gonio = et.NearFieldGoniophotometer((30, 120), camera_pixels=16, photometer_distance=200)
+    measured = gonio.measure(place / "led.h5", samples=4)
+    options = ("--positions", "30,120", "--camera-pixels", 16, "--photometer-distance", 200, "--samples", 4)
     outputs = ("-o", "out.tm25ray", "-o", "out.ies", "-n", 100)
     notes = (*measured.notes, *measured.intensity().notes, *measured.ray_set(100).notes)
-    yield Case(("goniophotometer", place / "scene.toml", *options, *outputs), notes)
+    yield Case(("goniophotometer", place / "led.h5", *options, *outputs), notes)
 
 
 CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {

@@ -302,7 +302,7 @@ def test_scenes_and_fields_are_measured_alike() -> None:
 @pytest.mark.slow
 def test_the_same_bits_for_any_number_of_threads() -> None:
     scene = et.Scene(sources=[{"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 50}])
-    gonio = et.NearFieldGoniophotometer(step=(45, 120), camera_pixels=16)
+    gonio = et.NearFieldGoniophotometer(step=(30, 120), camera_pixels=16)
     one, three = gonio.measure(scene, threads=1), gonio.measure(scene, threads=3)
     assert (one.records == three.records).all()
     assert (one.illuminance == three.illuminance).all()
@@ -319,7 +319,7 @@ def test_a_measurement_in_a_file(run: et.NearFieldRun, tmp_path: Path) -> None:
 
 
 def test_damaged_files_are_refused(tmp_path: Path) -> None:
-    gonio = et.NearFieldGoniophotometer(step=(45, 90), camera_pixels=16, distance=60)
+    gonio = et.NearFieldGoniophotometer(step=(30, 90), camera_pixels=16, distance=60)
     path = gonio.measure(two_parts, size=3.4, samples=4).save(tmp_path / "lamp.h5")
     whole = path.read_bytes()
     for cut in range(0, len(whole), max(1, len(whole) // 40)):
@@ -347,11 +347,11 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
 )
 def test_impossible_measurements_are_told(settings: dict[str, object], told: str) -> None:
     with pytest.raises(ArgumentError, match=told):
-        et.NearFieldGoniophotometer(**{"step": 45, "camera_pixels": 16} | settings).measure(two_parts, size=3.4)  # type: ignore[arg-type]
+        et.NearFieldGoniophotometer(**{"step": 30, "camera_pixels": 16} | settings).measure(two_parts, size=3.4)  # type: ignore[arg-type]
 
 
 def test_what_cannot_be_measured_is_told() -> None:
-    gonio = et.NearFieldGoniophotometer(step=45, camera_pixels=16)
+    gonio = et.NearFieldGoniophotometer(step=30, camera_pixels=16)
     with pytest.raises(ArgumentError, match="size"):
         gonio.measure(two_parts)
     with pytest.raises(ArgumentError, match="no light was seen"):

@@ -58,7 +58,14 @@ def test_directions_between_positions_are_even() -> None:
 
 @pytest.mark.parametrize(
     ("steps", "told"),
-    [((7, 10), "in γ"), ((10, 7), "in C"), ((0.01, 5), "at least"), ((10, 180), "three planes"), ((math.nan, 5), "γ")],
+    [
+        ((7, 10), "in γ"),
+        ((10, 7), "in C"),
+        ((0.01, 5), "at least"),
+        ((10, 180), "at most"),
+        ((45, 5), "at most"),
+        ((math.nan, 5), "γ"),
+    ],
 )
 def test_impossible_steps_are_told(steps: tuple[float, float], told: str) -> None:
     with pytest.raises(ArgumentError, match=told):

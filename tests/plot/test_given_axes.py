@@ -36,7 +36,7 @@ def lobe() -> et.Deconvolution:
 
 def near_field() -> et.NearFieldRun:
     disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
-    return et.NearFieldGoniophotometer(step=(45, 90), camera_pixels=16).measure(et.Scene(sources=[disk]))
+    return et.NearFieldGoniophotometer(step=(30, 90), camera_pixels=16).measure(et.Scene(sources=[disk]))
 
 
 DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {

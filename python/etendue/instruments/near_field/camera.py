@@ -61,7 +61,7 @@ class Camera:
     --------
     >>> camera = Camera(bits=12, exposures=3, exposure_ratio=10)
     >>> camera.times.tolist(), camera.top, round(camera.dark_noise, 2), round(camera.dynamic_range)
-    ([1.0, 10.0, 100.0], 4095, 2.07, 39557)
+    ([1.0, 10.0, 100.0], 4095, 2.07, 39608)
     """
 
     pixels: int = 512

@@ -91,7 +91,7 @@ class Merging:
         >>> camera = Camera(bits=8, exposures=2)
         >>> values, saturated = Merging(camera, np.array([1.0, 10.0]), (True,)).merged(np.array([[20, 199], [30, 255]]))
         >>> values.round(2).tolist(), saturated.tolist()
-        ([19.9, 30.0], [False, False])
+        ([19.91, 30.0], [False, False])
         """
         c = np.asarray(counts, dtype=np.float64)
         usable = c < TRUSTED * self.camera.top
