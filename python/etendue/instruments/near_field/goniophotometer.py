@@ -72,7 +72,7 @@ class NearFieldGoniophotometer:
     --------
     >>> import etendue as et
     >>> disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
-    >>> run = et.NearFieldGoniophotometer(step=15, camera_pixels=32).measure(et.Scene(sources=[disk]))
+    >>> run = et.NearFieldGoniophotometer(step=30, camera_pixels=32).measure(et.Scene(sources=[disk]))
     >>> round(run.total_flux), run.ray_set(1000).total_flux == run.total_flux
     (100, True)
     """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -103,15 +104,11 @@ class PixelRays:
         found = np.searchsorted(summed, turn * summed[-1], side="right")
         return np.asarray(np.minimum(found, len(self.flux) - 1), dtype=np.intp)
 
-    @property
+    @cached_property
     def _frames(self) -> Array:
         """Axes of the camera at each position, shape (positions, 3, 3): right, up, towards it."""
-        observers = self.stops_as_observers(self.stops.gamma, self.stops.c)
-        return np.array([self.screen.axes(observer) for observer in observers])
-
-    def stops_as_observers(self, gamma: Array, c: Array) -> list[Observer]:
-        """Who stands at the positions."""
-        return [Observer(float(g), float(a), self.distance, self.centre) for g, a in zip(gamma, c, strict=True)]
+        stops = zip(self.stops.gamma, self.stops.c, strict=True)
+        return np.array([self.screen.axes(Observer(float(g), float(a), self.distance, self.centre)) for g, a in stops])
 
 
 def in_blocks(

@@ -68,10 +68,9 @@ class NearFieldRun:
     --------
     >>> import etendue as et
     >>> disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
-    >>> gonio = et.NearFieldGoniophotometer(step=15, camera_pixels=32)
-    >>> run = gonio.measure(et.Scene(sources=[disk]))
-    >>> round(run.intensity().at(0, 0).item(), 1), round(run.luminance_map(45, 0).maximum / (100e6 / (4 * np.pi**2)), 1)
-    (31.8, 1.0)
+    >>> run = et.NearFieldGoniophotometer(step=30, camera_pixels=32).measure(et.Scene(sources=[disk]))
+    >>> round(run.intensity().at(0, 0).item()), round(float(run.luminance_map(60, 0).values.max()) / 2.53e6, 1)
+    (32, 1.0)
     """
 
     setting: Setting
@@ -285,8 +284,8 @@ class NearFieldRun:
     # --- rays --------------------------------------------------------------------------------------------------------
 
     @cached_property
-    def _pixel_rays(self) -> tuple[PixelRays, Integers]:
-        """The lit pixels as rays, and the records they come from."""
+    def _pixel_rays(self) -> PixelRays:
+        """The lit pixels as rays."""
         setting, (values, _) = self.setting, self._merged
         lit = np.flatnonzero(values)
         start = np.searchsorted(lit, self.start).astype(np.intp)
@@ -297,15 +296,20 @@ class NearFieldRun:
         for some in stretches(lit.size):
             stop = np.searchsorted(start, np.arange(some.start, some.stop), side="right") - 1
             flux[some] = weight[stop] * share[pixel[some]] * values[lit[some]]
-        return PixelRays(setting.positions, setting.screen, setting.centre, setting.distance, start, pixel, flux), lit
+        return PixelRays(setting.positions, setting.screen, setting.centre, setting.distance, start, pixel, flux)
 
     def closest_surface(self, seed: int = 1) -> Surface:
         """The surface of least étendue that nearly all pixels look at: where rays start unless stated otherwise."""
-        rays, _ = self._pixel_rays
+        return closest_surface(self._pilot(seed), seed)
+
+    def _pilot(self, seed: int) -> RaySet:
+        """Some rays along the lines of pixels, where these pass the centre at their closest."""
+        rays = self._pixel_rays
         summed = np.cumsum(rays.flux, dtype=np.float64)
         rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 6))))
         points, along, _ = rays.rays(rays.chosen(summed, 0, PILOT, 0.5), None, rng, between=False)
-        return closest_surface(RaySet(points, along, np.full(PILOT, 1.0 / PILOT)), seed)
+        away = np.einsum("ij,ij->i", points - np.asarray(self.setting.centre), along)
+        return RaySet(points - away[:, None] * along, along, np.full(PILOT, 1.0 / PILOT))
 
     def ray_set(
         self,
@@ -345,7 +349,7 @@ class NearFieldRun:
         """
         if rays is not None and not 1 <= rays <= 10**11:
             raise ArgumentError(f"{rays} rays; give at least one.")
-        pixels, _ = self._pixel_rays
+        pixels = self._pixel_rays
         at = self._surface(surface, seed)
         n = pixels.flux.size if rays is None else int(rays)
         summed = None if rays is None else np.cumsum(pixels.flux, dtype=np.float64)
@@ -383,16 +387,7 @@ class NearFieldRun:
             return self.closest_surface(seed)
         if not isinstance(surface, Surface):
             raise ArgumentError(f"{surface!r} is no surface; give et.Sphere(…), et.Box(…), … or 'closest'.")
-        if not surface.open_dimensions:
-            return surface
-        rays, _ = self._pixel_rays
-        summed = np.cumsum(rays.flux, dtype=np.float64)
-        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 6))))
-        points, along, _ = rays.rays(rays.chosen(summed, 0, PILOT, 0.5), None, rng, between=False)
-        # Where rays pass the centre at their closest, so that their start points lie about the lamp.
-        away = points - np.asarray(self.setting.centre)
-        feet = points - np.einsum("ij,ij->i", away, along)[:, None] * along
-        return surface.sized_for(RaySet(feet, along, np.full(PILOT, 1.0 / PILOT)))
+        return surface.sized_for(self._pilot(seed)) if surface.open_dimensions else surface
 
     def light_field(
         self, surface: Surface | Literal["auto"] = "auto", *, seed: int = 1, progress: Progress | None = None
