@@ -25,6 +25,8 @@ from etendue.instruments.agreement import Agreement, agreement
 from etendue.instruments.deconvolution import Deconvolution, deconvolve
 from etendue.instruments.detectors import Baffle, Detector
 from etendue.instruments.goniometer_scan import GoniometerScan, read_goniometer_scan
+from etendue.instruments.near_field.goniophotometer import NearFieldGoniophotometer
+from etendue.instruments.near_field.run import NearFieldRun
 from etendue.instruments.revolved import revolved
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.lightfield.diagnostics import diagnose
@@ -47,6 +49,7 @@ from etendue.plot import (
     plot_deconvolution,
     plot_intensity,
     plot_map,
+    plot_near_field,
     plot_threshold_sweep,
 )
 from etendue.quantities.illuminance_map import IlluminanceMap
@@ -94,6 +97,8 @@ __all__ = [
     "LuminanceMap",
     "MemoryLimitError",
     "MissingLibraryError",
+    "NearFieldGoniophotometer",
+    "NearFieldRun",
     "Observer",
     "OutputError",
     "PathTracing",
@@ -141,6 +146,7 @@ __all__ = [
     "plot_deconvolution",
     "plot_intensity",
     "plot_map",
+    "plot_near_field",
     "plot_threshold_sweep",
     "read_bsdf",
     "read_goniometer_scan",

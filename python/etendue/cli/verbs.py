@@ -29,6 +29,7 @@ VERBS = {
     "compare": "etendue.cli.compare:compare",
     "goniometer": "etendue.cli.goniometer:goniometer",
     "deconvolve": "etendue.cli.deconvolve:deconvolve",
+    "goniophotometer": "etendue.cli.goniophotometer:goniophotometer",
     "cache": "etendue.cli.cache:cache",
 }
 """By name, the module and the function."""
