@@ -280,7 +280,7 @@ class NearFieldRun:
         if unsure.size:
             which = ", ".join(f"{i + 1} to {self.merging.errors[i]:.1%}" for i in unsure)
             told.append(
-                f"how much longer an exposure is than the one before is known of exposure {which}: few pixels are lit in both"
+                f"how much longer an exposure is than the one before is known of exposure {which}: few pixels show in both"
             )
         return tuple(told)
 
