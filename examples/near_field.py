@@ -5,18 +5,18 @@
 
 Three questions. How well does a lamp come back through images, rays and a light field (1.3.1 of the thesis)? What does one
 exposure do to a lamp that is 10⁵ times as bright in one place as in another, and how many exposures bring it back (6.2)? And
-how does the LED of table 3.3 look from the side with one exposure?
+how does an LED look from the side, where its brightest pixel has a fourteenth (table 3.3), with one exposure?
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from pathlib import Path
 
 import etendue as et
 import numpy as np
 from experiments import closed_form_lamps as lamps
-from experiments import led
 from experiments.panels import QUICK, draw_maps, print_table
 
 OBSERVERS = {"0°": (0.0, 0.0), "33°, 52°": (33.0, 52.0), "62°, 200°": (62.0, 200.0), "78°, 310°": (78.0, 310.0)}
@@ -127,24 +127,37 @@ def dynamic_range(*, full: bool, folder: Path) -> None:
 
 
 def from_the_side(*, full: bool, folder: Path) -> None:
-    """The LED of table 3.3: images of single positions with one exposure of 8 bits and with four."""
+    """A die under a dome that glows: images with one exposure of 8 bits, over what is taken for dark, against the truth."""
+    gonio = et.NearFieldGoniophotometer(30, camera_pixels=128 if full else 48, exposures=4, bits=8, distance=100)
     rows, pictures = [], []
-    scene = et.Scene(name="dome LED", **led.PARTS)
-    gonio = et.NearFieldGoniophotometer(
-        15 if full else 30, camera_pixels=96 if full else 24, exposures=4, bits=8, exposure_ratio=8, distance=80,
-        centre=(0, 0, 0.4),
-    )  # fmt: skip
-    run = gonio.measure(scene, samples=16 if full else 4)
-    one = run.using(1)
-    for gamma in (0.0, 30.0, 60.0, 90.0):
-        dim, hdr = one.luminance_map(gamma), run.luminance_map(gamma)
-        found = et.compare(dim, hdr)
-        bright = hdr.values.max() / run.luminance_map(0).values.max()
-        rows.append([f"({gamma:g}°, 0°)", f"1/{1 / bright:.1f}", f"{100 * found.ncc:.1f}", f"{100 * found.nrmse:.1f}"])
-        pictures.append((f"{gamma:g}°", [dim, hdr]))
-    print(f"\nLED with a dome: {run.total_flux:.2f} lm; one exposure of 8 bits puts {one.disagreement:.2%} elsewhere\n")
-    print_table(["observer", "brightest pixel", "NCC [%]", "NRMSE [%]"], rows)
-    draw_maps(folder / "near-field-side.png", ["one exposure of 8 bits", "four"], pictures[2:], "root")
+    angles = (0.0, 30.0, 60.0, 90.0)
+    for threshold in (5.0, 15.0, 24.0, 30.0):
+        camera = dataclasses.replace(gonio, threshold=threshold)
+        run = camera.measure(lamps.dome, size=2.6, samples=25)
+        for n in (1, 4) if threshold == 5.0 else (1,):
+            some, row = run.using(n), []
+            for gamma in angles:
+                seen = some.luminance_map(gamma)
+                exact = lamps.luminance_map(lamps.dome, seen.observer, seen.screen)
+                found = et.compare(seen, exact)
+                row.append(f"{100 * found.ncc:.1f} / {100 * found.nrmse:.1f}")
+                if gamma == 90.0:
+                    pictures.append(seen)
+            least = run.setting.camera.least_count / run.setting.camera.highest
+            rows.append([f"{n}", f"{least:.1%}", f"{100 * some.disagreement:.2f}", *row])
+    brightest = [exact_maximum(run, gamma) for gamma in angles]
+    heads = [f"{g:g}°, brightest 1/{brightest[0] / b:.1f}" for g, b in zip(angles, brightest, strict=True)]
+    print("\nDome: NCC / NRMSE [%] against the lamp's own images\n")
+    print_table(["exposures of 8 bits", "dark below, of full scale", "disagreement [%]", *heads], rows)
+    exact = lamps.luminance_map(lamps.dome, pictures[0].observer, pictures[0].screen)
+    titles = [f"{row[0]} exposure{'s' * (row[0] != '1')}, dark below {row[1]}" for row in rows]
+    draw_maps(folder / "near-field-side.png", [*titles, "the lamp itself"], [("γ 90°", [*pictures, exact])], "root")
+
+
+def exact_maximum(run: et.NearFieldRun, gamma: float) -> float:
+    """Of the lamp's own image."""
+    seen = run.luminance_map(gamma)
+    return float(lamps.luminance_map(lamps.dome, seen.observer, seen.screen).values.max())
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Two lamps whose luminance is known in closed form: what a virtual instrument measures can be held against them."""
+"""Three lamps whose luminance is known in closed form: what a virtual instrument measures can be held against them."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ Luminance = Callable[[Array, Array], Array]
 DIE, RIM = 2e7, 2e5  # [cd/m²]
 LED_SIZE = 6.4
 """Diameter of a ball that holds the LED [mm]."""
+
+DOME = 1.25
+"""Radius of the dome [mm]."""
 
 CHIP, GLOW = 2e7, 200.0  # [cd/m²]
 REFLECTOR = 250.0
@@ -56,6 +59,22 @@ def reflector(points: Array, k: Array) -> Array:
     chip = np.where(radius < CHIP_RADIUS, CHIP * np.cos(0.5 * math.pi * radius / CHIP_RADIUS) ** 2, 0.0)
     glow = np.where(np.hypot(x, y) < REFLECTOR, GLOW * (1.0 + 0.5 * k[:, 0]), 0.0)
     return np.nan_to_num(chip + glow)
+
+
+def dome(points: Array, k: Array) -> Array:
+    """A die of 1.4 mm × 1 mm, and a dome of 1.25 mm about it that glows with a fourteenth of it at its foot, less above.
+
+    From the side only the dome is seen, as in table 3.3 of the thesis. It is brighter on the side of +y.
+    """
+    x, y = _crossing(points, k, 0.0)
+    die = np.where((np.abs(x - 0.1) < 0.7) & (np.abs(y) < 0.5), DIE, 0.0)
+    middle = -np.einsum("ij,ij->i", points, k)
+    near = points + middle[:, None] * k
+    half = np.sqrt(np.maximum(DOME**2 - np.einsum("ij,ij->i", near, near), 0.0))
+    leaves = near + half[:, None] * k
+    out = (half > 0.0) & (leaves[:, 2] > 0.0)
+    glow = DIE / 14.0 * np.exp(-4.0 * leaves[:, 2] / DOME) * (1.0 + 0.6 * leaves[:, 1] / DOME) / 1.6
+    return np.nan_to_num(die) + np.where(out, glow, 0.0)
 
 
 CHIP_FLUX = math.pi * CHIP * math.pi * CHIP_RADIUS**2 * (0.5 - 2.0 / math.pi**2) / 1e6

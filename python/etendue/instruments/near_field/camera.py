@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,9 @@ Counts = npt.NDArray[np.uint16]
 MOST_EXPOSURES = 12
 """Of one image."""
 
+DARK_LEVEL = 6.0
+"""Of the counts, in standard deviations of their noise."""
+
 REACH = 4.0
 """Standard deviations to which the spread of a point is followed."""
 
@@ -26,7 +30,7 @@ class Camera:
     """An image sensor behind a lens.
 
     A pixel collects electrons in proportion to its luminance and the time, with the noise of their number and of reading;
-    they become counts of a converter. Counts are stated without their dark level; what is below it reads 0.
+    they become counts of a converter, which lie above a dark level, so that its noise is not cut.
 
     Parameters
     ----------
@@ -45,7 +49,7 @@ class Camera:
     exposure_ratio : number
         From each exposure to the next, longer one.
     level : number
-        Share of the highest count that the brightest pixel of all positions reaches in the shortest exposure; above 1 it is
+        Share of the highest signal that the brightest pixel of all positions reaches in the shortest exposure; above 1 it is
         saturated.
     exposure_error : number
         Standard deviation by which the true times differ from the stated ones, as a share: once for a measurement.
@@ -60,8 +64,8 @@ class Camera:
     Examples
     --------
     >>> camera = Camera(bits=12, exposures=3, exposure_ratio=10)
-    >>> camera.times.tolist(), camera.top, round(camera.dark_noise, 2), round(camera.dynamic_range)
-    ([1.0, 10.0, 100.0], 4095, 2.07, 39608)
+    >>> camera.times.tolist(), camera.dark_level, camera.highest, round(camera.dark_noise, 2), round(camera.dynamic_range)
+    ([1.0, 10.0, 100.0], 13, 4082, 2.07, 39483)
     """
 
     pixels: int = 512
@@ -100,8 +104,18 @@ class Camera:
 
     @property
     def top(self) -> int:
-        """The highest count: a pixel that reads it is saturated."""
+        """The highest count of the converter: a pixel that reads it is saturated."""
         return int(2**self.bits - 1)
+
+    @property
+    def dark_level(self) -> int:
+        """Mean count of a pixel without light: so high that noise does not reach 0."""
+        return math.ceil(DARK_LEVEL * self.dark_noise)
+
+    @property
+    def highest(self) -> int:
+        """The highest signal [counts above the dark level]."""
+        return self.top - self.dark_level
 
     @property
     def electrons_per_count(self) -> float:
@@ -115,13 +129,13 @@ class Camera:
 
     @property
     def least_count(self) -> float:
-        """At and below it a pixel is taken for dark."""
+        """At and below this signal a pixel is taken for dark [counts above the dark level]."""
         return self.threshold * self.dark_noise
 
     @property
     def dynamic_range(self) -> float:
         """Of the brightest luminance that is not saturated to the faintest that is not taken for dark."""
-        return float(self.top / self.least_count * self.times[-1])
+        return float(self.highest / self.least_count * self.times[-1])
 
     def true_times(self, seed: int) -> Array:
         """The times as they are, shape (exposures,)."""
@@ -129,7 +143,7 @@ class Camera:
         return self.times * (1.0 + self.exposure_error * rng.standard_normal(self.exposures))
 
     def expose(self, luminance: Array, counts_per_luminance: float, times: Array, rng: np.random.Generator) -> Counts:
-        """Counts of some pixels in each exposure, shape (n, exposures).
+        """Counts of some pixels in each exposure, the dark level among them, shape (n, exposures).
 
         Parameters
         ----------
@@ -147,7 +161,8 @@ class Camera:
             np.minimum(luminance[:, None] * (counts_per_luminance * per) * times, 4.0 * self.full_well)
         )
         read = electrons + self.read_noise * rng.standard_normal(electrons.shape)
-        return np.clip(np.rint(read / per), 0, self.top).astype(np.uint16)
+        counts: Counts = np.clip(np.rint(read / per) + self.dark_level, 0, self.top).astype(np.uint16)
+        return counts
 
     def blurred(self, image: Array) -> Array:
         """An image as the lens throws it: each point spread by a Gaussian of the stated width."""

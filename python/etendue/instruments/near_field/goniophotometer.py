@@ -271,12 +271,12 @@ class NearFieldGoniophotometer:
         """Counts of the pixels that are not dark in all exposures."""
         camera, luminance = self.camera, seen.array()
         times = camera.true_times(seed)
-        per = camera.level * camera.top / brightest
+        per = camera.level * camera.highest / brightest
         counts, kept = Spool(counts_dtype(camera.exposures)), np.zeros(len(stops), dtype=np.intp)
         for number, some in enumerate(stretches(len(luminance))):
             rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 5, number))))
             read = camera.expose(luminance["luminance"][some].astype(np.float64), per, times, rng)
-            bright = (read > camera.least_count).any(axis=1)
+            bright = (read > camera.dark_level + camera.least_count).any(axis=1)
             record = np.zeros(int(bright.sum()), dtype=counts_dtype(camera.exposures))
             record["pixel"], record["counts"] = luminance["pixel"][some][bright], read[bright]
             counts.append(record)

@@ -40,6 +40,9 @@ RECORD = np.dtype([("position", "<f4", (3,)), ("direction", "<f4", (3,)), ("flux
 PILOT = 1 << 14
 """Rays that show where they may start."""
 
+UNSURE = 3e-3
+"""Error of the ratio of two exposure times that is worth a note."""
+
 TOLD = 1e-3
 """Share of the flux from which something is worth a note."""
 
@@ -273,11 +276,11 @@ class NearFieldRun:
                 "faint for the camera, or beyond its image, or an arm or lamp out of place; more exposures show whether it "
                 "is the first"
             )
-        given = [i + 2 for i, found in enumerate(self.merging.found) if not found]
-        if given:
+        unsure = np.flatnonzero(self.merging.errors > UNSURE)
+        if unsure.size:
+            which = ", ".join(f"{i + 1} to {self.merging.errors[i]:.1%}" for i in unsure)
             told.append(
-                f"of exposures {', '.join(map(str, given))} too few pixels are bright without being saturated: their stated "
-                "times are used"
+                f"how much longer an exposure is than the one before is known of exposure {which}: few pixels show in both"
             )
         return tuple(told)
 
