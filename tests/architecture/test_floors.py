@@ -238,6 +238,7 @@ WITHOUT_EXAMPLE = {
     "etendue.luminance.methods.Spelling": "how messages name options; tests/luminance/test_methods.py shows both",
     "etendue.quantities.node_choice.Choice": "what choose_nodes returns",
     "etendue.tracing.far_fields.far_field_nodes": "a step of trace_rounds, which shows it",
+    "etendue.instruments.near_field.storage": "NearFieldRun.save and load are the door; tests/instruments shows them",
     "etendue.formats.input": "about files that change and pipes that wait; its tests show it",
 }
 """Public things whose docstring may do without an example, with the reason."""

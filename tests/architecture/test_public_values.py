@@ -51,6 +51,12 @@ def lobe() -> et.GoniometerScan:
     return dataclasses.replace(scan(), solid_angle=1e-3)
 
 
+def near_field() -> et.NearFieldRun:
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
+    gonio = et.NearFieldGoniophotometer((30, 90), camera_pixels=16)
+    return gonio.measure(et.Scene(sources=[lamp]), samples=2)
+
+
 MAKERS: dict[str, Callable[[], Any]] = {
     **{type(surface).__name__: lambda surface=surface: surface for surface in SURFACES.values()},
     "Agreement": lambda: et.agreement([lobe(), lobe()]),
@@ -65,6 +71,8 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "Intensity": lambda: et.intensity_distribution(rays()),
     "LightField": lambda: make_field(SURFACES["dome"]),
     "LuminanceMap": make_map,
+    "NearFieldGoniophotometer": lambda: et.NearFieldGoniophotometer((10, 15), exposures=3),
+    "NearFieldRun": near_field,
     "Observer": lambda: et.Observer(30, 10, 500, target=(1, 2, 3)),
     "PathTracing": lambda: et.PathTracing(rays_per_pixel=64, until=0.01, seed=3, forward_rays=1e6, gather=True),
     "RayIndex": lambda: et.RayIndex.build(rays()),

@@ -71,6 +71,14 @@ def finite_boxes(things: list[dict[str, Any]]) -> list[Array]:
     ----------
     things : list of records
         ``compiled.record["faces"]`` or ``["sources"]``.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> ball = et.Scene(solids=[{"shape": {"kind": "ball", "radius": 3}, "medium": "BK7", "at": [1, 0, 0]}])
+    >>> (corners,) = finite_boxes(et.scene.compile_scene(ball).record["faces"])
+    >>> corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    ([-2.0, -3.0, -3.0], [4.0, 3.0, 3.0])
     """
     found = []
     for thing in things:

@@ -13,7 +13,7 @@ from etendue.instruments.near_field.setting import Setting
 Array = npt.NDArray[np.float64]
 
 FAR = 15.0
-"""Sizes of the lamp from which a photometer stands in its far field [CIE121]_; the default distance."""
+"""Sizes of the lamp from which a photometer stands in its far field [CIE1211996]_; the default distance."""
 
 ROUNDED = 0.06
 """By which share the distance may be less: it is rounded to two digits."""
@@ -41,6 +41,14 @@ def far_field_notes(setting: Setting, values: Array) -> Iterator[str]:
         Of the measurement.
     values : array, shape (planes, rings)
         Illuminance times the square of the distance.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
+    >>> near = et.NearFieldGoniophotometer((30, 90), distance=40, camera_pixels=16)
+    >>> near.measure(et.Scene(sources=[disk]), samples=2).intensity().notes  # doctest: +ELLIPSIS
+    ("the photometer stands 7.07 times the lamp's size of 5.657 mm away; from 15 times on its intensities are ...",)
     """
     size, distance = setting.lamp_size, setting.photometer_distance
     if distance < FAR * size * (1.0 - ROUNDED):

@@ -60,6 +60,11 @@ class Lamp(abc.ABC):
     provenance : Provenance
     notes : tuple of str
         What all that is made of the lamp should tell.
+
+    Examples
+    --------
+    >>> lamp_of(lambda points, k: np.where(k[:, 2] > 0.0, 1e4, 0.0), size=2.0).reach((0.0, 0.0, 0.0))
+    (1.0, 1.0)
     """
 
     name: str
@@ -89,6 +94,14 @@ class FieldLamp(Lamp):
     samples : int, optional
         Points within each pixel.
     threads : int, optional
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> rings = et.RingSource(rays=20_000)
+    >>> lamp = FieldLamp(et.LightField.fit(rings, et.Disk(radius=30), depths=(2, 2, 2, 2)), None, None)
+    >>> round(lamp.reach((0.0, 0.0, 0.0))[1])
+    30
     """
 
     def __init__(self, field: LightField, samples: int | None, threads: int | None) -> None:
@@ -123,6 +136,13 @@ class SceneLamp(Lamp):
         Lines of sight per pixel.
     seed : int
     threads : int, optional
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 3}, "at": [1, 0, 2], "flux": 10}
+    >>> SceneLamp(et.Scene(sources=[disk]), None, 1, None).centre()
+    (1.0, 0.0, 2.0)
     """
 
     def __init__(self, scene: Scene, samples: int | None, seed: int, threads: int | None) -> None:
@@ -187,6 +207,13 @@ class FunctionLamp(Lamp):
     samples : int, optional
         Lines through each pixel, at random within a lattice.
     seed : int
+
+    Examples
+    --------
+    >>> even = FunctionLamp(lambda points, k: np.full(len(points), 7.0), 2.0, 4, 1)
+    >>> values, _ = next(even.images([Observer(0, 0, 50)], Screen(1, 1, 2, 2)))
+    >>> values.tolist()
+    [[7.0, 7.0], [7.0, 7.0]]
     """
 
     def __init__(self, luminance: Luminance, size: float | None, samples: int | None, seed: int) -> None:
@@ -261,6 +288,12 @@ def lamp_of(
     ------
     ArgumentError
         If it is no source, its extent is not known, or a number is impossible.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> lamp_of(et.Scene(sources=[{"kind": "surface", "shape": {"kind": "disk", "radius": 3}, "flux": 10}])).flux_unit
+    'lm'
     """
     if samples is not None and not 1 <= samples <= 1 << 16:
         raise ArgumentError(f"{samples} lines of sight per pixel; give 1 to 65536.")

@@ -43,6 +43,15 @@ class PixelRays:
         Row by row.
     flux : array, shape (n,)
         Of the light that each pixel stands for [flux unit].
+
+    Examples
+    --------
+    >>> from etendue.instruments.near_field.positions import ArmPositions
+    >>> screen, start = Screen(2, 2, 2, 2), np.append(0, np.ones(22, dtype=np.intp))
+    >>> rays = PixelRays(ArmPositions(30, 90), screen, (0.0, 0.0, 0.0), 50.0, start, np.array([1], "u4"), np.ones(1, "f4"))
+    >>> points, camera = rays.lines(np.array([0]), np.random.default_rng(1))       # the upper right quarter, seen from above
+    >>> bool(0 < points[0, 0] < 1 and 0 < points[0, 1] < 1), camera.tolist()
+    (True, [[0.0, 0.0, 50.0]])
     """
 
     stops: ArmPositions
@@ -114,7 +123,14 @@ class PixelRays:
 def in_blocks(
     count: int, seed: int, make: Callable[[int, int, np.random.Generator], None], progress: Callable[[int], None] | None
 ) -> None:
-    """Call `make` for each block of rays with random numbers of its own: the same rays whatever was drawn before."""
+    """Call `make` for each block of rays with random numbers of its own: the same rays whatever was drawn before.
+
+    Examples
+    --------
+    >>> in_blocks(300_000, 1, lambda first, count, rng: print(first, count), None)
+    0 262144
+    262144 37856
+    """
     for block, first in enumerate(range(0, count, BLOCK)):
         rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 4, block))))
         make(first, min(BLOCK, count - first), rng)

@@ -16,7 +16,13 @@ Array = npt.NDArray[np.float64]
 
 
 def counts_dtype(exposures: int) -> np.dtype[Any]:
-    """Of a pixel that is not dark: which, and what each exposure read."""
+    """Of a pixel that is not dark: which, and what each exposure read.
+
+    Examples
+    --------
+    >>> counts_dtype(3).itemsize
+    10
+    """
     return np.dtype([("pixel", "<u4"), ("counts", "<u2", (exposures,))])
 
 
@@ -36,6 +42,13 @@ class Setting:
         [mm]
     lamp_size : number
         Diameter of a ball about the centre that nearly all light passes [mm].
+
+    Examples
+    --------
+    >>> setting = Setting(ArmPositions(30, 90), Camera(), 100.0, 100.0, 10.0, (0.0, 0.0, 0.0), 9.0)
+    >>> even = setting.illuminance_of(setting.screen, 100.0)                       # a square of 10 mm, 1 cd/m², at 100 mm
+    >>> round(float(even.sum()), 4)
+    0.01
     """
 
     positions: ArmPositions

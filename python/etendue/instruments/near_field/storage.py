@@ -67,7 +67,7 @@ def write_run(
     provenance: Provenance,
     notes: tuple[str, ...],
 ) -> Path:
-    """See `NearFieldRun.save`."""
+    """See `NearFieldRun.save`, which shows it."""
     import h5py  # noqa: PLC0415
 
     # The temporary file is locked already: that no other process takes it for one that was left behind.
@@ -91,7 +91,7 @@ def write_run(
 
 
 def read_run(path: Path) -> Parts:
-    """See `NearFieldRun.load`."""
+    """See `NearFieldRun.load`, which shows it."""
     import h5py  # noqa: PLC0415
 
     if not begins_as_hdf5(path):
