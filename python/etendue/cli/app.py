@@ -26,6 +26,7 @@ from etendue.cli import (
     patches,
     sample,
     trace,
+    view,
 )
 from etendue.cli.guard import guarded
 from etendue.cli.stopping import Stop, stoppable
@@ -55,6 +56,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "convert": convert.convert,
     "fit": fit.fit,
     "luminance": luminance.luminance,
+    "view": view.view,
     "sample": sample.sample,
     "intensity": intensity.intensity,
     "draw": draw.draw,

@@ -65,6 +65,19 @@ def framed_screen(compiled: Compiled, observer: Observer, columns: int = 128, ro
     return Screen(side * columns, side * rows, columns, rows)
 
 
+def corners_of(compiled: Compiled) -> Array:
+    """Corners of the boxes around all that has an end [mm], shape (n, 3); of a scene without faces, of its sources.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> ball = et.Scene(solids=[{"shape": {"kind": "ball", "radius": 3}, "medium": "BK7", "at": [1, 0, 0]}])
+    >>> corners_of(et.scene.compile_scene(ball)).max(axis=0).tolist()
+    [4.0, 3.0, 3.0]
+    """
+    return np.concatenate([np.zeros((0, 3)), *_boxes(compiled)])
+
+
 def _boxes(compiled: Compiled) -> Iterator[Array]:
     """The corners of the boxes around what has an end, in the world."""
 
