@@ -105,7 +105,8 @@ class Refinement:
             self._observer,
             screen,
             rays_per_pixel=lines,
-            forward_rays=0,
+            # Caustics need rays from the sources as well, which take their time: in the last pass.
+            forward_rays=None if number + 1 == len(PASSES) else 0,
             threads=self._threads,
             progress=told,
         )

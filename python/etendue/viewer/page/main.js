@@ -148,6 +148,7 @@ function frame(now) {
     if (painter.unfinished) painter.sample(view);
     painter.paint(look);
   }
+  document.body.dataset.painted ??= String(performance.now()); // [ms] since the page was asked for: a test reads it
   drawMarks($("marks"), view, { ...state, resolution: look.grid ? packed.resolution?.pitch : 0 });
   showReading();
   showView();
@@ -186,7 +187,7 @@ function fitScale() {
   let [low, high] = shares.map((share) => quantile(values, share));
   // A little of the brightest would fill the scale with what hardly anybody sees; nothing at all leaves no scale.
   if (!(high > 0)) high = values.at(-1) || 1;
-  if (look.errors) high = Math.min(high, 10);
+  if (look.errors) high = Math.min(high, 1); // what is less sure than that is not known
   if (!look.logarithmic && low < 0.02 * high) low = 0;
   if (look.logarithmic && !(low > high * 1e-4)) low = high * 1e-3;
   if (!(low < high)) low = look.logarithmic ? high / 10 : 0;
@@ -263,6 +264,7 @@ function showView() {
   const unit = look.errors ? 0.01 : 1;
   fields.low(look.range[0] / unit, 4);
   fields.high(look.range[1] / unit, 4);
+  $("scale-unit").textContent = look.errors ? "%" : packed.unit;
   if (solid) $("intensity").textContent = `${withUnit(solid.towards(view.theta, view.phi), packed.intensity.unit)} here`;
 }
 
@@ -470,6 +472,7 @@ function describe() {
   $("notes").replaceChildren(
     ...packed.notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })),
   );
+  $("notes-box").hidden = packed.notes.length === 0;
   $("resolution").textContent = packed.resolution?.text ?? "";
   $("grid-box").hidden = !packed.resolution;
   $("solid-box").hidden = !packed.intensity;
