@@ -19,19 +19,14 @@ from etendue.units import MM2_PER_M2
 
 FloatArray = npt.NDArray[np.float64]
 
-FINEST = 0.002
-"""Step of ln r: a ratio is off by half of it at most, 0.1 %."""
+STEPS = ((0.002, 0.06), (0.002, 0.2), (0.005, 0.2), (0.01, 0.2), (0.02, 0.2))
+"""Steps of ln r and of the logarithm of its standard deviation, finest first: each is off by half of its step at most. A
+field is kept in the first that is as small as is wanted. How large an error is is known less well than to a tenth."""
 
 FACTOR_SHARE = 0.5
 """Step of the factors over place and over direction, as a share of the ratio's."""
 
-ERROR_STEP = 0.06
-"""Step of the logarithm of standard deviations: they are off by 3 %, far less than they are known to."""
-
 LARGEST_CODE = 0xFFFF
-
-COARSENINGS = (1.0, 2.0, 4.0, 8.0)
-"""Factors by which all steps grow, one after the other, until a field is as small as is wanted."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -112,8 +107,8 @@ class PartTables:
     within_left: tuple[float, ...]
 
     @classmethod
-    def of(cls, chart: Part, part: PartField, step: float) -> Self:
-        """The tables of a part, its ratio in steps of `step`."""
+    def of(cls, chart: Part, part: PartField, step: float, error_step: float) -> Self:
+        """The tables of a part, its ratio in steps of `step`, errors in steps of `error_step`."""
         ratio, deviation = (np.asarray(values, dtype=np.float64) for values in (part.ratio, part.deviation))
         relative = deviation / np.where(ratio > 0.0, ratio, 1.0)
 
@@ -124,11 +119,11 @@ class PartTables:
             chart=chart,
             level=part.level,
             ratio=LogTable.of(ratio, step),
-            deviation=LogTable.of(relative, ERROR_STEP),
+            deviation=LogTable.of(relative, error_step),
             space=table(part.space, step * FACTOR_SHARE),
             direction=table(part.direction, step * FACTOR_SHARE),
-            space_error=table(part.errors.space, ERROR_STEP),
-            direction_error=table(part.errors.direction, ERROR_STEP),
+            space_error=table(part.errors.space, error_step),
+            direction_error=table(part.errors.direction, error_step),
             cells_left=part.errors.cells_left,
             within_left=part.errors.within_left,
         )
@@ -164,8 +159,8 @@ class FieldTables:
     Parameters
     ----------
     parts : tuple of PartTables
-    step : float
-        Of the logarithm of the ratios.
+    step, error_step : float
+        Of the logarithms of the ratios and of the errors.
 
     Examples
     --------
@@ -181,18 +176,19 @@ class FieldTables:
 
     parts: tuple[PartTables, ...]
     step: float
+    error_step: float
 
     @classmethod
-    def of(cls, field: EtendueDensity, step: float = FINEST) -> Self:
+    def of(cls, field: EtendueDensity, step: float = STEPS[0][0], error_step: float = STEPS[0][1]) -> Self:
         """The tables of a field, whose ratios are kept in steps of `step`."""
         pairs = zip(field.surface.parts(), field.parts, strict=True)
-        return cls(tuple(PartTables.of(chart, part, step) for chart, part in pairs), step)
+        return cls(tuple(PartTables.of(chart, part, step, error_step) for chart, part in pairs), step, error_step)
 
     @classmethod
     def within(cls, field: EtendueDensity, most_bytes: int) -> tuple[Self, dict[str, Any]]:
         """The finest tables whose packed form has at most so many letters of JSON, or the coarsest; and that form."""
-        for factor in COARSENINGS:
-            tables = cls.of(field, FINEST * factor)
+        for steps in STEPS:
+            tables = cls.of(field, *steps)
             packed = tables.packed()
             if sum(_letters(part) for part in packed["parts"]) <= most_bytes:
                 break

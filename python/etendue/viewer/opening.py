@@ -22,6 +22,7 @@ from etendue.scene.compiling import compile_scene
 from etendue.scene.framing import corners_of
 from etendue.tracing import TraceResult, trace
 from etendue.tracing.storage import is_result_file
+from etendue.viewer.geometry import scene_geometry
 from etendue.viewer.subjects import field_subject, map_subject
 
 Viewable = LightField | RayStream | PixelMap | TraceResult | Scene
@@ -150,9 +151,15 @@ def exhibit_of(
     if isinstance(viewable, Scene):
         light = light_of(viewable, rays or SCENE_RAYS, seed, threads, progress)
         field = fit_or_recall(light, cache=cache, threads=threads)
-        return Exhibit(field_subject(field, name, file), field, viewable)
+        return Exhibit({**field_subject(field, name, file), **scene_subject(viewable, seed)}, field, viewable)
     field = fit_or_recall(viewable, cache=cache, threads=threads, progress=progress)
     return Exhibit(field_subject(field, name, file), field)
+
+
+def scene_subject(scene: Scene, seed: int) -> dict[str, Any]:
+    """What a page shows of a scene besides its light."""
+    geometry = scene_geometry(scene, seed=seed)
+    return {} if geometry is None else {"geometry": geometry}
 
 
 def light_of(

@@ -67,6 +67,7 @@ def field_subject(field: LightField, name: str, file: str) -> dict[str, Any]:
             "file. ± is the standard error of the light field itself, the mean over one pixel."
         ),
         "notes": [*field.notes, field.provenance.source],
+        "geometry": None,
         "server": None,
     }
 
@@ -87,6 +88,7 @@ def map_subject(lmap: PixelMap, name: str, file: str) -> dict[str, Any]:
         "resolution": None,
         "accuracy": "The pixels are those of the map, in single precision; ± is their standard error.",
         "notes": [*lmap.notes, lmap.provenance.source],
+        "geometry": None,
         "server": None,
     }
 

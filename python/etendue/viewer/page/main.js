@@ -2,6 +2,7 @@
 
 import { COLOUR_MAPS, coloursOf } from "./colours.js";
 import { Field } from "./field.js";
+import { sectionOf } from "./geometry.js";
 import { listenToKeys, listenToPointer } from "./hands.js";
 import { measured, plain, prefixed, withUnit } from "./numbers.js";
 import { drawLegend, drawMarks, drawSection } from "./overlay.js";
@@ -33,6 +34,7 @@ const state = {
   section: null,
   drawing: null,
   pointer: null,
+  shown: { faces: true, rays: false, axis: "", place: 0.5 },
   moving: false,
 };
 let painter = null;
@@ -149,7 +151,11 @@ function frame(now) {
     painter.paint(look);
   }
   document.body.dataset.painted ??= String(performance.now()); // [ms] since the page was asked for: a test reads it
-  drawMarks($("marks"), view, { ...state, resolution: look.grid ? packed.resolution?.pitch : 0 });
+  drawMarks($("marks"), view, {
+    ...state,
+    geometry: packed.geometry,
+    resolution: look.grid ? packed.resolution?.pitch : 0,
+  });
   showReading();
   showView();
   solid?.draw(view);
@@ -220,6 +226,15 @@ function setLook(changes) {
   $("isolines").value = String(look.isolines);
   $("overlay").value = look.errors ? "error" : "light";
   $("resolution").hidden = !look.grid;
+  draw();
+}
+
+/** What is seen of the scene's faces and rays, and where it is cut. */
+function setShown(changes) {
+  Object.assign(state.shown, changes);
+  const plane = sectionOf(packed.geometry, state.shown);
+  $("section-place").hidden = !plane;
+  $("section-at").textContent = plane ? `${plane.axis} = ${plain(plane.at, 4)} mm` : "";
   draw();
 }
 
@@ -446,6 +461,12 @@ function makeFields() {
   $("isolines").addEventListener("change", (event) => setLook({ isolines: Number(event.target.value) }));
   $("logarithmic").addEventListener("change", (event) => setLook({ logarithmic: event.target.checked }));
   $("grid").addEventListener("change", (event) => setLook({ grid: event.target.checked }));
+  for (const [id, name] of [["show-faces", "faces"], ["show-rays", "rays"]]) {
+    $(id).checked = state.shown[name];
+    $(id).addEventListener("change", (event) => setShown({ [name]: event.target.checked }));
+  }
+  $("section-axis").addEventListener("change", (event) => setShown({ axis: event.target.value }));
+  $("section-place").addEventListener("input", (event) => setShown({ place: Number(event.target.value) }));
   $("fit").addEventListener("click", fitScale);
   $("reset").addEventListener("click", reset);
   $("clear").addEventListener("click", clear);
@@ -476,6 +497,7 @@ function describe() {
   $("resolution").textContent = packed.resolution?.text ?? "";
   $("grid-box").hidden = !packed.resolution;
   $("solid-box").hidden = !packed.intensity;
+  $("geometry-box").hidden = !packed.geometry;
   $("observer-box").hidden = fixed();
   $("copy").hidden = fixed();
   $("export-box").hidden = fixed() && !packed.server;
@@ -530,6 +552,7 @@ async function begin() {
     finished: () => !painter?.unfinished && !queued,
     failed: () => ($("trouble").hidden ? null : $("trouble").textContent),
     setLook,
+    setShown,
     drawn(tool, corners) {
       chooseTool(tool);
       drawn(corners);

@@ -1,6 +1,7 @@
 // What is drawn over the picture: regions, the line of a cross section, the pointer, a ruler; and diagrams beside it.
 
 import { colourAt } from "./colours.js";
+import { drawGeometry } from "./geometry.js";
 import { plain, prefixed, ticks } from "./numbers.js";
 
 const LINE = "#7fd4ff";
@@ -18,11 +19,12 @@ export function penOf(canvas) {
 }
 
 /** Regions, line and pointer; `marks` holds them in mm on the screen, `resolution` the pitch that is resolved [mm]. */
-export function drawMarks(canvas, view, { regions, line, drawing, pointer, resolution }) {
+export function drawMarks(canvas, view, { regions, line, drawing, pointer, resolution, geometry, shown }) {
   const pen = penOf(canvas);
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const scale = width / view.width;
   const at = ([x, y]) => [width / 2 + x * scale, height / 2 - y * scale];
+  if (geometry) drawGeometry(pen, at, view, geometry, shown);
   const path = (corners, closed) => {
     pen.beginPath();
     corners.forEach((corner, i) => pen[i ? "lineTo" : "moveTo"](...at(corner)));

@@ -32,6 +32,7 @@ export class PixelMap {
     const x = Math.floor(((u + right) / this.width + 0.5) * this.columns);
     const y = Math.floor((0.5 - (v + up) / this.height) * this.rows);
     if (!(x >= 0 && x < this.columns && y >= 0 && y < this.rows)) return { value: NaN, error: NaN };
-    return { value: this.values[y * this.columns + x], error: this.errors[y * this.columns + x] };
+    const at = y * this.columns + x;
+    return { value: this.values[at], error: this.errors[at], column: x, row: y };
   }
 }
