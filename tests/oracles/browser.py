@@ -7,19 +7,12 @@ import contextlib
 import json
 import os
 import select
-import shutil
 import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-
-import pytest
-
-NO_BROWSER = "no Chromium is installed"
-
-NAMES = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
 
 FLAGS = (
     "--headless=new",
@@ -34,18 +27,10 @@ FLAGS = (
 )
 
 
-def chromium() -> str:
-    """The program, or the test is skipped."""
-    found = next((path for name in NAMES if (path := shutil.which(name))), None)
-    if found is None:
-        pytest.skip(NO_BROWSER)
-    return found
-
-
 class Browser:
     """A page in Chromium. What it asks the network for is kept in `requests`, what it complains of in `complaints`."""
 
-    def __init__(self, *, width: int = 1200, height: int = 800, patience: float = 120.0) -> None:
+    def __init__(self, program: str, *, width: int, height: int, patience: float = 120.0) -> None:
         self.patience = patience
         self.requests: list[str] = []
         self.complaints: list[str] = []
@@ -61,7 +46,7 @@ class Browser:
             os.dup2(high[0], 3)
             os.dup2(high[1], 4)
 
-        arguments = [chromium(), *FLAGS, f"--window-size={width},{height}", f"--user-data-dir={self._profile.name}", "about:blank"]
+        arguments = [program, *FLAGS, f"--window-size={width},{height}", f"--user-data-dir={self._profile.name}", "about:blank"]
         self._process = subprocess.Popen(
             arguments, preexec_fn=pipes, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
@@ -175,9 +160,9 @@ class Browser:
 
 
 @contextlib.contextmanager
-def browsing(*, width: int = 1200, height: int = 800) -> Iterator[Browser]:
-    """A browser for as long as the block runs; the test is skipped if there is none."""
-    browser = Browser(width=width, height=height)
+def browsing(program: str, *, width: int = 1200, height: int = 800) -> Iterator[Browser]:
+    """A browser for as long as the block runs."""
+    browser = Browser(program, width=width, height=height)
     try:
         yield browser
     finally:

@@ -234,6 +234,8 @@ function setShown(changes) {
   Object.assign(state.shown, changes);
   const plane = sectionOf(packed.geometry, state.shown);
   $("section-place").hidden = !plane;
+  for (const [id, name] of [["show-faces", "faces"], ["show-rays", "rays"]]) $(id).checked = state.shown[name];
+  $("section-axis").value = state.shown.axis;
   $("section-at").textContent = plane ? `${plane.axis} = ${plain(plane.at, 4)} mm` : "";
   draw();
 }
@@ -462,7 +464,6 @@ function makeFields() {
   $("logarithmic").addEventListener("change", (event) => setLook({ logarithmic: event.target.checked }));
   $("grid").addEventListener("change", (event) => setLook({ grid: event.target.checked }));
   for (const [id, name] of [["show-faces", "faces"], ["show-rays", "rays"]]) {
-    $(id).checked = state.shown[name];
     $(id).addEventListener("change", (event) => setShown({ [name]: event.target.checked }));
   }
   $("section-axis").addEventListener("change", (event) => setShown({ axis: event.target.value }));

@@ -19,7 +19,8 @@ export function prefixed(value, unit) {
 
 /** Digits after the point that `digits` significant ones of a number need. */
 function decimals(value, digits) {
-  return Math.min(Math.max(digits - 1 - Math.floor(Math.log10(Math.abs(value) || 1)), 0), 12);
+  const rounded = Math.abs(Number(value.toPrecision(digits)));
+  return Math.min(Math.max(digits - 1 - Math.floor(Math.log10(rounded || 1)), 0), 12);
 }
 
 /** A plain number of so many significant digits, without an exponent unless it is very large or small. */
