@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from etendue.scatter.scans.scans import Scans
     from etendue.scatter.table import BsdfTable
     from etendue.scene import Scene
+    from etendue.viewer.notebook import view
 
 __all__ = [
     "ArgumentError",
@@ -161,6 +162,7 @@ __all__ = [
     "trace",
     "trace_rounds",
     "trace_work",
+    "view",
     "write_bsdf",
     "write_intensity",
     "write_rays",
@@ -193,6 +195,7 @@ LAZY = {
     "read_goniometer_scan": "etendue.instruments.goniometer_scan:read_goniometer_scan",
     "read_scans": "etendue.scatter.scans.files:read_scans",
     "scene": "etendue.scene",
+    "view": "etendue.viewer.notebook:view",
     "write_bsdf": "etendue.scatter.files:write_bsdf",
 }
 

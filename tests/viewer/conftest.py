@@ -12,7 +12,9 @@ FIELDS: dict[str, et.LightField] = {
     name: made.replace(report=dataclasses.replace(made.report, rays=20_000, symmetry="none"))
     for name, made in {
         "die": make_field(
-            et.Plane(z=0.2, width=2.4, height=1.7, centre=(0.2, -0.1), focus=(-0.3, 0.1, 0.4, -0.2), frames=2, rest=9.0),
+            et.Plane(
+                z=0.2, width=2.4, height=1.7, centre=(0.2, -0.1), focus=(-0.3, 0.1, 0.4, -0.2), frames=2, rest=9.0
+            ),
             seed=2,
             cells=(8, 4, 4, 8),
         ),

@@ -17,7 +17,17 @@ from etendue.viewer.bundle import page_html, script, text_of
 
 SUBJECT: dict[str, Any] = {"name": "a <b> & c", "note": "</script><script>alert(1)</script><!--", "unit": "cd/m²"}
 
-CALLS = ("fetch(", "XMLHttpRequest", "WebSocket", "EventSource", "sendBeacon", "importScripts", "import(", "window.open", "eval(")
+CALLS = (
+    "fetch(",
+    "XMLHttpRequest",
+    "WebSocket",
+    "EventSource",
+    "sendBeacon",
+    "importScripts",
+    "import(",
+    "window.open",
+    "eval(",
+)
 """By which a script reaches the network, or runs what is not in the page."""
 
 
@@ -118,7 +128,10 @@ def test_modules_keep_to_what_the_bundle_understands(name: str) -> None:
 
 
 def test_a_circle_of_modules_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    texts = {"main.js": 'import { a } from "./a.js";\n', "a.js": 'import { b } from "./main.js";\nexport const a = 1;\n'}
+    texts = {
+        "main.js": 'import { a } from "./a.js";\n',
+        "a.js": 'import { b } from "./main.js";\nexport const a = 1;\n',
+    }
     monkeypatch.setattr(bundle, "_module_text", lambda name, served: texts[name])  # noqa: ARG005
-    with pytest.raises(ValueError, match="main.js imports itself"):
+    with pytest.raises(ValueError, match=r"main\.js imports itself"):
         script(served=False)

@@ -55,7 +55,7 @@ def test_a_table_comes_back_within_half_a_step() -> None:
 
 
 def test_numbers_that_span_too_much_are_refused() -> None:
-    with pytest.raises(ArgumentError, match="do not fit into steps of 0.002"):
+    with pytest.raises(ArgumentError, match=r"do not fit into steps of 0\.002"):
         LogTable.of(np.array([1e-60, 1e60]), 0.002)
     assert LogTable.of(np.zeros(3), 0.002).values().tolist() == [0.0, 0.0, 0.0]
 

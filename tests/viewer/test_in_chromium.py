@@ -1,4 +1,4 @@
-"""Pages in a real browser: what stands under the pointer, what the graphics processor draws, and that nothing is asked of anybody."""
+"""Pages in a real browser: what stands under the pointer, what the processor draws, and that nothing leaves the file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOST_BYTES = 6_000_000
 @pytest.fixture(scope="module")
 def browser(chromium: str) -> Iterator[Browser]:
     """One for all pages: small, since here the processor draws them."""
-    with browsing(chromium, width=680, height=420) as found:
+    with browsing(chromium, width=780, height=380) as found:
         yield found
 
 
@@ -85,7 +85,7 @@ def test_values_under_the_pointer_are_those_of_the_map(
         assert off[:, 0].max(initial=0) < bound + 1e-6
         assert off[:, 1].max(initial=0) < ERROR_BOUND
         # One sample of every pixel of the canvas is there at once; of even neighbours any sample will do.
-        browser.wait("!etendue.state.moving && document.body.dataset.painted")
+        browser.wait("etendue.samples() > 0")
         height = browser.evaluate("document.getElementById('picture').height")
         ask = "(([c, r]) => [0, 1].flatMap((i) => [0, 1].map((j) => etendue.painted(2 * c + i, %d - 1 - 2 * r - j).value)))"
         painted = np.array(browser.evaluate(f"{picks}.map({ask % height})"))
@@ -100,7 +100,7 @@ def test_values_under_the_pointer_are_those_of_the_map(
     browser.mouse("mouseMoved", *middle_of(browser, int(column), int(row)))
     browser.wait(f"document.getElementById('place').textContent.includes('pixel {column}, {row}')")
     text = browser.evaluate("document.getElementById('reading').textContent")
-    value, _, error, unit = text.split()
+    value, _, error, unit = text.split(maxsplit=3)
     factor = {"G": 1e9, "M": 1e6, "k": 1e3}.get(unit[0], 1.0)
     assert float(value) * factor == pytest.approx(truth.values[row, column], abs=0.6 * float(error) * factor)
     quiet(browser, path)
@@ -118,9 +118,9 @@ def led() -> et.LightField:
 def test_an_led_is_a_small_file_that_opens_at_once_and_can_be_handled(
     chromium: str, led: et.LightField, tmp_path: Path
 ) -> None:
-    """At most 6 MB; the picture stands within 2 s; mouse, wheel and keys move it; regions and sections have their figures."""
+    """At most 6 MB; the picture stands within 2 s; mouse, wheel and keys move it; regions and sections have figures."""
     path = tmp_path / "led.html"
-    with browsing(chromium, width=680, height=420) as browser:
+    with browsing(chromium, width=780, height=380) as browser:
         opened(browser, exhibit_of(led, name="led.h5"), path)
         assert path.stat().st_size < MOST_BYTES
         browser.wait("document.body.dataset.painted")
@@ -144,8 +144,12 @@ def test_an_led_is_a_small_file_that_opens_at_once_and_can_be_handled(
         browser.drag(middle_of(browser, 70, 50), middle_of(browser, 90, 70), middle_of(browser, 100, 80))
         browser.wait("etendue.state.regions[0]?.figures?.pixels > 0")
         figures = browser.evaluate("etendue.state.regions[0].figures")
-        screen = et.Screen(start["width"], start["width"] / start["columns"] * start["rows"], start["columns"], start["rows"])
-        truth = et.luminance_map(led, et.Observer(0, start["phi"], start["distance"], start["target"]), screen, samples=4)
+        screen = et.Screen(
+            start["width"], start["width"] / start["columns"] * start["rows"], start["columns"], start["rows"]
+        )
+        truth = et.luminance_map(
+            led, et.Observer(0, start["phi"], start["distance"], start["target"]), screen, samples=4
+        )
         inside = truth.values[50:81, 70:101]  # corners lie in the middle of pixels, whose middles lie on the border
         assert figures["pixels"] in {30 * 30, 30 * 31, 31 * 31}
         assert figures["maximum"] <= inside.max() * 1.003
@@ -164,7 +168,9 @@ def test_a_map_shows_its_own_pixels(browser: Browser, tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     values = rng.uniform(1, 100, (20, 30))
     values[4, 7] = np.nan
-    lmap = et.LuminanceMap(values, values / 10, np.full(values.shape, 5), et.Observer(20, 30, 500, (1, 2, 3)), et.Screen(6, 4, 30, 20))
+    lmap = et.LuminanceMap(
+        values, values / 10, np.full(values.shape, 5), et.Observer(20, 30, 500, (1, 2, 3)), et.Screen(6, 4, 30, 20)
+    )
     path = tmp_path / "map.html"
     opened(browser, exhibit_of(lmap, name="map.exr"), path)
     view = browser.evaluate("({...etendue.state.view})")
@@ -178,7 +184,11 @@ def test_a_map_shows_its_own_pixels(browser: Browser, tmp_path: Path) -> None:
     column, row = np.floor((x / 6 + 0.5) * 30).astype(int), np.floor((0.5 - y / 4) * 20).astype(int)
     inside = (row[:, None] >= 0) & (row[:, None] < 20) & (column[None] >= 0) & (column[None] < 30)
     expected = np.where(inside, values[np.clip(row, 0, 19)[:, None], np.clip(column, 0, 29)[None]], np.nan)
-    np.testing.assert_allclose(grid, expected, rtol=1e-6)
+    # Middles of the page's pixels on the borders of the map's belong to either side.
+    clear = [np.abs(t - np.round(t)) > 1e-6 for t in ((0.5 - y / 4) * 20, (x / 6 + 0.5) * 30)]
+    clear_of_borders = np.ix_(*clear)
+    np.testing.assert_allclose(grid[clear_of_borders], expected[clear_of_borders], rtol=1e-6)
+    assert min(one.mean() for one in clear) > 0.9
     assert inside.sum() > 1000
     quiet(browser, path)
 

@@ -17,6 +17,8 @@ from oracles.light_fields import SURFACES, make_field
 
 from viewer.views import page_views
 
+NO_NODE = "no Node is installed"
+
 ERROR_BOUND = 0.035
 """Of standard errors: half of the step of their logarithm is 0.03, and the value that they are relative to is off too."""
 
@@ -25,7 +27,7 @@ ERROR_BOUND = 0.035
 def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder from which Node can import them."""
     if shutil.which("node") is None:
-        pytest.skip("no Node is installed")
+        pytest.skip(NO_NODE)
     folder = tmp_path_factory.mktemp("page")
     for file in resources.files("etendue.viewer").joinpath("page").iterdir():
         if file.name.endswith(".js"):
@@ -39,7 +41,9 @@ def run(modules: Path, code: str, data: Any) -> Any:
     (modules / "data.json").write_text(json.dumps(data), encoding="utf-8")
     head = 'import { readFileSync } from "node:fs";\nconst data = JSON.parse(readFileSync("data.json", "utf-8"));\n'
     (modules / "try.js").write_text(head + code, encoding="utf-8")
-    done = subprocess.run(["node", "try.js"], cwd=modules, capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run(
+        [str(shutil.which("node")), "try.js"], cwd=modules, capture_output=True, text=True, check=False, timeout=120
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -145,8 +149,14 @@ def test_figures_of_a_region_are_those_of_the_map(modules: Path) -> None:
     r = np.sqrt(rng.random(n))
     share = np.stack([1 - r, r * (1 - (s := rng.random(n))), r * s], axis=1) @ np.array(corners)
     sine, turn = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
-    k = np.outer(sine * np.cos(turn), right) + np.outer(sine * np.sin(turn), up) + np.outer(np.sqrt(1 - sine**2), toward)
-    light = field.luminance(np.array(observer.target) + share @ np.array([right, up]), k)[0] * np.pi * region["area"] * 1e-6
+    k = (
+        np.outer(sine * np.cos(turn), right)
+        + np.outer(sine * np.sin(turn), up)
+        + np.outer(np.sqrt(1 - sine**2), toward)
+    )
+    light = (
+        field.luminance(np.array(observer.target) + share @ np.array([right, up]), k)[0] * np.pi * region["area"] * 1e-6
+    )
     error = np.hypot(light.std() / np.sqrt(n), region["flux"]["error"])
     assert abs(light.mean() - region["flux"]["value"]) < 4 * error  # 6·10⁻⁵ by chance
     assert region["flux"]["error"] < 0.05 * region["flux"]["value"]
@@ -217,7 +227,9 @@ const point = [0.3, 1.1, -0.4];
 const seen = projected(view, ...point);
 console.log(JSON.stringify({
   axes: [view.right, view.up, view.toward], eye: view.eye, turned: [turned.theta, turned.phi, turned.toward],
-  seen, line: view.line((seen[0] / view.width + 0.5) * 40, (0.5 - seen[1] / view.height) * 30), behind: projected(view, ...view.toward.map((x) => 2000 * x)),
+  seen,
+  line: view.line((seen[0] / view.width + 0.5) * 40, (0.5 - seen[1] / view.height) * 30),
+  behind: projected(view, ...view.toward.map((x) => 2000 * x)),
 }));
 """
 

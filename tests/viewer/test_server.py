@@ -168,7 +168,14 @@ def scene() -> et.Scene:
     """A small lamp off its axis under a lens."""
     return et.Scene(
         name="lens",
-        sources=[{"kind": "surface", "shape": {"kind": "rectangle", "width": 1, "height": 0.6}, "at": [0.2, -0.1, 0], "flux": 9}],
+        sources=[
+            {
+                "kind": "surface",
+                "shape": {"kind": "rectangle", "width": 1, "height": 0.6},
+                "at": [0.2, -0.1, 0],
+                "flux": 9,
+            }
+        ],
         solids=[{"shape": {"kind": "ball", "radius": 2}, "medium": "PMMA", "at": [0, 0, 3]}],
     )
 
@@ -186,7 +193,10 @@ def test_a_scene_is_refined_by_lines_of_sight_until_another_view_comes(scene: et
         visitor.enter()
         assert json.loads(visitor.ask("POST", "/refine", asked).body) == {}
         first = visitor.server.refinement
-        assert json.loads(visitor.ask("POST", "/refine", {**asked, "observer": {**asked["observer"], "theta": 20.0}}).body) == {}
+        assert (
+            json.loads(visitor.ask("POST", "/refine", {**asked, "observer": {**asked["observer"], "theta": 20.0}}).body)
+            == {}
+        )
         assert first is not None
         assert first.after(10**9, 60).done
         number, maps = 0, []
@@ -201,7 +211,10 @@ def test_a_scene_is_refined_by_lines_of_sight_until_another_view_comes(scene: et
         assert found["words"].startswith("by lines of sight")
         coarseness, lines = PASSES[-1]
         truth = et.luminance_map(
-            scene, et.Observer(20, 0, 100, (0, 0, 2)), et.Screen(5, 4, 40 // coarseness, 32 // coarseness), rays_per_pixel=lines
+            scene,
+            et.Observer(20, 0, 100, (0, 0, 2)),
+            et.Screen(5, 4, 40 // coarseness, 32 // coarseness),
+            rays_per_pixel=lines,
         )
         values = np.frombuffer(base64.b64decode(maps[-1]["values"]), "<f4").reshape(truth.values.shape)
         np.testing.assert_array_equal(values, truth.values.astype(np.float32))

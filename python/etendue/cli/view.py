@@ -27,7 +27,9 @@ def view(
     ],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Page to write, .html: one file that works offline. If not given, it is served."),
+        typer.Option(
+            "-o", "--output", help="Page to write, .html: one file that works offline. If not given, it is served."
+        ),
     ] = None,
     detector: Annotated[
         str | None, typer.Option("--detector", help="Of the result of a trace: whose map or rays are shown.")
@@ -59,7 +61,9 @@ def view(
     """Look at a source from all sides and measure it: in the browser, or in a page of one file to be handed on."""
     check_outputs([output] if output else [], PAGE_EXTENSIONS)
     viewable = _in_unit(open_viewable(file, detector), file, flux, unit)
-    total = (rays or SCENE_RAYS) if isinstance(viewable, Scene) else len(viewable) if isinstance(viewable, RaySet) else 0
+    total = (
+        (rays or SCENE_RAYS) if isinstance(viewable, Scene) else len(viewable) if isinstance(viewable, RaySet) else 0
+    )
     with progress_bar("rays", total) if total else contextlib.nullcontext() as progress:
         exhibit = exhibit_of(
             viewable,

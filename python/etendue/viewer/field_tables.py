@@ -1,4 +1,4 @@
-"""A light field as the page holds it: tables of codes in equal steps of the logarithm, with a bound of the error they make."""
+"""A light field as the page holds it: tables of codes in equal steps of the logarithm, and a bound of their error."""
 
 from __future__ import annotations
 

@@ -17,6 +17,7 @@ def write_page(exhibit: Exhibit, path: Path) -> None:
     Parameters
     ----------
     exhibit : Exhibit
+        What it shows.
     path : Path
         Of a folder that exists.
 

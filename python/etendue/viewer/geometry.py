@@ -39,6 +39,7 @@ def scene_geometry(scene: Scene, *, seed: int = 1) -> dict[str, Any] | None:
     Parameters
     ----------
     scene : Scene
+        Whose faces and rays.
     seed : int
         Of the rays.
 

@@ -1,10 +1,9 @@
-"""From whatever can be looked at to what the page shows: light fields and maps as they are, rays and scenes by a light field."""
+"""From what can be looked at to what the page shows: light fields and maps as they are, rays and scenes by a light field."""
 
 from __future__ import annotations
 
 import dataclasses
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -174,7 +173,9 @@ def light_of(
     """
     corners = corners_of(compile_scene(scene))
     if len(corners) == 0:
-        raise ArgumentError(f"{scene.name or 'the scene'}: nothing in it has an end, so that nothing can be put around it.")
+        raise ArgumentError(
+            f"{scene.name or 'the scene'}: nothing in it has an end, so that nothing can be put around it."
+        )
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     radius = AROUND * float(np.linalg.norm(corners - middle, axis=1).max())
     # From the inside alone: what comes from outside is not the luminaire's.

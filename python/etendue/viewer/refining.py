@@ -1,4 +1,4 @@
-"""The present view by lines of sight through a scene, in the background: each pass shows more of it, until another view comes."""
+"""The present view by lines of sight through a scene, in the background, until another view comes."""
 
 from __future__ import annotations
 

@@ -182,7 +182,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     def log_message(self, *_: Any) -> None:
         """Say nothing: the terminal is the user's."""
 
-    def do_GET(self) -> None:  # noqa: N802 - the name that http.server calls
+    def do_GET(self) -> None:
         if self.headers.get("Host") != self.server.place:
             self._refuse(HTTPStatus.FORBIDDEN, "This server is asked for under its address only.")
             return
@@ -198,7 +198,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         else:
             self._refuse(HTTPStatus.NOT_FOUND, "There is one page here.")
 
-    def do_POST(self) -> None:  # noqa: N802
+    def do_POST(self) -> None:
         length = self.headers.get("Content-Length", "")
         if not (length.isascii() and length.isdigit() and int(length) <= MOST_ASKED):
             self.close_connection = True
@@ -244,7 +244,12 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     def _answer(self, status: HTTPStatus, body: bytes, kind: str, more: dict[str, str] | None = None) -> None:
         try:
             self.send_response(status)
-            for name, value in {**HEADERS, **(more or {}), "Content-Type": kind, "Content-Length": str(len(body))}.items():
+            for name, value in {
+                **HEADERS,
+                **(more or {}),
+                "Content-Type": kind,
+                "Content-Length": str(len(body)),
+            }.items():
                 self.send_header(name, value)
             self.end_headers()
             self.wfile.write(body)

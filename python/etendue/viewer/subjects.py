@@ -41,6 +41,7 @@ def field_subject(field: LightField, name: str, file: str) -> dict[str, Any]:
     Parameters
     ----------
     field : LightField
+        Kept in tables.
     name : str
         Title of the page.
     file : str
@@ -61,7 +62,10 @@ def field_subject(field: LightField, name: str, file: str) -> dict[str, Any]:
         "view": first_view(field, solid),
         "field": packed,
         "intensity": solid,
-        "resolution": {"pitch": resolved.place, "text": f"Resolves {resolved.summary()}. Circle: that pitch; lines: cells."},
+        "resolution": {
+            "pitch": resolved.place,
+            "text": f"Resolves {resolved.summary()}. Circle: that pitch; lines: cells.",
+        },
         "accuracy": (
             f"The light field is kept in steps: each luminance is within ±{percent} of that of étendue from the same "
             "file. ± is the standard error of the light field itself, the mean over one pixel."
@@ -179,5 +183,3 @@ def _facts(field: LightField) -> str:
     unmet = report.unmet_flux / (report.unmet_flux + field.total_flux) if field.total_flux > 0 else 0.0
     left = f", {unmet:.2%} of the flux not met" if math.isfinite(unmet) and unmet > 0.001 else ""
     return f"{field.total_flux:.5g} {field.flux_unit} · {report.rays:,} rays on {field.surface.NAME}{left}"
-
-

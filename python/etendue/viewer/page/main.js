@@ -550,6 +550,7 @@ async function begin() {
     setView: (changes) => setView(state.view.with(changes)),
     reading: (column, row) => state.subject.pixel(state.view, column, row),
     painted: (x, y) => painter.found(x, y),
+    samples: () => painter?.samples ?? 0,
     finished: () => !painter?.unfinished && !queued,
     failed: () => ($("trouble").hidden ? null : $("trouble").textContent),
     setLook,

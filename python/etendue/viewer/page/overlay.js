@@ -63,6 +63,7 @@ export function drawMarks(canvas, view, { regions, line, drawing, pointer, resol
 }
 
 function label(pen, text, x, y) {
+  pen.font = "bold 12px system-ui, sans-serif";
   pen.textAlign = "center";
   pen.lineWidth = 3;
   pen.strokeStyle = "rgb(0 0 0 / 0.8)";

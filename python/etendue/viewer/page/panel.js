@@ -39,7 +39,7 @@ export function regionRows(figures, unit, fluxUnit) {
     ["uniformity min/mean", plain(figures.uniformity, 3)],
     ["min/max", plain(figures.diversity, 3)],
   ];
-  if (luminance) rows.push(["intensity to the observer", withUnit(figures.intensity, intensityUnit)]);
+  if (luminance) rows.push(["intensity", withUnit(figures.intensity, intensityUnit)]);
   if (figures.flux) rows.push(["flux, all directions", measured(figures.flux.value, figures.flux.error, fluxUnit)]);
   rows.push(["area", `${plain(figures.area, 4)} mm²`], ["pixels", String(figures.pixels)]);
   return rows;
