@@ -15,12 +15,11 @@ import numpy as np
 from etendue.viewer.file_output import write_page
 from etendue.viewer.opening import exhibit_of
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from oracles.browser import Browser, browsing
 from oracles.packaged_led import PackagedLed
 
-FIGURES = ROOT / "docs" / "figures"
+FIGURES = Path(__file__).with_name("figures")
 RAYS = 3_000_000
 
 COLLIMATOR = et.Scene(

@@ -46,13 +46,12 @@ def scene_geometry(scene: Scene, *, seed: int = 1) -> dict[str, Any] | None:
     Examples
     --------
     >>> import etendue as et
-    >>> ball = et.Scene(solids=[{"shape": {"kind": "ball", "radius": 3}, "medium": "BK7"}])
-    >>> geometry = scene_geometry(ball)
+    >>> wall = {"shape": {"kind": "rectangle", "width": 2, "height": 4}, "finish": "absorber"}
+    >>> geometry = scene_geometry(et.Scene(surfaces=[wall]))
     >>> [plane["axis"] for plane in geometry["planes"]].count("x"), geometry["rays"]
     (15, [])
-    >>> middle = next(plane for plane in geometry["planes"] if abs(plane["at"]) < 1e-9)
-    >>> round(float(np.hypot(*np.array(middle["lines"][0]).reshape(-1, 3)[:, 1:].T).max()), 2)
-    3.0
+    >>> next(plane["lines"] for plane in geometry["planes"] if plane["axis"] == "x" and abs(plane["at"]) < 1e-9)
+    [[0.0, -2.0, 0.0, 0.0, 2.0, 0.0]]
     """
     compiled = compile_scene(scene)
     corners = corners_of(compiled)
