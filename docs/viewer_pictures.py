@@ -1,6 +1,6 @@
 """Make the pictures of docs/viewer.md, in Chromium: a packaged LED, and a collimator cut open.
 
-usage: python docs/viewer_pictures.py
+usage: python docs/viewer_pictures.py [led] [scene]
 """
 
 from __future__ import annotations
@@ -67,36 +67,49 @@ def show(browser: Browser, value: et.LightField | et.Scene, name: str, *steps: s
         browser.wait("etendue.finished()")
 
 
+def show_led(browser: Browser) -> None:
+    """From 35°, with isolines, a polygon and a cross section."""
+    show(
+        browser,
+        led(),
+        "led.h5",
+        "etendue.setView({theta: 35, phi: 20, width: 4})",
+        "etendue.setLook({isolines: 10})",
+        "etendue.drawn('polygon', [[0.08, -0.46], [0.27, 0.28], [0.62, 0.1], [0.7, -0.42]])",
+        "etendue.drawn('line', [[-1.2, 0.1], [1.1, -0.1]])",
+        "document.querySelector('#solid-box').style.display = 'none'",
+        "document.querySelector('#observer-box').style.display = 'none'",
+    )
+    browser.wait("etendue.state.regions[0].figures?.flux && etendue.state.section")
+    browser.mouse("mouseMoved", 420, 300)
+    browser.wait("etendue.finished() && document.getElementById('reading').textContent !== '–'")
+    browser.screenshot(FIGURES / "viewer-led.png")
+
+
+def show_scene(browser: Browser) -> None:
+    """Cut open, with rays."""
+    show(
+        browser,
+        COLLIMATOR,
+        "collimator.toml",
+        "etendue.setView({theta: 32, phi: -65, width: 26, target: [0, 0, 5]})",
+        "document.getElementById('fit').click()",
+        "etendue.setShown({rays: true, axis: 'x', place: 0.5})",
+    )
+    browser.screenshot(FIGURES / "viewer-scene.png")
+
+
 def main() -> None:
-    """Make both."""
+    """Make the pictures that are named, or both."""
     program = shutil.which("chromium")
     if program is None:
         sys.exit("no Chromium is installed")
+    wanted = sys.argv[1:] or ["led", "scene"]
     with browsing(program, width=1280, height=800) as browser:
-        show(
-            browser,
-            led(),
-            "led.h5",
-            "etendue.setView({theta: 35, phi: 20, width: 4})",
-            "etendue.setLook({isolines: 10})",
-            "etendue.drawn('polygon', [[0.08, -0.46], [0.27, 0.28], [0.62, 0.1], [0.7, -0.42]])",
-            "etendue.drawn('line', [[-1.2, 0.1], [1.1, -0.1]])",
-            "document.querySelector('#solid-box').style.display = 'none'",
-            "document.querySelector('#observer-box').style.display = 'none'",
-        )
-        browser.wait("etendue.state.regions[0].figures?.flux && etendue.state.section")
-        browser.mouse("mouseMoved", 420, 300)
-        browser.wait("etendue.finished() && document.getElementById('reading').textContent !== '–'")
-        browser.screenshot(FIGURES / "viewer-led.png")
-        show(
-            browser,
-            COLLIMATOR,
-            "collimator.toml",
-            "etendue.setView({theta: 48, phi: -65, width: 30, target: [0, 0, 5]})",
-            "etendue.setLook({logarithmic: true})",
-            "etendue.setShown({rays: true, axis: 'x', place: 0.5})",
-        )
-        browser.screenshot(FIGURES / "viewer-scene.png")
+        if "led" in wanted:
+            show_led(browser)
+        if "scene" in wanted:
+            show_scene(browser)
 
 
 if __name__ == "__main__":

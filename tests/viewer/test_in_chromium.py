@@ -193,6 +193,66 @@ def test_a_map_shows_its_own_pixels(browser: Browser, tmp_path: Path) -> None:
     quiet(browser, path)
 
 
+NO_FLOAT_TARGETS = """
+const whole = WebGL2RenderingContext.prototype.getExtension;
+WebGL2RenderingContext.prototype.getExtension = function (name) {
+  return name === "EXT_color_buffer_float" ? null : whole.call(this, name);
+};
+"""
+
+
+@pytest.mark.slow
+def test_processors_without_float_targets_draw_the_same(chromium: str, tmp_path: Path) -> None:
+    """With targets of 16 bits the picture is that of 32 bits to their eleven digits (2⁻¹¹, and as much by the mean)."""
+    path = tmp_path / "die.html"
+    exhibit = exhibit_of(FIELDS["die"], name="die")
+    found = []
+    for prepared in ("", NO_FLOAT_TARGETS):
+        with browsing(chromium, width=620, height=260) as browser:
+            browser.call("Page.addScriptToEvaluateOnNewDocument", source=prepared)
+            opened(browser, exhibit, path)
+            browser.wait("etendue.finished()")
+            found.append(
+                browser.evaluate("[...Array(150).keys()].map((i) => etendue.painted(2 * i, (7 * i) % 160).value)")
+            )
+            assert browser.complaints == []
+    whole, half = np.array(found)
+    assert (whole > 0).sum() > 20
+    assert np.abs(half - whole).max() < 2.0**-10 * whole.max()
+    assert (half != whole).any()  # otherwise the extension was not taken away
+
+
+@pytest.mark.slow
+def test_fingers_turn_shift_and_zoom(browser: Browser, tmp_path: Path) -> None:
+    """One finger turns a quarter of a degree a pixel; two that part zoom in by how much farther apart they are."""
+    opened(browser, exhibit_of(FIELDS["lamp"], name="lamp"), tmp_path / "lamp.html")
+    browser.evaluate("etendue.setView({theta: 0, phi: 0})")
+    x, y = middle_of(browser, 100, 60)
+
+    def touch(kind: str, *places: tuple[float, float]) -> None:
+        points = [{"x": px, "y": py, "id": i} for i, (px, py) in enumerate(places)]
+        browser.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+
+    for kind, *places in (
+        ("touchStart", (x, y)),
+        ("touchMove", (x, y + 20)),
+        ("touchMove", (x, y + 40)),
+        ("touchEnd",),
+    ):
+        touch(kind, *places)
+    browser.wait("etendue.state.view.theta > 0")
+    assert browser.evaluate("etendue.state.view.theta") == pytest.approx(10, rel=0.5)  # a browser may swallow the first
+    width = browser.evaluate("etendue.state.view.width")
+    theta = browser.evaluate("etendue.state.view.theta")
+    touch("touchStart", (x - 30, y), (x + 30, y))
+    touch("touchMove", (x - 45, y), (x + 45, y))
+    touch("touchMove", (x - 60, y), (x + 60, y))
+    touch("touchEnd")
+    browser.wait(f"etendue.state.view.width < 0.9 * {width}")
+    assert browser.evaluate("etendue.state.view.width") == pytest.approx(width / 2, rel=0.4)
+    assert browser.evaluate("etendue.state.view.theta") == theta
+
+
 @pytest.mark.slow
 def test_the_served_page_opens_and_hands_out_maps(browser: Browser, tmp_path: Path) -> None:
     """Through the token, under its policy, in the browser: the map that it fetches is the core's."""

@@ -41,7 +41,8 @@ let painter = null;
 let solid = null;
 let round = 0; // of measurements: older ones are given up
 let timer = 0;
-let lastFrame = 0;
+let lastFrame = 0; // [ms]
+let sampled = false; // whether that frame drew the light anew
 let queued = false;
 
 // --- the view -------------------------------------------------------------------------------------------------------
@@ -145,9 +146,10 @@ function frame(now) {
   queued = false;
   const { view, look } = state;
   if (painter) {
-    if (state.moving) painter.pace(now - lastFrame);
+    if (state.moving && sampled) painter.pace(now - lastFrame);
     lastFrame = now;
-    if (painter.unfinished) painter.sample(view);
+    sampled = painter.unfinished;
+    if (sampled) painter.sample(view);
     painter.paint(look);
   }
   document.body.dataset.painted ??= String(performance.now()); // [ms] since the page was asked for: a test reads it
@@ -160,7 +162,8 @@ function frame(now) {
   showView();
   solid?.draw(view);
   if (state.line && state.section) drawSection($("section"), state.section, packed.unit, look.logarithmic);
-  if (painter?.unfinished) draw();
+  // As long as it moves, frames follow one another, so that their distance tells how long one takes.
+  if (painter?.unfinished || state.moving) draw();
   else document.body.dataset.ready = "true";
 }
 
@@ -551,6 +554,7 @@ async function begin() {
     reading: (column, row) => state.subject.pixel(state.view, column, row),
     painted: (x, y) => painter.found(x, y),
     samples: () => painter?.samples ?? 0,
+    coarseness: () => painter.coarseness,
     finished: () => !painter?.unfinished && !queued,
     failed: () => ($("trouble").hidden ? null : $("trouble").textContent),
     setLook,
