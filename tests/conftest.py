@@ -20,9 +20,10 @@ pytest_plugins = ["oracles.time_budget", "oracles.workers"]
 
 NO_SAMPLES = "the folder of real sample files is not there"
 NO_BROWSER = "no Chromium is installed"
+NO_NODE = "no Node is installed"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
 
-COUNTED = {NO_SAMPLES: "the sample files are not there", NO_BROWSER: NO_BROWSER}
+COUNTED = {NO_SAMPLES: "the sample files are not there", NO_BROWSER: NO_BROWSER, NO_NODE: NO_NODE}
 """Reasons for which tests are skipped that are counted at the end, and what is said of them."""
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -46,9 +47,18 @@ def chromium() -> str:
     return found
 
 
+@pytest.fixture(scope="session")
+def node() -> str:
+    """The program in which the modules of pages are tried without a browser."""
+    found = shutil.which("node")
+    if found is None:
+        pytest.skip(NO_NODE)
+    return found
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say last how many tests could not run for want of sample files or of a browser."""
+    """Say last how many tests could not run for want of sample files or of a program."""
     skipped = terminalreporter.stats.get("skipped", [])
     for reason, words in COUNTED.items():
         if missing := sum(reason in str(report.longrepr) for report in skipped):

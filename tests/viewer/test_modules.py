@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 from importlib import resources
 from pathlib import Path
@@ -17,21 +16,18 @@ from oracles.light_fields import SURFACES, make_field
 
 from viewer.views import page_views
 
-NO_NODE = "no Node is installed"
-
 ERROR_BOUND = 0.035
 """Of standard errors: half of the step of their logarithm is 0.03, and the value that they are relative to is off too."""
 
 
 @pytest.fixture(scope="module")
-def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def modules(node: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder from which Node can import them."""
-    if shutil.which("node") is None:
-        pytest.skip(NO_NODE)
     folder = tmp_path_factory.mktemp("page")
     for file in resources.files("etendue.viewer").joinpath("page").iterdir():
         if file.name.endswith(".js"):
             (folder / file.name).write_text(file.read_text("utf-8"), encoding="utf-8")
+    (folder / "node").symlink_to(node)
     (folder / "package.json").write_text('{"type": "module"}', encoding="utf-8")
     return folder
 
@@ -42,7 +38,7 @@ def run(modules: Path, code: str, data: Any) -> Any:
     head = 'import { readFileSync } from "node:fs";\nconst data = JSON.parse(readFileSync("data.json", "utf-8"));\n'
     (modules / "try.js").write_text(head + code, encoding="utf-8")
     done = subprocess.run(
-        [str(shutil.which("node")), "try.js"], cwd=modules, capture_output=True, text=True, check=False, timeout=120
+        [str(modules / "node"), "try.js"], cwd=modules, capture_output=True, text=True, check=False, timeout=120
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

@@ -42,7 +42,13 @@ def text_of(name: str) -> str:
 
 
 def script(*, served: bool) -> str:
-    """All modules as one script; the program behind the page is there or not."""
+    """All modules as one script; the program behind the page is there or not.
+
+    Examples
+    --------
+    >>> "fetch(" in script(served=True), "fetch(" in script(served=False)
+    (True, False)
+    """
     done: list[str] = []
     pieces = list(_pieces(FIRST, served, done, ()))
     return '"use strict";\n' + "\n".join(pieces)
@@ -80,7 +86,13 @@ def _shaders() -> dict[str, str]:
 
 
 def policy(style: str, code: str, *, served: bool) -> str:
-    """The content-security policy: this style, this script, pictures of the page's own making, and nothing else."""
+    """The content-security policy: this style, this script, pictures of the page's own making, and nothing else.
+
+    Examples
+    --------
+    >>> policy("", "", served=False).split("; ")[0]
+    "default-src 'none'"
+    """
     hashes = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii") for text in (style, code))
     style_hash, code_hash = hashes
     rules = {
@@ -104,6 +116,11 @@ def page_html(subject: dict[str, Any], *, served: bool = False) -> str:
         Plain data; see `etendue.viewer.subjects`.
     served : bool
         Whether the program is behind the page.
+
+    Examples
+    --------
+    >>> page_html({"name": "LED <1>"}).splitlines()[7]
+    '<title>LED &lt;1&gt; – étendue</title>'
     """
     style, code = text_of("style.css"), script(served=served)
     # "</script>" would end the element that the data stand in, wherever in them it stood.

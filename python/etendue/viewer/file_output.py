@@ -25,6 +25,17 @@ def write_page(exhibit: Exhibit, path: Path) -> None:
     ------
     OSError
         If it cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> import etendue as et
+    >>> from etendue.viewer.opening import exhibit_of
+    >>> desk = et.IlluminanceMap([[500.0]], [[5.0]], [[900]], et.Screen(20, 10, 1, 1, "xy"))
+    >>> with TemporaryDirectory() as folder:
+    ...     write_page(exhibit_of(desk, name="desk"), Path(folder) / "desk.html")
+    ...     (Path(folder) / "desk.html").stat().st_size < 200_000
+    True
     """
     text = page_html(exhibit.subject)
     with atomic_output(path) as temporary:

@@ -70,6 +70,16 @@ def open_viewable(path: str | os.PathLike[str], detector: str | None = None) -> 
         If a detector is named and the file is no result of a trace.
     FormatError, SceneError, OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import etendue as et
+    >>> with TemporaryDirectory() as folder:
+    ...     et.Scene(name="nothing").save(Path(folder) / "nothing.toml")
+    ...     open_viewable(Path(folder) / "nothing.toml").name
+    'nothing'
     """
     path = as_path(path)
     if is_result_file(path):
@@ -88,6 +98,15 @@ def of_detector(result: TraceResult, detector: str | None) -> PixelMap | RayStre
         If there is no such detector.
     ArgumentError
         If none is named, and there is none or more than one.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> desk = {"name": "desk", "kind": "illuminance", "width": 10, "height": 10, "columns": 1, "rows": 1,
+    ...         "at": [0, 0, -1000], "toward": [0, 0, 1]}
+    >>> lamp = et.Scene(sources=[{"kind": "point", "flux": 1}], detectors=[desk])
+    >>> of_detector(et.trace(lamp, rays=1000), None).unit
+    'lx'
     """
     found: dict[str, PixelMap | RayStream] = {**result.images, **result.illuminance, **result.rays}
     if detector is not None and detector not in found:
@@ -135,6 +154,13 @@ def exhibit_of(
     ------
     ArgumentError
         If there is no light to be seen, or options and value do not go together.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> desk = et.IlluminanceMap([[500.0]], [[5.0]], [[900]], et.Screen(20, 10, 1, 1, "xy"))
+    >>> exhibit_of(desk, name="desk").subject["unit"]
+    'lx'
     """
     if not isinstance(viewable, Scene) and rays is not None:
         raise ArgumentError("rays: for scenes, which are traced; this is none.")
@@ -150,12 +176,12 @@ def exhibit_of(
     if isinstance(viewable, Scene):
         light = light_of(viewable, rays or SCENE_RAYS, seed, threads, progress)
         field = fit_or_recall(light, cache=cache, threads=threads)
-        return Exhibit({**field_subject(field, name, file), **scene_subject(viewable, seed)}, field, viewable)
+        return Exhibit({**field_subject(field, name, file), **_scene_subject(viewable, seed)}, field, viewable)
     field = fit_or_recall(viewable, cache=cache, threads=threads, progress=progress)
     return Exhibit(field_subject(field, name, file), field)
 
 
-def scene_subject(scene: Scene, seed: int) -> dict[str, Any]:
+def _scene_subject(scene: Scene, seed: int) -> dict[str, Any]:
     """What a page shows of a scene besides its light."""
     geometry = scene_geometry(scene, seed=seed)
     return {} if geometry is None else {"geometry": geometry}
@@ -170,6 +196,13 @@ def light_of(
     ------
     ArgumentError
         If nothing in the scene has an end, or no light leaves it.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 100}
+    >>> len(light_of(et.Scene(sources=[lamp]), 1000))
+    1000
     """
     corners = corners_of(compile_scene(scene))
     if len(corners) == 0:

@@ -1,6 +1,5 @@
 // What is drawn over the picture: regions, the line of a cross section, the pointer, a ruler; and diagrams beside it.
 
-import { colourAt } from "./colours.js";
 import { drawGeometry } from "./geometry.js";
 import { plain, prefixed, ticks } from "./numbers.js";
 
@@ -102,10 +101,10 @@ export function drawLegend(canvas, colours, { range: [low, high], logarithmic, u
   const [left, right, top, thick] = [14, canvas.clientWidth - 14, 20, 12];
   const share = (x) => (logarithmic ? Math.log(Math.max(x, low) / low) / Math.log(high / low) : (x - low) / (high - low));
   const at = (x) => left + Math.min(Math.max(share(x), 0), 1) * (right - left);
-  for (let x = left; x < right; x++) {
-    pen.fillStyle = colourAt(colours, (x - left) / (right - left));
-    pen.fillRect(x, top, 1.5, thick);
-  }
+  const strip = pen.createLinearGradient(left, 0, right, 0);
+  colours.forEach((colour, i) => strip.addColorStop(i / (colours.length - 1), `rgb(${colour.join(" ")})`));
+  pen.fillStyle = strip;
+  pen.fillRect(left, top, right - left, thick);
   pen.fillStyle = "rgb(255 255 255 / 0.55)";
   for (let i = 1; i < isolines; i++) pen.fillRect(left + (i / isolines) * (right - left), top, 1, thick);
   pen.fillStyle = "#c9d1da";

@@ -45,22 +45,32 @@ export class Solid {
   draw(view) {
     const { canvas } = this;
     const scale = window.devicePixelRatio || 1;
-    const [width, height] = [canvas.clientWidth * scale, canvas.clientHeight * scale];
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.round(x * scale));
     if (width === 0) return;
-    Object.assign(canvas, { width, height });
+    if (canvas.width !== width || canvas.height !== height || !this.body) {
+      Object.assign(canvas, { width, height });
+      this.drawBody(width, height, scale);
+    }
     const pen = canvas.getContext("2d");
+    pen.clearRect(0, 0, width, height);
+    pen.drawImage(this.body, 0, 0);
+    this.drawDirection(pen, scale, view);
+  }
+
+  /** The body itself, which does not change, on a canvas of its own; and where points of it are on that. */
+  drawBody(width, height, scale) {
+    this.body = Object.assign(document.createElement("canvas"), { width, height });
+    const pen = this.body.getContext("2d");
     pen.lineJoin = "round";
-    // All of the solid in the middle of the canvas, as large as fits.
     const points = this.c.map((c, i) =>
       this.gamma.map((g, j) => this.seen(unit(g, c).map((x) => (x * this.value(i, j)) / this.most))),
     );
+    // All of it in the middle of the canvas, as large as fits.
     const flat = [...points.flat(), [0, 0, 0]];
-    const [lowest, highest] = [0, 1].map((axis) => flat.reduce((m, p) => [Math.min(m[0], p[axis]), Math.max(m[1], p[axis])], [0, 0]))
-      .reduce(([lo, hi], [a, b]) => [[...lo, a], [...hi, b]], [[], []]);
-    const span = Math.max((highest[0] - lowest[0]) / width, (highest[1] - lowest[1]) / height);
-    const zoom = FILL / span;
-    const middle = [0, 1].map((axis) => (lowest[axis] + highest[axis]) / 2);
-    const place = (p) => [width / 2 + (p[0] - middle[0]) * zoom, height / 2 - (p[1] - middle[1]) * zoom];
+    const ends = [0, 1].map((axis) => flat.reduce(([low, high], p) => [Math.min(low, p[axis]), Math.max(high, p[axis])], [0, 0]));
+    const zoom = FILL / Math.max((ends[0][1] - ends[0][0]) / width, (ends[1][1] - ends[1][0]) / height);
+    const middle = ends.map(([low, high]) => (low + high) / 2);
+    this.place = (p) => [width / 2 + (p[0] - middle[0]) * zoom, height / 2 - (p[1] - middle[1]) * zoom];
     const faces = [];
     for (let i = 0; i < this.c.length; i++) {
       for (let j = 0; j + 1 < this.gamma.length; j++) {
@@ -73,7 +83,7 @@ export class Solid {
     faces.sort((a, b) => a.depth - b.depth);
     for (const { corners, value } of faces) {
       pen.beginPath();
-      corners.forEach((c, k) => pen[k ? "lineTo" : "moveTo"](...place(c)));
+      corners.forEach((c, k) => pen[k ? "lineTo" : "moveTo"](...this.place(c)));
       pen.closePath();
       const [a, b, c] = corners;
       const [u, v] = [b, c].map((p) => p.map((x, k) => x - a[k]));
@@ -82,11 +92,11 @@ export class Solid {
       pen.fill();
       pen.stroke();
     }
-    this.drawAxes(pen, place, scale);
-    this.drawDirection(pen, place, scale, view);
+    this.drawAxes(pen, scale);
   }
 
-  drawAxes(pen, place, scale) {
+  drawAxes(pen, scale) {
+    const { place } = this;
     pen.strokeStyle = pen.fillStyle = "#7d8894";
     pen.lineWidth = scale;
     pen.font = `${10 * scale}px system-ui, sans-serif`;
@@ -100,7 +110,8 @@ export class Solid {
     }
   }
 
-  drawDirection(pen, place, scale, view) {
+  drawDirection(pen, scale, view) {
+    const { place } = this;
     const value = this.towards(view.theta, view.phi) / this.most;
     const direction = unit(view.theta, view.phi);
     const tip = place(this.seen(direction.map((x) => x * Math.max(value, 0.02))));
