@@ -92,7 +92,7 @@ def show_scene(browser: Browser) -> None:
         browser,
         COLLIMATOR,
         "collimator.toml",
-        "etendue.setView({theta: 32, phi: -65, width: 26, target: [0, 0, 5]})",
+        "etendue.setView({theta: 20, phi: -65, width: 26, target: [0, 0, 5]})",
         "document.getElementById('fit').click()",
         "etendue.setShown({rays: true, axis: 'x', place: 0.5})",
     )

@@ -99,18 +99,21 @@ async function rest() {
   showCommand();
   const mine = ++round;
   const current = () => mine === round;
-  for (const region of state.regions) region.figures = null;
+  const { subject, view } = state;
+  const known = (measured) => measured?.subject === subject && measured.view === view;
+  const open = state.regions.filter((region) => !known(region.of));
+  for (const region of open) region.figures = null;
   listRegions();
-  for (const region of state.regions) {
-    const figures = await measureRegion(state.subject, state.view, region.corners, current);
+  for (const region of open) {
+    const figures = await measureRegion(subject, view, region.corners, current);
     if (!current()) return;
-    region.figures = figures;
+    Object.assign(region, { figures, of: { subject, view } });
     listRegions();
   }
-  if (state.line) {
-    const section = await measureSection(state.subject, state.view, state.line, current);
+  if (state.line && !(state.section && known(state.sectionOf))) {
+    const section = await measureSection(subject, view, state.line, current);
     if (!current()) return;
-    state.section = section;
+    Object.assign(state, { section, sectionOf: { subject, view } });
     draw();
   }
   $("section-box").hidden = !state.line;
