@@ -50,6 +50,7 @@ from etendue.plot import (
     plot_deconvolution,
     plot_intensity,
     plot_map,
+    plot_near_field,
     plot_threshold_sweep,
 )
 from etendue.quantities.illuminance_map import IlluminanceMap
@@ -70,6 +71,8 @@ if TYPE_CHECKING:
     from etendue import scene
     from etendue.instruments.deconvolution import Deconvolution, deconvolve
     from etendue.instruments.goniometer_scan import GoniometerScan, read_goniometer_scan
+    from etendue.instruments.near_field.goniophotometer import NearFieldGoniophotometer
+    from etendue.instruments.near_field.run import NearFieldRun
     from etendue.instruments.scatter_goniometer import ScatterGoniometer
     from etendue.scatter import models as bsdf
     from etendue.scatter.bsdf import Bsdf
@@ -103,6 +106,8 @@ __all__ = [
     "LuminanceMap",
     "MemoryLimitError",
     "MissingLibraryError",
+    "NearFieldGoniophotometer",
+    "NearFieldRun",
     "Observer",
     "OutputError",
     "PathTracing",
@@ -149,6 +154,7 @@ __all__ = [
     "plot_deconvolution",
     "plot_intensity",
     "plot_map",
+    "plot_near_field",
     "plot_threshold_sweep",
     "read_bsdf",
     "read_goniometer_scan",
@@ -187,6 +193,8 @@ LAZY = {
     "Deconvolution": "etendue.instruments.deconvolution:Deconvolution",
     "GoniometerScan": "etendue.instruments.goniometer_scan:GoniometerScan",
     "Scans": "etendue.scatter.scans.scans:Scans",
+    "NearFieldGoniophotometer": "etendue.instruments.near_field.goniophotometer:NearFieldGoniophotometer",
+    "NearFieldRun": "etendue.instruments.near_field.run:NearFieldRun",
     "ScatterGoniometer": "etendue.instruments.scatter_goniometer:ScatterGoniometer",
     "Scene": "etendue.scene:Scene",
     "bsdf": "etendue.scatter.models",

@@ -84,7 +84,7 @@ def test_help_names_every_verb_with_what_it_does(run: Run) -> None:
         "cache",
         "bsdf",
     ]
-    assert set(verbs()) == {*expected, "goniometer", "deconvolve", "view"}
+    assert set(verbs()) == {*expected, "goniometer", "deconvolve", "goniophotometer", "view"}
     for name, verb in verbs().items():
         assert f" {name} " in outcome.out
         assert verb.help
@@ -112,6 +112,7 @@ def test_every_verb_that_draws_random_numbers_takes_a_seed() -> None:
         "draw",
         "fit",
         "goniometer",
+        "goniophotometer",
         "luminance",
         "sample",
         "trace",

@@ -310,6 +310,15 @@ def view(place: Path) -> Iterator[Case]:
     yield Case(("view", place / "rcs.result.h5", "-o", "out.html"), (*et.LightField.fit(kept).notes, *of_rays(kept)))
 
 
+def goniophotometer(place: Path) -> Iterator[Case]:
+    gonio = et.NearFieldGoniophotometer((30, 120), camera_pixels=16, photometer_distance=200)
+    measured = gonio.measure(place / "led.h5", samples=4)
+    options = ("--positions", "30,120", "--camera-pixels", 16, "--photometer-distance", 200, "--samples", 4)
+    outputs = ("-o", "out.tm25ray", "-o", "out.ies", "-n", 100)
+    notes = (*measured.notes, *measured.intensity().notes, *measured.ray_set(100).notes)
+    yield Case(("goniophotometer", place / "led.h5", *options, *outputs), notes)
+
+
 CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "demo": demo,
     "info": info,
@@ -326,6 +335,7 @@ CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "compare": compare,
     "goniometer": goniometer,
     "deconvolve": deconvolve,
+    "goniophotometer": goniophotometer,
     "cache": None,  # a count of files and their size: nothing that has notes
 }
 """Of each verb: what it is called with, and what Python has to say of the same."""

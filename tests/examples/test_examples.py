@@ -22,6 +22,7 @@ RUNS = {
     "how_many_rays.py": ([], 1),
     "many_rays.py": (["--rays", "20000"], 3),
     "narrow_beam.py": (["--rays", "50000"], 3),
+    "near_field.py": ([], 4),
     "remote_phosphor.py": (["--rays", "20000"], 3),
     "rings_traced.py": (["--rays", "1000000"], 1),
     "threshold_sweep.py": (["--rays", "100000"], 1),

@@ -20,6 +20,7 @@ from etendue.cli import (
     filter_,
     fit,
     goniometer,
+    goniophotometer,
     info,
     intensity,
     luminance,
@@ -66,6 +67,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "compare": compare.compare,
     "goniometer": goniometer.goniometer,
     "deconvolve": deconvolve.deconvolve,
+    "goniophotometer": goniophotometer.goniophotometer,
     "cache": cache.cache,
 }
 for _name, _verb in VERBS.items():

@@ -9,6 +9,7 @@ from etendue.plot.cross_section_picture import plot_cross_sections
 from etendue.plot.deconvolution_picture import plot_deconvolution
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
+from etendue.plot.near_field_picture import plot_near_field
 from etendue.plot.scene_picture import draw_scene
 from etendue.plot.threshold_picture import plot_threshold_sweep
 
@@ -21,5 +22,6 @@ __all__ = [
     "plot_deconvolution",
     "plot_intensity",
     "plot_map",
+    "plot_near_field",
     "plot_threshold_sweep",
 ]
