@@ -28,8 +28,8 @@ GROUPS = {
     ),
     "Scatter": ("bsdf", "Bsdf", "BsdfTable", "Scans", "read_bsdf", "read_scans", "write_bsdf"),
     "Instruments": (
-        "ScatterGoniometer", "GoniometerScan", "read_goniometer_scan", "deconvolve", "Deconvolution",
-        "NearFieldGoniophotometer", "NearFieldRun",
+        "ScatterGoniometer", "GoniometerScan", "read_goniometer_scan", "Detector", "Baffle", "deconvolve", "Deconvolution",
+        "revolved", "agreement", "Agreement", "NearFieldGoniophotometer", "NearFieldRun",
     ),
     "Intensity and spectra": ("intensity_distribution", "Intensity", "read_intensity", "write_intensity", "Spectrum"),
     "Pictures": (

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import etendue as et
 import numpy as np
 import pytest
-from etendue.cli.app import VERBS
+from etendue.cli.verbs import VERBS
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.lightfield.fit_cache import FOLDER_VARIABLE
 from etendue.lightfield.gridded.gridded_source import GriddedSource

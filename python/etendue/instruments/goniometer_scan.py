@@ -28,6 +28,9 @@ FINE = 16
 SAME_STEP = 1e-3
 """By which steps may differ, relative to the smallest, and still be the same: angles in files have few digits."""
 
+MOST_POSITIONS = 1_000_000
+"""Of a scan."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class GoniometerScan:
@@ -326,6 +329,21 @@ def detector_directions(angle: npt.ArrayLike, incidence: float, plane: Plane, *,
     return np.asarray(np.cos(a) * direction(incidence, 0.0, behind=behind) + np.sin(a) * np.array([0.0, 1.0, 0.0]))
 
 
+def positions(middle: float, step: float, span: float) -> Array:
+    """Even positions [°] about a middle one, up to a span on both sides.
+
+    Examples
+    --------
+    >>> positions(30.0, 2.5, 6.0).tolist()
+    [25.0, 27.5, 30.0, 32.5, 35.0]
+    """
+    if not 0.0 < step < 90.0 or not 0.0 < span <= 180.0 or span / step > MOST_POSITIONS:
+        raise ArgumentError(f"steps of {step:g}° to {span:g}° on both sides; give a step and a span of more than 0")
+    k = int(np.floor(span / step + 1e-9))
+    # 8.7 and not 8.700000000000001: files hold what people would write.
+    return np.round(middle + step * np.arange(-k, k + 1), 10)
+
+
 def summit(angle: Array, values: Array) -> float:
     """The largest value of a smooth lobe, between positions: a parabola through the logarithms of the three highest.
 
@@ -381,16 +399,28 @@ def total_scatter(angle: Array, values: Array) -> float:
     """
     if angle.size < 2:
         return 0.0
-    slope = np.gradient(values, angle)
     inner = np.arange(FINE) / FINE
-    h = np.diff(angle)[:, None]
-    u = inner[None, :]
-    cubic = (
-        values[:-1, None] * (1 + 2 * u) * (1 - u) ** 2
-        + slope[:-1, None] * h * u * (1 - u) ** 2
-        + values[1:, None] * u * u * (3 - 2 * u)
-        + slope[1:, None] * h * u * u * (u - 1)
-    )
-    x = np.append((angle[:-1, None] + h * u).ravel(), angle[-1])
-    y = np.append(cubic.ravel(), values[-1])
+    x = np.append((angle[:-1, None] + np.diff(angle)[:, None] * inner).ravel(), angle[-1])
+    y = cubic(angle, values, x)
     return float(np.pi * np.trapezoid(y * np.abs(np.sin(np.radians(x))), np.radians(x)))
+
+
+def cubic(angle: Array, values: Array, at: Array) -> Array:
+    """Values between positions by cubics with the slopes of `numpy.gradient`.
+
+    Examples
+    --------
+    >>> angle = np.arange(5.0)
+    >>> cubic(angle, angle**2, np.array([1.5, 2.0])).tolist()
+    [2.25, 4.0]
+    """
+    slope = np.gradient(values, angle)
+    k = np.clip(np.searchsorted(angle, at, side="right") - 1, 0, angle.size - 2)
+    h = angle[k + 1] - angle[k]
+    u = (at - angle[k]) / h
+    return np.asarray(
+        values[k] * (1 + 2 * u) * (1 - u) ** 2
+        + slope[k] * h * u * (1 - u) ** 2
+        + values[k + 1] * u * u * (3 - 2 * u)
+        + slope[k + 1] * h * u * u * (u - 1)
+    )

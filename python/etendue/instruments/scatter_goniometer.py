@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape
-from etendue.instruments.goniometer_scan import GoniometerScan, Plane, Way, detector_directions
+from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape, axes_of, into_the_sample
+from etendue.instruments.goniometer_scan import GoniometerScan, Plane, Way, detector_directions, positions
 from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
 from etendue.scatter.bsdf import Bsdf
 
@@ -26,9 +26,6 @@ FINENESS = ((5, 11), (4, 8))
 
 SPAN = 9.0
 """To which angles on both sides a scan goes if nothing is said [°]: 181 positions in steps of 0.1°."""
-
-MOST_POSITIONS = 1_000_000
-"""Of a scan."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,7 +161,7 @@ class ScatterGoniometer:
             reach += self.distance * np.tan(np.radians(0.5 * self.source_angle))
             # Two positions more, where there is no light any more.
             span = (np.ceil(np.degrees(np.arctan(reach / self.distance)) / step) + 2.0) * step if step > 0.0 else 1.0
-        angle = _angles(0.0, step, float(span))
+        angle = positions(0.0, step, float(span))
         if rays is None:
             flux, error = self._beam.overlap(self._aperture, angle, self.distance), np.zeros(angle.shape)
         else:
@@ -230,7 +227,7 @@ class ScatterGoniometer:
             raise UnknownNameError("plane", plane, get_args(Plane))
         way = _way(bsdf, way)
         _require_incidence(theta)
-        angle = _angles(theta if plane == "in-plane" else 0.0, step, span)
+        angle = positions(theta if plane == "in-plane" else 0.0, step, span)
         if plane == "in-plane":
             angle = angle[np.abs(angle) < 90.0]
         behind = way == "transmitted"
@@ -243,6 +240,57 @@ class ScatterGoniometer:
         if method == "trace" and not fresh and self.photons is None:
             notes = ("all positions count the same rays: neighbours err together",)
         return self._noisy(angle, flux, error, seed, incidence=theta, way=way, plane=plane, sample=True, notes=notes)
+
+    def flux_at(
+        self,
+        bsdf: Bsdf,
+        directions: npt.ArrayLike,
+        theta: float = 0.0,
+        rays: int = 10**6,
+        seed: int = 1,
+        *,
+        method: Method = "trace",
+    ) -> tuple[Array, Array]:
+        """Flux in the aperture wherever it stands, before any detector makes noise of it: what `Detector.read` reads.
+
+        Parameters
+        ----------
+        bsdf, theta, rays, seed, method
+            As those of `measure`; all directions count the same rays.
+        directions : array, shape (n, 3)
+            Unit vectors from the spot to the aperture, in front of the sample or behind it; light comes from azimuth 180°.
+
+        Returns
+        -------
+        array, array, shape (n,)
+            Share of the flux of the beam, and its standard error.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> paint = et.bsdf.Lambertian(reflectance=0.5)
+        >>> goniometer = et.ScatterGoniometer()
+        >>> flux, _ = goniometer.flux_at(paint, [[0, 0, 1], [0.8, 0, 0.6]], method="quadrature")
+        >>> (flux / goniometer.solid_angle).round(4).tolist()  # 0.5 cosθ / π
+        [0.1591, 0.0955]
+        """
+        if method not in get_args(Method):
+            raise UnknownNameError("method", method, get_args(Method))
+        _require_incidence(theta)
+        arms = np.asarray(directions, np.float64)
+        if arms.ndim != 2 or arms.shape[1] != 3 or not (np.abs(np.einsum("ij,ij->i", arms, arms) - 1.0) < 1e-6).all():
+            raise ArgumentError("directions are unit vectors, shape (n, 3)")
+        flux, error = np.zeros(len(arms)), np.zeros(len(arms))
+        for behind in (False, True):
+            own = np.flatnonzero((arms[:, 2] < 0.0) == behind)
+            if not own.size:
+                continue
+            if method == "trace":
+                found = self._counted(bsdf, theta, arms[own], rays, seed, behind=behind, fresh=False)
+            else:
+                found = self._integrated(bsdf, theta, arms[own], behind=behind)
+            flux[own], error[own] = found
+        return flux, error
 
     def measure_hemisphere(
         self,
@@ -264,21 +312,14 @@ class ScatterGoniometer:
         BsdfSlice
             F [1/sr] by eq. 5.1 on a grid of azimuths and angles from the normal, with its standard error.
         """
-        if method not in get_args(Method):
-            raise UnknownNameError("method", method, get_args(Method))
         way = _way(bsdf, way)
-        _require_incidence(theta)
         if not 0.5 <= step <= 30.0:
             raise ArgumentError(f"steps of {step:g}° over a hemisphere; give 0.5 to 30°")
         behind = way == "transmitted"
         polar = np.arange(0.0, 90.0 - min(0.5 * step, 5.0) + 1e-9, step)
         grid = PolarGrid("normal", polar, np.linspace(0.0, 360.0, max(round(360.0 / step), 3), endpoint=False))
-        arms = direction(polar[None, :], grid.azimuth[:, None], behind=behind)
-        flat = arms.reshape(-1, 3)
-        if method == "trace":
-            flux, error = self._counted(bsdf, theta, flat, rays, seed, behind=behind, fresh=False)
-        else:
-            flux, error = self._integrated(bsdf, theta, flat, behind=behind)
+        flat = direction(polar[None, :], grid.azimuth[:, None], behind=behind).reshape(-1, 3)
+        flux, error = self.flux_at(bsdf, flat, theta, rays, seed, method=method)
         flux, error = self._with_noise(flux, error, seed)
         per = self.solid_angle * np.abs(flat[:, 2])
         shape = grid.shape
@@ -297,7 +338,7 @@ class ScatterGoniometer:
         """Where rays leave the sample [mm] and to where, shape (n, 3) each; NaN where they are absorbed."""
         rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((*seed, 0))))
         points = self._beam.points(rng, n)
-        start, v = _into_the_sample(points, self._beam.tilts(points, rng), theta, across=bsdf is None)
+        start, v = into_the_sample(points, self._beam.tilts(points, rng), theta, across=bsdf is None)
         if bsdf is None:
             return start, v
         number = int(np.random.SeedSequence((*seed, 1)).generate_state(1, np.uint64)[0])
@@ -347,7 +388,7 @@ class ScatterGoniometer:
         for k, (i, j) in enumerate(zip(*ends, strict=True)):
             if j <= i:
                 continue
-            d, (t1, t2) = arms[k], _frame(arms[k])
+            d, (t1, t2) = arms[k], axes_of(arms[k])
             sx, sy, sz, px, py, pz = (*s[:, i:j], *p[:, i:j])
             along = (self.distance - (px * d[0] + py * d[1] + pz * d[2])) / (sx * d[0] + sy * d[1] + sz * d[2])
             x, y, z = px + along * sx, py + along * sy, pz + along * sz
@@ -368,13 +409,13 @@ class ScatterGoniometer:
 
     def _quadrature(self, bsdf: Bsdf, theta: float, arms: Array, beam: int, aperture: int) -> Array:
         points, tilts, share = self._beam.nodes(beam)
-        start, v = _into_the_sample(points, tilts, theta, across=False)
+        start, v = into_the_sample(points, tilts, theta, across=False)
         offsets, area = self._aperture.nodes(aperture)
         found = np.zeros(len(arms))
         together = max(1, 400_000 // (len(points) * len(offsets)))
         for at in range(0, len(arms), together):
             d = arms[at : at + together]
-            frames = np.array([_frame(one) for one in d])
+            frames = np.array([axes_of(one) for one in d])
             ends = self.distance * d[:, None] + np.einsum("na,iac->inc", offsets, frames)
             off = ends[:, None] - start[None, :, None]
             length = np.linalg.norm(off, axis=-1)
@@ -426,33 +467,6 @@ class ScatterGoniometer:
             sample=sample,
             notes=notes,
         )
-
-
-def _into_the_sample(points: Array, tilts: Array, theta: float, *, across: bool) -> tuple[Array, Array]:
-    """Where rays meet the surface (or pass the plane across the beam) and their directions, shape (n, 3) each."""
-    c, s = np.cos(np.radians(theta)), np.sin(np.radians(theta))
-    axis, first, second = np.array([s, 0.0, -c]), np.array([c, 0.0, s]), np.array([0.0, 1.0, 0.0])
-    v = axis + tilts[:, :1] * first + tilts[:, 1:] * second
-    v /= np.linalg.norm(v, axis=1, keepdims=True)
-    q = points[:, :1] * first + points[:, 1:] * second
-    if not across:
-        q = q - (q[:, 2] / v[:, 2])[:, None] * v
-    return q, v
-
-
-def _frame(arm: Array) -> tuple[Array, Array]:
-    """The axes of the aperture: in the plane of the arm and the normal, and across it."""
-    across = np.hypot(arm[0], arm[1])
-    x, y = (arm[0] / across, arm[1] / across) if across > 1e-12 else (1.0, 0.0)
-    return np.array([arm[2] * x, arm[2] * y, -across]), np.array([-y, x, 0.0])
-
-
-def _angles(middle: float, step: float, span: float) -> Array:
-    if not 0.0 < step < 90.0 or not 0.0 < span <= 180.0 or span / step > MOST_POSITIONS:
-        raise ArgumentError(f"steps of {step:g}° to {span:g}° on both sides; give a step and a span of more than 0")
-    k = int(np.floor(span / step + 1e-9))
-    # 8.7 and not 8.700000000000001: files hold what people would write.
-    return np.round(middle + step * np.arange(-k, k + 1), 10)
 
 
 def _require_incidence(theta: float) -> None:
