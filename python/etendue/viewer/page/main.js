@@ -310,8 +310,7 @@ function showCommand() {
 // --- tools ----------------------------------------------------------------------------------------------------------
 
 function chooseTool(name) {
-  state.tool = name;
-  state.drawing = null;
+  Object.assign(state, { tool: name, drawing: null, polygon: null }); // a polygon that was begun is given up
   for (const button of document.querySelectorAll("[data-tool]")) {
     button.setAttribute("aria-pressed", String(button.dataset.tool === name));
   }
