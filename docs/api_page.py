@@ -34,7 +34,7 @@ GROUPS = {
     "Intensity and spectra": ("intensity_distribution", "Intensity", "read_intensity", "write_intensity", "Spectrum"),
     "Pictures": (
         "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",
-        "plot_threshold_sweep", "plot_bsdf", "plot_deconvolution", "plot_near_field", "draw_scene",
+        "plot_threshold_sweep", "plot_bsdf", "plot_deconvolution", "plot_near_field", "draw_scene", "view",
     ),
     "Errors and warnings": tuple(name for name in et.__all__ if name.endswith(("Error", "Warning"))),
 }  # fmt: skip

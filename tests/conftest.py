@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import hypothesis
@@ -18,6 +19,12 @@ os.environ["ETENDUE_CACHE_DIR"] = ""
 pytest_plugins = ["oracles.time_budget", "oracles.workers"]
 
 NO_SAMPLES = "the folder of real sample files is not there"
+NO_BROWSER = "no Chromium is installed"
+NO_NODE = "no Node is installed"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
+
+COUNTED = {NO_SAMPLES: "the sample files are not there", NO_BROWSER: NO_BROWSER, NO_NODE: NO_NODE}
+"""Reasons for which tests are skipped that are counted at the end, and what is said of them."""
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -31,9 +38,28 @@ def samples() -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """The program of a browser in which pages are tried."""
+    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
+    if found is None:
+        pytest.skip(NO_BROWSER)
+    return found
+
+
+@pytest.fixture(scope="session")
+def node() -> str:
+    """The program in which the modules of pages are tried without a browser."""
+    found = shutil.which("node")
+    if found is None:
+        pytest.skip(NO_NODE)
+    return found
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say last how many tests could not run for want of sample files."""
+    """Say last how many tests could not run for want of sample files or of a program."""
     skipped = terminalreporter.stats.get("skipped", [])
-    if missing := sum(NO_SAMPLES in str(report.longrepr) for report in skipped):
-        terminalreporter.write_line(f"{missing} tests were skipped because the sample files are not there")
+    for reason, words in COUNTED.items():
+        if missing := sum(reason in str(report.longrepr) for report in skipped):
+            terminalreporter.write_line(f"{missing} tests were skipped because {words}")

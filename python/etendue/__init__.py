@@ -92,6 +92,7 @@ PUBLIC = {
     "etendue.sources.ring_source": ("RingSource",),
     "etendue.tracing": ("TraceResult", "TraceWork", "trace", "trace_rounds", "trace_work"),
     "etendue.tracing.ledger": ("TraceWarning",),
+    "etendue.viewer.notebook": ("view",),
 }
 """Public names by the module that has them, which is imported when one of them is asked for (PEP 562): all of them together
 take four times as long as numpy. `__init__.pyi` says the same to type checkers and editors."""

@@ -70,6 +70,7 @@ from etendue.scene.scatter_events import ScatterEvents
 from etendue.sources.ring_source import RingSource
 from etendue.tracing import TraceResult, TraceWork, trace, trace_rounds, trace_work
 from etendue.tracing.ledger import TraceWarning
+from etendue.viewer.notebook import view
 
 __all__ = [
     "Agreement",
@@ -161,6 +162,7 @@ __all__ = [
     "trace",
     "trace_rounds",
     "trace_work",
+    "view",
     "write_bsdf",
     "write_intensity",
     "write_rays",

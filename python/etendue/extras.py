@@ -38,6 +38,7 @@ EXTRAS: dict[str, Extra] = {
     "cascadio": Extra("step", "STEP files"),
     "scipy": Extra("scans", "interpolations of scattered points"),
     "xlrd": Extra("xls", "workbooks of goniometers"),
+    "anywidget": Extra("notebook", "pages in notebooks"),
     "xarray": Extra("xarray", "datasets of xarray"),
 }
 """By the name of the library."""

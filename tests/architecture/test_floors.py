@@ -239,6 +239,11 @@ WITHOUT_EXAMPLE = {
     "etendue.quantities.node_choice.Choice": "what choose_nodes returns",
     "etendue.tracing.far_fields.far_field_nodes": "a step of trace_rounds, which shows it",
     "etendue.instruments.near_field.storage": "NearFieldRun.save and load are the door; tests/instruments shows them",
+    "etendue.viewer.field_tables.PartTables": "a part of FieldTables, which shows it",
+    "etendue.viewer.opening.Exhibit": "what exhibit_of returns",
+    "etendue.viewer.refining": "a thread; tests/viewer/test_server.py shows it",
+    "etendue.viewer.server.ViewerServer": "a server; tests/viewer/test_server.py shows it",
+    "etendue.viewer.subjects": "plain data for the page; exhibit_of is the door",
     "etendue.formats.input": "about files that change and pipes that wait; its tests show it",
 }
 """Public things whose docstring may do without an example, with the reason."""

@@ -300,6 +300,16 @@ def deconvolve(place: Path) -> Iterator[Case]:
     yield Case(call, et.deconvolve(scan, bare).notes)
 
 
+def view(place: Path) -> Iterator[Case]:
+    field = et.LightField.load(place / "led.h5")
+    yield Case(("view", place / "led.h5", "-o", "out.html"), field.notes)
+    rays = et.read_rays(place / "led.tm25ray")
+    yield Case(("view", place / "led.tm25ray", "-o", "out.html"), (*et.LightField.fit(rays).notes, *of_rays(rays)))
+    yield Case(("view", place / "map.npz", "-o", "out.html"), et.read_map(place / "map.npz").notes)
+    kept = et.TraceResult.load(place / "rcs.result.h5").rays.only
+    yield Case(("view", place / "rcs.result.h5", "-o", "out.html"), (*et.LightField.fit(kept).notes, *of_rays(kept)))
+
+
 def goniophotometer(place: Path) -> Iterator[Case]:
     gonio = et.NearFieldGoniophotometer((30, 120), camera_pixels=16, photometer_distance=200)
     measured = gonio.measure(place / "led.h5", samples=4)
@@ -319,6 +329,7 @@ CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "intensity": intensity,
     "draw": draw,
     "trace": trace,
+    "view": view,
     "patches": patches,
     "filter": filter_,
     "compare": compare,

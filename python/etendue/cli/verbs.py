@@ -20,6 +20,7 @@ VERBS = {
     "convert": "etendue.cli.convert:convert",
     "fit": "etendue.cli.fit:fit",
     "luminance": "etendue.cli.luminance:luminance",
+    "view": "etendue.cli.view:view",
     "sample": "etendue.cli.sample:sample",
     "intensity": "etendue.cli.intensity:intensity",
     "draw": "etendue.cli.draw:draw",

@@ -64,6 +64,20 @@ def framed_screen(compiled: Compiled, observer: Observer, columns: int = 128, ro
     return Screen(side * columns, side * rows, columns, rows)
 
 
+def corners_of(compiled: Compiled) -> Array:
+    """Corners of the boxes around all that has an end [mm], shape (n, 3); of a scene without faces, of its sources.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> ball = et.Scene(solids=[{"shape": {"kind": "ball", "radius": 3}, "medium": "BK7", "at": [1, 0, 0]}])
+    >>> corners_of(et.scene.compile_scene(ball)).max(axis=0).tolist()
+    [4.0, 3.0, 3.0]
+    """
+    record = compiled.record
+    return np.concatenate([np.zeros((0, 3)), *(finite_boxes(record["faces"]) or finite_boxes(record["sources"]))])
+
+
 def finite_boxes(things: list[dict[str, Any]]) -> list[Array]:
     """The corners in the world of the boxes around those faces or sources that have an end, shape (8, 3) each [mm].
 

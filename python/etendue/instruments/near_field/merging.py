@@ -16,9 +16,6 @@ Array = npt.NDArray[np.float64]
 TRUSTED = 0.9
 """Share of the highest signal above which an exposure is not used: noise may have saturated some of its light."""
 
-SEEN = 10.0
-"""Standard deviations of dark noise that a signal of the longer exposure exceeds if its pixel is to tell how much longer."""
-
 LIKE = 1 << 20
 """Pixels at a time."""
 
@@ -49,9 +46,9 @@ class Merging:
     def calibrated(cls, camera: Camera, counts: Iterable[Counts]) -> Merging:
         """With times from the pixels that two neighbouring exposures both see.
 
-        The ratio of two times is that of the sums of their signals, over all pixels that stand out in the longer one and are
-        not near saturation in it. How faint they are in the shorter one does not matter: its noise averages out. It is
-        averaged with the stated ratio, each by the reciprocal of its variance; exact times stay as they are stated.
+        The ratio of two times is that of the sums of their signals, over all lit pixels that are not near saturation in the
+        longer one. How faint they are in either does not matter: noise averages out, where a lower limit would choose by it.
+        The ratio is averaged with the stated ratio, each by the reciprocal of its variance; exact times stay as they are stated.
 
         Parameters
         ----------
@@ -72,7 +69,7 @@ class Merging:
         for some in counts:
             for j in range(1, camera.exposures):
                 shorter, longer = (some[:, i].astype(np.float64) - camera.dark_level for i in (j - 1, j))
-                good = (longer > SEEN * camera.dark_noise) & (longer < TRUSTED * camera.highest)
+                good = longer < TRUSTED * camera.highest
                 sums[j] += good.sum(), shorter[good].sum(), longer[good].sum()
         stated = math.sqrt(2.0) * camera.exposure_error
         times, errors = [1.0], [0.0]

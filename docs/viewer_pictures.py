@@ -1,0 +1,116 @@
+"""Make the pictures of docs/viewer.md, in Chromium: a packaged LED, and a collimator cut open.
+
+usage: python docs/viewer_pictures.py [led] [scene]
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+from etendue.viewer.file_output import write_page
+from etendue.viewer.opening import exhibit_of
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from oracles.browser import Browser, browsing
+from oracles.packaged_led import PackagedLed
+
+FIGURES = Path(__file__).with_name("figures")
+RAYS = 3_000_000
+
+COLLIMATOR = et.Scene(
+    name="collimator",
+    sources=[
+        {
+            "kind": "surface",
+            "shape": {"kind": "rectangle", "width": 2, "height": 1.2},
+            "at": [0.3, -0.2, 0],
+            "flux": 100,
+        }
+    ],
+    solids=[
+        {
+            "medium": "PMMA",
+            "at": [0, 0, 3],
+            "shape": {"kind": "lens", "radius": 6, "thickness": 5, "back": {"radius_of_curvature": -6, "conic": -1.2}},
+            "finishes": {"edge": "absorber"},
+        }
+    ],
+    surfaces=[
+        {
+            "shape": {"kind": "cylinder", "radius": 7, "height": 9},
+            "finish": {"kind": "lambertian", "reflectance": 0.8},
+        }
+    ],
+)
+
+
+def led() -> et.LightField:
+    """The field of a packaged LED."""
+    source = PackagedLed()
+    position, direction = source.rays(RAYS, seed=1)
+    return et.LightField.fit(et.RaySet(position, direction, np.full(RAYS, source.total_flux / RAYS)))
+
+
+def show(browser: Browser, value: et.LightField | et.Scene, name: str, *steps: str) -> None:
+    """Open a page, do something in it, and wait until it has finished."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "page.html"
+        write_page(exhibit_of(value, name=name), path)
+        browser.open(path.as_uri())
+        for step in steps:
+            browser.evaluate(step)
+        browser.wait("etendue.finished()")
+
+
+def show_led(browser: Browser) -> None:
+    """From 35°, with isolines, a polygon and a cross section."""
+    show(
+        browser,
+        led(),
+        "led.h5",
+        "etendue.setView({theta: 35, phi: 20, width: 4})",
+        "etendue.setLook({isolines: 10})",
+        "etendue.drawn('polygon', [[0.08, -0.46], [0.27, 0.28], [0.62, 0.1], [0.7, -0.42]])",
+        "etendue.drawn('line', [[-1.2, 0.1], [1.1, -0.1]])",
+        "document.querySelector('#solid-box').style.display = 'none'",
+        "document.querySelector('#observer-box').style.display = 'none'",
+    )
+    browser.wait("etendue.state.regions[0].figures?.flux && etendue.state.section")
+    browser.mouse("mouseMoved", 420, 300)
+    browser.wait("etendue.finished() && document.getElementById('reading').textContent !== '–'")
+    browser.screenshot(FIGURES / "viewer-led.png")
+
+
+def show_scene(browser: Browser) -> None:
+    """Cut open, with rays."""
+    show(
+        browser,
+        COLLIMATOR,
+        "collimator.toml",
+        "etendue.setView({theta: 20, phi: -65, width: 26, target: [0, 0, 5]})",
+        "document.getElementById('fit').click()",
+        "etendue.setShown({rays: true, axis: 'x', place: 0.5})",
+    )
+    browser.screenshot(FIGURES / "viewer-scene.png")
+
+
+def main() -> None:
+    """Make the pictures that are named, or both."""
+    program = shutil.which("chromium")
+    if program is None:
+        sys.exit("no Chromium is installed")
+    wanted = sys.argv[1:] or ["led", "scene"]
+    with browsing(program, width=1280, height=800) as browser:
+        if "led" in wanted:
+            show_led(browser)
+        if "scene" in wanted:
+            show_scene(browser)
+
+
+if __name__ == "__main__":
+    main()

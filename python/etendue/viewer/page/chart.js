@@ -1,0 +1,97 @@
+// Charts of a carrier surface: where a line leaves a part, in double precision. theory.md, eq. 37; the core's `surface.rs`.
+
+const EIGHTH = Math.PI / 4;
+
+function clamp(x) {
+  return x < 0 ? 0 : x > 1 ? 1 : x;
+}
+
+/** From the unit disk to the unit square: the concentric map of Shirley and Chiu, inverted. */
+export function diskToSquare(x, y) {
+  const wide = Math.abs(x) > Math.abs(y);
+  const along = wide ? x : y;
+  const across = wide ? y : x;
+  const slope = along === 0 ? 0 : across / along;
+  const radius = Math.sqrt(x * x + y * y);
+  const r = along < 0 ? -radius : radius;
+  const other = (r * Math.atan(slope)) / EIGHTH;
+  return wide ? [0.5 * r + 0.5, 0.5 * other + 0.5] : [0.5 * other + 0.5, 0.5 * r + 0.5];
+}
+
+/** Azimuth of (x, y) as a fraction of a turn; the seam lies at -x. */
+function turns(x, y) {
+  return clamp(Math.atan2(y, x) / (2 * Math.PI) + 0.5);
+}
+
+function departure(inside, s1, s2, p, q) {
+  if (!inside || !(s1 >= 0 && s1 <= 1 && s2 >= 0 && s2 <= 1)) return null;
+  const [a, b] = diskToSquare(p, q);
+  return [s1, s2, clamp(a), clamp(b)];
+}
+
+function crossRectangle([width, height], focus, o, d) {
+  const lean = 1 - d[2];
+  const depth = focus[0] + lean * (focus[1] + lean * (focus[2] + lean * focus[3]));
+  const t = (depth - o[2]) / d[2];
+  return departure(d[2] > 0, (o[0] + t * d[0]) / width + 0.5, (o[1] + t * d[1]) / height + 0.5, d[0], d[1]);
+}
+
+function crossDisk([radius], o, d) {
+  const t = -o[2] / d[2];
+  const x = (o[0] + t * d[0]) / radius;
+  const y = (o[1] + t * d[1]) / radius;
+  const [s1, s2] = diskToSquare(x, y);
+  return departure(d[2] > 0 && x * x + y * y <= 1, clamp(s1), clamp(s2), d[0], d[1]);
+}
+
+function crossHemisphere([radius], o, d) {
+  const back = -(o[0] * d[0] + o[1] * d[1] + o[2] * d[2]);
+  const near = o.map((x, i) => x + d[i] * back);
+  const halfChord = radius * radius - (near[0] ** 2 + near[1] ** 2 + near[2] ** 2);
+  const half = Math.sqrt(Math.max(halfChord, 0));
+  const n = near.map((x, i) => (x + d[i] * half) / radius);
+  const lift = 1 / (1 + Math.max(n[2], 0));
+  const azimuthal = Math.sqrt(lift);
+  const shear = (d[0] * n[0] + d[1] * n[1]) * lift + d[2];
+  const [s1, s2] = diskToSquare(n[0] * azimuthal, n[1] * azimuthal);
+  const inside = halfChord > 0 && n[2] >= 0;
+  return departure(inside, clamp(s1), clamp(s2), d[0] - n[0] * shear, d[1] - n[1] * shear);
+}
+
+function crossTube([radius, height], o, d) {
+  const across = d[0] * d[0] + d[1] * d[1];
+  const t = -(o[0] * d[0] + o[1] * d[1]) / across;
+  let x = o[0] + t * d[0];
+  let y = o[1] + t * d[1];
+  const halfChord = (radius * radius - (x * x + y * y)) / across;
+  const out = t + Math.sqrt(Math.max(halfChord, 0));
+  x = (o[0] + out * d[0]) / radius;
+  y = (o[1] + out * d[1]) / radius;
+  const z = o[2] + out * d[2];
+  return departure(across > 0 && halfChord > 0, turns(x, y), z / height + 0.5, d[1] * x - d[0] * y, d[2]);
+}
+
+/** A vector in the axes of a part. */
+export function turned(axes, v) {
+  return axes.map((axis) => axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2]);
+}
+
+/**
+ * Where the line through `point` along the unit vector `direction` leaves a part: [s1, s2, a, b], or null if it does not.
+ */
+export function cross(chart, point, direction) {
+  const o = turned(chart.axes, point.map((x, i) => x - chart.centre[i]));
+  const d = turned(chart.axes, direction);
+  switch (chart.shape) {
+    case "rectangle":
+      return crossRectangle(chart.size, chart.focus, o, d);
+    case "disk":
+      return crossDisk(chart.size, o, d);
+    case "hemisphere":
+      return crossHemisphere(chart.size, o, d);
+    case "tube":
+      return crossTube(chart.size, o, d);
+    default:
+      throw new Error(`there is no chart of the shape ${chart.shape}`);
+  }
+}

@@ -1,0 +1,162 @@
+// A light field read in double precision, as the core reads it: theory.md, eq. 38; the core's `light_field.rs` and `look.rs`.
+
+import { cross } from "./chart.js";
+import { constantTable, readTable } from "./tables.js";
+
+/** The two cells between whose centres `x` lies, and the weight of the second. */
+function tent(x, n, wraps) {
+  const t = x * n + 0.5;
+  const upper = Math.trunc(t);
+  const weight = t - upper;
+  if (wraps) return [upper === 0 ? n - 1 : upper - 1, upper >= n ? 0 : upper, 1 - weight, weight];
+  return [Math.min(Math.max(upper - 1, 0), n - 1), Math.min(upper, n - 1), 1 - weight, weight];
+}
+
+function bilinear(table, x, y, wraps) {
+  const [rows, columns] = table.shape;
+  if (rows * columns === 1) return table.values[table.codes[0]];
+  const u = tent(x, rows, wraps);
+  const v = tent(y, columns, false);
+  let sum = 0;
+  for (const i of [0, 1]) {
+    for (const j of [0, 1]) sum += u[2 + i] * v[2 + j] * table.values[table.codes[u[i] * columns + v[j]]];
+  }
+  return sum;
+}
+
+/** What is left of errors averaged over an area of so many cells. */
+function left(shares, area) {
+  if (!(area > 1) || shares.length === 1) return shares[0];
+  const doublings = 0.5 * Math.log2(area);
+  const last = shares.length - 1;
+  if (doublings >= last) return shares[last];
+  const lower = Math.floor(doublings);
+  return shares[lower] + (doublings - lower) * (shares[lower + 1] - shares[lower]);
+}
+
+function gcd(a, b) {
+  return b === 0 ? a : gcd(b, a % b);
+}
+
+/** The core's points of a pixel: a lattice of rank 1. */
+export function lattice(n) {
+  const ideal = n * 0.6180339887498949;
+  let generator = 1;
+  for (let g = 1; g <= n; g++) {
+    if (gcd(g, n) === 1 && Math.abs(g - ideal) < Math.abs(generator - ideal)) generator = g;
+  }
+  return Array.from({ length: n }, (_, i) => [(i + 0.5) / n, (((i * generator) % n) + 0.5) / n]);
+}
+
+/** One part: value and the three kinds of its errors at (s1, s2, a, b). */
+function readPart(part, [s1, s2, a, b]) {
+  const [n1, n2, n3, n4] = part.ratio.shape;
+  const wraps = part.chart.shape === "tube";
+  const x = tent(s1, n1, wraps);
+  const y = tent(s2, n2, false);
+  const u = tent(a, n3, false);
+  const v = tent(b, n4, false);
+  let mean = 0;
+  let deviation = 0;
+  for (const i of [0, 1]) {
+    for (const j of [0, 1]) {
+      const layer = (x[i] * n2 + y[j]) * n3;
+      const near = x[2 + i] * y[2 + j];
+      for (const k of [0, 1]) {
+        for (const l of [0, 1]) {
+          const cell = (layer + u[k]) * n4 + v[l];
+          const weight = near * u[2 + k] * v[2 + l];
+          const ratio = part.ratio.values[part.ratio.codes[cell]];
+          mean += weight * ratio;
+          // Kept relative, but where the ratio is 0.
+          deviation += weight * (ratio || 1) * part.deviation.values[part.deviation.codes[cell]];
+        }
+      }
+    }
+  }
+  const base = part.level * bilinear(part.space, s1, s2, wraps) * bilinear(part.direction, a, b, false);
+  const value = base * mean;
+  return [
+    value,
+    base * deviation,
+    value * bilinear(part.spaceError, s1, s2, wraps),
+    value * bilinear(part.directionError, a, b, false),
+  ];
+}
+
+export class Field {
+  constructor(parts) {
+    this.parts = parts;
+  }
+
+  /** From what the page holds. */
+  static async read(packed) {
+    const table = (one, value) => (one ? readTable(one) : constantTable(value, 2));
+    const parts = packed.parts.map(async (part) => ({
+      chart: part.chart,
+      level: part.level,
+      cellsLeft: part.cells_left,
+      withinLeft: part.within_left,
+      ratio: await readTable(part.ratio),
+      deviation: await readTable(part.deviation),
+      space: await table(part.space, 1),
+      direction: await table(part.direction, 1),
+      spaceError: await table(part.space_error, 0),
+      directionError: await table(part.direction_error, 0),
+    }));
+    return new Field(await Promise.all(parts));
+  }
+
+  /** Luminance along one line and its standard error. */
+  luminance(point, direction) {
+    let value = 0;
+    let variance = 0;
+    for (const part of this.parts) {
+      const place = cross(part.chart, point, direction);
+      if (!place) continue;
+      const [mean, ...kinds] = readPart(part, place);
+      value += mean;
+      for (const d of kinds) variance += d * d;
+    }
+    return { value, error: Math.sqrt(variance) };
+  }
+
+  /** Mean luminance of a pixel of a view and its standard error, as the core's maps have them. */
+  pixel(view, column, row, samples = 16) {
+    const lines = lattice(samples).map(([du, dv]) => view.line(column + du, row + dv));
+    let value = 0;
+    let variance = 0;
+    for (const part of this.parts) {
+      const wraps = part.chart.shape === "tube";
+      const sums = [0, 0, 0, 0];
+      let first = null;
+      const away = [0, 0];
+      const squares = [0, 0];
+      let points = 0;
+      for (const [point, direction] of lines) {
+        const place = cross(part.chart, point, direction);
+        if (!place) continue;
+        first ??= place;
+        points += 1;
+        readPart(part, place).forEach((x, i) => (sums[i] += x));
+        for (const axis of [0, 1]) {
+          let step = place[axis] - first[axis];
+          if (wraps && axis === 0) step -= Math.round(step);
+          away[axis] += step;
+          squares[axis] += step * step;
+        }
+      }
+      if (points === 0) continue;
+      const side = (axis) => Math.sqrt(12 * Math.max(squares[axis] / points - (away[axis] / points) ** 2, 0));
+      const area = side(0) * side(1);
+      const [n1, n2] = part.ratio.shape;
+      const fine = part.spaceError.shape[0];
+      value += sums[0] / samples;
+      variance +=
+        ((sums[1] * left(part.cellsLeft, area * n1 * n2)) / samples) ** 2 +
+        ((sums[2] * left(part.withinLeft, area * fine * fine)) / samples) ** 2 +
+        (sums[3] / samples) ** 2;
+    }
+    return { value, error: Math.sqrt(variance) };
+  }
+}

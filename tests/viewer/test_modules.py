@@ -1,0 +1,248 @@
+"""The page's own modules in Node: they read light fields as the core does."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.viewer.field_tables import FieldTables
+from oracles.light_fields import SURFACES, make_field
+
+from viewer.views import page_views
+
+ERROR_BOUND = 0.035
+"""Of standard errors: half of the step of their logarithm is 0.03, and the value that they are relative to is off too."""
+
+
+@pytest.fixture(scope="module")
+def modules(node: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder from which Node can import them."""
+    folder = tmp_path_factory.mktemp("page")
+    for file in resources.files("etendue.viewer").joinpath("page").iterdir():
+        if file.name.endswith(".js"):
+            (folder / file.name).write_text(file.read_text("utf-8"), encoding="utf-8")
+    (folder / "node").symlink_to(node)
+    (folder / "package.json").write_text('{"type": "module"}', encoding="utf-8")
+    return folder
+
+
+def run(modules: Path, code: str, data: Any) -> Any:
+    """What a piece of JavaScript prints, given data as `data`."""
+    (modules / "data.json").write_text(json.dumps(data), encoding="utf-8")
+    head = 'import { readFileSync } from "node:fs";\nconst data = JSON.parse(readFileSync("data.json", "utf-8"));\n'
+    (modules / "try.js").write_text(head + code, encoding="utf-8")
+    done = subprocess.run(
+        [str(modules / "node"), "try.js"], cwd=modules, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+READ = """
+import { Field } from "./field.js";
+import { View } from "./view.js";
+const field = await Field.read(data.field);
+const found = data.views.map((one) => {
+  const view = new View({ ...one, columns: data.columns, rows: data.rows });
+  const values = [];
+  for (let row = 0; row < view.rows; row++) {
+    for (let column = 0; column < view.columns; column++) {
+      const { value, error } = field.pixel(view, column, row);
+      values.push([value, error]);
+    }
+  }
+  return values;
+});
+console.log(JSON.stringify(found));
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SURFACES)
+def test_pixels_are_those_of_the_cores_map(modules: Path, name: str) -> None:
+    """Value within the bound that the page states, error within that of its steps, on every surface."""
+    field = make_field(SURFACES[name], seed=8)
+    tables = FieldTables.of(field)
+    columns, rows = 12, 8
+    views = page_views(count=8, columns=columns, rows=rows, seed=9)
+    data = {"field": tables.packed(), "views": [v.page for v in views], "columns": columns, "rows": rows}
+    found = np.array(run(modules, READ, data)).reshape(len(views), rows, columns, 2)
+    lit = 0
+    for view, pixels in zip(views, found, strict=True):
+        truth = et.luminance_map(field, view.observer, view.screen)
+        bright = truth.values > 0
+        lit += int(bright.sum())
+        assert ((pixels[..., 0] > 0) == bright).all()
+        assert np.abs(pixels[..., 0][bright] / truth.values[bright] - 1).max(initial=0) < tables.bound + 1e-6
+        assert np.abs(pixels[..., 1][bright] / truth.standard_error[bright] - 1).max(initial=0) < ERROR_BOUND
+    assert lit > 50
+
+
+REGION = """
+import { Field } from "./field.js";
+import { measureRegion, measureSection } from "./readings.js";
+import { View } from "./view.js";
+const field = await Field.read(data.field);
+const view = new View({ ...data.view, columns: data.columns, rows: data.rows });
+const region = await measureRegion(field, view, data.corners, () => true);
+const section = await measureSection(field, view, data.line, () => true);
+console.log(JSON.stringify({ region, section }));
+"""
+
+
+@pytest.mark.slow
+def test_figures_of_a_region_are_those_of_the_map(modules: Path) -> None:
+    """Mean, extremes, percentiles, uniformity and intensity of the pixels whose middles lie in a triangle.
+
+    The flux through it is π times area times the mean over places and directions, here by random numbers.
+    """
+    field = make_field(SURFACES["plane"], seed=8, cells=(4, 4, 4, 4))
+    columns, rows = 40, 30
+    view = page_views(count=1, columns=columns, rows=rows, seed=3)[0]
+    page = {**view.page, "theta": 25.0, "width": 2.0, "target": [0.1, -0.4, 0.7]}
+    observer = et.Observer(25.0, page["phi"], page["distance"], (0.1, -0.4, 0.7))
+    screen = et.Screen(2.0, 1.5, columns, rows)
+    corners = [[-0.813, -0.307], [0.709, -0.093], [0.117, 0.611]]
+    line = [[-0.9, 0.05], [0.8, -0.1]]
+    packed = FieldTables.of(field).packed()
+    data = {"field": packed, "view": page, "corners": corners, "line": line, "columns": columns, "rows": rows}
+    found = run(modules, REGION, data)
+    region, section = found["region"], found["section"]
+
+    truth = et.luminance_map(field, observer, screen, samples=4)
+    x, y = np.meshgrid(screen.x, screen.y)
+    turns = [
+        (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+        for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True)
+    ]
+    inside = np.all(np.array(turns) > 0, axis=0)
+    values = truth.values[inside]
+    assert region["pixels"] == inside.sum() > 100
+    bound = packed["bound"] + 1e-6
+    expected = {
+        "mean": values.mean(),
+        "minimum": values.min(),
+        "maximum": values.max(),
+        "uniformity": values.min() / values.mean(),
+        "intensity": (values * screen.cosine(observer)[inside]).sum() * screen.pixel_area * 1e-6,
+    }
+    for name, value in expected.items():
+        assert region[name] == pytest.approx(value, rel=2 * bound), name
+    assert region["percentiles"] == pytest.approx(np.quantile(values, [0.05, 0.5, 0.95]), rel=2 * bound)
+    (ax, ay), (bx, by), (cx, cy) = corners
+    assert region["area"] == pytest.approx(0.5 * ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)), rel=1e-9)
+
+    # Points even in the triangle, directions of density cos/π about the screen's normal.
+    rng = np.random.default_rng(5)
+    right, up, toward = screen.axes(observer)
+    n = 200_000
+    r = np.sqrt(rng.random(n))
+    share = np.stack([1 - r, r * (1 - (s := rng.random(n))), r * s], axis=1) @ np.array(corners)
+    sine, turn = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    k = (
+        np.outer(sine * np.cos(turn), right)
+        + np.outer(sine * np.sin(turn), up)
+        + np.outer(np.sqrt(1 - sine**2), toward)
+    )
+    light = (
+        field.luminance(np.array(observer.target) + share @ np.array([right, up]), k)[0] * np.pi * region["area"] * 1e-6
+    )
+    error = np.hypot(light.std() / np.sqrt(n), region["flux"]["error"])
+    assert abs(light.mean() - region["flux"]["value"]) < 4 * error  # 6·10⁻⁵ by chance
+    assert region["flux"]["error"] < 0.05 * region["flux"]["value"]
+
+    # Each point of the section is the mean over a pixel of its own, at the core's four points of it: {i·3/4}.
+    steps = np.arange(4)
+    du, dv = (steps + 0.5) / 4 - 0.5, 0.5 - (steps * 3 % 4 + 0.5) / 4
+    for point in (section[3], section[120], section[201]):
+        place = np.array(line[0]) + point["at"] / np.hypot(1.7, 0.15) * (np.array(line[1]) - line[0])
+        seen = place + np.stack([du, dv], axis=1) * (2.0 / columns)
+        there = np.array(observer.target) + seen @ np.array([right, up])
+        truth_here = field.luminance(there, observer.position - there)[0].mean()
+        assert point["value"] == pytest.approx(truth_here, rel=bound)
+    assert section[-1]["at"] + section[0]["at"] == pytest.approx(np.hypot(1.7, 0.15))
+
+
+NUMBERS = """
+import { measured, plain, prefixed, ticks, typed, withUnit } from "./numbers.js";
+console.log(JSON.stringify([
+  measured(3041234, 22345, "cd/m²"), measured(0.0123, 0.0004, "cd/m²"), measured(5, 0, "lx"), measured(NaN, 1, "lx"),
+  withUnit(999.97, "cd"), withUnit(0, "cd"), plain(-12.345, 3), plain(123456789, 3), prefixed(2e9, "cd/m²"),
+  ticks(0, 3.3, 6, false), ticks(0.02, 30, 4, true), typed(" 1,5 "), String(typed("x")),
+]));
+"""
+
+
+def test_numbers_have_the_digits_that_are_known(modules: Path) -> None:
+    assert run(modules, NUMBERS, {}) == [
+        "3.041 ± 0.022 Mcd/m²",
+        "12.30 ± 0.40 mcd/m²",
+        "5.000 lx",
+        "no value",
+        "1.000 kcd",
+        "0.000 cd",
+        "−12.3",
+        "1.23e+8",
+        [1e9, "Gcd/m²"],
+        pytest.approx([0, 1, 2, 3]),
+        pytest.approx([0.1, 1, 10]),
+        1.5,
+        "NaN",
+    ]
+
+
+COLOURS = """
+import { COLOUR_MAPS, coloursOf } from "./colours.js";
+console.log(JSON.stringify(Object.fromEntries(COLOUR_MAPS.map((name) => [name, coloursOf(name)]))));
+"""
+
+
+def test_colours_are_those_of_the_pictures(modules: Path) -> None:
+    """Mixed between 33 stops, they differ from matplotlib's 256 by less than can be told apart: 5 of 255."""
+    matplotlib = pytest.importorskip("matplotlib")
+    found = run(modules, COLOURS, {})
+    assert {"inferno", "viridis", "cividis"} <= set(found)
+    t = np.linspace(0, 1, 256)
+    for name, stops in found.items():
+        mixed = np.stack([np.interp(t, np.linspace(0, 1, len(stops)), np.array(stops)[:, i]) for i in range(3)], axis=1)
+        assert np.abs(mixed - 255 * matplotlib.colormaps[name](t)[:, :3]).max() < 5
+
+
+ORBIT = """
+import { View } from "./view.js";
+import { projected } from "./geometry.js";
+const view = new View({ ...data, columns: 40, rows: 30 });
+const turned = view.orbited(7, -4);
+const point = [0.3, 1.1, -0.4];
+const seen = projected(view, ...point);
+console.log(JSON.stringify({
+  axes: [view.right, view.up, view.toward], eye: view.eye, turned: [turned.theta, turned.phi, turned.toward],
+  seen,
+  line: view.line((seen[0] / view.width + 0.5) * 40, (0.5 - seen[1] / view.height) * 30),
+  behind: projected(view, ...view.toward.map((x) => 2000 * x)),
+}));
+"""
+
+
+def test_views_are_observers_and_screens(modules: Path) -> None:
+    """Axes and eye of the core's conventions; a point is seen where the line of sight through that place meets it."""
+    page, observer, screen = page_views(count=3, columns=40, rows=30, seed=6)[2]
+    found = run(modules, ORBIT, page)
+    np.testing.assert_allclose(found["axes"], screen.axes(observer), atol=1e-12)
+    np.testing.assert_allclose(found["eye"], observer.position, atol=1e-9)
+    point, direction = np.array(found["line"])
+    np.testing.assert_allclose(np.cross(np.array([0.3, 1.1, -0.4]) - point, direction), 0.0, atol=1e-9)
+    assert found["behind"] is None
+    theta, phi, toward = found["turned"]
+    np.testing.assert_allclose(et.Observer(theta, phi, 1).direction, toward, atol=1e-12)
+    right, up, before = screen.axes(observer)
+    angle = np.radians(np.hypot(7, 4))
+    assert np.dot(toward, before) == pytest.approx(np.cos(angle))
+    assert np.dot(toward, right) == pytest.approx(np.sin(angle) * 7 / np.hypot(7, 4))
+    assert np.dot(toward, up) == pytest.approx(-np.sin(angle) * 4 / np.hypot(7, 4))

@@ -1,0 +1,134 @@
+"""From files and values to pages: what is shown, what is refused, and that the light around a scene is the scene's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.viewer.file_output import write_page
+from etendue.viewer.geometry import scene_geometry
+from etendue.viewer.opening import exhibit_of, light_of, open_viewable
+
+from viewer.conftest import FIELDS
+from viewer.viewables import LAMP, make_files, traced
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """One of each kind."""
+    return make_files(tmp_path)
+
+
+def test_files_are_what_they_hold(files: Path) -> None:
+    for name, kind in (
+        ("lamp.h5", et.LightField),
+        ("rings.tm25ray", et.RaySet),
+        ("map.exr", et.LuminanceMap),
+        ("scene.toml", et.Scene),
+    ):
+        assert isinstance(open_viewable(files / name), kind)
+    assert isinstance(open_viewable(files / "trace.h5", "card"), et.IlluminanceMap)
+    assert isinstance(open_viewable(files / "trace.h5", "disk"), et.RaySet)
+
+
+def test_what_cannot_be_shown_is_refused(files: Path) -> None:
+    with pytest.raises(ArgumentError, match="disk"):
+        open_viewable(files / "trace.h5")
+    with pytest.raises(UnknownNameError, match="'card'"):
+        open_viewable(files / "trace.h5", "cart")
+    with pytest.raises(ArgumentError, match="results of traces"):
+        open_viewable(files / "lamp.h5", "card")
+    with pytest.raises(FormatError):
+        open_viewable(files / "notes.txt")
+    with pytest.raises(FileNotFoundError):
+        open_viewable(files / "missing.h5")
+    with pytest.raises(ArgumentError, match="scenes"):
+        exhibit_of(FIELDS["lamp"], name="lamp", rays=1000)
+    with pytest.raises(ArgumentError, match="results of traces"):
+        exhibit_of(FIELDS["lamp"], name="lamp", detector="card")
+    with pytest.raises(ArgumentError, match="nothing in it has an end"):
+        light_of(et.Scene(name="void"), 100)
+    dark = et.Scene(sources=[LAMP], surfaces=[{"shape": {"kind": "sphere", "radius": 9}, "finish": "absorber"}])
+    with pytest.raises(ArgumentError, match="leaves it"):
+        light_of(dark, 1000)
+
+
+def test_a_trace_shows_what_one_detector_saw() -> None:
+    result = traced()
+    exhibit = exhibit_of(result, name="trace.h5", detector="card")
+    assert exhibit.subject["kind"] == "map"
+    assert exhibit.subject["quantity"] == "illuminance"
+    assert exhibit.subject["unit"] == "lx"
+    assert exhibit.source is result.illuminance["card"]
+
+
+def test_the_light_around_a_scene_is_all_of_it() -> None:
+    """A lamp that loses nothing: every ray leaves, once, and its lines are those of the lamp.
+
+    Rays that leave a Lambertian rectangle have E[cos θ] = 2/3 with variance 1/18, and begin evenly on it: variance of x is
+    w²/12. 4.5 standard errors: 10⁻⁵ by chance in three figures.
+    """
+    n = 40_000
+    light = light_of(et.Scene(sources=[LAMP]), n, seed=3)
+    assert isinstance(light, et.RaySet)
+    assert len(light) == n
+    assert light.total_flux == pytest.approx(100, rel=1e-9)
+    cosine = light.direction[:, 2]
+    assert abs(cosine.mean() - 2 / 3) < 4.5 * np.sqrt(1 / 18 / n)
+    along = (1.0 - light.position[:, 2]) / cosine
+    x, y = (light.position + along[:, None] * light.direction)[:, :2].T
+    assert abs(x.mean() - 0.3) < 4.5 * 2 / np.sqrt(12 * n)
+    assert abs(y.mean() + 0.2) < 4.5 * 1 / np.sqrt(12 * n)
+    assert np.abs(x - 0.3).max() <= 1 + 1e-6
+
+
+@pytest.mark.slow
+def test_curves_lie_on_the_faces_and_in_their_planes() -> None:
+    """Of a ball: |x - c| = r within what simplification may take, in every plane that cuts it; and none is left out."""
+    ball = {"shape": {"kind": "ball", "radius": 3}, "medium": "BK7", "at": [1, -2, 5]}
+    geometry = scene_geometry(et.Scene(sources=[LAMP], solids=[ball]))
+    assert geometry is not None
+    assert not geometry["left_out"]
+    size = float(np.linalg.norm(np.subtract(geometry["high"], geometry["low"])))
+    cut = 0
+    for plane in geometry["planes"]:
+        axis = "xyz".index(plane["axis"])
+        for line in plane["lines"]:
+            points = np.array(line).reshape(-1, 3)
+            cut += len(points)
+            assert np.abs(points[:, axis] - plane["at"]).max() < 1e-4 * size
+            assert np.abs(np.linalg.norm(points - (1, -2, 5), axis=1) - 3).max() < 1e-3 * size
+            # Chords of a circle of radius ρ with the sagitta s reach s = ρ - sqrt(ρ² - (chord/2)²) into it.
+            chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
+            assert chord.max() < 2 * np.sqrt(2 * 3 * 1.1e-3 * size)
+    assert cut > 500
+    assert len(geometry["rays"]) > 100
+    assert json.dumps(geometry)
+
+
+def test_many_faces_are_cut_in_the_middle_only() -> None:
+    surfaces = [
+        {"shape": {"kind": "disk", "radius": 0.1}, "at": [i % 40, i // 40, 0], "finish": "absorber"}
+        for i in range(1600)
+    ]
+    geometry = scene_geometry(et.Scene(surfaces=surfaces))
+    assert geometry is not None
+    assert [plane["axis"] for plane in geometry["planes"]] == ["x", "y", "z"]
+    assert geometry["left_out"]
+
+
+def test_a_notebook_shows_the_same_page(files: Path) -> None:
+    """The widget holds the page of a file of its own; its frame may run a script and hand out files."""
+    pytest.importorskip("anywidget")
+    widget = et.view(files / "map.exr", height=500)
+    assert widget.title == "map.exr"
+    assert widget.height == 500
+    run_file = files / "page.html"
+    write_page(exhibit_of(et.read_map(files / "map.exr"), name="map.exr", file=str(files / "map.exr")), run_file)
+    assert widget.page == run_file.read_text("utf-8")
+    named = et.view(et.read_map(files / "map.exr"))
+    assert named.page.startswith("<!doctype html>")
