@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -107,6 +108,20 @@ class LobeSplines:
             known |= there[:, 16 * k : 16 * (k + 1)].all(axis=1)
         found[~known] = np.nan
         return np.asarray(found.reshape(d.shape[:-1] + weights.shape[1:]))
+
+    def matrix(self, directions: Array) -> Any:
+        """From weights to f at directions of shape (n, 3): a sparse matrix."""
+        numbers, values = self.rows(directions[:, :2])
+        there = numbers >= 0
+        rows = np.broadcast_to(np.arange(len(numbers))[:, None], numbers.shape)
+        entries = (values[there], (rows[there], numbers[there]))
+        return scipy_part("sparse").csr_array(entries, shape=(len(numbers), self.count))
+
+    def only(self, kept: npt.NDArray[np.bool_]) -> LobeSplines:
+        """Those of `kept`, shape (count,), under new numbers."""
+        renumbered = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
+        levels = tuple(dataclasses.replace(level, number=renumbered[level.number]) for level in self.levels)
+        return LobeSplines(levels, self.behind, int(kept.sum()))
 
     def fitted(self, f: Callable[[Array], Array]) -> Array:
         """Weights of the finest splines at each place with which the sum is a smooth function, to fourth order.

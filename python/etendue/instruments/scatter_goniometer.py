@@ -22,6 +22,7 @@ from etendue.instruments.positions import (
     hemisphere_around,
     window,
 )
+from etendue.instruments.turned_sample import TurnedSample
 from etendue.quantities.bsdf_data import BsdfSlice, direction
 from etendue.scatter.bsdf import Bsdf
 
@@ -301,6 +302,7 @@ class ScatterGoniometer:
         rays: int = 10**6,
         seed: int = 1,
         *,
+        turn: float = 0.0,
         method: Method = "trace",
         fresh: bool = False,
     ) -> DirectionalScan:
@@ -315,6 +317,8 @@ class ScatterGoniometer:
             the detector would stand in the beam, nothing is measured.
         theta, rays, seed, method, fresh
             As of `measure`.
+        turn : number
+            By which the sample is turned about its normal, against the light that comes from azimuth 180° [°].
 
         Returns
         -------
@@ -329,6 +333,7 @@ class ScatterGoniometer:
         if method not in get_args(Method):
             raise UnknownNameError("method", method, get_args(Method))
         _require_incidence(theta)
+        sample = TurnedSample(bsdf, turn) if turn else bsdf
         arms = np.array(directions, np.float64)
         checked = DirectionalScan(arms, np.zeros(len(arms)), incidence=theta)
         shadowed = arms @ checked.incident > np.cos(np.arcsin(min(self._shadow, 1.0))) if self._shadow else None
@@ -341,9 +346,9 @@ class ScatterGoniometer:
             )
             arms = arms[~shadowed]
         if method == "trace":
-            flux, error = self._counted(bsdf, theta, arms, rays, seed, behind=checked.behind, fresh=fresh)
+            flux, error = self._counted(sample, theta, arms, rays, seed, behind=checked.behind, fresh=fresh)
         else:
-            flux, error = self._integrated(bsdf, theta, arms, behind=checked.behind)
+            flux, error = self._integrated(sample, theta, arms, behind=checked.behind)
         flux, error = self._with_noise(flux, error, seed)
         return DirectionalScan(
             arms,
@@ -366,6 +371,7 @@ class ScatterGoniometer:
         seed: int = 1,
         *,
         outside: float | None = None,
+        turn: float = 0.0,
         way: Way | None = None,
         method: Method = "trace",
         fresh: bool = False,
@@ -374,8 +380,8 @@ class ScatterGoniometer:
 
         Parameters
         ----------
-        bsdf, theta, rays, seed, way, method, fresh
-            As of `measure`.
+        bsdf, theta, rays, seed, turn, way, method, fresh
+            As of `measure` and `measure_directions`.
         step, span : number
             Between positions, and from the regular direction to the edges of the window [°].
         outside : number, optional
@@ -395,7 +401,7 @@ class ScatterGoniometer:
         arms = window(theta, step, span, behind=behind)
         if outside is not None:
             arms = np.concatenate([arms, hemisphere_around(theta, outside, span + 0.5 * step, behind=behind)])
-        return self.measure_directions(bsdf, arms, theta, rays, seed, method=method, fresh=fresh)
+        return self.measure_directions(bsdf, arms, theta, rays, seed, turn=turn, method=method, fresh=fresh)
 
     @property
     def _shadow(self) -> float:
