@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.extras import scipy_part
-from etendue.instruments.courses import after, course_of
+from etendue.instruments.courses import FURTHEST, after, course_of
 from etendue.instruments.directional_operator import ForwardModel
 from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.stopping import Course
@@ -78,9 +78,10 @@ class CountedScan:
         total = np.maximum(measured.sum(axis=0), 1e-9 * self.counts.sum())
         return np.asarray(np.multiply.outer(ones, total / (self.matrix @ ones).sum()))
 
-    def course(self, rule: str, seed: int, shrink: Shrink = None) -> tuple[Course, int, str]:
+    def course(self, rule: str, seed: int, shrink: Shrink = None, furthest: int = FURTHEST) -> tuple[Course, int, str]:
         """Where a rule stops: `course_of`."""
-        return course_of(self.matrix, self.counts, self.background, self.gain, self.start, rule, seed, shrink)
+        given = (self.matrix, self.counts, self.background, self.gain, self.start, rule, seed, shrink, furthest)
+        return course_of(*given)
 
     def after(self, count: int, shrink: Shrink = None, counts: Array | None = None) -> Array:
         """Weights after a number of iterations, of these counts or of others of shape (n, k)."""

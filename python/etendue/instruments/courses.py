@@ -74,6 +74,7 @@ def course_of(
     rule: str,
     seed: int,
     shrink: Callable[[Array], Array] | None = None,
+    furthest: int = FURTHEST,
 ) -> tuple[Course, int, str]:
     """Iterate until a rule is sure of its stop.
 
@@ -95,6 +96,8 @@ def course_of(
         Of the counts that are kept back.
     shrink : callable, optional
         As of `iterations`.
+    furthest : int
+        Iterations after which held-out counts are not asked any more.
 
     Returns
     -------
@@ -109,7 +112,7 @@ def course_of(
         columns = np.hstack([columns, learned])
     errors, left, scores = [], [], []
     least, since = np.inf, 0
-    most = fixed or (FURTHEST if halves is not None else MOST)
+    most = fixed or (furthest if halves is not None else MOST)
     bare = measured - b[:, 0]
     for i, (_, image) in enumerate(iterations(matrix, columns, start(columns - b), background, shrink), 1):
         own = image[:, 0]

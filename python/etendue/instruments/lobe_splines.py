@@ -59,10 +59,10 @@ class Level:
                 values[:, a, b] = x[a] * y[b]
         return numbers.reshape(-1, 16), values.reshape(-1, 16)
 
-    def nodes(self) -> Array:
-        """Middles of all splines of the grid, shape (m, n, 2)."""
-        m, n = self.number.shape
-        i, j = np.meshgrid(np.arange(m) + self.low[0], np.arange(n) + self.low[1], indexing="ij")
+    def nodes(self, margin: int = 0) -> Array:
+        """Middles of all splines of the grid and of a margin around it, shape (m, n, 2)."""
+        m, n = (size + 2 * margin for size in self.number.shape)
+        i, j = np.meshgrid(np.arange(m) + self.low[0] - margin, np.arange(n) + self.low[1] - margin, indexing="ij")
         return np.asarray(self.origin + np.stack([i, j], axis=-1) * self.size)
 
 
@@ -123,37 +123,28 @@ class LobeSplines:
         levels = tuple(dataclasses.replace(level, number=renumbered[level.number]) for level in self.levels)
         return LobeSplines(levels, self.behind, int(kept.sum()))
 
-    def fitted(self, f: Callable[[Array], Array]) -> Array:
-        """Weights of the finest splines at each place with which the sum is a smooth function, to fourth order.
+    def weights_of(self, f: Callable[[Array], Array]) -> Array:
+        """Weights with which the sum is a smooth function of β − β₀ of shape (n, 2), to fourth order; of one level.
 
-        `f` gets directions of shape (n, 3). Only one level takes part at a place where there are several.
+        A spline takes a sixth of the second difference from its neighbours along both axes.
         """
-        level = self.levels[0]
-        beta = level.nodes()
-        values = f(self.directions(beta.reshape(-1, 2))).reshape(beta.shape[:2])
-        padded = np.pad(values, 1, mode="edge")
-        across = sum(
-            padded[1 + a : padded.shape[0] - 1 + a, 1 + b : padded.shape[1] - 1 + b]
-            for a, b in ((1, 0), (-1, 0), (0, 1), (0, -1))
-        )
-        weights = np.zeros(self.count)
+        (level,) = self.levels
         there = level.number >= 0
-        weights[level.number[there]] = (values - (across - 4.0 * values) / 6.0)[there]
+        near = np.pad(there, 1)
+        for k, axis in ((1, 0), (-1, 0), (1, 1), (-1, 1)):
+            near = near | np.roll(np.pad(there, 1), k, axis)
+        values = np.zeros(near.shape)
+        values[near] = f(level.nodes(margin=1)[near] - level.origin)
+        around = values[2:, 1:-1] + values[:-2, 1:-1] + values[1:-1, 2:] + values[1:-1, :-2]
+        own = values[1:-1, 1:-1]
+        weights = np.zeros(self.count)
+        weights[level.number[there]] = (own - (around - 4.0 * own) / 6.0)[there]
         return weights
 
-    def directions(self, beta: Array) -> Array:
-        """Unit vectors of direction cosines of shape (n, 2); those beyond the hemisphere are laid on its rim."""
-        radius = np.hypot(beta[:, 0], beta[:, 1])
-        inside = beta * np.minimum(1.0, RIM / np.maximum(radius, 1e-12))[:, None]
-        height = np.sqrt(1.0 - np.sum(inside**2, axis=1))
-        return np.column_stack([inside, -height if self.behind else height])
 
-
-RIM = 0.9999
-"""Largest direction cosine of a direction that f is asked at."""
-
-
-def splines_for(arms: Array, regular: Array, spacing: Array, cell: float, reach: float) -> LobeSplines:
+def splines_for(
+    arms: Array, regular: Array, spacing: Array, cell: float, reach: float, *, even: bool = False
+) -> LobeSplines:
     """Splines where positions are: of width `cell` [°] where they are dense, wider where they are not.
 
     Parameters
@@ -168,6 +159,8 @@ def splines_for(arms: Array, regular: Array, spacing: Array, cell: float, reach:
         Of the finest level [°].
     reach : number
         To which angle from its position the detector sees [°].
+    even : bool
+        One level everywhere, however far positions are apart: for lobes that are known between them.
     """
     step = float(np.quantile(spacing, 0.1))
     widest = float(np.quantile(spacing, 0.98))
@@ -177,12 +170,12 @@ def splines_for(arms: Array, regular: Array, spacing: Array, cell: float, reach:
     count, scale = 0, 1.0
     while True:
         size = np.radians(cell * scale) * np.array([cosine, 1.0])
-        dense = spacing <= DENSE * step * scale
+        dense = (spacing <= DENSE * step * scale) | even
         if dense.any():
             level = _level(arms[dense, :2], regular[:2], size, np.radians(reach), tree, count)
             levels.append(level)
             count += int((level.number >= 0).sum())
-        if step * scale * DENSE >= widest:
+        if even or step * scale * DENSE >= widest:
             break
         scale *= COARSER
     return LobeSplines(tuple(levels), bool(regular[2] < 0.0), count)

@@ -15,6 +15,9 @@ Array = npt.NDArray[np.float64]
 EVALUATIONS = 16
 """Of the score, on the way to the best share."""
 
+FURTHEST = 300
+"""Iterations at most for each of them: where more are needed, what is left is far from smooth."""
+
 SIGNIFICANT = 4.0
 """Standard errors by which a scan must be predicted better with such light than without."""
 
@@ -67,7 +70,7 @@ def regular_share(counted: CountedScan, seed: int) -> RegularShare:
 
     def score(share: float) -> float:
         if share not in known:
-            course, _, _ = counted.with_regular(share).course("held-out", seed)
+            course, _, _ = counted.with_regular(share).course("held-out", seed, furthest=FURTHEST)
             assert course.held_out is not None  # noqa: S101 - there are counts
             known[share] = course.held_out[int(np.argmin(course.held_out.sum(axis=1)))]
         return float(known[share].sum())
