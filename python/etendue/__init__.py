@@ -69,7 +69,10 @@ from etendue.tracing.ledger import TraceWarning
 if TYPE_CHECKING:
     from etendue import scene
     from etendue.instruments.deconvolution import Deconvolution, deconvolve
+    from etendue.instruments.directional_deconvolution import DirectionalDeconvolution, deconvolve_directions
+    from etendue.instruments.directional_scan import DirectionalScan, read_directional_scan
     from etendue.instruments.goniometer_scan import GoniometerScan, read_goniometer_scan
+    from etendue.instruments.lobe_table import bsdf_table
     from etendue.instruments.scatter_goniometer import ScatterGoniometer
     from etendue.scatter import models as bsdf
     from etendue.scatter.bsdf import Bsdf
@@ -88,6 +91,8 @@ __all__ = [
     "Cone",
     "Cylinder",
     "Deconvolution",
+    "DirectionalDeconvolution",
+    "DirectionalScan",
     "Disk",
     "Dome",
     "EtendueError",
@@ -128,12 +133,14 @@ __all__ = [
     "UnsupportedFormatError",
     "WaitingWarning",
     "bsdf",
+    "bsdf_table",
     "cache_content",
     "clear_cache",
     "combine_maps",
     "compare",
     "cross_section",
     "deconvolve",
+    "deconvolve_directions",
     "denoise_map",
     "diagnose",
     "draw_scene",
@@ -150,6 +157,7 @@ __all__ = [
     "plot_map",
     "plot_threshold_sweep",
     "read_bsdf",
+    "read_directional_scan",
     "read_goniometer_scan",
     "read_illuminance_map",
     "read_intensity",
@@ -183,13 +191,18 @@ LAZY = {
     "Bsdf": "etendue.scatter.table:Bsdf",
     "BsdfTable": "etendue.scatter.table:BsdfTable",
     "Deconvolution": "etendue.instruments.deconvolution:Deconvolution",
+    "DirectionalDeconvolution": "etendue.instruments.directional_deconvolution:DirectionalDeconvolution",
+    "DirectionalScan": "etendue.instruments.directional_scan:DirectionalScan",
     "GoniometerScan": "etendue.instruments.goniometer_scan:GoniometerScan",
     "Scans": "etendue.scatter.scans.scans:Scans",
     "ScatterGoniometer": "etendue.instruments.scatter_goniometer:ScatterGoniometer",
     "Scene": "etendue.scene:Scene",
     "bsdf": "etendue.scatter.models",
+    "bsdf_table": "etendue.instruments.lobe_table:bsdf_table",
     "deconvolve": "etendue.instruments.deconvolution:deconvolve",
+    "deconvolve_directions": "etendue.instruments.directional_deconvolution:deconvolve_directions",
     "read_bsdf": "etendue.scatter.files:read_bsdf",
+    "read_directional_scan": "etendue.instruments.directional_scan:read_directional_scan",
     "read_goniometer_scan": "etendue.instruments.goniometer_scan:read_goniometer_scan",
     "read_scans": "etendue.scatter.scans.files:read_scans",
     "scene": "etendue.scene",

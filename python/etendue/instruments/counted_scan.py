@@ -40,6 +40,8 @@ class CountedScan:
         From weights of splines to expected counts.
     counted : bool
         Whether the noise is known.
+    regular : number
+        Share of the light that is known to go on in a single direction.
     """
 
     model: ForwardModel
@@ -48,6 +50,7 @@ class CountedScan:
     background: Array
     matrix: Any
     counted: bool
+    regular: float = 0.0
 
     @classmethod
     def of(cls, scan: DirectionalScan, model: ForwardModel) -> CountedScan:
@@ -65,12 +68,8 @@ class CountedScan:
 
     def with_regular(self, share: float) -> CountedScan:
         """The same, with a share of the beam known to be mirrored, or to go straight on."""
-        return dataclasses.replace(self, background=self.background + share * self.model.bare / self.per_count)
-
-    def without(self, kept: npt.NDArray[np.bool_]) -> CountedScan:
-        """Some of the positions alone."""
-        parts = {name: getattr(self, name)[kept] for name in ("counts", "per_count", "background", "matrix")}
-        return dataclasses.replace(self, **parts)
+        background = self.background + share * self.model.bare / self.per_count
+        return dataclasses.replace(self, background=background, regular=self.regular + share)
 
     def start(self, measured: Array) -> Array:
         """An even lobe that gives as many counts; `measured` without background, of shape (n,) or (n, k)."""

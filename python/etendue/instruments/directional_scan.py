@@ -16,7 +16,8 @@ from etendue.formats.output import atomic_output
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, POLAR, read_columns, read_remarks
 from etendue.instruments.bench import Bench
 from etendue.instruments.goniometer_scan import GoniometerScan, Way, known_of, read_goniometer_scan
-from etendue.quantities.bsdf_data import direction
+from etendue.instruments.lobe_table import polar_slice
+from etendue.quantities.bsdf_data import BsdfSlice, direction
 
 Array = npt.NDArray[np.float64]
 
@@ -173,6 +174,53 @@ class DirectionalScan:
             )
         return np.asarray(self.solid_angle * self.cosine)
 
+    @functools.cached_property
+    def spread(self) -> tuple[float, float]:
+        """Angles that the positions span: in the plane of incidence, and across it [°]."""
+        x, y, z = self.direction.T
+        along = np.degrees(np.arctan2(x, np.abs(z)))
+        return float(np.ptp(along)), float(np.ptp(np.degrees(np.arcsin(np.clip(y, -1.0, 1.0)))))
+
+    @functools.cached_property
+    def gaps(self) -> int:
+        """Positions that are missing in an even window: holes whose neighbours on both sides of both axes are there."""
+        step = float(np.quantile(self.spacing, 0.1))
+        dense = self.direction[self.spacing < 1.5 * step]
+        x, y, z = dense.T
+        across = np.round(np.degrees(np.arcsin(np.clip(y, -1.0, 1.0))) / step)
+        along = np.degrees(np.arctan2(x, np.abs(z)))
+        at = np.column_stack([np.round((along - along.min()) / step), across - across.min()]).astype(int)
+        there = np.zeros(at.max(axis=0) + 1, bool)
+        there[at[:, 0], at[:, 1]] = True
+        before = [np.logical_or.accumulate(there, axis) for axis in (0, 1)]
+        after = [np.flip(np.logical_or.accumulate(np.flip(there, axis), axis), axis) for axis in (0, 1)]
+        return int((~there & before[0] & before[1] & after[0] & after[1]).sum())
+
+    @property
+    def regular_share(self) -> float:
+        """What is mirrored is in the flux of a scan."""
+        return 0.0
+
+    def extent(self, cell: float) -> dict[str, float]:
+        """Detail of width `cell` [°] and distance of the farthest position, in direction cosines."""
+        off = self.direction[:, :2] - self.regular[:2]
+        fine = np.radians(cell) * abs(float(self.regular[2]))
+        return {"cell": float(fine), "farthest": float(np.hypot(*off.T).max())}
+
+    def slice(self) -> BsdfSlice:
+        """As a slice of a table, on a polar grid about the regular direction; linear between positions."""
+        interpolate = scipy_part("interpolate")
+        error = self.bsdf_error
+        both = self.bsdf[:, None] if error is None else np.column_stack([self.bsdf, error])
+        between = interpolate.LinearNDInterpolator(self.direction[:, :2], np.maximum(both, 0.0))
+
+        def f(to: Array) -> tuple[Array, Array | None]:
+            found = between(to[:, :2])
+            return found[:, 0], None if error is None else found[:, 1]
+
+        step = float(np.quantile(self.spacing, 0.1))
+        return polar_slice(f, self.incident, behind=self.behind, **self.extent(0.5 * step))
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a CSV file: theta_s and phi_s [°], flux and standard error; what else is known in lines with ``#``.
 
@@ -198,17 +246,28 @@ class DirectionalScan:
             remarks["solid_angle"] = self.solid_angle
         if self.bench is not None:
             remarks |= self.bench.remarks()
-        x, y, z = self.direction.T
-        # Whole numbers stay whole: 60 and not 59.99999999999999.
-        theta, phi = (
-            np.round(np.degrees(a), 12) for a in (np.arctan2(np.hypot(x, y), z), np.arctan2(y, x) % (2.0 * np.pi))
-        )
+        theta, phi = angles_of(self.direction)
         error = [] if self.standard_error is None else [self.standard_error]
         names = [*POLAR, *([ERROR] if error else [])]
         rows = [",".join(map(repr, map(float, row))) for row in zip(theta, phi, self.flux, *error, strict=True)]
         lines = [*(f"# {key} = {value}" for key, value in remarks.items()), ",".join(names), *rows]
         with atomic_output(path) as temporary:
             temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def angles_of(directions: Array) -> tuple[Array, Array]:
+    """Angle from +z and azimuth [°] of unit vectors of shape (n, 3); 60 and not 59.99999999999999.
+
+    Examples
+    --------
+    >>> [a.tolist() for a in angles_of(direction([60.0], 90.0))]
+    [[60.0], [90.0]]
+    """
+    x, y, z = directions.T
+    return (
+        np.round(np.degrees(np.arctan2(np.hypot(x, y), z)), 12),
+        np.round(np.degrees(np.arctan2(y, x) % (2.0 * np.pi)), 12),
+    )
 
 
 def read_directional_scan(path: str | os.PathLike[str]) -> DirectionalScan:
