@@ -22,6 +22,10 @@ SURE = 2.0
 """Standard errors of a flux from which on its error says what a count stands for."""
 
 
+COARSER_STARTS = 0.1
+"""Of the weight of the level before: where both are, the finer one tells the lobe, and elsewhere one step puts it right."""
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class CountedScan:
     """Counts, and the matrix that expects them.
@@ -72,8 +76,10 @@ class CountedScan:
         return dataclasses.replace(self, background=background, regular=self.regular + share)
 
     def start(self, measured: Array) -> Array:
-        """An even lobe that gives as many counts; `measured` without background, of shape (n,) or (n, k)."""
-        ones = np.ones(self.matrix.shape[1]) / len(self.model.splines.levels)
+        """An even lobe, most of it in the finest splines where they are, that gives as many counts; `measured` without background, of shape (n,) or (n, k)."""
+        ones = np.zeros(self.matrix.shape[1])
+        for k, level in enumerate(self.model.splines.levels):
+            ones[level.number[level.number >= 0]] = COARSER_STARTS**k
         total = np.maximum(measured.sum(axis=0), 1e-9 * self.counts.sum())
         return np.asarray(np.multiply.outer(ones, total / (self.matrix @ ones).sum()))
 

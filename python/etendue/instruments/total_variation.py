@@ -24,7 +24,8 @@ LEAST = 0.2
 def total_variation(splines: LobeSplines, strength: float) -> Callable[[Array], Array]:
     """The factor 1/(1 − λ div(∇x/|∇x|)) of [Dey2006]_, for weights of splines of shape (m, k).
 
-    Each level has its own gradients; where a neighbour is missing there is none.
+    Of the finest splines alone: where positions are farther apart, nothing is to be smoothed. Where a neighbour is missing
+    there is no gradient.
 
     Parameters
     ----------
@@ -45,7 +46,7 @@ def total_variation(splines: LobeSplines, strength: float) -> Callable[[Array], 
 
     def factor(x: Array) -> Array:
         divergence = np.zeros_like(x)
-        for level in splines.levels:
+        for level in splines.levels[:1]:
             there = level.number >= 0
             g = np.zeros((*there.shape, x.shape[1]))
             g[there] = x[level.number[there]]
