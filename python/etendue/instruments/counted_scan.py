@@ -76,7 +76,10 @@ class CountedScan:
         return dataclasses.replace(self, background=background, regular=self.regular + share)
 
     def start(self, measured: Array) -> Array:
-        """An even lobe, most of it in the finest splines where they are, that gives as many counts; `measured` without background, of shape (n,) or (n, k)."""
+        """An even lobe that gives as many counts, most of it in the finest splines where they are.
+
+        `measured` is without background, of shape (n,) or (n, k).
+        """
         ones = np.zeros(self.matrix.shape[1])
         for k, level in enumerate(self.model.splines.levels):
             ones[level.number[level.number >= 0]] = COARSER_STARTS**k
