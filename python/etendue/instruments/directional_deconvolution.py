@@ -247,9 +247,10 @@ def deconvolve_directions(
     else:
         raise ArgumentError(f"a regular share of {regular:g}; it is from 0 to 1")
     counted = counted.with_regular(share.share)
+    fitted = _WAYS[method](_Task(scan, of, counted, share, rule, tuple(models), replicates, seed))
+    share = fitted.share or share
     if share.share > 0.0:
         notes.append(f"{share.share:.4g} of the light goes on in a single direction, and is not in f: {share.why}")
-    fitted = _WAYS[method](_Task(scan, of, counted, rule, tuple(models), replicates, seed))
     flux = fitted.expected * counted.per_count - scan.background
     residuals = scan.flux - flux
     if scan.standard_error is not None and counted.counted:
@@ -329,6 +330,7 @@ class _Task:
     scan: DirectionalScan
     instrument: Instrument
     counted: CountedScan
+    share: RegularShare
     rule: str
     models: tuple[str, ...]
     replicates: int
@@ -345,6 +347,7 @@ class _Found:
     lobe: Callable[[Array], Array]
     model: Fitted | None = None
     notes: tuple[str, ...] = ()
+    share: RegularShare | None = None
 
 
 def _richardson_lucy(task: _Task, shrink: Shrink = None, told: str = "") -> _Found:
@@ -359,6 +362,9 @@ def _richardson_lucy(task: _Task, shrink: Shrink = None, told: str = "") -> _Fou
     if task.replicates and counted.counted:
         reach = task.instrument.reach
         error = error_of(counted, task.scan.direction, reach, count, shrink, task.replicates, task.seed)
+        if task.share.error > 0.0:
+            less = counted.with_regular(-task.share.error).after(count, shrink)
+            error = np.hypot(error, counted.model.at_positions @ (less - counted.after(count, shrink)))
     return _of_weights(counted.model, weights, error, counted.expected(weights), count, f"{task.rule}: {why}{told}")
 
 
@@ -377,7 +383,11 @@ def _total_variation(task: _Task) -> _Found:
 
 
 def _parametric(task: _Task) -> _Found:
-    fit = parametric_lobe(task.instrument, task.scan, task.counted, task.models, task.seed)
+    free = task.share.error > 0.0
+    fit = parametric_lobe(task.instrument, task.scan, task.counted, task.models, task.seed, regular=free)
+    share = (
+        RegularShare(fit.regular, fit.regular_error, f"fitted with the lobe; {task.share.why}") if free else task.share
+    )
     origin = task.scan.regular[:2]
     off = task.scan.direction[:, :2] - origin
     notes = []
@@ -390,7 +400,7 @@ def _parametric(task: _Task) -> _Found:
         )
     made = None
     try:
-        made = fit.model.bsdf(fit.parameters, behind=task.scan.behind, regular=task.counted.regular)
+        made = fit.model.bsdf(fit.parameters, behind=task.scan.behind, regular=share.share)
     except EtendueError as error:
         notes.append(f"the model is no finish: {error}")
     told = ", ".join(f"{name} {score:.4g}" for name, score in fit.scores.items())
@@ -403,6 +413,7 @@ def _parametric(task: _Task) -> _Found:
         lambda to: fit.f(to[:, :2] - origin),
         made,
         tuple(notes),
+        share,
     )
 
 

@@ -56,6 +56,8 @@ class ParametricLobe:
         Mean Poisson deviance of the counts.
     scores : dict of str to float
         Of all models, the mean deviance of counts that were kept back.
+    regular, regular_error : float
+        Share of the light that goes on in a single direction, and its standard error if it was fitted.
     """
 
     model: LobeModel
@@ -64,6 +66,8 @@ class ParametricLobe:
     expected: Array
     deviance: float
     scores: dict[str, float]
+    regular: float
+    regular_error: float
 
     def f(self, off: Array) -> Array:
         """F [1/sr] at β − β₀ of shape (n, 2)."""
@@ -88,9 +92,10 @@ class _Seen:
     sees: Array
     off: Array
     background: Array
+    bare: Array | None
 
     @classmethod
-    def of(cls, instrument: Instrument, scan: DirectionalScan, counted: CountedScan) -> _Seen:
+    def of(cls, instrument: Instrument, scan: DirectionalScan, counted: CountedScan, *, regular: bool) -> _Seen:
         near = scan.spacing <= DENSE * float(np.quantile(scan.spacing, 0.1))
         arms, per = scan.direction[near], counted.per_count
         cell = FINER * counted.model.cell
@@ -101,18 +106,30 @@ class _Seen:
             sees[sight.positions] = sight.weights.sum(axis=(1, 2))
         off = scan.direction[:, :2] - scan.regular[:2]
         scaled = scipy_part("sparse").csr_array(matrix.multiply(1.0 / per[near, None]))
-        return cls(near, splines, scaled, sees / per, off, counted.background)
+        bare = counted.model.bare / per if regular else None
+        background = counted.with_regular(-counted.regular).background if regular else counted.background
+        return cls(near, splines, scaled, sees / per, off, background, bare)
 
-    def expected(self, model: LobeModel, parameters: Array) -> Array:
+    def expected(self, model: LobeModel, given: Array) -> Array:
+        """Counts; the last parameter is ln of what is mirrored in a single direction, if that is fitted."""
+        parameters = given if self.bare is None else given[:-1]
         found = np.zeros(self.sees.shape)
         found[self.near] = self.matrix @ self.splines.weights_of(lambda off: model.f(parameters, off))
         far = ~self.near
         found[far] = self.sees[far] * model.f(parameters, self.off[far])
+        if self.bare is not None:
+            found += np.exp(min(float(given[-1]), 0.0)) * self.bare
         return found + self.background
 
 
 def parametric_lobe(
-    instrument: Instrument, scan: DirectionalScan, counted: CountedScan, models: Sequence[str], seed: int
+    instrument: Instrument,
+    scan: DirectionalScan,
+    counted: CountedScan,
+    models: Sequence[str],
+    seed: int,
+    *,
+    regular: bool = False,
 ) -> ParametricLobe:
     """The most likely lobe of the model that predicts held-out counts best.
 
@@ -130,6 +147,8 @@ def parametric_lobe(
         To choose from, by the kinds of finishes.
     seed : int
         Of the counts that are kept back.
+    regular : bool
+        Whether the share of light in a single direction is fitted too, from the one that is known of the counts.
 
     Raises
     ------
@@ -143,14 +162,17 @@ def parametric_lobe(
     if not counted.counted:
         raise ArgumentError("a fit needs the standard errors of the scan, by which its values count")
     candidates = sorted((lobe_model(name) for name in models), key=lambda one: len(one.extra))
-    seen = _Seen.of(instrument, scan, counted)
+    seen = _Seen.of(instrument, scan, counted, regular=regular)
+    tail = [np.log(max(counted.regular, 1e-12))] if regular else []
+    size = len(tail)
     learned, kept = halves_of(counted.counts, 1.0, seed)
     # The simplest finds the place and the axis, from which the others start.
-    starts = _starts(seen, counted, candidates[0])
+    starts = [np.append(one, tail) for one in _starts(seen, counted, candidates[0])]
     fits: dict[str, Array] = {}
     missed: dict[str, Array] = {}
     for one in candidates:
-        again = [one.start_from(next(iter(fits.values())))] if fits else starts
+        first = next(iter(fits.values()), None)
+        again = starts if first is None else [np.append(one.start_from(first), first[first.size - size :])]
         fits[one.name] = _fit(seen, learned[:, 0], one, again)
         missed[one.name] = deviances(kept[:, 0], 0.5 * seen.expected(one, fits[one.name]))
     scores = {name: float(values.mean()) for name, values in missed.items()}
@@ -164,7 +186,11 @@ def parametric_lobe(
     covariance = np.asarray(np.linalg.pinv(information, rcond=1e-12, hermitian=True))
     # A model that the sample is not leaves more than noise.
     left = float(deviances(counted.counts, expected).mean())
-    return ParametricLobe(best, parameters, covariance * max(left, 1.0), expected, left, scores)
+    covariance = covariance * max(left, 1.0)
+    own = parameters.size - size
+    share = float(np.exp(parameters[-1])) if regular else counted.regular
+    uncertain = share * float(np.sqrt(covariance[-1, -1])) if regular else 0.0
+    return ParametricLobe(best, parameters[:own], covariance[:own, :own], expected, left, scores, share, uncertain)
 
 
 def _alike(scores: Array, best: Array) -> bool:

@@ -26,7 +26,7 @@ WIDTH, HEIGHT = 13.2, 3.7
 LEFT, BOTTOM, PANEL, TALL = 0.7, 0.85, 2.3, 2.3
 """Margins of the first diagram, and the sides of each [inches]."""
 
-STARTS = (0.7, 3.35, 7.05, 10.55)
+STARTS = (0.7, 3.35, 6.9, 10.55)
 """Left edges of the four diagrams [inches]."""
 
 DECADES = 3.0
@@ -205,7 +205,7 @@ def _cuts(
         t = np.linspace(limits[2 * k], limits[2 * k + 1], FINE)
         x, y = (t, np.zeros(FINE)) if k == 0 else (np.zeros(FINE), t)
         f = found.evaluate(_directions(found, x, y))
-        axes.plot(t, raw(x, y), "--", color=colour, lw=0.9, label=f"{name}, measured")
+        axes.plot(t, raw(x, y), "--", color=colour, lw=0.9, label="as measured" if k else None)
         axes.plot(t, np.maximum(f, 1e-300), color=colour, lw=1.2, label=name)
         if error is not None:
             e = error(x, y)
@@ -213,6 +213,6 @@ def _cuts(
     top = max(found.peak, float(found.scan.bsdf.max()))
     axes.set_yscale("log")
     low = max(top * 10.0**-DECADES, 0.3 * float(np.quantile(found.scan.bsdf[found.scan.bsdf > 0.0], 0.02)))
-    axes.set(ylim=(low, 30.0 * top), xlabel="from the regular direction [°]", ylabel="f [1/sr]")
-    style.put_legend(axes, loc="upper left", ncol=2)
+    axes.set(ylim=(low, 10.0 * top), xlabel="from the regular direction [°]", ylabel="f [1/sr]")
+    style.put_legend(axes, loc="upper left")
     style.put_title(axes, "Cuts")
