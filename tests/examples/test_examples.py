@@ -16,6 +16,7 @@ RUNS = {
     "chapter_3_drawings.py": ([], 4),
     "chapter_4.py": (["--lines", "4"], 6),
     "chapter_5.py": ([], 4),
+    "deconvolution_2d.py": ([], 2),
     "dome_led.py": (["--rays", "100000"], 3),
     "first_picture.py": (["--rays", "500000", "--output", "picture.png"], 1),
     "half_against_half.py": ([], 1),

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape
-from etendue.instruments.bench import Bench, frame, into_the_sample
+from etendue.instruments.bench import Bench, into_the_sample
 from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.goniometer_scan import GoniometerScan, Way
 from etendue.instruments.positions import (
@@ -22,6 +22,7 @@ from etendue.instruments.positions import (
     hemisphere_around,
     window,
 )
+from etendue.instruments.ray_counting import ray_hits
 from etendue.instruments.turned_sample import TurnedSample
 from etendue.quantities.bsdf_data import BsdfSlice, direction
 from etendue.scatter.bsdf import Bsdf
@@ -433,44 +434,13 @@ class ScatterGoniometer:
             if fresh:
                 for k in range(len(arms)):
                     start, to = self._rays(bsdf, theta, n, (seed, block, k + 1))
-                    hits[k : k + 1] += self._hits(start, to, arms[k : k + 1], behind=behind)
+                    hits[k : k + 1] += ray_hits(self.bench, start, to, arms[k : k + 1], behind=behind)
             else:
                 start, to = self._rays(bsdf, theta, n, (seed, block, 0))
-                hits += self._hits(start, to, arms, behind=behind)
+                hits += ray_hits(self.bench, start, to, arms, behind=behind)
         share = hits / rays
         # Where no ray came, as if one had: the error of nothing is not nothing.
         return share, np.sqrt(np.maximum(share, 1.0 / rays) * (1.0 - share) / rays)
-
-    def _hits(self, start: Array, to: Array, arms: Array, *, behind: bool) -> Array:
-        """How many rays get into the aperture at each position."""
-        aperture = self.bench.aperture
-        leaving = to[:, 2] < 0.0 if behind else to[:, 2] > 0.0
-        farthest = float(np.sqrt(np.max(np.einsum("ij,ij->i", start, start), initial=0.0)))
-        # Two unit vectors differ by less than this if the one leads from the spot into the aperture at the other.
-        bound = 1.01 * (aperture.reach + farthest) / (self.distance - farthest)
-        # Along the widest spread of the positions, rays are put in order: each position looks at a stretch of them.
-        spread = np.ptp(arms, axis=0) if len(arms) > 1 else np.ones(3)
-        first = int(np.argmax(spread))
-        low, high = arms.min(axis=0) - bound, arms.max(axis=0) + bound
-        near = leaving
-        for k in range(3):
-            near = near & (to[:, k] >= low[k]) & (to[:, k] <= high[k])
-        chosen = np.flatnonzero(near)
-        if len(arms) > 1:
-            chosen = chosen[np.argsort(to[chosen, first], kind="stable")]
-        s, p = to[chosen].T.copy(), start[chosen].T.copy()
-        found = np.zeros(len(arms))
-        ends = (np.searchsorted(s[first], arms[:, first] + shift) for shift in (-bound, bound))
-        for k, (i, j) in enumerate(zip(*ends, strict=True)):
-            if j <= i:
-                continue
-            d, (t1, t2) = arms[k], frame(arms[k])
-            sx, sy, sz, px, py, pz = (*s[:, i:j], *p[:, i:j])
-            along = (self.distance - (px * d[0] + py * d[1] + pz * d[2])) / (sx * d[0] + sy * d[1] + sz * d[2])
-            x, y, z = px + along * sx, py + along * sy, pz + along * sz
-            u, w = x * t1[0] + y * t1[1] + z * t1[2], x * t2[0] + y * t2[1] + z * t2[2]
-            found[k] = np.count_nonzero(aperture.holds(u, w) & (along > 0.0))
-        return found
 
     def _integrated(self, bsdf: Bsdf, theta: float, arms: Array, *, behind: bool) -> tuple[Array, Array]:
         fine, coarse = (self._quadrature(bsdf, theta, arms, *nodes) for nodes in FINENESS)
