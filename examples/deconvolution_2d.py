@@ -142,13 +142,14 @@ def appearances(table: et.Bsdf) -> list[float]:
     ]
 
 
-def look_at_gloss(seed: int) -> list[et.DirectionalDeconvolution]:
+def look_at_gloss(seed: int) -> None:
     """A satin coat at 20, 30 and 60°: gloss, haze and distinctness of image, as measured and without the instrument."""
     coat = et.bsdf.RoughCoat(roughness=0.012, index=1.5, base_reflectance=0.3)
     rows = [["truth", *(f"{value:.1f}" for value in appearances(coat))]]
-    scans, founds = [], {method: [] for method in ("richardson-lucy", "parametric")}
+    scans: list[et.DirectionalScan] = []
+    founds: dict[str, list[et.DirectionalDeconvolution]] = {"richardson-lucy": [], "parametric": []}
     for theta in (20.0, 30.0, 60.0):
-        clean = et.ScatterGoniometer().measure_window(coat, theta, 0.3, 6, method="quadrature")
+        clean = et.ScatterGoniometer().measure_window(coat, theta, 0.4, 6, method="quadrature")
         scans.append(counted(clean, 1e5, seed))
         for method, found in founds.items():
             found.append(et.deconvolve_directions(scans[-1], method=method, regular=False))  # type: ignore[arg-type]
@@ -156,7 +157,6 @@ def look_at_gloss(seed: int) -> list[et.DirectionalDeconvolution]:
     for method, found in founds.items():
         rows.append([method, *(f"{value:.1f}" for value in appearances(et.bsdf_table(found)))])
     print_table(["", "gloss 20°", "gloss 60°", "reflection haze", "DOI [%]", "haze index 2° [%]"], rows)
-    return founds["richardson-lucy"]
 
 
 def draw_cuts(path: Path, names: tuple[str, ...], coarser: float) -> None:
@@ -193,9 +193,21 @@ def draw_cuts(path: Path, names: tuple[str, ...], coarser: float) -> None:
     save(made, path)
 
 
+def draw_metal(path: Path, coarser: float) -> None:
+    """The brushed metal, as `etendue deconvolve` would draw it."""
+    sample, step, span = LOBES["brushed metal"]
+    clean = et.ScatterGoniometer().measure_window(sample, THETA, coarser * step, span, turn=TURN, method="quadrature")
+    found = et.deconvolve_directions(counted(clean, PEAK_COUNTS, 0), regular=False)
+    et.plot_directions(found, path, title="Brushed metal, turned by 30°")
+
+
+PARTS = ("methods", "mirrors", "gloss", "figures")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--full", action="store_true", help="all lobes, twelve seeds, gloss and mirrors")
+    parser.add_argument("--only", choices=("methods", "mirrors", "gloss", "figures"), help="one part of it")
     parser.add_argument("--seeds", type=int, help="scans of each lobe")
     parser.add_argument("--output", type=Path, default=Path("deconvolution-2d"), help="folder for the figures")
     options = parser.parse_args()
@@ -203,15 +215,16 @@ def main() -> None:
     seeds = options.seeds or (12 if options.full else 1)
     names = tuple(LOBES) if options.full else ("Gaussian",)
     coarser = 1.0 if options.full else 2.0
-    compare_methods(seeds, names, coarser)
-    if options.full:
+    parts = (options.only,) if options.only else PARTS if options.full else ("methods", "figures")
+    if "methods" in parts:
+        compare_methods(seeds, names, coarser)
+    if "mirrors" in parts:
         look_for_mirrors(min(seeds, 4))
+    if "gloss" in parts:
         look_at_gloss(1)
-    sample, step, span = LOBES["brushed metal"]
-    clean = et.ScatterGoniometer().measure_window(sample, THETA, coarser * step, span, turn=TURN, method="quadrature")
-    found = et.deconvolve_directions(counted(clean, PEAK_COUNTS, 0), regular=False)
-    et.plot_directions(found, options.output / "deconvolution-2d-metal.png", title="Brushed metal, turned by 30°")
-    draw_cuts(options.output / "deconvolution-2d-cuts.png", names, coarser)
+    if "figures" in parts:
+        draw_metal(options.output / "deconvolution-2d-metal.png", coarser)
+        draw_cuts(options.output / "deconvolution-2d-cuts.png", names, coarser)
     print(f"\nfigures: {options.output}/")
 
 

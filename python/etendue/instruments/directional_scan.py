@@ -233,7 +233,8 @@ class DirectionalScan:
 
         Examples
         --------
-        >>> from tempfile import TemporaryDirectory
+        >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
         >>> with TemporaryDirectory() as folder:
         ...     path = Path(folder) / "scan.csv"
         ...     DirectionalScan(direction([29.0, 30.0], 0.0), [0.25, 0.5], solid_angle=1e-3).save(path)
@@ -287,6 +288,7 @@ def read_directional_scan(path: str | os.PathLike[str]) -> DirectionalScan:
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder) / "scan.csv"

@@ -20,8 +20,8 @@ AZIMUTHS = 120
 GROWTH = 0.06
 """By which share of its distance the next radial coordinate is further out, where that is more than a cell."""
 
-RIM = 0.1
-"""Part of the values at the edges of a scan that are taken for a floor: beyond them f is the largest of these."""
+NEAR_RIM = 0.98
+"""Direction cosine of a position from which on a scan is one of the hemisphere, and f goes on to its rim."""
 
 
 class Lobe(Protocol):
@@ -101,11 +101,14 @@ def polar_slice(
     Returns
     -------
     BsdfSlice
-        Where nothing is known f is that of the faintest tenth of its edge: a floor.
+        Beyond a window f is 0: what was not measured is taken for absorbed. Beyond the last position of a hemisphere it is
+        that of the last.
     """
     radial = [0.0]
     while radial[-1] < farthest:
         radial.append(radial[-1] + max(cell, GROWTH * radial[-1]))
+    # One more, where nothing is known: tables go on with their last value.
+    radial.append(radial[-1] + cell)
     grid = PolarGrid("cosines", np.array(radial), np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False))
     to = grid.directions(incident, transmitted=behind)
     there = ~np.isnan(to[..., 0])
@@ -113,12 +116,14 @@ def polar_slice(
     values[there], error = f(to[there])
     if error is not None:
         errors[there] = error
-    known = ~np.isnan(values)
-    edge = known & there & ~np.roll(known, -1, axis=1)
-    edge[:, -1] = known[:, -1]
-    floor = float(np.quantile(values[edge], RIM)) if edge.any() else 0.0
-    beyond = there & ~known
-    values[beyond] = max(floor, 0.0)
+    known = ~np.isnan(values) & (grid.radial <= farthest)
+    # Along each azimuth: gaps hold what was before them, and so does what is beyond the last position near the rim.
+    last = np.maximum.accumulate(np.where(known, np.arange(grid.radial.size), -1), axis=1)
+    outermost = last[:, -1]
+    rim = np.hypot(*np.take_along_axis(to[..., :2], np.maximum(outermost, 0)[:, None, None], axis=1)[:, 0].T) > NEAR_RIM
+    held = (last >= 0) & ((np.arange(grid.radial.size) <= outermost[:, None]) | rim[:, None])
+    filled = np.where(held, np.take_along_axis(values, np.maximum(last, 0), axis=1), 0.0)
+    values = np.where(there, filled, np.nan)
     if error is not None:
-        errors[beyond] = np.nanmedian(errors[edge]) if edge.any() else 0.0
+        errors = np.where(there, np.where(held, np.take_along_axis(errors, np.maximum(last, 0), axis=1), 0.0), np.nan)
     return BsdfSlice(incident, values, behind, grid=grid, standard_error=None if error is None else errors)

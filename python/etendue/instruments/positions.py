@@ -100,7 +100,7 @@ def hemisphere_around(incidence: float, step: float, hole: float, *, behind: boo
     Examples
     --------
     >>> len(hemisphere_around(0.0, 30.0, 20.0, behind=False))
-    18
+    16
     """
     found = []
     for theta in hemisphere(step).radial:
