@@ -47,10 +47,17 @@ def scan() -> et.GoniometerScan:
     return et.GoniometerScan(angle, np.exp(-(angle**2)), notes=("by hand",))
 
 
+def wide_scan() -> et.DirectionalScan:
+    sample = et.bsdf.Gaussian(peak=200.0, sigma=0.012)
+    return et.ScatterGoniometer(photons=1e6).measure_window(sample, 60, step=1, span=3, method="quadrature")
+
+
 MAKERS: dict[str, Callable[[], Any]] = {
     **{type(surface).__name__: lambda surface=surface: surface for surface in SURFACES.values()},
     "Cone": lambda: et.Cone(acceptance="auto"),
     "Deconvolution": lambda: et.deconvolve(scan(), et.GoniometerScan(scan().angle, scan().flux ** 4), stop=5),
+    "DirectionalDeconvolution": lambda: et.deconvolve_directions(wide_scan(), stop=5, regular=False, replicates=2),
+    "DirectionalScan": wide_scan,
     "FromField": lambda: et.FromField(surface=et.Disk(radius=30), samples=4),
     "GoniometerScan": scan,
     "GriddedSource": lambda: et.GriddedSource.fit(rays(), et.Disk(radius=30), pixel=20, threshold=5),

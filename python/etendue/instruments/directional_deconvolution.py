@@ -22,8 +22,9 @@ from etendue.instruments.directional_operator import ForwardModel, Instrument, f
 from etendue.instruments.directional_scan import DirectionalScan, angles_of
 from etendue.instruments.goniometer_scan import GoniometerScan
 from etendue.instruments.lobe_models import LOBE_MODELS, Fitted
+from etendue.instruments.lobe_splines import SplineLobe
 from etendue.instruments.lobe_table import polar_slice
-from etendue.instruments.parametric_lobe import parametric_lobe
+from etendue.instruments.parametric_lobe import ModelLobe, parametric_lobe
 from etendue.instruments.regular_share import RegularShare, regular_share
 from etendue.instruments.round_blur import RoundBlur
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
@@ -410,7 +411,7 @@ def _parametric(task: _Task) -> _Found:
         fit.expected,
         0,
         f"{fit.model.name}: mean deviance of held-out counts: {told}",
-        lambda to: fit.f(to[:, :2] - origin),
+        ModelLobe(fit.model, fit.parameters, origin),
         made,
         tuple(notes),
         share,
@@ -438,7 +439,7 @@ def _of_weights(
     model: ForwardModel, weights: Array, error: Array | None, expected: Array, count: int, stop: str
 ) -> _Found:
     values = np.asarray(model.at_positions @ weights)
-    return _Found(values, error, expected, count, stop, lambda to: model.splines.evaluate(weights, to))
+    return _Found(values, error, expected, count, stop, SplineLobe(model.splines, weights))
 
 
 _WAYS: dict[str, Callable[[_Task], _Found]] = {

@@ -234,7 +234,7 @@ class DirectionalScan:
         Examples
         --------
         >>> from pathlib import Path
-    >>> from tempfile import TemporaryDirectory
+        >>> from tempfile import TemporaryDirectory
         >>> with TemporaryDirectory() as folder:
         ...     path = Path(folder) / "scan.csv"
         ...     DirectionalScan(direction([29.0, 30.0], 0.0), [0.25, 0.5], solid_angle=1e-3).save(path)

@@ -98,6 +98,7 @@ class Fitted:
     turn: float
 
 
+@dataclasses.dataclass(frozen=True)
 class GaussianLobe(LobeModel):
     """exp(−t²/2)."""
 
@@ -112,6 +113,7 @@ class GaussianLobe(LobeModel):
         return {"peak": peak, "sigma": width}
 
 
+@dataclasses.dataclass(frozen=True)
 class AbgLobe(LobeModel):
     """1/(1 + tᵍ)."""
 
@@ -128,6 +130,7 @@ class AbgLobe(LobeModel):
         return {"a": peak * b, "b": b, "g": float(np.exp(min(extra[0], STEEPEST)))}
 
 
+@dataclasses.dataclass(frozen=True)
 class HarveyShackLobe(LobeModel):
     """(1 + t²)^(S/2)."""
 

@@ -142,6 +142,26 @@ class LobeSplines:
         return weights
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class SplineLobe:
+    """F [1/sr] at directions of shape (k, 3), as a sum of splines.
+
+    Parameters
+    ----------
+    splines : LobeSplines
+        m of them.
+    weights : array, shape (m,)
+        One for each.
+    """
+
+    splines: LobeSplines
+    weights: Array
+
+    def __call__(self, directions: Array) -> Array:
+        """F; NaN where no scan says anything."""
+        return self.splines.evaluate(self.weights, directions)
+
+
 def splines_for(
     arms: Array, regular: Array, spacing: Array, cell: float, reach: float, *, even: bool = False
 ) -> LobeSplines:

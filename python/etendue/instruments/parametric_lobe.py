@@ -80,6 +80,29 @@ class ParametricLobe:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class ModelLobe:
+    """F [1/sr] at directions of shape (k, 3), by a model.
+
+    Parameters
+    ----------
+    model : LobeModel
+        Which.
+    parameters : array, shape (p,)
+        Of the model.
+    origin : array, shape (2,)
+        Projection of the regular direction on the surface.
+    """
+
+    model: LobeModel
+    parameters: Array
+    origin: Array
+
+    def __call__(self, directions: Array) -> Array:
+        """F, everywhere."""
+        return self.model.f(self.parameters, directions[:, :2] - self.origin)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class _Seen:
     """What positions would count of a lobe whose f is known everywhere.
 
