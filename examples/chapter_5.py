@@ -20,6 +20,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import numpy.typing as npt
+from etendue.instruments.agreement import variation
 from etendue.instruments.stopping import RULES
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
 from experiments.panels import FAINT, INK, LINES, new_figure, print_table, save
@@ -209,9 +210,27 @@ def deconvolve_diffusers(output: Path, *, full: bool, fresh: bool) -> None:
         print_table(["L2 [%] (stop)", *names], rules)
 
 
-def spread(values: list[float]) -> float:
-    """Eq. 5.8 [%]."""
-    return 100 * float(np.std(values, ddof=1) / np.mean(values))
+def stops_by_range(seeds: int = 8) -> None:
+    """Where the thesis' rule stops if the scans go further, from the least to the largest of some seeds."""
+    goniometer = et.ScatterGoniometer()
+    bare = goniometer.instrument_function(0.1, rays=10**6)
+    rows = []
+    for span in (2.0, 3.0, 5.0, 9.0):
+        row = [f"±{span:g}°"]
+        for name in STOPS:
+            exact = goniometer.measure(sample(name), span=span, method="quadrature")
+            found = []
+            for seed in range(seeds):
+                share = np.random.default_rng(seed).binomial(10**6, np.clip(exact.flux, 0, 1)) / 1e6
+                error = np.sqrt(np.maximum(share, 1e-6) / 1e6)
+                scan = dataclasses.replace(exact, flux=share, standard_error=error)
+                one = et.deconvolve(scan, bare, operator="slice", stop="thesis", middle=0.0, replicates=0)
+                found.append(one.iterations)
+            least, most = min(found), max(found)
+            row.append(f"{least}" if least == most else f"{least}–{most}")
+        rows.append(row)
+    rows.append(["thesis", *map(str, STOPS.values())])
+    print_table(["range", *STOPS], rows)
 
 
 def four_apertures(output: Path, fwhm: float, seeds: int) -> None:
@@ -240,12 +259,12 @@ def four_apertures(output: Path, fwhm: float, seeds: int) -> None:
             for name, options in kinds.items():
                 found[name].append(et.deconvolve(scan, signature, replicates=0, **options))  # type: ignore[arg-type]
         one = found["rings, held-out"]
-        peaks["measured"].append(spread([float(d.raw.max()) for d in one]))
-        widths["measured"].append(spread([dataclasses.replace(d, values=d.raw).fwhm for d in one]))
+        peaks["measured"].append(variation([float(d.raw.max()) for d in one]))
+        widths["measured"].append(variation([dataclasses.replace(d, values=d.raw).fwhm for d in one]))
         rise.append(max(100 * (d.peak / float(d.raw.max()) - 1) for d in one))
         for name in kinds:
-            peaks[name].append(spread([d.peak for d in found[name]]))
-            widths[name].append(spread([d.fwhm for d in found[name]]))
+            peaks[name].append(variation([d.peak for d in found[name]]))
+            widths[name].append(variation([d.fwhm for d in found[name]]))
             stops[name].append([d.iterations for d in found[name]])
     rows = []
     for name, peak_spread in peaks.items():
@@ -278,6 +297,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--full", action="store_true", help="10⁴ iterations, all rules, 20 seeds")
     parser.add_argument("--fresh", action="store_true", help="a million fresh rays at each position")
+    parser.add_argument("--ranges", action="store_true", help="where the thesis' rule stops, by the range of the scan")
     parser.add_argument("--seeds", type=int, help="scans of each aperture")
     parser.add_argument("--output", type=Path, default=Path("chapter-5"), help="folder for the figures")
     options = parser.parse_args()
@@ -286,6 +306,8 @@ def main() -> None:
     print_diffusers()
     print_instrument(options.output)
     deconvolve_diffusers(options.output, full=options.full, fresh=options.fresh)
+    if options.ranges:
+        stops_by_range()
     for fwhm in (NARROW, WIDE) if options.full else (NARROW,):
         four_apertures(options.output, fwhm, seeds)
     print(f"\nfigures: {options.output}/")

@@ -11,8 +11,8 @@ from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, directi
 
 Array = npt.NDArray[np.float64]
 
-BEAM, APERTURE = 0.45, 0.8
-"""Half-angles of the light that arrives and of the detector [°]: 0.9° and 1.6° are those of chapter 5."""
+INSTRUMENT = et.ScatterGoniometer()
+"""That of chapter 5: its beam is 0.9° wide seen from the detector, its aperture 1.6° seen from the sample."""
 
 HORIZON = 2.0
 """Closer to the surface of the sample nothing is measured [°]: the sample itself would shade the detector."""
@@ -21,55 +21,20 @@ OFFSETS = np.concatenate([np.arange(0.0, 3.0, 0.2), np.arange(3.0, 10.0, 0.5), n
 """Angles from the specular direction at which a scan stops [°], in the plane of incidence and across it."""
 
 
-def disc(points: int) -> Array:
-    """Points that are spread evenly over the unit disc, shape (points, 2)."""
-    k = np.arange(points)
-    r, a = np.sqrt((k + 0.5) / points), k * math.pi * (3.0 - math.sqrt(5.0))
-    return np.column_stack([r * np.cos(a), r * np.sin(a)])
-
-
-def around(centre: Array, half_angle: float, points: int) -> Array:
-    """Directions within an angle [°] of others, shape (..., points, 3)."""
-    x = np.cross(centre, np.where(np.abs(centre[..., 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
-    x /= np.linalg.norm(x, axis=-1, keepdims=True)
-    y = np.cross(centre, x)
-    off = disc(points) * math.tan(math.radians(half_angle))
-    found = centre[..., None, :] + off[:, :1] * x[..., None, :] + off[:, 1:] * y[..., None, :]
-    return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
-
-
-def overlap(apart: Array) -> Array:
-    """The part of a beam that an aperture holds whose centre is so far away [°]."""
-    r, R, d = BEAM, APERTURE, np.clip(apart, 1e-12, None)
-    a = r * r * np.arccos(np.clip((d * d + r * r - R * R) / (2 * d * r), -1, 1))
-    b = R * R * np.arccos(np.clip((d * d + R * R - r * r) / (2 * d * R), -1, 1))
-    root = 0.5 * np.sqrt(np.clip((-d + r + R) * (d + r - R) * (d - r + R) * (d + r + R), 0, None))
-    both = np.where(d >= r + R, 0.0, np.where(d <= R - r, math.pi * r * r, a + b - root))
-    return np.asarray(both / (math.pi * r * r))
-
-
 def measured(bsdf: et.Bsdf, theta: float, scattered: Array) -> Array:
-    """The BRDF [1/sr] as the instrument states it: flux over that which arrives, over solid angle and cosine.
+    """The BRDF [1/sr] as the instrument states it (eq. 5.1), what is mirrored included.
 
-    Directions are those of the detector, shape (..., 3); the light arrives at an angle [°] in the plane φ = 180°.
+    Directions are those of the detector, shape (n, 3); the light arrives at an angle [°] in the plane φ = 180°.
     """
-    incident = direction(theta, 180.0)
-    cells = around(scattered, APERTURE, 37)
-    beams = around(incident[None], BEAM, 13)[0]
-    f = np.mean([bsdf.evaluate(beam, cells) for beam in beams], axis=0)
-    diffuse = np.mean(f * np.clip(cells[..., 2], 0.0, None), axis=-1)
-    apart = np.degrees(np.arccos(np.clip(scattered @ mirrored(incident), -1.0, 1.0)))
-    solid_angle = 2.0 * math.pi * (1.0 - math.cos(math.radians(APERTURE)))
-    regular = float(bsdf.regular_reflectance(theta)) * overlap(apart) / solid_angle
-    return np.asarray((diffuse + regular) / np.clip(scattered[..., 2], 1e-3, None))
+    flux, _ = INSTRUMENT.flux_at(bsdf, scattered, theta, method="quadrature")
+    return np.asarray(flux / (INSTRUMENT.solid_angle * np.clip(scattered[:, 2], 1e-3, None)))
 
 
 def specular_reflectance(bsdf: et.Bsdf, theta: float) -> float:
     """The share of the light in the aperture at the specular direction, less that of an even surface of the same R."""
     at = mirrored(direction(theta, 180.0))
-    solid_angle = 2.0 * math.pi * (1.0 - math.cos(math.radians(APERTURE)))
     f = float(measured(bsdf, theta, at[None])[0]) - total_reflectance(bsdf) / math.pi
-    return max(0.0, f * solid_angle * at[2])
+    return max(0.0, f * INSTRUMENT.solid_angle * at[2])
 
 
 def total_reflectance(bsdf: et.Bsdf) -> float:

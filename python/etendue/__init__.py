@@ -8,219 +8,134 @@
 """
 
 import importlib
-from typing import TYPE_CHECKING, Any
+import importlib.util
+from typing import Any
 
-from etendue.errors import (
-    ArgumentError,
-    EtendueError,
-    FormatError,
-    MemoryLimitError,
-    MissingLibraryError,
-    OutputError,
-    SceneError,
-    SceneWarning,
-    UnitError,
-    UnknownNameError,
-    UnsupportedFormatError,
-)
-from etendue.formats.input import WaitingWarning
-from etendue.formats.intensity import read_intensity, write_intensity
-from etendue.formats.maps import read_illuminance_map, read_map, save_map
-from etendue.formats.rays import read_rays, write_rays
-from etendue.formats.rays.ray_index import RayIndex
-from etendue.goniophotometry.far_field import intensity_distribution
-from etendue.goniophotometry.threshold_sweep import threshold_sweep
-from etendue.lightfield.diagnostics import diagnose
-from etendue.lightfield.fit_cache import cache_content, clear_cache
-from etendue.lightfield.gridded.gridded_source import GriddedSource
-from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, parse_surface
-from etendue.luminance.combination import combine_maps
-from etendue.luminance.comparison import Region, compare, cross_section
-from etendue.luminance.denoising import denoise_map
-from etendue.luminance.estimate import luminance_map
-from etendue.luminance.filters import filter_map
-from etendue.luminance.methods import Cone, FromField, PathTracing
-from etendue.plot import (
-    draw_scene,
-    plot_bsdf,
-    plot_characteristic,
-    plot_comparison,
-    plot_cross_sections,
-    plot_deconvolution,
-    plot_directions,
-    plot_intensity,
-    plot_map,
-    plot_threshold_sweep,
-)
-from etendue.quantities.illuminance_map import IlluminanceMap
-from etendue.quantities.intensity import Intensity
-from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.notebook import InNotebook, Pages
-from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.pixel_map import MapOutlets, PixelMap
-from etendue.quantities.ray_set import RaySet
-from etendue.quantities.report import ChangedFileWarning, RayFileWarning
-from etendue.quantities.spectrum import Spectrum
-from etendue.scene.scatter_events import ScatterEvents
-from etendue.sources.ring_source import RingSource
-from etendue.tracing import TraceResult, TraceWork, trace, trace_rounds, trace_work
-from etendue.tracing.ledger import TraceWarning
 
-if TYPE_CHECKING:
-    from etendue import scene
-    from etendue.instruments.deconvolution import Deconvolution, deconvolve
-    from etendue.instruments.directional_deconvolution import DirectionalDeconvolution, deconvolve_directions
-    from etendue.instruments.directional_scan import DirectionalScan, read_directional_scan
-    from etendue.instruments.goniometer_scan import GoniometerScan, read_goniometer_scan
-    from etendue.instruments.lobe_table import bsdf_table
-    from etendue.instruments.scatter_goniometer import ScatterGoniometer
-    from etendue.scatter import models as bsdf
-    from etendue.scatter.bsdf import Bsdf
-    from etendue.scatter.files import read_bsdf, write_bsdf
-    from etendue.scatter.scans.files import read_scans
-    from etendue.scatter.scans.scans import Scans
-    from etendue.scatter.table import BsdfTable
-    from etendue.scene import Scene
-
-__all__ = [
-    "ArgumentError",
-    "Box",
-    "Bsdf",
-    "BsdfTable",
-    "ChangedFileWarning",
-    "Cone",
-    "Cylinder",
-    "Deconvolution",
-    "DirectionalDeconvolution",
-    "DirectionalScan",
-    "Disk",
-    "Dome",
-    "EtendueError",
-    "FormatError",
-    "FromField",
-    "GoniometerScan",
-    "GriddedSource",
-    "Hemisphere",
-    "IlluminanceMap",
-    "Intensity",
-    "LightField",
-    "LuminanceMap",
-    "MemoryLimitError",
-    "MissingLibraryError",
-    "Observer",
-    "OutputError",
-    "PathTracing",
-    "Plane",
-    "RayFileWarning",
-    "RayIndex",
-    "RaySet",
-    "Region",
-    "RingSource",
-    "Scans",
-    "ScatterEvents",
-    "ScatterGoniometer",
-    "Scene",
-    "SceneError",
-    "SceneWarning",
-    "Screen",
-    "Spectrum",
-    "Sphere",
-    "TraceResult",
-    "TraceWarning",
-    "TraceWork",
-    "UnitError",
-    "UnknownNameError",
-    "UnsupportedFormatError",
-    "WaitingWarning",
-    "bsdf",
-    "bsdf_table",
-    "cache_content",
-    "clear_cache",
-    "combine_maps",
-    "compare",
-    "cross_section",
-    "deconvolve",
-    "deconvolve_directions",
-    "denoise_map",
-    "diagnose",
-    "draw_scene",
-    "filter_map",
-    "intensity_distribution",
-    "luminance_map",
-    "parse_surface",
-    "plot_bsdf",
-    "plot_characteristic",
-    "plot_comparison",
-    "plot_cross_sections",
-    "plot_deconvolution",
-    "plot_directions",
-    "plot_intensity",
-    "plot_map",
-    "plot_threshold_sweep",
-    "read_bsdf",
-    "read_directional_scan",
-    "read_goniometer_scan",
-    "read_illuminance_map",
-    "read_intensity",
-    "read_map",
-    "read_rays",
-    "read_scans",
-    "scene",
-    "threshold_sweep",
-    "trace",
-    "trace_rounds",
-    "trace_work",
-    "write_bsdf",
-    "write_intensity",
-    "write_rays",
-]
-
-
-def _page(value: object) -> str:
-    # Pages are made where all kinds of values are known, which nobody needs before a notebook shows one.
-    page: str = importlib.import_module("etendue.plot.notebook").notebook_page(value)
-    return page
-
-
-# Maps are quantities, which cannot import the files and pictures above them.
-PixelMap.outlets = MapOutlets(save=save_map, plot=plot_map)
-InNotebook.pages = Pages(of=_page)
-
-
-# Scenes and models are checked by pydantic, which takes as long to import as all the rest: only when somebody asks for one.
-LAZY = {
-    "Bsdf": "etendue.scatter.table:Bsdf",
-    "BsdfTable": "etendue.scatter.table:BsdfTable",
-    "Deconvolution": "etendue.instruments.deconvolution:Deconvolution",
-    "DirectionalDeconvolution": "etendue.instruments.directional_deconvolution:DirectionalDeconvolution",
-    "DirectionalScan": "etendue.instruments.directional_scan:DirectionalScan",
-    "GoniometerScan": "etendue.instruments.goniometer_scan:GoniometerScan",
-    "Scans": "etendue.scatter.scans.scans:Scans",
-    "ScatterGoniometer": "etendue.instruments.scatter_goniometer:ScatterGoniometer",
-    "Scene": "etendue.scene:Scene",
-    "bsdf": "etendue.scatter.models",
-    "bsdf_table": "etendue.instruments.lobe_table:bsdf_table",
-    "deconvolve": "etendue.instruments.deconvolution:deconvolve",
-    "deconvolve_directions": "etendue.instruments.directional_deconvolution:deconvolve_directions",
-    "read_bsdf": "etendue.scatter.files:read_bsdf",
-    "read_directional_scan": "etendue.instruments.directional_scan:read_directional_scan",
-    "read_goniometer_scan": "etendue.instruments.goniometer_scan:read_goniometer_scan",
-    "read_scans": "etendue.scatter.scans.files:read_scans",
-    "scene": "etendue.scene",
-    "write_bsdf": "etendue.scatter.files:write_bsdf",
+PUBLIC = {
+    "etendue.errors": (
+        "ArgumentError",
+        "EtendueError",
+        "FormatError",
+        "MemoryLimitError",
+        "MissingLibraryError",
+        "OutputError",
+        "SceneError",
+        "SceneWarning",
+        "UnitError",
+        "UnknownNameError",
+        "UnsupportedFormatError",
+    ),
+    "etendue.formats.input": ("WaitingWarning",),
+    "etendue.formats.intensity": ("read_intensity", "write_intensity"),
+    "etendue.formats.maps": ("read_illuminance_map", "read_map"),
+    "etendue.formats.rays": ("read_rays", "write_rays"),
+    "etendue.formats.rays.ray_index": ("RayIndex",),
+    "etendue.goniophotometry.far_field": ("intensity_distribution",),
+    "etendue.goniophotometry.threshold_sweep": ("threshold_sweep",),
+    "etendue.instruments.agreement": ("Agreement", "agreement"),
+    "etendue.instruments.deconvolution": ("Deconvolution", "deconvolve"),
+    "etendue.instruments.detectors": ("Baffle", "Detector"),
+    "etendue.instruments.directional_deconvolution": ("DirectionalDeconvolution", "deconvolve_directions"),
+    "etendue.instruments.directional_scan": ("DirectionalScan", "read_directional_scan"),
+    "etendue.instruments.goniometer_scan": ("GoniometerScan", "read_goniometer_scan"),
+    "etendue.instruments.lobe_table": ("bsdf_table",),
+    "etendue.instruments.near_field.goniophotometer": ("NearFieldGoniophotometer",),
+    "etendue.instruments.near_field.run": ("NearFieldRun",),
+    "etendue.instruments.revolved": ("revolved",),
+    "etendue.instruments.scatter_goniometer": ("ScatterGoniometer",),
+    "etendue.lightfield.diagnostics": ("diagnose",),
+    "etendue.lightfield.fit_cache": ("cache_content", "clear_cache"),
+    "etendue.lightfield.gridded.gridded_source": ("GriddedSource",),
+    "etendue.lightfield.light_field": ("LightField",),
+    "etendue.lightfield.surfaces": (
+        "Box",
+        "Cylinder",
+        "Disk",
+        "Dome",
+        "Hemisphere",
+        "Plane",
+        "Sphere",
+        "parse_surface",
+    ),
+    "etendue.luminance.combination": ("combine_maps",),
+    "etendue.luminance.comparison": ("Region", "compare", "cross_section"),
+    "etendue.luminance.denoising": ("denoise_map",),
+    "etendue.luminance.estimate": ("luminance_map",),
+    "etendue.luminance.filters": ("filter_map",),
+    "etendue.luminance.methods": ("Cone", "FromField", "PathTracing"),
+    "etendue.plot": (
+        "draw_scene",
+        "plot_bsdf",
+        "plot_characteristic",
+        "plot_comparison",
+        "plot_cross_sections",
+        "plot_deconvolution",
+        "plot_directions",
+        "plot_intensity",
+        "plot_map",
+        "plot_near_field",
+        "plot_threshold_sweep",
+    ),
+    "etendue.quantities.illuminance_map": ("IlluminanceMap",),
+    "etendue.quantities.intensity": ("Intensity",),
+    "etendue.quantities.luminance_map": ("LuminanceMap",),
+    "etendue.quantities.observer": ("Observer", "Screen"),
+    "etendue.quantities.ray_set": ("RaySet",),
+    "etendue.quantities.report": ("ChangedFileWarning", "RayFileWarning"),
+    "etendue.quantities.spectrum": ("Spectrum",),
+    "etendue.scatter.bsdf": ("Bsdf",),
+    "etendue.scatter.files": ("read_bsdf", "write_bsdf"),
+    "etendue.scatter.scans.files": ("read_scans",),
+    "etendue.scatter.scans.scans": ("Scans",),
+    "etendue.scatter.table": ("BsdfTable",),
+    "etendue.scene": ("Scene",),
+    "etendue.scene.scatter_events": ("ScatterEvents",),
+    "etendue.sources.ring_source": ("RingSource",),
+    "etendue.tracing": ("TraceResult", "TraceWork", "trace", "trace_rounds", "trace_work"),
+    "etendue.tracing.ledger": ("TraceWarning",),
 }
+"""Public names by the module that has them, which is imported when one of them is asked for (PEP 562): all of them together
+take four times as long as numpy. `__init__.pyi` says the same to type checkers and editors."""
+
+MODULES = {"bsdf": "etendue.scatter.models", "scene": "etendue.scene"}
+"""Public names of whole modules."""
+
+HOMES = {name: module for module, names in PUBLIC.items() for name in names}
+
+__all__ = sorted([*HOMES, *MODULES])  # noqa: PLE0605 - the stub has the names in so many words
 
 
 def __getattr__(name: str) -> Any:
-    if name in LAZY:
-        module, _, attribute = LAZY[name].partition(":")
-        found = importlib.import_module(module)
-        return getattr(found, attribute) if attribute else found
-    if name == "__version__":
-        return importlib.import_module("importlib.metadata").version("etendue")
-    raise AttributeError(f"module 'etendue' has no attribute {name!r}")
+    if name in HOMES:
+        found = getattr(importlib.import_module(HOMES[name]), name)
+    elif name in MODULES:
+        found = importlib.import_module(MODULES[name])
+    elif name == "__version__":
+        found = importlib.import_module("etendue.quantities.provenance").version()
+    elif not name.startswith("_") and importlib.util.find_spec(f"etendue.{name}"):
+        found = importlib.import_module(f"etendue.{name}")
+    else:
+        raise AttributeError(f"module 'etendue' has no attribute {name!r}")
+    globals()[name] = found
+    return found
 
 
 def __dir__() -> list[str]:
     return sorted([*__all__, "__version__"])
+
+
+def _later(module: str, name: str) -> Any:
+    """A function of a higher floor, imported when it is called."""
+
+    def call(*args: Any, **options: Any) -> Any:
+        return getattr(importlib.import_module(module), name)(*args, **options)
+
+    return call
+
+
+# Maps are quantities, which cannot import the files and pictures above them; values in notebooks neither.
+PixelMap.outlets = MapOutlets(save=_later("etendue.formats.maps", "save_map"), plot=_later("etendue.plot", "plot_map"))
+InNotebook.pages = Pages(of=_later("etendue.plot.notebook", "notebook_page"))

@@ -239,8 +239,6 @@ WITHOUT_EXAMPLE = {
     "etendue.quantities.node_choice.Choice": "what choose_nodes returns",
     "etendue.tracing.far_fields.far_field_nodes": "a step of trace_rounds, which shows it",
     "etendue.instruments.bench.Sight": "lines of sight, as Bench.sights yields them",
-    "etendue.instruments.bench.frame": "axes of an aperture, for lines of sight",
-    "etendue.instruments.bench.into_the_sample": "where rays meet a sample, for lines of sight",
     "etendue.instruments.courses.course_of": "deconvolve is the door",
     "etendue.instruments.courses.halves_of": "likewise",
     "etendue.instruments.counted_scan": "what the ways of deconvolve_directions share",

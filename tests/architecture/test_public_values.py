@@ -52,12 +52,19 @@ def wide_scan() -> et.DirectionalScan:
     return et.ScatterGoniometer(photons=1e6).measure_window(sample, 60, step=1, span=3, method="quadrature")
 
 
+def lobe() -> et.GoniometerScan:
+    return dataclasses.replace(scan(), solid_angle=1e-3)
+
+
 MAKERS: dict[str, Callable[[], Any]] = {
     **{type(surface).__name__: lambda surface=surface: surface for surface in SURFACES.values()},
+    "Agreement": lambda: et.agreement([lobe(), lobe()]),
+    "Baffle": lambda: et.Baffle(24, 200),
     "Cone": lambda: et.Cone(acceptance="auto"),
     "Deconvolution": lambda: et.deconvolve(scan(), et.GoniometerScan(scan().angle, scan().flux ** 4), stop=5),
     "DirectionalDeconvolution": lambda: et.deconvolve_directions(wide_scan(), stop=5, regular=False, replicates=2),
     "DirectionalScan": wide_scan,
+    "Detector": lambda: et.Detector(1e9, 1e5, filters=[1, 0.1], longest=2.0),
     "FromField": lambda: et.FromField(surface=et.Disk(radius=30), samples=4),
     "GoniometerScan": scan,
     "GriddedSource": lambda: et.GriddedSource.fit(rays(), et.Disk(radius=30), pixel=20, threshold=5),

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import etendue as et
 import numpy as np
 import pytest
-from etendue.cli.app import VERBS
+from etendue.cli.verbs import VERBS
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.lightfield.fit_cache import FOLDER_VARIABLE
 from etendue.lightfield.gridded.gridded_source import GriddedSource
@@ -310,6 +310,15 @@ def deconvolve(place: Path) -> Iterator[Case]:
     yield Case(("deconvolve", place / "wide.csv", *options, "-o", "out.csv"), found.notes)
 
 
+def goniophotometer(place: Path) -> Iterator[Case]:
+    gonio = et.NearFieldGoniophotometer((30, 120), camera_pixels=16, photometer_distance=200)
+    measured = gonio.measure(place / "led.h5", samples=4)
+    options = ("--positions", "30,120", "--camera-pixels", 16, "--photometer-distance", 200, "--samples", 4)
+    outputs = ("-o", "out.tm25ray", "-o", "out.ies", "-n", 100)
+    notes = (*measured.notes, *measured.intensity().notes, *measured.ray_set(100).notes)
+    yield Case(("goniophotometer", place / "led.h5", *options, *outputs), notes)
+
+
 CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "demo": demo,
     "info": info,
@@ -325,6 +334,7 @@ CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "compare": compare,
     "goniometer": goniometer,
     "deconvolve": deconvolve,
+    "goniophotometer": goniophotometer,
     "cache": None,  # a count of files and their size: nothing that has notes
 }
 """Of each verb: what it is called with, and what Python has to say of the same."""

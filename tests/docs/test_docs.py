@@ -9,7 +9,7 @@ from pathlib import Path
 
 import etendue as et
 import pytest
-from etendue.cli.app import FAMILIES_OF_VERBS, VERBS
+from etendue.cli.verbs import FAMILIES_OF_VERBS, VERBS
 from etendue.description.keys import Description
 from etendue.formats.intensity import INTENSITY_FORMATS
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS

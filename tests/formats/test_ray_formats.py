@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats import rays as package
+from etendue.formats.head import Head
 from etendue.formats.rays import RAY_FORMATS, detect_format, read_rays, write_rays
-from etendue.formats.rays.ray_format import Head, RayFormat
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.quantities.file_records import FileRecords
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_stream import BATCH

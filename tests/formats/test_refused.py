@@ -7,8 +7,8 @@ from pathlib import Path
 import etendue as et
 import pytest
 from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.formats.head import Head
 from etendue.formats.rays import read_rays, write_rays
-from etendue.formats.rays.ray_format import Head
 from etendue.formats.rays.refused import REFUSALS, refuse
 
 BINARY = bytes(range(7, 256)) * 4

@@ -12,8 +12,8 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
+from etendue.formats.head import Head
 from etendue.formats.rays import RAY_FORMATS, read_rays, write_rays
-from etendue.formats.rays.ray_format import Head
 from etendue.quantities.report import RayFileWarning
 
 # File: format, rays, unit, sum over the rays as stored, total of the header.

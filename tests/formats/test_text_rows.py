@@ -10,8 +10,9 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError, EtendueError, FormatError
+from etendue.formats.head import Head
 from etendue.formats.rays import ascii_table, lighttools_text, read_rays, speos_text, text_rows, tracepro, zemax_text
-from etendue.formats.rays.ray_format import Head, RayFormat
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.formats.rays.text_rows import RowLayout, Rows, head_lines, number, read_rows
 
 LAYOUT = RowLayout(fields={"direction": (0, 1, 2), "flux": (3,)}, columns=4, clause="test")

@@ -40,6 +40,11 @@ def wide_lobe() -> et.DirectionalDeconvolution:
     return et.deconvolve_directions(scan, stop=5, regular=False, replicates=4)
 
 
+def near_field() -> et.NearFieldRun:
+    disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
+    return et.NearFieldGoniophotometer(step=(30, 90), camera_pixels=16).measure(et.Scene(sources=[disk]))
+
+
 DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {
     "map": (1, lambda **given: et.plot_map(make_map(), **given)),
     "method": (1, lambda **given: make_map().plot(**given)),
@@ -51,6 +56,7 @@ DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {
     "characteristic": (2, lambda **given: et.plot_characteristic(et.diagnose(make_field(SURFACES["disk"])), **given)),
     "deconvolution": (3, lambda **given: et.plot_deconvolution(lobe(), **given)),
     "directions": (4, lambda **given: et.plot_directions(wide_lobe(), **given)),
+    "near field": (4, lambda **given: et.plot_near_field(near_field(), **given)),
     "bsdf": (3, lambda **given: et.plot_bsdf(et.bsdf.Gaussian(peak=3.0, sigma=0.2), **given)),
     "scene": (2, lambda **given: et.draw_scene(LENS, rays=0, **given)),
 }

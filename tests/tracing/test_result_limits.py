@@ -40,6 +40,16 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def test_a_large_result_is_written_where_it_stands(
+    result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beyond some size a file is not made in memory first: its temporary file is locked, and written all the same."""
+    monkeypatch.setattr("etendue.tracing.storage.IMAGE_LIMIT", 1)
+    TraceResult.load(result).save(tmp_path / "large.h5")
+    before, after = TraceResult.load(result), TraceResult.load(tmp_path / "large.h5")
+    assert (before.rays["all"].position == after.rays["all"].position).all()
+
+
 def instead(place: str, **made: Any) -> Callable[[Any], None]:
     """Another dataset."""
 

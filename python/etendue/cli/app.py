@@ -1,33 +1,13 @@
-"""The program `etendue`: its verbs, and what happens when one of them fails."""
+"""The program `etendue`, and what happens when one of its verbs fails."""
 
 from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable
 from typing import Annotated, cast
 
 import typer
 
-from etendue.cli import (
-    bsdf,
-    cache,
-    compare,
-    convert,
-    deconvolve,
-    demo,
-    draw,
-    filter_,
-    fit,
-    goniometer,
-    info,
-    intensity,
-    luminance,
-    patches,
-    sample,
-    trace,
-)
-from etendue.cli.guard import guarded
 from etendue.cli.stopping import Stop, stoppable
 from etendue.cli.terminal import (
     INTERRUPTED,
@@ -38,40 +18,20 @@ from etendue.cli.terminal import (
     complain_of_usage,
     spell_out_unknown_letters,
 )
+from etendue.cli.verbs import VerbGroup, add_verbs
 from etendue.errors import EtendueError, SceneWarning
 from etendue.formats.input import WaitingWarning
 from etendue.quantities.provenance import version
 from etendue.quantities.report import ChangedFileWarning
 
 app = typer.Typer(
+    cls=VerbGroup,
     help="Luminance maps of light sources and luminaires from ray files, with an error bar in every pixel.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-VERBS: dict[str, Callable[..., None]] = {
-    "demo": demo.demo,
-    "info": info.info,
-    "convert": convert.convert,
-    "fit": fit.fit,
-    "luminance": luminance.luminance,
-    "sample": sample.sample,
-    "intensity": intensity.intensity,
-    "draw": draw.draw,
-    "trace": trace.trace,
-    "patches": patches.patches,
-    "filter": filter_.filter_,
-    "compare": compare.compare,
-    "goniometer": goniometer.goniometer,
-    "deconvolve": deconvolve.deconvolve,
-    "cache": cache.cache,
-}
-for _name, _verb in VERBS.items():
-    app.command(_name)(guarded(_name, _verb))
-FAMILIES_OF_VERBS: dict[str, typer.Typer] = {"bsdf": bsdf.app}
-"""Verbs of two words, by the first."""
-for _name, _family in FAMILIES_OF_VERBS.items():
-    app.add_typer(_family, name=_name)
+add_verbs(app)
 
 
 def _print_version(wanted: bool) -> None:

@@ -2,37 +2,28 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-import numpy as np
 import typer
 
-from etendue.cli.bodies import describe_bodies, print_bodies
-from etendue.cli.field import describe_field, print_field
-from etendue.cli.intensity import print_intensity, summary
-from etendue.cli.maps import describe_map, print_map_file
 from etendue.cli.terminal import complain, print_json, progress_bar, say
-from etendue.cli.trace import print_result
 from etendue.errors import ArgumentError, EtendueError
-from etendue.formats.intensity import detect_intensity_format, read_intensity
-from etendue.formats.maps import is_map_file, read_any_map
-from etendue.formats.maps.map_format import AnyMap
-from etendue.formats.patch_folder import is_patch_folder
-from etendue.formats.rays import detect_format, read_rays
-from etendue.lightfield.gridded.gridded_source import GriddedSource
-from etendue.lightfield.light_field import LightField
-from etendue.lightfield.storage import is_field_file
-from etendue.quantities.illuminance_map import IlluminanceMap
-from etendue.quantities.intensity import Intensity
-from etendue.quantities.luminance_map import LuminanceMap
-from etendue.quantities.ray_set import RaySet
-from etendue.scene.mesh_files import step_bodies
-from etendue.scene.step_files import StepBody
-from etendue.tracing.result import TraceResult
-from etendue.tracing.storage import is_result_file
 
-Found = dict[str, Any] | LightField | GriddedSource | TraceResult | Intensity | AnyMap | list[StepBody]
+if TYPE_CHECKING:
+    import numpy as np
+
+    from etendue.quantities.intensity import Intensity
+    from etendue.quantities.ray_set import RaySet
+
+
+class Found(NamedTuple):
+    """What a file holds: as plain data, and for people."""
+
+    facts: dict[str, Any]
+    show: Callable[[], None]
 
 
 def info(
@@ -57,77 +48,137 @@ def info(
         except (EtendueError, OSError) as error:
             failed = True
             reason = error.strerror if isinstance(error, OSError) else error
-            described.append({"file": str(file), "error": str(reason)})
+            described.append(_plainly({"file": str(file), "error": str(reason)}))
     if json:
-        print_json([_facts(file, d) for file, d in zip(files, described, strict=True)])
+        print_json([found.facts for found in described])
     else:
-        for number, (file, facts) in enumerate(zip(files, described, strict=True)):
+        for number, found in enumerate(described):
             if number:
                 say()
-            if isinstance(facts, LightField):
-                say(f"{file}: light field, {file.stat().st_size / 1000:,.1f} kB")
-                print_field(facts)
-            elif isinstance(facts, GriddedSource):
-                say(f"{file}: {len(facts.patches):,} patches on {facts.surface.surface.spec}")
-                for note in facts.notes:
-                    say(f"  {note}")
-            elif isinstance(facts, Intensity):
-                say(f"{file}: intensity, {file.stat().st_size / 1000:,.1f} kB")
-                print_intensity(facts)
-                for complaint in facts.complaints:
-                    say(f"  {complaint}")
-            elif isinstance(facts, TraceResult):
-                say(f"{file}: result of a trace, {file.stat().st_size / 1000:,.1f} kB")
-                print_result(facts)
-            elif isinstance(facts, LuminanceMap | IlluminanceMap):
-                say(f"{file}: map of {facts.quantity}, {file.stat().st_size / 1000:,.1f} kB")
-                print_map_file(facts)
-            elif isinstance(facts, list):
-                say(f"{file}: STEP, {len(facts)} {'body' if len(facts) == 1 else 'bodies'}")
-                print_bodies(facts)
-            else:
-                _print(facts)
+            found.show()
     if failed:
         raise typer.Exit(1)
 
 
 def _opened(path: Path, photometry: str | None) -> Found:
-    if is_patch_folder(path):
-        return GriddedSource.load(path)
+    """What the file is, looked for from what is quickly recognised to what is read to its end."""
+    # Whoever asks for an intensity file waits for no light fields, scenes or traces to be imported.
+    from etendue.formats.intensity import detect_intensity_format, read_intensity
+
+    if path.is_dir():
+        patches = _patches(path)
+        if patches is not None:
+            return patches
     if detect_intensity_format(path) is not None:
-        return read_intensity(path, photometry)
+        return _intensity(path, read_intensity(path, photometry))
     if photometry is not None:
         raise ArgumentError(f"{path}: --photometry is for intensity files, and this is none.")
-    if is_field_file(path):
-        return LightField.load(path)
-    if is_result_file(path):
-        return TraceResult.load(path)
-    if is_map_file(path):
-        return read_any_map(path)
+    for look in (_light_field, _trace_result, _map, _bodies):
+        found = look(path)
+        if found is not None:
+            return found
+    return _plainly(describe(path))
+
+
+def _found(path: Path, name: str, what: str, facts: dict[str, Any], show: Callable[[], None]) -> Found:
+    """A file with a line that says what it is, its size in it."""
+    size = path.stat().st_size
+
+    def show_all() -> None:
+        say(f"{path}: {what}, {size / 1000:,.1f} kB")
+        show()
+
+    return Found({"file": path, "format": name, "bytes": size} | facts, show_all)
+
+
+def _plainly(facts: dict[str, Any]) -> Found:
+    return Found(facts, lambda: _print(facts))
+
+
+def _patches(path: Path) -> Found | None:
+    from etendue.formats.patch_folder import is_patch_folder
+
+    if not is_patch_folder(path):
+        return None
+    from etendue.lightfield.gridded.gridded_source import GriddedSource
+
+    patches = GriddedSource.load(path)
+
+    def show() -> None:
+        say(f"{path}: {len(patches.patches):,} patches on {patches.surface.surface.spec}")
+        for note in patches.notes:
+            say(f"  {note}")
+
+    size = {"patches": len(patches.patches), "flux_unit": patches.flux_unit}
+    return Found({"file": path, "format": "patches"} | size | patches.facts, show)
+
+
+def _intensity(path: Path, intensity: Intensity) -> Found:
+    from etendue.cli.distributions import describe_intensity, print_intensity
+
+    def show() -> None:
+        print_intensity(intensity)
+        for complaint in intensity.complaints:
+            say(f"  {complaint}")
+
+    facts = describe_intensity(intensity) | {"complaints": [one.to_dict() for one in intensity.complaints]}
+    return _found(path, facts["format"], "intensity", facts, show)
+
+
+def _light_field(path: Path) -> Found | None:
+    from etendue.lightfield.storage import is_field_file
+
+    if not is_field_file(path):
+        return None
+    from etendue.cli.field import describe_field, print_field
+    from etendue.lightfield.light_field import LightField
+
+    field = LightField.load(path)
+    return _found(path, "light field", "light field", describe_field(field), lambda: print_field(field))
+
+
+def _trace_result(path: Path) -> Found | None:
+    from etendue.tracing.storage import is_result_file
+
+    if not is_result_file(path):
+        return None
+    from etendue.cli.trace import print_result
+    from etendue.tracing.result import TraceResult
+
+    result = TraceResult.load(path)
+    return _found(path, "trace result", "result of a trace", result.to_dict(), lambda: print_result(result))
+
+
+def _map(path: Path) -> Found | None:
+    from etendue.formats.maps import is_map_file, read_any_map
+
+    if not is_map_file(path):
+        return None
+    from etendue.cli.maps import describe_map, print_map_file
+
+    found = read_any_map(path)
+    return _found(path, "map", f"map of {found.quantity}", describe_map(found), lambda: print_map_file(found))
+
+
+def _bodies(path: Path) -> Found | None:
+    from etendue.scene.mesh_files import step_bodies
+
     bodies = step_bodies(path)
-    return describe(path) if bodies is None else bodies
+    if bodies is None:
+        return None
+    from etendue.cli.bodies import describe_bodies, print_bodies
 
+    def show() -> None:
+        say(f"{path}: STEP, {len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}")
+        print_bodies(bodies)
 
-def _facts(path: Path, found: Found) -> dict[str, Any]:
-    if isinstance(found, LightField):
-        return {"file": path, "format": "light field", "bytes": path.stat().st_size} | describe_field(found)
-    if isinstance(found, GriddedSource):
-        size = {"patches": len(found.patches), "flux_unit": found.flux_unit}
-        return {"file": path, "format": "patches"} | size | found.facts
-    if isinstance(found, Intensity):
-        told = {"complaints": [complaint.to_dict() for complaint in found.complaints]}
-        return {"file": path, "bytes": path.stat().st_size} | summary(found) | told
-    if isinstance(found, LuminanceMap | IlluminanceMap):
-        return {"file": path, "format": "map", "bytes": path.stat().st_size} | describe_map(found)
-    if isinstance(found, list):
-        return {"file": path, "format": "STEP", "bytes": path.stat().st_size} | describe_bodies(found)
-    if isinstance(found, TraceResult):
-        return {"file": path, "format": "trace result", "bytes": path.stat().st_size} | found.to_dict()
-    return found
+    return Found({"file": path, "format": "STEP", "bytes": path.stat().st_size} | describe_bodies(bodies), show)
 
 
 def describe(path: Path) -> dict[str, Any]:
-    """Everything that `info` prints about one file, as plain data: lengths in mm, wavelengths in nm."""
+    """Everything that `info` prints about one file of rays, as plain data: lengths in mm, wavelengths in nm."""
+    from etendue.formats.rays import detect_format, read_rays
+
     rays = read_rays(path)
     with progress_bar(path.name, len(rays)) as progress:
         moments = rays.moments(progress)
@@ -159,7 +210,7 @@ def describe(path: Path) -> dict[str, Any]:
 
 
 def _mean_direction(weighted: np.ndarray[Any, np.dtype[np.float64]]) -> list[float] | None:
-    length = float(np.linalg.norm(weighted))
+    length = math.hypot(*weighted.tolist())
     return [float(c) / length for c in weighted] if length > 0 else None
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
+from etendue.cli.distributions import describe_intensity, print_intensity
 from etendue.cli.field import complaints_of, read_source
 from etendue.cli.options import Flux, Json, Unit
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, progress_bar, say
@@ -26,11 +26,8 @@ from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
-from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
 from etendue.quantities.intensity_nodes import check_steps
-from etendue.quantities.measured import measured, peak_line
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.spectrum import Spectrum
 
 
 def intensity(
@@ -102,7 +99,9 @@ def intensity(
         else:
             losses += [f"{path}: {note}" for note in write_intensity(path, result, rotate=rotate, mirror=mirror)]
     if json:
-        print_json({"file": file, **summary(shown), "outputs": outputs, "complaints": complaints, "losses": losses})
+        print_json(
+            {"file": file, **describe_intensity(shown), "outputs": outputs, "complaints": complaints, "losses": losses}
+        )
         return
     for line in (*complaints, *(f"note: {note}" for note in losses)):
         complain(line)
@@ -126,54 +125,3 @@ def _source(file: Path, flux: str | None, unit: str | None) -> RaySet | LightFie
             # The name promises intensity, which is what this verb reads: say why the content is none.
             read_intensity(file)
         raise
-
-
-def summary(distribution: Intensity) -> dict[str, Any]:
-    """A distribution in figures, as plain data [its unit, °]."""
-    c, gamma = distribution.peak
-    return {
-        "quantity": distribution.quantity,
-        "unit": distribution.unit,
-        "format": distribution.provenance.format,
-        "flux": distribution.flux,
-        "flux_error": distribution.flux_error,
-        "flux_unit": distribution.flux_unit,
-        "maximum": distribution.maximum,
-        "maximum_error": distribution.maximum_error,
-        "peak_intensity": distribution.peak_intensity,
-        "peak_error": distribution.peak_error,
-        "maximum_at": {"c": c, "gamma": gamma},
-        "symmetry": distribution.symmetry(),
-        "planes": distribution.c.size,
-        "gammas": distribution.gamma.size,
-        "gamma_range": [float(distribution.gamma[0]), float(distribution.gamma[-1])],
-        "luminaire": {name: _plain(fact) for name, fact in distribution.luminaire.items()},
-        "notes": list(distribution.notes),
-    }
-
-
-def _plain(fact: Any) -> Any:
-    return (
-        {"wavelength": fact.wavelength.tolist(), "weight": fact.weight.tolist()} if isinstance(fact, Spectrum) else fact
-    )
-
-
-def print_intensity(distribution: Intensity) -> None:
-    """A distribution in figures, for people."""
-    facts = summary(distribution)
-    low, high = facts["gamma_range"]
-    say(f"{facts['quantity']}, {facts['planes']} planes, {facts['gammas']} angles γ from {low:g}° to {high:g}°")
-    flux = measured(distribution.flux, distribution.flux_error, distribution.flux_unit)
-    say(f"  flux {flux}, symmetry {facts['symmetry']}")
-    say(f"  {peak_line(distribution)}")
-    for name, value in distribution.luminaire.items():
-        if isinstance(value, Spectrum):
-            say(
-                f"  spectrum: {value.wavelength[0]:g} to {value.wavelength[-1]:g} nm, {value.wavelength.size} wavelengths"
-            )
-        elif name not in {"keywords", "lamp_sets", "tilt"}:
-            text = f"{value:.7g}" if isinstance(value, float) else str(value)
-            unit = re.search(r"\[(\w+)\]", LUMINAIRE_FACTS[name])
-            say(f"  {name.replace('_', ' ')}: {text[:100]}{f' {unit[1]}' if unit else ''}")
-    for note in distribution.notes:
-        say(f"  {note}")

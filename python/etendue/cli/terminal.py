@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 import numpy as np
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
 from etendue.errors import ArgumentError, SceneError, UnknownNameError
@@ -131,6 +130,8 @@ def progress_bar(title: str, total: int) -> Iterator[ProgressFunction | None]:
     if not errors.is_terminal:
         yield None
         return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=errors, transient=True) as bar:
         task = bar.add_task(printable(title), total=total)

@@ -243,3 +243,35 @@ class Beam:
         radii, heights = np.append(middle, 1.0), np.append(-np.diff(g), g[-1])
         flux = heights * radii**2
         return 0.5 * self.diameter * radii, flux / flux.sum()
+
+
+def into_the_sample(points: Array, tilts: Array, theta: float, *, across: bool) -> tuple[Array, Array]:
+    """Where rays meet the surface (or pass the plane across the beam) and their directions, shape (n, 3) each.
+
+    Examples
+    --------
+    >>> start, to = into_the_sample(np.array([[1.0, 2.0]]), np.zeros((1, 2)), 60.0, across=False)
+    >>> (start + 0.0).round(3).tolist(), to.round(3).tolist()
+    ([[2.0, 2.0, 0.0]], [[0.866, 0.0, -0.5]])
+    """
+    c, s = np.cos(np.radians(theta)), np.sin(np.radians(theta))
+    axis, first, second = np.array([s, 0.0, -c]), np.array([c, 0.0, s]), np.array([0.0, 1.0, 0.0])
+    v = axis + tilts[:, :1] * first + tilts[:, 1:] * second
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    q = points[:, :1] * first + points[:, 1:] * second
+    if not across:
+        q = q - (q[:, 2] / v[:, 2])[:, None] * v
+    return q, v
+
+
+def axes_of(arm: Array) -> tuple[Array, Array]:
+    """The axes of an aperture on an arm: in the plane of the arm and the normal, and across it.
+
+    Examples
+    --------
+    >>> [axis.round(3).tolist() for axis in axes_of(np.array([0.6, 0.0, 0.8]))]
+    [[0.8, 0.0, -0.6], [-0.0, 1.0, 0.0]]
+    """
+    across = np.hypot(arm[0], arm[1])
+    x, y = (arm[0] / across, arm[1] / across) if across > 1e-12 else (1.0, 0.0)
+    return np.array([arm[2] * x, arm[2] * y, -across]), np.array([-y, x, 0.0])

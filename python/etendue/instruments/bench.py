@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.instruments.beam_and_aperture import Aperture, Beam
+from etendue.instruments.beam_and_aperture import Aperture, Beam, axes_of, into_the_sample
 
 Array = npt.NDArray[np.float64]
 
@@ -107,7 +107,7 @@ class Bench:
         together = max(1, TOGETHER // (len(points) * len(offsets)))
         for at in range(0, len(arms), together):
             d = arms[at : at + together]
-            frames = np.array([frame(one) for one in d])
+            frames = np.array([axes_of(one) for one in d])
             ends = self.distance * d[:, None] + np.einsum("na,iac->inc", offsets, frames)
             off = ends[:, None] - start[None, :, None]
             length = np.linalg.norm(off, axis=-1)
@@ -164,22 +164,3 @@ class Bench:
         beam = Beam(value("beam_diameter"), profile, value("divergence"), value("source_angle"))
         shape: Any = remarks.get("aperture", "disk")
         return cls(beam, Aperture(shape, value("aperture_diameter"), value("inner_diameter")), value("distance"))
-
-
-def into_the_sample(points: Array, tilts: Array, theta: float, *, across: bool) -> tuple[Array, Array]:
-    """Where rays meet the surface (or pass the plane across the beam) and their directions, shape (n, 3) each."""
-    c, s = np.cos(np.radians(theta)), np.sin(np.radians(theta))
-    axis, first, second = np.array([s, 0.0, -c]), np.array([c, 0.0, s]), np.array([0.0, 1.0, 0.0])
-    v = axis + tilts[:, :1] * first + tilts[:, 1:] * second
-    v /= np.linalg.norm(v, axis=1, keepdims=True)
-    q = points[:, :1] * first + points[:, 1:] * second
-    if not across:
-        q = q - (q[:, 2] / v[:, 2])[:, None] * v
-    return q, v
-
-
-def frame(arm: Array) -> tuple[Array, Array]:
-    """The axes of the aperture: in the plane of the arm and the normal, and across it."""
-    across = np.hypot(arm[0], arm[1])
-    x, y = (arm[0] / across, arm[1] / across) if across > 1e-12 else (1.0, 0.0)
-    return np.array([arm[2] * x, arm[2] * y, -across]), np.array([-y, x, 0.0])

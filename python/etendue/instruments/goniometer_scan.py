@@ -374,16 +374,28 @@ def total_scatter(angle: Array, values: Array) -> float:
     """
     if angle.size < 2:
         return 0.0
-    slope = np.gradient(values, angle)
     inner = np.arange(FINE) / FINE
-    h = np.diff(angle)[:, None]
-    u = inner[None, :]
-    cubic = (
-        values[:-1, None] * (1 + 2 * u) * (1 - u) ** 2
-        + slope[:-1, None] * h * u * (1 - u) ** 2
-        + values[1:, None] * u * u * (3 - 2 * u)
-        + slope[1:, None] * h * u * u * (u - 1)
-    )
-    x = np.append((angle[:-1, None] + h * u).ravel(), angle[-1])
-    y = np.append(cubic.ravel(), values[-1])
+    x = np.append((angle[:-1, None] + np.diff(angle)[:, None] * inner).ravel(), angle[-1])
+    y = cubic(angle, values, x)
     return float(np.pi * np.trapezoid(y * np.abs(np.sin(np.radians(x))), np.radians(x)))
+
+
+def cubic(angle: Array, values: Array, at: Array) -> Array:
+    """Values between positions by cubics with the slopes of `numpy.gradient`.
+
+    Examples
+    --------
+    >>> angle = np.arange(5.0)
+    >>> cubic(angle, angle**2, np.array([1.5, 2.0])).tolist()
+    [2.25, 4.0]
+    """
+    slope = np.gradient(values, angle)
+    k = np.clip(np.searchsorted(angle, at, side="right") - 1, 0, angle.size - 2)
+    h = angle[k + 1] - angle[k]
+    u = (at - angle[k]) / h
+    return np.asarray(
+        values[k] * (1 + 2 * u) * (1 - u) ** 2
+        + slope[k] * h * u * (1 - u) ** 2
+        + values[k + 1] * u * u * (3 - 2 * u)
+        + slope[k + 1] * h * u * u * (u - 1)
+    )

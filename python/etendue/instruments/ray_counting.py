@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from etendue.instruments.bench import Bench, frame
+from etendue.instruments.beam_and_aperture import axes_of
+from etendue.instruments.bench import Bench
 
 Array = npt.NDArray[np.float64]
 
@@ -57,7 +58,7 @@ def ray_hits(bench: Bench, start: Array, to: Array, arms: Array, *, behind: bool
     for k, (i, j) in enumerate(zip(*ends, strict=True)):
         if j <= i:
             continue
-        d, (t1, t2) = arms[k], frame(arms[k])
+        d, (t1, t2) = arms[k], axes_of(arms[k])
         sx, sy, sz, px, py, pz = (*s[:, i:j], *p[:, i:j])
         along = (bench.distance - (px * d[0] + py * d[1] + pz * d[2])) / (sx * d[0] + sy * d[1] + sz * d[2])
         x, y, z = px + along * sx, py + along * sy, pz + along * sz

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from etendue.instruments.bench import TOGETHER, Sight, frame
+from etendue.instruments.beam_and_aperture import axes_of
+from etendue.instruments.bench import TOGETHER, Sight
 from etendue.instruments.goniometer_scan import GoniometerScan
 from etendue.instruments.operators import folded
 from etendue.quantities.bsdf_data import direction
@@ -76,7 +77,7 @@ class RoundBlur:
         together = max(1, TOGETHER // len(local))
         for at in range(0, len(arms), together):
             d = arms[at : at + together]
-            frames = np.array([[*frame(one), one] for one in d])
+            frames = np.array([[*axes_of(one), one] for one in d])
             s = np.einsum("nk,ikc->inc", local, frames)
             leaving = s[..., 2] * d[:, None, 2] > 0.0
             weights = np.where(leaving, share * np.abs(s[..., 2]) * self.solid_angle, 0.0)

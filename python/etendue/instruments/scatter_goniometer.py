@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape
-from etendue.instruments.bench import Bench, into_the_sample
+from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape, into_the_sample
+from etendue.instruments.bench import Bench
 from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.goniometer_scan import GoniometerScan, Way
 from etendue.instruments.positions import (
@@ -251,6 +251,57 @@ class ScatterGoniometer:
             notes = (SHARED,)
         return self._noisy(angle, flux, error, seed, incidence=theta, way=way, plane=plane, sample=True, notes=notes)
 
+    def flux_at(
+        self,
+        bsdf: Bsdf,
+        directions: npt.ArrayLike,
+        theta: float = 0.0,
+        rays: int = 10**6,
+        seed: int = 1,
+        *,
+        method: Method = "trace",
+    ) -> tuple[Array, Array]:
+        """Flux in the aperture wherever it stands, before any detector makes noise of it: what `Detector.read` reads.
+
+        Parameters
+        ----------
+        bsdf, theta, rays, seed, method
+            As those of `measure`; all directions count the same rays.
+        directions : array, shape (n, 3)
+            Unit vectors from the spot to the aperture, in front of the sample or behind it; light comes from azimuth 180°.
+
+        Returns
+        -------
+        array, array, shape (n,)
+            Share of the flux of the beam, and its standard error.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> paint = et.bsdf.Lambertian(reflectance=0.5)
+        >>> goniometer = et.ScatterGoniometer()
+        >>> flux, _ = goniometer.flux_at(paint, [[0, 0, 1], [0.8, 0, 0.6]], method="quadrature")
+        >>> (flux / goniometer.solid_angle).round(4).tolist()  # 0.5 cosθ / π
+        [0.1591, 0.0955]
+        """
+        if method not in get_args(Method):
+            raise UnknownNameError("method", method, get_args(Method))
+        _require_incidence(theta)
+        arms = np.asarray(directions, np.float64)
+        if arms.ndim != 2 or arms.shape[1] != 3 or not (np.abs(np.einsum("ij,ij->i", arms, arms) - 1.0) < 1e-6).all():
+            raise ArgumentError("directions are unit vectors, shape (n, 3)")
+        flux, error = np.zeros(len(arms)), np.zeros(len(arms))
+        for behind in (False, True):
+            own = np.flatnonzero((arms[:, 2] < 0.0) == behind)
+            if not own.size:
+                continue
+            if method == "trace":
+                found = self._counted(bsdf, theta, arms[own], rays, seed, behind=behind, fresh=False)
+            else:
+                found = self._integrated(bsdf, theta, arms[own], behind=behind)
+            flux[own], error[own] = found
+        return flux, error
+
     def measure_hemisphere(
         self,
         bsdf: Bsdf,
@@ -271,18 +322,11 @@ class ScatterGoniometer:
         BsdfSlice
             F [1/sr] by eq. 5.1 on a grid of azimuths and angles from the normal, with its standard error.
         """
-        if method not in get_args(Method):
-            raise UnknownNameError("method", method, get_args(Method))
         way = _way(bsdf, way)
-        _require_incidence(theta)
         behind = way == "transmitted"
         grid = hemisphere(step)
-        arms = direction(grid.radial[None, :], grid.azimuth[:, None], behind=behind)
-        flat = arms.reshape(-1, 3)
-        if method == "trace":
-            flux, error = self._counted(bsdf, theta, flat, rays, seed, behind=behind, fresh=False)
-        else:
-            flux, error = self._integrated(bsdf, theta, flat, behind=behind)
+        flat = direction(grid.radial[None, :], grid.azimuth[:, None], behind=behind).reshape(-1, 3)
+        flux, error = self.flux_at(bsdf, flat, theta, rays, seed, method=method)
         flux, error = self._with_noise(flux, error, seed)
         per = self.solid_angle * np.abs(flat[:, 2])
         shape = grid.shape

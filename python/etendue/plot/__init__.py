@@ -10,6 +10,7 @@ from etendue.plot.deconvolution_picture import plot_deconvolution
 from etendue.plot.directional_picture import plot_directions
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
+from etendue.plot.near_field_picture import plot_near_field
 from etendue.plot.scene_picture import draw_scene
 from etendue.plot.threshold_picture import plot_threshold_sweep
 
@@ -23,5 +24,6 @@ __all__ = [
     "plot_directions",
     "plot_intensity",
     "plot_map",
+    "plot_near_field",
     "plot_threshold_sweep",
 ]

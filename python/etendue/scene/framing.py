@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -51,7 +50,7 @@ def framed_screen(compiled: Compiled, observer: Observer, columns: int = 128, ro
     target = np.array(observer.target)
     away = float(np.linalg.norm(observer.position - target))
     reach = np.zeros(2)
-    for corners in _boxes(compiled):
+    for corners in finite_boxes(compiled.record["faces"]) or finite_boxes(compiled.record["sources"]):
         depth = (corners - target) @ normal
         if (depth >= away).any():
             raise ArgumentError(
@@ -65,17 +64,19 @@ def framed_screen(compiled: Compiled, observer: Observer, columns: int = 128, ro
     return Screen(side * columns, side * rows, columns, rows)
 
 
-def _boxes(compiled: Compiled) -> Iterator[Array]:
-    """The corners of the boxes around what has an end, in the world."""
+def finite_boxes(things: list[dict[str, Any]]) -> list[Array]:
+    """The corners in the world of the boxes around those faces or sources that have an end, shape (8, 3) each [mm].
 
-    def finite(things: list[dict[str, Any]]) -> list[Array]:
-        found = []
-        for thing in things:
-            if "shape" not in thing or not np.isfinite(box := box_of(thing["shape"])).all():
-                continue
-            origin, x, y, z = np.array(thing["frame"]).reshape(4, 3)
-            corners = np.array(list(itertools.product(*box.T)))
-            found.append(origin + corners @ np.array([x, y, z]))
-        return found
-
-    yield from finite(compiled.record["faces"]) or finite(compiled.record["sources"])
+    Parameters
+    ----------
+    things : list of records
+        ``compiled.record["faces"]`` or ``["sources"]``.
+    """
+    found = []
+    for thing in things:
+        if "shape" not in thing or not np.isfinite(box := box_of(thing["shape"])).all():
+            continue
+        origin, x, y, z = np.array(thing["frame"]).reshape(4, 3)
+        corners = np.array(list(itertools.product(*box.T)))
+        found.append(origin + corners @ np.array([x, y, z]))
+    return found

@@ -97,7 +97,8 @@ def save_result(plan: Plan, sums: Sums, path: Path) -> None:
             temporary.write_bytes(image.getbuffer())
         else:
             require_room(path, size)
-            with h5py.File(temporary, "w", libver=LIBRARY) as file:
+            # The temporary file is locked already: that no other process takes it for one that was left behind.
+            with h5py.File(temporary, "w", libver=LIBRARY, locking=False) as file:
                 _write(file, plan, sums, path.parent)
 
 

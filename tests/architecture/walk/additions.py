@@ -208,8 +208,11 @@ ADDITIONS: dict[str, Addition] = {
         "peak",
         {f"{VERBS}/peak.py": "peak.py"},
         (
-            Insertion(f"{VERBS}/app.py", "    patches,\n", "    peak,\n"),
-            Insertion(f"{VERBS}/app.py", '    "cache": cache.cache,\n', '    "peak": peak.peak,\n'),
+            Insertion(
+                f"{VERBS}/verbs.py",
+                '    "cache": "etendue.cli.cache:cache",\n',
+                '    "peak": "etendue.cli.peak:peak",\n',
+            ),
             Insertion(
                 "tests/cli/test_cli_notes.py",
                 '    yield Case(("demo", "--rays", 100_000, "-o", "out.png"), lmap.notes)\n',

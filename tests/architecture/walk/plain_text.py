@@ -10,7 +10,8 @@ import re
 from pathlib import Path
 
 from etendue.errors import FormatError
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.head import Head, file_provenance
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.formats.rays.shared import FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.text_output import usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, head_lines, read_rows

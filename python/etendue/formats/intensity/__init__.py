@@ -7,11 +7,11 @@ from pathlib import Path
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.encodings import refuse_unmarked
+from etendue.formats.head import Head
 from etendue.formats.input import as_path, is_stream, require_file
 from etendue.formats.intensity import eulumdat, gldf, lm63, tm33
 from etendue.formats.intensity.intensity_format import IntensityFormat
 from etendue.formats.output import atomic_output
-from etendue.formats.rays.ray_format import Head
 from etendue.quantities.intensity import Intensity
 
 INTENSITY_FORMATS: dict[str, IntensityFormat] = {

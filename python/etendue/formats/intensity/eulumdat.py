@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import FormatError
+from etendue.formats.head import Head, file_provenance
 from etendue.formats.intensity.eulumdat_writer import write
 from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_lines, scaled
 from etendue.formats.intensity.symmetry import Array, unfolded
-from etendue.formats.rays.ray_format import Head, file_provenance
 from etendue.quantities.intensity import Intensity, Symmetry
 from etendue.quantities.report import Complaint, Severity
 from etendue.units import LUMENS_PER_KILOLUMEN

@@ -12,9 +12,9 @@ from tempfile import TemporaryDirectory
 
 from etendue.errors import FormatError, UnknownNameError, UnsupportedFormatError
 from etendue.formats.archive import Archive
+from etendue.formats.head import Head, file_provenance
 from etendue.formats.intensity import eulumdat, lm63, tm33
 from etendue.formats.intensity.intensity_format import DAMAGED, MOST_BYTES, IntensityFormat
-from etendue.formats.rays.ray_format import Head, file_provenance
 from etendue.formats.xml_tree import Element, parse_xml
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.report import Complaint

@@ -11,8 +11,8 @@ import numpy as np
 
 from etendue.errors import FormatError
 from etendue.formats.encodings import decoded
+from etendue.formats.head import Head
 from etendue.formats.intensity.symmetry import Array
-from etendue.formats.rays.ray_format import Head
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.measured import measured, measured_peak
 

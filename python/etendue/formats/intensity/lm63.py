@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError
+from etendue.formats.head import Head, file_provenance
 from etendue.formats.intensity.goniometer import Kind, in_c_gamma
 from etendue.formats.intensity.intensity_format import (
     DAMAGED,
@@ -24,7 +25,6 @@ from etendue.formats.intensity.intensity_format import (
 from etendue.formats.intensity.lm63_writer import write
 from etendue.formats.intensity.opening import opening_facts
 from etendue.formats.intensity.symmetry import Array, from_sector
-from etendue.formats.rays.ray_format import Head, file_provenance
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.report import Complaint, Severity
 from etendue.units import INTENSITY_UNIT, WATTS_PER_FILE_UNIT, FluxUnit

@@ -10,10 +10,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError, UnsupportedFormatError
+from etendue.formats.head import Head, file_provenance
 from etendue.formats.intensity.goniometer import in_c_gamma
 from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_bytes, scaled
 from etendue.formats.intensity.symmetry import Array, from_sector, sum_of
-from etendue.formats.rays.ray_format import Head, file_provenance
 from etendue.formats.xml_tree import Element, parse_xml
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.report import Complaint, Severity

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.encodings import in_utf8, refuse_unmarked
+from etendue.formats.head import Head
 from etendue.formats.input import as_path, at_rest, is_stream, require_readable, stream_in_file
 from etendue.formats.output import atomic_output
 from etendue.formats.rays import (
@@ -23,7 +24,7 @@ from etendue.formats.rays import (
     zemax,
     zemax_text,
 )
-from etendue.formats.rays.ray_format import Head, RayFormat
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 from etendue.units import FluxUnit

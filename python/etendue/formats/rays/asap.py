@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import FormatError
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, stored_records
+from etendue.formats.head import Head, file_provenance
+from etendue.formats.rays.ray_format import RayFormat, stored_records
 from etendue.formats.rays.shared import (
     RayColour,
     losses,

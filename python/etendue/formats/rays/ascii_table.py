@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import NoReturn
 
 from etendue.errors import FormatError
+from etendue.formats.head import Head, file_provenance
 from etendue.formats.rays.column_names import ColumnName, column_name
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.formats.rays.shared import FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.text_output import geometry, usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows, whole

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from etendue.formats.head import Head
 from etendue.formats.rays.index_file import MAGIC
-from etendue.formats.rays.ray_format import Head, RayFormat
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.formats.rays.ray_index import RayIndex, write_index
 from etendue.quantities.ray_stream import RayStream
 

@@ -17,8 +17,9 @@ import numpy as np
 
 from etendue import _core
 from etendue.errors import ArgumentError, FormatError
+from etendue.formats.head import file_provenance
 from etendue.formats.rays.index_building import SIDES, Counted, IndexTables, Records, leaf_count
-from etendue.formats.rays.ray_format import file_provenance, stored_records
+from etendue.formats.rays.ray_format import stored_records
 from etendue.formats.rays.shared import read_bytes
 from etendue.formats.strict_json import strict_json
 from etendue.quantities.file_records import AnyRecords

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.formats.head import Head, file_provenance
 from etendue.formats.rays.lighttools_colour import (
     NO_COLOUR,
     TRISTIMULUS,
@@ -21,7 +22,7 @@ from etendue.formats.rays.lighttools_colour import (
     colour_losses,
     held_colour,
 )
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance, stored_records
+from etendue.formats.rays.ray_format import RayFormat, stored_records
 from etendue.formats.rays.shared import (
     RayColour,
     Records,

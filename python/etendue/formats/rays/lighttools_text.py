@@ -14,6 +14,7 @@ from typing import NoReturn
 import numpy as np
 
 from etendue.errors import FormatError
+from etendue.formats.head import Head, file_provenance
 from etendue.formats.rays.lighttools_colour import (
     NO_COLOUR,
     TRISTIMULUS,
@@ -22,7 +23,7 @@ from etendue.formats.rays.lighttools_colour import (
     colour_losses,
     held_colour,
 )
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.formats.rays.shared import FloatArray, RayColour, own_rows, wavelength_complaints
 from etendue.formats.rays.text_output import geometry, usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows

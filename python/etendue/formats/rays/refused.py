@@ -9,7 +9,7 @@ import dataclasses
 from pathlib import PurePath
 
 from etendue.errors import UnsupportedFormatError
-from etendue.formats.rays.ray_format import Head
+from etendue.formats.head import Head
 
 OTHER_EXPORT = (
     "Its layout is not public. Ask for the same rays as TM-25 (.tm25ray), LightTools (.ray) or Zemax (.dat, .sdf); LED "

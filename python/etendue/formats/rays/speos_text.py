@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from etendue.errors import FormatError
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.head import Head, file_provenance
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.formats.rays.shared import FloatArray, RayColour, losses, wavelength_complaints
 from etendue.formats.rays.speos import in_watts
 from etendue.formats.rays.text_output import usable_rays, write_rows

@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.formats.head import Head
 from etendue.formats.input import shortened
-from etendue.formats.rays.ray_format import Head
 from etendue.quantities.report import Complaint, Severity
 from etendue.quantities.spool import spool
 

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from etendue.errors import FormatError
-from etendue.formats.rays.ray_format import Head, RayFormat, file_provenance
+from etendue.formats.head import Head, file_provenance
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.formats.rays.shared import FloatArray, RayColour, losses
 from etendue.formats.rays.text_output import usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows, whole

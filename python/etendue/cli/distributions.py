@@ -1,0 +1,62 @@
+"""Intensity distributions, as the verbs tell them."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from etendue.cli.terminal import say
+from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
+from etendue.quantities.measured import measured, peak_line
+from etendue.quantities.spectrum import Spectrum
+
+
+def describe_intensity(distribution: Intensity) -> dict[str, Any]:
+    """A distribution in figures, as plain data [its unit, °]."""
+    c, gamma = distribution.peak
+    return {
+        "quantity": distribution.quantity,
+        "unit": distribution.unit,
+        "format": distribution.provenance.format,
+        "flux": distribution.flux,
+        "flux_error": distribution.flux_error,
+        "flux_unit": distribution.flux_unit,
+        "maximum": distribution.maximum,
+        "maximum_error": distribution.maximum_error,
+        "peak_intensity": distribution.peak_intensity,
+        "peak_error": distribution.peak_error,
+        "maximum_at": {"c": c, "gamma": gamma},
+        "symmetry": distribution.symmetry(),
+        "planes": distribution.c.size,
+        "gammas": distribution.gamma.size,
+        "gamma_range": [float(distribution.gamma[0]), float(distribution.gamma[-1])],
+        "luminaire": {name: _plain(fact) for name, fact in distribution.luminaire.items()},
+        "notes": list(distribution.notes),
+    }
+
+
+def _plain(fact: Any) -> Any:
+    return (
+        {"wavelength": fact.wavelength.tolist(), "weight": fact.weight.tolist()} if isinstance(fact, Spectrum) else fact
+    )
+
+
+def print_intensity(distribution: Intensity) -> None:
+    """A distribution in figures, for people."""
+    facts = describe_intensity(distribution)
+    low, high = facts["gamma_range"]
+    say(f"{facts['quantity']}, {facts['planes']} planes, {facts['gammas']} angles γ from {low:g}° to {high:g}°")
+    flux = measured(distribution.flux, distribution.flux_error, distribution.flux_unit)
+    say(f"  flux {flux}, symmetry {facts['symmetry']}")
+    say(f"  {peak_line(distribution)}")
+    for name, value in distribution.luminaire.items():
+        if isinstance(value, Spectrum):
+            say(
+                f"  spectrum: {value.wavelength[0]:g} to {value.wavelength[-1]:g} nm, {value.wavelength.size} wavelengths"
+            )
+        elif name not in {"keywords", "lamp_sets", "tilt"}:
+            text = f"{value:.7g}" if isinstance(value, float) else str(value)
+            unit = re.search(r"\[(\w+)\]", LUMINAIRE_FACTS[name])
+            say(f"  {name.replace('_', ' ')}: {text[:100]}{f' {unit[1]}' if unit else ''}")
+    for note in distribution.notes:
+        say(f"  {note}")

@@ -1,0 +1,1 @@
+"""The virtual near-field goniophotometer: a camera and a photometer on an arm that moves around a lamp."""

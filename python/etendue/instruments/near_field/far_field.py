@@ -1,0 +1,90 @@
+"""Whether a photometer at some distance sees the far field of a lamp."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.instruments.near_field.setting import Setting
+
+Array = npt.NDArray[np.float64]
+
+FAR = 15.0
+"""Sizes of the lamp from which a photometer stands in its far field [CIE121]_; the default distance."""
+
+ROUNDED = 0.06
+"""By which share the distance may be less: it is rounded to two digits."""
+
+NARROW = 0.01
+"""Error of the photometer's peak intensity from which the beam is called too narrow for its distance."""
+
+LOWERED = math.log(2.0) / 2.0
+"""Of the peak of a Gaussian beam of full width w, by an even disk that is seen under β: this times (β/w)².
+
+Each point of the disk sends its beam past the photometer by up to β/2; the mean square of that is β²/8, and the peak falls
+by the mean of 4 ln 2 (angle/w)².
+"""
+
+STEPS_PER_BEAM = 3.0
+"""Positions that a beam should have within its width."""
+
+
+def far_field_notes(setting: Setting, values: Array) -> Iterator[str]:
+    """What is to be said of intensities by a photometer.
+
+    Parameters
+    ----------
+    setting : Setting
+        Of the measurement.
+    values : array, shape (planes, rings)
+        Illuminance times the square of the distance.
+    """
+    size, distance = setting.lamp_size, setting.photometer_distance
+    if distance < FAR * size * (1.0 - ROUNDED):
+        yield (
+            f"the photometer stands {distance / size:.3g} times the lamp's size of {size:.4g} mm away; from {FAR:g} times "
+            "on its intensities are those of the far field"
+        )
+    plane, ring = np.unravel_index(int(np.argmax(values)), values.shape)
+    width = full_width(setting.positions.rings, values[plane], int(ring))
+    seen = math.degrees(size / distance)
+    lowered = LOWERED * (seen / width) ** 2
+    if lowered > NARROW:
+        yield (
+            f"the beam is {width:.3g}° wide and the lamp is seen under {seen:.3g}°: the peak by the photometer is too low "
+            f"by some {min(lowered, 1.0):.0%}; the intensity distribution of the rays has no such error"
+        )
+    step = setting.positions.step_gamma
+    if width < STEPS_PER_BEAM * step:
+        yield f"the beam is {width:.3g}° wide, and positions are {step:g}° apart: take smaller steps"
+
+
+def full_width(rings: Array, profile: Array, peak: int) -> float:
+    """Full width of a beam at half its maximum along γ [°]; past a pole it goes on as on this side.
+
+    Parameters
+    ----------
+    rings, profile : array, shape (n,)
+        γ [°] and intensity.
+    peak : int
+        Where that is largest.
+
+    Examples
+    --------
+    >>> full_width(np.array([0.0, 10, 20, 30]), np.array([8.0, 6, 2, 0]), 0)
+    30.0
+    """
+    half = profile[peak] / 2.0
+    sides = []
+    for some, at in ((profile[peak:], rings[peak:]), (profile[peak::-1], rings[peak::-1])):
+        below = np.flatnonzero(some < half)
+        if below.size:
+            i = int(below[0])
+            share = (some[i - 1] - half) / (some[i - 1] - some[i])
+            sides.append(abs(at[i - 1] + share * (at[i] - at[i - 1]) - rings[peak]))
+    if not sides:
+        return math.inf
+    return float(sum(sides)) if len(sides) == 2 else 2.0 * float(sides[0])

@@ -1,0 +1,184 @@
+"""`ArmPositions`: where the arm of a goniophotometer of type C stops, and what each stop counts for."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError
+
+Array = npt.NDArray[np.float64]
+
+FINEST = 0.1
+"""Smallest step [°]: 6.5 million positions."""
+
+COARSEST = 30.0
+"""Largest step in γ [°]: with larger ones the pole would count for less than nothing."""
+
+NODES = 12
+"""Of the Gauss-Legendre rule between two positions; it integrates a cubic times sin γ to 10⁻¹⁶."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ArmPositions:
+    """Stops in even steps of γ and C over the whole sphere; one at each pole, where C has no meaning.
+
+    Parameters
+    ----------
+    step_gamma, step_c : number
+        [°]; steps of γ go into 90°, steps of C into 360°.
+
+    Raises
+    ------
+    ArgumentError
+        If a step does not, is smaller than 0.1° or larger than 30° and 120°.
+
+    Examples
+    --------
+    >>> stops = ArmPositions(30, 90)
+    >>> len(stops), stops.gamma[:3].tolist(), stops.c[:3].tolist()
+    (22, [0.0, 30.0, 30.0], [0.0, 0.0, 90.0])
+    >>> round(float(stops.weight.sum() / np.pi), 9)
+    4.0
+    """
+
+    step_gamma: float
+    step_c: float
+
+    def __post_init__(self) -> None:
+        for name, step, whole in (("γ", self.step_gamma, 90.0), ("C", self.step_c, 360.0)):
+            parts = whole / step if step > 0.0 else np.nan
+            if not step >= FINEST or abs(parts - round(parts)) > 1e-9 * parts:
+                raise ArgumentError(
+                    f"a step of {step:g}° in {name}: {whole:g}° must be a whole number of steps, of {FINEST:g}° at least; "
+                    "give 10, 5, 2.5 or 1, for instance."
+                )
+        if self.step_c > 120.0 or self.step_gamma > COARSEST:
+            raise ArgumentError(
+                f"steps of {self.step_gamma:g}° in γ and {self.step_c:g}° in C; give {COARSEST:g}° and 120° at most."
+            )
+
+    @property
+    def rings(self) -> Array:
+        """γ of each ring of positions [°], both poles among them."""
+        return self.step_gamma * np.arange(2 * round(90.0 / self.step_gamma) + 1, dtype=np.float64)
+
+    @property
+    def planes(self) -> Array:
+        """C of each plane [°]."""
+        count = round(360.0 / self.step_c)
+        return (360.0 / count) * np.arange(count, dtype=np.float64)
+
+    def __len__(self) -> int:
+        """Number of positions."""
+        return 2 + (self.rings.size - 2) * self.planes.size
+
+    @property
+    def gamma(self) -> Array:
+        """Of each position [°], shape (n,): ring by ring."""
+        return np.concatenate([[0.0], np.repeat(self.rings[1:-1], self.planes.size), [180.0]])
+
+    @property
+    def c(self) -> Array:
+        """Of each position [°], shape (n,)."""
+        return np.concatenate([[0.0], np.tile(self.planes, self.rings.size - 2), [0.0]])
+
+    @property
+    def weight(self) -> Array:
+        """Solid angle that each position counts for [sr], shape (n,): 4π together.
+
+        Sums with them are integrals over the sphere of what is even in C and, in γ, a cubic spline above the horizon and
+        another below it. Most lamps send light to one side only, so that their light has a kink at 90°.
+        """
+        ring = 2.0 * np.pi * _spline_integrals(self.rings)
+        inner = np.repeat(ring[1:-1] / self.planes.size, self.planes.size)
+        return np.concatenate([ring[:1], inner, ring[-1:]])
+
+    def table(self, values: Array) -> Array:
+        """Values of the positions as a table, shape (planes, rings)."""
+        inner = values[1:-1].reshape(self.rings.size - 2, self.planes.size).T
+        ends = np.ones((self.planes.size, 1))
+        return np.hstack([values[0] * ends, inner, values[-1] * ends])
+
+    def nearest(self, gamma: float, c: float) -> int:
+        """The position closest to a direction."""
+        towards = _directions(np.array([gamma]), np.array([c]))[0]
+        return int(np.argmax(_directions(self.gamma, self.c) @ towards))
+
+    def drawn(self, stops: npt.NDArray[np.intp], rng: np.random.Generator) -> Array:
+        """A direction near each of some positions, drawn with the weight that they have in between, shape (n, 3).
+
+        That weight falls linearly to the neighbours, in γ and in C: a light that is constant stays so, and any other is
+        linear between positions.
+        """
+        gamma_of, n = self.gamma[stops], len(stops)
+        gamma = np.zeros(n)
+        left = np.arange(n)
+        while left.size:
+            middle = gamma_of[left]
+            trial = np.abs(middle + self.step_gamma * (rng.random(left.size) - rng.random(left.size)))
+            trial = np.where(trial > 180.0, 360.0 - trial, trial)
+            top = np.where(np.abs(middle - 90.0) <= self.step_gamma, 90.0, 0.0)
+            edge = np.where(middle < 90.0, middle + self.step_gamma, middle - self.step_gamma)
+            largest = np.sin(np.radians(np.where(top > 0.0, top, edge)))
+            taken = rng.random(left.size) * largest < np.sin(np.radians(trial))
+            gamma[left[taken]] = trial[taken]
+            left = left[~taken]
+        pole = (gamma_of == 0.0) | (gamma_of == 180.0)
+        c = self.c[stops] + self.step_c * (rng.random(n) - rng.random(n))
+        c = np.where(pole, 360.0 * rng.random(n), c)
+        return _directions(gamma, c)
+
+
+def _directions(gamma: Array, c: Array) -> Array:
+    g, a = np.radians(gamma), np.radians(c)
+    return np.stack([np.sin(g) * np.cos(a), np.sin(g) * np.sin(a), np.cos(g)], axis=1)
+
+
+def _spline_integrals(rings: Array) -> Array:
+    """∫ s(γ) sin γ dγ as weights of the values at the rings; s: one cubic spline above 90°, one below.
+
+    At a pole its slope is zero, since what is averaged over C is even in γ; at 90° its third derivative is continuous
+    across the last position ("not a knot").
+    """
+    count = (rings.size - 1) // 2
+    half = _half_integrals(np.radians(rings[: count + 1]))
+    weights = np.zeros(rings.size)
+    weights[: count + 1] += half
+    weights[count:] += half[::-1]
+    return weights
+
+
+def _half_integrals(x: Array) -> Array:
+    """For positions from the pole to 90° [rad]."""
+    n = x.size - 1
+    h = x[1] - x[0]
+    # Slopes d of the spline from its values y: A d = B y.
+    a, b = np.zeros((n + 1, n + 1)), np.zeros((n + 1, n + 1))
+    a[0, 0] = 1.0
+    for i in range(1, n):
+        a[i, i - 1 : i + 2] = 1.0, 4.0, 1.0
+        b[i, i - 1], b[i, i + 1] = -3.0 / h, 3.0 / h
+    if n == 1:
+        a[1, :], b[1, :] = (1.0, 1.0), (-2.0 / h, 2.0 / h)  # a parabola
+    else:
+        a[n, n - 2], a[n, n] = -1.0, 1.0
+        b[n, n - 2 :] = 2.0 / h, -4.0 / h, 2.0 / h
+    slopes = np.linalg.solve(a, b)
+    nodes, factors = np.polynomial.legendre.leggauss(NODES)
+    t = 0.5 * (nodes + 1.0)
+    hermite = np.stack([
+        (1 + 2 * t) * (1 - t) ** 2,
+        t * (1 - t) ** 2 * h,
+        t**2 * (3 - 2 * t),
+        t**2 * (t - 1) * h,
+    ])  # fmt: skip
+    weights = np.zeros(n + 1)
+    for i in range(n):
+        left, left_slope, right, right_slope = hermite @ (0.5 * h * factors * np.sin(x[i] + h * t))
+        weights[i] += left
+        weights[i + 1] += right
+        weights += left_slope * slopes[i] + right_slope * slopes[i + 1]
+    return weights
