@@ -29,12 +29,14 @@ GROUPS = {
     "Scatter": ("bsdf", "Bsdf", "BsdfTable", "Scans", "read_bsdf", "read_scans", "write_bsdf"),
     "Instruments": (
         "ScatterGoniometer", "GoniometerScan", "read_goniometer_scan", "Detector", "Baffle", "deconvolve", "Deconvolution",
-        "revolved", "agreement", "Agreement", "NearFieldGoniophotometer", "NearFieldRun",
+        "revolved", "agreement", "Agreement", "NearFieldGoniophotometer", "NearFieldRun", "DirectionalScan",
+        "read_directional_scan", "deconvolve_directions", "DirectionalDeconvolution", "bsdf_table",
     ),
     "Intensity and spectra": ("intensity_distribution", "Intensity", "read_intensity", "write_intensity", "Spectrum"),
     "Pictures": (
         "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",
-        "plot_threshold_sweep", "plot_bsdf", "plot_deconvolution", "plot_near_field", "draw_scene", "view",
+        "plot_threshold_sweep", "plot_bsdf", "plot_deconvolution", "plot_directions", "plot_near_field", "draw_scene",
+        "view",
     ),
     "Errors and warnings": tuple(name for name in et.__all__ if name.endswith(("Error", "Warning"))),
 }  # fmt: skip

@@ -24,7 +24,10 @@ from etendue.goniophotometry.threshold_sweep import threshold_sweep
 from etendue.instruments.agreement import Agreement, agreement
 from etendue.instruments.deconvolution import Deconvolution, deconvolve
 from etendue.instruments.detectors import Baffle, Detector
+from etendue.instruments.directional_deconvolution import DirectionalDeconvolution, deconvolve_directions
+from etendue.instruments.directional_scan import DirectionalScan, read_directional_scan
 from etendue.instruments.goniometer_scan import GoniometerScan, read_goniometer_scan
+from etendue.instruments.lobe_table import bsdf_table
 from etendue.instruments.near_field.goniophotometer import NearFieldGoniophotometer
 from etendue.instruments.near_field.run import NearFieldRun
 from etendue.instruments.revolved import revolved
@@ -47,6 +50,7 @@ from etendue.plot import (
     plot_comparison,
     plot_cross_sections,
     plot_deconvolution,
+    plot_directions,
     plot_intensity,
     plot_map,
     plot_near_field,
@@ -84,6 +88,8 @@ __all__ = [
     "Cylinder",
     "Deconvolution",
     "Detector",
+    "DirectionalDeconvolution",
+    "DirectionalScan",
     "Disk",
     "Dome",
     "EtendueError",
@@ -127,12 +133,14 @@ __all__ = [
     "WaitingWarning",
     "agreement",
     "bsdf",
+    "bsdf_table",
     "cache_content",
     "clear_cache",
     "combine_maps",
     "compare",
     "cross_section",
     "deconvolve",
+    "deconvolve_directions",
     "denoise_map",
     "diagnose",
     "draw_scene",
@@ -145,11 +153,13 @@ __all__ = [
     "plot_comparison",
     "plot_cross_sections",
     "plot_deconvolution",
+    "plot_directions",
     "plot_intensity",
     "plot_map",
     "plot_near_field",
     "plot_threshold_sweep",
     "read_bsdf",
+    "read_directional_scan",
     "read_goniometer_scan",
     "read_illuminance_map",
     "read_intensity",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from etendue.errors import MissingLibraryError
 
@@ -36,7 +36,7 @@ class Extra(NamedTuple):
 EXTRAS: dict[str, Extra] = {
     "matplotlib": Extra("plot", "pictures", (".png", ".pdf")),
     "cascadio": Extra("step", "STEP files"),
-    "scipy": Extra("scans", "interpolations of scattered points"),
+    "scipy": Extra("scans", "interpolations of scattered points and scans in two dimensions"),
     "xlrd": Extra("xls", "workbooks of goniometers"),
     "anywidget": Extra("notebook", "pages in notebooks"),
     "xarray": Extra("xarray", "datasets of xarray"),
@@ -64,6 +64,23 @@ def require(library: str) -> ModuleType:
             raise
         extra = EXTRAS[library]
         raise MissingLibraryError(library, extra.purpose, extra.name) from None
+
+
+def scipy_part(name: str) -> Any:
+    """Import a part of SciPy, which states no types.
+
+    Raises
+    ------
+    MissingLibraryError
+        If it is not installed.
+
+    Examples
+    --------
+    >>> scipy_part("sparse").__name__
+    'scipy.sparse'
+    """
+    require("scipy")
+    return importlib.import_module(f"scipy.{name}")
 
 
 def require_for(path: Path) -> None:

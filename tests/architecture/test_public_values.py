@@ -47,6 +47,11 @@ def scan() -> et.GoniometerScan:
     return et.GoniometerScan(angle, np.exp(-(angle**2)), notes=("by hand",))
 
 
+def wide_scan() -> et.DirectionalScan:
+    sample = et.bsdf.Gaussian(peak=200.0, sigma=0.012)
+    return et.ScatterGoniometer(photons=1e6).measure_window(sample, 60, step=1, span=3, method="quadrature")
+
+
 def lobe() -> et.GoniometerScan:
     return dataclasses.replace(scan(), solid_angle=1e-3)
 
@@ -63,6 +68,8 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "Baffle": lambda: et.Baffle(24, 200),
     "Cone": lambda: et.Cone(acceptance="auto"),
     "Deconvolution": lambda: et.deconvolve(scan(), et.GoniometerScan(scan().angle, scan().flux ** 4), stop=5),
+    "DirectionalDeconvolution": lambda: et.deconvolve_directions(wide_scan(), stop=5, regular=False, replicates=2),
+    "DirectionalScan": wide_scan,
     "Detector": lambda: et.Detector(1e9, 1e5, filters=[1, 0.1], longest=2.0),
     "FromField": lambda: et.FromField(surface=et.Disk(radius=30), samples=4),
     "GoniometerScan": scan,

@@ -50,3 +50,57 @@ def test_mistakes_are_told_and_nothing_is_written(run: Run) -> None:
     assert "scan to larger angles" in told.err
     assert run("deconvolve", "scan.csv", "--instrument", "scan.csv", "--stop", "heldout").status == 2
     assert not Path("true.csv").exists()
+
+
+BRUSHED = """kind = "mixture"
+parts = [{kind = "gaussian", peak = 60.0, sigma = 0.008, aspect = 2.0}, {kind = "lambertian", reflectance = 0.3}]
+"""
+
+
+@pytest.mark.slow
+def test_a_brushed_sample_is_measured_in_two_dimensions_and_comes_back(run: Run) -> None:
+    """The instrument is told by the file, by options, or by a scan of its bare beam."""
+    Path("brushed.toml").write_text(BRUSHED)
+    place = ("--window", "--incidence", "60", "--turn", "30", "--step", "1", "--span", "5", "--head", "60")
+    told = run("goniometer", "brushed.toml", *place, "--photons", "1e6", "--method", "quadrature", "-o", "scan.csv")
+    assert told.status == 0, told.err
+    assert "121 positions in two dimensions" in told.out
+    outputs = ("-o", "true.csv", "-o", "true.png")
+    found = run("deconvolve", "scan.csv", "--method", "parametric", *outputs, "--json")
+    assert found.status == 0, found.err
+    facts = json.loads(found.out)
+    assert abs(facts["peak"] - 60.1) < 4 * facts["peak_error"]
+    assert facts["peak_before"] < 50
+    assert facts["model"]["parts"][0]["kind"] == "gaussian"
+    assert Path("true.png").stat().st_size > 10_000
+    assert "# regular_share = 0.0" in Path("true.csv").read_text()
+    text = Path("scan.csv").read_text()
+    Path("bare.csv").write_text("".join(line for line in text.splitlines(True) if "diameter" not in line))
+    unknown = run("deconvolve", "bare.csv")
+    assert unknown.status == 1
+    assert "instrument is not known" in unknown.err
+    short = ("--stop", "5", "--regular", "0", "--replicates", "0", "--json")
+    stated = run("deconvolve", "bare.csv", "--aperture", "25", "--beam", "14", "--distance", "886", *short)
+    run("goniometer", "--no-sample", "-o", "signature.csv")
+    signed = run("deconvolve", "bare.csv", "--instrument", "signature.csv", *short)
+    peaks = [json.loads(one.out)["peak"] for one in (stated, signed)]
+    assert peaks[1] == pytest.approx(peaks[0], rel=0.02)
+
+
+def test_options_of_the_other_kind_of_scan_are_refused(run: Run) -> None:
+    Path("brushed.toml").write_text(BRUSHED)
+    assert run("goniometer", "brushed.toml", "--outside", "10").status == 2
+    assert run("goniometer", "--no-sample", "--window").status == 2
+    assert run("goniometer", "brushed.toml", "--window", "--plane", "cross-plane").status == 2
+    Path("flat.csv").write_text("angle,flux\n" + "".join(f"{k / 10},{1 / (1 + k * k)}\n" for k in range(-50, 51)))
+    Path("wide.csv").write_text("theta_s,phi_s,flux\n" + "".join(f"{30 + k},0,1\n{30 + k},5,2\n" for k in range(9)))
+    for call, told in (
+        (("flat.csv", "--instrument", "flat.csv", "--cell", "0.5"), "two dimensions"),
+        (("flat.csv", "--instrument", "flat.csv", "--method", "parametric"), "two dimensions"),
+        (("flat.csv",), "state --instrument"),
+        (("wide.csv", "--operator", "slice"), "one plane"),
+        (("wide.csv", "--aperture", "25"), "all three"),
+    ):
+        refused = run("deconvolve", *call)
+        assert refused.status == 1
+        assert told in refused.err

@@ -292,12 +292,22 @@ def goniometer(place: Path) -> Iterator[Case]:
     scan = et.ScatterGoniometer().measure(DIFFUSER, step=0.5, span=5, rays=20_000)
     call = ("goniometer", place / "diffuser.toml", "--step", 0.5, "--span", 5, "--rays", 20_000, "-o", "out.csv")
     yield Case(call, scan.notes)
+    wide = et.ScatterGoniometer().measure_window(DIFFUSER, step=1, span=3, rays=20_000)
+    call = ("goniometer", place / "diffuser.toml", "--window", "--step", 1, "--span", 3, "--rays", 20_000)
+    yield Case(call, wide.notes)
 
 
 def deconvolve(place: Path) -> Iterator[Case]:
     scan, bare = (et.read_goniometer_scan(place / name) for name in ("scan.csv", "bare.csv"))
     call = ("deconvolve", place / "scan.csv", "--instrument", place / "bare.csv", "-o", "out.csv")
     yield Case(call, et.deconvolve(scan, bare).notes)
+    sample = et.bsdf.Gaussian(peak=200.0, sigma=0.012)
+    goniometer = et.ScatterGoniometer(photons=1e6, dark=20)
+    wide = goniometer.measure_window(sample, 60, step=1, span=5, outside=20, method="quadrature")
+    wide.save(place / "wide.csv")
+    found = et.deconvolve_directions(et.read_directional_scan(place / "wide.csv"), stop=5, regular=0.001, replicates=2)
+    options = ("--stop", 5, "--regular", 0.001, "--replicates", 2)
+    yield Case(("deconvolve", place / "wide.csv", *options, "-o", "out.csv"), found.notes)
 
 
 def view(place: Path) -> Iterator[Case]:

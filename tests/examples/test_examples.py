@@ -19,6 +19,7 @@ RUNS = {
     "chapter_5_luminaire.py": ([], 2),
     "chapter_5_round_robin.py": ([], 1),
     "chapter_5_scan_time.py": ([], 1),
+    "deconvolution_2d.py": ([], 2),
     "dome_led.py": (["--rays", "100000"], 3),
     "first_picture.py": (["--rays", "500000", "--output", "picture.png"], 1),
     "half_against_half.py": ([], 1),

@@ -34,6 +34,12 @@ def lobe() -> et.Deconvolution:
     return et.deconvolve(scan, et.GoniometerScan(angle, np.exp(-4.0 * angle**2)), stop=5)
 
 
+def wide_lobe() -> et.DirectionalDeconvolution:
+    goniometer = et.ScatterGoniometer(photons=1e6)
+    scan = goniometer.measure_window(et.bsdf.Gaussian(peak=200.0, sigma=0.012), 60, step=1, span=4, method="quadrature")
+    return et.deconvolve_directions(scan, stop=5, regular=False, replicates=4)
+
+
 def near_field() -> et.NearFieldRun:
     disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
     return et.NearFieldGoniophotometer(step=(30, 90), camera_pixels=16).measure(et.Scene(sources=[disk]))
@@ -49,6 +55,7 @@ DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {
     "threshold": (2, lambda **given: et.plot_threshold_sweep(sweep(), **given)),
     "characteristic": (2, lambda **given: et.plot_characteristic(et.diagnose(make_field(SURFACES["disk"])), **given)),
     "deconvolution": (3, lambda **given: et.plot_deconvolution(lobe(), **given)),
+    "directions": (4, lambda **given: et.plot_directions(wide_lobe(), **given)),
     "near field": (4, lambda **given: et.plot_near_field(near_field(), **given)),
     "bsdf": (3, lambda **given: et.plot_bsdf(et.bsdf.Gaussian(peak=3.0, sigma=0.2), **given)),
     "scene": (2, lambda **given: et.draw_scene(LENS, rays=0, **given)),

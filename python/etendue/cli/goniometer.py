@@ -8,11 +8,16 @@ from typing import Annotated
 import typer
 
 from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, say
-from etendue.instruments.goniometer_scan import Plane, Way
+from etendue.instruments.directional_scan import DirectionalScan
+from etendue.instruments.goniometer_scan import Way
+from etendue.instruments.positions import Plane
 from etendue.instruments.samples import read_sample
 from etendue.instruments.scatter_goniometer import SPAN, Method, ScatterGoniometer
 
 COLLIMATED = 0.0
+
+WINDOW = 6.0
+"""Span of a window if nothing is said [°]."""
 
 
 def goniometer(
@@ -41,8 +46,25 @@ def goniometer(
     incidence: Annotated[float, typer.Option("--incidence", help="Angle of incidence in °.")] = 0.0,
     step: Annotated[float, typer.Option("--step", help="Between positions in °.")] = 0.1,
     span: Annotated[
-        float | None, typer.Option("--span", help=f"To which angle in ° on both sides; {SPAN:g} with a sample.")
+        float | None,
+        typer.Option(
+            "--span", help=f"To which angle in ° on both sides; {SPAN:g} with a sample, {WINDOW:g} of a window."
+        ),
     ] = None,
+    window: Annotated[
+        bool, typer.Option("--window", help="In two dimensions: a window about the regular direction.")
+    ] = False,
+    outside: Annotated[
+        float | None,
+        typer.Option("--outside", help="With --window: steps in ° over the rest of the hemisphere, 0.5 to 30."),
+    ] = None,
+    turn: Annotated[
+        float, typer.Option("--turn", help="With --window: by how much the sample is turned about its normal in °.")
+    ] = 0.0,
+    head: Annotated[
+        float,
+        typer.Option("--head", help="With --window: diameter of the detector's head in mm, which shadows the sample."),
+    ] = 0.0,
     plane: Annotated[str, typer.Option("--plane", help="Of the scan: in-plane or cross-plane.")] = "in-plane",
     way: Annotated[
         str | None, typer.Option("--way", help="transmitted or reflected, of a sample that does both.")
@@ -64,6 +86,12 @@ def goniometer(
     """Measure a sample, or the bare beam, with a virtual goniometer."""
     if (sample is None) != no_sample:
         raise typer.BadParameter("give a sample, or --no-sample for the instrument function")
+    if no_sample and window:
+        raise typer.BadParameter("--window needs a sample: the bare beam is the same across and along")
+    if not window and (outside is not None or turn or head):
+        raise typer.BadParameter("--outside, --turn and --head are for scans in two dimensions: add --window")
+    if window and plane != "in-plane":
+        raise typer.BadParameter("--plane is for scans in one plane; --window scans both")
     which: Plane = one_of(plane, ("in-plane", "cross-plane"), "--plane")
     how: Method = one_of(method, ("trace", "quadrature"), "--method")
     ways: tuple[Way, Way] = ("transmitted", "reflected")
@@ -83,7 +111,24 @@ def goniometer(
         photons=photons,
         dark=dark,
         drift=drift,
+        head_diameter=head,
     )
+    if window:
+        wide = instrument.measure_window(
+            read_sample(sample),  # type: ignore[arg-type] # there is one
+            incidence,
+            step,
+            WINDOW if span is None else span,
+            rays,
+            seed,
+            outside=outside,
+            turn=turn,
+            way=to,
+            method=how,
+            fresh=fresh,
+        )
+        _tell_directions(wide, sample, output, json=json)
+        return
     if sample is None:
         scan = instrument.instrument_function(step, span, rays=rays if method == "trace" and fresh else None, seed=seed)
     else:
@@ -127,5 +172,29 @@ def goniometer(
     else:
         say(f"peak {scan.bsdf.max():.5g} 1/sr, full width at half maximum {scan.fwhm:.3f}°")
         say(f"total scatter {scan.total_scatter:.4f}, if the lobe is round and the scan reaches its end")
+    if output is not None:
+        say(f"{output}: written")
+
+
+def _tell_directions(scan: DirectionalScan, sample: Path | None, output: Path | None, *, json: bool) -> None:
+    if output is not None:
+        scan.save(output)
+    peak = float(scan.bsdf.max())
+    if json:
+        print_json({
+            "output": output,
+            "sample": sample,
+            "positions": scan.flux.size,
+            "solid_angle": scan.solid_angle,
+            "peak": peak,
+            "notes": list(scan.notes),
+        })  # fmt: skip
+        return
+    for note in scan.notes:
+        complain(f"note: {note}")
+    say(
+        f"{scan.flux.size} positions in two dimensions, {scan.way} at {scan.incidence:g}°, Ω = {scan.solid_angle:.4g} sr"
+    )
+    say(f"peak {peak:.5g} 1/sr")
     if output is not None:
         say(f"{output}: written")

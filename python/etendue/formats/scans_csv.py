@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 
 DIRECTIONS = ("theta_i", "phi_i", "theta_s", "phi_s", "bsdf")
 POSITIONS = ("angle", "flux")
+POLAR = ("theta_s", "phi_s", "flux")
 STAGES = ("alpha", "beta", "gamma", "delta", "flux")
 ERROR = "standard_error"
 LARGEST = 1 << 28

@@ -12,10 +12,9 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
 from etendue.formats.output import atomic_output
+from etendue.instruments.courses import after, course_of, rule_of
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
 from etendue.instruments.operators import Operator, OperatorName, middle_of, operator_of
-from etendue.instruments.richardson_lucy import deviances, iterations
-from etendue.instruments.stopping import MOST, NEEDS_COUNTS, RULES, Course
 
 Array = npt.NDArray[np.float64]
 Method = Literal["richardson-lucy", "matrix"]
@@ -26,19 +25,8 @@ REPLICATES = 32
 FURTHER = 4
 """Times the iterations after which a lobe stands for the truth when errors are estimated."""
 
-THINNINGS = 4
-"""Times that counts are parted into halves."""
-
-PATIENCE = 25
-"""Iterations without a better score of held-out counts after which none is looked for."""
-
-FURTHEST = 1000
-"""Iterations after which held-out counts are not asked any more."""
-
 LARGE = 200
 """Positions from which on the matrix, most of which is 0, is kept as a sparse one if SciPy is there."""
-
-LARGEST_ITERATIONS = 1_000_000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -210,13 +198,14 @@ def deconvolve(
     at = middle_of(full.angle, np.maximum(full.flux, 0.0)) if middle is None else float(middle)
     model = operator_of(full, signature, operator, at)
     gain = _gain(full)
-    rule = _rule(stop, gain)
+    rule = rule_of(stop, counted=gain is not None)
     flux = np.asarray(full.flux)
     if method == "matrix":
         found, course, count, why = _inverted(model, flux), None, 0, "matrix inversion needs no stop"
     else:
-        course, count, why = _stopped(model, full, gain, rule, seed)
-        found = _after(model, flux + full.background, full.background, count)
+        measured = flux + full.background
+        course, count, why = course_of(_sparse(model), measured, full.background, gain, model.start, rule, seed)
+        found = _after(model, measured, full.background, count)
     image = model.matrix @ found
     spread = None
     if replicates and gain is not None:
@@ -285,68 +274,8 @@ def _gain(scan: GoniometerScan) -> float | None:
     return float(np.sum(scan.standard_error**2)) / total if total > 0.0 else None
 
 
-def _rule(stop: str | int | None, gain: float | None) -> str:
-    if isinstance(stop, int):
-        if not 1 <= stop <= LARGEST_ITERATIONS:
-            raise ArgumentError(f"{stop} iterations; give 1 to {LARGEST_ITERATIONS}")
-        return f"{stop} iterations"
-    if stop is None:
-        return "thesis" if gain is None else next(iter(RULES))
-    if stop not in RULES:
-        raise UnknownNameError("rule", stop, RULES)
-    if gain is None and stop in NEEDS_COUNTS:
-        raise ArgumentError(f"the rule {stop!r} needs the standard errors of the scan; 'thesis' and 'plateau' do not")
-    return stop
-
-
 def _after(model: Operator, measured: Array, background: float, count: int) -> Array:
-    steps = iterations(_sparse(model), measured, model.start(measured - background), background)
-    for _ in range(count):
-        x, _image = next(steps)
-    return x
-
-
-def _stopped(
-    model: Operator, scan: GoniometerScan, gain: float | None, rule: str, seed: int
-) -> tuple[Course, int, str]:
-    fixed = 0 if rule in RULES else int(rule.removesuffix(" iterations"))
-    measured, b = scan.flux + scan.background, scan.background
-    columns, halves = [measured], None
-    if gain is not None and rule == "held-out":
-        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 0))))
-        counts = np.round(np.maximum(measured, 0.0) / gain).astype(np.int64)
-        first = rng.binomial(counts[:, None], 0.5, (counts.size, THINNINGS))
-        halves = (counts[:, None] - first).astype(np.float64)
-        columns += list((2.0 * gain * first).T)
-    errors, left, scores = [], [], []
-    least, since = np.inf, 0
-    together = np.stack(columns, axis=1)
-    steps = iterations(_sparse(model), together, model.start(together - b), b)
-    most = fixed or (FURTHEST if halves is not None else MOST)
-    for i, (_, image) in enumerate(steps, 1):
-        own = image[:, 0]
-        # Where nothing was measured the term is 1, whatever the lobe.
-        lit = (own > 0.0) & (scan.flux > 0.0)
-        errors.append(float(np.sqrt(np.mean(((own[lit] - scan.flux[lit]) / own[lit]) ** 2))))
-        if gain is not None:
-            left.append(float(deviances(np.maximum(measured, 0.0) / gain, (own + b) / gain).mean()))
-        if halves is not None:
-            scores.append(deviances(halves, 0.5 * (image[:, 1:] + b) / gain).mean(axis=1))  # type: ignore[operator]
-            score = float(scores[-1].sum())
-            least, since = (score, 0) if score < least else (least, since + 1)
-            if since > PATIENCE + len(scores) // 2:
-                break
-        if i >= most:
-            break
-    course = Course(
-        np.array(errors),
-        np.array(left) if left else None,
-        np.array(scores) if scores else None,
-    )
-    if fixed:
-        return course, fixed, "as many as were asked for"
-    count, why = RULES[rule](course)
-    return course, count, why
+    return after(_sparse(model), measured, model.start(measured - background), count, background)
 
 
 def _sparse(model: Operator) -> Any:

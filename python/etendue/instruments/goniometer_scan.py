@@ -15,21 +15,18 @@ from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, POSITIONS, read_columns, read_remarks
+from etendue.instruments.positions import Plane, detector_directions
 from etendue.quantities.bsdf_data import direction
 from etendue.scatter.scans.scans import Scans
 
 Array = npt.NDArray[np.float64]
 Way = Literal["transmitted", "reflected"]
-Plane = Literal["in-plane", "cross-plane"]
 
 FINE = 16
 """Parts of a step between positions in which the total scatter is added up."""
 
 SAME_STEP = 1e-3
 """By which steps may differ, relative to the smallest, and still be the same: angles in files have few digits."""
-
-MOST_POSITIONS = 1_000_000
-"""Of a scan."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -271,7 +268,7 @@ def read_goniometer_scan(path: str | os.PathLike[str]) -> GoniometerScan:
     """
     path = as_path(path)
     columns = read_columns(path, (POSITIONS, DIRECTIONS))
-    known = _known(path, read_remarks(path))
+    known = known_of(path, read_remarks(path))
     if DIRECTIONS[0] in columns:
         incidence = float(columns["theta_i"][0])
         if np.ptp(columns["theta_i"]) > 0.0 or np.ptp(columns["phi_i"]) > 0.0:
@@ -299,7 +296,14 @@ def read_goniometer_scan(path: str | os.PathLike[str]) -> GoniometerScan:
     return GoniometerScan(angle[order], flux[order], None if error is None else error[order], **known)  # type: ignore[arg-type]
 
 
-def _known(path: Path, remarks: Mapping[str, str]) -> dict[str, object]:
+def known_of(path: Path, remarks: Mapping[str, str]) -> dict[str, object]:
+    """What lines of a file say of a scan, by the names of `GoniometerScan`.
+
+    Raises
+    ------
+    FormatError
+        If a value is none that is possible.
+    """
     found: dict[str, object] = {}
     for key in ("incidence", "background", "solid_angle"):
         if key in remarks:
@@ -313,35 +317,6 @@ def _known(path: Path, remarks: Mapping[str, str]) -> dict[str, object]:
                 raise FormatError(path, f"# {key}", f"{remarks[key][:40]!r}", f"It is one of {', '.join(choices)}.")
             found[key] = remarks[key] == "yes" if key == "sample" else remarks[key]
     return found
-
-
-def detector_directions(angle: npt.ArrayLike, incidence: float, plane: Plane, *, behind: bool) -> Array:
-    """Where the detector stands, shape (…, 3), light coming from azimuth 180°.
-
-    Examples
-    --------
-    >>> detector_directions([30.0], 30.0, "in-plane", behind=False).round(3).tolist()
-    [[0.5, 0.0, 0.866]]
-    """
-    if plane == "in-plane":
-        return direction(angle, 0.0, behind=behind)
-    a = np.radians(angle)[..., None]
-    return np.asarray(np.cos(a) * direction(incidence, 0.0, behind=behind) + np.sin(a) * np.array([0.0, 1.0, 0.0]))
-
-
-def positions(middle: float, step: float, span: float) -> Array:
-    """Even positions [°] about a middle one, up to a span on both sides.
-
-    Examples
-    --------
-    >>> positions(30.0, 2.5, 6.0).tolist()
-    [25.0, 27.5, 30.0, 32.5, 35.0]
-    """
-    if not 0.0 < step < 90.0 or not 0.0 < span <= 180.0 or span / step > MOST_POSITIONS:
-        raise ArgumentError(f"steps of {step:g}° to {span:g}° on both sides; give a step and a span of more than 0")
-    k = int(np.floor(span / step + 1e-9))
-    # 8.7 and not 8.700000000000001: files hold what people would write.
-    return np.round(middle + step * np.arange(-k, k + 1), 10)
 
 
 def summit(angle: Array, values: Array) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,13 @@ LEAST = 1e-6
 """Of the largest value of the start: what is 0 there would stay 0."""
 
 
-def iterations(matrix: Any, measured: Array, start: Array, background: float = 0.0) -> Iterator[tuple[Array, Array]]:
+def iterations(
+    matrix: Any,
+    measured: Array,
+    start: Array,
+    background: float | Array = 0.0,
+    shrink: Callable[[Array], Array] | None = None,
+) -> Iterator[tuple[Array, Array]]:
     """Lobes one after the other: x ← x · Aᵀ(y/(A x + b))/Aᵀ1 [Richardson1972]_, without end.
 
     Parameters
@@ -26,8 +32,10 @@ def iterations(matrix: Any, measured: Array, start: Array, background: float = 0
         y with the background b in it; what lies below 0 counts as 0.
     start : array, shape (m,) or (m, k)
         The lobe that the iteration begins with; 0 is raised to a millionth of the largest value.
-    background : number
+    background : number, or array of shape (n,)
         b.
+    shrink : callable, optional
+        By x what each step multiplies x with besides: what a prior says.
 
     Yields
     ------
@@ -47,11 +55,12 @@ def iterations(matrix: Any, measured: Array, start: Array, background: float = 0
     weight = np.asarray(matrix.T @ np.ones(y.shape[0]))
     seen = weight > 1e-9 * weight.max()
     per = np.where(seen, 1.0 / np.where(seen, weight, 1.0), 0.0).reshape((-1,) + (1,) * (y.ndim - 1))
+    b = np.reshape(background, (-1,) + (1,) * (y.ndim - 1))
     image = matrix @ x
     while True:
-        total = image + background
+        total = image + b
         ratio = np.divide(y, total, out=np.zeros_like(total), where=total > 0.0)
-        x = x * (matrix.T @ ratio) * per
+        x = x * (matrix.T @ ratio) * (per if shrink is None else per * shrink(x))
         image = matrix @ x
         yield x, image
 

@@ -10,9 +10,21 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape, axes_of, into_the_sample
-from etendue.instruments.goniometer_scan import GoniometerScan, Plane, Way, detector_directions, positions
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape, into_the_sample
+from etendue.instruments.bench import Bench
+from etendue.instruments.directional_scan import DirectionalScan
+from etendue.instruments.goniometer_scan import GoniometerScan, Way
+from etendue.instruments.positions import (
+    Plane,
+    detector_directions,
+    even_angles,
+    hemisphere,
+    hemisphere_around,
+    window,
+)
+from etendue.instruments.ray_counting import ray_hits
+from etendue.instruments.turned_sample import TurnedSample
+from etendue.quantities.bsdf_data import BsdfSlice, direction
 from etendue.scatter.bsdf import Bsdf
 
 Array = npt.NDArray[np.float64]
@@ -26,6 +38,10 @@ FINENESS = ((5, 11), (4, 8))
 
 SPAN = 9.0
 """To which angles on both sides a scan goes if nothing is said [°]: 181 positions in steps of 0.1°."""
+
+
+SHARED = "all positions count the same rays: neighbours err together"
+"""Note of scans whose errors are not independent."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,6 +77,9 @@ class ScatterGoniometer:
         Mean number of counts without light at each position, subtracted afterwards: the floor of the detector.
     drift : number
         By which share the beam has changed at the last position.
+    head_diameter : number
+        Of the head of the detector [mm], which shadows the sample where it gets into the beam: scans in two dimensions leave
+        these positions out.
 
     Raises
     ------
@@ -94,40 +113,34 @@ class ScatterGoniometer:
     photons: float | None = None
     dark: float = 0.0
     drift: float = 0.0
+    head_diameter: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("beam_diameter", "aperture_diameter", "distance", "wavelength"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise ArgumentError(f"{name} is {getattr(self, name)}; it is more than 0")
-        reach = 0.5 * self.beam_diameter + Aperture(self.aperture, self.aperture_diameter, self.inner_diameter).reach
-        if self.distance <= reach:
-            raise ArgumentError(
-                f"a distance of {self.distance:g} mm: beam and aperture reach {reach:g} mm; move it away"
-            )
         if not abs(self.divergence) < 45.0 or not 0.0 <= self.source_angle < 90.0:
             raise ArgumentError("a divergence is below 45°, and source_angle is from 0 to 90°")
         if self.photons is not None and not self.photons > 0.0:
             raise ArgumentError(f"{self.photons} photons; give more than 0, or None for no noise")
         if self.dark < 0.0 or (self.dark and self.photons is None):
             raise ArgumentError("dark counts are not negative, and need photons to be counted with")
+        if not self.head_diameter >= 0.0:
+            raise ArgumentError(f"head_diameter is {self.head_diameter}; it is not negative")
         if not self.drift > -1.0:
             raise ArgumentError(f"a drift of {self.drift}; the beam keeps more than nothing")
-        object.__setattr__(self, "profile", self._beam.profile)
+        object.__setattr__(self, "profile", self.bench.beam.profile)
 
     @property
-    def _beam(self) -> Beam:
-        """What meets the sample."""
-        return Beam(self.beam_diameter, self.profile, self.divergence, self.source_angle)
-
-    @property
-    def _aperture(self) -> Aperture:
-        """What stands in front of the detector."""
-        return Aperture(self.aperture, self.aperture_diameter, self.inner_diameter)
+    def bench(self) -> Bench:
+        """Beam, aperture and distance."""
+        beam = Beam(self.beam_diameter, self.profile, self.divergence, self.source_angle)
+        return Bench(beam, Aperture(self.aperture, self.aperture_diameter, self.inner_diameter), self.distance)
 
     @property
     def solid_angle(self) -> float:
         """Ω of the aperture, area over square of the distance [sr]."""
-        return self._aperture.area / self.distance**2
+        return self.bench.solid_angle
 
     def instrument_function(
         self, step: float = 0.1, span: float | None = None, *, rays: int | None = None, seed: int = 1
@@ -156,14 +169,11 @@ class ScatterGoniometer:
             If step, span or rays are impossible.
         """
         if span is None:
-            grown = abs(1.0 + self.distance * np.tan(np.radians(self.divergence)) / (0.5 * self.beam_diameter))
-            reach = 0.5 * self.beam_diameter * grown + self._aperture.reach
-            reach += self.distance * np.tan(np.radians(0.5 * self.source_angle))
             # Two positions more, where there is no light any more.
-            span = (np.ceil(np.degrees(np.arctan(reach / self.distance)) / step) + 2.0) * step if step > 0.0 else 1.0
-        angle = positions(0.0, step, float(span))
+            span = (np.ceil(self.bench.reach / step) + 2.0) * step if step > 0.0 else 1.0
+        angle = even_angles(0.0, step, float(span))
         if rays is None:
-            flux, error = self._beam.overlap(self._aperture, angle, self.distance), np.zeros(angle.shape)
+            flux, error = self.bench.beam.overlap(self.bench.aperture, angle, self.distance), np.zeros(angle.shape)
         else:
             arms = detector_directions(angle, 0.0, "in-plane", behind=True)
             flux, error = self._counted(None, 0.0, arms, rays, seed, behind=True, fresh=False)
@@ -227,7 +237,7 @@ class ScatterGoniometer:
             raise UnknownNameError("plane", plane, get_args(Plane))
         way = _way(bsdf, way)
         _require_incidence(theta)
-        angle = positions(theta if plane == "in-plane" else 0.0, step, span)
+        angle = even_angles(theta if plane == "in-plane" else 0.0, step, span)
         if plane == "in-plane":
             angle = angle[np.abs(angle) < 90.0]
         behind = way == "transmitted"
@@ -238,7 +248,7 @@ class ScatterGoniometer:
             flux, error = self._integrated(bsdf, theta, arms, behind=behind)
         notes: tuple[str, ...] = ()
         if method == "trace" and not fresh and self.photons is None:
-            notes = ("all positions count the same rays: neighbours err together",)
+            notes = (SHARED,)
         return self._noisy(angle, flux, error, seed, incidence=theta, way=way, plane=plane, sample=True, notes=notes)
 
     def flux_at(
@@ -313,12 +323,9 @@ class ScatterGoniometer:
             F [1/sr] by eq. 5.1 on a grid of azimuths and angles from the normal, with its standard error.
         """
         way = _way(bsdf, way)
-        if not 0.5 <= step <= 30.0:
-            raise ArgumentError(f"steps of {step:g}° over a hemisphere; give 0.5 to 30°")
         behind = way == "transmitted"
-        polar = np.arange(0.0, 90.0 - min(0.5 * step, 5.0) + 1e-9, step)
-        grid = PolarGrid("normal", polar, np.linspace(0.0, 360.0, max(round(360.0 / step), 3), endpoint=False))
-        flat = direction(polar[None, :], grid.azimuth[:, None], behind=behind).reshape(-1, 3)
+        grid = hemisphere(step)
+        flat = direction(grid.radial[None, :], grid.azimuth[:, None], behind=behind).reshape(-1, 3)
         flux, error = self.flux_at(bsdf, flat, theta, rays, seed, method=method)
         flux, error = self._with_noise(flux, error, seed)
         per = self.solid_angle * np.abs(flat[:, 2])
@@ -332,17 +339,131 @@ class ScatterGoniometer:
             standard_error=(error / per).reshape(shape),
         )
 
+    def measure_directions(
+        self,
+        bsdf: Bsdf,
+        directions: npt.ArrayLike,
+        theta: float = 0.0,
+        rays: int = 10**6,
+        seed: int = 1,
+        *,
+        turn: float = 0.0,
+        method: Method = "trace",
+        fresh: bool = False,
+    ) -> DirectionalScan:
+        """Measure a sample at any directions of one side.
+
+        Parameters
+        ----------
+        bsdf : Bsdf
+            Of the sample; light meets its front from azimuth 180°.
+        directions : array_like, shape (n, 3)
+            Unit vectors to the detector: above the front for reflected light, below it for transmitted. Where the head of
+            the detector would stand in the beam, nothing is measured.
+        theta, rays, seed, method, fresh
+            As of `measure`.
+        turn : number
+            By which the sample is turned about its normal, against the light that comes from azimuth 180° [°].
+
+        Returns
+        -------
+        DirectionalScan
+            Flux as a share of that of the beam.
+
+        Raises
+        ------
+        ArgumentError, UnknownNameError
+            As of `measure`; if directions are no unit vectors, or none is left.
+        """
+        if method not in get_args(Method):
+            raise UnknownNameError("method", method, get_args(Method))
+        _require_incidence(theta)
+        sample = TurnedSample(bsdf, turn) if turn else bsdf
+        arms = np.array(directions, np.float64)
+        checked = DirectionalScan(arms, np.zeros(len(arms)), incidence=theta)
+        shadowed = arms @ checked.incident > np.cos(np.arcsin(min(self._shadow, 1.0))) if self._shadow else None
+        notes = [] if method != "trace" or fresh or self.photons is not None else [SHARED]
+        if shadowed is not None and shadowed.any():
+            if shadowed.all():
+                raise ArgumentError("the head of the detector stands in the beam at all positions")
+            notes.append(
+                f"{int(shadowed.sum())} positions are left out: the head of the detector stands in the beam there"
+            )
+            arms = arms[~shadowed]
+        if method == "trace":
+            flux, error = self._counted(sample, theta, arms, rays, seed, behind=checked.behind, fresh=fresh)
+        else:
+            flux, error = self._integrated(sample, theta, arms, behind=checked.behind)
+        flux, error = self._with_noise(flux, error, seed)
+        return DirectionalScan(
+            arms,
+            flux,
+            error,
+            solid_angle=self.solid_angle,
+            incidence=theta,
+            background=0.0 if self.photons is None else self.dark / self.photons,
+            bench=self.bench,
+            notes=tuple(notes),
+        )
+
+    def measure_window(
+        self,
+        bsdf: Bsdf,
+        theta: float = 0.0,
+        step: float = 0.5,
+        span: float = 6.0,
+        rays: int = 10**6,
+        seed: int = 1,
+        *,
+        outside: float | None = None,
+        turn: float = 0.0,
+        way: Way | None = None,
+        method: Method = "trace",
+        fresh: bool = False,
+    ) -> DirectionalScan:
+        """Measure a sample in two dimensions: a window about the regular direction, and coarsely the hemisphere around it.
+
+        Parameters
+        ----------
+        bsdf, theta, rays, seed, turn, way, method, fresh
+            As of `measure` and `measure_directions`.
+        step, span : number
+            Between positions, and from the regular direction to the edges of the window [°].
+        outside : number, optional
+            Step over the rest of the hemisphere [°], 0.5 to 30; nothing is measured there if left out.
+
+        Returns
+        -------
+        DirectionalScan
+
+        Raises
+        ------
+        ArgumentError, UnknownNameError
+            As of `measure`.
+        """
+        behind = _way(bsdf, way) == "transmitted"
+        _require_incidence(theta)
+        arms = window(theta, step, span, behind=behind)
+        if outside is not None:
+            arms = np.concatenate([arms, hemisphere_around(theta, outside, span + 0.5 * step, behind=behind)])
+        return self.measure_directions(bsdf, arms, theta, rays, seed, turn=turn, method=method, fresh=fresh)
+
+    @property
+    def _shadow(self) -> float:
+        """Sine of the angle from the incident beam within which the head of the detector is in it; 0: it has no head."""
+        return 0.5 * (self.head_diameter + self.beam_diameter) / self.distance if self.head_diameter else 0.0
+
     # --- the two ways ------------------------------------------------------------------------------------------------
 
     def _rays(self, bsdf: Bsdf | None, theta: float, n: int, seed: tuple[int, ...]) -> tuple[Array, Array]:
         """Where rays leave the sample [mm] and to where, shape (n, 3) each; NaN where they are absorbed."""
         rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((*seed, 0))))
-        points = self._beam.points(rng, n)
-        start, v = into_the_sample(points, self._beam.tilts(points, rng), theta, across=bsdf is None)
+        points = self.bench.beam.points(rng, n)
+        start, v = into_the_sample(points, self.bench.beam.tilts(points, rng), theta, across=bsdf is None)
         if bsdf is None:
             return start, v
         number = int(np.random.SeedSequence((*seed, 1)).generate_state(1, np.uint64)[0])
-        incident = direction(theta, 180.0) if self._beam.collimated else -v
+        incident = direction(theta, 180.0) if self.bench.beam.collimated else -v
         return start, bsdf.sample(incident, n, seed=number, wavelength=self.wavelength)
 
     def _counted(
@@ -357,76 +478,31 @@ class ScatterGoniometer:
             if fresh:
                 for k in range(len(arms)):
                     start, to = self._rays(bsdf, theta, n, (seed, block, k + 1))
-                    hits[k : k + 1] += self._hits(start, to, arms[k : k + 1], behind=behind)
+                    hits[k : k + 1] += ray_hits(self.bench, start, to, arms[k : k + 1], behind=behind)
             else:
                 start, to = self._rays(bsdf, theta, n, (seed, block, 0))
-                hits += self._hits(start, to, arms, behind=behind)
+                hits += ray_hits(self.bench, start, to, arms, behind=behind)
         share = hits / rays
         # Where no ray came, as if one had: the error of nothing is not nothing.
         return share, np.sqrt(np.maximum(share, 1.0 / rays) * (1.0 - share) / rays)
-
-    def _hits(self, start: Array, to: Array, arms: Array, *, behind: bool) -> Array:
-        """How many rays get into the aperture at each position."""
-        aperture = self._aperture
-        leaving = to[:, 2] < 0.0 if behind else to[:, 2] > 0.0
-        farthest = float(np.sqrt(np.max(np.einsum("ij,ij->i", start, start), initial=0.0)))
-        # Two unit vectors differ by less than this if the one leads from the spot into the aperture at the other.
-        bound = 1.01 * (aperture.reach + farthest) / (self.distance - farthest)
-        # Along the widest spread of the positions, rays are put in order: each position looks at a stretch of them.
-        spread = np.ptp(arms, axis=0) if len(arms) > 1 else np.ones(3)
-        first = int(np.argmax(spread))
-        low, high = arms.min(axis=0) - bound, arms.max(axis=0) + bound
-        near = leaving
-        for k in range(3):
-            near = near & (to[:, k] >= low[k]) & (to[:, k] <= high[k])
-        chosen = np.flatnonzero(near)
-        if len(arms) > 1:
-            chosen = chosen[np.argsort(to[chosen, first], kind="stable")]
-        s, p = to[chosen].T.copy(), start[chosen].T.copy()
-        found = np.zeros(len(arms))
-        ends = (np.searchsorted(s[first], arms[:, first] + shift) for shift in (-bound, bound))
-        for k, (i, j) in enumerate(zip(*ends, strict=True)):
-            if j <= i:
-                continue
-            d, (t1, t2) = arms[k], axes_of(arms[k])
-            sx, sy, sz, px, py, pz = (*s[:, i:j], *p[:, i:j])
-            along = (self.distance - (px * d[0] + py * d[1] + pz * d[2])) / (sx * d[0] + sy * d[1] + sz * d[2])
-            x, y, z = px + along * sx, py + along * sy, pz + along * sz
-            u, w = x * t1[0] + y * t1[1] + z * t1[2], x * t2[0] + y * t2[1] + z * t2[2]
-            found[k] = np.count_nonzero(aperture.holds(u, w) & (along > 0.0))
-        return found
 
     def _integrated(self, bsdf: Bsdf, theta: float, arms: Array, *, behind: bool) -> tuple[Array, Array]:
         fine, coarse = (self._quadrature(bsdf, theta, arms, *nodes) for nodes in FINENESS)
         side = bsdf.regular_transmittance(theta) if behind else bsdf.regular_reflectance(theta)
         straight = float(np.asarray(side))
         if straight > 0.0:
-            regular = direction(theta, 0.0, behind=behind)
-            turned = np.degrees(2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(arms - regular, axis=1), 0.0, 1.0)))
-            fine = fine + straight * self._beam.overlap(self._aperture, turned, self.distance)
-            coarse = coarse + straight * self._beam.overlap(self._aperture, turned, self.distance)
+            bare = straight * self.bench.bare(arms, direction(theta, 0.0, behind=behind))
+            fine, coarse = fine + bare, coarse + bare
         return fine, np.abs(fine - coarse)
 
     def _quadrature(self, bsdf: Bsdf, theta: float, arms: Array, beam: int, aperture: int) -> Array:
-        points, tilts, share = self._beam.nodes(beam)
-        start, v = into_the_sample(points, tilts, theta, across=False)
-        offsets, area = self._aperture.nodes(aperture)
         found = np.zeros(len(arms))
-        together = max(1, 400_000 // (len(points) * len(offsets)))
-        for at in range(0, len(arms), together):
-            d = arms[at : at + together]
-            frames = np.array([axes_of(one) for one in d])
-            ends = self.distance * d[:, None] + np.einsum("na,iac->inc", offsets, frames)
-            off = ends[:, None] - start[None, :, None]
-            length = np.linalg.norm(off, axis=-1)
-            s = off / length[..., None]
-            incident = np.broadcast_to(-v[None, :, None], s.shape)
-            leaving = s[..., 2] * d[:, None, None, 2] > 0.0
-            f = np.zeros(leaving.shape)
-            f[leaving] = bsdf.evaluate(incident[leaving], s[leaving], wavelength=self.wavelength)
-            facing = np.einsum("ibnc,ic->ibn", s, d)
-            seen = f * np.abs(s[..., 2]) * facing / length**2
-            found[at : at + together] = np.einsum("b,ibn,n->i", share, seen, area)
+        for sight in self.bench.sights(arms, theta, beam, aperture):
+            incident = np.broadcast_to(sight.incident[None, :, None], sight.scattered.shape)
+            lit = sight.weights > 0.0
+            f = np.zeros(lit.shape)
+            f[lit] = bsdf.evaluate(incident[lit], sight.scattered[lit], wavelength=self.wavelength)
+            found[sight.positions] = np.einsum("ibn,ibn->i", f, sight.weights)
         return found
 
     # --- the detector ------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from etendue.plot.characteristic_picture import plot_characteristic
 from etendue.plot.comparison_picture import plot_comparison
 from etendue.plot.cross_section_picture import plot_cross_sections
 from etendue.plot.deconvolution_picture import plot_deconvolution
+from etendue.plot.directional_picture import plot_directions
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
 from etendue.plot.near_field_picture import plot_near_field
@@ -20,6 +21,7 @@ __all__ = [
     "plot_comparison",
     "plot_cross_sections",
     "plot_deconvolution",
+    "plot_directions",
     "plot_intensity",
     "plot_map",
     "plot_near_field",

@@ -48,7 +48,7 @@ class Merging:
 
         The ratio of two times is that of the sums of their signals, over all lit pixels that are not near saturation in the
         longer one. How faint they are in either does not matter: noise averages out, where a lower limit would choose by it.
-        The ratio is averaged with the stated ratio, each by the reciprocal of its variance; exact times stay as they are stated.
+        It is averaged with the stated ratio, each by the reciprocal of its variance; exact times stay as they are stated.
 
         Parameters
         ----------
