@@ -82,7 +82,8 @@ def _crossing(part: Part, points: Array, directions: Array) -> Array:
 def closest_surface(rays: RaySet, seed: int = 1) -> Surface:
     """The surface of least étendue that the lines of almost all light cross: disks, spheres, hemispheres, cylinders.
 
-    The light of a die crosses a small disk at its depth, that of a dome crosses nothing smaller than the dome.
+    The light of a die crosses a small disk at its depth, that of a dome crosses nothing smaller than the dome. Disks and
+    rectangles are tried at the depth where half of the light is closest together.
 
     Parameters
     ----------
@@ -113,7 +114,7 @@ def closest_surface(rays: RaySet, seed: int = 1) -> Surface:
 
 
 def _flats(rays: RaySet, centre: Array, reach: float) -> list[Surface]:
-    """A disk and a rectangle at the depth where least area holds the light that heads upwards."""
+    """A disk and a rectangle at the depth where the brightest part of the light that heads upwards is narrowest."""
     up = rays.direction[:, 2] > 0.0
     flux = rays.flux[up]
     if rays.flux[~up].sum() > LEFT_OUT / 2 * rays.flux.sum():
@@ -127,11 +128,16 @@ def _flats(rays: RaySet, centre: Array, reach: float) -> list[Surface]:
         width, height = (_quantile(np.abs(side), flux, 1.0 - LEFT_OUT / 4) for side in at.T)
         return width, height, _quantile(np.hypot(*at.T), flux, 1.0 - LEFT_OUT / 2)
 
+    def spread(z: float) -> float:
+        """How far half of the light crosses from the middle of all of it: small where the brightest part is."""
+        at = (x + ((z - x[:, 2]) / k[:, 2])[:, None] * k)[:, :2]
+        middle = [_quantile(side, flux, 0.5) for side in at.T]
+        return _quantile(np.hypot(*(at - middle).T), flux, 0.5)
+
     best, span = float(centre[2]), reach
     for _ in range(2):
         depths = best + span * np.linspace(-1.0, 1.0, DEPTHS)
-        sizes = [sides(float(z)) for z in depths]
-        best = float(depths[int(np.argmin([min(4.0 * w * h, np.pi * r * r) for w, h, r in sizes]))])
+        best = float(depths[int(np.argmin([spread(float(z)) for z in depths]))])
         span *= 2.0 / (DEPTHS - 1)
     width, height, radius = sides(best)
     middle = (float(centre[0]), float(centre[1]))
