@@ -99,6 +99,7 @@ def test_help_imports_no_verb() -> None:
     assert commands == {f"etendue.cli.{name}" for name in ("app", "guard", "stopping", "terminal", "verbs")}
 
 
+@pytest.mark.slow
 def test_info_imports_what_the_file_asks_for(tmp_path: Path) -> None:
     """An intensity file needs no scenes, no light fields and none of the libraries of other formats."""
     path = tmp_path / "small.ies"

@@ -350,6 +350,7 @@ def test_impossible_measurements_are_told(settings: dict[str, object], told: str
         et.NearFieldGoniophotometer(**{"step": 30, "camera_pixels": 16} | settings).measure(two_parts, size=3.4)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_measured_is_told() -> None:
     gonio = et.NearFieldGoniophotometer(step=30, camera_pixels=16)
     with pytest.raises(ArgumentError, match="size"):

@@ -97,6 +97,11 @@ class NearFieldGoniophotometer:
     misalignment: tuple[float, float, float] = (0.0, 0.0, 0.0)
     arm_error: float = 0.0
 
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+        stated = [f for f in dataclasses.fields(self) if getattr(self, f.name) != f.default]
+        return f"NearFieldGoniophotometer({', '.join(f'{f.name}={getattr(self, f.name)!r}' for f in stated)})"
+
     def __post_init__(self) -> None:
         for name in ("distance", "field_of_view", "photometer_distance"):
             value = getattr(self, name)
