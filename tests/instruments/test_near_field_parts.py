@@ -126,6 +126,16 @@ def test_merged_exposures_are_right_over_five_decades() -> None:
     assert np.abs(ratio - 1).max() < LARGEST_Z * math.sqrt(2 / each) + 0.05
 
 
+def test_the_converter_s_steps_do_not_lose_faint_light_when_times_are_compared() -> None:
+    """Most pixels read 0 in the shorter exposure of a quiet camera of few bits: 0.3 of a count; some have enough."""
+    camera = Camera(bits=8, read_noise=5, exposures=2, exposure_error=0.05)
+    rng = np.random.default_rng(2)
+    truth = np.concatenate([np.full(200_000, 0.3), rng.uniform(2.0, 20.0, 20_000)])
+    counts = camera.expose(truth, 1.0, np.array([1.0, 10.7]), rng)
+    merging = Merging.calibrated(camera, [counts])
+    assert abs(merging.times[1] / 10.7 - 1) < LARGEST_Z * merging.errors[1] + 2e-3
+
+
 def test_saturated_pixels_are_those_that_even_the_shortest_exposure_cannot_hold() -> None:
     camera = Camera(bits=8, exposures=2)
     merged, saturated = Merging(camera, camera.times, np.zeros(2)).merged(

@@ -16,6 +16,12 @@ Array = npt.NDArray[np.float64]
 TRUSTED = 0.9
 """Share of the highest signal above which an exposure is not used: noise may have saturated some of its light."""
 
+BLURRED = 0.5
+"""Noise of reading [counts] from which the mean of many readings of a faint signal is that signal."""
+
+STEPS = 3.0
+"""Counts of the shorter exposure, else, for the same."""
+
 LIKE = 1 << 20
 """Pixels at a time."""
 
@@ -47,8 +53,9 @@ class Merging:
         """With times from the pixels that two neighbouring exposures both see.
 
         The ratio of two times is that of the sums of their signals, over all lit pixels that are not near saturation in the
-        longer one. How faint they are in either does not matter: noise averages out, where a lower limit would choose by it.
-        It is averaged with the stated ratio, each by the reciprocal of its variance; exact times stay as they are stated.
+        longer one. How faint they are does not matter where the noise of reading blurs the converter's steps. Otherwise the
+        shorter exposure must have some counts, as what is less than half a count reads 0. It is averaged
+        with the stated ratio, each by the reciprocal of its variance; exact times stay as they are stated.
 
         Parameters
         ----------
@@ -66,10 +73,12 @@ class Merging:
         [1.0, 10.4]
         """
         sums = np.zeros((camera.exposures, 3))
+        blurred = camera.read_noise >= BLURRED * camera.electrons_per_count
+        least = -np.inf if blurred else STEPS * camera.exposure_ratio
         for some in counts:
             for j in range(1, camera.exposures):
                 shorter, longer = (some[:, i].astype(np.float64) - camera.dark_level for i in (j - 1, j))
-                good = longer < TRUSTED * camera.highest
+                good = (longer < TRUSTED * camera.highest) & (longer > least)
                 sums[j] += good.sum(), shorter[good].sum(), longer[good].sum()
         stated = math.sqrt(2.0) * camera.exposure_error
         times, errors = [1.0], [0.0]
