@@ -63,6 +63,8 @@ def materials(tmp_path_factory: pytest.TempPathFactory) -> Path:
     et.write_bsdf(folder / "vinyl.bsdf", vinyl)
     lobe_of = 'kind = "cosine-power"\npeak = 2897.5\nexponent = 18204\nway = "transmitted"\n'
     (folder / "diffuser.toml").write_text(lobe_of, encoding="utf-8")
+    brushed = 'kind = "gaussian"\npeak = 9.0\nsigma = 0.06\naspect = 3.0\naxis = [1, 0, 0]\n'
+    (folder / "brushed.toml").write_text(brushed, encoding="utf-8")
     return folder
 
 

@@ -54,8 +54,9 @@ class Merging:
 
         The ratio of two times is that of the sums of their signals, over all lit pixels that are not near saturation in the
         longer one. How faint they are does not matter where the noise of reading blurs the converter's steps. Otherwise the
-        shorter exposure must have some counts, as what is less than half a count reads 0. It is averaged
-        with the stated ratio, each by the reciprocal of its variance; exact times stay as they are stated.
+        shorter exposure must have some counts, as what is less than half a count reads 0.
+
+        The ratio is averaged with the stated one, each by the reciprocal of its variance; exact times stay as stated.
 
         Parameters
         ----------
