@@ -81,7 +81,7 @@ def show_led(browser: Browser) -> None:
         "document.querySelector('#observer-box').style.display = 'none'",
     )
     browser.wait("etendue.state.regions[0].figures?.flux && etendue.state.section")
-    browser.mouse("mouseMoved", 420, 300)
+    browser.mouse("mouseMoved", x=420, y=300)
     browser.wait("etendue.finished() && document.getElementById('reading').textContent !== '–'")
     browser.screenshot(FIGURES / "viewer-led.png")
 

@@ -135,16 +135,16 @@ class Browser:
                 raise TimeoutError(f"{condition} does not come true; {self.complaints}")
             time.sleep(0.02)
 
-    def mouse(self, kind: str, x: float, y: float, **more: Any) -> None:
+    def mouse(self, kind: str, *, x: float, y: float, **more: Any) -> None:
         """mousePressed, mouseMoved, mouseReleased or mouseWheel at a place of the page."""
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
 
     def drag(self, *places: tuple[float, float]) -> None:
         """The left button, pressed at the first place and let go at the last."""
-        self.mouse("mousePressed", *places[0], button="left", buttons=1, clickCount=1)
+        self.mouse("mousePressed", x=places[0][0], y=places[0][1], button="left", buttons=1, clickCount=1)
         for place in places[1:]:
-            self.mouse("mouseMoved", *place, button="left", buttons=1)
-        self.mouse("mouseReleased", *places[-1], button="left", buttons=0, clickCount=1)
+            self.mouse("mouseMoved", x=place[0], y=place[1], button="left", buttons=1)
+        self.mouse("mouseReleased", x=places[-1][0], y=places[-1][1], button="left", buttons=0, clickCount=1)
 
     def key(self, key: str) -> None:
         """One key, pressed and let go."""

@@ -97,7 +97,8 @@ def test_values_under_the_pointer_are_those_of_the_map(
     assert agree > 0.97 * smooth
     # What is written beside the pointer is that reading.
     row, column = np.unravel_index(int(truth.values.argmax()), truth.values.shape)
-    browser.mouse("mouseMoved", *middle_of(browser, int(column), int(row)))
+    x, y = middle_of(browser, int(column), int(row))
+    browser.mouse("mouseMoved", x=x, y=y)
     browser.wait(f"document.getElementById('place').textContent.includes('pixel {column}, {row}')")
     text = browser.evaluate("document.getElementById('reading').textContent")
     value, _, error, unit = text.split(maxsplit=3)
@@ -131,7 +132,7 @@ def test_an_led_is_a_small_file_that_opens_at_once_and_can_be_handled(
         browser.drag((x, y), (x + 20, y), (x + 40, y + 12))
         turned = browser.evaluate("({...etendue.state.view})")
         assert turned["theta"] == pytest.approx(0.25 * np.hypot(40, 12), rel=1e-2)  # a quarter degree a pixel
-        browser.mouse("mouseWheel", x, y, deltaX=0, deltaY=-200)
+        browser.mouse("mouseWheel", x=x, y=y, deltaX=0, deltaY=-200)
         browser.wait(f"etendue.state.view.width < 0.8 * {turned['width']}")
         browser.key("g")
         assert browser.evaluate("etendue.state.look.logarithmic")

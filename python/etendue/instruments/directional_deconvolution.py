@@ -87,7 +87,7 @@ class DirectionalDeconvolution:
     >>> sample = et.bsdf.Gaussian(peak=200.0, sigma=0.012, aspect=2.0)
     >>> scan = goniometer.measure_window(sample, 60, step=0.75, span=6, turn=30, method="quadrature")
     >>> found = et.deconvolve_directions(scan)
-    >>> bool(scan.bsdf.max() < 170 and 190 < found.peak < 210)
+    >>> bool(scan.bsdf.max() < 180 and 190 < found.peak < 210)
     True
     """
 
@@ -229,8 +229,8 @@ def deconvolve_directions(
     >>> sample = et.bsdf.ABg(a=0.003, b=1e-4, g=2.2)
     >>> scan = goniometer.measure_window(sample, 45, step=1, span=6, method="quadrature")
     >>> found = et.deconvolve_directions(scan, goniometer, method="parametric")
-    >>> found.model.bsdf.parts[0].kind
-    'abg'
+    >>> bool(27 < found.peak < 33)                                             # a/b = 30
+    True
     """
     if method not in get_args(DirectionalMethod):
         raise UnknownNameError("method", method, get_args(DirectionalMethod))

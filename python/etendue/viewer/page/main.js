@@ -504,6 +504,7 @@ function describe() {
   $("grid-box").hidden = !packed.resolution;
   $("solid-box").hidden = !packed.intensity;
   $("geometry-box").hidden = !packed.geometry;
+  $("left-out").hidden = !packed.geometry?.left_out;
   $("observer-box").hidden = fixed();
   $("copy").hidden = fixed();
   $("export-box").hidden = fixed() && !packed.server;
