@@ -229,3 +229,40 @@ class Node:
         if not isinstance(member, h5py.Group if kind == "group" else h5py.Dataset):
             raise self.error(f"{kind} {name!r}", "there is none")
         return member
+
+
+def states_format(path: Path, name: str, damaged: str) -> bool:
+    """Whether a file is an HDF5 file whose attribute ``format`` has this text; False of a damaged one.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    name : str
+        What the attribute should say.
+    damaged : str
+        What to do about a damaged file.
+
+    Raises
+    ------
+    OSError
+        If there is no such file.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "notes.txt"
+    ...     _ = path.write_text("no HDF5")
+    ...     states_format(path, "etendue trace result", "Copy it again.")
+    False
+    """
+    import h5py
+
+    if not begins_as_hdf5(path):
+        return False
+    try:
+        with reading(path, "HDF5", damaged), h5py.File(path, "r") as file:
+            return Node(path, file, damaged).has_text("format", name)
+    except FormatError:
+        return False

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
-from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
+from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading, states_format
 from etendue.formats.output import atomic_output
 from etendue.formats.strict_json import strict_json
 from etendue.instruments.near_field.camera import Camera
@@ -45,15 +45,7 @@ def is_run_file(path: Path) -> bool:
     OSError
         If there is no such file.
     """
-    import h5py  # noqa: PLC0415 - only who has such a file needs the library
-
-    if not begins_as_hdf5(path):
-        return False
-    try:
-        with reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
-            return Node(path, file, DAMAGED).has_text("format", FORMAT)
-    except FormatError:
-        return False
+    return states_format(path, FORMAT, DAMAGED)
 
 
 def write_run(
