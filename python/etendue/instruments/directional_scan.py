@@ -15,7 +15,7 @@ from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, POLAR, read_columns, read_remarks
 from etendue.instruments.bench import Bench
-from etendue.instruments.goniometer_scan import GoniometerScan, Way, known_of, read_goniometer_scan
+from etendue.instruments.goniometer_scan import GoniometerScan, Way, flux_of_unit_bsdf, known_of, read_goniometer_scan
 from etendue.instruments.lobe_table import polar_slice
 from etendue.quantities.bsdf_data import BsdfSlice, direction
 
@@ -160,19 +160,16 @@ class DirectionalScan:
         ArgumentError
             If the solid angle is not known.
         """
-        return np.asarray(self.flux / self._per_bsdf())
+        return np.asarray(self.flux / flux_of_unit_bsdf(self.solid_angle, self.cosine))
 
     @property
     def bsdf_error(self) -> Array | None:
         """Standard error of `bsdf`."""
-        return None if self.standard_error is None else np.asarray(self.standard_error / self._per_bsdf())
-
-    def _per_bsdf(self) -> Array:
-        if self.solid_angle is None:
-            raise ArgumentError(
-                "the solid angle of the aperture is not known, so that flux is no BSDF: state solid_angle"
-            )
-        return np.asarray(self.solid_angle * self.cosine)
+        return (
+            None
+            if self.standard_error is None
+            else np.asarray(self.standard_error / flux_of_unit_bsdf(self.solid_angle, self.cosine))
+        )
 
     @functools.cached_property
     def spread(self) -> tuple[float, float]:

@@ -29,6 +29,33 @@ SAME_STEP = 1e-3
 """By which steps may differ, relative to the smallest, and still be the same: angles in files have few digits."""
 
 
+def flux_of_unit_bsdf(solid_angle: float | None, cosine: Array) -> Array:
+    """Flux in the aperture, as a share of that of the beam, for f = 1/sr: solid angle · |cos θₛ|, eq. 5.1, shape (n,).
+
+    Parameters
+    ----------
+    solid_angle : number or None
+        Of the aperture [sr]; None if it is not known.
+    cosine : array, shape (n,)
+        |cos θₛ| of the detector.
+
+    Raises
+    ------
+    ArgumentError
+        If the solid angle is not known, or the detector stood in the plane of the sample.
+
+    Examples
+    --------
+    >>> flux_of_unit_bsdf(1e-3, np.array([1.0, 0.5])).tolist()
+    [0.001, 0.0005]
+    """
+    if solid_angle is None:
+        raise ArgumentError("the solid angle of the aperture is not known, so that flux is no BSDF: state solid_angle")
+    if (cosine < 1e-9).any():
+        raise ArgumentError("a detector in the plane of the sample measures no BSDF")
+    return np.asarray(solid_angle * cosine)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class GoniometerScan:
     """A scan in one plane: flux by angle of the detector, with its standard error.
@@ -152,22 +179,16 @@ class GoniometerScan:
         ArgumentError
             If the solid angle is not known, or the detector stood in the plane of the sample.
         """
-        return np.asarray(self.flux / self._per_bsdf())
+        return np.asarray(self.flux / flux_of_unit_bsdf(self.solid_angle, self.cosine))
 
     @property
     def bsdf_error(self) -> Array | None:
         """Standard error of `bsdf`."""
-        return None if self.standard_error is None else np.asarray(self.standard_error / self._per_bsdf())
-
-    def _per_bsdf(self) -> Array:
-        if self.solid_angle is None:
-            raise ArgumentError(
-                "the solid angle of the aperture is not known, so that flux is no BSDF: state solid_angle"
-            )
-        cosine = self.cosine
-        if (cosine < 1e-9).any():
-            raise ArgumentError("a detector in the plane of the sample measures no BSDF")
-        return np.asarray(self.solid_angle * cosine)
+        return (
+            None
+            if self.standard_error is None
+            else np.asarray(self.standard_error / flux_of_unit_bsdf(self.solid_angle, self.cosine))
+        )
 
     @property
     def peak(self) -> float:
