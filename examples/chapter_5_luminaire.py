@@ -56,7 +56,7 @@ def measure(replicates: int) -> Measured:
     goniometer = et.ScatterGoniometer(photons=PHOTONS)
     bare = goniometer.instrument_function(seed=2)
     scan = goniometer.measure(holographic(FWHM), span=5, method="quadrature", seed=3)
-    ours = et.deconvolve(scan, bare, replicates=0)
+    ours = et.deconvolve(scan, bare, stop="held-out", replicates=0)
     thesis = et.deconvolve(scan, bare, operator="slice", stop="thesis", replicates=0)
     further = et.deconvolve(scan, bare, stop=4 * ours.iterations, replicates=0)
     rng = np.random.default_rng(4)

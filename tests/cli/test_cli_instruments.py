@@ -30,7 +30,7 @@ def test_a_diffuser_is_measured_and_comes_back(run: Run) -> None:
     assert facts["fwhm"] == pytest.approx(1.0, abs=0.03)
     assert facts["total_scatter"][1] == pytest.approx(facts["total_scatter"][0], rel=1e-6)
     assert Path("true.png").stat().st_size > 10_000
-    assert "# stop = held-out" in Path("true.csv").read_text()
+    assert "# stop = penalised" in Path("true.csv").read_text()
     plain = run("deconvolve", "scan.csv", "--instrument", "signature.csv", "--stop", "12", "--operator", "slice")
     assert "stop after 12 iterations" in plain.out
 

@@ -133,7 +133,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         et.write_intensity(place / "led.ies", intensity_distribution(spoilt, 4, 30))
     (place / "diffuser.toml").write_text('kind = "gaussian"\npeak = 500.0\nsigma = 0.015\nway = "transmitted"\n')
     et.ScatterGoniometer(photons=1e5).measure(DIFFUSER, step=0.5, span=5).save(place / "scan.csv")
-    et.ScatterGoniometer().instrument_function(0.1).save(place / "bare.csv")
+    et.ScatterGoniometer().instrument_function(0.55).save(place / "bare.csv")
     return place
 
 

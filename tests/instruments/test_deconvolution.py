@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.instruments import penalised_lobe as penalised
 from etendue.instruments.goniometer_scan import GoniometerScan
 from etendue.instruments.operators import middle_of, operator_of
 from etendue.instruments.stopping import Course, discrepancy, held_out, plateau, thesis
@@ -160,19 +161,120 @@ def test_the_lobe_comes_back_better_than_by_the_rule_of_the_thesis(name: str) ->
     assert any("below 0" in note for note in inverse.notes)
 
 
+LOBES: dict[str, et.Bsdf] = {
+    "ABg": et.bsdf.ABg(a=0.006, b=1e-4, g=2.0, way="transmitted"),
+    "Harvey and Shack": et.bsdf.HarveyShack(b0=200, l=0.012, s=-2.2, way="transmitted"),
+    "a peak on a foot": et.bsdf.Mixture(
+        parts=[
+            et.bsdf.Gaussian(peak=800.0, sigma=0.008, way="transmitted"),
+            et.bsdf.Gaussian(peak=80.0, sigma=0.025, way="transmitted"),
+        ]
+    ),
+}
+"""Lobes that are no Gaussians, beside those of the thesis."""
+
+
+@functools.cache
+def known(name: str) -> tuple[GoniometerScan, Array]:
+    """An exact scan, and the truth at its positions [1/sr]."""
+    if name not in LOBES:
+        scan = exact_scan(name)
+        return scan, truth(name=name, angle=scan.angle)
+    scan = et.ScatterGoniometer().measure(LOBES[name], span=5, method="quadrature")
+    a = np.radians(scan.angle)
+    to = np.column_stack([np.sin(a), np.zeros(a.size), -np.cos(a)])
+    return scan, LOBES[name].evaluate([0.0, 0.0, 1.0], to)
+
+
+def inside(*, name: str, photons: float, seeds: int, **options: object) -> list[float]:
+    """For each seed the share of the bright positions at which the truth is within a standard error."""
+    scan, exact = known(name)
+    lit = exact > 0.05 * exact.max()
+    found = []
+    for seed in range(seeds):
+        noisy = counted(scan=scan, photons=photons, seed=seed)
+        one = et.deconvolve(noisy, SIGNATURE, **options)  # type: ignore[arg-type]
+        assert one.standard_error is not None
+        found.append(float(np.mean(np.abs(one.values - exact)[lit] < one.standard_error[lit])))
+    return found
+
+
 @pytest.mark.slow
 def test_error_bands_hold() -> None:
-    """Over 24 scans of 10⁵ photons. Neighbours err together; what the stop leaves out is part of the error, estimated from
-    a lobe that was iterated further, which falls short: the share is below 68 %, yet half at least."""
-    inside = []
-    for name in ("SD2", "SD3"):
-        exact = truth(name=name, angle=exact_scan(name).angle)
-        lit = exact > 0.05 * exact.max()
-        for seed in range(12):
-            found = et.deconvolve(counted(scan=exact_scan(name), photons=1e5, seed=seed), SIGNATURE)
-            assert found.standard_error is not None
-            inside += list(np.abs(found.values - exact)[lit] < found.standard_error[lit])
-    assert 0.5 < np.mean(inside) < 0.85
+    """Bands of one standard error hold the truth at 68 ± 5 % of the positions, over lobes, counts and seeds.
+
+    Seeds are independent, positions of one scan are not: the share is known to about 2 %. No lobe falls below a half.
+    """
+    shares = {
+        (name, photons): inside(name=name, photons=photons, seeds=16)
+        for name in ("SD1", "SD2", "SD3", "SD4", *LOBES)
+        for photons in (1e5, 1e6)
+    }
+    mean = float(np.mean(list(shares.values())))
+    error = float(np.sqrt(np.sum([np.var(one, ddof=1) / len(one) for one in shares.values()])) / len(shares))
+    assert error < 0.025
+    assert 0.63 < mean < 0.73
+    assert min(np.mean(one) for one in shares.values()) > 0.5
+
+
+@pytest.mark.slow
+def test_error_bands_of_the_iteration_hold_less() -> None:
+    """What the stop leaves out is part of the error, estimated from a lobe that was iterated further, which falls short."""
+    found = [np.mean(inside(name=name, photons=1e5, seeds=12, method="richardson-lucy")) for name in ("SD2", "SD3")]
+    assert 0.45 < np.mean(found) < 0.85
+
+
+@pytest.mark.slow
+def test_the_width_of_a_gaussian_is_found_nearly_as_well_as_by_fitting_one() -> None:
+    """The smoothest lobe is a Gaussian; that it might be another one costs a factor over the bound of Cramér and Rao for two
+    parameters, which the iteration exceeds by far."""
+    scan, _ = known("SD2")
+    model = operator_of(scan, SIGNATURE, "rings", 0.0)
+    sigma = 1.0 / (2.0 * math.sqrt(2.0 * math.log(2.0)))
+    # How counts of 10⁶ photons change with the logarithms of the peak and of the variance.
+    shape = np.exp(-0.5 * (model.nodes / sigma) ** 2)
+    unit = scan.flux.max() / (model.matrix @ shape).max() * 1e6
+    by_peak = model.matrix @ shape * unit
+    by_width = model.matrix @ (shape * 0.5 * (model.nodes / sigma) ** 2) * unit
+    slopes = np.stack([by_peak, by_width])
+    bound = 0.5 * math.sqrt(np.linalg.inv(slopes / np.maximum(by_peak, 1e-12) @ slopes.T)[1, 1])
+    off = {}
+    for method in ("penalised", "richardson-lucy"):
+        widths = [
+            et.deconvolve(
+                counted(scan=scan, photons=1e6, seed=seed), SIGNATURE, method=method, middle=0.0, replicates=0
+            ).fwhm
+            for seed in range(24)
+        ]
+        off[method] = math.sqrt(np.mean(np.square(np.array(widths) - 1.0)))
+    # The root of the mean square of 24 is known to 14 %.
+    assert bound < off["penalised"] < 3.5 * bound
+    assert off["richardson-lucy"] > 2.0 * off["penalised"]
+
+
+def test_the_penalty_is_the_integral_of_the_third_derivative() -> None:
+    """Of x⁴: 24 x, whose square integrates to 192 x³; a parabola costs nothing."""
+    knots = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.0, 1.4])
+    rows = penalised._third_derivatives(knots, even=False)
+    at = np.linspace(0.0, knots[-1] - 1e-9, 500)
+    splines = penalised._splines(at, knots, even=False)
+    cube = np.linalg.lstsq(splines, at**3, rcond=None)[0]
+    assert rows @ cube == pytest.approx(6.0 * np.sqrt(np.diff(knots)), rel=1e-6)
+    even, folded = penalised._third_derivatives(knots, even=True), penalised._splines(at, knots, even=True)
+    parabola = np.linalg.lstsq(folded, 2.0 - at**2, rcond=None)[0]
+    assert folded @ parabola == pytest.approx(2.0 - at**2, abs=1e-9)
+    assert even @ parabola == pytest.approx(np.zeros(len(even)), abs=1e-7)
+
+
+def test_a_lobe_that_is_not_round_is_told() -> None:
+    """Twice as bright on one side: no even lobe shows that."""
+    scan = exact_scan("SD1")
+    lopsided = dataclasses.replace(scan, flux=scan.flux * (1.0 + 0.5 * np.tanh(scan.angle)))
+    told = et.deconvolve(counted(scan=lopsided, photons=1e6, seed=1), SIGNATURE).notes
+    assert any("times its noise" in note for note in told)
+    assert not any(
+        "times its noise" in note for note in et.deconvolve(counted(scan=scan, photons=1e6, seed=1), SIGNATURE).notes
+    )
 
 
 @pytest.mark.slow
@@ -240,6 +342,10 @@ def test_what_is_refused() -> None:
         et.deconvolve(GoniometerScan([0.0, 1.0], [1.0, 1.0]), SIGNATURE)
     with pytest.raises(ArgumentError, match="iterations"):
         et.deconvolve(scan, SIGNATURE, stop=0)
+    with pytest.raises(ArgumentError, match="does not iterate"):
+        et.deconvolve(scan, SIGNATURE, method="penalised", stop="thesis")
+    with pytest.raises(ArgumentError, match="needs the standard errors"):
+        et.deconvolve(bare, SIGNATURE, method="penalised")
 
 
 def test_what_was_found_is_written(tmp_path: Path) -> None:

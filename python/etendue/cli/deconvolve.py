@@ -26,7 +26,7 @@ from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.stopping import RULES
 from etendue.plot import plot_deconvolution, plot_directions
 
-METHODS = get_args(DirectionalMethod)
+METHODS = sorted({*get_args(Method), *get_args(DirectionalMethod)})
 
 
 def deconvolve(
@@ -51,11 +51,13 @@ def deconvolve(
         typer.Option("--operator", help="In one plane. rings: a round lobe, exactly; slice: as the thesis does it."),
     ] = "rings",
     method: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--method", help="richardson-lucy or matrix; in two dimensions total-variation and parametric too."
+            "--method",
+            help="richardson-lucy or matrix; in one plane penalised, the default for rings whose noise is known; "
+            "in two dimensions total-variation and parametric.",
         ),
-    ] = "richardson-lucy",
+    ] = None,
     stop: Annotated[str | None, typer.Option("--stop", help=f"{', '.join(RULES)}, or a number of iterations.")] = None,
     models: Annotated[
         str | None, typer.Option("--models", help=f"To choose from if parametric: {', '.join(LOBE_MODELS)}.")
@@ -80,7 +82,8 @@ def deconvolve(
 ) -> None:
     """Take the instrument out of a scan, and say how the iteration stopped and what it is sure of."""
     how: OperatorName = one_of(operator, ("rings", "slice"), "--operator")
-    one_of(method, METHODS, "--method")
+    if method is not None:
+        one_of(method, METHODS, "--method")
     rule: str | int | None = stop
     if stop is not None:
         rule = int(stop) if stop.isdecimal() else one_of(stop, RULES, "--stop")
@@ -92,7 +95,7 @@ def deconvolve(
     if isinstance(measured, GoniometerScan):
         only = {"--models": chosen, "--regular": regular, "--cell": cell, "--aperture": aperture, "--beam": beam}
         _refuse({**only, "--distance": distance})
-        if method not in get_args(Method):
+        if method not in {None, *get_args(Method)}:
             raise ArgumentError(f"--method {method} is for scans in two dimensions; {scan} is in one plane")
         if bare is None:
             raise ArgumentError(f"{scan} is in one plane: state --instrument, a scan of the bare beam")
@@ -102,7 +105,9 @@ def deconvolve(
         return
     if operator != "rings":
         raise ArgumentError("--operator is for scans in one plane; this one is in two dimensions")
-    way: Any = method
+    if method not in {None, *get_args(DirectionalMethod)}:
+        raise ArgumentError(f"--method {method} is for scans in one plane; {scan} is in two dimensions")
+    way: Any = method or "richardson-lucy"
     more: dict[str, Any] = {} if chosen is None else {"models": chosen}
     found = deconvolve_directions(
         measured,
@@ -177,7 +182,7 @@ def _tell(found: Deconvolution, scan: Path, outputs: list[Path], *, json: bool) 
         complain(f"note: {note}")
     before, after = found.total_scatter
     told = "" if error is None else f" ± {error:.2g}"
-    say(f"stop after {found.iterations} iterations, {found.stop}")
+    say(f"stop after {found.iterations} iterations, {found.stop}" if found.iterations else found.stop)
     say(f"peak {found.raw.max():.5g} as measured, {found.peak:.5g}{told} without the instrument")
     say(f"full width at half maximum {found.fwhm:.3f}°, middle at {found.middle:.3f}°")
     say(f"total scatter {before:.6g} before, {after:.6g} after")

@@ -44,7 +44,9 @@ def goniometer(
     ] = COLLIMATED,
     distance: Annotated[float, typer.Option("--distance", help="From the sample to the aperture in mm.")] = 886.0,
     incidence: Annotated[float, typer.Option("--incidence", help="Angle of incidence in °.")] = 0.0,
-    step: Annotated[float, typer.Option("--step", help="Between positions in °.")] = 0.1,
+    step: Annotated[
+        float | None, typer.Option("--step", help="Between positions in °; 0.1, or 0.05 of the bare beam.")
+    ] = None,
     span: Annotated[
         float | None,
         typer.Option(
@@ -92,6 +94,7 @@ def goniometer(
         raise typer.BadParameter("--outside, --turn and --head are for scans in two dimensions: add --window")
     if window and plane != "in-plane":
         raise typer.BadParameter("--plane is for scans in one plane; --window scans both")
+    step = step if step is not None else 0.05 if no_sample else 0.1
     which: Plane = one_of(plane, ("in-plane", "cross-plane"), "--plane")
     how: Method = one_of(method, ("trace", "quadrature"), "--method")
     ways: tuple[Way, Way] = ("transmitted", "reflected")

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from typing import Any, Literal, get_args
+from collections.abc import Callable
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.extras import require
 from etendue.formats.output import atomic_output
 from etendue.instruments.courses import after, course_of, rule_of
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
-from etendue.instruments.operators import Operator, OperatorName, middle_of, operator_of
+from etendue.instruments.operators import Operator, OperatorName, middle_of, operator_of, sparse_if_large
+from etendue.instruments.penalised_lobe import PenalisedLobe, penalised_lobe
 
 Array = npt.NDArray[np.float64]
-Method = Literal["richardson-lucy", "matrix"]
+Method = Literal["penalised", "richardson-lucy", "matrix"]
 
 REPLICATES = 32
 """Scans that error bands are made of."""
@@ -25,8 +26,8 @@ REPLICATES = 32
 FURTHER = 4
 """Times the iterations after which a lobe stands for the truth when errors are estimated."""
 
-LARGE = 200
-"""Positions from which on the matrix, most of which is 0, is kept as a sparse one if SciPy is there."""
+UNLIKELY = 5.0
+"""Standard deviations of the deviance from which on what is left of the scan is not its noise."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,13 +51,13 @@ class Deconvolution:
     middle : float
         Of the lobe [°].
     iterations : int
-        How many; 0 for matrix inversion.
+        How many; 0 if nothing was iterated.
     stop : str
-        The rule, and why it stopped there.
+        The rule, and why it stopped there; or the method, and how it came to its smoothness.
     total_scatter : (float, float)
         Before and after, by eq. 5.2: the same to 1e-6.
     error_function : array
-        E(i) of eq. 5.7, from iteration 1 on.
+        E(i) of eq. 5.7, from iteration 1 on; empty if nothing was iterated.
     operator : {"rings", "slice"}
         How the instrument was described.
     notes : tuple of str
@@ -133,7 +134,7 @@ def deconvolve(
     signature: GoniometerScan,
     *,
     operator: OperatorName = "rings",
-    method: Method = "richardson-lucy",
+    method: Method | None = None,
     stop: str | int | None = None,
     middle: float | None = None,
     replicates: int = REPLICATES,
@@ -141,7 +142,7 @@ def deconvolve(
 ) -> Deconvolution:
     """Take the instrument out of a scan: eqs. 5.1, 5.2 and 5.7 of the thesis.
 
-    The iteration works on fluxes; the BSDF follows from eq. 5.1 and is scaled so that the total scatter stays what it is.
+    All work on fluxes; the BSDF follows from eq. 5.1 and is scaled so that the total scatter stays what it is.
 
     Parameters
     ----------
@@ -152,14 +153,17 @@ def deconvolve(
     operator : {"rings", "slice"}
         Of a lobe that is round: its exact image by a round beam and a round aperture on the sphere. Or the slice convolved
         with a slice, as the thesis does it; for lobes that are not symmetrical.
-    method : {"richardson-lucy", "matrix"}
-        Or the inverse of the matrix [Ferrero2011]_, which makes negative values of noise.
+    method : {"penalised", "richardson-lucy", "matrix"}, optional
+        A lobe whose logarithm is as smooth as the counts ask for, with error bands of its own [Eilers1996]_; the iteration
+        of the thesis; or the inverse of the matrix [Ferrero2011]_, which makes negative values of noise. If left out: the
+        first for rings if the noise of the scan is known and no stop is stated, else the second.
     stop : {"held-out", "discrepancy", "plateau", "thesis"} or int, optional
-        The rule, or a number of iterations. If left out: "held-out", or "thesis" if the noise of the scan is not known.
+        Of the iteration: the rule, or a number of iterations. If left out: "held-out", or "thesis" if the noise of the scan
+        is not known.
     middle : number, optional
         Of the lobe [°]; found by its symmetry if left out.
     replicates : int
-        Scans drawn about what was found, which the standard error is made of; 0: none.
+        Scans drawn about what was found, which the standard error of an iteration is made of; 0: no standard errors.
     seed : int
         Of them, and of the counts that are kept back.
 
@@ -170,8 +174,8 @@ def deconvolve(
     Raises
     ------
     ArgumentError
-        If the scan has less than five positions or no light, the signature is wider than it, or a rule needs standard
-        errors that it does not have.
+        If the scan has less than five positions or no light, the signature is wider than it, a rule or the method needs
+        standard errors that it does not have, or a stop is stated and nothing is iterated.
     UnknownNameError
         If there is no such operator, method or rule.
 
@@ -186,8 +190,10 @@ def deconvolve(
     >>> bool(abs(after / before - 1) < 1e-6)
     True
     """
-    if method not in get_args(Method):
+    if method is not None and method not in get_args(Method):
         raise UnknownNameError("method", method, get_args(Method))
+    if stop is not None and method not in {None, "richardson-lucy"}:
+        raise ArgumentError(f"a stop is for method='richardson-lucy'; {method!r} does not iterate")
     notes = list(scan.notes)
     if scan.angle.size < 5:
         raise ArgumentError(f"a scan of {scan.angle.size} positions; five are needed at least")
@@ -198,21 +204,16 @@ def deconvolve(
     at = middle_of(full.angle, np.maximum(full.flux, 0.0)) if middle is None else float(middle)
     model = operator_of(full, signature, operator, at)
     gain = _gain(full)
-    rule = rule_of(stop, counted=gain is not None)
-    flux = np.asarray(full.flux)
-    if method == "matrix":
-        found, course, count, why = _inverted(model, flux), None, 0, "matrix inversion needs no stop"
-    else:
-        measured = flux + full.background
-        course, count, why = course_of(_sparse(model), measured, full.background, gain, model.start, rule, seed)
-        found = _after(model, measured, full.background, count)
-    image = model.matrix @ found
-    spread = None
-    if replicates and gain is not None:
-        # The lobe that was found is too wide by what the stop leaves out. One that is less so stands for the truth.
-        truth = found if method == "matrix" else _after(model, flux + full.background, full.background, FURTHER * count)
-        spread = _spread(model, truth, full, gain, count, method, replicates, seed)
-    values, error, raw, fitted, totals = _as_bsdf(scan, full, model, found, spread, image)
+    if method is None:
+        method = "penalised" if operator == "rings" and gain is not None and stop is None else "richardson-lucy"
+    task = _Task(model, full, gain, rule_of(stop, counted=gain is not None), replicates, seed)
+    found = _WAYS[method](task)
+    notes += found.notes
+    spread = found.spread
+    if spread is not None and gain is not None and middle is None:
+        spread = np.hypot(spread, _error_of_middle(model, found.lobe, full, gain))
+    image = model.matrix @ found.lobe
+    values, error, raw, fitted, totals = _as_bsdf(scan, full, model, found.lobe, spread, image)
     residuals = np.asarray(scan.flux - fitted)
     if gain is not None and scan.standard_error is not None:
         lit = scan.standard_error > 0.0
@@ -229,10 +230,10 @@ def deconvolve(
         residuals,
         fitted,
         at,
-        count,
-        f"{rule if method == 'richardson-lucy' else method}: {why}",
+        found.iterations,
+        found.stop,
         totals,
-        np.zeros(0) if course is None else course.error,
+        found.error_function,
         operator,
         tuple(notes),
     )
@@ -248,10 +249,10 @@ def _doubts(scan: GoniometerScan, signature: GoniometerScan) -> list[str]:
             f"{int(below.sum())} fluxes are below 0 by {-scan.flux[below].sum() / np.abs(scan.flux).sum():.2%} of all flux: "
             "the iteration takes them for 0, the total scatter counts them; state the background to keep them"
         )
-    if abs(signature.step - scan.step) > 1e-3 * scan.step:
+    if signature.step > 1.001 * scan.step:
         found.append(
             f"the steps are {scan.step:g}° of the scan and {signature.step:g}° of the instrument function: "
-            "the latter is taken for linear between its positions"
+            "the latter is a cubic between its positions"
         )
     for low, high in signature.gaps:
         found.append(f"the instrument function has no positions between {low:g}° and {high:g}°: taken for linear")
@@ -275,40 +276,102 @@ def _gain(scan: GoniometerScan) -> float | None:
 
 
 def _after(model: Operator, measured: Array, background: float, count: int) -> Array:
-    return after(_sparse(model), measured, model.start(measured - background), count, background)
+    return after(sparse_if_large(model.matrix), measured, model.start(measured - background), count, background)
 
 
-def _sparse(model: Operator) -> Any:
-    if model.angle.size < LARGE:
-        return model.matrix
-    try:
-        return require("scipy.sparse").csr_array(model.matrix)
-    except ImportError:
-        return model.matrix
+def _misfit(lobe: PenalisedLobe) -> tuple[str, ...]:
+    if (lobe.deviance - 1.0) / np.sqrt(2.0 / lobe.left) < UNLIKELY:
+        return ()
+    why = "the lobe is not round about its middle, or the instrument function is another one or has too wide steps"
+    return (
+        f"what is left of the scan is {lobe.deviance:.3g} times its noise: {why}; the standard errors are too small",
+    )
+
+
+def _error_of_middle(model: Operator, found: Array, scan: GoniometerScan, gain: float) -> Array:
+    """What the values owe to the middle, which was found with an error of its own, by Fisher's information of a shift."""
+    image = model.matrix @ found + scan.background
+    slope = np.gradient(image, model.angle)
+    known = float(np.sum(slope**2 / np.maximum(image, 1e-9 * image.max())))
+    shift = np.sqrt(gain / known) if known > 0.0 else 0.0
+    return np.asarray(np.abs(np.gradient(model.at_positions(found), model.angle)) * shift)
+
+
+class _Task(NamedTuple):
+    """What each way starts from."""
+
+    model: Operator
+    scan: GoniometerScan
+    gain: float | None
+    rule: str
+    replicates: int
+    seed: int
+
+    @property
+    def measured(self) -> Array:
+        """With the background in it."""
+        return np.asarray(self.scan.flux + self.scan.background)
+
+
+class _Found(NamedTuple):
+    """Values at the nodes, their standard errors at the positions, and how they were found."""
+
+    lobe: Array
+    spread: Array | None
+    stop: str
+    iterations: int = 0
+    error_function: Array = np.zeros(0)
+    notes: tuple[str, ...] = ()
+
+
+def _penalised(task: _Task) -> _Found:
+    if task.gain is None:
+        raise ArgumentError("method='penalised' needs the standard errors of the scan; 'richardson-lucy' does not")
+    lobe = penalised_lobe(task.model, task.measured, task.scan.background, task.gain)
+    stop = f"penalised: {lobe.freedom:.3g} degrees of freedom, the smoothness of ln f by marginal likelihood"
+    return _Found(lobe.values, np.sqrt(lobe.variance) if task.replicates else None, stop, notes=_misfit(lobe))
+
+
+def _by_matrix(task: _Task) -> _Found:
+    lobe = _inverted(task.model, np.asarray(task.scan.flux))
+    return _Found(lobe, _spread(task, lobe, 0), "matrix: matrix inversion needs no stop")
+
+
+def _iterated(task: _Task) -> _Found:
+    model, background = task.model, task.scan.background
+    matrix = sparse_if_large(model.matrix)
+    course, count, why = course_of(matrix, task.measured, background, task.gain, model.start, task.rule, task.seed)
+    lobe = _after(model, task.measured, background, count)
+    spread = None
+    if task.replicates and task.gain is not None:
+        # The lobe that was found is too wide by what the stop leaves out. One that is less so stands for the truth.
+        spread = _spread(task, _after(model, task.measured, background, FURTHER * count), count)
+    return _Found(lobe, spread, f"{task.rule}: {why}", count, course.error)
+
+
+_WAYS: dict[Method, Callable[[_Task], _Found]] = {
+    "penalised": _penalised,
+    "richardson-lucy": _iterated,
+    "matrix": _by_matrix,
+}
 
 
 def _inverted(model: Operator, flux: Array) -> Array:
     return np.asarray(np.linalg.lstsq(model.matrix, flux, rcond=1e-10)[0])
 
 
-def _spread(
-    model: Operator,
-    truth: Array,
-    scan: GoniometerScan,
-    gain: float,
-    count: int,
-    method: str,
-    replicates: int,
-    seed: int,
-) -> Array:
-    """Standard errors of the values at the positions: spread, and what the stop costs."""
-    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 1))))
-    expected = np.maximum(model.matrix @ truth + scan.background, 0.0) / gain
-    drawn = np.asarray(gain * rng.poisson(expected[:, None], (expected.size, replicates)), np.float64)
-    if method == "matrix":
-        again = np.stack([_inverted(model, one - scan.background) for one in drawn.T], axis=1)
+def _spread(task: _Task, truth: Array, count: int) -> Array | None:
+    """Standard errors of the values at the positions: spread, and what the stop after `count` iterations costs."""
+    model, gain, background = task.model, task.gain, task.scan.background
+    if not task.replicates or gain is None:
+        return None
+    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((task.seed, 1))))
+    expected = np.maximum(model.matrix @ truth + background, 0.0) / gain
+    drawn = np.asarray(gain * rng.poisson(expected[:, None], (expected.size, task.replicates)), np.float64)
+    if count:
+        again = _after(model, drawn, background, count)
     else:
-        again = _after(model, drawn, scan.background, count)
+        again = np.stack([_inverted(model, one - background) for one in drawn.T], axis=1)
     at, here = model.at_positions(again), model.at_positions(truth)
     return np.asarray(np.sqrt(at.var(axis=1, ddof=1) + (at.mean(axis=1) - here) ** 2))
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.extras import scipy_part
 from etendue.instruments.goniometer_scan import GoniometerScan
 
 Array = npt.NDArray[np.float64]
@@ -19,6 +20,9 @@ FAINT = 1e-4
 
 FINE = 16
 """Parts of a step between positions of an instrument function."""
+
+LARGE = 200
+"""Rows from which on a matrix is kept as a sparse one."""
 
 PER_STEP, AZIMUTHS = 4, 24
 """Nodes of the rings by step and by half a turn: the matrix is right to 1e-4 of a signature that is five steps wide."""
@@ -38,12 +42,15 @@ class Operator:
         Angles of the unknowns [°]: of cubic B-splines from the middle if "rings", else those of the positions.
     angle : array, shape (n,)
         Of the positions from the middle of the lobe [°].
+    reach : number
+        Angle from its middle at which the instrument function ends [°].
     """
 
     name: OperatorName
     matrix: Array
     nodes: Array
     angle: Array
+    reach: float
 
     def at_positions(self, values: Array) -> Array:
         """Values at the nodes as values at the positions; `values` of shape (m,) or (m, k)."""
@@ -144,6 +151,16 @@ def _monotone(x: Array, nodes: Array, values: Array) -> Array:
     return np.asarray(flat + h * (slope[k] * u * (1 - u) ** 2 + slope[k + 1] * u * u * (u - 1)))
 
 
+def sparse_if_large(matrix: Array) -> Any:
+    """The same; most of it is 0, which SciPy makes use of if it is there and the matrix is large."""
+    if matrix.shape[0] < LARGE:
+        return matrix
+    try:
+        return scipy_part("sparse").csr_array(matrix)
+    except ImportError:
+        return matrix
+
+
 def operator_of(scan: GoniometerScan, signature: GoniometerScan, name: OperatorName, middle: float) -> Operator:
     """The operator of a name; see `Operator`.
 
@@ -163,20 +180,23 @@ def operator_of(scan: GoniometerScan, signature: GoniometerScan, name: OperatorN
     if name not in get_args(OperatorName):
         raise UnknownNameError("operator", name, get_args(OperatorName))
     radius, blur = folded(signature)
+    reach = float(radius[-1])
     angle = scan.angle - middle
     width = float(scan.angle[-1] - scan.angle[0])
-    if 2.0 * radius[-1] >= width:
+    if 2.0 * reach >= width:
         raise ArgumentError(
-            f"the instrument function is {2.0 * radius[-1]:.3g}° wide, the scan {width:.3g}°: scan to larger angles"
+            f"the instrument function is {2.0 * reach:.3g}° wide, the scan {width:.3g}°: scan to larger angles"
         )
     if name == "slice":
         matrix = np.interp(np.abs(angle[:, None] - angle[None, :]), radius, blur, right=0.0)
         step = np.gradient(angle)
         # What a flat lobe gives is itself.
-        return Operator(name, matrix * step / np.trapezoid(np.append(blur[:0:-1], blur), dx=radius[1]), angle, angle)
+        return Operator(
+            name, matrix * step / np.trapezoid(np.append(blur[:0:-1], blur), dx=radius[1]), angle, angle, reach
+        )
     step = scan.step
     nodes = np.arange(0.0, np.abs(angle).max() + step, step)
-    return Operator(name, _rings(np.abs(angle), nodes, radius, blur), nodes, angle)
+    return Operator(name, _rings(np.abs(angle), nodes, radius, blur), nodes, angle, reach)
 
 
 def _rings(angle: Array, nodes: Array, radius: Array, blur: Array) -> Array:

@@ -117,7 +117,26 @@ def _draw(panels: Sequence[Axes], found: Deconvolution) -> None:
         if limits[0] < limits[1]:
             axes.set_xlim(*limits)
         axes.set_xlabel("angle of the detector [°]")
-    _error_function(panels[2], found)
+    if found.error_function.size:
+        _error_function(panels[2], found)
+        return
+    # Nothing was iterated: there is room for what is faint.
+    _logarithmic(panels[2], found)
+    if limits[0] < limits[1]:
+        panels[2].set_xlim(*limits)
+
+
+def _logarithmic(axes: Axes, found: Deconvolution) -> None:
+    least = SHOWN * found.peak
+    axes.semilogy(found.angle, np.maximum(found.raw, least), "--", color=style.LINES[1], lw=1.1)
+    if found.standard_error is not None:
+        low, high = found.values - found.standard_error, found.values + found.standard_error
+        band = (np.maximum(low, least), np.maximum(high, least))
+        axes.fill_between(found.angle, *band, color=style.LINES[0], alpha=0.25, lw=0)
+    axes.semilogy(found.angle, np.maximum(found.values, least), color=style.LINES[0], lw=1.2)
+    axes.set(ylim=(least, 2.0 * max(found.peak, float(found.raw.max()))), xlabel="angle of the detector [°]")
+    axes.set_ylabel("f [1/sr]")
+    style.put_title(axes, "The same, logarithmic")
 
 
 def _lobe(axes: Axes, found: Deconvolution) -> None:
@@ -142,11 +161,6 @@ def _residuals(axes: Axes, found: Deconvolution) -> None:
 
 def _error_function(axes: Axes, found: Deconvolution) -> None:
     error = found.error_function
-    if not error.size:
-        axes.text(0.5, 0.5, "no iteration", ha="center", va="center", transform=axes.transAxes, color=style.FAINT)
-        axes.set(xticks=[], yticks=[])
-        style.put_title(axes, "E(i), eq. 5.7")
-        return
     counted = np.arange(1, error.size + 1)
     axes.loglog(counted, error / error.max(), color=style.LINES[0], lw=1.2)
     axes.axvline(found.iterations, color=style.LINES[1], lw=1.0, ls="--", label=f"stop: {found.iterations}")
