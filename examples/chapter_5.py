@@ -213,6 +213,34 @@ def deconvolve_diffusers(output: Path, *, full: bool, fresh: bool) -> None:
         print_table(["L2 [%] (stop)", *names], rules)
 
 
+def bands(seeds: int) -> None:
+    """How often an error band of one standard error holds the truth, where f is above 5 % of its peak; and the time."""
+    goniometer = et.ScatterGoniometer()
+    bare = goniometer.instrument_function()
+    rows = []
+    for method in ("penalised", "richardson-lucy"):
+        for photons in (1e4, 1e5, 1e6):
+            row, start, error = [method, f"{photons:.0e}"], time.process_time(), []
+            for name in STOPS:
+                exact = goniometer.measure(sample(name), span=5, method="quadrature")
+                truth = lobe(name, exact.angle)
+                lit = truth > 0.05 * truth.max()
+                shares = []
+                for seed in range(seeds):
+                    found = et.deconvolve(noisy(exact, photons, seed), bare, method=method)  # type: ignore[arg-type]
+                    assert found.standard_error is not None  # noqa: S101 - counts are known
+                    shares.append(np.mean(np.abs(found.values - truth)[lit] < found.standard_error[lit]))
+                    error.append(loss(found, name))
+                row.append(f"{100 * np.mean(shares):.0f} ± {100 * np.std(shares) / math.sqrt(seeds):.0f} %")
+            seconds = (time.process_time() - start) / (seeds * len(STOPS))
+            rows.append([*row, f"{100 * np.mean(error):.1f} %", f"{seconds:.2f} s"])
+    print_table([f"bands, {seeds} seeds", "photons", *STOPS, "L2, mean", "CPU of one"], rows)
+    scan = noisy(goniometer.measure(sample("SD2"), span=90, method="quadrature"), 1e6, 1)
+    start = time.perf_counter()
+    et.deconvolve(scan, bare)
+    print(f"{scan.angle.size} positions with error bands: {time.perf_counter() - start:.2f} s")
+
+
 def stops_by_range(seeds: int = 8) -> None:
     """Where the thesis' rule stops if the scans go further, from the least to the largest of some seeds."""
     goniometer = et.ScatterGoniometer()
@@ -302,6 +330,7 @@ def main() -> None:
     parser.add_argument("--full", action="store_true", help="10⁴ iterations, all rules, 20 seeds")
     parser.add_argument("--fresh", action="store_true", help="a million fresh rays at each position")
     parser.add_argument("--ranges", action="store_true", help="where the thesis' rule stops, by the range of the scan")
+    parser.add_argument("--bands", action="store_true", help="how often error bands hold")
     parser.add_argument("--seeds", type=int, help="scans of each aperture")
     parser.add_argument("--output", type=Path, default=Path("chapter-5"), help="folder for the figures")
     options = parser.parse_args()
@@ -312,6 +341,8 @@ def main() -> None:
     deconvolve_diffusers(options.output, full=options.full, fresh=options.fresh)
     if options.ranges:
         stops_by_range()
+    if options.bands:
+        bands(options.seeds or 24)
     for fwhm in (NARROW, WIDE) if options.full else (NARROW,):
         four_apertures(options.output, fwhm, seeds)
     print(f"\nfigures: {options.output}/")

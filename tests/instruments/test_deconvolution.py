@@ -141,7 +141,6 @@ def test_rules_on_courses_that_are_known() -> None:
 # --- the diffusers of the thesis ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SD1", "SD2", "SD3", "SD4"])
 def test_the_lobe_comes_back_better_than_by_the_rule_of_the_thesis(name: str) -> None:
     """A million photons: relative L2 error, total scatter, no negative values."""
@@ -277,7 +276,6 @@ def test_a_lobe_that_is_not_round_is_told() -> None:
     )
 
 
-@pytest.mark.slow
 def test_a_scan_that_is_not_in_line_is_put_right() -> None:
     """The middle lies between two positions; the peak is what it would be."""
     straight = et.deconvolve(counted(scan=exact_scan("SD2"), photons=1e7, seed=1), SIGNATURE, replicates=0)
@@ -292,7 +290,6 @@ def test_a_scan_that_is_not_in_line_is_put_right() -> None:
 # --- what is not as it should be ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_gaps_negative_fluxes_and_other_steps_are_told_and_survive() -> None:
     scan = counted(scan=exact_scan("SD2"), photons=1e6, seed=3)
     keep = np.abs(scan.angle - 1.0) > 0.15

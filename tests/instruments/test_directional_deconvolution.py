@@ -107,7 +107,6 @@ def test_splines_carry_even_and_smooth_lobes() -> None:
     assert np.isnan(splines.evaluate(np.ones(splines.count), direction(10.0, 90.0, behind=True)))
 
 
-@pytest.mark.slow
 def test_an_instrument_function_alone_is_enough_about_the_regular_direction() -> None:
     """The spot is seen there as the beam is: both matrices expect the same within 1 % of the peak."""
     goniometer = et.ScatterGoniometer()
@@ -312,7 +311,6 @@ def test_a_turned_sample() -> None:
 # --- what is not as it should be ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_gaps_and_negative_fluxes_are_told_and_survived() -> None:
     scan = counted(scan=exact_scan("gaussian"), peak=1e4, seed=3)
     hole = np.linalg.norm(scan.direction - direction(62.0, 0.0), axis=1) > 0.02

@@ -101,6 +101,19 @@ def test_rays_and_integrals_agree(theta: float, plane: str, settings: dict[str, 
 
 
 @pytest.mark.slow
+@pytest.mark.slow
+def test_the_quadrature_resolves_a_lobe_that_is_narrow_beside_the_instrument() -> None:
+    """A lobe of 0.5° behind a beam and an aperture of 1.4°, where few nodes are off by 2 % of the flux and more."""
+    goniometer = et.ScatterGoniometer(30, 30, 1200, divergence=0.3)
+    sigma = math.sin(math.radians(0.25)) / math.sqrt(2.0 * math.log(2.0))
+    sample = et.bsdf.Gaussian(peak=0.92 / (2.0 * math.pi * sigma**2), sigma=sigma, way="transmitted")
+    exact = goniometer.measure(sample, step=0.4, span=2, method="quadrature")
+    traced = goniometer.measure(sample, step=0.4, span=2, rays=3_000_000, seed=3, fresh=True)
+    assert (exact.flux > 1e-4).all()
+    error = np.sqrt(exact.flux * (1 - exact.flux) / 3_000_000)
+    assert_agree(values=traced.flux, expected=exact.flux, standard_error=error)
+
+
 def test_light_that_is_mirrored_arrives_too() -> None:
     """A share of 0.3 in a single direction on a floor: the floor in closed form (ρ cosθ Ω/π), the rest of the bare beam."""
     sample = et.bsdf.DiffuseSpecular(total_reflectance=0.8, specular_reflectance=0.3)

@@ -34,6 +34,9 @@ SETTLED = 0.02
 ENOUGH = 0.01
 """Of the logarithm of the likelihood: less than this is not searched for."""
 
+OPERATOR = 1e-3
+"""To which share of the largest flux an operator is right: no scan is taken for more certain."""
+
 MOST_ROUNDS, MOST_STEPS = 200, 30
 
 SMOOTHER = np.arange(-6.0, 6.1, 1.5)
@@ -85,12 +88,25 @@ def penalised_lobe(model: Operator, measured: Array, background: float, gain: fl
     background : number
         In the same unit.
     gain : number
-        What one count stands for.
+        What one count stands for; more if the largest flux would be known to better than `OPERATOR`.
 
     Returns
     -------
     PenalisedLobe
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> from etendue.instruments.operators import operator_of
+    >>> goniometer = et.ScatterGoniometer()
+    >>> sample = et.bsdf.Gaussian(peak=500, sigma=0.016, way="transmitted")
+    >>> scan = goniometer.measure(sample, step=0.2, span=4, method="quadrature")
+    >>> model = operator_of(scan, goniometer.instrument_function(), "rings", 0.0)
+    >>> lobe = penalised_lobe(model, scan.flux, 0.0, 1e-6)
+    >>> round(float(model.at_positions(lobe.values).max() / scan.solid_angle), -1)
+    500.0
     """
+    gain = max(gain, OPERATOR**2 * float(measured.max()))
     fit = _Fit(model, np.maximum(measured, 0.0) / gain, background / gain, gain)
     start = model.start(np.maximum(measured - background, 0.0))
     wanted = np.log(np.maximum(start, LEAST_START * start.max()))
@@ -160,9 +176,10 @@ class _Fit:
     def search(self, unknowns: Array, at: Array, most: int) -> tuple[Array, _Curvature]:
         """Fisher's scoring, with a step that is halved until it does no harm."""
         best = self.objective(unknowns, at)
+        penalty = self.thirds.T @ (at[:, None] * self.thirds)
         for _ in range(most):
-            lobe, mean, slopes, curvature = self._about(unknowns, at)
-            slope = slopes.T @ (1.0 - self.counts / mean) + self.thirds.T @ (at * (self.thirds @ unknowns))
+            lobe, mean, slopes, curvature = self._about(unknowns, penalty)
+            slope = slopes.T @ (1.0 - self.counts / mean) + penalty @ unknowns
             step = -curvature.solve(slope)
             # What is dark may become as dark as it likes; what is bright is not to overshoot.
             change = np.abs(self.splines @ step)[lobe > 1e-12 * lobe.max()]
@@ -174,7 +191,7 @@ class _Fit:
             unknowns, gained, best = unknowns + length * step, best - found, found
             if abs(gained) < ENOUGH:
                 break
-        return unknowns, self._about(unknowns, at)[3]
+        return unknowns, self._about(unknowns, penalty)[3]
 
     def averaged(self, unknowns: Array, at: Array) -> PenalisedLobe:
         """Over factors of the penalty, by their marginal likelihood."""
@@ -198,12 +215,12 @@ class _Fit:
         deviance = float(deviances(self.counts, mean)[bright].sum()) / left
         return PenalisedLobe(values, share @ (np.stack(variances) + apart**2), freedom, deviance, left)
 
-    def _about(self, unknowns: Array, at: Array) -> tuple[Array, Array, Any, _Curvature]:
+    def _about(self, unknowns: Array, penalty: Array) -> tuple[Array, Array, Any, _Curvature]:
         lobe = np.exp(self.splines @ unknowns)
         mean = np.maximum(self.matrix @ lobe + self.background, 1e-300)
         slopes = self.matrix @ _scaled(self.splines, lobe)
         data = _dense(slopes.T @ _scaled(slopes, 1.0 / mean))
-        return lobe, mean, slopes, _Curvature(data + self.thirds.T @ (at[:, None] * self.thirds))
+        return lobe, mean, slopes, _Curvature(data + penalty)
 
 
 class _Curvature:

@@ -5,10 +5,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from etendue.instruments.beam_and_aperture import axes_of
+from etendue.errors import ArgumentError
+from etendue.instruments.beam_and_aperture import axes_of, into_the_sample
 from etendue.instruments.bench import Bench
+from etendue.quantities.bsdf_data import direction
+from etendue.scatter.bsdf import Bsdf
 
 Array = npt.NDArray[np.float64]
+
+BLOCK = 1 << 20
+"""Rays that are traced together; what a scan takes of memory does not grow with its rays."""
 
 
 def ray_hits(bench: Bench, start: Array, to: Array, arms: Array, *, behind: bool) -> Array:
@@ -65,3 +71,79 @@ def ray_hits(bench: Bench, start: Array, to: Array, arms: Array, *, behind: bool
         u, w = x * t1[0] + y * t1[1] + z * t1[2], x * t2[0] + y * t2[1] + z * t2[2]
         found[k] = np.count_nonzero(aperture.holds(u, w) & (along > 0.0))
     return found
+
+
+def counted_flux(
+    bench: Bench,
+    bsdf: Bsdf | None,
+    arms: Array,
+    rays: int,
+    seed: int,
+    *,
+    theta: float,
+    wavelength: float,
+    behind: bool,
+    fresh: bool = False,
+) -> tuple[Array, Array]:
+    """Share of the rays of a beam that get into the aperture at each position, and its standard error; shapes (k,).
+
+    Parameters
+    ----------
+    bench : Bench
+        Beam, aperture and distance.
+    bsdf : Bsdf, optional
+        Of the sample; None: there is none.
+    arms : array, shape (k, 3)
+        Positions.
+    rays, seed : int
+        How many, and their seed.
+    theta, wavelength : number
+        Angle of incidence [°], and in nm.
+    behind : bool
+        Whether rays are counted that go to the other side.
+    fresh : bool
+        Rays of its own for each position, instead of the same for all.
+
+    Raises
+    ------
+    ArgumentError
+        If there are no rays, or the seed is negative.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> goniometer, up = et.ScatterGoniometer(), np.array([[0.0, 0.0, 1.0]])
+    >>> paint = et.bsdf.Lambertian(reflectance=1.0)
+    >>> share, error = counted_flux(
+    ...     goniometer.bench, paint, up, 200_000, 1, theta=0.0, wavelength=550.0, behind=False
+    ... )
+    >>> bool(abs(share[0] - goniometer.solid_angle / np.pi) < 4 * error[0])
+    True
+    """
+    if rays < 1:
+        raise ArgumentError(f"{rays} rays; draw at least one")
+    if seed < 0:
+        raise ArgumentError(f"a seed of {seed}; it is not negative")
+
+    def leaving(n: int, number: tuple[int, ...]) -> tuple[Array, Array]:
+        """Where rays leave the sample [mm] and to where, shape (n, 3) each; NaN where they are absorbed."""
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((*number, 0))))
+        points = bench.beam.points(rng, n)
+        start, v = into_the_sample(points, bench.beam.tilts(points, rng), theta, across=bsdf is None)
+        if bsdf is None:
+            return start, v
+        own = int(np.random.SeedSequence((*number, 1)).generate_state(1, np.uint64)[0])
+        incident = direction(theta, 180.0) if bench.beam.collimated else -v
+        return start, bsdf.sample(incident, n, seed=own, wavelength=wavelength)
+
+    hits = np.zeros(len(arms))
+    for block, first in enumerate(range(0, rays, BLOCK)):
+        n = min(BLOCK, rays - first)
+        if fresh:
+            for k in range(len(arms)):
+                hits[k : k + 1] += ray_hits(bench, *leaving(n, (seed, block, k + 1)), arms[k : k + 1], behind=behind)
+        else:
+            hits += ray_hits(bench, *leaving(n, (seed, block, 0)), arms, behind=behind)
+    share = hits / rays
+    # Where no ray came, as if one had: the error of nothing is not nothing.
+    return share, np.sqrt(np.maximum(share, 1.0 / rays) * (1.0 - share) / rays)

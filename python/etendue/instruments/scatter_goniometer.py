@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape, into_the_sample
+from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape
 from etendue.instruments.bench import Bench
 from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.goniometer_scan import GoniometerScan, Way
@@ -22,22 +21,14 @@ from etendue.instruments.positions import (
     hemisphere_around,
     window,
 )
-from etendue.instruments.ray_counting import ray_hits
+from etendue.instruments.ray_counting import counted_flux
+from etendue.instruments.sight_quadrature import integrated_flux
 from etendue.instruments.turned_sample import TurnedSample
 from etendue.quantities.bsdf_data import BsdfSlice, direction
 from etendue.scatter.bsdf import Bsdf
 
 Array = npt.NDArray[np.float64]
 Method = Literal["trace", "quadrature"]
-
-BLOCK = 1 << 20
-"""Rays that are traced together; what a scan takes of memory does not grow with its rays."""
-
-FINENESS = ((4, 8), (5, 11), (7, 15), (10, 21), (14, 30))
-"""Nodes across beam and aperture: the next are tried where two differ by more than `RESOLVED`."""
-
-RESOLVED = 2e-4
-"""Of the largest flux of a scan: quadratures that differ by less agree."""
 
 SPAN = 9.0
 """To which angles on both sides a scan goes if nothing is said [°]: 181 positions in steps of 0.1°."""
@@ -179,7 +170,9 @@ class ScatterGoniometer:
             flux, error = self.bench.beam.overlap(self.bench.aperture, angle, self.distance), np.zeros(angle.shape)
         else:
             arms = detector_directions(angle, 0.0, "in-plane", behind=True)
-            flux, error = self._counted(None, 0.0, arms, rays, seed, behind=True, fresh=False)
+            flux, error = counted_flux(
+                self.bench, None, arms, rays, seed, theta=0.0, wavelength=self.wavelength, behind=True
+            )
         return self._noisy(angle, flux, error, seed, incidence=0.0, way="transmitted", plane="in-plane", sample=False)
 
     def measure(
@@ -245,10 +238,7 @@ class ScatterGoniometer:
             angle = angle[np.abs(angle) < 90.0]
         behind = way == "transmitted"
         arms = detector_directions(angle, theta, plane, behind=behind)
-        if method == "trace":
-            flux, error = self._counted(bsdf, theta, arms, rays, seed, behind=behind, fresh=fresh)
-        else:
-            flux, error = self._integrated(bsdf, theta, arms, behind=behind)
+        flux, error = self._flux(bsdf, arms, theta, rays, seed, method, behind=behind, fresh=fresh)
         notes: tuple[str, ...] = ()
         if method == "trace" and not fresh and self.photons is None:
             notes = (SHARED,)
@@ -298,10 +288,7 @@ class ScatterGoniometer:
             own = np.flatnonzero((arms[:, 2] < 0.0) == behind)
             if not own.size:
                 continue
-            if method == "trace":
-                found = self._counted(bsdf, theta, arms[own], rays, seed, behind=behind, fresh=False)
-            else:
-                found = self._integrated(bsdf, theta, arms[own], behind=behind)
+            found = self._flux(bsdf, arms[own], theta, rays, seed, method, behind=behind, fresh=False)
             flux[own], error[own] = found
         return flux, error
 
@@ -393,10 +380,7 @@ class ScatterGoniometer:
                 f"{int(shadowed.sum())} positions are left out: the head of the detector stands in the beam there"
             )
             arms = arms[~shadowed]
-        if method == "trace":
-            flux, error = self._counted(sample, theta, arms, rays, seed, behind=checked.behind, fresh=fresh)
-        else:
-            flux, error = self._integrated(sample, theta, arms, behind=checked.behind)
+        flux, error = self._flux(sample, arms, theta, rays, seed, method, behind=checked.behind, fresh=fresh)
         flux, error = self._with_noise(flux, error, seed)
         return DirectionalScan(
             arms,
@@ -456,66 +440,24 @@ class ScatterGoniometer:
         """Sine of the angle from the incident beam within which the head of the detector is in it; 0: it has no head."""
         return 0.5 * (self.head_diameter + self.beam_diameter) / self.distance if self.head_diameter else 0.0
 
-    # --- the two ways ------------------------------------------------------------------------------------------------
-
-    def _rays(self, bsdf: Bsdf | None, theta: float, n: int, seed: tuple[int, ...]) -> tuple[Array, Array]:
-        """Where rays leave the sample [mm] and to where, shape (n, 3) each; NaN where they are absorbed."""
-        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((*seed, 0))))
-        points = self.bench.beam.points(rng, n)
-        start, v = into_the_sample(points, self.bench.beam.tilts(points, rng), theta, across=bsdf is None)
-        if bsdf is None:
-            return start, v
-        number = int(np.random.SeedSequence((*seed, 1)).generate_state(1, np.uint64)[0])
-        incident = direction(theta, 180.0) if self.bench.beam.collimated else -v
-        return start, bsdf.sample(incident, n, seed=number, wavelength=self.wavelength)
-
-    def _counted(
-        self, bsdf: Bsdf | None, theta: float, arms: Array, rays: int, seed: int, *, behind: bool, fresh: bool
+    def _flux(
+        self,
+        bsdf: Bsdf | None,
+        arms: Array,
+        theta: float,
+        rays: int,
+        seed: int,
+        method: Method,
+        *,
+        behind: bool,
+        fresh: bool,
     ) -> tuple[Array, Array]:
-        if rays < 1:
-            raise ArgumentError(f"{rays} rays; draw at least one")
-        if seed < 0:
-            raise ArgumentError(f"a seed of {seed}; it is not negative")
-        hits = np.zeros(len(arms))
-        for block, n in enumerate(_blocks(rays)):
-            if fresh:
-                for k in range(len(arms)):
-                    start, to = self._rays(bsdf, theta, n, (seed, block, k + 1))
-                    hits[k : k + 1] += ray_hits(self.bench, start, to, arms[k : k + 1], behind=behind)
-            else:
-                start, to = self._rays(bsdf, theta, n, (seed, block, 0))
-                hits += ray_hits(self.bench, start, to, arms, behind=behind)
-        share = hits / rays
-        # Where no ray came, as if one had: the error of nothing is not nothing.
-        return share, np.sqrt(np.maximum(share, 1.0 / rays) * (1.0 - share) / rays)
-
-    def _integrated(self, bsdf: Bsdf, theta: float, arms: Array, *, behind: bool) -> tuple[Array, Array]:
-        coarse, fine = (self._quadrature(bsdf, theta, arms, *nodes) for nodes in FINENESS[:2])
-        for k, nodes in enumerate(FINENESS[2:]):
-            # A lobe that is narrow beside the instrument falls between the nodes.
-            open_ = np.abs(fine - coarse) > RESOLVED * fine.max()
-            if not open_.any():
-                break
-            if k == 0:
-                # Two coarse ones may agree by chance.
-                open_ = np.maximum(fine, coarse) > 0.1 * RESOLVED * fine.max()
-            coarse[open_], fine[open_] = fine[open_], self._quadrature(bsdf, theta, arms[open_], *nodes)
-        side = bsdf.regular_transmittance(theta) if behind else bsdf.regular_reflectance(theta)
-        straight = float(np.asarray(side))
-        if straight > 0.0:
-            bare = straight * self.bench.bare(arms, direction(theta, 0.0, behind=behind))
-            fine, coarse = fine + bare, coarse + bare
-        return fine, np.abs(fine - coarse)
-
-    def _quadrature(self, bsdf: Bsdf, theta: float, arms: Array, beam: int, aperture: int) -> Array:
-        found = np.zeros(len(arms))
-        for sight in self.bench.sights(arms, theta, beam, aperture):
-            incident = np.broadcast_to(sight.incident[None, :, None], sight.scattered.shape)
-            lit = sight.weights > 0.0
-            f = np.zeros(lit.shape)
-            f[lit] = bsdf.evaluate(incident[lit], sight.scattered[lit], wavelength=self.wavelength)
-            found[sight.positions] = np.einsum("ibn,ibn->i", f, sight.weights)
-        return found
+        """Share of the beam in the aperture at positions, and its error; shapes (k,). Without a sample it is traced."""
+        if bsdf is None or method == "trace":
+            return counted_flux(
+                self.bench, bsdf, arms, rays, seed, theta=theta, wavelength=self.wavelength, behind=behind, fresh=fresh
+            )
+        return integrated_flux(self.bench, bsdf, arms, theta=theta, wavelength=self.wavelength, behind=behind)
 
     # --- the detector ------------------------------------------------------------------------------------------------
 
@@ -573,8 +515,3 @@ def _way(bsdf: Bsdf, way: Way | None) -> Way:
             "the sample reflects and transmits: say which is measured, way='transmitted' or 'reflected'"
         )
     return "transmitted" if straight or through else "reflected"
-
-
-def _blocks(rays: int) -> Iterator[int]:
-    for start in range(0, rays, BLOCK):
-        yield min(BLOCK, rays - start)

@@ -128,12 +128,15 @@ def _draw(panels: Sequence[Axes], found: Deconvolution) -> None:
 
 def _logarithmic(axes: Axes, found: Deconvolution) -> None:
     least = SHOWN * found.peak
-    axes.semilogy(found.angle, np.maximum(found.raw, least), "--", color=style.LINES[1], lw=1.1)
+
+    def shown(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return np.where(values > least, values, np.nan)
+
+    axes.semilogy(found.angle, shown(found.raw), "--", color=style.LINES[1], lw=1.1)
     if found.standard_error is not None:
         low, high = found.values - found.standard_error, found.values + found.standard_error
-        band = (np.maximum(low, least), np.maximum(high, least))
-        axes.fill_between(found.angle, *band, color=style.LINES[0], alpha=0.25, lw=0)
-    axes.semilogy(found.angle, np.maximum(found.values, least), color=style.LINES[0], lw=1.2)
+        axes.fill_between(found.angle, np.maximum(low, least), shown(high), color=style.LINES[0], alpha=0.25, lw=0)
+    axes.semilogy(found.angle, shown(found.values), color=style.LINES[0], lw=1.2)
     axes.set(ylim=(least, 2.0 * max(found.peak, float(found.raw.max()))), xlabel="angle of the detector [°]")
     axes.set_ylabel("f [1/sr]")
     style.put_title(axes, "The same, logarithmic")
