@@ -39,7 +39,7 @@ OPERATOR = 1e-3
 
 MOST_ROUNDS, MOST_STEPS = 200, 30
 
-SMOOTHER = np.arange(-6.0, 6.1, 1.5)
+SMOOTHER = np.arange(-6.0, 6.1, 2.0)
 """Logarithms of the factors by which all weights are varied, since the counts do not tell them exactly."""
 
 
