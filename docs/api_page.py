@@ -20,7 +20,8 @@ GROUPS = {
     ),
     "Luminance": (
         "luminance_map", "Cone", "FromField", "PathTracing", "Observer", "Screen", "LuminanceMap", "read_map",
-        "combine_maps", "compare", "Region", "cross_section", "filter_map", "denoise_map",
+        "combine_maps", "compare", "Region", "PolygonRegion", "region_statistics", "RegionStatistics", "cross_section",
+        "filter_map", "denoise_map",
     ),
     "Scenes": (
         "scene", "Scene", "trace", "trace_rounds", "trace_work", "TraceWork", "TraceResult", "ScatterEvents",

@@ -65,6 +65,7 @@ PUBLIC = {
     "etendue.luminance.denoising": ("denoise_map",),
     "etendue.luminance.estimate": ("luminance_map",),
     "etendue.luminance.filters": ("filter_map",),
+    "etendue.luminance.regions": ("PolygonRegion", "RegionStatistics", "region_statistics"),
     "etendue.luminance.methods": ("Cone", "FromField", "PathTracing"),
     "etendue.plot": (
         "draw_scene",

@@ -43,6 +43,7 @@ from etendue.luminance.denoising import denoise_map
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
 from etendue.luminance.methods import Cone, FromField, PathTracing
+from etendue.luminance.regions import PolygonRegion, RegionStatistics, region_statistics
 from etendue.plot import (
     draw_scene,
     plot_bsdf,
@@ -110,10 +111,12 @@ __all__ = [
     "OutputError",
     "PathTracing",
     "Plane",
+    "PolygonRegion",
     "RayFileWarning",
     "RayIndex",
     "RaySet",
     "Region",
+    "RegionStatistics",
     "RingSource",
     "Scans",
     "ScatterEvents",
@@ -166,6 +169,7 @@ __all__ = [
     "read_map",
     "read_rays",
     "read_scans",
+    "region_statistics",
     "revolved",
     "scene",
     "threshold_sweep",

@@ -143,6 +143,8 @@ WITHOUT_EXAMPLE = {
     "etendue.cli": "a verb explains itself by --help, and docs/how-to.md runs it",
     "etendue.errors": "raised by the package, never called by users",
     "etendue.instruments.penalised_lobe.PenalisedLobe": "what penalised_lobe returns, shown in its example",
+    "etendue.plot.colour_scale.ChosenScale": "what choose_scale returns, shown in its example",
+    "etendue.plot.region_marks": "a step of plot_map",
     "etendue.plot.style": "how pictures are put together; plot_map, plot_comparison and plot_cross_sections are the door",
     "etendue.plot.map_picture": "likewise",
     "etendue.plot.labels.Label": "what LabelPlacer.place returns, shown in its example",

@@ -84,6 +84,8 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "RayIndex": lambda: et.RayIndex.build(rays()),
     "RaySet": rays,
     "Region": lambda: et.Region(left=-1, right=0, bottom=-2, top=2),
+    "PolygonRegion": lambda: et.PolygonRegion([(-1, -2), (1, -2), (0, 2)]),
+    "RegionStatistics": lambda: et.region_statistics(make_map(), et.Region(left=-1e3, right=1e3, bottom=-1e3, top=1e3)),
     "RingSource": lambda: et.RingSource(rays=77, runs=3, seed=9),
     "Scans": lambda: et.Scans([[-0.6, 0, 0.8]] * 50, [[0.6, 0, 0.8]] * 50, [2.5] * 50),
     "Scene": scene,

@@ -136,7 +136,7 @@ def test_relative_error_is_in_per_cent(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         colours_at_pixel_centres(figure, tmp_path / "map.png", lmap.screen), expected, atol=0.006
     )
-    assert "2 pixels without a relative error (grey, 50 %)" in words(figure)
+    assert "2 pixels without a relative error, or darker than 0.1 % of the maximum (grey, 50 %)" in words(figure)
     assert figure.axes[1].get_ylabel() + figure.axes[1].get_xlabel() == "standard error / luminance [%]"
 
 
@@ -151,7 +151,7 @@ def test_the_words_say_geometry_rays_and_errors() -> None:
     assert f"{lmap.dead_pixels} dead pixels (grey, 1" in text
     assert "led.tm25ray" in text
     assert figure.axes[1].get_ylabel() == "luminance [cd/m²]"
-    assert figure.axes[0].get_ylabel() == "y [mm]"
+    assert figure.axes[0].get_ylabel() == "vertical on the screen [mm]"
     assert plot_map(MAPS["radiance"]).axes[1].get_ylabel() == "radiance [W/(m² sr)]"
 
 
@@ -300,7 +300,10 @@ def test_cross_sections_draw_steps_with_bands(tmp_path: Path) -> None:
     np.testing.assert_array_equal(steps.values, [1, NAN, 3, 2])
     np.testing.assert_allclose(band.values, 1.05 * np.array([1, NAN, 3, 2]))
     np.testing.assert_allclose(band.baseline, 0.95 * np.array([1, NAN, 3, 2]))
-    assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == ("x [mm]", "luminance [cd/m²]")
+    assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == (
+        "horizontal on the screen [mm]",
+        "luminance [cd/m²]",
+    )
     assert figure.axes[0].get_legend().get_texts()[0].get_text() == "my line"
     assert imread(tmp_path / "cut.png").ndim == 3
 
@@ -339,10 +342,14 @@ def test_comparison_shows_both_maps_alike_and_where_they_differ(tmp_path: Path) 
     np.testing.assert_array_equal(images[0].get_array(), test.values)
     np.testing.assert_array_equal(images[1].get_array(), reference.values)
     np.testing.assert_array_equal(images[2].get_array().mask, np.isnan(result.difference))
+    # Above 0 where the first is brighter, in per cent of 6.
+    signed = 100.0 * (test.values - reference.values) / 6.0
+    np.testing.assert_allclose(images[2].get_array().compressed(), signed[~np.isnan(result.difference)])
+    assert images[2].get_clim()[0] == -images[2].get_clim()[1]
     assert images[0].get_clim() == images[1].get_clim() == (0.0, 18.0)
     outline = figure.axes[0].patches[0]
     assert (*outline.get_xy(), outline.get_width(), outline.get_height()) == (-1, -2, 4, 3)
-    assert [axes.get_title(loc="left") for axes in figure.axes[:3]] == ["mine", "theirs", "difference"]
+    assert [axes.get_title(loc="left") for axes in figure.axes[:3]] == ["mine", "theirs", "first − second"]
     text = words(figure)
     assert f"NCC {100 * result.ncc:.4g} %" in text
     assert "mine: mean" in text

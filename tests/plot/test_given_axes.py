@@ -117,7 +117,7 @@ def test_a_map_has_its_values_and_its_colour_bar() -> None:
     """The image holds the values at their places, and beside it the bar spans them."""
     lmap, figure = make_map(), figure_with(1)
     (axes,) = figure.axes
-    et.plot_map(lmap, ax=axes, cmap="viridis", title="$x")
+    et.plot_map(lmap, ax=axes, scale="linear", cmap="viridis", title="$x")
     (image,) = axes.get_images()
     shown = np.ma.filled(image.get_array(), np.nan)
     np.testing.assert_array_equal(shown, np.maximum(lmap.values, 0.0))
@@ -126,7 +126,7 @@ def test_a_map_has_its_values_and_its_colour_bar() -> None:
     assert image.get_cmap()(0.3) == mpl.colormaps["viridis"](0.3)
     assert axes.get_title(loc="left") == "$x"
     (bar,) = (other for other in figure.axes if other is not axes)
-    assert bar.get_ylabel() == f"luminance [{lmap.unit}]"
+    assert bar.get_ylabel() == f"luminance [10⁶ {lmap.unit}]"
     assert bar.get_ylim()[1] == pytest.approx(np.nanmax(lmap.values))
 
 

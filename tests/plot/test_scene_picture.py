@@ -341,5 +341,5 @@ def test_arguments_out_of_their_domain_are_refused(arguments: dict[str, Any], to
 
 def test_other_pictures_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match=r"\.png"):
-        et.draw_scene(Scene(), tmp_path / "scene.svg")
+        et.draw_scene(Scene(), tmp_path / "scene.gif")
     assert not list(tmp_path.iterdir())

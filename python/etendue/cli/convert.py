@@ -8,8 +8,9 @@ from typing import Annotated, TypeVar
 
 import typer
 
+from etendue.cli.options import ray_format
 from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, progress_bar, say
-from etendue.formats.rays import RAY_FORMATS, read_rays, write_rays
+from etendue.formats.rays import read_rays, write_rays
 from etendue.lightfield.light_field import LightField
 from etendue.quantities.ray_set import RaySet
 from etendue.units import FLUX_UNITS, FluxUnit
@@ -44,7 +45,7 @@ def convert(
 ) -> None:
     """Read one or more ray files and write one; complaints and losses are printed."""
     if format is not None:
-        one_of(format, [f.name for f in RAY_FORMATS], "--format")
+        ray_format(format)
     check_folder(output)
     if flux and len(flux) != len(inputs):
         raise typer.BadParameter(f"--flux was given {len(flux)} times for {len(inputs)} input files")

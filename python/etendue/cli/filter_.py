@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
@@ -12,7 +12,7 @@ from etendue.cli.terminal import check_outputs, complain, one_of, print_json, sa
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS, read_map
 from etendue.luminance.denoising import denoise_map
 from etendue.luminance.filters import FILTERS, filter_map
-from etendue.plot.map_picture import SCALES
+from etendue.plot.colour_scale import Scale
 
 KINDS = ("opt", *FILTERS)
 """The denoiser by optional Pólya tree, and the filters of the thesis."""
@@ -26,16 +26,18 @@ def filter_(
     gamma: Annotated[
         float, typer.Option("--gamma", help="Largest relative deviation of a neighbour (eq. 2.6); selective filters.")
     ] = 0.2,
-    scale: Annotated[str, typer.Option("--scale", help="Colours of a picture: linear or log.")] = "linear",
+    scale: Annotated[
+        str, typer.Option("--scale", help="Colours of a picture: auto, linear or log; auto: what its values ask for.")
+    ] = "auto",
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Smooth a map: opt needs no setting and keeps the flux; the four filters of the thesis report what they lose."""
     one_of(kind, KINDS, "--kind")
-    one_of(scale, SCALES, "--scale")
+    colours = one_of(scale, get_args(Scale), "--scale")
     check_outputs(output, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
     noisy = read_map(file)
     smooth = denoise_map(noisy) if kind == "opt" else filter_map(noisy, kind, size=size, gamma=gamma)
-    losses = write_map(smooth, output, scale)
+    losses = write_map(smooth, output, colours)
     if json:
         print_json(summary(smooth) | {"outputs": output, "losses": losses})
         return

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from etendue.cli.options import Json, Threads
-from etendue.cli.terminal import check_folder, complain, count, numbers, one_of, print_json, progress_bar, say
+from etendue.cli.options import Json, Threads, ray_format
+from etendue.cli.terminal import check_folder, complain, count, numbers, print_json, progress_bar, say
 from etendue.errors import ArgumentError
 from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
 from etendue.formats.maps import PICTURE_EXTENSIONS
@@ -101,7 +101,7 @@ def goniophotometer(
     """Measure a lamp with a virtual near-field goniophotometer: images and illuminances from all around."""
     outputs = output or []
     if format is not None:
-        one_of(format, [f.name for f in RAY_FORMATS], "--format")
+        ray_format(format)
     for path in outputs:
         _check(path, format)
     at = CLOSEST if surface == CLOSEST else parse_surface(surface)

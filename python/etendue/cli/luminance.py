@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import numpy as np
 import typer
@@ -41,7 +41,9 @@ from etendue.luminance.methods import (
     mismatch,
 )
 from etendue.luminance.opening import SCENE_EXTENSION
-from etendue.plot.map_picture import SCALES, plot_map
+from etendue.luminance.regions import AnyRegion, parse_region, region_statistics
+from etendue.plot.colour_scale import Scale
+from etendue.plot.map_picture import plot_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import PLANES, Observer, Screen
 from etendue.quantities.ray_set import RaySet
@@ -91,6 +93,19 @@ def luminance(
             help="Point looked at, in mm (0,0,0; of rays and light fields without --size, where the light is).",
             metavar="X,Y,Z",
             show_default=False,
+        ),
+    ] = None,
+    up: Annotated[
+        str | None,
+        typer.Option("--up", help="Direction that stands upright in the picture, e.g. 0,0,1.", metavar="X,Y,Z"),
+    ] = None,
+    roll: Annotated[float, typer.Option("--roll", help="Tilt of the observer's head to its left in °.")] = 0.0,
+    region: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--region",
+            help="Part of the map in figures, outlined in pictures; may be given several times.",
+            metavar="LEFT,RIGHT,BOTTOM,TOP|X/Y,X/Y,X/Y",
         ),
     ] = None,
     pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
@@ -169,7 +184,9 @@ def luminance(
     ] = None,
     flux: Flux = None,
     unit: Unit = None,
-    scale: Annotated[str, typer.Option("--scale", help="Colours of a picture: linear or log.")] = "linear",
+    scale: Annotated[
+        str, typer.Option("--scale", help="Colours of a picture: auto, linear or log; auto: what its values ask for.")
+    ] = "auto",
     cache: Annotated[
         bool, typer.Option("--cache/--no-cache", help="Take light fields from those fitted before (etendue cache).")
     ] = True,
@@ -179,7 +196,7 @@ def luminance(
     """Luminance maps with a standard error per pixel, from rays, a light field, a scene or a trace, for many observers."""
     one_of(method, METHOD_NAMES, "--method")
     one_of(plane, PLANES, "--plane")
-    one_of(scale, SCALES, "--scale")
+    colours = one_of(scale, get_args(Scale), "--scale")
     stated = {
         "acceptance": None if acceptance is None else _acceptance(acceptance),
         "observer_radius": observer_radius,
@@ -193,6 +210,7 @@ def luminance(
     }
     scene = Scene.load(file) if file.suffix.lower() == SCENE_EXTENSION else None
     detected = _detected(file, detector)
+    regions = [parse_region(text) for text in region or []]
     looked = detected if isinstance(detected, ScatterEvents) else scene
     own = looked.scene if isinstance(looked, ScatterEvents) else scene
     own_observers = own is not None and observer is None and size is None
@@ -201,7 +219,8 @@ def luminance(
         if not who:
             raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
     else:
-        who = [("", Observer(theta, phi, distance)) for theta, phi in _angles(observer)]
+        upright = None if up is None else _three(up, "--up", "0,0,1")
+        who = [("", Observer(theta, phi, distance, up=upright, roll=roll)) for theta, phi in _angles(observer)]
     targets = _targets(output, who)
     if looked is None:
         source: Source = (
@@ -228,16 +247,17 @@ def luminance(
             threads=threads,
             progress=progress,
         )
-    losses = [note for lmap, paths in zip(maps, targets, strict=True) for note in write_map(lmap, paths, scale)]
+    written = zip(maps, targets, strict=True)
+    losses = [note for lmap, paths in written for note in write_map(lmap, paths, colours, regions)]
     complaints = complaints_of(source) if isinstance(source, RaySet) else []
     if json:
-        summaries = [summary(lmap) | {"outputs": paths} for lmap, paths in zip(maps, targets, strict=True)]
+        summaries = [summary(lmap, regions) | {"outputs": paths} for lmap, paths in zip(maps, targets, strict=True)]
         print_json({"file": file, "maps": summaries, "complaints": complaints, "notes": losses})
         return
     for line in (*complaints, *(f"note: {note}" for note in losses)):
         complain(line)
     for lmap, paths in zip(maps, targets, strict=True):
-        print_map(lmap)
+        print_map(lmap, regions)
         for path in paths:
             say(f"  {path}")
 
@@ -326,10 +346,10 @@ def _views(
     plane: str,
 ) -> tuple[list[Observer], list[Screen]]:
     """Observers of the target with their screens: of the stated size, or framed to what each sees of the source."""
-    columns, rows = whole_numbers(pixels, 2, "--pixels", "128,128")
+    columns, rows = whole_numbers(pixels if "," in pixels else f"{pixels},{pixels}", 2, "--pixels", "128,128")
     to_frame = size is None and plane == "view"
     if target is not None:
-        x, y, z = numbers(target, 3, "--target", "0,0,0")
+        x, y, z = _three(target, "--target", "0,0,0")
     elif to_frame and isinstance(source, RaySet | LightField):
         x, y, z = centre_of_light(probe(source))
     else:
@@ -339,8 +359,14 @@ def _views(
         return observers, framed_screens(source, observers, columns, rows)
     if size is None:
         raise typer.BadParameter("give the screen's width and height in mm, e.g. --size 25,25", param_hint="--size")
-    width, height = numbers(size, 2, "--size", "25,25")
+    # One number is a square.
+    width, height = numbers(size if "," in size else f"{size},{size}", 2, "--size", "25,25")
     return observers, [Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")] * len(observers)
+
+
+def _three(text: str, option: str, example: str) -> tuple[float, float, float]:
+    x, y, z = numbers(text, 3, option, example)
+    return x, y, z
 
 
 def _refuse(options: Mapping[str, object], why: str) -> None:
@@ -354,12 +380,14 @@ def _acceptance(text: str) -> Acceptance:
     return "auto" if text.strip() == "auto" else numbers(text, 1, "--acceptance", "1.5, or --acceptance auto")[0]
 
 
-def write_map(lmap: LuminanceMap, paths: list[Path], scale: str) -> list[str]:
+def write_map(
+    lmap: LuminanceMap, paths: list[Path], scale: Scale = "auto", regions: Sequence[AnyRegion] = ()
+) -> list[str]:
     """Write a map to files, or draw it, by extension; returns what the formats could not express."""
     notes: list[str] = []
     for path in paths:
         if path.suffix.lower() in PICTURE_EXTENSIONS:
-            plot_map(lmap, path, "log" if scale == "log" else "linear")
+            plot_map(lmap, path, scale, regions=regions)
         else:
             notes.extend(f"{path}: {note}" for note in lmap.save(path))
     return notes
@@ -378,7 +406,7 @@ def _named(path: Path, observer: Observer, name: str) -> Path:
     return Path(re.sub(r"\{(\w*)\}", value, str(path)))
 
 
-def summary(lmap: LuminanceMap) -> dict[str, Any]:
+def summary(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> dict[str, Any]:
     """A map in figures, as plain data [unit of the map]."""
     live = ~np.isnan(lmap.values)
     values = lmap.values[live]
@@ -395,11 +423,12 @@ def summary(lmap: LuminanceMap) -> dict[str, Any]:
         "rays": int(lmap.rays[lmap.rays > 0].sum()) if (lmap.rays >= 0).any() else None,
         "dead_pixels": lmap.dead_pixels,
         "pixels": lmap.values.size,
+        "regions": [region_statistics(lmap, region).to_dict() for region in regions],
         "notes": list(lmap.notes),
     }
 
 
-def print_map(lmap: LuminanceMap) -> None:
+def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> None:
     """A map in figures, for people."""
     facts = summary(lmap)
     where = lmap.observer
@@ -413,5 +442,12 @@ def print_map(lmap: LuminanceMap) -> None:
         say(f"  intensity towards the observer {facts['intensity']:.5g} {'cd' if lmap.flux_unit == 'lm' else 'W/sr'}")
     if lmap.relative_error is not None:
         say(f"  {lmap.relative_error.sentence(facts['quantity'])}")
+    for number, region in enumerate(regions, 1):
+        found = region_statistics(lmap, region)
+        known = f" ± {found.mean_error:.2g}" if np.isfinite(found.mean_error) else ""
+        say(
+            f"  region {number}: mean {found.mean:.4g}{known} {found.unit}, minimum {found.minimum:.4g}, "
+            f"maximum {found.maximum:.4g}, minimum over mean {found.uniformity:.3g}"
+        )
     for note in lmap.notes:
         say(f"  {note}")

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, progress_bar, say
+from etendue.cli.options import ray_format
+from etendue.cli.terminal import check_folder, complain, count, print_json, progress_bar, say
 from etendue.errors import ArgumentError
 from etendue.formats.patch_folder import is_patch_folder
 from etendue.formats.rays import RAY_FORMATS, write_rays
@@ -30,7 +31,7 @@ def sample(
 ) -> None:
     """Draw rays of equal flux from a light field or from patches, exactly as these are read out; they stream to disk."""
     if format is not None:
-        one_of(format, [f.name for f in RAY_FORMATS], "--format")
+        ray_format(format)
     for path in output:
         check_folder(path)
         if format is None:

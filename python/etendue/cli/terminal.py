@@ -85,6 +85,20 @@ def complain_of_usage(error: typer.BadParameter) -> None:
     error.show(told)
     for line in told.getvalue().replace(message, printable(message)).splitlines():
         complain(line)
+    advice = INSTEAD.get(str(getattr(error, "option_name", "")))
+    if advice:
+        complain(f"give {advice}")
+
+
+INSTEAD = {
+    "--theta": "both angles of the observer together: --observer THETA,PHI, e.g. --observer 30,0",
+    "--phi": "both angles of the observer together: --observer THETA,PHI, e.g. --observer 30,0",
+    "--width": "width and height of the screen together: --size W,H, e.g. --size 25,25",
+    "--height": "width and height of the screen together: --size W,H, e.g. --size 25,25",
+    "--log": "the scale of the colours: --scale log",
+    "--resolution": "columns and rows: --pixels C,R, e.g. --pixels 128,128",
+}
+"""What is meant by options that do not exist."""
 
 
 def spell_out_unknown_letters() -> None:
@@ -171,7 +185,7 @@ def whole_numbers(text: str, count: int, option: str, example: str) -> tuple[int
 
 
 def count(fewest: int = 1) -> Callable[[str | int], int]:
-    """The `parser` of an option that counts something: digits, or a power of ten as in ``1e8``.
+    """The `parser` of an option that counts something: digits, a power of ten as in ``1e8``, or ``10k``, ``1M``, ``2G``.
 
     Parameters
     ----------
@@ -185,8 +199,8 @@ def count(fewest: int = 1) -> Callable[[str | int], int]:
 
     Examples
     --------
-    >>> count()("1e8"), count()("12345678901234567")
-    (100000000, 12345678901234567)
+    >>> count()("1e8"), count()("12345678901234567"), count()("2.5M")
+    (100000000, 12345678901234567, 2500000)
     """
 
     def parse(text: str | int) -> int:
@@ -203,13 +217,19 @@ def count(fewest: int = 1) -> Callable[[str | int], int]:
 
 
 def _from_float(text: str | int) -> int:
+    digits = str(text).strip()
+    factor = THOUSANDS.get(digits[-1:], 1.0)
     try:
-        rounded = float(text)
+        rounded = float(digits if factor == 1.0 else digits[:-1]) * factor
     except ValueError:
         rounded = math.nan
     if not rounded.is_integer():
-        raise typer.BadParameter(f"{text!r}: give a whole number, e.g. 20000 or 1e8")
+        raise typer.BadParameter(f"{text!r}: give a whole number, e.g. 20000, 1e8 or 100M")
     return int(rounded)
+
+
+THOUSANDS = {"k": 1e3, "K": 1e3, "M": 1e6, "G": 1e9}
+"""Letters after a count."""
 
 
 Name = TypeVar("Name", bound=str)
@@ -225,7 +245,7 @@ def one_of(value: str, known: Iterable[Name], option: str) -> Name:
     """
     known = list(known)
     for name in known:
-        if name == value:
+        if name.lower() == value.strip().lower():
             return name
     raise typer.BadParameter(str(UnknownNameError(f"value of {option}", value, known)))
 

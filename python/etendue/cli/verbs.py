@@ -76,13 +76,44 @@ def summary(place: str) -> str:
     return inspect.cleandoc(found[1])
 
 
+WITH_COMMAS = ("--observer", "--size", "--pixels", "--target", "--up", "--region")
+"""Options of several numbers, between which commas stand."""
+
+
+def with_commas(words: list[str]) -> list[str]:
+    """The same with commas in place of blanks between the numbers of an option.
+
+    Examples
+    --------
+    >>> with_commas(["led.h5", "--observer", "30", "0", "--size", "4", "--seed", "1", "2"])
+    ['led.h5', '--observer', '30,0', '--size', '4', '--seed', '1', '2']
+    """
+    found: list[str] = []
+    joining = False
+    for before, word in zip(["", *words], words, strict=False):
+        if joining and _is_number(before) and _is_number(word):
+            found[-1] += f",{word}"
+        else:
+            joining = word in WITH_COMMAS or (joining and before in WITH_COMMAS)
+            found.append(word)
+    return found
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
 class VerbGroup(TyperGroup):
     """Lists the verbs by their names and summaries, and imports the one that is called."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
         """The verb itself in place of its line in the list."""
         name, line, rest = super().resolve_command(ctx, args)
-        return name, line if name is None else command_of(name), rest
+        return name, line if name is None else command_of(name), with_commas(rest)
 
 
 def add_verbs(app: typer.Typer) -> None:

@@ -34,7 +34,7 @@ class Description(BaseModel):
         cls = type(self)
         keys = cls.names_by_key()
         known = [key for key, name in keys.items() if name not in cls.IN_MEMORY]
-        mistakes = [(key, f"unknown key.{_hint(key, known)}") for key in values if key not in keys]
+        mistakes = [(key, f"unknown key.{cls._meant(key, values[key], known)}") for key in values if key not in keys]
         wrong = {
             name: f"is {shown(values[name])}.{_hint(values[name], choices)}"
             for name, choices in _choices(cls).items()
@@ -47,6 +47,13 @@ class Description(BaseModel):
             mistakes += [mistake for mistake in mistakes_of(error, values) if mistake[0] not in wrong]
         if mistakes:
             raise SceneError(cls.__name__, mistakes)
+
+    INSTEAD: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """What is meant by keys that do not exist, with ``{}`` for their value."""
+
+    @classmethod
+    def _meant(cls, key: str, value: Any, known: Iterable[str]) -> str:
+        return f" Give {cls.INSTEAD[key].format(shown(value))}." if key in cls.INSTEAD else _hint(key, known)
 
     @classmethod
     def names_by_key(cls) -> dict[str, str]:

@@ -143,6 +143,8 @@ class Comparison:
         Mean, extremes, uniformity and intensity of each map over the pixels compared.
     test, reference : LuminanceMap
         The maps.
+    compared : array of bool, shape (rows, columns)
+        The pixels compared.
     region : Region or None
         Where they were compared; None for the whole screen.
     notes : tuple of str
@@ -160,6 +162,7 @@ class Comparison:
     reference_statistics: MapStatistics
     test: LuminanceMap
     reference: LuminanceMap
+    compared: Mask
     region: Region | None = None
     notes: tuple[str, ...] = ()
 
@@ -168,6 +171,31 @@ class Comparison:
         """Intensity of the test map over that of the reference, in the pixels compared; NaN if the latter is 0."""
         reference = self.reference_statistics.intensity
         return self.test_statistics.intensity / reference if reference else math.nan
+
+    @property
+    def signed_difference(self) -> Array:
+        """100 · (Ls - Lm) / max of the reference [%], shape (rows, columns): above 0 where the test map is brighter.
+
+        NaN outside the pixels compared, and everywhere if the reference is black.
+        """
+        brightest = self.reference_statistics.maximum
+        if not brightest > 0.0:
+            return np.full(self.compared.shape, np.nan)
+        return np.where(self.compared, 100.0 * self._deviation / brightest, np.nan)
+
+    @property
+    def difference_in_sigma(self) -> Array:
+        """Z = (Ls - Lm) / √(σs² + σm²), shape (rows, columns).
+
+        NaN outside the pixels compared, where a map is dead, and where the standard errors are unknown or both 0.
+        """
+        error = np.hypot(self.test.standard_error, self.reference.standard_error)
+        known = self.compared & (error > 0.0) & np.isfinite(self.test.values) & np.isfinite(self.reference.values)
+        return np.where(known, self._deviation, np.nan) / np.where(known, error, 1.0)
+
+    @property
+    def _deviation(self) -> Array:
+        return _dead_as_zero(self.test.values) - _dead_as_zero(self.reference.values)
 
     @property
     def median_difference(self) -> float:
@@ -298,6 +326,7 @@ def compare(
         reference_statistics=figures[1],
         test=test,
         reference=reference,
+        compared=used,
         region=region,
     )
     return dataclasses.replace(result, notes=tuple(_what_is_undefined(result)))
@@ -335,15 +364,15 @@ def _geometric_differences(test: LuminanceMap, reference: LuminanceMap) -> Itera
     reach = SAME_GEOMETRY * other.distance
     if not np.allclose(one.target, other.target, rtol=0.0, atol=reach):
         yield f"observers' targets differ: {one.target} against {other.target} mm"
-    elif not (
-        np.allclose(one.position, other.position, rtol=0.0, atol=reach)
-        # At θ = 180° the azimuth turns the screen without moving the observer.
-        and np.allclose(ours.axes(one), ours.axes(other), rtol=0.0, atol=SAME_GEOMETRY)
-    ):
+    elif not np.allclose(one.position, other.position, rtol=0.0, atol=reach):
         yield (
             f"observers differ: θ = {one.theta:g}°, φ = {one.phi:g}°, {one.distance:g} mm against "
             f"θ = {other.theta:g}°, φ = {other.phi:g}°, {other.distance:g} mm"
         )
+    # At θ = 180° the azimuth turns the screen without moving the observer, as up and roll do anywhere.
+    elif not np.allclose(ours.axes(one), ours.axes(other), rtol=0.0, atol=SAME_GEOMETRY):
+        turns = (f"φ = {who.phi:g}°, up = {who.up}, roll = {who.roll:g}°" for who in (one, other))
+        yield f"observers differ in what is up for them: {' against '.join(turns)}"
 
 
 def _ncc(simulated: Array, measured: Array) -> float:
@@ -423,6 +452,8 @@ class CrossSection:
         Of those pixels, in `unit`; NaN where dead (and where the error is unknown).
     quantity, unit : str
         What `values` are.
+    source : str
+        Where the map comes from.
     """
 
     axis: Literal["x", "y"]
@@ -433,6 +464,7 @@ class CrossSection:
     standard_error: Array
     quantity: str
     unit: str
+    source: str = ""
 
 
 def cross_section(lmap: LuminanceMap, *, x: float | None = None, y: float | None = None) -> CrossSection:
@@ -481,7 +513,8 @@ def cross_section(lmap: LuminanceMap, *, x: float | None = None, y: float | None
         # From the bottom up, so that positions rise.
         axis, position, pitch, at = "y", screen.y[::-1], screen.height / screen.rows, screen.x[column]
         values, error = lmap.values[::-1, column], lmap.standard_error[::-1, column]
-    return CrossSection(axis, float(at), position, pitch, values, error, lmap.quantity, lmap.unit)
+    source = lmap.provenance.source
+    return CrossSection(axis, float(at), position, pitch, values, error, lmap.quantity, lmap.unit, source)
 
 
 def _pixel_index(coordinate: float, extent: float, count: int, name: str) -> int:

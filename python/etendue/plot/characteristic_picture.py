@@ -152,7 +152,7 @@ def _draw_luminance(axes: Axes, curve: CharacteristicCurve, unit: FluxUnit) -> N
     left, right = max(curve.etendue_of(BRIGHTEST), middles[0]), curve.total_etendue
     axes.set_xscale("log")
     axes.set_xlim(left, right)
-    axes.xaxis.set_major_formatter(style.log_formatter(left, right))
+    axes.xaxis.set_major_formatter(style.log_formatter())
     axes.set_xlabel("étendue, brightest first [mm² sr]")
     shown = high[middles >= left]
     axes.set_ylim(0.0, 1.05 * float(shown.max()) or 1.0)
@@ -201,10 +201,9 @@ def _draw_forecast(axes: Axes, forecast: Forecast) -> None:
         label=f"half the error: {then.value:.2g} times the rays ({then.low:.2g} to {then.high:.2g})",
     )  # fmt: skip
     axes.set_xlim(n[0] / 1.15, n[-1])
-    floor, ceiling = axes.get_ylim()
     for place in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-        place(style.log_formatter(floor, ceiling))
-    axes.xaxis.set_major_formatter(style.log_formatter(n[0], n[-1]))
+        place(style.log_formatter())
+    axes.xaxis.set_major_formatter(style.log_formatter())
     axes.set_xlabel("rays")
     axes.set_ylabel("relative error at a ray [%]")
     axes.legend(loc="lower left", frameon=False, fontsize=style.TICK_SIZE, labelcolor=style.INK, handlelength=1.6)

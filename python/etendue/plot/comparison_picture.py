@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -13,25 +14,19 @@ import numpy.typing as npt
 from etendue.errors import UnknownNameError
 from etendue.luminance.comparison import Comparison
 from etendue.plot import style
-from etendue.plot.map_picture import (
-    SCALES,
-    Scale,
-    bar_beside,
-    colour_map,
-    draw_colour_bar,
-    draw_screen,
-    normalisation,
-    picture_within,
-)
+from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation, signed_normalisation
+from etendue.plot.map_picture import axis_names, bar_beside, draw_colour_bar, draw_screen, picture_within
 from etendue.quantities.observer import Screen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.colors import Colormap
+    from matplotlib.colors import Colormap, Normalize
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
 Array = npt.NDArray[np.float64]
+Difference = Literal["maximum", "sigma", "thesis"]
+DIFFERENCES: tuple[str, ...] = get_args(Difference)
 
 NARROWEST_COLUMN = 2.1
 """Room for the lines of text under three narrow maps [inches]."""
@@ -44,8 +39,9 @@ GREATEST_DIFFERENCE = 200.0
 def plot_comparison(
     comparison: Comparison,
     path: str | os.PathLike[str] | None = None,
-    scale: Scale = "linear",
+    scale: Scale = "auto",
     *,
+    difference: Difference = "maximum",
     labels: tuple[str, str] = ("test", "reference"),
     title: str | None = None,
     cmap: str | Colormap | None = None,
@@ -57,8 +53,9 @@ def plot_comparison(
 def plot_comparison(
     comparison: Comparison,
     path: None = None,
-    scale: Scale = "linear",
+    scale: Scale = "auto",
     *,
+    difference: Difference = "maximum",
     labels: tuple[str, str] = ("test", "reference"),
     title: str | None = None,
     cmap: str | Colormap | None = None,
@@ -69,27 +66,32 @@ def plot_comparison(
 def plot_comparison(
     comparison: Comparison,
     path: str | os.PathLike[str] | None = None,
-    scale: Scale = "linear",
+    scale: Scale = "auto",
     *,
+    difference: Difference = "maximum",
     labels: tuple[str, str] = ("test", "reference"),
     title: str | None = None,
     cmap: str | Colormap | None = None,
     ax: Sequence[Axes] | npt.NDArray[Any] | None = None,
 ) -> Figure | tuple[Axes, ...]:
-    """Draw both maps with the same colours, their difference [%], and the measures of agreement (cf. fig. 3.3).
+    """Draw both maps with the same colours, their signed difference, and the measures of agreement (cf. fig. 3.3).
 
     Parameters
     ----------
     comparison : Comparison
         What `etendue.compare` gave.
     path : path, optional
-        Where to write the picture, .png or .pdf.
-    scale : {"linear", "log"}
-        Scale of the luminance colours. Those of the difference are linear and end at its 99th percentile.
+        Where to write the picture, .png, .svg or .pdf.
+    scale : {"auto", "linear", "log"}
+        Scale of the luminance colours; ``"auto"`` is that of `plot_map`. Those of the difference are linear, alike on both
+        sides of 0, and end at the 99th percentile of its size.
+    difference : {"maximum", "sigma", "thesis"}
+        Test less reference, in per cent of the reference's maximum or in standard errors of that difference; or the size of
+        the difference in per cent of the mean of both (eq. 3.4), as the thesis has it.
     labels : pair of str
         Names of the two maps.
     title : str, optional
-        First line; "Comparison" if not given.
+        First line; the names of both files if not given.
     cmap : str or matplotlib.colors.Colormap, optional
         The colours of the luminance, as matplotlib calls them.
     ax : sequence of matplotlib.axes.Axes, optional
@@ -107,7 +109,7 @@ def plot_comparison(
     ArgumentError
         If the directory of `path` does not exist, `path` and `ax` are both given, or there are not three axes.
     UnknownNameError
-        If `scale`, `cmap` or the extension of `path` does not exist.
+        If `scale`, `difference`, `cmap` or the extension of `path` does not exist.
     MissingLibraryError
         If matplotlib is not installed.
 
@@ -120,69 +122,111 @@ def plot_comparison(
     >>> lmap = LuminanceMap([[3.0, 1.0]], [[0.1, 0.1]], [[900, 300]], Observer(0, 0, 1000), Screen(2, 1, 2, 1),
     ...                     provenance=Provenance(software="example"))
     >>> [axes.get_title(loc="left") for axes in plot_comparison(compare(lmap, lmap)).axes[:3]]
-    ['test', 'reference', 'difference']
+    ['test', 'reference', 'test − reference']
     """
-    if scale not in SCALES:
-        raise UnknownNameError("colour scale", scale, SCALES)
+    if difference not in DIFFERENCES:
+        raise UnknownNameError("difference", difference, DIFFERENCES)
     reference = comparison.reference
+    chosen = choose_scale(np.stack((comparison.test.values, reference.values)), scale)
+    shown = _shown(comparison, difference, labels)
+    names = axis_names(reference)
     if ax is not None:
         given = style.given_axes(ax, 3, path)
         for axes, name, (image, data, label) in zip(
             given,
-            (*labels, "difference"),
-            _draw_panels(given, comparison, scale, cmap, picture_within(given[0], reference.screen)),
+            (*labels, shown.title),
+            _draw_panels(
+                given, comparison, chosen.name, shown, cmap, picture_within(given[0], reference.screen), names
+            ),
             strict=True,
         ):
-            axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+            axes.set_aspect("equal")
             style.put_title(axes, name)
-            draw_colour_bar(image, data, label, bar_beside(axes, reference.screen))
+            draw_colour_bar(image, data, *label, bar_beside(axes, reference.screen))
         return given
     layout = _Layout.around(reference.screen)
     figure = style.new_figure(layout.width, layout.height)
     panels = [style.add_axes(figure, *place) for place in layout.panels]
-    drawn = _draw_panels(panels, comparison, scale, cmap, layout.panels[0][2:])
+    drawn = _draw_panels(panels, comparison, chosen.name, shown, cmap, layout.panels[0][2:], names)
     # Both maps have the same colours: one bar for them.
     for (image, data, label), place in zip(drawn[1:], layout.bars, strict=True):
-        draw_colour_bar(image, data, label, style.add_axes(figure, *place))
-    for axes, name in zip(panels, (*labels, "difference"), strict=True):
-        axes.set_title(name, loc="left", size=style.LABEL_SIZE, color=style.INK, pad=4)
-        axes.set_xlabel("x [mm]")
-    panels[0].set_ylabel("y [mm]")
+        draw_colour_bar(image, data, *label, style.add_axes(figure, *place))
+    for axes, name in zip(panels, (*labels, shown.title), strict=True):
+        axes.set_title(_shortened(name, layout.pitch), loc="left", size=style.LABEL_SIZE, color=style.INK, pad=4)
     for axes in panels[1:]:
         axes.set_yticklabels([])
-    heading = title if title is not None else "Comparison"
+        axes.set_ylabel("")
+    heading = title if title is not None else _heading(comparison)
     left, top = layout.panels[0][0], layout.height
     style.add_text(figure, left, top - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     seen = f"seen at {style.describe_observer(reference.observer)}"
     style.add_text(figure, left, top - 0.54, seen, size=style.LABEL_SIZE, color=style.FAINT)
-    for number, line in enumerate(reversed(_figures(comparison, labels))):
+    for number, line in enumerate(reversed(_figures(comparison, labels, chosen.why))):
         style.add_text(figure, left, 0.14 + 0.16 * number, line, size=style.TICK_SIZE, color=style.FAINT)
     return style.finish(figure, path)
+
+
+class _Shown(NamedTuple):
+    """How the third panel shows where the maps differ."""
+
+    data: Array
+    norm: Normalize
+    colours: str  # a key of `style.COLOUR_MAPS`
+    title: str
+    label: tuple[str, str]  # of the colour bar, with its unit
+
+
+def _shown(comparison: Comparison, difference: str, labels: tuple[str, str]) -> _Shown:
+    if difference == "thesis":
+        data = comparison.difference
+        defined = data[~np.isnan(data)]
+        end = float(np.percentile(defined, 99)) if defined.size else 0.0
+        norm = normalisation(data, "linear", 0.0, end if end > 0.0 else GREATEST_DIFFERENCE)
+        return _Shown(data, norm, "size of difference", "size of the difference", ("difference (eq. 3.4)", "%"))
+    plain = labels == ("test", "reference")
+    title = "test − reference" if plain else "first − second"
+    if difference == "sigma":
+        data = comparison.difference_in_sigma
+        return _Shown(data, signed_normalisation(data, 1.0), "difference", title, ("difference", "standard errors"))
+    data = comparison.signed_difference
+    return _Shown(data, signed_normalisation(data, 1.0), "difference", title, ("difference", "% of max"))
+
+
+def _heading(comparison: Comparison) -> str:
+    one, other = (Path(lmap.provenance.source).name for lmap in (comparison.test, comparison.reference))
+    what = f"{comparison.reference.quantity.capitalize()} compared"
+    return style.headed(what, one, 6.0) if one == other else f"{_shortened(one, 3.0)} against {_shortened(other, 3.0)}"
+
+
+def _shortened(name: str, inches: float) -> str:
+    """A name that has so much room, its middle left out if it must be."""
+    room = max(8, int(inches * 11.0))
+    return name if len(name) <= room else f"{name[: room // 2 - 1]}…{name[-(room // 2) :]}"
 
 
 def _draw_panels(
     panels: Sequence[Axes],
     comparison: Comparison,
     scale: str,
+    shown: _Shown,
     cmap: str | Colormap | None,
     inches: tuple[float, float],
-) -> list[tuple[AxesImage, Array, str]]:
+    names: tuple[str, str],
+) -> list[tuple[AxesImage, Array, tuple[str, str]]]:
     """Both maps and their difference: the pictures, with what their colour bars say."""
-    test, reference, difference = comparison.test, comparison.reference, comparison.difference
+    test, reference = comparison.test, comparison.reference
     both = np.stack((test.values, reference.values))
-    defined = difference[~np.isnan(difference)]
-    end = float(np.percentile(defined, 99)) if defined.size else 0.0
-    norm = normalisation(both, scale, None, None)
-    of_difference = normalisation(difference, "linear", 0.0, end if end > 0.0 else GREATEST_DIFFERENCE)
-    luminance = f"{reference.quantity} [{reference.unit}]"
+    norm = normalisation(both, scale, None, None, np.stack((test.standard_error, reference.standard_error)))
+    luminance = (reference.quantity, reference.unit)
     colours = colour_map("value", cmap)
+    of_difference = colour_map(shown.colours)
     drawn = [
-        (draw_screen(panels[0], test.values, test.screen, colours, norm, inches), both, luminance),
-        (draw_screen(panels[1], reference.values, reference.screen, colours, norm, inches), both, luminance),
+        (draw_screen(panels[0], test.values, test.screen, colours, norm, inches, names), both, luminance),
+        (draw_screen(panels[1], reference.values, reference.screen, colours, norm, inches, names), both, luminance),
         (
-            draw_screen(panels[2], difference, reference.screen, colour_map("difference"), of_difference, inches),
-            difference,
-            "difference [%]",
+            draw_screen(panels[2], shown.data, reference.screen, of_difference, shown.norm, inches, names),
+            shown.data,
+            shown.label,
         ),
     ]
     for axes in panels:
@@ -200,8 +244,8 @@ def _outline(axes: Axes, comparison: Comparison) -> None:
         axes.add_patch(Rectangle((region.left, region.bottom), *size, fill=False, edgecolor="white", linewidth=1.0))
 
 
-def _figures(comparison: Comparison, labels: tuple[str, str]) -> list[str]:
-    """Three lines below the pictures."""
+def _figures(comparison: Comparison, labels: tuple[str, str], why: str) -> list[str]:
+    """The lines below the pictures: agreement, each map, and why the colours are what they are."""
     maps = zip(labels, (comparison.test_statistics, comparison.reference_statistics), strict=True)
     unit = comparison.reference.unit
     agreement = (
@@ -220,7 +264,7 @@ def _figures(comparison: Comparison, labels: tuple[str, str]) -> list[str]:
             f"{style.grouped(str(figures.dead_pixels))} dead pixels",
         )
         lines.append(style.SEPARATOR.join(facts))
-    return lines
+    return [*lines, why] if why else lines
 
 
 def _per_cent(fraction: float) -> str:
@@ -234,6 +278,7 @@ class _Layout(NamedTuple):
     height: float
     panels: list[tuple[float, float, float, float]]
     bars: list[tuple[float, float, float, float]]
+    pitch: float
 
     @classmethod
     def around(cls, screen: Screen) -> _Layout:
@@ -241,9 +286,9 @@ class _Layout(NamedTuple):
         # Beyond these limits the pixels are drawn out of proportion rather than invisibly thin.
         wide = float(np.clip(4.2 * aspect, 0.4, 3.1))
         high = float(np.clip(wide / aspect, 0.3, 4.2))
-        left, gap, bottom, top, bar = 0.7, 0.18, 1.82, 0.98, 0.72
+        left, gap, bottom, top, bar = 0.7, 0.18, 1.98, 0.98, 0.72
         pitch = max(wide + gap, NARROWEST_COLUMN)
         panels = [(left + column * pitch, bottom, wide, high) for column in range(3)]
         under = bottom - bar
         bars = [(left, under, 2 * pitch - gap, 0.13), (panels[2][0], under, pitch - gap, 0.13)]
-        return cls(left + 3 * pitch + 0.1, bottom + high + top, panels, bars)
+        return cls(left + 3 * pitch + 0.1, bottom + high + top, panels, bars, pitch)

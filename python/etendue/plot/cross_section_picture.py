@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.luminance.comparison import CrossSection
 from etendue.plot import style
-from etendue.plot.map_picture import SCALES, Scale
+from etendue.plot.colour_scale import Scale, choose_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +34,7 @@ DASHES = ("-", "--", ":")
 def plot_cross_sections(
     sections: Sequence[CrossSection],
     path: str | os.PathLike[str] | None = None,
-    scale: Scale = "linear",
+    scale: Scale = "auto",
     *,
     labels: Sequence[str] | None = None,
     title: str | None = None,
@@ -46,7 +46,7 @@ def plot_cross_sections(
 def plot_cross_sections(
     sections: Sequence[CrossSection],
     path: None = None,
-    scale: Scale = "linear",
+    scale: Scale = "auto",
     *,
     labels: Sequence[str] | None = None,
     title: str | None = None,
@@ -57,7 +57,7 @@ def plot_cross_sections(
 def plot_cross_sections(
     sections: Sequence[CrossSection],
     path: str | os.PathLike[str] | None = None,
-    scale: Scale = "linear",
+    scale: Scale = "auto",
     *,
     labels: Sequence[str] | None = None,
     title: str | None = None,
@@ -70,13 +70,13 @@ def plot_cross_sections(
     sections : sequence of CrossSection
         At least one; all along the same axis and in the same unit.
     path : path, optional
-        Where to write the picture, .png or .pdf.
-    scale : {"linear", "log"}
-        Scale of the luminance.
+        Where to write the picture, .png, .svg or .pdf.
+    scale : {"auto", "linear", "log"}
+        Scale of the luminance; ``"auto"`` is that of `plot_map`.
     labels : sequence of str, optional
         One name per section; by default where it was cut.
     title : str, optional
-        First line; "Cross section" if not given.
+        First line; "Cross section" and where the map comes from if not given.
     ax : matplotlib.axes.Axes, optional
         Where to draw, in a figure of your own.
 
@@ -101,11 +101,12 @@ def plot_cross_sections(
     >>> plot_cross_sections([line]).axes[0].get_ylabel()
     'luminance [cd/m²]'
     """
-    _check(sections, labels, scale)
-    first = sections[0]
-    other = "y" if first.axis == "x" else "x"
-    names = labels if labels is not None else [f"{other} = {style.plain(section.at)} mm" for section in sections]
-    heading = title if title is not None else "Cross section" + ("s" if len(sections) > 1 else "")
+    _check(sections, labels)
+    scale = choose_scale(np.concatenate([section.values for section in sections]), scale).name
+    names = labels if labels is not None else [_place(section) for section in sections]
+    sources = {section.source for section in sections}
+    what = "Cross section" + ("s" if len(sections) > 1 else "")
+    heading = title if title is not None else style.headed(what, sources.pop() if len(sources) == 1 else "")
     if ax is not None:
         style.given_axes(ax, 1, path)
         _draw_all(ax, sections, names, scale)
@@ -126,8 +127,14 @@ def _draw_all(axes: Axes, sections: Sequence[CrossSection], names: Sequence[str]
     _prepare(axes, sections, scale)
     for number, (section, name) in enumerate(zip(sections, names, strict=True)):
         _draw(axes, section, name, number)
-    first = sections[0]
-    axes.set(xlabel=f"{first.axis} [mm]", ylabel=f"{first.quantity} [{first.unit}]")
+    edges = _edges(sections[0])
+    name = style.HORIZONTAL if sections[0].axis == "x" else style.VERTICAL
+    style.put_numbers(axes.xaxis, name, "mm", edges[0], edges[-1])
+
+
+def _place(section: CrossSection) -> str:
+    """Where a section was cut."""
+    return f"at {style.plain(section.at)} mm {'up' if section.axis == 'x' else 'right'}"
 
 
 def _prepare(axes: Axes, sections: Sequence[CrossSection], scale: str) -> None:
@@ -150,11 +157,13 @@ def _prepare(axes: Axes, sections: Sequence[CrossSection], scale: str) -> None:
             low, high = positive.min() / 2.0, 2.0 * top
             axes.set_ylim(low, high)
             for place in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-                place(style.log_formatter(low, high))
+                place(style.log_formatter())
+        axes.set_ylabel(f"{sections[0].quantity} [{sections[0].unit}]")
     else:
         low = min(0.0, float(shown.min(initial=0.0)))
         axes.set_ylim(low, top + 0.05 * (top - low) if top > low else low + 1.0)
-        axes.yaxis.set_major_formatter(style.number_formatter())
+        # The power of ten stands at the axis: over the diagram it would lie on the legend.
+        style.put_numbers(axes.yaxis, sections[0].quantity, sections[0].unit, *axes.get_ylim())
 
 
 def _draw(axes: Axes, section: CrossSection, name: str, number: int) -> None:
@@ -179,9 +188,7 @@ def _edges(section: CrossSection) -> Array:
     return np.append(section.position - section.pitch / 2, section.position[-1] + section.pitch / 2)
 
 
-def _check(sections: Sequence[CrossSection], labels: Sequence[str] | None, scale: str) -> None:
-    if scale not in SCALES:
-        raise UnknownNameError("scale", scale, SCALES)
+def _check(sections: Sequence[CrossSection], labels: Sequence[str] | None) -> None:
     if not sections:
         raise ArgumentError("plot_cross_sections: no section was given; make some with cross_section(map, y=0).")
     kinds = sorted({f"{section.quantity} [{section.unit}] along {section.axis}" for section in sections})

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, get_args, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import UnknownNameError
+from etendue.luminance.regions import AnyRegion
 from etendue.plot import style
+from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation
+from etendue.plot.region_marks import draw_marks, marks_of
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
@@ -24,26 +26,28 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
 
 Array = npt.NDArray[np.float64]
-Scale = Literal["linear", "log"]
 Show = Literal["value", "relative-error"]
-SCALES: tuple[str, ...] = get_args(Scale)
 SHOWS: tuple[str, ...] = get_args(Show)
 
-DECADES = 4
-"""How far a logarithmic scale reaches down from the brightest pixel unless `vmin` says otherwise."""
+DARK = 1e-3
+"""Share of the brightest pixel below which the relative error of a pixel is not shown: it says nothing of the lamp."""
+
+MOST_ERROR = 100.0
+"""Relative error [%] at which its colours end at the latest."""
 
 
 @overload
 def plot_map(
     lmap: LuminanceMap | IlluminanceMap,
     path: str | os.PathLike[str] | None = None,
-    scale: Scale = "linear",
+    scale: Scale = "auto",
     *,
     vmin: float | None = None,
     vmax: float | None = None,
     title: str | None = None,
     show: Show = "value",
     cmap: str | Colormap | None = None,
+    regions: Sequence[AnyRegion] = (),
     ax: None = None,
 ) -> Figure: ...
 
@@ -52,13 +56,14 @@ def plot_map(
 def plot_map(
     lmap: LuminanceMap | IlluminanceMap,
     path: None = None,
-    scale: Scale = "linear",
+    scale: Scale = "auto",
     *,
     vmin: float | None = None,
     vmax: float | None = None,
     title: str | None = None,
     show: Show = "value",
     cmap: str | Colormap | None = None,
+    regions: Sequence[AnyRegion] = (),
     ax: Axes,
 ) -> Axes: ...
 
@@ -66,13 +71,14 @@ def plot_map(
 def plot_map(
     lmap: LuminanceMap | IlluminanceMap,
     path: str | os.PathLike[str] | None = None,
-    scale: Scale = "linear",
+    scale: Scale = "auto",
     *,
     vmin: float | None = None,
     vmax: float | None = None,
     title: str | None = None,
     show: Show = "value",
     cmap: str | Colormap | None = None,
+    regions: Sequence[AnyRegion] = (),
     ax: Axes | None = None,
 ) -> Figure | Axes:
     """Draw a map in false colour with its geometry, unit and error.
@@ -82,17 +88,22 @@ def plot_map(
     lmap : LuminanceMap or IlluminanceMap
         The map.
     path : path, optional
-        Where to write the picture, .png or .pdf. The same map gives the same bytes.
-    scale : {"linear", "log"}
-        Scale of the colours.
+        Where to write the picture, .png, .svg or .pdf. The same map gives the same bytes.
+    scale : {"auto", "linear", "log"}
+        Scale of the colours. ``"auto"``: logarithmic if the median of the lit pixels is less than a thirtieth of the
+        maximum, and so next to black on a linear scale; the caption says which, and why.
     vmin, vmax : float, optional
         What the ends of the colour bar mean, in the unit shown. By default 0 (or the lowest value, if that is below 0;
-        four decades under the highest on a logarithmic scale, at most down to the lowest) and the highest value.
+        four decades under the highest on a logarithmic scale, at most down to the lowest that is two standard errors above
+        0) and the highest value; of the relative error 100 % at most.
         Values beyond get the colour of the end, and the colour bar an arrow.
     title : str, optional
-        First line; the name of the quantity if not given.
+        First line; the quantity and where it comes from if not given.
     show : {"value", "relative-error"}
         The value, or its standard error in per cent of it.
+    regions : sequence of Region or PolygonRegion
+        Nine at most; they are outlined and numbered, and the caption has their mean with its error, extremes and uniformity
+        (`etendue.region_statistics`).
     cmap : str or matplotlib.colors.Colormap, optional
         The colours, as matplotlib calls them.
     ax : matplotlib.axes.Axes, optional
@@ -101,14 +112,14 @@ def plot_map(
     Returns
     -------
     matplotlib.figure.Figure or matplotlib.axes.Axes
-        The figure, not registered with pyplot; or `ax`. Pixels without a number (dead; for the error also black ones
-        and those with unknown error) are grey, and the caption counts them.
+        The figure, not registered with pyplot; or `ax`. Pixels without a number (dead; for the error also those with
+        less than 0.1 % of the maximum, or with unknown error) are grey, and the caption counts them.
 
     Raises
     ------
     ArgumentError
-        If `vmin` and `vmax` are no range for this scale, the directory of `path` does not exist, or `path` and `ax` are
-        both given.
+        If `vmin` and `vmax` are no range for this scale, the directory of `path` does not exist, `path` and `ax` are
+        both given, there are more than nine regions, or one holds no live pixel.
     UnknownNameError
         If `scale`, `show`, `cmap` or the extension of `path` does not exist.
     MissingLibraryError
@@ -121,37 +132,34 @@ def plot_map(
     >>> lmap = LuminanceMap([[3.0, 1.0]], [[0.1, 0.1]], [[900, 300]], Observer(0, 0, 1000), Screen(2, 1, 2, 1),
     ...                     provenance=Provenance(software="example"))
     >>> plot_map(lmap, scale="log").axes[0].get_xlabel()
-    'x [mm]'
+    'horizontal on the screen [mm]'
     """
-    for kind, name, known in (("colour scale", scale, SCALES), ("thing to show", show, SHOWS)):
-        if name not in known:
-            raise UnknownNameError(kind, name, known)
-    if show == "value":
-        data, colours, label = lmap.values, "value", f"{lmap.quantity} [{lmap.unit}]"
-    else:
-        data, colours, label = _relative_error(lmap), "error", f"standard error / {lmap.quantity} [%]"
-    heading = title if title is not None else lmap.quantity.capitalize()
-    something = bool((np.isfinite(data) & ((data > 0.0) | (scale == "linear"))).any())
+    if show not in SHOWS:
+        raise UnknownNameError("thing to show", show, SHOWS)
+    shown = _shown(lmap, show, scale, vmin, vmax)
+    marked = marks_of(lmap, regions)
+    heading = title if title is not None else style.headed(shown.heading, lmap.provenance.source, 4.0)
+    colours = colour_map(shown.colours, cmap)
+    across, up = axis_names(lmap)
     if ax is not None:
         style.given_axes(ax, 1, path)
-        norm = normalisation(data, scale, vmin, vmax)
         place = picture_within(ax, lmap.screen)
-        image = draw_screen(ax, data, lmap.screen, colour_map(colours, cmap), norm, place)
-        ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+        image = draw_screen(ax, shown.data, lmap.screen, colours, shown.norm, place, (across, up))
+        ax.set_aspect("equal")
         style.put_title(ax, heading)
-        if something:
-            draw_colour_bar(image, data, label, bar_beside(ax, lmap.screen))
+        draw_marks(ax, marked)
+        if shown.something:
+            draw_colour_bar(image, shown.data, shown.name, shown.unit, bar_beside(ax, lmap.screen))
         else:
             _write_why_dark(ax, lmap)
         return ax
-    layout = _Layout.around(lmap.screen, list(_facts(lmap, data, show)))
+    layout = _Layout.around(lmap.screen, [*_facts(lmap, shown, show)], [mark.line for mark in marked])
     figure = style.new_figure(layout.width, layout.height)
-    norm = normalisation(data, scale, vmin, vmax)
     axes = style.add_axes(figure, *layout.picture)
-    image = draw_screen(axes, data, lmap.screen, colour_map(colours, cmap), norm, layout.picture[2:])
-    axes.set(xlabel="x [mm]", ylabel="y [mm]")
-    if something:
-        draw_colour_bar(image, data, label, style.add_axes(figure, *layout.bar))
+    image = draw_screen(axes, shown.data, lmap.screen, colours, shown.norm, layout.picture[2:], (across, up))
+    draw_marks(axes, marked)
+    if shown.something:
+        draw_colour_bar(image, shown.data, shown.name, shown.unit, style.add_axes(figure, *layout.bar))
     else:
         _write_why_dark(axes, lmap)
     left, top = layout.text_left, layout.height
@@ -160,6 +168,48 @@ def plot_map(
     for number, line in enumerate(reversed(layout.caption)):
         style.add_text(figure, left, 0.14 + 0.15 * number, line, size=style.CAPTION_SIZE, color=style.FAINT)
     return style.finish(figure, path)
+
+
+class _Shown(NamedTuple):
+    """What the pixels show: numbers, how they become colours, and the words for them."""
+
+    data: Array
+    norm: Normalize
+    colours: str  # a key of `style.COLOUR_MAPS`
+    name: str  # of the colour bar
+    unit: str
+    heading: str
+    why: str  # the scale was chosen; empty if it was asked for
+    something: bool  # there is something to show
+
+
+def _shown(
+    lmap: LuminanceMap | IlluminanceMap, show: str, scale: str, vmin: float | None, vmax: float | None
+) -> _Shown:
+    if show == "value":
+        chosen = choose_scale(lmap.values, scale)
+        norm = normalisation(lmap.values, chosen.name, vmin, vmax, lmap.standard_error)
+        data, heading = lmap.values, lmap.quantity.capitalize()
+        colours, name, unit, why = "value", lmap.quantity, lmap.unit, chosen.why
+    else:
+        data, heading = _relative_error(lmap), f"Relative error of {lmap.quantity}"
+        # Errors of one map seldom differ by powers of ten; that of a single dark pixel shall not set the scale.
+        name = "linear" if scale == "auto" else choose_scale(data, scale).name
+        largest = float(data[np.isfinite(data)].max(initial=0.0))
+        norm = normalisation(data, name, vmin, vmax if vmax is not None or largest <= MOST_ERROR else MOST_ERROR)
+        colours, name, unit, why = "error", f"standard error / {lmap.quantity}", "%", ""
+    linear = norm.vmin is not None and norm.vmin <= 0.0
+    something = bool((np.isfinite(data) & ((data > 0.0) | linear)).any())
+    return _Shown(data, norm, colours, name, unit, heading, why, something)
+
+
+def axis_names(lmap: LuminanceMap | IlluminanceMap) -> tuple[str, str]:
+    """What runs across and up in the picture of a map: sides of what an observer sees, or coordinates on a fixed plane."""
+    if isinstance(lmap, IlluminanceMap):
+        return "right in the plane", "up in the plane"
+    if lmap.screen.plane == "xy":
+        return ("x", "y") if not any(lmap.observer.target) else ("x from the target", "y from the target")
+    return style.HORIZONTAL, style.VERTICAL
 
 
 def _geometry(lmap: LuminanceMap | IlluminanceMap) -> str:
@@ -175,51 +225,22 @@ def _write_why_dark(axes: Axes, lmap: LuminanceMap | IlluminanceMap) -> None:
     axes.text(0.5, 0.5, message, transform=axes.transAxes, ha="center", va="center", color="white", size=9)
 
 
-def colour_map(colours: str, wanted: str | Colormap | None = None) -> Colormap:
-    """The colours that are wanted, or those of `style.COLOUR_MAPS`, with the colour of missing numbers.
-
-    Raises
-    ------
-    UnknownNameError
-        If matplotlib knows no colours of this name.
-    """
-    import matplotlib as mpl
-
-    name = style.COLOUR_MAPS[colours] if wanted is None else wanted
-    if isinstance(name, str) and name not in mpl.colormaps:
-        raise UnknownNameError("colour map", name, mpl.colormaps)
-    return mpl.colormaps.get_cmap(name).with_extremes(bad=style.DEAD)
-
-
-def normalisation(data: Array, scale: str, vmin: float | None, vmax: float | None) -> Normalize:
-    """From numbers to colours; the defaults are those of `plot_map`."""
-    from matplotlib.colors import LogNorm, Normalize
-
-    finite = data[np.isfinite(data)]
-    if scale == "log":
-        finite = finite[finite > 0.0]
-        high = float(finite.max(initial=0.0)) or 1.0 if vmax is None else vmax
-        low = max(float(finite.min(initial=high)), high * 10.0**-DECADES) if vmin is None else vmin
-        if vmin is None and low >= high:
-            low = high / 10.0
-    else:
-        low = min(0.0, float(finite.min(initial=0.0))) if vmin is None else vmin
-        high = float(finite.max(initial=low)) if vmax is None else vmax
-        if vmax is None and high <= low:
-            high = low + 1.0
-    if not (math.isfinite(low) and math.isfinite(high) and low < high and (scale == "linear" or low > 0.0)):
-        above = " above 0" if scale == "log" else ""
-        raise ArgumentError(f"plot: the colours would span {low:g} to {high:g}; give finite vmin < vmax{above}.")
-    return LogNorm(low, high) if scale == "log" else Normalize(low, high)
+NARROW = 1.6
+"""Length of an axis [inches] on which there is no room for more than the first word of its name."""
 
 
 def draw_screen(
-    axes: Axes, data: Array, screen: Screen, colours: Colormap, norm: Normalize, inches: tuple[float, float]
+    axes: Axes,
+    data: Array,
+    screen: Screen,
+    colours: Colormap,
+    norm: Normalize,
+    inches: tuple[float, float],
+    names: tuple[str, str],
 ) -> AxesImage:
-    """The pixels in their place [mm], each one a rectangle of one colour, on axes of this width and height."""
-    lowest = norm.vmin or 0.0
+    """The pixels in their place [mm], each a rectangle of one colour, on axes of this width and height and these names."""
     # Values at or below 0 have no logarithm; they are dark, not missing.
-    clipped = np.where(np.isnan(data), np.nan, np.maximum(data, lowest))
+    clipped = np.where(np.isnan(data), np.nan, np.maximum(data, -np.inf if norm.vmin is None else norm.vmin))
     crisp = inches[0] * style.DPI >= screen.columns and inches[1] * style.DPI >= screen.rows
     image = axes.imshow(
         np.ma.masked_invalid(clipped),
@@ -233,9 +254,11 @@ def draw_screen(
         interpolation_stage="data",
     )
     style.dress(axes)
-    for axis, length in zip((axes.xaxis, axes.yaxis), inches, strict=True):
+    for axis, length, name, size in zip(
+        (axes.xaxis, axes.yaxis), inches, names, (screen.width, screen.height), strict=True
+    ):
         axis.set_major_locator(style.locator_for(length))
-        axis.set_major_formatter(style.number_formatter())
+        style.put_numbers(axis, name if length >= NARROW else name.split()[0], "mm", -size / 2, size / 2)
     return image
 
 
@@ -262,7 +285,7 @@ def bar_beside(axes: Axes, screen: Screen) -> Axes:
     return bar
 
 
-def draw_colour_bar(image: AxesImage, data: Array, label: str, axes: Axes) -> None:
+def draw_colour_bar(image: AxesImage, data: Array, name: str, unit: str, axes: Axes) -> None:
     """A bar in `axes`, upright or lying as these are, with arrows where values lie beyond its ends."""
     from matplotlib.colors import LogNorm
 
@@ -279,26 +302,29 @@ def draw_colour_bar(image: AxesImage, data: Array, label: str, axes: Axes) -> No
         extendfrac=0.03,
     )
     if isinstance(image.norm, LogNorm):
-        bar.formatter = bar.minorformatter = style.log_formatter(lowest or 0.0, highest or 0.0)
+        bar.formatter = bar.minorformatter = style.log_formatter()
+        power = 0
     else:
         # Numbers side by side need more room than one above the other.
         bar.locator = style.locator_for((place.height if upright else 0.85 * place.width) / style.figure_of(axes).dpi)
-        bar.formatter = style.number_formatter()
+        power = style.common_power(lowest or 0.0, highest or 0.0)
+        bar.formatter = style.number_formatter(power)
     bar.update_ticks()
-    bar.set_label(label, size=style.LABEL_SIZE, color=style.INK)
+    bar.set_label(f"{name} [{style.in_powers(unit, power)}]", size=style.LABEL_SIZE, color=style.INK)
     bar.outline.set_linewidth(0.0)
     style.dress(axes)
 
 
 def _relative_error(lmap: LuminanceMap | IlluminanceMap) -> Array:
-    """Standard error in per cent of the value; NaN where there is no value above 0."""
-    positive = (lmap.values > 0.0) & np.isfinite(lmap.values)
+    """Standard error in per cent of the value; NaN where there is no value, or next to none."""
+    brightest = float(lmap.values[np.isfinite(lmap.values)].max(initial=0.0))
+    positive = (lmap.values > 0.0) & (lmap.values >= DARK * brightest) & np.isfinite(lmap.values)
     result = np.full(lmap.values.shape, np.nan)
     result[positive] = 100.0 * lmap.standard_error[positive] / lmap.values[positive]
     return result
 
 
-def _facts(lmap: LuminanceMap | IlluminanceMap, data: Array, show: str) -> Iterator[str]:
+def _facts(lmap: LuminanceMap | IlluminanceMap, shown: _Shown, show: str) -> Iterator[str]:
     """What the picture rests on, fact by fact."""
     lit = (lmap.values > 0.0) & np.isfinite(lmap.values)
     if lit.any():
@@ -308,10 +334,14 @@ def _facts(lmap: LuminanceMap | IlluminanceMap, data: Array, show: str) -> Itera
         error = lmap.relative_error
         known = "" if error is None else style.percent(100.0 * error.flux_weighted)
         yield f"standard error {known}, weighted by flux" if known else "standard errors unknown"
-    missing = int(np.isnan(data).sum())
+    missing = int(np.isnan(shown.data).sum())
     if missing:
-        what = "dead pixels" if show == "value" else "pixels without a relative error"
-        yield f"{style.grouped(str(missing))} {what} (grey, {style.percent(100.0 * missing / data.size)})"
+        what = (
+            "dead pixels" if show == "value" else "pixels without a relative error, or darker than 0.1 % of the maximum"
+        )
+        yield f"{style.grouped(str(missing))} {what} (grey, {style.percent(100.0 * missing / shown.data.size)})"
+    if shown.why:
+        yield shown.why
     yield f"{lmap.screen.columns} × {lmap.screen.rows} pixels"
     yield Path(lmap.provenance.source).name
 
@@ -327,7 +357,7 @@ class _Layout(NamedTuple):
     caption: list[str]
 
     @classmethod
-    def around(cls, screen: Screen, facts: list[str]) -> _Layout:
+    def around(cls, screen: Screen, facts: list[str], lines_of_regions: list[str]) -> _Layout:
         aspect = screen.width / screen.height
         lying = aspect > 2.0
         # Beyond these limits the pixels are drawn out of proportion rather than invisibly thin.
@@ -340,7 +370,9 @@ class _Layout(NamedTuple):
         shift = (width - left - block - right) / 2
         # The text stands over the picture, or at the edge of a figure that is wide for the sake of the text.
         text_left = left + shift if shift < 0.3 else 0.3
-        lines = style.wrapped(facts, width - text_left - right)
+        text = width - text_left - right
+        lines = [line for whole in lines_of_regions for line in style.wrapped(whole.split(style.SEPARATOR), text)]
+        lines += style.wrapped(facts, text)
         below = bottom + 0.15 * len(lines) + (0.72 if lying else 0.0)
         picture = (left + shift, below, wide, high)
         bar = (picture[0], below - 0.72, wide, thick) if lying else (picture[0] + wide + gap, below, thick, high)

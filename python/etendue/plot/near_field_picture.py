@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.plot import style
-from etendue.plot.map_picture import bar_beside, colour_map, draw_colour_bar, draw_screen
+from etendue.plot.colour_scale import colour_map
+from etendue.plot.map_picture import axis_names, bar_beside, draw_colour_bar, draw_screen
 from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT
 
 if TYPE_CHECKING:
@@ -83,14 +84,14 @@ def plot_near_field(
     if ax is not None:
         panels = style.given_axes(ax, len(maps), path)
         image = _draw(panels, maps)
-        draw_colour_bar(image, _all(maps), _label(run), bar_beside(panels[-1], maps[-1].screen))
+        draw_colour_bar(image, _all(maps), *_label(run), bar_beside(panels[-1], maps[-1].screen))
         if title:
             style.put_title(panels[0], title)
         return panels
     figure = style.new_figure(WIDTH, HEIGHT)
     image = _draw([style.add_axes(figure, LEFT + k * (PANEL + GAP), BOTTOM, PANEL, PANEL) for k in range(IMAGES)], maps)
     bar = style.add_axes(figure, LEFT + 4 * PANEL + 3 * GAP + 0.2, BOTTOM, 0.14, PANEL)
-    draw_colour_bar(image, _all(maps), _label(run), bar)
+    draw_colour_bar(image, _all(maps), *_label(run), bar)
     setting = run.setting
     facts = [
         f"{len(setting.positions):,} positions at {setting.distance:g} mm",
@@ -124,11 +125,10 @@ def _draw(panels: Sequence[Axes], maps: Sequence[LuminanceMap]) -> AxesImage:
     low = max(float(lit.min(initial=high)), high * 10.0**-DECADES)
     norm = LogNorm(low if low < high else high / 10.0, high)
     for k, (axes, lmap) in enumerate(zip(panels, maps, strict=True)):
-        image = draw_screen(axes, lmap.values, lmap.screen, colour_map("value"), norm, (PANEL, PANEL))
-        axes.set(xlabel="x [mm]", aspect="equal")
-        if k == 0:
-            axes.set_ylabel("y [mm]")
-        else:
+        image = draw_screen(axes, lmap.values, lmap.screen, colour_map("value"), norm, (PANEL, PANEL), axis_names(lmap))
+        axes.set_aspect("equal")
+        if k > 0:
+            axes.set_ylabel("")
             axes.set_yticklabels([])
         style.put_title(axes, f"γ {lmap.observer.theta:g}°, C {lmap.observer.phi:g}°")
     return image
@@ -138,5 +138,5 @@ def _all(maps: Sequence[LuminanceMap]) -> npt.NDArray[np.float64]:
     return np.concatenate([lmap.values.ravel() for lmap in maps])
 
 
-def _label(run: NearFieldRun) -> str:
-    return f"{LUMINANCE_NAME[run.flux_unit]} [{LUMINANCE_UNIT[run.flux_unit]}]"
+def _label(run: NearFieldRun) -> tuple[str, str]:
+    return LUMINANCE_NAME[run.flux_unit], LUMINANCE_UNIT[run.flux_unit]

@@ -21,6 +21,7 @@ from etendue.quantities.printable import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
     from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
@@ -36,8 +37,8 @@ DEAD = "#8fa3ad"
 LINES = ("#1f5aa6", "#d1622b", "#3c8d5a", "#8a4fa3", "#b8942b", "#5b6770")
 """Lines in one diagram, in this order."""
 
-COLOUR_MAPS = {"value": "inferno", "error": "viridis", "difference": "magma"}
-"""Perceptually uniform, each for one kind of number."""
+COLOUR_MAPS = {"value": "inferno", "error": "viridis", "difference": "RdBu_r", "size of difference": "magma"}
+"""Each for one kind of number: perceptually uniform, and for signed numbers two colours that all eyes tell apart."""
 
 TITLE_SIZE, LABEL_SIZE, TICK_SIZE, CAPTION_SIZE = 11.0, 9.0, 8.0, 7.5
 DPI = 200
@@ -45,7 +46,11 @@ DPI = 200
 SEPARATOR = "  ·  "
 """Between the facts of a caption."""
 
-FILE_TYPES: dict[str, dict[str, Any]] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}}
+FILE_TYPES: dict[str, dict[str, Any]] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+}
 """File types of pictures, each with what keeps its bytes the same from run to run."""
 
 
@@ -155,7 +160,10 @@ def finish(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
         suffix = Path(path).suffix.lower()
         if suffix not in FILE_TYPES:
             raise UnknownNameError("extension of a picture", suffix, FILE_TYPES)
-        with atomic_output(path) as temporary:
+        from matplotlib import rc_context
+
+        # The names of parts in an .svg are drawn by chance unless a salt is stated.
+        with atomic_output(path) as temporary, rc_context({"svg.hashsalt": "etendue"}):
             figure.savefig(temporary, format=suffix[1:], metadata=FILE_TYPES[suffix])
     return figure
 
@@ -179,21 +187,58 @@ def locator_for(inches: float) -> MaxNLocator:
     return MaxNLocator(int(min(7, max(1, inches * 1.8))), steps=[1, 2, 2.5, 5, 10])
 
 
-def number_formatter() -> ScalarFormatter:
-    """Ticks as plain numbers in groups of three digits, powers of ten only where it must be."""
+def put_numbers(axis: Axis, name: str, unit: str, low: float, high: float) -> None:
+    """The label of an axis with its unit, and its ticks: plain numbers, of tiny or huge ones a power of ten in the unit."""
+    power = common_power(low, high)
+    axis.set_major_formatter(number_formatter(power))
+    axis.set_label_text(f"{name} [{in_powers(unit, power)}]")
+
+
+def common_power(low: float, high: float) -> int:
+    """The power of ten, a multiple of three, that numbers are counted in; 0 if the largest is neither tiny nor huge."""
+    size = max(abs(low), abs(high))
+    return 0 if size == 0.0 or not math.isfinite(size) or 1e-3 <= size < 1e7 else 3 * math.floor(math.log10(size) / 3.0)
+
+
+def in_powers(unit: str, power: int) -> str:
+    """A unit with a power of ten before it, unless that is 1."""
+    return f"{ten_to(power)} {unit}" if power else unit
+
+
+def ten_to(power: int) -> str:
+    """A power of ten.
+
+    Examples
+    --------
+    >>> ten_to(-12)
+    '10⁻¹²'
+    """
+    return "10" + str(power).translate(RAISED)
+
+
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number_formatter(power: int = 0) -> ScalarFormatter:
+    """Ticks as plain numbers in groups of three digits, counted in this power of ten."""
     from matplotlib.ticker import ScalarFormatter
 
     class Grouped(ScalarFormatter):
+        def get_offset(self) -> str:
+            return ""
+
         def __call__(self, x: float, pos: int | None = None) -> str:
             return grouped(super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$"))
 
-    formatter = Grouped(useMathText=True)
-    formatter.set_powerlimits((-3, 7))
+    formatter = Grouped(useMathText=True, useOffset=False)
+    # Twice the same limit fixes the power.
+    formatter.set_powerlimits((power, power))
+    formatter.set_scientific(power != 0)
     return formatter
 
 
-def log_formatter(low: float, high: float) -> LogFormatter:
-    """Ticks of a logarithmic axis from `low` to `high`, as plain numbers if these are neither tiny nor huge."""
+def log_formatter() -> LogFormatter:
+    """Ticks of a logarithmic axis, written as all other numbers are (`plain`)."""
     from matplotlib.ticker import LogFormatterSciNotation
 
     class Plain(LogFormatterSciNotation):
@@ -201,10 +246,7 @@ def log_formatter(low: float, high: float) -> LogFormatter:
             # The empty text marks ticks for which there is no room.
             return plain(x) if super().__call__(x, pos) else ""
 
-    thresholds = (1.5, 0.6)
-    if low >= 1e-3 and high < 1e7:
-        return Plain(minor_thresholds=thresholds)
-    return LogFormatterSciNotation(minor_thresholds=thresholds)
+    return Plain(minor_thresholds=(1.5, 0.6))
 
 
 def grouped(text: str) -> str:
@@ -217,9 +259,12 @@ def plain(number: float) -> str:
     """A number to four digits, in powers of ten only if it is very small or very large."""
     if not math.isfinite(number):
         return "undefined"
-    rounded = f"{number:.4g}"
-    small_or_large = number != 0.0 and not 1e-4 <= abs(number) < 1e10
-    return (rounded if small_or_large else grouped(f"{float(rounded):.10g}")).replace("-", "−")
+    rounded = f"{number:.3e}"
+    if number != 0.0 and not 1e-3 <= abs(number) < 1e7:
+        digits, power = rounded.split("e")
+        digits = f"{float(digits):g}".replace("-", "−")
+        return {"1": "", "−1": "−"}.get(digits, f"{digits} × ") + ten_to(int(power))
+    return grouped(f"{float(rounded):.10g}").replace("-", "−")
 
 
 def percent(number: float) -> str:
@@ -232,7 +277,25 @@ def describe_observer(observer: Observer) -> str:
     place = f"θ = {observer.theta:g}°, φ = {observer.phi:g}°, from {grouped(f'{observer.distance:.10g}')} mm"
     if any(observer.target):
         place += f" of ({', '.join(f'{c:g}' for c in observer.target)}) mm"
+    if observer.up is not None:
+        axes = {(1.0, 0.0, 0.0): "+X", (0.0, 1.0, 0.0): "+Y", (0.0, 0.0, 1.0): "+Z"}
+        place += f", {axes.get(observer.up) or '(' + ', '.join(map(plain, observer.up)) + ')'} up"
+    if observer.roll:
+        place += f", rolled by {observer.roll:g}°"
     return place.replace("-", "−")
+
+
+HORIZONTAL, VERTICAL = "horizontal on the screen", "vertical on the screen"
+"""The axes of a map, which are those of what the observer sees and seldom x and y of the source."""
+
+
+def headed(what: str, source: str, inches: float = 4.4) -> str:
+    """A heading that names where a picture comes from, the middle of a long name left out."""
+    name, room = Path(source).name, max(12, int(inches * 10.0) - len(what) - 4)
+    if not name:
+        return what
+    half = (room - 1) // 2
+    return f"{what} of {name if len(name) <= room else name[:half] + '…' + name[-half:]}"
 
 
 def wrapped(facts: Iterable[str], inches: float) -> list[str]:

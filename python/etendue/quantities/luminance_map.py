@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.observer import Observer, Screen, observer_from_dict
+from etendue.quantities.observer import Observer, Screen, observer_from_dict, observer_to_dict
 from etendue.quantities.pixel_map import MapValues, PixelMap
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.relative_error import RelativeError
@@ -85,7 +85,7 @@ class LuminanceMap(PixelMap):
         return float(np.nansum(self.values * apparent))
 
     def _geometry(self) -> dict[str, Any]:
-        return {"observer": dataclasses.asdict(self.observer), "screen": dataclasses.asdict(self.screen)}
+        return {"observer": observer_to_dict(self.observer), "screen": dataclasses.asdict(self.screen)}
 
     @classmethod
     def _geometry_from(cls, header: dict[str, Any]) -> dict[str, Any]:

@@ -19,6 +19,9 @@ MAX_PIXELS = 1 << 26
 
 Vector = npt.NDArray[np.float64]
 
+ALONG_THE_LINE = 1e-6
+"""Sine of the angle between `up` and the line of sight below which rounding decides what is upright."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Observer:
@@ -36,22 +39,35 @@ class Observer:
         From target to observer [mm], > 0 and finite.
     target : tuple of 3 floats
         The point looked at [mm].
+    up : tuple of 3 floats, optional
+        The direction, of any length, that stands upright in the picture. If it is not given, the axes of the screen are +X
+        and +Y under the shortest rotation that takes +Z to the observer.
+    roll : float
+        By how much the head is tilted to its left about the line of sight [°], after `up`: the screen's right and up axes
+        turn anticlockwise as the observer sees them, and the picture clockwise.
 
     Raises
     ------
     ArgumentError
-        If an angle, the distance or the target is out of its domain.
+        If an angle, the distance or the target is out of its domain, or `up` lies along the line of sight.
 
     Examples
     --------
     >>> Observer(theta=90, phi=0, distance=1000).position.round(9).tolist()
     [1000.0, 0.0, 0.0]
+
+    A lamp along Z, looked at from +X, lies on its side unless +Z is said to be up:
+
+    >>> [Screen(1, 1, 1, 1).axes(Observer(90, 0, 1000, up=up))[1].tolist() for up in (None, (0, 0, 1))]
+    [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
 
     theta: float
     phi: float
     distance: float
     target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    up: tuple[float, float, float] | None = None
+    roll: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.theta <= 180.0:
@@ -64,17 +80,47 @@ class Observer:
         if len(target) != 3 or not all(map(math.isfinite, target)):
             raise ArgumentError(f"Observer: target is {self.target}; give three finite coordinates in mm.")
         object.__setattr__(self, "target", target)
+        if not math.isfinite(self.roll):
+            raise ArgumentError(f"Observer: roll is {self.roll}°; give a finite angle.")
+        if self.up is not None:
+            self._check_up(self.up)
+
+    def _check_up(self, up: tuple[float, ...]) -> None:
+        upright = tuple(float(c) for c in up)
+        if len(upright) != 3 or not all(map(math.isfinite, upright)) or not any(upright):
+            raise ArgumentError(f"Observer: up is {up}; give a direction as three finite numbers, not all 0.")
+        object.__setattr__(self, "up", upright)
+        along = np.linalg.norm(np.cross(_unit(upright), self.direction))
+        if along < ALONG_THE_LINE:
+            raise ArgumentError(
+                f"Observer: up is {upright}, along the line of sight from theta = {self.theta:g}°, phi = {self.phi:g}°: "
+                "nothing stands upright there; give another direction, or roll alone."
+            )
 
     @property
     def direction(self) -> Vector:
         """Unit vector from the target to the observer, shape (3,)."""
-        _, _, toward = self._rotation()
-        return toward
+        c, s = cos_sin_degrees(self.phi)
+        ct, st = cos_sin_degrees(self.theta)
+        return np.array((st * c, st * s, ct))
 
     @property
     def position(self) -> Vector:
         """Where the observer stands [mm], shape (3,)."""
         return np.asarray(self.target) + self.distance * self.direction
+
+    def axes(self) -> tuple[Vector, Vector, Vector]:
+        """Unit vectors right, up and towards the observer of what he sees, each of shape (3,)."""
+        right, up, toward = self._rotation()
+        if self.up is not None:
+            # What of `up` is across the line of sight is upright in the picture.
+            right = np.cross(_unit(self.up), toward)
+            right = _unit(right) + 0.0  # no minus zeros
+            up = np.cross(toward, right) + 0.0
+        if self.roll == 0.0:
+            return right, up, toward
+        c, s = cos_sin_degrees(self.roll)
+        return c * right + s * up, c * up - s * right, toward
 
     def _rotation(self) -> tuple[Vector, Vector, Vector]:
         """Images of +X, +Y, +Z under the shortest rotation that takes +Z to the observer.
@@ -87,8 +133,15 @@ class Observer:
         ct, st = cos_sin_degrees(self.theta)
         right = (ct * c * c + s * s, (ct - 1.0) * c * s, -st * c)
         up = ((ct - 1.0) * c * s, ct * s * s + c * c, -st * s)
-        toward = (st * c, st * s, ct)
-        return np.array(right), np.array(up), np.array(toward)
+        return np.array(right), np.array(up), self.direction
+
+
+def _unit(vector: npt.ArrayLike) -> Vector:
+    found = np.asarray(vector, dtype=np.float64)
+    # Scaled to 1 first, so that no square overflows or vanishes.
+    found = found / np.abs(found).max()
+    unit: Vector = found / np.linalg.norm(found)
+    return unit
 
 
 def cos_sin_degrees(angle: float) -> tuple[float, float]:
@@ -117,9 +170,9 @@ class Screen:
     columns, rows : int
         Number of pixels, ≥ 1. Row 0 is the top, column 0 the left.
     plane : {"view", "xy"}
-        ``"view"``: perpendicular to the line of sight; its axes are +X (right) and +Y (up) turned by the shortest
-        rotation that takes +Z to the observer. ``"xy"``: fixed parallel to the source's XY plane (the ray collecting
-        surface of [Audenaert2014]_ 2.2.1); the apparent pixel area then carries its cosine.
+        ``"view"``: perpendicular to the line of sight; its axes are those of the observer, +X (right) and +Y (up) turned
+        by the shortest rotation that takes +Z to him unless he says what is up. ``"xy"``: fixed parallel to the source's
+        XY plane (the ray collecting surface of [Audenaert2014]_ 2.2.1); the apparent pixel area then carries its cosine.
 
     Raises
     ------
@@ -181,10 +234,15 @@ class Screen:
         Raises
         ------
         ArgumentError
-            If ``plane="xy"`` and the observer stands in that plane (θ = 90°): every pixel's apparent area is zero.
+            If ``plane="xy"`` and the observer stands in that plane (θ = 90°): every pixel's apparent area is zero; or he has
+            `up` or `roll`, which turn no fixed plane.
         """
         if self.plane == "view":
-            return observer._rotation()  # noqa: SLF001 - the screen's axes are the observer's
+            return observer.axes()
+        if observer.up is not None or observer.roll != 0.0:
+            raise ArgumentError(
+                "Screen: plane='xy' is fixed, whatever is up for the observer; use plane='view' with up and roll."
+            )
         if observer.direction[2] == 0.0:
             raise ArgumentError(
                 "Screen: plane='xy' seen from theta = 90° has no apparent area; use plane='view' or another theta."
@@ -220,6 +278,13 @@ class Screen:
         return cosine
 
 
+def observer_to_dict(observer: Observer) -> dict[str, Any]:
+    """Plain data; `up` and `roll` are in it only where they are stated, so that other files stay as they were."""
+    data = dataclasses.asdict(observer)
+    return {name: value for name, value in data.items() if not (name in ("up", "roll") and not value)}
+
+
 def observer_from_dict(data: dict[str, Any]) -> Observer:
-    """Rebuild an observer from `dataclasses.asdict`."""
-    return Observer(**{**data, "target": tuple(data["target"])})
+    """Rebuild an observer from `observer_to_dict`."""
+    values: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in data.items()}
+    return Observer(**values)

@@ -48,6 +48,8 @@ class ObserverKeys(Description):
     phi: Number = 0.0
     distance: Number
     target: Vector = (0.0, 0.0, 0.0)
+    up: Vector | None = None
+    roll: Number = 0.0
     screen: ScreenKeys
 
     def model_post_init(self, _context: Any) -> None:
@@ -56,4 +58,4 @@ class ObserverKeys(Description):
 
     def observer(self) -> Observer:
         """The observer alone."""
-        return Observer(self.theta, self.phi, self.distance, self.target)
+        return Observer(self.theta, self.phi, self.distance, self.target, self.up, self.roll)

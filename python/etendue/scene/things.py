@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
@@ -42,6 +43,14 @@ class Solid(Placement):
     >>> lens.finishes
     {'side': 'absorber'}
     """
+
+    INSTEAD: ClassVar[Mapping[str, str]] = MappingProxyType({
+        "material": "medium = {0} for what it is filled with, or finish = {0} for what is done to its surface",
+        "index": "medium = {{ index = {} }}",
+        "radius": "the size in the shape, e.g. shape = {{ kind = 'ball', radius = {} }}",
+        "height": "the size in the shape, e.g. shape = {{ kind = 'rod', radius = 5, height = {} }}",
+        "position": "at = {}",
+    })  # fmt: skip
 
     name: str = ""
     shape: Annotated[Body, Family(BODIES)]

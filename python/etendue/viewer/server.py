@@ -157,6 +157,7 @@ def view_of(asked: dict[str, Any]) -> tuple[Observer, Screen]:
     """
     try:
         observer, screen = asked["observer"], asked["screen"]
+        up = observer.get("up")
         if int(screen["columns"]) * int(screen["rows"]) > MOST_PIXELS:
             raise ArgumentError(f"a page asks for {MOST_PIXELS:,} pixels at most.")
         return (
@@ -165,6 +166,8 @@ def view_of(asked: dict[str, Any]) -> tuple[Observer, Screen]:
                 float(observer["phi"]),
                 float(observer["distance"]),
                 tuple(float(x) for x in observer["target"]),  # type: ignore[arg-type]  # Observer checks how many
+                tuple(float(x) for x in up) if up else None,  # type: ignore[arg-type]
+                float(observer.get("roll", 0.0)),
             ),
             Screen(float(screen["width"]), float(screen["height"]), int(screen["columns"]), int(screen["rows"])),
         )

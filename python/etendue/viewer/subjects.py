@@ -141,6 +141,8 @@ def _view(observer: Observer, width: float, height: float) -> dict[str, Any]:
         "phi": observer.phi,
         "distance": observer.distance,
         "target": list(observer.target),
+        "up": None if observer.up is None else list(observer.up),
+        "roll": observer.roll,
         "width": width,
         "height": height,
     }

@@ -156,7 +156,7 @@ def write_rays(
         position and the format needs one.
     """
     path = Path(path)
-    chosen = _format_named(format) if format is not None else _format_for(path)
+    chosen = format_named(format) if format is not None else _format_for(path)
     if len(rays) == 0:
         raise ArgumentError(f"{path}: there are no rays to write.")
     if chosen.most_rays is not None and len(rays) > chosen.most_rays:
@@ -180,9 +180,32 @@ def write_rays(
         return (*notes, *chosen.write(rays, temporary), *rays.notes)
 
 
-def _format_named(name: str) -> RayFormat:
+OTHER_NAMES = {
+    "opticstudio": "zemax",
+    "zemax-opticstudio": "zemax",
+    "ansys-speos": "speos",
+    "iestm25": "tm25",
+    "tm-25": "tm25",
+}
+"""Of formats, as users call them."""
+
+
+def format_named(name: str) -> RayFormat:
+    """The format of a name, whatever its case, or of another name that it goes by.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none; suggests the nearest.
+
+    Examples
+    --------
+    >>> format_named("OpticStudio").name
+    'zemax'
+    """
+    wanted = name.strip().lower()
     for candidate in RAY_FORMATS:
-        if candidate.name == name:
+        if candidate.name.lower() == OTHER_NAMES.get(wanted, wanted):
             return candidate
     raise UnknownNameError("ray format", name, [f.name for f in RAY_FORMATS])
 

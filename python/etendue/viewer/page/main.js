@@ -57,12 +57,12 @@ function firstView() {
   return new View({ ...rest, width: Math.max(width, (height * columns) / rows), ...shape, ...asked });
 }
 
-/** The view that the address asks for, as #theta=30&phi=0&width=4. */
+/** The view that the address asks for, as #theta=30&phi=0&roll=90&width=4. */
 function viewOfAddress() {
   const found = {};
   for (const [name, value] of new URLSearchParams(location.hash.slice(1))) {
-    if (["theta", "phi", "distance", "width", "columns", "rows"].includes(name)) found[name] = Number(value);
-    if (name === "target") found.target = value.split(",").map(Number);
+    if (["theta", "phi", "distance", "roll", "width", "columns", "rows"].includes(name)) found[name] = Number(value);
+    if (["target", "up"].includes(name)) found[name] = value.split(",").map(Number);
   }
   return found;
 }
@@ -295,10 +295,12 @@ function showView() {
 function command() {
   const { view } = state;
   const digits = (x) => String(Number(x.toPrecision(12)));
+  const turns = [view.upright && `--up=${view.upright.map(digits).join(",")} `, view.roll && `--roll=${digits(view.roll)} `];
+  const upright = turns.filter(Boolean).join("");
   const file = /^[\w./-]+$/.test(packed.file) ? packed.file : `'${packed.file.replaceAll("'", `'\\''`)}'`;
   return (
     `etendue luminance ${file} --observer=${digits(view.theta)},${digits(view.phi)} --distance ${digits(view.distance)} ` +
-    `--target=${view.target.map(digits).join(",")} --size ${digits(view.width)},${digits(view.height)} ` +
+    `--target=${view.target.map(digits).join(",")} ${upright}--size ${digits(view.width)},${digits(view.height)} ` +
     `--pixels ${view.columns},${view.rows} -o map.exr`
   );
 }

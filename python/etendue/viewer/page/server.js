@@ -10,8 +10,8 @@ export function serverOf() {
     return response;
   }
 
-  const screenOf = ({ theta, phi, distance, target, width, height, columns, rows }) => ({
-    observer: { theta, phi, distance, target },
+  const screenOf = ({ theta, phi, distance, target, upright, roll, width, height, columns, rows }) => ({
+    observer: { theta, phi, distance, target, up: upright, roll },
     screen: { width, height, columns, rows },
   });
 

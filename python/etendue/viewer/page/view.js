@@ -18,17 +18,35 @@ export function normalised(v) {
   return v.map((x) => x / length);
 }
 
+function cross(a, b) {
+  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+}
+
+/** Sine of the angle between `up` and the line of sight below which nothing is upright, as in `etendue.Observer`. */
+const ALONG_THE_LINE = 1e-6;
+
 export class View {
   /**
-   * theta, phi [°], distance [mm], target [mm]; width of the screen [mm]; columns and rows, whose pixels are square.
+   * theta, phi [°], distance [mm], target [mm]; up, a direction or null, and roll [°]; width of the screen [mm]; columns and rows, whose pixels are square.
    */
-  constructor({ theta, phi, distance, target, width, columns, rows }) {
-    Object.assign(this, { theta, phi, distance, target, width, columns, rows });
+  constructor({ theta, phi, distance, target, up = null, roll = 0, width, columns, rows }) {
+    Object.assign(this, { theta, phi, distance, target, upright: up, roll, width, columns, rows });
     const [c, s] = cosSin(phi);
     const [ct, st] = cosSin(theta);
     this.right = [ct * c * c + s * s, (ct - 1) * c * s, -st * c];
     this.up = [(ct - 1) * c * s, ct * s * s + c * c, -st * s];
     this.toward = [st * c, st * s, ct];
+    // Along `up` the view has no side that is upright, and keeps the axes of a view without one.
+    if (up && Math.hypot(...cross(normalised(up), this.toward)) > ALONG_THE_LINE) {
+      this.right = normalised(cross(normalised(up), this.toward));
+      this.up = cross(this.toward, this.right);
+    }
+    if (roll) {
+      const [cr, sr] = cosSin(roll);
+      const { right, up: above } = this;
+      this.right = plus(right.map((x) => cr * x), above, sr);
+      this.up = plus(above.map((x) => cr * x), right, -sr);
+    }
     this.eye = plus(target, this.toward, distance);
   }
 
@@ -41,7 +59,7 @@ export class View {
   }
 
   with(changes) {
-    return new View({ ...this, ...changes });
+    return new View({ ...this, up: this.upright, ...changes });
   }
 
   /** Place on the screen [mm], right and up of the target, of a point counted in pixels from the upper left corner. */

@@ -1,0 +1,101 @@
+"""What people type who do not know the program: it is understood, or answered with the right form."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import pytest
+
+from cli.outcome import Run
+
+
+@pytest.fixture
+def lamp(tmp_path: Path) -> Path:
+    et.write_rays(tmp_path / "lamp.tm25ray", et.RingSource(rays=20_000, seed=1).ray_set())
+    return tmp_path / "lamp.tm25ray"
+
+
+def mapped(run: Run, lamp: Path, *words: object) -> dict[str, object]:
+    """The map that a call of `luminance` makes."""
+    base = ("--method", "cone", "--acceptance", "5", "-o", "map.npz", "--json")
+    outcome = run("luminance", lamp, *words, *base)
+    assert outcome.status == 0, outcome.err
+    found = json.loads(outcome.out)["maps"][0]
+    assert isinstance(found, dict)
+    return found
+
+
+def test_blanks_between_numbers_are_commas(run: Run, lamp: Path) -> None:
+    """`--observer 30 0 --size 40 20` and `--observer 30,0 --size 40,20` are the same map."""
+    usual = mapped(run, lamp, "--observer", "30,-5", "--size", "40,20", "--pixels", "8,4")
+    loose = mapped(run, lamp, "--observer", "30", "-5", "--size", "40", "20", "--pixels", "8", "4")
+    assert usual == loose
+
+
+def test_one_number_is_a_square(run: Run, lamp: Path) -> None:
+    screen = mapped(run, lamp, "--observer", "0,0", "--size", "4", "--pixels", "8")["screen"]
+    assert isinstance(screen, dict)
+    assert (screen["width"], screen["height"], screen["columns"], screen["rows"]) == (4, 4, 8, 8)
+
+
+def test_counts_have_letters(run: Run, lamp: Path) -> None:
+    for text, number in (("1k", 1000), ("0.002M", 2000), ("2e3", 2000)):
+        assert run("convert", lamp, "less.tm25ray", "--subset", text).status == 0
+        assert len(et.read_rays("less.tm25ray")) == number
+    assert "100M" in run("convert", lamp, "less.tm25ray", "--subset", "1X").err
+
+
+def test_the_case_of_a_choice_does_not_matter(run: Run, lamp: Path) -> None:
+    mapped(run, lamp, "--observer", "0,0", "--size", "20,20", "--scale", "Log")
+
+
+@pytest.mark.parametrize(
+    ("option", "told"), [("--theta", "--observer 30,0"), ("--resolution", "--pixels 128,128"), ("--log", "--scale log")]
+)
+def test_options_that_do_not_exist_are_answered(run: Run, lamp: Path, option: str, told: str) -> None:
+    outcome = run("luminance", lamp, option, "30", "-o", "map.npz")
+    assert outcome.status == 2
+    assert told in outcome.err
+
+
+def test_a_format_goes_by_the_name_of_its_program(run: Run, lamp: Path) -> None:
+    assert run("convert", lamp, "lamp.dat", "--format", "opticstudio").status == 0
+    assert run("convert", lamp, "usual.dat", "--format", "zemax").status == 0
+    assert Path("lamp.dat").read_bytes() == Path("usual.dat").read_bytes()
+    assert "zemax" in run("convert", lamp, "lamp.dat", "--format", "zemaks").err
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ('material = "PMMA"', "medium = 'PMMA'"),
+        ("radius = 4", "shape = { kind = 'ball', radius = 4 }"),
+        ("position = [0, 0, 7]", "at = [0, 0, 7]"),
+    ],
+)
+def test_keys_of_other_programs_are_answered(run: Run, tmp_path: Path, line: str, told: str) -> None:
+    scene = f'[[solids]]\nname = "lens"\nshape = {{ kind = "ball", radius = 4 }}\n{line}\n'
+    (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
+    outcome = run("trace", "scene.toml")
+    assert outcome.status == 1
+    assert told in outcome.err
+
+
+def test_regions_and_what_is_up(run: Run, lamp: Path) -> None:
+    """A region is the mean of its pixels; a quarter turn of the head turns the map by a quarter."""
+    words = ("--size", "20,20", "--pixels", "4,4")
+    plain = mapped(run, lamp, "--observer", "40,0", *words, "--region", "-10,0,0,10")
+    values = et.read_map("map.npz").values
+    (region,) = plain["regions"]  # type: ignore[misc]
+    assert region["mean"] == pytest.approx(np.nanmean(values[:2, :2]), rel=1e-12)
+    mapped(run, lamp, "--observer", "40,0", *words, "--roll", "90")
+    # The head tilts to its left, so that the picture turns clockwise.
+    np.testing.assert_allclose(et.read_map("map.npz").values, np.rot90(values, -1), rtol=1e-9)
+    mapped(run, lamp, "--observer", "90,0", *words, "--up", "0,0,1")
+    upright = et.read_map("map.npz").values
+    mapped(run, lamp, "--observer", "90,0", *words)
+    # Seen along X without it, +Y is up and Z points to the left.
+    np.testing.assert_allclose(upright, np.rot90(et.read_map("map.npz").values, -1), rtol=1e-9)
