@@ -167,7 +167,7 @@ LUMINANCE = ["luminance", "led.tm25ray", "--observer", "0,0", "--size", "10,8", 
         ["luminance", "led.tm25ray", "--observer", "thirty,0", "--size", "1,1", "-o", "a.npz"],
         [*LUMINANCE, "--pixels", "12.7,3"],  # 12 would be another map than the one asked for
         [*LUMINANCE, "--pixels", "nan,3"],
-        [*LUMINANCE, "--pixels", "12"],
+        [*LUMINANCE, "--pixels", "12,12,12"],
         [*LUMINANCE, "--target", "0,0"],
         [*LUMINANCE, "--threads", "0"],
         [*LUMINANCE, "--threads", "-2"],
