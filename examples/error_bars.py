@@ -3,7 +3,8 @@
     python examples/error_bars.py
 
 Twenty sets of rays of a source whose luminance is known are mapped. Of all pixels within a ring, the truth must lie within
-one standard error in 68.3 % and within two in 95.4 %. The sets are independent, so how far those shares may be off is known too.
+one standard error in 68.3 % and within two in 95.4 %. The sets are independent, so how far those shares may be off is known
+too.
 """
 
 from __future__ import annotations

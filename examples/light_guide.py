@@ -3,8 +3,8 @@
     python examples/light_guide.py
 
 Light that enters a polished rod of index above √2 through its end cannot leave through its side. So what comes out at the
-other end is a matter of the two ends alone, (1 - R)/(1 + R) at each angle, and does not depend on the length of the rod. Seen
-through it, a square of light becomes a pattern of its mirror images.
+other end is a matter of the two ends alone, (1 - R)/(1 + R) at each angle, and does not depend on the length of the rod.
+Seen through it, a square of light becomes a pattern of its mirror images.
 """
 
 from __future__ import annotations

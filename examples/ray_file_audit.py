@@ -3,7 +3,8 @@
     python examples/ray_file_audit.py
 
 The header of a good file is spoilt: it claims 20 % more light than its rays carry, as real files do. Reading it says so,
-with both numbers; `etendue info` prints the same. The flux of the data sheet, stated by hand, restores the map of the good file.
+with both numbers; `etendue info` prints the same. The flux of the data sheet, stated by hand, restores the map of the good
+file.
 """
 
 from __future__ import annotations
