@@ -239,7 +239,7 @@ def test_more_pixels_than_dots_are_averaged_not_dropped(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("extension", [".png", ".pdf", ".PNG"])
+@pytest.mark.parametrize("extension", [".png", ".svg", ".pdf", ".PNG"])
 def test_the_same_map_gives_the_same_bytes(extension: str, tmp_path: Path) -> None:
     first, second = tmp_path / f"first{extension}", tmp_path / f"second{extension}"
     MAPS["dead pixels"].plot(first)

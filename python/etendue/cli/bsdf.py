@@ -94,7 +94,7 @@ def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
 
 def plot(
     file: File,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The picture, .png or .pdf.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The picture, .png, .svg or .pdf.")],
     incidence: Annotated[float, typer.Option("--incidence", help="Angle of the diagram in the middle [°].")] = 45.0,
     side: Annotated[str, typer.Option("--side", help="The side that the light meets: front or back.")] = "front",
     json: Json = False,

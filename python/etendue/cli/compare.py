@@ -12,6 +12,8 @@ from etendue.formats.maps import PICTURE_EXTENSIONS, read_map
 from etendue.luminance.comparison import DEAD_RULES, Region, cross_section
 from etendue.luminance.comparison import compare as compare_maps
 from etendue.plot import plot_comparison, plot_cross_sections
+from etendue.plot.colour_scale import SCALES
+from etendue.plot.comparison_picture import DIFFERENCES
 
 
 def compare(
@@ -25,8 +27,18 @@ def compare(
         bool, typer.Option("--ignore-geometry", help="Compare pixel by pixel even if observer or screen differ.")
     ] = False,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Picture of both maps and their difference (eq. 3.4), .png")
+        Path | None, typer.Option("-o", "--output", help="Picture of both maps and their difference: .png, .svg, .pdf")
     ] = None,
+    difference: Annotated[
+        str,
+        typer.Option(
+            "--difference",
+            help="In the picture: maximum (signed, in % of the reference's), sigma (in standard errors), thesis (eq. 3.4).",
+        ),
+    ] = "maximum",
+    scale: Annotated[
+        str, typer.Option("--scale", help="Colours and sections: linear, log, or auto: by the range of the lit pixels.")
+    ] = "auto",
     section_y: Annotated[
         float | None, typer.Option("--section-y", help="Cut both maps along the row at this height in mm.")
     ] = None,
@@ -34,12 +46,13 @@ def compare(
         float | None, typer.Option("--section-x", help="Cut both maps along the column at this position in mm.")
     ] = None,
     section_output: Annotated[
-        Path | None, typer.Option("--section-output", help="Picture of the cross sections, .png")
+        Path | None, typer.Option("--section-output", help="Picture of the cross sections: .png, .svg, .pdf")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """NCC (3.5), NRMSE as printed (3.6), true RMSE over the reference's maximum, difference image (3.4), cross sections."""
     one_of(dead, DEAD_RULES, "--dead")
+    scaling, shown = one_of(scale, SCALES, "--scale"), one_of(difference, DIFFERENCES, "--difference")
     if (section_output is None) != (section_x is None and section_y is None):
         raise typer.BadParameter("--section-output goes with --section-x or --section-y")
     check_outputs([p for p in (output, section_output) if p], PICTURE_EXTENSIONS)
@@ -51,10 +64,10 @@ def compare(
         a, b, region=limits, dead="zero" if dead == "zero" else "exclude", ignore_geometry=ignore_geometry
     )
     if output is not None:
-        plot_comparison(result, output, labels=(test.name, reference.name))
+        plot_comparison(result, output, scaling, difference=shown, labels=(test.name, reference.name))
     if section_output is not None:
         cuts = [cross_section(lmap, x=section_x, y=section_y) for lmap in (a, b)]
-        plot_cross_sections(cuts, section_output, labels=[test.name, reference.name])
+        plot_cross_sections(cuts, section_output, scaling, labels=[test.name, reference.name])
     if json:
         print_json(result.to_dict() | {"outputs": [p for p in (output, section_output) if p]})
         return

@@ -44,7 +44,8 @@ def deconvolve(
         ),
     ] = None,
     output: Annotated[
-        list[Path] | None, typer.Option("--output", "-o", help="Values, .csv, or a picture, .png or .pdf; repeatable.")
+        list[Path] | None,
+        typer.Option("--output", "-o", help="Values, .csv, or a picture, .png, .svg or .pdf; repeatable."),
     ] = None,
     operator: Annotated[
         str,

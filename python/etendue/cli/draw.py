@@ -18,7 +18,7 @@ from etendue.scene import Scene
 def draw(
     file: Annotated[Path, typer.Argument(help="A scene, .toml")],
     output: Annotated[
-        list[Path] | None, typer.Option("-o", "--output", help="Picture (.png, .pdf); several are allowed.")
+        list[Path] | None, typer.Option("-o", "--output", help="Picture (.png, .svg, .pdf); several are allowed.")
     ] = None,
     section: Annotated[
         list[str] | None,

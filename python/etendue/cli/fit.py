@@ -54,7 +54,9 @@ def fit(
     unit: Unit = None,
     report: Annotated[
         Path | None,
-        typer.Option("--report", help="Picture of the diagnostics, .png or .pdf; takes about as long as the fit."),
+        typer.Option(
+            "--report", help="Picture of the diagnostics, .png, .svg or .pdf; takes about as long as the fit."
+        ),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -39,7 +39,9 @@ def intensity(
     ],
     output: Annotated[
         list[Path] | None,
-        typer.Option("-o", "--output", help="Distribution (.ies, .ldt) or picture (.png, .pdf); several are allowed."),
+        typer.Option(
+            "-o", "--output", help="Distribution (.ies, .ldt) or picture (.png, .svg, .pdf); several are allowed."
+        ),
     ] = None,
     c_planes: Annotated[
         int | None,

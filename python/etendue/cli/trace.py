@@ -74,7 +74,7 @@ def trace(
             "-o",
             "--output",
             help="Whole result (.h5), or by extension what a detector saw: rays (.tm25ray …), intensity (.ies, .ldt), "
-            "illuminance and light images (.exr, .npz …), pictures (.png, .pdf). {detector} is filled in.",
+            "illuminance and light images (.exr, .npz …), pictures (.png, .svg, .pdf). {detector} is filled in.",
         ),
     ] = None,
     rays: Annotated[

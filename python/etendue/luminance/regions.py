@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError
-from etendue.luminance.comparison import ON_THE_EDGE, Region
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.luminance.comparison import DEAD_RULES, ON_THE_EDGE, DeadRule, Region
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
@@ -98,7 +98,7 @@ class RegionStatistics:
     Parameters
     ----------
     mean, minimum, maximum : float
-        Of the live pixels in the region, in `unit`.
+        Of the pixels counted, in `unit`.
     mean_error : float
         Standard error of the mean if all pixels err together: the mean of their errors, which no correlation exceeds.
         Pixels of light fields and of smoothed maps are like that. NaN where no error is known.
@@ -113,7 +113,7 @@ class RegionStatistics:
     area : float
         Of all pixels in the region [mm²].
     pixels, dead_pixels : int
-        How many pixels there are, and how many of them are dead: those count nowhere else.
+        How many pixels there are, and how many of them are dead.
     quantity, unit : str
         Of the map.
 
@@ -152,7 +152,10 @@ class RegionStatistics:
 
 
 def region_statistics(
-    lmap: LuminanceMap | IlluminanceMap, region: AnyRegion, percentiles: Sequence[float] = PERCENTILES
+    lmap: LuminanceMap | IlluminanceMap,
+    region: AnyRegion,
+    percentiles: Sequence[float] = PERCENTILES,
+    dead: DeadRule = "zero",
 ) -> RegionStatistics:
     """Mean, extremes, percentiles and uniformity of a part of a map.
 
@@ -164,11 +167,16 @@ def region_statistics(
         On the screen of the map.
     percentiles : sequence of float
         Which ones [%], 0 to 100.
+    dead : {"zero", "exclude"}
+        ``"zero"``: a dead pixel counts as 0 ± 0, so that the mean is not biased: where rays are few, those pixels that one
+        of them reached are too bright on average. ``"exclude"``: it is left out, where it is dead for want of a measurement.
 
     Raises
     ------
     ArgumentError
         If no pixel centre, or no live pixel, lies in the region, or a percentile is out of its range.
+    UnknownNameError
+        If there is no such rule for dead pixels.
 
     Examples
     --------
@@ -180,11 +188,14 @@ def region_statistics(
     """
     if not all(0.0 <= share <= 100.0 for share in percentiles):
         raise ArgumentError(f"region_statistics: percentiles are {tuple(percentiles)}; give numbers from 0 to 100.")
+    if dead not in DEAD_RULES:
+        raise UnknownNameError("rule for dead pixels", dead, DEAD_RULES)
     inside = region.mask(lmap.screen)
     live = inside & ~np.isnan(lmap.values)
     if not live.any():
         raise ArgumentError(f"region_statistics: all {int(inside.sum())} pixels in {region} are dead.")
-    values, errors = lmap.values[live], lmap.standard_error[live]
+    counted = inside if dead == "zero" else live
+    values, errors = (np.where(live, array, 0.0)[counted] for array in (lmap.values, lmap.standard_error))
     mean, low, high = float(values.mean()), float(values.min()), float(values.max())
     return RegionStatistics(
         mean=mean,
@@ -223,12 +234,17 @@ def parse_region(text: str) -> AnyRegion:
     >>> parse_region("0/0,1/0,0/1").area
     0.5
     """
+    rows = [part.split("/") for part in text.split(",")]
+    polygon = "/" in text
     try:
-        if "/" in text:
-            return PolygonRegion([(float(x), float(y)) for x, y in (corner.split("/") for corner in text.split(","))])
-        left, right, bottom, top = map(float, text.split(","))
+        numbers = [tuple(map(float, row)) for row in rows]
     except ValueError:
-        raise ArgumentError(
-            f"{text!r} is no region: give LEFT,RIGHT,BOTTOM,TOP in mm, e.g. -5,5,-2,2, or corners X/Y, e.g. 0/0,4/0,0/3."
-        ) from None
-    return Region(left, right, bottom, top)
+        numbers = []
+    # What the regions themselves refuse, they explain.
+    if polygon and numbers and all(len(row) == 2 for row in numbers):
+        return PolygonRegion([(x, y) for x, y in numbers])
+    if not polygon and len(numbers) == 4:
+        return Region(*(x for (x,) in numbers))
+    raise ArgumentError(
+        f"{text!r} is no region: give LEFT,RIGHT,BOTTOM,TOP in mm, e.g. -5,5,-2,2, or corners X/Y, e.g. 0/0,4/0,0/3."
+    )

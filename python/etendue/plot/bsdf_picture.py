@@ -77,7 +77,7 @@ def plot_bsdf(
     bsdf : Bsdf
         A model or a table.
     path : path, optional
-        Where to write the picture, .png or .pdf.
+        Where to write the picture, .png, .svg or .pdf.
     side : {"front", "back"}
         The side that the light meets.
     incidence : number
@@ -99,7 +99,7 @@ def plot_bsdf(
     ArgumentError
         If there are not three axes, or a path beside them.
     UnknownNameError
-        If the extension is neither .png nor .pdf.
+        If the extension is none of .png, .svg and .pdf.
 
     Examples
     --------

@@ -66,7 +66,7 @@ def plot_characteristic(
     diagnostics : Diagnostics
         With or without a forecast.
     path : path, optional
-        Where to write the picture, .png or .pdf. The same diagnostics give the same bytes.
+        Where to write the picture, .png, .svg or .pdf. The same diagnostics give the same bytes.
     title : str, optional
         First line; "Light field" if not given.
     ax : sequence of matplotlib.axes.Axes, optional
@@ -156,8 +156,7 @@ def _draw_luminance(axes: Axes, curve: CharacteristicCurve, unit: FluxUnit) -> N
     axes.set_xlabel("étendue, brightest first [mm² sr]")
     shown = high[middles >= left]
     axes.set_ylim(0.0, 1.05 * float(shown.max()) or 1.0)
-    axes.yaxis.set_major_formatter(style.number_formatter())
-    axes.set_ylabel(f"{LUMINANCE_NAME[unit]} [{LUMINANCE_UNIT[unit]}]")
+    style.put_numbers(axes.yaxis, LUMINANCE_NAME[unit], LUMINANCE_UNIT[unit], *axes.get_ylim())
 
 
 def _draw_flux(axes: Axes, curve: CharacteristicCurve, unit: FluxUnit) -> None:
@@ -165,10 +164,8 @@ def _draw_flux(axes: Axes, curve: CharacteristicCurve, unit: FluxUnit) -> None:
     axes.plot(np.append(0.0, curve.etendue), np.append(0.0, curve.flux), color=style.LINES[0], linewidth=1.2)
     axes.set_xlim(0.0, curve.etendue_of(LIT))
     axes.set_ylim(0.0, 1.05 * float(curve.flux[-1]))
-    axes.xaxis.set_major_formatter(style.number_formatter())
-    axes.set_xlabel("étendue, brightest first [mm² sr]")
-    axes.yaxis.set_major_formatter(style.number_formatter())
-    axes.set_ylabel(f"flux [{unit}]")
+    style.put_numbers(axes.xaxis, "étendue, brightest first", "mm² sr", *axes.get_xlim())
+    style.put_numbers(axes.yaxis, "flux", unit, *axes.get_ylim())
     half = curve.etendue_of(0.5)
     axes.plot([half], [0.5 * curve.flux[-1]], "o", color=style.LINES[1], markersize=4)
     axes.annotate(

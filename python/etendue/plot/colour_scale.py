@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 Scale = Literal["auto", "linear", "log"]
-SCALES: tuple[str, ...] = get_args(Scale)
+SCALES: tuple[Scale, ...] = get_args(Scale)
 
 DECADES = 4
 """How far a logarithmic scale reaches down from the brightest pixel unless `vmin` says otherwise."""
@@ -85,6 +85,11 @@ def colour_map(colours: str, wanted: str | Colormap | None = None) -> Colormap:
     ------
     UnknownNameError
         If matplotlib knows no colours of this name.
+
+    Examples
+    --------
+    >>> colour_map("value").name, colour_map("value", "viridis").name
+    ('inferno', 'viridis')
     """
     mpl = require("matplotlib")
     name = style.COLOUR_MAPS[colours] if wanted is None else wanted
@@ -106,6 +111,13 @@ def normalisation(
     ------
     ArgumentError
         If the range is none.
+
+    Examples
+    --------
+    >>> values, errors = np.array([0.2, 1.0, 500.0]), np.array([0.3, 0.4, 20.0])
+    >>> norm = normalisation(values, "log", None, None, errors)                 # 0.2 ± 0.3 may well be black
+    >>> norm.vmin, norm.vmax
+    (1.0, 500.0)
     """
     require("matplotlib")
     from matplotlib.colors import LogNorm, Normalize
@@ -131,7 +143,13 @@ def normalisation(
 
 
 def signed_normalisation(data: Array, least: float) -> Normalize:
-    """Symmetric about 0, to the 99th percentile of the sizes, and `least` if all are smaller than rounding shows."""
+    """Symmetric about 0, to the 99th percentile of the sizes, or to `least` if all of them are 0.
+
+    Examples
+    --------
+    >>> signed_normalisation(np.array([-3.0, 3.0]), 1.0).vmin, signed_normalisation(np.zeros(2), 1.0).vmax
+    (-3.0, 1.0)
+    """
     from matplotlib.colors import Normalize
 
     sizes = np.abs(data[np.isfinite(data)])

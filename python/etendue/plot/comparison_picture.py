@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 Difference = Literal["maximum", "sigma", "thesis"]
-DIFFERENCES: tuple[str, ...] = get_args(Difference)
+DIFFERENCES: tuple[Difference, ...] = get_args(Difference)
 
 NARROWEST_COLUMN = 2.1
 """Room for the lines of text under three narrow maps [inches]."""

@@ -60,7 +60,7 @@ def plot_deconvolution(
     found : Deconvolution
         What to draw.
     path : path, optional
-        Where to write the picture, .png or .pdf.
+        Where to write the picture, .png, .svg or .pdf.
     title : str, optional
         Above everything.
     ax : three Axes, optional
@@ -78,7 +78,7 @@ def plot_deconvolution(
     ArgumentError
         If there are not three axes, or a path beside them.
     UnknownNameError
-        If the extension is neither .png nor .pdf.
+        If the extension is none of .png, .svg and .pdf.
 
     Examples
     --------

@@ -74,7 +74,7 @@ def plot_directions(
     found : DirectionalDeconvolution
         What to draw.
     path : path, optional
-        Where to write the picture, .png or .pdf.
+        Where to write the picture, .png, .svg or .pdf.
     title : str, optional
         Above everything.
     ax : four Axes, optional
@@ -92,7 +92,7 @@ def plot_directions(
     ArgumentError
         If there are not four axes, or a path beside them.
     UnknownNameError
-        If the extension is neither .png nor .pdf.
+        If the extension is none of .png, .svg and .pdf.
 
     Examples
     --------

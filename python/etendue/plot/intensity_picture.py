@@ -82,7 +82,7 @@ def plot_intensity(
     intensity : Intensity
         The distribution.
     path : path, optional
-        Where to write the picture, .png or .pdf. The same distribution gives the same bytes.
+        Where to write the picture, .png, .svg or .pdf. The same distribution gives the same bytes.
     kind : {"polar", "cartesian"}
         The diagram of a data sheet, γ = 0° pointing down; or intensity over γ.
     title : str, optional
@@ -263,13 +263,13 @@ def _cartesian(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: fl
     low = min(0.0, float(intensity.values.min()))
     top = max(float((curve.values + curve.error).max()) for curve in curves)
     axes.set_ylim(low, top + 0.05 * (top - low) if top > low else low + 1.0)
-    axes.yaxis.set_major_formatter(style.number_formatter())
     for number, curve in enumerate(curves):
         colour = style.LINES[number]
         low_edge, high_edge = curve.values - curve.error, curve.values + curve.error
         axes.fill_between(curve.gamma, low_edge, high_edge, color=colour, alpha=0.22, linewidth=0.0)
         axes.plot(curve.gamma, curve.values, color=colour, linewidth=1.2, label=curve.label)
-    axes.set(xlabel="γ [°], to the left in the plane C + 180°", ylabel=f"{intensity.quantity} [{intensity.unit}]")
+    axes.set_xlabel("γ [°], to the left in the plane C + 180°")
+    style.put_numbers(axes.yaxis, intensity.quantity, intensity.unit, *axes.get_ylim())
 
 
 def _facts(intensity: Intensity) -> Iterator[str]:

@@ -50,7 +50,7 @@ def plot_near_field(
     run : NearFieldRun
         What to draw.
     path : path, optional
-        Where to write the picture, .png or .pdf.
+        Where to write the picture, .png, .svg or .pdf.
     title : str, optional
         Above everything; the source of the light if left out.
     c : number
@@ -70,7 +70,7 @@ def plot_near_field(
     ArgumentError
         If there are not four axes, or a path beside them.
     UnknownNameError
-        If the extension is neither .png nor .pdf.
+        If the extension is none of .png, .svg and .pdf.
 
     Examples
     --------

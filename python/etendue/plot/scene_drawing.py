@@ -35,14 +35,17 @@ LABEL_SIZE = 7.5
 def draw_view(axes: Axes, view: View, layout: SceneLayout, inches: tuple[float, float], *, labelled: bool) -> None:
     """Draw a section on axes of this width and height; `labelled`: with numbers at its upright axis."""
     left, right, bottom, top = view.window
-    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel=f"{view.section.across} [mm]")
+    axes.set(xlim=(left, right), ylim=(bottom, top))
     style.dress(axes)
-    for axis, length in zip((axes.xaxis, axes.yaxis), inches, strict=True):
+    section = view.section
+    for axis, length, name, low, high in (
+        (axes.xaxis, inches[0], section.across, left, right),
+        (axes.yaxis, inches[1], section.up, bottom, top),
+    ):
         axis.set_major_locator(style.locator_for(length))
-        axis.set_major_formatter(style.number_formatter())
-    if labelled:
-        axes.set_ylabel(f"{view.section.up} [mm]")
-    else:
+        style.put_numbers(axis, name, "mm", low, high)
+    if not labelled:
+        axes.set_ylabel("")
         axes.tick_params(labelleft=False)
     placer = LabelPlacer(*inches, LABEL_SIZE)
     _fill(axes, view, layout)

@@ -83,7 +83,7 @@ def draw_scene(
     scene : Scene
         What is drawn; all its mistakes are told first.
     path : path, optional
-        Where to write the picture, .png or .pdf. The same scene gives the same bytes.
+        Where to write the picture, .png, .svg or .pdf. The same scene gives the same bytes.
     section : str or sequence of str
         Planes across one of the axes, e.g. ``"y=0"``; up to three.
     rays : int

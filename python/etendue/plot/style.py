@@ -291,7 +291,7 @@ HORIZONTAL, VERTICAL = "horizontal on the screen", "vertical on the screen"
 
 def headed(what: str, source: str, inches: float = 4.4) -> str:
     """A heading that names where a picture comes from, the middle of a long name left out."""
-    name, room = Path(source).name, max(12, int(inches * 10.0) - len(what) - 4)
+    name, room = Path(source).name.partition(" (")[0], max(12, int(inches * 10.0) - len(what) - 4)
     if not name:
         return what
     half = (room - 1) // 2

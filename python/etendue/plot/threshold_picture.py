@@ -51,7 +51,7 @@ def plot_threshold_sweep(
     sweep : ThresholdSweep
         At least two thresholds above 0.
     path : path, optional
-        Where to write the picture, .png or .pdf. The same sweep gives the same bytes.
+        Where to write the picture, .png, .svg or .pdf. The same sweep gives the same bytes.
     title : str, optional
         First line.
     ax : sequence of matplotlib.axes.Axes, optional

@@ -279,7 +279,13 @@ class Screen:
 
 
 def observer_to_dict(observer: Observer) -> dict[str, Any]:
-    """Plain data; `up` and `roll` are in it only where they are stated, so that other files stay as they were."""
+    """Plain data; `up` and `roll` are in it only where they are stated, so that other files stay as they were.
+
+    Examples
+    --------
+    >>> observer_to_dict(Observer(30, 0, 1000, roll=15))
+    {'theta': 30, 'phi': 0, 'distance': 1000, 'target': (0.0, 0.0, 0.0), 'roll': 15}
+    """
     data = dataclasses.asdict(observer)
     return {name: value for name, value in data.items() if not (name in ("up", "roll") and not value)}
 

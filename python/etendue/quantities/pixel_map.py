@@ -119,7 +119,7 @@ class PixelMap(InNotebook, abc.ABC):
     def save(self, path: str | os.PathLike[str]) -> tuple[str, ...]:
         """Write the map; the format follows the extension.
 
-        That is .exr, .tif, .npz, .csv, for luminance also .hdr, and .png or .pdf for a picture.
+        That is .exr, .tif, .npz, .csv, for luminance also .hdr, and .png, .svg or .pdf for a picture.
 
         Returns
         -------

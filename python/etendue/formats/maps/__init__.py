@@ -17,7 +17,7 @@ from etendue.quantities.luminance_map import LuminanceMap
 MAP_FORMATS: dict[str, MapFormat] = {module.FORMAT.name: module.FORMAT for module in (exr, hdr, tiff, npz, csv)}
 """Every format by name."""
 
-PICTURE_EXTENSIONS = (".png", ".pdf")
+PICTURE_EXTENSIONS = (".png", ".svg", ".pdf")
 """Extensions that are drawn instead of written: a picture for people, which no program reads back."""
 
 MAP_EXTENSIONS: tuple[str, ...] = tuple(extension for f in MAP_FORMATS.values() for extension in f.extensions)

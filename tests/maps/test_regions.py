@@ -1,0 +1,136 @@
+"""Regions of maps: pixels against areas, statistics against sums by hand, and what is drawn of them."""
+
+from __future__ import annotations
+
+import math
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.errors import ArgumentError
+from etendue.luminance.comparison import Region, compare
+from etendue.luminance.regions import PolygonRegion, parse_region, region_statistics
+from etendue.plot import plot_comparison, plot_map, style
+from etendue.plot.colour_scale import choose_scale
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.observer import Observer, Screen
+
+
+def make_map(values: object, error: float = 0.5) -> LuminanceMap:
+    found = np.array(values, dtype=float)
+    screen = Screen(found.shape[1], found.shape[0], found.shape[1], found.shape[0])
+    return LuminanceMap(found, np.full(found.shape, error), np.full(found.shape, 9), Observer(0, 0, 1000), screen)
+
+
+def test_a_polygon_holds_the_pixels_of_its_area() -> None:
+    """Concave and aslant: the pixels that it holds have its area but for those on its edges; one without sides parallel to
+    the axes and a rectangle as a polygon, against the rectangle itself."""
+    screen = Screen(10, 8, 1000, 800)
+    arrow = PolygonRegion([(-4.1, -3.3), (0.2, -1.2), (4.3, -2.9), (0.1, 3.7)])
+    assert arrow.mask(screen).sum() * screen.pixel_area == pytest.approx(arrow.area, rel=2e-3)
+    box = PolygonRegion([(-1.003, -2.003), (3.003, -2.003), (3.003, 0.503), (-1.003, 0.503)])
+    np.testing.assert_array_equal(box.mask(screen), Region(-1.003, 3.003, -2.003, 0.503).mask(screen))
+
+
+def test_statistics_are_those_of_the_pixels_in_the_region() -> None:
+    """Two rows by hand, one of the pixels dead: left out, mean 4, errors 0.5 and 0.5/√5; as 0, 20/6 and less."""
+    lmap = make_map([[9, 9, 9, 9], [2, 4, math.nan, 9], [3, 5, 6, 9]])
+    found = region_statistics(lmap, Region(-2, 1, -1.5, 0.5), percentiles=(0, 50, 100), dead="exclude")
+    assert (found.mean, found.minimum, found.maximum) == (4.0, 2.0, 6.0)
+    assert (found.mean_error, found.mean_error_apart) == (0.5, pytest.approx(0.5 / math.sqrt(5)))
+    assert found.percentiles == ((0.0, 2.0), (50.0, 4.0), (100.0, 6.0))
+    assert (found.uniformity, found.uniformity_of_extremes) == (0.5, pytest.approx(1 / 3))
+    assert (found.area, found.pixels, found.dead_pixels) == (6.0, 6, 1)
+    whole = region_statistics(lmap, Region(-2, 1, -1.5, 0.5))
+    assert (whole.mean, whole.minimum, whole.uniformity) == (pytest.approx(20 / 6), 0.0, 0.0)
+    assert (whole.mean_error, whole.mean_error_apart) == (pytest.approx(2.5 / 6), pytest.approx(0.5 * math.sqrt(5) / 6))
+    with pytest.raises(et.errors.UnknownNameError, match="Did you mean 'zero'"):
+        region_statistics(lmap, Region(-2, 1, -1.5, 0.5), dead="zeros")  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="all 1 pixels"):
+        region_statistics(lmap, Region(0, 1, -0.5, 0.5))
+    with pytest.raises(ArgumentError, match="percentiles"):
+        region_statistics(lmap, Region(-2, 1, -1, 1), percentiles=(101,))
+
+
+def test_the_mean_of_a_region_is_the_luminance_however_many_pixels_are_dead() -> None:
+    """The innermost zone of the ring source has a stated luminance; with few rays most pixels are dead, and the mean of
+    eight independent maps lies within 4 standard errors (6e-5) of it. The mean of the live pixels alone does not."""
+    region = PolygonRegion([(9 * math.cos(a), 9 * math.sin(a)) for a in np.arange(8) * math.pi / 4])
+    found, live = [], []
+    for seed in range(1, 9):
+        source = et.RingSource(rays=100_000, seed=seed)
+        lmap = et.luminance_map(source, Observer(0, 0, 1000), Screen(20, 20, 64, 64), method=et.Cone(acceptance=2))
+        found.append(region_statistics(lmap, region))
+        live.append(region_statistics(lmap, region, dead="exclude").mean)
+    assert all(one.dead_pixels > one.pixels / 2 for one in found)
+    error = math.sqrt(sum(one.mean_error_apart**2 for one in found)) / len(found)
+    truth = source.zone_luminance[0]
+    assert abs(np.mean([one.mean for one in found]) - truth) < 4 * error
+    assert np.mean(live) - truth > 20 * error
+
+
+def test_the_error_of_a_mean_is_its_spread() -> None:
+    """500 maps of 40 independent pixels: the spread of their means within 4 of its standard errors (6e-5)."""
+    draws = np.random.default_rng(1).normal(10.0, 0.5, (500, 4, 10))
+    means = [region_statistics(make_map(one), Region(-5, 5, -2, 2)).mean for one in draws]
+    stated = region_statistics(make_map(draws[0]), Region(-5, 5, -2, 2)).mean_error_apart
+    assert np.std(means, ddof=1) == pytest.approx(stated, rel=4 / math.sqrt(2 * 499))
+
+
+def test_regions_are_outlined_and_numbered() -> None:
+    regions = [Region(-1, 1, -1, 0), PolygonRegion([(-2, -1), (2, -1), (0, 1)])]
+    figure = plot_map(make_map([[1, 2, 3, 4], [5, 6, 7, 8]]), regions=regions)
+    first, second = figure.axes[0].patches
+    assert {tuple(map(float, c)) for c in first.get_xy()} == {(-1, -1), (1, -1), (1, 0), (-1, 0)}
+    assert {tuple(map(float, c)) for c in second.get_xy()} == set(regions[1].corners)
+    assert [text.get_text() for text in figure.axes[0].texts] == ["1", "2"]
+    words = "\n".join(text.get_text() for text in figure.texts)
+    assert "1: mean 6.5 cd/m²" in words
+    with pytest.raises(ArgumentError, match="10 regions"):
+        plot_map(make_map([[1, 2]]), regions=[Region(-1, 1, -1, 1)] * 10)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1,2,3", "is no region"),
+        ("a/b,1/2,3/4", "is no region"),
+        ("0/0,1/1,2/2", "no area"),
+        ("0/0,1/1", "three"),
+        ("2,1,0,1", "left"),
+    ],
+)
+def test_what_is_no_region_is_refused(text: str, message: str) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        parse_region(text)
+
+
+def test_the_scale_follows_the_median_of_the_lit() -> None:
+    """A thirtieth of the maximum decides, whatever is black or dead."""
+    for median, name in ((0.99, "log"), (1.01, "linear")):
+        values = np.array([0.0, 0.0, math.nan, median / 2, median, 30.0])
+        assert choose_scale(values[values != median / 2], "auto").name == "linear"  # the median of two is between them
+        assert choose_scale(values, "auto").name == name
+    assert choose_scale(np.array([1.0, 1e6, 1e6]), "log") == ("log", "")
+
+
+def test_differences_have_a_sign() -> None:
+    """By hand: (test − reference) over the reference's maximum, and over √(0.3² + 0.4²); colours symmetric about 0."""
+    test, reference = make_map([[1, 4, math.nan, 2]], 0.3), make_map([[2, 2, 1, 5]], 0.4)
+    result = compare(test, reference)
+    np.testing.assert_allclose(result.signed_difference, [[-20, 40, -20, -60]])
+    np.testing.assert_allclose(result.difference_in_sigma, [[-2, 4, math.nan, -6]])
+    for kind, expected in (("maximum", result.signed_difference), ("sigma", result.difference_in_sigma)):
+        image = plot_comparison(result, difference=kind).axes[2].images[0]  # type: ignore[arg-type]
+        low, high = image.get_clim()
+        np.testing.assert_allclose(image.get_array().filled(math.nan), np.maximum(expected, low))
+        assert low == -high < 0.0
+    with pytest.raises(et.errors.UnknownNameError, match="Did you mean 'sigma'"):
+        plot_comparison(result, difference="sigm")  # type: ignore[arg-type]
+
+
+def test_numbers_have_one_notation() -> None:
+    assert [style.plain(x) for x in (0.0, 12345.0, -0.5, 1e-5, -2.5e9, 1.23456e-12)] == [
+        "0", "12\u2009340", "−0.5", "10⁻⁵", "−2.5 × 10⁹", "1.235 × 10⁻¹²",
+    ]  # fmt: skip
+    assert [style.common_power(-x, x) for x in (0.0, 1e-3, 9e-4, 9.9e6, 1e7, 2e9)] == [0, 0, -6, 0, 6, 9]
