@@ -54,6 +54,12 @@ def marks_of(lmap: LuminanceMap | IlluminanceMap, regions: Sequence[AnyRegion]) 
             f"max {style.plain(figures.maximum)}",
             f"min/mean {style.plain(figures.uniformity)}",
             ", ".join(f"{share:g} %: {style.plain(value)}" for share, value in figures.percentiles),
+            # Without the dead ones a mean is too large, if they are dead for want of light.
+            *(
+                [f"{figures.dead_pixels} of {figures.pixels} pixels are dead and left out"]
+                if figures.dead_pixels
+                else []
+            ),
         )
         found.append(Mark(number, _outline(region), style.SEPARATOR.join(facts)))
     return found
