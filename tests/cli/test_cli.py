@@ -84,7 +84,7 @@ def test_help_names_every_verb_with_what_it_does(run: Run) -> None:
         "cache",
         "bsdf",
     ]
-    assert set(verbs()) == {*expected, "goniometer", "deconvolve", "goniophotometer", "view"}
+    assert set(verbs()) == {*expected, "goniometer", "deconvolve", "goniophotometer", "view", "plot"}
     for name, verb in verbs().items():
         assert f" {name} " in outcome.out
         assert verb.help

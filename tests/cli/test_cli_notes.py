@@ -329,6 +329,14 @@ def goniophotometer(place: Path) -> Iterator[Case]:
     yield Case(("goniophotometer", place / "led.h5", *options, *outputs), notes)
 
 
+def plot(place: Path) -> Iterator[Case]:
+    lmap = et.luminance_map(
+        et.read_rays(place / "led.tm25ray"), et.Observer(0, 0, 100), et.Screen(2, 2, 8, 8), method="cone"
+    )
+    lmap.save(place / "for-plot.npz")
+    yield Case(("plot", place / "for-plot.npz", "-o", "out.png"), et.read_map(place / "for-plot.npz").notes)
+
+
 CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "demo": demo,
     "info": info,
@@ -338,6 +346,7 @@ CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "sample": sample,
     "intensity": intensity,
     "draw": draw,
+    "plot": plot,
     "trace": trace,
     "view": view,
     "patches": patches,

@@ -448,6 +448,7 @@ def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> None:
         say(
             f"  region {number}: mean {found.mean:.4g}{known} {found.unit}, minimum {found.minimum:.4g}, "
             f"maximum {found.maximum:.4g}, minimum over mean {found.uniformity:.3g}"
+            + (f"; {found.dead_pixels} of {found.pixels} pixels are dead and count as 0" if found.dead_pixels else "")
         )
     for note in lmap.notes:
         say(f"  {note}")

@@ -24,6 +24,7 @@ VERBS = {
     "sample": "etendue.cli.sample:sample",
     "intensity": "etendue.cli.intensity:intensity",
     "draw": "etendue.cli.draw:draw",
+    "plot": "etendue.cli.plot:plot",
     "trace": "etendue.cli.trace:trace",
     "patches": "etendue.cli.patches:patches",
     "filter": "etendue.cli.filter_:filter_",

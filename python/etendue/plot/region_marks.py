@@ -54,6 +54,11 @@ def marks_of(lmap: LuminanceMap | IlluminanceMap, regions: Sequence[AnyRegion]) 
             f"max {style.plain(figures.maximum)}",
             f"min/mean {style.plain(figures.uniformity)}",
             ", ".join(f"{share:g} %: {style.plain(value)}" for share, value in figures.percentiles),
+            *(
+                [f"{figures.dead_pixels} of {figures.pixels} pixels are dead and count as 0"]
+                if figures.dead_pixels
+                else []
+            ),
         )
         found.append(Mark(number, _outline(region), style.SEPARATOR.join(facts)))
     return found
