@@ -79,7 +79,7 @@ def test_an_empty_scene_has_bounds_that_json_can_tell(run: Run, tmp_path: Path) 
         (("--window", "1,2,3"), 2, "give 4 numbers"),
         (("--window", "4,2,0,1"), 1, "left < right"),
         (("--sections", "y=0"), 2, "--section"),
-        (("-o", "lamp.svg"), 1, "'.svg' is none of the known ones: .png, .pdf"),
+        (("-o", "lamp.bmp"), 1, "'.bmp' is none of the known ones: .png, .svg, .pdf"),
         (("-o", "nowhere/lamp.png"), 1, "the directory nowhere does not exist"),
     ],
 )

@@ -58,7 +58,7 @@ class Observer:
 
     A lamp along Z, looked at from +X, lies on its side unless +Z is said to be up:
 
-    >>> [Screen(1, 1, 1, 1).axes(Observer(90, 0, 1000, up=up))[1].tolist() for up in (None, (0, 0, 1))]
+    >>> [(Screen(1, 1, 1, 1).axes(Observer(90, 0, 1000, up=up))[1] + 0.0).tolist() for up in (None, (0, 0, 1))]
     [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
 
