@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import Annotated
 
 import typer
 
@@ -12,7 +12,7 @@ from etendue.cli.terminal import check_outputs, complain, one_of, print_json, sa
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS, read_map
 from etendue.luminance.denoising import denoise_map
 from etendue.luminance.filters import FILTERS, filter_map
-from etendue.plot.colour_scale import Scale
+from etendue.plot.colour_scale import SCALES
 
 KINDS = ("opt", *FILTERS)
 """The denoiser by optional Pólya tree, and the filters of the thesis."""
@@ -33,7 +33,7 @@ def filter_(
 ) -> None:
     """Smooth a map: opt needs no setting and keeps the flux; the four filters of the thesis report what they lose."""
     one_of(kind, KINDS, "--kind")
-    colours = one_of(scale, get_args(Scale), "--scale")
+    colours = one_of(scale, SCALES, "--scale")
     check_outputs(output, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
     noisy = read_map(file)
     smooth = denoise_map(noisy) if kind == "opt" else filter_map(noisy, kind, size=size, gamma=gamma)

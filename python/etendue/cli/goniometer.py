@@ -12,7 +12,7 @@ from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.goniometer_scan import Way
 from etendue.instruments.positions import Plane
 from etendue.instruments.samples import read_sample
-from etendue.instruments.scatter_goniometer import SPAN, Method, ScatterGoniometer
+from etendue.instruments.scatter_goniometer import BARE_STEP, SPAN, STEP, Method, ScatterGoniometer
 
 COLLIMATED = 0.0
 
@@ -45,7 +45,8 @@ def goniometer(
     distance: Annotated[float, typer.Option("--distance", help="From the sample to the aperture in mm.")] = 886.0,
     incidence: Annotated[float, typer.Option("--incidence", help="Angle of incidence in °.")] = 0.0,
     step: Annotated[
-        float | None, typer.Option("--step", help="Between positions in °; 0.1, or 0.05 of the bare beam.")
+        float | None,
+        typer.Option("--step", help=f"Between positions in °; {STEP:g}, or {BARE_STEP:g} of the bare beam."),
     ] = None,
     span: Annotated[
         float | None,
@@ -94,7 +95,7 @@ def goniometer(
         raise typer.BadParameter("--outside, --turn and --head are for scans in two dimensions: add --window")
     if window and plane != "in-plane":
         raise typer.BadParameter("--plane is for scans in one plane; --window scans both")
-    step = step if step is not None else 0.05 if no_sample else 0.1
+    step = step if step is not None else BARE_STEP if no_sample else STEP
     which: Plane = one_of(plane, ("in-plane", "cross-plane"), "--plane")
     how: Method = one_of(method, ("trace", "quadrature"), "--method")
     ways: tuple[Way, Way] = ("transmitted", "reflected")

@@ -7,14 +7,14 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.field import complaints_of, read_source, surface_option
-from etendue.cli.options import Flux, Json, Threads, Unit
+from etendue.cli.options import Flux, Json, Regions, Threads, Unit
 from etendue.cli.terminal import (
     check_outputs,
     complain,
@@ -42,7 +42,7 @@ from etendue.luminance.methods import (
 )
 from etendue.luminance.opening import SCENE_EXTENSION
 from etendue.luminance.regions import AnyRegion, parse_region, region_statistics
-from etendue.plot.colour_scale import Scale
+from etendue.plot.colour_scale import SCALES, Scale
 from etendue.plot.map_picture import plot_map
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import PLANES, Observer, Screen
@@ -100,14 +100,7 @@ def luminance(
         typer.Option("--up", help="Direction that stands upright in the picture, e.g. 0,0,1.", metavar="X,Y,Z"),
     ] = None,
     roll: Annotated[float, typer.Option("--roll", help="Tilt of the observer's head to its left in °.")] = 0.0,
-    region: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--region",
-            help="Part of the map in figures, outlined in pictures; may be given several times.",
-            metavar="LEFT,RIGHT,BOTTOM,TOP|X/Y,X/Y,X/Y",
-        ),
-    ] = None,
+    region: Regions = None,
     pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
     plane: Annotated[str, typer.Option("--plane", help="view or xy.")] = "view",
     method: Annotated[
@@ -196,7 +189,7 @@ def luminance(
     """Luminance maps with a standard error per pixel, from rays, a light field, a scene or a trace, for many observers."""
     one_of(method, METHOD_NAMES, "--method")
     one_of(plane, PLANES, "--plane")
-    colours = one_of(scale, get_args(Scale), "--scale")
+    colours = one_of(scale, SCALES, "--scale")
     stated = {
         "acceptance": None if acceptance is None else _acceptance(acceptance),
         "observer_radius": observer_radius,

@@ -10,13 +10,13 @@ import numpy as np
 import typer
 
 from etendue.cli.luminance import print_map
-from etendue.cli.options import Json
+from etendue.cli.options import Json, Regions
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, say
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.intensity import detect_intensity_format, read_intensity
 from etendue.formats.maps import read_any_map
 from etendue.luminance.regions import AnyRegion, parse_region, region_statistics
-from etendue.plot.colour_scale import Scale, choose_scale, normalisation
+from etendue.plot.colour_scale import SCALES, Scale, choose_scale, normalisation
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import Show, plot_map
 from etendue.plot.style import FILE_TYPES
@@ -41,18 +41,11 @@ def plot(
     vmax: Annotated[float | None, typer.Option("--vmax", help="What their upper end means.")] = None,
     title: Annotated[str | None, typer.Option("--title", help="First line; quantity and source if not given.")] = None,
     show: Annotated[str, typer.Option("--show", help="value or relative-error.")] = "value",
-    region: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--region",
-            help="Part of the map in figures, outlined and numbered; may be given several times.",
-            metavar="LEFT,RIGHT,BOTTOM,TOP|X/Y,X/Y,X/Y",
-        ),
-    ] = None,
+    region: Regions = None,
     json: Json = False,
 ) -> None:
     """Draw maps, or intensity distributions, that are in files; say what regions of a map amount to."""
-    colours: Scale = "log" if log else one_of(scale, get_args(Scale), "--scale")
+    colours: Scale = "log" if log else one_of(scale, SCALES, "--scale")
     shown = one_of(show, get_args(Show), "--show")
     regions = [parse_region(text) for text in region or []]
     targets = [[_named(path, file) for path in output] for file in files]

@@ -30,6 +30,9 @@ from etendue.scatter.bsdf import Bsdf
 Array = npt.NDArray[np.float64]
 Method = Literal["trace", "quadrature"]
 
+STEP, BARE_STEP = 0.1, 0.05
+"""Between positions with a sample and without one, if nothing is said [°]."""
+
 SPAN = 9.0
 """To which angles on both sides a scan goes if nothing is said [°]: 181 positions in steps of 0.1°."""
 
@@ -137,7 +140,7 @@ class ScatterGoniometer:
         return self.bench.solid_angle
 
     def instrument_function(
-        self, step: float = 0.05, span: float | None = None, *, rays: int | None = None, seed: int = 1
+        self, step: float = BARE_STEP, span: float | None = None, *, rays: int | None = None, seed: int = 1
     ) -> GoniometerScan:
         """The bare beam, scanned: what the instrument shows of an infinitely sharp sample (S of section 5.3).
 
@@ -179,7 +182,7 @@ class ScatterGoniometer:
         self,
         bsdf: Bsdf,
         theta: float = 0.0,
-        step: float = 0.1,
+        step: float = STEP,
         rays: int = 10**6,
         seed: int = 1,
         *,
