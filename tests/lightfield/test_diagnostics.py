@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 
 import etendue as et
@@ -481,7 +482,15 @@ def test_the_picture_shows_what_was_found_and_repeats_its_bytes(name: str, tmp_p
             plot_characteristic(found, tmp_path / file)
         assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     unit = ("radiance [W/(m² sr)]", "flux [W]") if name == "cylinder" else ("luminance [cd/m²]", "flux [lm]")
-    assert [axes.get_ylabel() for axes in figure.axes] == [*unit, "relative error at a ray [%]"]
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert [re.sub("10[⁰¹²³⁴⁵⁶⁷⁸⁹]+ ", "", label) for label in labels] == [*unit, "relative error at a ray [%]"]
+    figure.canvas.draw()
+    for axes in figure.axes[:2]:
+        # Numbers at the ticks, times the power of ten beside the unit, are where the ticks are.
+        power = re.search("10([⁰¹²³⁴⁵⁶⁷⁸⁹]+) ", axes.get_ylabel())
+        factor = 10.0 ** int(power[1].translate(str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789"))) if power else 1.0
+        written = [factor * float(tick.get_text().replace("\u202f", "")) for tick in axes.get_yticklabels()]
+        np.testing.assert_allclose(written, axes.get_yticks(), rtol=1e-9, atol=1e-9 * factor)
     drawn = figure.axes[1].lines[0]
     assert (drawn.get_xdata()[-1], drawn.get_ydata()[-1]) == (found.curve.etendue[-1], found.curve.flux[-1])
     texts = [text.get_text() for text in figure.texts]
