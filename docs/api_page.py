@@ -33,7 +33,10 @@ GROUPS = {
         "revolved", "agreement", "Agreement", "NearFieldGoniophotometer", "NearFieldRun", "DirectionalScan",
         "read_directional_scan", "deconvolve_directions", "DirectionalDeconvolution", "bsdf_table",
     ),
-    "Intensity and spectra": ("intensity_distribution", "Intensity", "read_intensity", "write_intensity", "Spectrum"),
+    "Intensity and spectra": (
+        "intensity_distribution", "Intensity", "read_intensity", "write_intensity",
+        "data_sheet", "DataSheet", "beam_angle", "BeamAngle", "cut_off_angle", "zonal_flux", "Spectrum",
+    ),
     "Pictures": (
         "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",
         "plot_threshold_sweep", "plot_bsdf", "plot_deconvolution", "plot_directions", "plot_near_field", "draw_scene",

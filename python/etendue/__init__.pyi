@@ -57,6 +57,8 @@ from etendue.plot import (
     plot_near_field,
     plot_threshold_sweep,
 )
+from etendue.quantities.beam_angle import BeamAngle, beam_angle, cut_off_angle
+from etendue.quantities.data_sheet import DataSheet, data_sheet
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
@@ -64,6 +66,7 @@ from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.report import ChangedFileWarning, RayFileWarning
 from etendue.quantities.spectrum import Spectrum
+from etendue.quantities.zonal_flux import zonal_flux
 from etendue.scatter import models as bsdf
 from etendue.scatter.bsdf import Bsdf
 from etendue.scatter.files import read_bsdf, write_bsdf
@@ -81,12 +84,14 @@ __all__ = [
     "Agreement",
     "ArgumentError",
     "Baffle",
+    "BeamAngle",
     "Box",
     "Bsdf",
     "BsdfTable",
     "ChangedFileWarning",
     "Cone",
     "Cylinder",
+    "DataSheet",
     "Deconvolution",
     "Detector",
     "DirectionalDeconvolution",
@@ -135,6 +140,7 @@ __all__ = [
     "UnsupportedFormatError",
     "WaitingWarning",
     "agreement",
+    "beam_angle",
     "bsdf",
     "bsdf_table",
     "cache_content",
@@ -142,6 +148,8 @@ __all__ = [
     "combine_maps",
     "compare",
     "cross_section",
+    "cut_off_angle",
+    "data_sheet",
     "deconvolve",
     "deconvolve_directions",
     "denoise_map",
@@ -180,6 +188,7 @@ __all__ = [
     "write_bsdf",
     "write_intensity",
     "write_rays",
+    "zonal_flux",
 ]
 
 __version__: str

@@ -67,8 +67,8 @@ def test_a_name_brings_its_own_module_alone() -> None:
 AT_TERMINALS = {"annotated_doc", "numpy", "rich", "shellingham", "typer"}
 """Libraries behind the command line, with those that they bring."""
 
-FOR_HELP = {"markdown_it", "mdurl", "pygments"}
-"""What rich takes to write the list of verbs."""
+FOR_HELP = {"attr", "markdown_it", "mdurl", "pygments"}
+"""What rich takes to write the list of verbs; `attr` only where something else has installed it."""
 
 FOR_ARGUMENTS = {"annotated_types", "pydantic", "pydantic_core", "typing_extensions", "typing_inspection"}
 """What typer takes to read the arguments of any verb, if it is installed."""

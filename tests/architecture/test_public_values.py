@@ -75,6 +75,8 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "GriddedSource": lambda: et.GriddedSource.fit(rays(), et.Disk(radius=30), pixel=20, threshold=5),
     "IlluminanceMap": illuminance,
     "Intensity": lambda: et.intensity_distribution(rays()),
+    "BeamAngle": lambda: et.beam_angle(et.intensity_distribution(rays())),
+    "DataSheet": lambda: et.data_sheet(et.intensity_distribution(rays())),
     "LightField": lambda: make_field(SURFACES["dome"]),
     "LuminanceMap": make_map,
     "NearFieldGoniophotometer": lambda: et.NearFieldGoniophotometer((10, 15), exposures=3),

@@ -13,7 +13,7 @@ from etendue.instruments.near_field.camera import Camera
 from etendue.instruments.near_field.merging import Merging
 from etendue.instruments.near_field.positions import ArmPositions
 from etendue.instruments.near_field.starting_points import closest_surface, on_surface
-from etendue.quantities.intensity import hat_integrals
+from etendue.quantities.angle_table import hat_integrals
 from oracles.verdicts import LARGEST_Z, SIGNIFICANCE
 from scipy.stats import chi2
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import pytest
-from etendue.errors import UnknownNameError
+from etendue.errors import ArgumentError, UnknownNameError
 from etendue.plot.intensity_picture import INTENSITY_KINDS, plot_intensity
 from etendue.quantities.intensity import Intensity
 from matplotlib.figure import Figure
@@ -51,6 +51,35 @@ def test_the_plane_of_the_maximum_is_added_if_it_is_another() -> None:
     led = Intensity(np.arange(8) * 45.0, [0, 30, 90], values)
     assert list(curves(plot_intensity(led))) == ["C0 – C180", "C90 – C270", "C45 – C225 (maximum)"]
     assert len(curves(plot_intensity(lid("both")))) == 2
+
+
+@BOTH
+def test_a_picture_per_klm_is_that_of_the_lamps_flux(kind: str) -> None:
+    led = Intensity([0, 90, 180, 270], [0, 60, 90], [[10, 8, 0], [10, 2, 0], [10, 3, 0], [10, 4, 0]])
+    for flux, stated in ((4.0, {"lamp_flux": 4.0}), (led.flux, {})):
+        figure = plot_intensity(led.replace(luminaire=stated), kind=kind, per_klm=True)  # type: ignore[arg-type]
+        points = curves(figure)["C0 – C180"]
+        assert np.hypot(*points.T).max() == pytest.approx(1e3 / flux * 10) or kind == "cartesian"
+        assert points[:, 1].max() == pytest.approx(1e3 / flux * 10) or kind == "polar"
+        texts = [t.get_text() for t in [*figure.axes[0].texts, *figure.texts]] + [figure.axes[0].get_ylabel()]
+        assert any("cd/klm" in text for text in texts)
+        assert any(f"of the {'lamps' if stated else 'luminaire'}" in text for text in texts)
+    with pytest.raises(ArgumentError, match="W/sr cannot be drawn as cd/klm"):
+        plot_intensity(led.replace(flux_unit="W"), per_klm=True)
+
+
+def test_a_polar_picture_names_the_half_planes_and_marks_the_edges_of_the_beam() -> None:
+    led = Intensity([0, 90, 180, 270], [0, 60, 180], [[10, 8, 0], [10, 2, 0], [10, 3, 0], [10, 4, 0]])
+    figure = plot_intensity(led)
+    places = {text.get_text(): text.get_position()[0] for text in figure.axes[0].texts}
+    assert places["C0, C90"] > 0 > places["C180, C270"]
+    dotted = [line for line in figure.axes[0].lines if line.get_linestyle() not in {"-", "--", "-."}]
+    angles = [np.degrees(np.arctan2(line.get_xdata()[1], -line.get_ydata()[1])) for line in dotted]
+    found = [one for sheet in et.data_sheet(led).beam for one in (sheet.left, sheet.right)]
+    assert sorted(np.round(angles, 6)) == sorted(np.round(found, 6))
+    captions = " ".join(text.get_text() for text in figure.texts)
+    assert "beam angle (50 %)" in captions
+    assert "field angle (10 %)" in captions
 
 
 def test_a_dark_back_is_left_out() -> None:

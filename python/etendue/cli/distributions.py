@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 from etendue.cli.terminal import say
+from etendue.quantities.data_sheet import data_sheet
 from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
 from etendue.quantities.measured import measured, peak_line
 from etendue.quantities.spectrum import Spectrum
@@ -30,6 +31,7 @@ def describe_intensity(distribution: Intensity) -> dict[str, Any]:
         "planes": distribution.c.size,
         "gammas": distribution.gamma.size,
         "gamma_range": [float(distribution.gamma[0]), float(distribution.gamma[-1])],
+        "data_sheet": data_sheet(distribution).to_dict(),
         "luminaire": {name: _plain(fact) for name, fact in distribution.luminaire.items()},
         "notes": list(distribution.notes),
     }
@@ -49,6 +51,8 @@ def print_intensity(distribution: Intensity) -> None:
     flux = measured(distribution.flux, distribution.flux_error, distribution.flux_unit)
     say(f"  flux {flux}, symmetry {facts['symmetry']}")
     say(f"  {peak_line(distribution)}")
+    for line in data_sheet(distribution).lines():
+        say(f"  {line}")
     for name, value in distribution.luminaire.items():
         if isinstance(value, Spectrum):
             say(

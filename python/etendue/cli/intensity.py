@@ -66,6 +66,7 @@ def intensity(
     ] = 0.0,
     mirror: Annotated[bool, typer.Option("--mirror", help="C becomes -C (before --rotate).")] = False,
     kind: Annotated[str, typer.Option("--kind", help="Picture: polar or cartesian.")] = "polar",
+    per_klm: Annotated[bool, typer.Option("--per-klm", help="Picture in cd/klm, of the lamps where known.")] = False,
     json: Json = False,
 ) -> None:
     """Far-field intensity of rays, a light field, patches or an intensity file: in figures, as a file, as a picture."""
@@ -97,7 +98,7 @@ def intensity(
     losses = []
     for path in outputs:
         if path.suffix.lower() in PICTURE_EXTENSIONS:
-            plot_intensity(shown, path, "cartesian" if kind == "cartesian" else "polar")
+            plot_intensity(shown, path, "cartesian" if kind == "cartesian" else "polar", per_klm=per_klm)
         else:
             losses += [f"{path}: {note}" for note in write_intensity(path, result, rotate=rotate, mirror=mirror)]
     if json:

@@ -42,6 +42,7 @@ def plot(
     title: Annotated[str | None, typer.Option("--title", help="First line; quantity and source if not given.")] = None,
     show: Annotated[str, typer.Option("--show", help="value or relative-error.")] = "value",
     region: Regions = None,
+    per_klm: Annotated[bool, typer.Option("--per-klm", help="Intensity in cd/klm, of the lamps where known.")] = False,
     json: Json = False,
 ) -> None:
     """Draw maps, or intensity distributions, that are in files; say what regions of a map amount to."""
@@ -60,12 +61,14 @@ def plot(
         wrong = ", ".join(name for name, is_given in given.items() if is_given)
         if wrong:
             raise typer.BadParameter(f"{wrong}: for maps; an intensity distribution has no colours and no regions")
+    elif per_klm and len(maps) == len(found):
+        raise typer.BadParameter("--per-klm: for intensity distributions; a map is in cd/m²")
     if len(maps) > 1 and shown == "value":
         colours, vmin, vmax = _common(maps, colours, vmin, vmax)
     for one, paths in zip(found, targets, strict=True):
         for path in paths:
             if isinstance(one, Intensity):
-                plot_intensity(one, path, title=title)
+                plot_intensity(one, path, title=title, per_klm=per_klm)
             else:
                 plot_map(one, path, colours, vmin=vmin, vmax=vmax, title=title, show=shown, regions=regions)
     if json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,8 +11,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args, overload
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import UnknownNameError
+from etendue.errors import ArgumentError, UnknownNameError
 from etendue.plot import style
+from etendue.quantities.data_sheet import DataSheet, data_sheet
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.measured import measured, measured_peak
 
@@ -43,6 +45,10 @@ class _Curve(NamedTuple):
     gamma: Array  # [°] from -180 (the left half plane) to 180
     values: Array
     error: Array
+    edges: tuple[float, ...] = ()  # signed γ at which the beam ends [°]
+
+    def times(self, factor: float) -> _Curve:
+        return self._replace(values=self.values * factor, error=self.error * factor)
 
 
 @overload
@@ -51,6 +57,7 @@ def plot_intensity(
     path: str | os.PathLike[str] | None = None,
     kind: IntensityKind = "polar",
     *,
+    per_klm: bool = False,
     title: str | None = None,
     ax: None = None,
 ) -> Figure: ...
@@ -62,6 +69,7 @@ def plot_intensity(
     path: None = None,
     kind: IntensityKind = "polar",
     *,
+    per_klm: bool = False,
     title: str | None = None,
     ax: Axes,
 ) -> Axes: ...
@@ -72,6 +80,7 @@ def plot_intensity(
     path: str | os.PathLike[str] | None = None,
     kind: IntensityKind = "polar",
     *,
+    per_klm: bool = False,
     title: str | None = None,
     ax: Axes | None = None,
 ) -> Figure | Axes:
@@ -85,6 +94,8 @@ def plot_intensity(
         Where to write the picture, .png, .svg or .pdf. The same distribution gives the same bytes.
     kind : {"polar", "cartesian"}
         The diagram of a data sheet, γ = 0° pointing down; or intensity over γ.
+    per_klm : bool
+        Draw cd/klm: per 1 000 lm of the lamps where their flux is known, else of the luminaire.
     title : str, optional
         First line; "Luminous intensity" or "Radiant intensity" if not given.
     ax : matplotlib.axes.Axes, optional
@@ -98,7 +109,8 @@ def plot_intensity(
     Raises
     ------
     ArgumentError
-        If the directory of `path` does not exist, `path` and `ax` are both given, or `ax` is polar itself.
+        If the directory of `path` does not exist, `path` and `ax` are both given, `ax` is polar itself, or cd/klm are
+        asked of a distribution in W/sr or without flux.
     UnknownNameError
         If `kind` or the extension of `path` does not exist.
     MissingLibraryError
@@ -112,26 +124,36 @@ def plot_intensity(
     """
     if kind not in INTENSITY_KINDS:
         raise UnknownNameError("kind of diagram", kind, INTENSITY_KINDS)
+    sheet = data_sheet(intensity)
+    unit, factor = intensity.unit, 1.0
+    if per_klm:
+        if not math.isfinite(sheet.per_klm):
+            raise ArgumentError(f"{intensity.unit} cannot be drawn as cd/klm: that takes a luminous flux above 0.")
+        unit, factor = "cd/klm", sheet.per_klm
     reach = _reach(intensity)
-    curves = list(_curves(intensity, reach))
+    ends = {one.plane: (one.left, one.right) for one in sheet.beam if 0.0 < one.angle < 360.0}
+    curves = [
+        curve.times(factor)._replace(edges=ends.get(90.0 * number, ()) if number < len(sheet.beam) else ())
+        for number, curve in enumerate(_curves(intensity, reach))
+    ]
     draw, high = (_polar, (4.5 if reach > 90.0 else 2.55)) if kind == "polar" else (_cartesian, 3.0)
     heading = title if title is not None else intensity.quantity.capitalize()
     if ax is not None:
         style.given_axes(ax, 1, path)
-        draw(ax, curves, intensity, reach)
+        draw(ax, curves, (intensity.quantity, unit), reach)
         style.put_title(ax, heading)
         if kind == "polar":
             style.put_legend(ax, loc="upper center", bbox_to_anchor=(0.5, 0.0))
         else:
             style.put_legend(ax, loc="best")
         return ax
-    facts = style.wrapped(_facts(intensity), WIDTH - 0.6)
+    facts = style.wrapped(_facts(intensity, sheet, per_klm=per_klm), WIDTH - 0.6)
     below = 0.3 + 0.15 * len(facts)
     left, bottom = (0.3, below) if kind == "polar" else (0.85, below + 0.42)
     height = bottom + high + ABOVE[kind]
     figure = style.new_figure(WIDTH, height)
     axes = style.add_axes(figure, left, bottom, WIDTH - left - (0.3 if kind == "polar" else 0.25), high)
-    draw(axes, curves, intensity, reach)
+    draw(axes, curves, (intensity.quantity, unit), reach)
     style.add_text(figure, 0.3, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     for number, line in enumerate(reversed(facts)):
         style.add_text(figure, 0.3, 0.14 + 0.15 * number, line, size=style.CAPTION_SIZE, color=style.FAINT)
@@ -186,14 +208,14 @@ def _curve(intensity: Intensity, c: float, reach: float, label: str) -> _Curve:
     gamma = np.sort(np.append(gamma, end + 1e-6)) if end < reach else gamma
     # Between the nodes the error of the mean of two is at most the mean of their errors.
     uncertain = intensity.replace(values=np.nan_to_num(intensity.standard_error))
-    both = [
+    values, errors = (
         np.concatenate([function.at(c + 180.0, gamma[::-1]), function.at(c, gamma)])
         for function in (intensity, uncertain)
-    ]
-    return _Curve(label, np.concatenate([-gamma[::-1], gamma]), *both)
+    )
+    return _Curve(label, np.concatenate([-gamma[::-1], gamma]), values, errors)
 
 
-def _polar(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: float) -> None:
+def _polar(axes: Axes, curves: list[_Curve], names: tuple[str, str], reach: float) -> None:
     """Circles of equal intensity, spokes of equal γ, and the curves, on plain axes of equal scale."""
     top = max(float((curve.values + curve.error).max()) for curve in curves)
     circles = _circles(top)
@@ -211,7 +233,7 @@ def _polar(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: float)
             linewidth=0.8 if radius == rim else 0.4,
             zorder=1,
         )
-        label = style.plain(radius) + (f" {intensity.unit}" if radius == rim else "")
+        label = style.plain(radius) + (f" {names[1]}" if radius == rim else "")
         axes.text(
             radius, 0.015 * rim, label, size=style.TICK_SIZE - 0.5, color=style.FAINT, ha="center", va="bottom", zorder=4,
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6},
@@ -240,6 +262,19 @@ def _polar(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: float)
             curve.values * np.sin(angle), -curve.values * np.cos(angle),
             color=colour, linewidth=1.2, label=curve.label, zorder=3,
         )  # fmt: skip
+        for edge in np.radians([one for one in curve.edges if abs(one) <= reach]):
+            axes.plot(
+                [0, rim * np.sin(edge)], [0, -rim * np.cos(edge)],
+                color=colour, linewidth=0.7, linestyle=(0, (1, 2)), zorder=2,
+            )  # fmt: skip
+    # The half planes lie where the readers of data sheets look for them.
+    sides = [curve.label.split(" (")[0].split(" – ") for curve in curves if " – " in curve.label]
+    for side, which in ((-1, 1), (1, 0)):
+        if sides:
+            axes.text(
+                side * 1.14 * rim, -1.1 * rim, ", ".join(side_names[which] for side_names in sides),
+                size=style.TICK_SIZE, color=style.FAINT, ha="left" if side < 0 else "right", va="bottom",
+            )  # fmt: skip
 
 
 def _circles(top: float) -> Array:
@@ -252,7 +287,7 @@ def _circles(top: float) -> Array:
     return circles
 
 
-def _cartesian(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: float) -> None:
+def _cartesian(axes: Axes, curves: list[_Curve], names: tuple[str, str], reach: float) -> None:
     style.dress(axes)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
@@ -260,7 +295,7 @@ def _cartesian(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: fl
     axes.set_axisbelow(True)
     axes.set_xlim(-reach, reach)
     axes.set_xticks(np.arange(-reach, reach + 1, reach / 6.0))
-    low = min(0.0, float(intensity.values.min()))
+    low = min(0.0, *(float(curve.values.min()) for curve in curves))
     top = max(float((curve.values + curve.error).max()) for curve in curves)
     axes.set_ylim(low, top + 0.05 * (top - low) if top > low else low + 1.0)
     for number, curve in enumerate(curves):
@@ -269,10 +304,10 @@ def _cartesian(axes: Axes, curves: list[_Curve], intensity: Intensity, reach: fl
         axes.fill_between(curve.gamma, low_edge, high_edge, color=colour, alpha=0.22, linewidth=0.0)
         axes.plot(curve.gamma, curve.values, color=colour, linewidth=1.2, label=curve.label)
     axes.set_xlabel("γ [°], to the left in the plane C + 180°")
-    style.put_numbers(axes.yaxis, intensity.quantity, intensity.unit, *axes.get_ylim())
+    style.put_numbers(axes.yaxis, *names, *axes.get_ylim())
 
 
-def _facts(intensity: Intensity) -> Iterator[str]:
+def _facts(intensity: Intensity, sheet: DataSheet, *, per_klm: bool) -> Iterator[str]:
     """What the picture rests on, fact by fact."""
     unit = intensity.flux_unit
     flux = measured(intensity.flux, intensity.flux_error, unit)
@@ -286,6 +321,9 @@ def _facts(intensity: Intensity) -> Iterator[str]:
     if known.any():
         share = 100.0 * float(np.median(intensity.standard_error[known] / intensity.values[known]))
         yield f"median standard error {style.percent(share)}"
+    yield from sheet.lines()[:2]
+    if per_klm:
+        yield f"per 1\u202f000 lm of the {sheet.reference}"
     planes = "one plane" if intensity.c.size == 1 else f"{intensity.c.size} planes"
     yield f"{planes} × {intensity.gamma.size} angles"
     yield Path(intensity.provenance.source).name

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.angle_table import ROUNDING, gaps_of, hat_integrals, kinks_along, kinks_around
 from etendue.quantities.labelled import dataset
 from etendue.quantities.notebook import InNotebook
 from etendue.quantities.provenance import Provenance
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Symmetry = Literal["none", "C0-C180", "C90-C270", "both", "rotational"]
 SYMMETRIES: tuple[str, ...] = get_args(Symmetry)
-
-ROUNDING = 1e-9
-"""Degrees by which γ may lie outside the table and still belong to its edge: angles that were computed."""
 
 LUMINAIRE_FACTS: dict[str, str] = {
     "manufacturer": "name",
@@ -183,7 +181,7 @@ class Intensity(InNotebook):
         array, shape (m, n_gamma)
             [`unit`] at the nodes γ.
         """
-        first, second, share = self._between_planes(_finite("C", c))
+        first, second, share = self.between_planes(_finite("C", c))
         share = share[..., None]
         return (1.0 - share) * self.values[first] + share * self.values[second]
 
@@ -212,7 +210,7 @@ class Intensity(InNotebook):
         gamma = gamma.clip(self.gamma[0], self.gamma[-1])
         row = (np.searchsorted(self.gamma, gamma, side="right") - 1).clip(0, self.gamma.size - 2)
         up = (gamma - self.gamma[row]) / (self.gamma[row + 1] - self.gamma[row])
-        first, second, share = self._between_planes(c)
+        first, second, share = self.between_planes(c)
         low = (1.0 - share) * self.values[first, row] + share * self.values[second, row]
         high = (1.0 - share) * self.values[first, row + 1] + share * self.values[second, row + 1]
         return np.asarray(np.where(inside, (1.0 - up) * low + up * high, 0.0))
@@ -236,7 +234,7 @@ class Intensity(InNotebook):
         x, y, z = np.moveaxis(d, -1, 0)
         return self.at(np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(np.hypot(x, y), z)))
 
-    def _between_planes(self, c: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
+    def between_planes(self, c: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
         """The planes before and after each C, and how far it is on the way to the latter, 0 to 1."""
         turned = np.mod(c, 360.0)
         first = (np.searchsorted(self.c, turned, side="right") - 1) % self.c.size
@@ -303,16 +301,8 @@ class Intensity(InNotebook):
     @property
     def _kinks(self) -> npt.NDArray[np.bool_]:
         """Where the function is not linear across a node, in γ and, if there are other planes, in C."""
-        limit = ROUNDING * float(np.abs(self.values).max())
-        width = np.diff(self.gamma)
-        slope = np.diff(self.values, axis=1) / width
-        kinks = np.ones(self.values.shape, dtype=np.bool_)
-        kinks[:, 1:-1] = np.abs(np.diff(slope, axis=1)) * np.minimum(width[1:], width[:-1]) > limit
-        if self.c.size > 1:
-            gaps = gaps_of(self.c)[:, None]
-            rise = (np.roll(self.values, -1, axis=0) - self.values) / gaps
-            kinks &= np.abs(rise - np.roll(rise, 1, axis=0)) * np.minimum(gaps, np.roll(gaps, 1, axis=0)) > limit
-        return kinks
+        kinks = kinks_along(self.gamma, self.values)
+        return kinks & kinks_around(self.c, self.values) if self.c.size > 1 else kinks
 
     @property
     def peak(self) -> tuple[float, float]:
@@ -439,38 +429,6 @@ class Intensity(InNotebook):
             luminaire=luminaire,
             provenance=self.provenance.then(step),
         )
-
-
-def gaps_of(c: Array) -> Array:
-    """Degrees from each plane to the next one, around the circle.
-
-    Examples
-    --------
-    >>> gaps_of(np.array([0.0, 90.0, 270.0])).tolist()
-    [90.0, 180.0, 90.0]
-    """
-    return np.append(np.diff(c), 360.0 - (c[-1] - c[0]))
-
-
-def hat_integrals(gamma: Array) -> Array:
-    """∫ (hat function of the node) sin γ dγ for nodes γ [°], in closed form: with 2π, solid angles.
-
-    Examples
-    --------
-    >>> round(float(hat_integrals(np.array([0.0, 40.0, 180.0])).sum()), 12)
-    2.0
-    """
-    gamma = np.radians(gamma)
-    half, middle = np.diff(gamma) / 2.0, (gamma[1:] + gamma[:-1]) / 2.0
-    even = np.sin(middle) * np.sin(half)
-    # cos h − sin h / h, whose two terms are equal to rounding for the smallest steps: its series below 0.01.
-    square = half * half
-    slope = np.where(half < 0.01, -square / 3.0 * (1.0 - square / 10.0), np.cos(half) - np.sin(half) / half)
-    odd = np.cos(middle) * slope
-    weights = np.zeros(gamma.size)
-    weights[:-1] += even + odd
-    weights[1:] += even - odd
-    return weights
 
 
 def _finite(name: str, numbers: npt.ArrayLike) -> Array:

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
-from etendue.quantities.intensity import Intensity, gaps_of, hat_integrals
+from etendue.quantities.angle_table import gaps_of, hat_integrals
+from etendue.quantities.intensity import Intensity
 from etendue.quantities.provenance import Provenance
 from etendue.units import FluxUnit
 

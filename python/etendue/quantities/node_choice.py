@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.intensity import gaps_of, hat_integrals
+from etendue.quantities.angle_table import gaps_of, hat_integrals
 from etendue.quantities.intensity_nodes import Nodes, check_steps, planes_of
 
 Array = npt.NDArray[np.float64]

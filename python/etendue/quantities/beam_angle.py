@@ -1,0 +1,297 @@
+"""Beam angle, field angle and cut-off of an intensity distribution."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.angle_table import gaps_of, kinks_along, kinks_around
+from etendue.quantities.intensity import Intensity
+from etendue.quantities.intensity_nodes import NEIGHBOURS
+from etendue.quantities.node_errors import covariance_around, known_errors
+
+Array = npt.NDArray[np.float64]
+Reference = Literal["maximum", "centre"]
+REFERENCES: tuple[str, ...] = get_args(Reference)
+
+BEAM, FIELD = 0.5, 0.1
+"""Shares of the reference intensity at which beam angle and field angle end."""
+
+CUT_OFF = 0.01
+"""Share of the maximum above which light counts as not cut off."""
+
+SURE = 3.0
+"""Standard errors by which a value must be above a limit to be certainly above it."""
+
+DRAWS = 256
+"""Tables drawn with the stated errors, whose edges show how sure an edge is."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BeamAngle:
+    """How wide the light is in one plane through the axis; see `beam_angle`.
+
+    Parameters
+    ----------
+    plane : float
+        C of the half plane on the right [°], 0 to 180; C + 180° is on the left.
+    share : float
+        Of the reference intensity, at which the beam ends.
+    angle : float
+        From edge to edge [°]; NaN if no direction of the plane reaches the share.
+    standard_error : float
+        [°]; NaN where no error of the intensity is known.
+    left, right : float
+        γ of the edges [°]; negative in the half plane C + 180°.
+
+    Examples
+    --------
+    >>> beam_angle(Intensity(c=[0], gamma=[0, 30, 60], values=[[100.0, 50, 0]])).right
+    30.0
+    """
+
+    plane: float
+    share: float
+    angle: float
+    standard_error: float
+    left: float
+    right: float
+
+    def __str__(self) -> str:
+        """The angle with its error, or that there is none.
+
+        Examples
+        --------
+        >>> str(BeamAngle(plane=0, share=0.5, angle=24.318, standard_error=0.21, left=-12.1, right=12.2))
+        '24.32° ± 0.21°'
+        """
+        if math.isnan(self.angle):
+            return "none"
+        if not self.standard_error > 0.0:
+            return f"{self.angle:.4g}°"
+        places = max(0, 1 - math.floor(math.log10(self.standard_error)))
+        return f"{self.angle:.{places}f}° ± {self.standard_error:.{places}f}°"
+
+
+def beam_angle(
+    intensity: Intensity, c: float = 0.0, share: float = BEAM, reference: Reference = "maximum"
+) -> BeamAngle:
+    """The angle that holds all directions of a plane whose intensity is above a share of the largest.
+
+    With a share of 50 % it is the beam angle, with 10 % the field angle. It is measured from edge to edge, so that a
+    distribution with a dark middle has the angle of its outer edges.
+
+    In noise, an edge is where the outermost value stands that is above the limit by three standard errors, plus the angle
+    beyond it that is above the limit: there, noise lifts as much light over the limit as it pushes below.
+
+    Parameters
+    ----------
+    intensity : Intensity
+        The distribution.
+    c : float
+        The plane, C and C + 180° [°].
+    share : float
+        Of the reference, above 0 and below 1.
+    reference : {"maximum", "centre"}
+        The largest intensity of all directions (`Intensity.peak_intensity`), or that on the axis, γ = 0, as IEC TR 61341
+        has it for reflector lamps [IEC2010]_.
+
+    Returns
+    -------
+    BeamAngle
+        The standard error is that of edges of tables drawn with the stated errors of the nodes, and of the reference; where
+        nodes err together (`Intensity.smooth`), that of both half planes being off by their errors.
+
+    Raises
+    ------
+    ArgumentError
+        If the share is not between 0 and 1, or the plane is not finite.
+    UnknownNameError
+        If there is no such reference.
+
+    Examples
+    --------
+    A Lambertian emitter falls to a half at 60°, and to a tenth at 84.3°:
+
+    >>> import numpy as np
+    >>> gamma = np.arange(91.0)
+    >>> lambertian = Intensity(c=[0], gamma=gamma, values=[np.cos(np.radians(gamma))])
+    >>> round(beam_angle(lambertian).angle, 2), round(beam_angle(lambertian, share=0.1).angle, 1)
+    (120.0, 168.5)
+    """
+    if not 0.0 < share < 1.0:
+        raise ArgumentError(f"beam_angle: share is {share:g}; give a share of the intensity above 0 and below 1.")
+    if reference not in REFERENCES:
+        raise UnknownNameError("reference of a beam angle", reference, REFERENCES)
+    if not math.isfinite(c):
+        raise ArgumentError(f"beam_angle: the plane is C = {c}; give an angle in degrees.")
+    if reference == "maximum":
+        top, top_error = intensity.peak_intensity, intensity.peak_error
+    else:
+        top = float(intensity.planes([c])[0, 0]) if intensity.gamma[0] == 0.0 else 0.0
+        top_error = float(_plane_errors(intensity, [c])[0, 0])
+    plane = float(np.mod(c, 360.0))
+    plane -= 180.0 if plane >= 180.0 else 0.0
+    curve = _signed(intensity, plane)
+    left, right = (
+        float(edge[0]) for edge in _edges(curve.gamma, curve.values[None], curve.errors, np.array([share * top]))
+    )
+    error = _angle_error(curve, share * top, share * top_error, together=intensity.smooth)
+    return BeamAngle(plane, share, right - left, error, left, right)
+
+
+def cut_off_angle(intensity: Intensity, share: float = CUT_OFF) -> float:
+    """The angle γ from which on no plane sends more than a share of the largest intensity [°].
+
+    Parameters
+    ----------
+    intensity : Intensity
+        The distribution.
+    share : float
+        Of the largest intensity (`Intensity.peak_intensity`), above 0 and below 1.
+
+    Returns
+    -------
+    float
+        180 if the light goes all around.
+
+    Raises
+    ------
+    ArgumentError
+        If the share is not between 0 and 1.
+
+    Examples
+    --------
+    >>> shielded = Intensity(c=[0], gamma=[0, 60, 61, 180], values=[[500.0, 400, 0, 0]])
+    >>> round(cut_off_angle(shielded), 2)
+    60.99
+    """
+    if not 0.0 < share < 1.0:
+        raise ArgumentError(f"cut_off_angle: share is {share:g}; give a share of the intensity above 0 and below 1.")
+    dark = [] if intensity.gamma[-1] == 180.0 else [0.0]
+    gamma = np.append(intensity.gamma, intensity.gamma[-1:] if dark else [])
+    edge = np.zeros((intensity.c.size, len(dark)))
+    values, errors = np.hstack([intensity.values, edge]), np.hstack([intensity.standard_error, edge])
+    # Between two planes the function lies between theirs, and so does its last edge.
+    _, last = _edges(gamma, values, errors, np.full(intensity.c.size, share * intensity.peak_intensity))
+    return float(np.nanmax(last, initial=0.0))
+
+
+# --- edges -------------------------------------------------------------------------------------------------------------
+
+
+class _Curve(NamedTuple):
+    """A plane: γ from −180° (half plane C + 180°) to 180°; at an angle that stands there twice the values jump."""
+
+    gamma: Array
+    values: Array
+    errors: Array
+    alike: tuple[Array, Array]  # γ ≥ 0, and the correlation of the errors of both half planes there
+
+
+def _signed(intensity: Intensity, plane: float) -> _Curve:
+    both = [plane, plane + 180.0]
+    gamma, (right, left) = intensity.gamma, intensity.planes(both)
+    right_error, left_error = _plane_errors(intensity, both)
+    # Beside the table there is no light.
+    dark = (int(gamma[0] > 0.0), int(gamma[-1] < 180.0))
+    angles = np.pad(gamma, dark, mode="edge")
+    return _Curve(
+        np.concatenate([-angles[::-1], angles]),
+        np.concatenate([np.pad(left, dark)[::-1], np.pad(right, dark)]),
+        np.concatenate([np.pad(left_error, dark)[::-1], np.pad(right_error, dark)]),
+        _alike(intensity, plane),
+    )
+
+
+def _plane_errors(intensity: Intensity, c: Sequence[float]) -> Array:
+    """Standard errors of the half planes, which need not be nodes: those of the two beside them are independent."""
+    first, second, share = intensity.between_planes(np.asarray(c, dtype=np.float64))
+    share = share[:, None]
+    known = known_errors(intensity)
+    return np.hypot((1.0 - share) * known[first], share * known[second])
+
+
+def _edges(gamma: Array, values: Array, errors: Array, limits: Array) -> tuple[Array, Array]:
+    """Where tables of one plane rise above their limits and where they fall below them, shape (tables,); NaN if never."""
+    above = values - limits[:, None]
+    first, second = above[:, :-1], above[:, 1:]
+    # Of each step, the share of it in which the straight line is above the limit.
+    crossing = np.maximum(first, second) / np.maximum(np.abs(first) + np.abs(second), 1e-300)
+    share = np.where((first >= 0.0) & (second >= 0.0), 1.0, np.where((first < 0.0) & (second < 0.0), 0.0, crossing))
+    length = share * np.diff(gamma)
+    sure = above >= SURE * np.nan_to_num(errors)
+    highest = values.argmax(axis=1)
+    rows = np.arange(len(values))
+    sure[rows, highest] = True
+    innermost_left = sure.argmax(axis=1)
+    innermost_right = values.shape[1] - 1 - sure[:, ::-1].argmax(axis=1)
+    sums = np.concatenate([np.zeros((len(values), 1)), np.cumsum(length, axis=1)], axis=1)
+    left = gamma[innermost_left] - sums[rows, innermost_left]
+    right = gamma[innermost_right] + sums[:, -1] - sums[rows, innermost_right]
+    none = (above[rows, highest] < 0.0) | (limits <= 0.0)
+    return np.where(none, np.nan, left), np.where(none, np.nan, right)
+
+
+def _angle_error(curve: _Curve, limit: float, limit_error: float, *, together: bool) -> float:
+    """Standard error of the angle between the edges [°]."""
+    if np.isnan(curve.errors).any():
+        return math.nan
+    off = limit_error if math.isfinite(limit_error) else 0.0
+    if together:
+        shifts = [
+            curve.errors * (curve.gamma < 0.0),
+            curve.errors * (curve.gamma >= 0.0),
+            np.full_like(curve.errors, off),
+        ]
+        widths = [_widths(curve, np.stack([-shift, shift]), np.full(2, limit)) for shift in shifts]
+        return math.hypot(*(float(width[1] - width[0]) / 2.0 for width in widths))
+    draw = np.random.Generator(np.random.Philox(key=1))
+    nodes = kinks_along(curve.gamma, curve.values[None])[0]
+    gamma, errors = curve.gamma[nodes], curve.errors[nodes]
+    # Neighbouring nodes share rays: their errors have the correlation ab / (a² + b²) = ¼.
+    turn = math.asin(2.0 * NEIGHBOURS) / 2.0
+    white = draw.standard_normal((2, DRAWS, gamma.size + 1))
+    right, other = math.cos(turn) * white[..., 1:] + math.sin(turn) * white[..., :-1]
+    # What both half planes have in common stands at the same |γ|; the first draw is that of the right one.
+    mirror = np.stack([np.interp(-gamma, gamma, row) for row in right])
+    alike = np.where(gamma < 0.0, np.interp(-gamma, *curve.alike), 0.0)
+    noise = errors * (alike * mirror + np.sqrt(1.0 - alike**2) * np.where(gamma < 0.0, other, right))
+    drawn = _widths(
+        curve._replace(gamma=gamma, values=curve.values[nodes], errors=errors),
+        noise,
+        limit + off * draw.standard_normal(DRAWS),
+    )
+    known = np.isfinite(drawn)
+    return float(drawn[known].std(ddof=1)) if known.sum() > 1 else math.nan
+
+
+def _alike(intensity: Intensity, plane: float) -> tuple[Array, Array]:
+    """Correlation of the errors of both half planes over γ: rows of few nodes around the axis have rays in common."""
+    rows = np.ones(intensity.gamma.size)
+    for row, around in enumerate(kinks_around(intensity.c, intensity.values).T):
+        rows[row] = _alike_around(intensity.c[around], plane) if around.sum() > 1 else 1.0
+    return intensity.gamma, rows
+
+
+def _alike_around(c: Array, plane: float) -> float:
+    """Correlation of values at C and C + 180° that are interpolated between nodes around the axis."""
+    weights = np.zeros((2, c.size))
+    for number, at in enumerate((plane, plane + 180.0)):
+        first = (np.searchsorted(c, at % 360.0, side="right") - 1) % c.size
+        share = np.mod(at - c[first], 360.0) / gaps_of(c)[first]
+        weights[number, first] += 1.0 - share
+        weights[number, (first + 1) % c.size] += share
+    found = weights @ covariance_around(c.size) @ weights.T
+    return float(found[0, 1] / math.sqrt(found[0, 0] * found[1, 1]))
+
+
+def _widths(curve: _Curve, noise: Array, limits: Array) -> Array:
+    left, right = _edges(curve.gamma, curve.values + noise, curve.errors, limits)
+    return right - left
