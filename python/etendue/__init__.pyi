@@ -55,6 +55,7 @@ from etendue.plot import (
     plot_intensity,
     plot_map,
     plot_near_field,
+    plot_sweep,
     plot_threshold_sweep,
 )
 from etendue.quantities.illuminance_map import IlluminanceMap
@@ -73,6 +74,8 @@ from etendue.scatter.table import BsdfTable
 from etendue.scene import Scene
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.sources.ring_source import RingSource
+from etendue.sweeps.running import sweep, sweep_steps
+from etendue.sweeps.table import SweepTable
 from etendue.tracing import TraceResult, TraceWork, trace, trace_rounds, trace_work
 from etendue.tracing.ledger import TraceWarning
 from etendue.viewer.notebook import view
@@ -127,6 +130,7 @@ __all__ = [
     "Screen",
     "Spectrum",
     "Sphere",
+    "SweepTable",
     "TraceResult",
     "TraceWarning",
     "TraceWork",
@@ -160,6 +164,7 @@ __all__ = [
     "plot_intensity",
     "plot_map",
     "plot_near_field",
+    "plot_sweep",
     "plot_threshold_sweep",
     "read_bsdf",
     "read_directional_scan",
@@ -172,6 +177,8 @@ __all__ = [
     "region_statistics",
     "revolved",
     "scene",
+    "sweep",
+    "sweep_steps",
     "threshold_sweep",
     "trace",
     "trace_rounds",

@@ -12,6 +12,7 @@ from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
 from etendue.plot.near_field_picture import plot_near_field
 from etendue.plot.scene_picture import draw_scene
+from etendue.plot.sweep_picture import plot_sweep
 from etendue.plot.threshold_picture import plot_threshold_sweep
 
 __all__ = [
@@ -25,5 +26,6 @@ __all__ = [
     "plot_intensity",
     "plot_map",
     "plot_near_field",
+    "plot_sweep",
     "plot_threshold_sweep",
 ]
