@@ -12,6 +12,14 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.plot import style
 from etendue.sweeps.table import SweepTable
+from etendue.units import (
+    ILLUMINANCE_NAME,
+    ILLUMINANCE_UNIT,
+    INTENSITY_NAME,
+    INTENSITY_UNIT,
+    LUMINANCE_NAME,
+    LUMINANCE_UNIT,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +27,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-WIDTH, LEFT, RIGHT = 6.0, 0.85, 0.25
+WIDTH, LEFT, RIGHT = 6.0, 0.95, 0.25
 PANEL, GAP, LEGEND = 2.0, 0.62, 0.19
 """Of the figure, its diagrams and a line of a legend [inches]."""
 
@@ -28,6 +36,15 @@ MOST_PANELS, MOST_LINES = 12, 12
 
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 """After the colours are used up, lines are dashed."""
+
+QUANTITIES: dict[str, str] = {"lm": "flux", "W": "flux"}
+for _units, _names in (
+    (LUMINANCE_UNIT, LUMINANCE_NAME),
+    (ILLUMINANCE_UNIT, ILLUMINANCE_NAME),
+    (INTENSITY_UNIT, INTENSITY_NAME),
+):
+    QUANTITIES |= {_units[flux_unit]: _names[flux_unit] for flux_unit in _units}
+"""What several measures in one unit have in common."""
 
 FEW = 40
 """Steps up to which each has a dot."""
@@ -110,6 +127,9 @@ def plot_sweep(
         return axes
     facts = style.wrapped(_facts(table), WIDTH - 0.6)
     legends = [_legend_rows(table, panel) for panel in panels]
+    if len(table.parameters) > 1:
+        # The lines are the same in all diagrams.
+        legends[1:] = [0] * (len(legends) - 1)
     below = 0.3 + 0.15 * len(facts) + 0.42
     height = below + len(panels) * PANEL + (len(panels) - 1) * GAP * 0.4 + LEGEND * sum(legends) + 0.75
     figure = style.new_figure(WIDTH, height)
@@ -198,7 +218,7 @@ def _draw(axes: Axes, table: SweepTable, panel: _Panel, *, last: bool) -> None:
     axes.yaxis.set_major_locator(style.locator_for(high))
     axes.grid(visible=True, color=style.RULE, linewidth=0.4)
     axes.set_axisbelow(True)
-    what = panel.measures[0] if len(panel.measures) == 1 else ""
+    what = panel.measures[0] if len(panel.measures) == 1 else QUANTITIES.get(panel.unit, "")
     _name(axes.yaxis, what, panel.unit, *axes.get_ylim())
     _name(axes.xaxis, over, table.unit(over), *axes.get_xlim())
     if not last:
@@ -207,7 +227,7 @@ def _draw(axes: Axes, table: SweepTable, panel: _Panel, *, last: bool) -> None:
 
 
 def _begin_at_zero(axes: Axes) -> None:
-    """Let an axis begin at 0 where its values nearly do; where they differ by little, the difference is what is looked at."""
+    """Let an axis begin at 0 unless its values differ by little: then the difference is what is looked at."""
     low, high = axes.get_ylim()
     if 0.0 < low < 0.5 * high or (
         low < 0.0 <= min(np.nanmin(np.asarray(line.get_ydata())) for line in axes.get_lines())
@@ -227,7 +247,7 @@ def _name(axis: Any, name: str, unit: str, low: float, high: float) -> None:
 
 def _legend_columns(table: SweepTable, panel: _Panel) -> int:
     longest = max(len(name) for name, _, _ in _curves(table, panel))
-    return int(max(1, min(4, (WIDTH - LEFT - RIGHT) * 13.0 // (longest + 7))))
+    return int(max(1, min(4, (WIDTH - LEFT - RIGHT) * 16.0 // (longest + 6))))
 
 
 def _legend_rows(table: SweepTable, panel: _Panel) -> int:

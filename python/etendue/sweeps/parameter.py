@@ -66,6 +66,7 @@ class Parameter:
         Parameters
         ----------
         scene : Scene
+            Where it is looked for.
         path : str
             ``lens.at.2`` begins with the name of a source, solid, surface, detector, observer, medium or finish;
             ``solids.lens.at.2`` and ``solids.0.at.2`` with its family; what is left is ``wavelength``. Numbers in rows

@@ -25,8 +25,8 @@ from etendue.sweeps.table import SweepTable
 from etendue.tracing.result import TraceResult
 from etendue.tracing.running import trace_rounds
 
-RAYS, LINES = 1_000_000, 64
-"""Rays of a trace, and lines of sight per pixel of a map, at each step."""
+RAYS, LINES, PIXELS = 1_000_000, 64, (128, 128)
+"""Rays of a trace, lines of sight per pixel of a map, and pixels of a screen that is framed, at each step."""
 
 Values = Sequence[float] | np.ndarray
 
@@ -36,7 +36,7 @@ def sweep(
     parameters: Mapping[str, Values],
     measure: str | Sequence[str],
     observer: Observer | Sequence[Observer] | None = None,
-    screen: Screen | None = None,
+    screen: Screen | tuple[int, int] | None = None,
     *,
     region: AnyRegion | None = None,
     rays: float = RAYS,
@@ -67,8 +67,9 @@ def sweep(
         ``minimum``, ``uniformity``, ``mean:desk``; towards an observer ``intensity``.
     observer : Observer or sequence of Observer, optional
         Who looks; the observers of the scene if None, whose numbers can be parameters too.
-    screen : Screen, optional
-        Of `observer`. None: one of 128 × 128 pixels, the same at all steps, on which the scene is seen whole at each.
+    screen : Screen or (columns, rows), optional
+        Of `observer`. Columns and rows alone, 128 × 128 if None: a screen about the target, the same at all steps, on which
+        the scene is seen whole at each.
     region : Region or PolygonRegion, optional
         The part of observers' maps that mean, extremes and uniformity are of.
     rays : int
@@ -103,7 +104,7 @@ def sweep(
     --------
     >>> import etendue as et
     >>> lamp = {"name": "lamp", "kind": "point", "flux": 100}
-    >>> wall = {"name": "wall", "shape": {"kind": "sphere", "radius": 10}, "finish": {"kind": "lambertian", "reflectance": 0}}
+    >>> wall = {"name": "wall", "shape": {"kind": "sphere", "radius": 10}, "finish": "absorber"}
     >>> hall = et.Scene(sources=[lamp], surfaces=[wall])
     >>> table = et.sweep(hall, {"lamp.flux": [50, 100, 200]}, "absorbed:wall", rays=1000)
     >>> table["absorbed:wall"].round(9).tolist(), table.unit("lamp.flux")
@@ -135,7 +136,7 @@ def sweep_steps(
     parameters: Mapping[str, Values],
     measure: str | Sequence[str],
     observer: Observer | Sequence[Observer] | None = None,
-    screen: Screen | None = None,
+    screen: Screen | tuple[int, int] | None = None,
     *,
     region: AnyRegion | None = None,
     rays: float = RAYS,
@@ -241,9 +242,8 @@ class Steps(Iterator[SweepTable]):
         notes: list[str] = []
         seen = [m for m in self._measures if m.of in self._looked.names and m.reads in ("map", "observer")]
         if len(seen) < len(self._measures):
-            for result in trace_rounds(scene, self._rays, self._how.seed, threads=self._threads):
-                pass
-            notes += [] if result is None else result.notes
+            *_, result = trace_rounds(scene, self._rays, self._how.seed, threads=self._threads)
+            notes += result.notes
         maps = {}
         if seen:
             seeable, told = with_fields(scene, self._threads, cache=self._cache, fits=self._fits)
@@ -316,7 +316,9 @@ NUMBER = re.compile(r"\d[\d.,]*(?:e[+-]?\d+)?")
 class _Looking:
     """Who looks at the scenes of a sweep: stated observers, the same at all steps, or those of each scene."""
 
-    def __init__(self, observer: Observer | Sequence[Observer] | None, screen: Screen | None, base: Scene) -> None:
+    def __init__(
+        self, observer: Observer | Sequence[Observer] | None, screen: Screen | tuple[int, int] | None, base: Scene
+    ) -> None:
         if observer is None and screen is not None:
             raise ArgumentError(
                 "screen: of which observer? Give one, or leave it out: those of the scene have their own."
@@ -331,11 +333,11 @@ class _Looking:
         """Choose the screens of stated observers: the largest that one of the scenes asks for."""
         if self._stated is None:
             return
-        if self._screen is not None:
+        if isinstance(self._screen, Screen):
             self._screens = dict.fromkeys(self._stated, self._screen)
             return
         observers = list(self._stated.values())
-        needed = [framed_screens(scene, observers) for scene in scenes]
+        needed = [framed_screens(scene, observers, *(self._screen or PIXELS)) for scene in scenes]
         for name, screens in zip(self._stated, zip(*needed, strict=True), strict=True):
             self._screens[name] = max(screens, key=lambda one: one.width * one.height)
 
