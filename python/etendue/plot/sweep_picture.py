@@ -130,7 +130,7 @@ def plot_sweep(
     if len(table.parameters) > 1:
         # The lines are the same in all diagrams.
         legends[1:] = [0] * (len(legends) - 1)
-    below = 0.3 + 0.15 * len(facts) + 0.42
+    below = 0.3 + 0.15 * len(facts) + 0.2
     height = below + len(panels) * PANEL + (len(panels) - 1) * GAP * 0.4 + LEGEND * sum(legends) + 0.75
     figure = style.new_figure(WIDTH, height)
     top = height - 0.62

@@ -27,7 +27,13 @@ Reads = Literal["ledger", "detector", "map", "observer"]
 
 
 class Found(NamedTuple):
-    """A number, its standard error (NaN where unknown) and its unit (empty if it has none)."""
+    """A number, its standard error (NaN where unknown) and its unit (empty if it has none).
+
+    Examples
+    --------
+    >>> Found(31.8, 0.2, "cd").unit
+    'cd'
+    """
 
     value: float
     error: float
@@ -47,6 +53,13 @@ class Step:
         Luminance maps by the name of the observer.
     region : Region, PolygonRegion or None
         What of these maps counts.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> scene = et.Scene(sources=[{"name": "lamp", "kind": "point", "flux": 5}])
+    >>> NOUNS["escaped"].read(Step(scene, et.trace(scene, rays=1000), {}), "").value
+    5.0
     """
 
     scene: Scene
@@ -79,6 +92,11 @@ class Noun:
         or the map of an observer.
     read : callable
         From a step and the name after the colon, which is empty for a whole ledger.
+
+    Examples
+    --------
+    >>> NOUNS["uniformity"].words
+    'minimum over mean'
     """
 
     name: str
@@ -202,6 +220,13 @@ def share_error(flux: float, result: TraceResult) -> float:
     That of a share of independent rays: √(p (1 − p)/n), n the number of equal rays that are as good as those of the sources
     (`TraceResult.effective_rays`). Rays are dealt to sources, and over sources, more evenly than by chance; so the error is
     at most this.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> result = et.trace(et.Scene(sources=[{"kind": "point", "flux": 50}]), rays=10_000)
+    >>> share_error(25.0, result)                         # 50 lm · √(0.5 · 0.5/10 000)
+    0.25
     """
     total = result.ledger.total.flux
     if not total > 0.0 or not result.effective_rays > 0.0:

@@ -193,7 +193,15 @@ def sweep_steps(
 
 
 class Steps(Iterator[SweepTable]):
-    """The steps of a sweep, each of which is computed when its table is asked for; see `sweep_steps`."""
+    """The steps of a sweep, each of which is computed when its table is asked for; see `sweep_steps`.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> lamp = et.Scene(sources=[{"name": "lamp", "kind": "point", "flux": 1}])
+    >>> [table.done for table in et.sweep_steps(lamp, {"lamp.flux": [1, 2]}, "escaped", rays=100)]
+    [1, 2]
+    """
 
     def __init__(
         self,
