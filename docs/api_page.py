@@ -37,6 +37,7 @@ GROUPS = {
     "Pictures": (
         "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",
         "plot_sweep", "plot_threshold_sweep", "plot_bsdf", "plot_deconvolution", "plot_directions", "plot_near_field",
+        "plot_animation",
         "draw_scene", "view",
     ),
     "Errors and warnings": tuple(name for name in et.__all__ if name.endswith(("Error", "Warning"))),

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import etendue as et
 import numpy as np
-from etendue.plot.animation_files import write_gif
+from etendue.plot.animation_files import Writing, write_gif
 from etendue.viewer.file_output import write_page
 from etendue.viewer.opening import exhibit_of
 
@@ -122,7 +122,7 @@ def show_moving(program: str) -> None:
             browser.wait("etendue.finished() && document.getElementById('reading').textContent !== '–'")
             browser.screenshot(Path(folder) / "frame.png")
             frames.append(np.asarray(Image.open(Path(folder) / "frame.png").convert("RGB")))
-    write_gif(frames, FIGURES / "viewer.gif", seconds=0.2)
+    write_gif(Writing(frames, [], "", 0.2), FIGURES / "viewer.gif")
 
 
 def main() -> None:

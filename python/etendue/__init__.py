@@ -69,6 +69,7 @@ PUBLIC = {
     "etendue.luminance.methods": ("Cone", "FromField", "PathTracing"),
     "etendue.plot": (
         "draw_scene",
+        "plot_animation",
         "plot_bsdf",
         "plot_characteristic",
         "plot_comparison",

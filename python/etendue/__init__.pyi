@@ -46,6 +46,7 @@ from etendue.luminance.methods import Cone, FromField, PathTracing
 from etendue.luminance.regions import PolygonRegion, RegionStatistics, region_statistics
 from etendue.plot import (
     draw_scene,
+    plot_animation,
     plot_bsdf,
     plot_characteristic,
     plot_comparison,
@@ -155,6 +156,7 @@ __all__ = [
     "intensity_distribution",
     "luminance_map",
     "parse_surface",
+    "plot_animation",
     "plot_bsdf",
     "plot_characteristic",
     "plot_comparison",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from etendue.plot.animation import plot_animation
 from etendue.plot.bsdf_picture import plot_bsdf
 from etendue.plot.characteristic_picture import plot_characteristic
 from etendue.plot.comparison_picture import plot_comparison
@@ -17,6 +18,7 @@ from etendue.plot.threshold_picture import plot_threshold_sweep
 
 __all__ = [
     "draw_scene",
+    "plot_animation",
     "plot_bsdf",
     "plot_characteristic",
     "plot_comparison",

@@ -225,7 +225,7 @@ def share_error(flux: float, result: TraceResult) -> float:
     --------
     >>> import etendue as et
     >>> result = et.trace(et.Scene(sources=[{"kind": "point", "flux": 50}]), rays=10_000)
-    >>> share_error(25.0, result)                         # 50 lm · √(0.5 · 0.5/10 000)
+    >>> round(share_error(25.0, result), 6)               # 50 lm · √(0.5 · 0.5/10 000)
     0.25
     """
     total = result.ledger.total.flux
