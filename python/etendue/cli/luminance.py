@@ -271,14 +271,21 @@ def luminance(
         return
     for line in (*complaints, *(f"note: {note}" for note in losses)):
         complain(line)
-    for lmap, paths in zip(maps, targets, strict=True):
-        print_map(lmap, regions, notes=orbit is None)
-        for path in paths:
-            say(f"  {path}")
-    for note in dict.fromkeys(note for lmap in maps for note in lmap.notes) if orbit is not None else ():
-        say(note)
+    _print_maps(maps, targets, regions, together=orbit is not None)
     for path in moving:
         say(str(path))
+
+
+def _print_maps(
+    maps: Sequence[LuminanceMap], targets: list[list[Path]], regions: list[AnyRegion], *, together: bool
+) -> None:
+    """Each map with its files and its notes, or the notes of all together, each once."""
+    for lmap, paths in zip(maps, targets, strict=True):
+        print_map(lmap, regions, notes=not together)
+        for path in paths:
+            say(f"  {path}")
+    for note in dict.fromkeys(note for lmap in maps for note in lmap.notes) if together else ():
+        say(note)
 
 
 def _detected(file: Path, detector: str | None) -> ScatterEvents | RaySet | None:

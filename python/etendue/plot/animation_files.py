@@ -10,7 +10,7 @@ import json
 import os
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -114,14 +114,11 @@ def write_gif(writing: Writing, path: str | os.PathLike[str]) -> None:
     b'GIF89a'
     """
     image = _pillow()
-    frames = writing.frames
-    if writing.palette is None:
-        some = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, LOOKED_AT).astype(int))]
-        palette = image.fromarray(np.concatenate(some)).quantize(COLOURS, method=image.Quantize.MAXCOVERAGE)
-    else:
-        palette = image.new("P", (1, 1))
-        palette.putpalette(np.concatenate([writing.palette] * COLOURS)[:COLOURS].tobytes())
-    indexed = [image.fromarray(frame).quantize(palette=palette, dither=image.Dither.NONE) for frame in frames]
+    palette = _chosen(writing.frames) if writing.palette is None else writing.palette
+    indexed = []
+    for numbers in _nearest(writing.frames, palette):
+        indexed.append(image.fromarray(numbers))
+        indexed[-1].putpalette(palette.tobytes())
     with atomic_output(path) as temporary:
         indexed[0].save(
             temporary,
@@ -133,6 +130,27 @@ def write_gif(writing: Writing, path: str | os.PathLike[str]) -> None:
             optimize=False,
             disposal=1,
         )
+
+
+def _chosen(frames: Sequence[Frame]) -> Frame:
+    """A palette for all frames, shape (n, 3), from some of them."""
+    image = _pillow()
+    some = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, LOOKED_AT).astype(int))]
+    chosen = image.fromarray(np.concatenate(some)).quantize(COLOURS, method=image.Quantize.MAXCOVERAGE)
+    return np.array(chosen.getpalette("RGB"), dtype=np.uint8).reshape(-1, 3)
+
+
+def _nearest(frames: Sequence[Frame], palette: Frame) -> Iterator[npt.NDArray[np.uint8]]:
+    """The number of the nearest colour of a palette at each pixel, shape (rows, columns); Pillow's own search is coarse."""
+    known: dict[int, int] = {}
+    weights = np.array([1 << 16, 1 << 8, 1])
+    for frame in frames:
+        codes, places = np.unique(frame.astype(np.int64) @ weights, return_inverse=True)
+        for code in set(codes.tolist()) - known.keys():
+            colour = np.array([code >> 16, code >> 8 & 255, code & 255])
+            known[code] = int(((palette.astype(np.int64) - colour) ** 2).sum(axis=1).argmin())
+        numbers = np.array([known[code] for code in codes.tolist()], dtype=np.uint8)
+        yield numbers[places.reshape(frame.shape[:2])]
 
 
 def write_mp4(writing: Writing, path: str | os.PathLike[str]) -> None:
