@@ -118,7 +118,7 @@ def show_moving(program: str) -> None:
         for number in range(FRAMES):
             turn = number / FRAMES
             theta = 35.0 + 20.0 * math.sin(2.0 * math.pi * turn)
-            browser.evaluate(f"etendue.setView({{theta: {theta:.1f}, phi: {360.0 * turn:.1f}}})")
+            browser.evaluate(f"etendue.setView({{theta: {theta:.1f}, phi: {360.0 * turn:.1f}, up: [0, 0, 1]}})")
             browser.wait("etendue.finished() && document.getElementById('reading').textContent !== '–'")
             browser.screenshot(Path(folder) / "frame.png")
             frames.append(np.asarray(Image.open(Path(folder) / "frame.png").convert("RGB")))

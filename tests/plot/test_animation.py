@@ -19,8 +19,6 @@ from etendue.plot.animation_files import Writing, write_gif, write_mp4, write_pa
 from etendue.plot.colour_scale import colour_map
 from PIL import Image
 
-pytestmark = pytest.mark.slow
-
 TOP = 3.0
 
 
@@ -64,6 +62,7 @@ def expected(lmap: et.LuminanceMap) -> np.ndarray[Any, Any]:
     return np.round(255 * seen[..., :3])
 
 
+@pytest.mark.slow
 def test_each_frame_of_a_gif_shows_its_map_on_the_scale_of_all(tmp_path: Path) -> None:
     maps = make_maps()
     et.plot_animation(maps, tmp_path / "a.gif", scale="linear", seconds=0.2)
@@ -102,6 +101,7 @@ def test_the_angle_is_named_in_each_frame(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert "φ = 120°" in (tmp_path / "a.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.gif", "a.html"])
 def test_the_same_maps_give_the_same_bytes(name: str, tmp_path: Path) -> None:
     for copy in ("one", "two"):
@@ -155,6 +155,7 @@ def test_a_page_holds_all_pictures_and_asks_for_nothing(tmp_path: Path) -> None:
     assert ["hidden" in image for image in page.images] == [False, True, True]
 
 
+@pytest.mark.slow
 def test_many_frames_stay_small(tmp_path: Path) -> None:
     """36 noisy maps of 128 × 128 pixels, the worst that a light field may give."""
     rng = np.random.default_rng(3)
@@ -173,6 +174,7 @@ def test_many_frames_stay_small(tmp_path: Path) -> None:
     assert (tmp_path / "a.gif").stat().st_size < 3e6
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="the program ffmpeg is not installed")
 def test_a_video_has_all_frames_and_the_same_bytes(tmp_path: Path) -> None:
     for name in ("a.mp4", "b.mp4"):
