@@ -160,6 +160,14 @@ def write_mp4(writing: Writing, path: str | os.PathLike[str]) -> None:
     ------
     ArgumentError
         If ffmpeg is not there or fails, with what it says; or the directory of `path` does not exist.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> frames = [np.full((16, 16, 3), level, np.uint8) for level in (0, 255)]
+    >>> with TemporaryDirectory() as folder:
+    ...     if shutil.which("ffmpeg"):
+    ...         write_mp4(Writing(frames, ["dark", "light"], "", 0.5), Path(folder) / "two.mp4")
     """
     writer_for(path)
     rows, columns, _ = writing.frames[0].shape
