@@ -58,7 +58,7 @@ class Step:
     --------
     >>> import etendue as et
     >>> scene = et.Scene(sources=[{"name": "lamp", "kind": "point", "flux": 5}])
-    >>> NOUNS["escaped"].read(Step(scene, et.trace(scene, rays=1000), {}), "").value
+    >>> round(NOUNS["escaped"].read(Step(scene, et.trace(scene, rays=1000), {}), "").value, 9)
     5.0
     """
 
@@ -172,6 +172,11 @@ def measures_of(names: Iterable[str], detectors: Iterable[str], observers: Itera
     ArgumentError
         If a name is needed and missing, given and not wanted, or that of a detector and of an observer; or no observer
         looks; or a measure is given twice.
+
+    Examples
+    --------
+    >>> [measure.label for measure in measures_of(["mean", "peak:far"], ["far"], ["front", "side"])]
+    ['mean:front', 'mean:side', 'peak:far']
     """
     seen, recorded = list(observers), list(detectors)
     found: list[Measure] = []
