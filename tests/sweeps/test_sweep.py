@@ -335,3 +335,10 @@ def test_mistakes_are_told(parameters: Any, measure: Any, message: str) -> None:
     with pytest.raises(et.EtendueError) as caught:
         et.sweep(scene, parameters, measure, rays=100)
     assert message.replace("\\", "") in str(caught.value)
+
+
+def test_the_page_tells_of_every_measure() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "how-to.md").read_text(encoding="utf-8")
+    section = page.partition("## See what a number of a scene does")[2].partition("\n## ")[0]
+    for noun in NOUNS:
+        assert f"`{noun}" in section, f"docs/how-to.md does not tell of {noun}"
