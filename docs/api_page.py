@@ -25,7 +25,7 @@ GROUPS = {
     ),
     "Scenes": (
         "scene", "Scene", "trace", "trace_rounds", "trace_work", "TraceWork", "TraceResult", "ScatterEvents",
-        "IlluminanceMap", "read_illuminance_map",
+        "IlluminanceMap", "read_illuminance_map", "sweep", "sweep_steps", "SweepTable",
     ),
     "Scatter": ("bsdf", "Bsdf", "BsdfTable", "Scans", "read_bsdf", "read_scans", "write_bsdf"),
     "Instruments": (
@@ -39,8 +39,9 @@ GROUPS = {
     ),
     "Pictures": (
         "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",
-        "plot_threshold_sweep", "plot_bsdf", "plot_deconvolution", "plot_directions", "plot_near_field", "draw_scene",
-        "view",
+        "plot_sweep", "plot_threshold_sweep", "plot_bsdf", "plot_deconvolution", "plot_directions", "plot_near_field",
+        "plot_animation",
+        "draw_scene", "view",
     ),
     "Errors and warnings": tuple(name for name in et.__all__ if name.endswith(("Error", "Warning"))),
 }  # fmt: skip

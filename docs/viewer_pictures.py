@@ -1,10 +1,14 @@
-"""Make the pictures of docs/viewer.md, in Chromium: a packaged LED, and a collimator cut open.
+"""Make the pictures of the viewer, in Chromium: a packaged LED, a collimator cut open, the LED turned.
 
-usage: python docs/viewer_pictures.py [led] [scene]
+usage: python docs/viewer_pictures.py [led] [scene] [moving]
+
+Chromium draws without a graphics processor here, some ten seconds for each picture in its full quality; the moving one has
+few and small frames for that reason.
 """
 
 from __future__ import annotations
 
+import math
 import shutil
 import sys
 import tempfile
@@ -12,12 +16,14 @@ from pathlib import Path
 
 import etendue as et
 import numpy as np
+from etendue.plot.animation_files import Writing, write_gif
 from etendue.viewer.file_output import write_page
 from etendue.viewer.opening import exhibit_of
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from oracles.browser import Browser, browsing
 from oracles.packaged_led import PackagedLed
+from PIL import Image
 
 FIGURES = Path(__file__).with_name("figures")
 RAYS = 3_000_000
@@ -99,12 +105,34 @@ def show_scene(browser: Browser) -> None:
     browser.screenshot(FIGURES / "viewer-scene.png")
 
 
+FRAMES, MOVING = 24, (800, 500)
+"""Frames of the moving picture, and pixels of its page."""
+
+
+def show_moving(program: str) -> None:
+    """Once around the LED, up and down on the way, the pointer on it."""
+    with browsing(program, width=MOVING[0], height=MOVING[1]) as browser, tempfile.TemporaryDirectory() as folder:
+        show(browser, led(), "led.h5", "etendue.setView({theta: 35, phi: 0, width: 3})")
+        browser.mouse("mouseMoved", x=236, y=222)
+        frames = []
+        for number in range(FRAMES):
+            turn = number / FRAMES
+            theta = 35.0 + 20.0 * math.sin(2.0 * math.pi * turn)
+            browser.evaluate(f"etendue.setView({{theta: {theta:.1f}, phi: {360.0 * turn:.1f}, up: [0, 0, 1]}})")
+            browser.wait("etendue.finished() && document.getElementById('reading').textContent !== '–'")
+            browser.screenshot(Path(folder) / "frame.png")
+            frames.append(np.asarray(Image.open(Path(folder) / "frame.png").convert("RGB")))
+    write_gif(Writing(frames, [], "", 0.2), FIGURES / "viewer.gif")
+
+
 def main() -> None:
-    """Make the pictures that are named, or both."""
+    """Make the pictures that are named, or all."""
     program = shutil.which("chromium")
     if program is None:
         sys.exit("no Chromium is installed")
-    wanted = sys.argv[1:] or ["led", "scene"]
+    wanted = sys.argv[1:] or ["led", "scene", "moving"]
+    if "moving" in wanted:
+        show_moving(program)
     with browsing(program, width=1280, height=800) as browser:
         if "led" in wanted:
             show_led(browser)

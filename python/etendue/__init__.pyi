@@ -46,6 +46,7 @@ from etendue.luminance.methods import Cone, FromField, PathTracing
 from etendue.luminance.regions import PolygonRegion, RegionStatistics, region_statistics
 from etendue.plot import (
     draw_scene,
+    plot_animation,
     plot_bsdf,
     plot_characteristic,
     plot_comparison,
@@ -55,6 +56,7 @@ from etendue.plot import (
     plot_intensity,
     plot_map,
     plot_near_field,
+    plot_sweep,
     plot_threshold_sweep,
 )
 from etendue.quantities.beam_angle import BeamAngle, beam_angle, cut_off_angle
@@ -76,6 +78,8 @@ from etendue.scatter.table import BsdfTable
 from etendue.scene import Scene
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.sources.ring_source import RingSource
+from etendue.sweeps.running import sweep, sweep_steps
+from etendue.sweeps.table import SweepTable
 from etendue.tracing import TraceResult, TraceWork, trace, trace_rounds, trace_work
 from etendue.tracing.ledger import TraceWarning
 from etendue.viewer.notebook import view
@@ -132,6 +136,7 @@ __all__ = [
     "Screen",
     "Spectrum",
     "Sphere",
+    "SweepTable",
     "TraceResult",
     "TraceWarning",
     "TraceWork",
@@ -159,6 +164,7 @@ __all__ = [
     "intensity_distribution",
     "luminance_map",
     "parse_surface",
+    "plot_animation",
     "plot_bsdf",
     "plot_characteristic",
     "plot_comparison",
@@ -168,6 +174,7 @@ __all__ = [
     "plot_intensity",
     "plot_map",
     "plot_near_field",
+    "plot_sweep",
     "plot_threshold_sweep",
     "read_bsdf",
     "read_directional_scan",
@@ -180,6 +187,8 @@ __all__ = [
     "region_statistics",
     "revolved",
     "scene",
+    "sweep",
+    "sweep_steps",
     "threshold_sweep",
     "trace",
     "trace_rounds",

@@ -25,7 +25,7 @@ class Extra(NamedTuple):
     Examples
     --------
     >>> EXTRAS["matplotlib"].name, EXTRAS["matplotlib"].endings
-    ('plot', ('.png', '.pdf'))
+    ('plot', ('.png', '.pdf', '.gif', '.mp4'))
     """
 
     name: str
@@ -34,7 +34,7 @@ class Extra(NamedTuple):
 
 
 EXTRAS: dict[str, Extra] = {
-    "matplotlib": Extra("plot", "pictures", (".png", ".pdf")),
+    "matplotlib": Extra("plot", "pictures", (".png", ".pdf", ".gif", ".mp4")),
     "cascadio": Extra("step", "STEP files"),
     "scipy": Extra("scans", "interpolations of scattered points and scans in two dimensions"),
     "xlrd": Extra("xls", "workbooks of goniometers"),

@@ -97,6 +97,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "ScatterEvents": lambda: result().events["scatter"],
     "Screen": lambda: et.Screen(2, 1, 8, 4),
     "Spectrum": lambda: et.Spectrum([450.0, 650.0], [1.0, 0.5]),
+    "SweepTable": lambda: et.sweep(scene(), {"paper.at.2": [20, 30]}, ["escaped", "absorbed:paper"], rays=1000),
     "TraceResult": result,
     "TraceWork": lambda: et.trace_work(scene(), rays=5000, seed=2),
 }

@@ -337,6 +337,14 @@ def plot(place: Path) -> Iterator[Case]:
     yield Case(("plot", place / "for-plot.npz", "-o", "out.png"), et.read_map(place / "for-plot.npz").notes)
 
 
+def sweep(place: Path) -> Iterator[Case]:
+    heights = {"upper.at.2": [8, 9]}
+    options = {"rays": 20_000, "rays_per_pixel": 16, "seed": 2}
+    table = et.sweep(place / "scene.toml", heights, ["escaped", "maximum"], OBSERVER, SCREEN, **options)
+    call = ("sweep", place / "scene.toml", "--set", "upper.at.2=8,9", "--measure", "escaped,maximum", *EYE)
+    yield Case((*call, "--rays", 20_000, "--rays-per-pixel", 16, "--seed", 2), table.notes)
+
+
 CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "demo": demo,
     "info": info,
@@ -348,6 +356,7 @@ CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "draw": draw,
     "plot": plot,
     "trace": trace,
+    "sweep": sweep,
     "view": view,
     "patches": patches,
     "filter": filter_,

@@ -107,6 +107,33 @@ def test_values_under_the_pointer_are_those_of_the_map(
     quiet(browser, path)
 
 
+@pytest.mark.slow
+def test_the_address_tells_what_is_upright_and_the_command_repeats_it(
+    browser: Browser, named_field: tuple[str, et.LightField], tmp_path: Path
+) -> None:
+    """The pixels are those of an observer with `up` and `roll`, and the command line that the page gives makes that map."""
+    name, field = named_field
+    path = tmp_path / "upright.html"
+    write_page(exhibit_of(field, name=name), path)
+    browser.requests.clear()
+    browser.complaints.clear()
+    browser.open(f"{path.as_uri()}#theta=70&phi=-40&up=0,0,1&roll=12")
+    view = browser.evaluate("({...etendue.state.view, height: etendue.state.view.height})")
+    command = browser.evaluate("document.getElementById('command').textContent")
+    assert "--observer=70,-40 " in command
+    assert " --up=0,0,1 --roll=12 " in command
+    observer = et.Observer(70, -40, view["distance"], tuple(view["target"]), up=(0, 0, 1), roll=12)
+    screen = et.Screen(view["width"], view["height"], view["columns"], view["rows"])
+    truth = et.luminance_map(field, observer, screen)
+    bound = exhibit_of(field, name=name).subject["field"]["bound"] + 1e-6
+    picks = np.random.default_rng(5).integers(0, screen.shape[::-1], (80, 2)).tolist()
+    found = np.array(browser.evaluate(f"{picks}.map(([c, r]) => etendue.reading(c, r).value)"))
+    exact = np.array([truth.values[r, c] for c, r in picks])
+    assert (exact > 0).sum() > 3
+    assert np.abs(found - exact).max() <= bound * exact.max()
+    assert np.abs(found[exact > 0] / exact[exact > 0] - 1).max() < bound
+
+
 @pytest.fixture(scope="module")
 def led() -> et.LightField:
     """A packaged LED with structure, glow and strays: 10⁵ rays."""

@@ -246,3 +246,46 @@ def test_views_are_observers_and_screens(modules: Path) -> None:
     assert np.dot(toward, before) == pytest.approx(np.cos(angle))
     assert np.dot(toward, right) == pytest.approx(np.sin(angle) * 7 / np.hypot(7, 4))
     assert np.dot(toward, up) == pytest.approx(-np.sin(angle) * 4 / np.hypot(7, 4))
+
+
+UPRIGHT = """
+import { View } from "./view.js";
+console.log(JSON.stringify(data.map((one) => {
+  const view = new View({ ...one, columns: 40, rows: 30 });
+  const turned = view.orbited(7, -4);
+  const axes = ({ right, up, toward }) => [right, up, toward];
+  return { axes: axes(view), turned: axes(turned), place: [turned.theta, turned.phi], kept: [turned.upright, turned.roll] };
+})));
+"""
+
+
+def test_what_is_upright_and_a_tilted_head_are_those_of_observers(modules: Path) -> None:
+    """Axes of the core with `up`, `roll` and both, at the side and behind; and both are kept when the source is turned."""
+    cases = [
+        {"theta": theta, "phi": phi, "up": up, "roll": roll}
+        for theta, phi in ((90, 0), (65, -130), (140, 25))
+        for up, roll in ((None, 33), ([0, 0, 2], 0), ([0.3, -1, 0.2], -20))
+    ]
+    shape = {"distance": 900, "target": [0.5, -2, 3], "width": 4}
+    found = run(modules, UPRIGHT, [{**case, **shape} for case in cases])
+    for case, one in zip(cases, found, strict=True):
+        screen, how = et.Screen(4, 3, 40, 30), {"up": case["up"], "roll": case["roll"]}
+        observer = et.Observer(case["theta"], case["phi"], 900, (0.5, -2, 3), **how)
+        np.testing.assert_allclose(one["axes"], screen.axes(observer), atol=1e-12)
+        turned = et.Observer(*one["place"], 900, (0.5, -2, 3), **how)
+        np.testing.assert_allclose(one["turned"], screen.axes(turned), atol=1e-12)
+        assert one["kept"] == [case["up"], case["roll"]]
+
+
+ALONG = """
+import { View } from "./view.js";
+const shape = { theta: 0, phi: 30, distance: 900, target: [0, 0, 0], width: 4, columns: 40, rows: 30 };
+const [plain, along] = [null, [0, 0, 1]].map((up) => new View({ ...shape, up }));
+console.log(JSON.stringify([plain.right, plain.up, along.right, along.up]));
+"""
+
+
+def test_along_up_a_view_has_the_axes_of_one_without(modules: Path) -> None:
+    """Where `Observer` refuses: in a page that is turned by hand, the picture must not vanish."""
+    right, up, right_along, up_along = run(modules, ALONG, {})
+    assert (right_along, up_along) == (right, up)

@@ -15,6 +15,7 @@ import typer
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.field import complaints_of, read_source, surface_option
 from etendue.cli.options import Flux, Json, Regions, Threads, Unit
+from etendue.cli.orbit import alike, around, moving_outputs
 from etendue.cli.terminal import (
     check_outputs,
     complain,
@@ -42,6 +43,7 @@ from etendue.luminance.methods import (
 )
 from etendue.luminance.opening import SCENE_EXTENSION
 from etendue.luminance.regions import AnyRegion, parse_region, region_statistics
+from etendue.plot.animation import plot_animation
 from etendue.plot.colour_scale import SCALES, Scale
 from etendue.plot.map_picture import plot_map
 from etendue.quantities.luminance_map import LuminanceMap
@@ -68,7 +70,10 @@ def luminance(
     output: Annotated[
         list[Path],
         typer.Option(
-            "-o", "--output", help="Map to write; several are allowed. {theta}, {phi} and {observer} are filled in."
+            "-o",
+            "--output",
+            help="Map to write, or with --orbit a moving picture; several are allowed. {theta}, {phi} and {observer} are "
+            "filled in.",
         ),
     ],
     observer: Annotated[
@@ -83,6 +88,16 @@ def luminance(
         str | None,
         typer.Option(
             "--size", help="Width and height of the screen in mm; framed to what is seen if not given.", metavar="W,H"
+        ),
+    ] = None,
+    orbit: Annotated[
+        int | None,
+        typer.Option(
+            "--orbit",
+            help="Go around: so many observers at the θ of --observer, φ from his on in even steps over 360°, +Z upright "
+            "unless --up says what is. For moving pictures (.gif, .mp4, .html), on one scale; or a file each with {phi}.",
+            metavar="NUMBER",
+            show_default=False,
         ),
     ] = None,
     distance: Annotated[float, typer.Option("--distance", help="From target to observer in mm.")] = 1000.0,
@@ -206,7 +221,7 @@ def luminance(
     regions = [parse_region(text) for text in region or []]
     looked = detected if isinstance(detected, ScatterEvents) else scene
     own = looked.scene if isinstance(looked, ScatterEvents) else scene
-    own_observers = own is not None and observer is None and size is None
+    own_observers = own is not None and observer is None and size is None and orbit is None
     if own is not None and own_observers:
         who = [(keys.name, keys.observer()) for keys in own.observers]
         if not who:
@@ -214,7 +229,10 @@ def luminance(
     else:
         upright = None if up is None else _three(up, "--up", "0,0,1")
         who = [("", Observer(theta, phi, distance, up=upright, roll=roll)) for theta, phi in _angles(observer)]
-    targets = _targets(output, who)
+    if orbit is not None:
+        who = [("", one) for one in around([one for _, one in who], orbit)]
+    moving, single = moving_outputs(output, orbit)
+    targets = _targets(single, who)
     if looked is None:
         source: Source = (
             in_unit(with_flux(detected, flux), unit) if isinstance(detected, RaySet) else read_source(file, flux, unit)
@@ -230,6 +248,7 @@ def luminance(
     else:
         framed = source if isinstance(source, RaySet | LightField) else own
         observers, screens = _views(framed, observers, target, size, pixels, plane)
+        screens = screens if orbit is None else alike(screens)
     with _progress(source, screens, how) as progress:
         maps = luminance_map(
             source,
@@ -242,17 +261,31 @@ def luminance(
         )
     written = zip(maps, targets, strict=True)
     losses = [note for lmap, paths in written for note in write_map(lmap, paths, colours, regions)]
+    for path in moving:
+        plot_animation(maps, path, colours)
     complaints = complaints_of(source) if isinstance(source, RaySet) else []
     if json:
         summaries = [summary(lmap, regions) | {"outputs": paths} for lmap, paths in zip(maps, targets, strict=True)]
-        print_json({"file": file, "maps": summaries, "complaints": complaints, "notes": losses})
+        found = {"file": file, "maps": summaries, "complaints": complaints, "notes": losses}
+        print_json(found | ({"moving": moving} if moving else {}))
         return
     for line in (*complaints, *(f"note: {note}" for note in losses)):
         complain(line)
+    _print_maps(maps, targets, regions, together=orbit is not None)
+    for path in moving:
+        say(str(path))
+
+
+def _print_maps(
+    maps: Sequence[LuminanceMap], targets: list[list[Path]], regions: list[AnyRegion], *, together: bool
+) -> None:
+    """Each map with its files and its notes, or the notes of all together, each once."""
     for lmap, paths in zip(maps, targets, strict=True):
-        print_map(lmap, regions)
+        print_map(lmap, regions, notes=not together)
         for path in paths:
             say(f"  {path}")
+    for note in dict.fromkeys(note for lmap in maps for note in lmap.notes) if together else ():
+        say(note)
 
 
 def _detected(file: Path, detector: str | None) -> ScatterEvents | RaySet | None:
@@ -421,8 +454,8 @@ def summary(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> dict[str, 
     }
 
 
-def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> None:
-    """A map in figures, for people."""
+def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = (), *, notes: bool = True) -> None:
+    """A map in figures, for people, with its notes or without."""
     facts = summary(lmap)
     where = lmap.observer
     say(f"{facts['quantity']} from θ = {where.theta:g}°, φ = {where.phi:g}°, {where.distance:g} mm")
@@ -443,5 +476,5 @@ def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> None:
             f"maximum {found.maximum:.4g}, minimum over mean {found.uniformity:.3g}"
             + (f"; {found.dead_pixels} of {found.pixels} pixels are dead and count as 0" if found.dead_pixels else "")
         )
-    for note in lmap.notes:
+    for note in lmap.notes if notes else ():
         say(f"  {note}")

@@ -26,6 +26,7 @@ VERBS = {
     "draw": "etendue.cli.draw:draw",
     "plot": "etendue.cli.plot:plot",
     "trace": "etendue.cli.trace:trace",
+    "sweep": "etendue.cli.sweep:sweep",
     "patches": "etendue.cli.patches:patches",
     "filter": "etendue.cli.filter_:filter_",
     "compare": "etendue.cli.compare:compare",

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.fit_cache import fit_or_recall
+from etendue.lightfield.light_field import LightField
 from etendue.luminance.caustics import Forward, LightImages, Plan, at_least_nearby, plan
 from etendue.luminance.gathering import CHECKS, FIRST_CHECK, blocks, comparison_note, survey_notes
 from etendue.luminance.methods import PathTracing
@@ -286,10 +287,17 @@ class _Spread:
         return self._squares / ((passes - 1) * passes)
 
 
-def with_fields(scene: Scene, threads: int | None = None, *, cache: bool = True) -> tuple[Scene, list[str]]:
+Fits = dict[tuple[object, ...], LightField]
+"""Light fields by the rays that they were fitted to."""
+
+
+def with_fields(
+    scene: Scene, threads: int | None = None, *, cache: bool = True, fits: Fits | None = None
+) -> tuple[Scene, list[str]]:
     """The scene with a light field in the place of each ray set, which has no luminance that could be seen; and notes.
 
-    The patches of gridded sources have one of their own.
+    The patches of gridded sources have one of their own. Fits that are handed over are used, and joined by those that are
+    made: a scene with the same rays elsewhere waits for none.
 
     Raises
     ------
@@ -302,7 +310,7 @@ def with_fields(scene: Scene, threads: int | None = None, *, cache: bool = True)
             sources.append(source.seen(scene.files) if isinstance(source, Gridded) else source)
             continue
         name = source.name or f"sources[{i}]"
-        field, surface, share = _fitted(source, scene, threads, cache=cache)
+        field, surface, share = _fitted(source, scene, threads, {} if fits is None else fits, cache=cache)
         sources.append(field)
         lost = f"; {share:.2%} of the flux does not come from it" if share > 1e-4 else ""
         notes.append(f"{name}: a light field on {surface} was fitted to its rays{lost}")
@@ -310,12 +318,16 @@ def with_fields(scene: Scene, threads: int | None = None, *, cache: bool = True)
     return scene.replace(sources=tuple(sources)), notes
 
 
-def _fitted(source: Rays, scene: Scene, threads: int | None, *, cache: bool) -> tuple[Field, str, float]:
+def _fitted(source: Rays, scene: Scene, threads: int | None, fits: Fits, *, cache: bool) -> tuple[Field, str, float]:
     """The light field of a ray source in its place, its carrier surface, and the share of the flux it does not hold."""
     rays = source.ray_stream(scene.files)
     unit = source.flux_unit if source.flux_unit is not None else rays.flux_unit
     (emitter,) = source.emitters(scene.files)
-    field = fit_or_recall(rays, cache=cache, threads=threads)
+    # Only the flux in another unit is not a mere factor.
+    origin = id(source.rays) if source.file is None else scene.files.find(source.file)
+    key = (origin, source.flux_unit, None if source.flux_unit is None else source.flux)
+    field = fits[key] if key in fits else fit_or_recall(rays, cache=cache, threads=threads)
+    fits[key] = field
     scale = emitter.record["flux"] / rays.total_flux
     place = {key: getattr(source, key) for key in Placement.model_fields}
     seen = Field(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from etendue.plot.animation import plot_animation
 from etendue.plot.bsdf_picture import plot_bsdf
 from etendue.plot.characteristic_picture import plot_characteristic
 from etendue.plot.comparison_picture import plot_comparison
@@ -12,10 +13,12 @@ from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
 from etendue.plot.near_field_picture import plot_near_field
 from etendue.plot.scene_picture import draw_scene
+from etendue.plot.sweep_picture import plot_sweep
 from etendue.plot.threshold_picture import plot_threshold_sweep
 
 __all__ = [
     "draw_scene",
+    "plot_animation",
     "plot_bsdf",
     "plot_characteristic",
     "plot_comparison",
@@ -25,5 +28,6 @@ __all__ = [
     "plot_intensity",
     "plot_map",
     "plot_near_field",
+    "plot_sweep",
     "plot_threshold_sweep",
 ]

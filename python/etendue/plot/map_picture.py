@@ -153,7 +153,7 @@ def plot_map(
         else:
             _write_why_dark(ax, lmap)
         return ax
-    layout = _Layout.around(lmap.screen, [*_facts(lmap, shown, show)], [mark.line for mark in marked])
+    layout = MapLayout.around(lmap.screen, [*_facts(lmap, shown, show)], [mark.line for mark in marked])
     figure = style.new_figure(layout.width, layout.height)
     axes = style.add_axes(figure, *layout.picture)
     image = draw_screen(axes, shown.data, lmap.screen, colours, shown.norm, layout.picture[2:], (across, up))
@@ -346,8 +346,14 @@ def _facts(lmap: LuminanceMap | IlluminanceMap, shown: _Shown, show: str) -> Ite
     yield Path(lmap.provenance.source).name
 
 
-class _Layout(NamedTuple):
-    """Places [inches]: of the figure, and (left, bottom, width, height) of what is in it."""
+class MapLayout(NamedTuple):
+    """Places [inches]: of the figure, and (left, bottom, width, height) of what is in it.
+
+    Examples
+    --------
+    >>> MapLayout.around(Screen(2, 1, 2, 1), ["one fact"], []).caption
+    ['one fact']
+    """
 
     width: float
     height: float
@@ -357,7 +363,8 @@ class _Layout(NamedTuple):
     caption: list[str]
 
     @classmethod
-    def around(cls, screen: Screen, facts: list[str], lines_of_regions: list[str]) -> _Layout:
+    def around(cls, screen: Screen, facts: list[str], lines_of_regions: list[str]) -> MapLayout:
+        """A picture of this screen, its colour bar, and the lines below it."""
         aspect = screen.width / screen.height
         lying = aspect > 2.0
         # Beyond these limits the pixels are drawn out of proportion rather than invisibly thin.

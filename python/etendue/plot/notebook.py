@@ -20,6 +20,7 @@ from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
 from etendue.plot.scene_layout import lay_out_scene
 from etendue.plot.scene_picture import plot_layout
+from etendue.plot.sweep_picture import plot_sweep
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
@@ -27,6 +28,7 @@ from etendue.quantities.pixel_map import PixelMap
 from etendue.quantities.printable import printable
 from etendue.quantities.ray_set import RaySet
 from etendue.scene import Scene
+from etendue.sweeps.table import SweepTable
 from etendue.tracing.result import TraceResult
 
 if TYPE_CHECKING:
@@ -140,6 +142,12 @@ def _(value: TraceResult) -> Iterator[str]:
     detections = value.plan.detections
     if detections:
         yield f"<p>detectors: {_text(', '.join(f'{d.name} ({d.KIND})' for d in detections))}</p>"
+    yield _notes(value.notes)
+
+
+@_parts.register
+def _(value: SweepTable) -> Iterator[str]:
+    yield _picture(lambda: plot_sweep(value), value)
     yield _notes(value.notes)
 
 

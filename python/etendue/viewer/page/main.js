@@ -1,387 +1,23 @@
-// The page: what is shown, how it is looked at, and what is read in it.
+// The page: what it begins with, and what hands, keys and fields do.
 
 import { COLOUR_MAPS, coloursOf } from "./colours.js";
 import { Field } from "./field.js";
-import { sectionOf } from "./geometry.js";
+import { command, fields } from "./figures.js";
 import { listenToKeys, listenToPointer } from "./hands.js";
-import { measured, plain, prefixed, withUnit } from "./numbers.js";
-import { drawLegend, drawMarks, drawSection } from "./overlay.js";
+import { atRest, fitCanvas, firstView, frame, reset, resized, setView } from "./motion.js";
 import { Painter } from "./painter.js";
-import { $, numberField, save, showRegions } from "./panel.js";
+import { $, numberField, save } from "./panel.js";
 import { PixelMap } from "./picture.js";
-import { measureRegion, measureSection, overview, quantile } from "./readings.js";
-import { serverOf } from "./server.js";
+import { overview } from "./readings.js";
+import { fitScale, setLook, setRange, setShown } from "./scale.js";
 import { SHADERS } from "./shaders.js";
 import { Solid } from "./solid.js";
-import { View } from "./view.js";
+import { PIXEL, draw, fixed, onFrame, onScreen, packed, server, state, waiting } from "./state.js";
+import { chooseTool, clear, drawings, drawn } from "./tools.js";
 
-const PIXEL = 2; // CSS pixels of a pixel of the core's map
-const REST = 220; // ms after the last touch of a wheel or key at which the picture is at rest
 const KEY_DEGREES = 1;
 const KEY_SHIFT = 0.04; // of the width
 const KEY_ZOOM = 1.15;
-
-const packed = JSON.parse($("subject").textContent);
-const server = serverOf();
-const state = {
-  view: null,
-  subject: null,
-  look: { range: [0, 1], logarithmic: false, errors: false, isolines: 0, grid: false, colours: "inferno" },
-  ranges: { light: null, error: null },
-  tool: "look",
-  regions: [],
-  line: null,
-  section: null,
-  drawing: null,
-  pointer: null,
-  shown: { faces: true, rays: false, axis: "", place: 0.5 },
-  moving: false,
-};
-let painter = null;
-let solid = null;
-let round = 0; // of measurements: older ones are given up
-let timer = 0;
-let lastFrame = 0; // [ms]
-let sampled = false; // whether that frame drew the light anew
-let queued = false;
-
-// --- the view -------------------------------------------------------------------------------------------------------
-
-function firstView() {
-  const box = $("stage").getBoundingClientRect();
-  const [columns, rows] = [box.width, box.height].map((x) => Math.max(8, Math.floor(x / PIXEL)));
-  const asked = viewOfAddress();
-  const shape = { columns, rows };
-  const { width, height = 0, ...rest } = packed.view;
-  // All of what was framed is seen, whatever the shape of the window.
-  return new View({ ...rest, width: Math.max(width, (height * columns) / rows), ...shape, ...asked });
-}
-
-/** The view that the address asks for, as #theta=30&phi=0&roll=90&width=4. */
-function viewOfAddress() {
-  const found = {};
-  for (const [name, value] of new URLSearchParams(location.hash.slice(1))) {
-    if (["theta", "phi", "distance", "roll", "width", "columns", "rows"].includes(name)) found[name] = Number(value);
-    if (["target", "up"].includes(name)) found[name] = value.split(",").map(Number);
-  }
-  return found;
-}
-
-function setView(view, moving = false) {
-  state.view = view;
-  server.stop();
-  if (packed.kind === "field" && painter && painter.subject !== state.field) showSubject(state.field);
-  state.moving = moving;
-  round += 1;
-  painter?.restart(moving);
-  clearTimeout(timer);
-  if (!moving) rest();
-  draw();
-}
-
-/** A map has been looked at already: no observer can be chosen. */
-function fixed() {
-  return packed.kind === "map";
-}
-
-function atRest() {
-  clearTimeout(timer);
-  timer = setTimeout(() => {
-    state.moving = false;
-    painter?.restart(false);
-    rest();
-    draw();
-  }, REST);
-}
-
-/** What is worked out once nothing moves. */
-async function rest() {
-  showCommand();
-  const mine = ++round;
-  const current = () => mine === round;
-  const { subject, view } = state;
-  const known = (measured) => measured?.subject === subject && measured.view === view;
-  const open = state.regions.filter((region) => !known(region.of));
-  for (const region of open) region.figures = null;
-  listRegions();
-  for (const region of open) {
-    const figures = await measureRegion(subject, view, region.corners, current);
-    if (!current()) return;
-    Object.assign(region, { figures, of: { subject, view } });
-    listRegions();
-  }
-  if (state.line && !(state.section && known(state.sectionOf))) {
-    const section = await measureSection(subject, view, state.line, current);
-    if (!current()) return;
-    Object.assign(state, { section, sectionOf: { subject, view } });
-    draw();
-  }
-  $("section-box").hidden = !state.line;
-  if (packed.kind === "field" && packed.server?.refines) await refine(current);
-}
-
-/** The view by lines of sight, in the place of the light field's picture. */
-function refine(current) {
-  return server.refine(state.view, (words, map) => {
-    if (!current()) return;
-    if (map) showSubject(PixelMap.read(map));
-    $("busy").hidden = false;
-    $("busy").textContent = words;
-    draw();
-  });
-}
-
-function showSubject(subject) {
-  state.subject = subject;
-  painter?.setSubject(subject);
-  $("busy").hidden = true;
-}
-
-// --- the picture ----------------------------------------------------------------------------------------------------
-
-function draw() {
-  if (queued) return;
-  queued = true;
-  requestAnimationFrame(frame);
-}
-
-function frame(now) {
-  queued = false;
-  const { view, look } = state;
-  if (painter) {
-    if (state.moving && sampled) painter.pace(now - lastFrame);
-    lastFrame = now;
-    sampled = painter.unfinished;
-    if (sampled) painter.sample(view);
-    painter.paint(look);
-  }
-  document.body.dataset.painted ??= String(performance.now()); // [ms] since the page was asked for: a test reads it
-  drawMarks($("marks"), view, {
-    ...state,
-    geometry: packed.geometry,
-    resolution: look.grid ? packed.resolution?.pitch : 0,
-  });
-  showReading();
-  showView();
-  solid?.draw(view);
-  if (state.line && state.section) drawSection($("section"), state.section, packed.unit, look.logarithmic);
-  // As long as it moves, frames follow one another, so that their distance tells how long one takes.
-  if (painter?.unfinished || state.moving) draw();
-  else document.body.dataset.ready = "true";
-}
-
-function fitCanvas() {
-  const box = $("stage").getBoundingClientRect();
-  const [columns, rows] = [box.width, box.height].map((x) => Math.max(8, Math.floor(x / PIXEL)));
-  const [width, height] = [columns * PIXEL, rows * PIXEL];
-  for (const canvas of [$("picture"), $("marks")]) {
-    canvas.style.width = `${width}px`;
-    canvas.style.height = `${height}px`;
-  }
-  const scale = window.devicePixelRatio || 1;
-  $("picture").width = Math.round(width * scale);
-  $("picture").height = Math.round(height * scale);
-  return { columns, rows };
-}
-
-function resized() {
-  const { columns, rows } = fitCanvas();
-  setView(state.view.with({ columns, rows, width: (state.view.width / state.view.columns) * columns }));
-}
-
-// --- the scale ------------------------------------------------------------------------------------------------------
-
-function fitScale() {
-  const { look } = state;
-  const shares = ["share-low", "share-high"].map((id) => Math.min(Math.max(Number($(id).value) / 100, 0), 1));
-  const values = overview(state.subject, state.view, look.errors);
-  if (values.length === 0) return;
-  let [low, high] = shares.map((share) => quantile(values, share));
-  // A little of the brightest would fill the scale with what hardly anybody sees; nothing at all leaves no scale.
-  if (!(high > 0)) high = values.at(-1) || 1;
-  if (look.errors) high = Math.min(high, 1); // what is less sure than that is not known
-  if (!look.logarithmic && low < 0.02 * high) low = 0;
-  if (look.logarithmic && !(low > high * 1e-4)) low = high * 1e-3;
-  if (!(low < high)) low = look.logarithmic ? high / 10 : 0;
-  setRange(low, high);
-}
-
-function setRange(low, high) {
-  const { look } = state;
-  look.range = [low, high];
-  state.ranges[look.errors ? "error" : "light"] = look.range;
-  draw();
-}
-
-function setLook(changes) {
-  const { look } = state;
-  Object.assign(look, changes);
-  if ("errors" in changes) {
-    const kept = state.ranges[look.errors ? "error" : "light"];
-    if (kept) look.range = kept;
-    else fitScale();
-  }
-  if (look.logarithmic && !(look.range[0] > 0)) look.range = [look.range[1] * 1e-3, look.range[1]];
-  if ("colours" in changes || "errors" in changes) {
-    const name = look.errors && look.colours === "inferno" ? "viridis" : look.colours;
-    state.colours = coloursOf(name);
-    painter?.setColours(state.colours);
-  }
-  $("logarithmic").checked = look.logarithmic;
-  $("grid").checked = look.grid;
-  $("isolines").value = String(look.isolines);
-  $("overlay").value = look.errors ? "error" : "light";
-  $("resolution").hidden = !look.grid;
-  draw();
-}
-
-/** What is seen of the scene's faces and rays, and where it is cut. */
-function setShown(changes) {
-  Object.assign(state.shown, changes);
-  const plane = sectionOf(packed.geometry, state.shown);
-  $("section-place").hidden = !plane;
-  for (const [id, name] of [["show-faces", "faces"], ["show-rays", "rays"]]) $(id).checked = state.shown[name];
-  $("section-axis").value = state.shown.axis;
-  $("section-at").textContent = plane ? `${plane.axis} = ${plain(plane.at, 4)} mm` : "";
-  draw();
-}
-
-// --- what is read ---------------------------------------------------------------------------------------------------
-
-/** Value and standard error of the pixel under a place [CSS pixels] on the picture. */
-function readingAt(x, y) {
-  const [column, row] = [x, y].map((p) => Math.floor(p / PIXEL));
-  return { column, row, ...state.subject.pixel(state.view, column, row) };
-}
-
-function showReading() {
-  const { look, pointer } = state;
-  const [factor, unit] = look.errors ? [0.01, "%"] : prefixed(look.range[1], packed.unit);
-  const legend = { ...look, unit, factor, title: look.errors ? "relative standard error" : packed.quantity };
-  let mark = NaN;
-  if (pointer) {
-    const found = readingAt(...pointer);
-    const [u, v] = state.view.place(found.column + 0.5, found.row + 0.5);
-    const share = found.value > 0 && Number.isFinite(found.error) ? ` · ± ${plain((100 * found.error) / found.value, 2)} %` : "";
-    $("reading").textContent = measured(found.value, found.error, packed.unit);
-    $("place").textContent = `${plain(u, 4)} mm right, ${plain(v, 4)} mm up${share} · pixel ${found.column}, ${found.row}`;
-    mark = look.errors ? found.error / found.value : found.value;
-  }
-  drawLegend($("legend"), state.colours, legend, mark);
-}
-
-function listRegions() {
-  showRegions(state.regions, packed.unit, packed.flux_unit, (region) => {
-    state.regions = state.regions.filter((one) => one !== region);
-    listRegions();
-    draw();
-  });
-}
-
-const fields = {};
-
-function showView() {
-  const { view, look } = state;
-  for (const name of ["theta", "phi", "distance", "width"]) fields[name](view[name]);
-  ["x", "y", "z"].forEach((axis, i) => fields[`target-${axis}`](view.target[i]));
-  const unit = look.errors ? 0.01 : 1;
-  fields.low(look.range[0] / unit, 4);
-  fields.high(look.range[1] / unit, 4);
-  $("scale-unit").textContent = look.errors ? "%" : packed.unit;
-  if (solid) $("intensity").textContent = `${withUnit(solid.towards(view.theta, view.phi), packed.intensity.unit)} here`;
-}
-
-/** The view as the command line takes it; numbers with so many digits that the core's map has the same pixels. */
-function command() {
-  const { view } = state;
-  const digits = (x) => String(Number(x.toPrecision(12)));
-  const turns = [view.upright && `--up=${view.upright.map(digits).join(",")} `, view.roll && `--roll=${digits(view.roll)} `];
-  const upright = turns.filter(Boolean).join("");
-  const file = /^[\w./-]+$/.test(packed.file) ? packed.file : `'${packed.file.replaceAll("'", `'\\''`)}'`;
-  return (
-    `etendue luminance ${file} --observer=${digits(view.theta)},${digits(view.phi)} --distance ${digits(view.distance)} ` +
-    `--target=${view.target.map(digits).join(",")} ${upright}--size ${digits(view.width)},${digits(view.height)} ` +
-    `--pixels ${view.columns},${view.rows} -o map.exr`
-  );
-}
-
-function showCommand() {
-  $("command").textContent = fixed() ? "" : command();
-}
-
-// --- tools ----------------------------------------------------------------------------------------------------------
-
-function chooseTool(name) {
-  Object.assign(state, { tool: name, drawing: null, polygon: null }); // a polygon that was begun is given up
-  for (const button of document.querySelectorAll("[data-tool]")) {
-    button.setAttribute("aria-pressed", String(button.dataset.tool === name));
-  }
-  $("stage").classList.toggle("drawing", name !== "look");
-  draw();
-}
-
-function onScreen([x, y]) {
-  return state.view.place(x / PIXEL, y / PIXEL);
-}
-
-function drawn(corners) {
-  state.drawing = null;
-  if (state.tool === "line") {
-    state.line = corners;
-    state.section = null;
-    $("section-box").hidden = false;
-  } else {
-    state.regions.push({ kind: state.tool, corners, figures: null });
-  }
-  rest();
-  draw();
-}
-
-function rectangle([a, b]) {
-  return [a, [b[0], a[1]], b, [a[0], b[1]]];
-}
-
-const drawings = {
-  begin(place) {
-    const here = onScreen(place);
-    if (state.tool === "polygon") {
-      state.polygon = [...(state.polygon ?? []), here];
-      state.drawing = state.polygon;
-    } else {
-      state.start = here;
-    }
-    draw();
-  },
-  extend(place) {
-    if (state.tool === "polygon") return;
-    const ends = [state.start, onScreen(place)];
-    state.drawing = state.tool === "line" ? ends : [...rectangle(ends), ends[0]];
-    draw();
-  },
-  end(place) {
-    if (state.tool === "polygon") return;
-    const ends = [state.start, onScreen(place)];
-    const large = Math.hypot(ends[0][0] - ends[1][0], ends[0][1] - ends[1][1]) > (2 * state.view.width) / state.view.columns;
-    state.drawing = null;
-    if (large) drawn(state.tool === "line" ? ends : rectangle(ends));
-    draw();
-  },
-  finish() {
-    if (state.tool !== "polygon" || (state.polygon?.length ?? 0) < 3) return;
-    const corners = state.polygon;
-    state.polygon = null;
-    drawn(corners);
-  },
-};
-
-function clear() {
-  Object.assign(state, { regions: [], line: null, section: null, drawing: null, polygon: null });
-  $("section-box").hidden = true;
-  listRegions();
-  draw();
-}
-
-// --- hands ----------------------------------------------------------------------------------------------------------
 
 function orbit(rightwards, upwards) {
   if (!fixed()) setView(state.view.orbited(rightwards, upwards), true);
@@ -444,10 +80,6 @@ function listen() {
   window.addEventListener("resize", resized);
 }
 
-function reset() {
-  setView(firstView());
-}
-
 function makeFields() {
   const above = (value) => value > 0;
   const view = (name) => (value) => setView(state.view.with({ [name]: value }));
@@ -488,8 +120,6 @@ function makeFields() {
     save("section.csv", [[`position from A [mm],${packed.quantity} [${packed.unit}],standard error`, ...lines, ""].join("\n")], "text/csv");
   });
 }
-
-// --- beginning ------------------------------------------------------------------------------------------------------
 
 function describe() {
   document.body.dataset.kind = packed.kind;
@@ -533,6 +163,7 @@ function complain(error) {
 }
 
 async function begin() {
+  onFrame(frame);
   describe();
   makeFields();
   state.subject = packed.kind === "field" ? await Field.read(packed.field) : PixelMap.read(packed.map);
@@ -542,12 +173,12 @@ async function begin() {
   state.colours = coloursOf(state.look.colours);
   const brightest = overview(state.subject, state.view).at(-1) || 1;
   try {
-    painter = new Painter($("picture"), state.subject, SHADERS, brightest);
-    painter.setColours(state.colours);
+    state.painter = new Painter($("picture"), state.subject, SHADERS, brightest);
+    state.painter.setColours(state.colours);
   } catch (error) {
     complain(error);
   }
-  if (packed.intensity) solid = new Solid($("solid"), packed.intensity, coloursOf("inferno"));
+  if (packed.intensity) state.solid = new Solid($("solid"), packed.intensity, coloursOf("inferno"));
   listen();
   chooseTool("look");
   fitScale();
@@ -557,10 +188,10 @@ async function begin() {
     state,
     setView: (changes) => setView(state.view.with(changes)),
     reading: (column, row) => state.subject.pixel(state.view, column, row),
-    painted: (x, y) => painter.found(x, y),
-    samples: () => painter?.samples ?? 0,
-    coarseness: () => painter.coarseness,
-    finished: () => !painter?.unfinished && !queued,
+    painted: (x, y) => state.painter.found(x, y),
+    samples: () => state.painter?.samples ?? 0,
+    coarseness: () => state.painter.coarseness,
+    finished: () => !state.painter?.unfinished && !waiting(),
     failed: () => ($("trouble").hidden ? null : $("trouble").textContent),
     setLook,
     setShown,

@@ -1,0 +1,1 @@
+"""Results of a scene over its parameters."""
