@@ -42,7 +42,7 @@ def _line(key: str, fields: dict[str, str]) -> str:
         rest.insert(-1 if "year" in fields else len(rest), f"pp. {fields['pages']}")
     link = f" [doi:{fields['doi']}](https://doi.org/{fields['doi']})" if "doi" in fields else ""
     who = f"{author}: " if author else ""
-    return f"<span id=\"{key.lower()}\">**{key}**</span>\n:   {who}*{fields['title']}*. {', '.join(rest)}.{link}\n"
+    return f'<span id="{key.lower()}">**{key}**</span>\n:   {who}*{fields["title"]}*. {", ".join(rest)}.{link}\n'
 
 
 def bibliography_page(path: Path) -> str:
@@ -53,9 +53,22 @@ def bibliography_page(path: Path) -> str:
 
 
 def link_citations(text: str, page: str) -> str:
-    """Keys in brackets made links to the page of that address.
+    r"""Keys in brackets made links to the page of that address.
 
-    >>> link_citations("A map [Audenaert2014] is", "references.md")
-    'A map [\\\\[Audenaert2014\\\\]](references.md#audenaert2014) is'
+    >>> print(link_citations("A map [Audenaert2014] is", "references.md"))
+    A map [\[Audenaert2014\]](references.md#audenaert2014) is
     """
     return _CITATION.sub(lambda found: rf"[\[{found[1]}\]]({page}#{found[1].lower()})", text)
+
+
+def link_citations_of_docstrings(html: str) -> str:
+    """The same in the HTML of a page of the reference; docstrings write ``[Key2014]_``.
+
+    >>> link_citations_of_docstrings("drawn as in [Salmon2011]_.")
+    'drawn as in <a href="../project/references.html#salmon2011">[Salmon2011]</a>.'
+    """
+    return re.sub(
+        _CITATION.pattern + "_?",
+        lambda found: f'<a href="../project/references.html#{found[1].lower()}">[{found[1]}]</a>',
+        html,
+    )

@@ -8,6 +8,8 @@ from latex2mathml.converter import convert
 
 _DISPLAYED = re.compile(r"^\$\$(.+?)\$\$[ \t]*$", re.MULTILINE | re.DOTALL)
 _TAG = re.compile(r"\\tag\{(\w+)\}")
+_UPRIGHT = re.compile(r"\\mathrm\{([A-Za-z]+)\}")
+"""A single letter of MathML is slanted unless it is text."""
 
 
 def draw_equations(text: str) -> str:
@@ -21,7 +23,11 @@ def draw_equations(text: str) -> str:
 
 def _drawn(tex: str) -> str:
     tag = _TAG.search(tex)
-    drawn = convert(" ".join(_TAG.sub("", tex).split()), display="block").replace("\n", " ")
+    # A large bracket with an exponent keeps its size only as a group of its own.
+    tex = re.sub(r"(\\[Bb]ig+\s*\))\s*\^", r"{\1}^", tex)
+    tex = re.sub(r"\\[Bb]ig+\s*(\\[lr]angle)", r"\1", tex)  # these have one size
+    upright = _UPRIGHT.sub(r"\\text{\1}", _TAG.sub("", tex))
+    drawn = convert(" ".join(upright.split()), display="block").replace("\n", " ")
     if not tag:
         return f'<div class="equation">{drawn}</div>'
     return f'<div class="equation" id="eq-{tag[1]}">{drawn}<span>({tag[1]})</span></div>'

@@ -9,7 +9,7 @@ from pathlib import Path
 from posixpath import dirname, normpath, relpath
 from typing import Any
 
-from bibliography import bibliography_page, link_citations
+from bibliography import bibliography_page, link_citations, link_citations_of_docstrings
 from equations import draw_equations
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -89,9 +89,7 @@ def example_page(path: Path) -> str:
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that docs/ does not hold."""
     made = {there: ROOT / here for here, there in ELSEWHERE.items()}
-    readme = files.get_file_from_path("README.md")
-    assert readme is not None
-    files.remove(readme)
+    files.remove(files.src_uris["README.md"])  # the page of all pages, which is not the first one here
     for page, path in made.items():
         text = bibliography_page(path) if path.suffix == ".bib" else path.read_text(encoding="utf-8")
         files.append(File.generated(config, page, content=text))
@@ -121,3 +119,8 @@ def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
         return draw_equations(text if made_here else link_names(text))
 
     return outside_blocks(markdown, change)
+
+
+def on_page_content(html: str, *, page: Any, **_: Any) -> str:
+    """Link the citations of docstrings."""
+    return link_citations_of_docstrings(html) if page.file.src_uri.startswith("reference/") else html

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import inspect
 import re
+import runpy
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -14,17 +14,7 @@ import etendue as et
 _CODE = re.compile(r"(?<!\[)`et\.(\w+)`")
 
 
-def _groups() -> dict[str, tuple[str, ...]]:
-    spec = importlib.util.spec_from_file_location("api_page", Path(__file__).parents[1] / "api_page.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    groups: dict[str, tuple[str, ...]] = module.GROUPS
-    return groups
-
-
-GROUPS = _groups()
+GROUPS: dict[str, tuple[str, ...]] = runpy.run_path(str(Path(__file__).parents[1] / "api_page.py"))["GROUPS"]
 
 
 def page_of(group: str) -> str:
@@ -48,13 +38,10 @@ def home_of(name: str) -> str:
 
 def _entry(name: str) -> Iterator[str]:
     value = getattr(et, name)
-    yield f"## `et.{name}` {{ #{name} }}"
-    yield ""
     yield f"::: {home_of(name)}"
     yield "    options:"
-    yield "      show_root_heading: false"
-    yield "      show_root_toc_entry: true"
-    yield "      heading_level: 3"
+    yield f"      heading: et.{name}"
+    yield f"      toc_label: et.{name}"
     if isinstance(value, ModuleType):
         members = [one for one in vars(value) if not one.startswith("_") and inspect.isclass(getattr(value, one))]
         yield f"      members: [{', '.join(members)}]"
