@@ -21,7 +21,7 @@ GROUPS = {
     "Luminance": (
         "luminance_map", "Cone", "FromField", "PathTracing", "Observer", "Screen", "LuminanceMap", "read_map",
         "combine_maps", "compare", "Region", "PolygonRegion", "region_statistics", "RegionStatistics", "cross_section",
-        "filter_map", "denoise_map",
+        "filter_map", "denoise_map", "report_source", "SourceReport",
     ),
     "Scenes": (
         "scene", "Scene", "trace", "trace_rounds", "trace_work", "TraceWork", "TraceResult", "ScatterEvents",
@@ -40,8 +40,7 @@ GROUPS = {
     "Pictures": (
         "plot_map", "plot_comparison", "plot_cross_sections", "plot_intensity", "plot_characteristic",
         "plot_sweep", "plot_threshold_sweep", "plot_bsdf", "plot_deconvolution", "plot_directions", "plot_near_field",
-        "plot_animation",
-        "draw_scene", "view",
+        "plot_animation", "plot_report", "draw_scene", "view",
     ),
     "Errors and warnings": tuple(name for name in et.__all__ if name.endswith(("Error", "Warning"))),
 }  # fmt: skip

@@ -66,6 +66,7 @@ PUBLIC = {
     "etendue.luminance.estimate": ("luminance_map",),
     "etendue.luminance.filters": ("filter_map",),
     "etendue.luminance.regions": ("PolygonRegion", "RegionStatistics", "region_statistics"),
+    "etendue.luminance.source_report": ("SourceReport", "report_source"),
     "etendue.luminance.methods": ("Cone", "FromField", "PathTracing"),
     "etendue.plot": (
         "draw_scene",
@@ -79,6 +80,7 @@ PUBLIC = {
         "plot_intensity",
         "plot_map",
         "plot_near_field",
+        "plot_report",
         "plot_sweep",
         "plot_threshold_sweep",
     ),

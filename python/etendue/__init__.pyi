@@ -44,6 +44,7 @@ from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
 from etendue.luminance.methods import Cone, FromField, PathTracing
 from etendue.luminance.regions import PolygonRegion, RegionStatistics, region_statistics
+from etendue.luminance.source_report import SourceReport, report_source
 from etendue.plot import (
     draw_scene,
     plot_animation,
@@ -56,6 +57,7 @@ from etendue.plot import (
     plot_intensity,
     plot_map,
     plot_near_field,
+    plot_report,
     plot_sweep,
     plot_threshold_sweep,
 )
@@ -134,6 +136,7 @@ __all__ = [
     "SceneError",
     "SceneWarning",
     "Screen",
+    "SourceReport",
     "Spectrum",
     "Sphere",
     "SweepTable",
@@ -174,6 +177,7 @@ __all__ = [
     "plot_intensity",
     "plot_map",
     "plot_near_field",
+    "plot_report",
     "plot_sweep",
     "plot_threshold_sweep",
     "read_bsdf",
@@ -185,6 +189,7 @@ __all__ = [
     "read_rays",
     "read_scans",
     "region_statistics",
+    "report_source",
     "revolved",
     "scene",
     "sweep",

@@ -84,7 +84,7 @@ def test_help_names_every_verb_with_what_it_does(run: Run) -> None:
         "cache",
         "bsdf",
     ]
-    assert set(verbs()) == {*expected, "goniometer", "deconvolve", "goniophotometer", "view", "plot", "sweep"}
+    assert set(verbs()) == {*expected, "goniometer", "deconvolve", "goniophotometer", "view", "plot", "report", "sweep"}
     for name, verb in verbs().items():
         assert f" {name} " in outcome.out
         assert verb.help
@@ -114,6 +114,7 @@ def test_every_verb_that_draws_random_numbers_takes_a_seed() -> None:
         "goniometer",
         "goniophotometer",
         "luminance",
+        "report",
         "sample",
         "sweep",
         "trace",

@@ -215,6 +215,12 @@ def sample(place: Path) -> Iterator[Case]:
     yield Case(("sample", place / "led.h5", "-n", 500, "-o", "out.dis"), (*field.notes, *drawn.notes, *losses))
 
 
+def report(place: Path) -> Iterator[Case]:
+    file = place / "led.tm25ray"
+    found = et.report_source(file, surface=parse_surface(DISK), forecast=False)
+    yield ("report", file, "--surface", DISK, "--no-forecast", "-o", "report.html"), [*found.notes, *found.complaints]
+
+
 def intensity(place: Path) -> Iterator[Case]:
     rays = et.read_rays(place / "led.tm25ray")
     far = intensity_distribution(rays, 4, 30)
@@ -355,6 +361,7 @@ CASES: dict[str, Callable[[Path], Iterator[Case]] | None] = {
     "intensity": intensity,
     "draw": draw,
     "plot": plot,
+    "report": report,
     "trace": trace,
     "sweep": sweep,
     "view": view,

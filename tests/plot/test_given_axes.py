@@ -79,7 +79,7 @@ def figure_with(axes: int) -> Figure:
 
 def test_every_picture_is_here() -> None:
     # A moving picture is a file, and on no axes.
-    public = {name for name in et.__all__ if name.startswith(("plot_", "draw_"))} - {"plot_animation"}
+    public = {name for name in et.__all__ if name.startswith(("plot_", "draw_"))} - {"plot_animation", "plot_report"}
     assert len(public) == len(set(DRAWN) - {"method", "cartesian"})
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -13,10 +12,7 @@ from etendue.cli.terminal import complain, print_json, progress_bar, say
 from etendue.errors import ArgumentError, EtendueError
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from etendue.quantities.intensity import Intensity
-    from etendue.quantities.ray_set import RaySet
 
 
 class Found(NamedTuple):
@@ -177,69 +173,12 @@ def _bodies(path: Path) -> Found | None:
 
 def describe(path: Path) -> dict[str, Any]:
     """Everything that `info` prints about one file of rays, as plain data: lengths in mm, wavelengths in nm."""
-    from etendue.formats.rays import detect_format, read_rays
+    from etendue.formats.rays import read_rays
+    from etendue.formats.rays.facts import ray_facts
 
     rays = read_rays(path)
     with progress_bar(path.name, len(rays)) as progress:
-        moments = rays.moments(progress)
-    focus = rays.virtual_focus
-    low, high = moments.flux_range
-    known = len(rays) > rays.tally.unusable
-    return {
-        "file": str(path),
-        "format": rays.provenance.format,
-        "title": detect_format(path).title,
-        "rays": len(rays),
-        "usable_rays": len(rays) - rays.tally.unusable,
-        "flux_unit": rays.flux_unit,
-        "total_flux": rays.total_flux,
-        "header_flux": rays.header.get("total_flux"),
-        "sum_flux": rays.tally.flux * rays.meaning.stored_flux_scale,
-        "effective_rays": rays.tally.effective_rays,
-        "flux_per_ray": [low * rays.flux_scale, high * rays.flux_scale] if known else None,
-        "bounding_box": moments.bounds.tolist() if known and rays.has_position else None,
-        "virtual_focus": list(focus.point) if focus.determined else None,
-        "mean_direction": _mean_direction(moments.weighted_direction),
-        "spectrum": _spectrum(rays),
-        "luminous_efficacy": _efficacy(rays),
-        "columns": list(rays.columns),
-        "header": dict(rays.header),
-        "complaints": [complaint.to_dict() for complaint in rays.complaints],
-        "complaint_lines": [str(complaint) for complaint in rays.complaints],
-    }
-
-
-def _mean_direction(weighted: np.ndarray[Any, np.dtype[np.float64]]) -> list[float] | None:
-    length = math.hypot(*weighted.tolist())
-    return [float(c) / length for c in weighted] if length > 0 else None
-
-
-def _spectrum(rays: RaySet) -> str:
-    colours = rays.colours()
-    efficacy = _efficacy(rays)
-    worth = "" if efficacy is None else f", {efficacy:.4g} lm/W"
-    if "wavelength" in rays.columns:
-        if colours is None or colours.range is None:
-            return "wavelength per ray, none known"
-        low, high = colours.range
-        unknown = f"; {colours.unknown_rays:,} rays state none" if colours.unknown_rays else ""
-        return f"wavelength per ray, {low:.4g} to {high:.4g} nm{worth}{unknown}"
-    if rays.meaning.single_wavelength is not None:
-        return f"single wavelength {rays.meaning.single_wavelength:.4g} nm{worth}"
-    if "spectrum_index" in rays.columns:
-        return f"one of {len(rays.spectra)} spectra per ray{worth}"
-    if rays.spectra:
-        nodes = rays.spectra[0].wavelength
-        return f"one spectrum for all rays, {nodes[0]:.4g} to {nodes[-1]:.4g} nm{worth}"
-    if "tristimulus_x" in rays.columns:
-        return "tristimulus values per ray"
-    return "unknown"
-
-
-def _efficacy(rays: RaySet) -> float | None:
-    """Luminous efficacy of radiation of all rays [lm/W]."""
-    spectrum = rays.total_spectrum()
-    return None if spectrum is None else spectrum.luminous_efficacy
+        return ray_facts(rays, path, progress)
 
 
 def _print(facts: dict[str, Any]) -> None:
@@ -250,54 +189,12 @@ def _print(facts: dict[str, Any]) -> None:
             else f"error: {facts['file']}: {facts['error']}"
         )
         return
-    unit = facts["flux_unit"]
+    from etendue.formats.rays.facts import fact_rows
+
     say(f"{facts['file']}")
-    header = facts["header_flux"]
-    stated = f"header {header:.7g} {unit}" if isinstance(header, float) else "no total in the header"
-    rows = [
-        ("format", facts["title"]),
-        ("rays", f"{facts['rays']:,}" + _unusable(facts)),
-        ("flux", f"{facts['total_flux']:.7g} {unit}"),
-        ("", f"{stated}; sum over the rays {facts['sum_flux']:.7g} {unit}"),
-        ("per ray", _range(facts["flux_per_ray"], unit) + f"; as good as {facts['effective_rays']:,.0f} equal rays"),
-        ("bounding box", _box(facts["bounding_box"])),
-        ("virtual focus", _point(facts["virtual_focus"], "mm") or "not determined (collimated rays, or far-field data)"),
-        ("mean direction", _point(facts["mean_direction"], "") or "none"),
-        ("spectrum", facts["spectrum"]),
-    ]  # fmt: skip
-    rows += [
-        (key.replace("_", " "), _short(value)) for key, value in facts["header"].items() if value not in ("", None)
-    ]
-    for label, value in rows:
+    for label, value in fact_rows(facts):
         say(f"  {label:<22} {value}")
     if not facts["complaint_lines"]:
         say(f"  {'complaints':<22} none")
     for number, line in enumerate(facts["complaint_lines"]):
         say(f"  {'complaints' if number == 0 else '':<22} {line}")
-
-
-def _unusable(facts: dict[str, Any]) -> str:
-    missing = facts["rays"] - facts["usable_rays"]
-    return f", {missing:,} of them cannot be used" if missing else ""
-
-
-def _range(pair: list[float] | None, unit: str) -> str:
-    if pair is None:
-        return "none"
-    low, high = pair
-    return f"{low:.4g} {unit} each" if low == high else f"{low:.4g} to {high:.4g} {unit}"
-
-
-def _box(bounds: list[list[float]] | None) -> str:
-    if bounds is None:
-        return "none (far-field data)"
-    return ", ".join(f"{axis} {low:.5g} to {high:.5g}" for axis, (low, high) in zip("xyz", bounds, strict=True)) + " mm"
-
-
-def _point(point: list[float] | None, unit: str) -> str | None:
-    return None if point is None else f"({', '.join(f'{c:.4f}' for c in point)}) {unit}".rstrip()
-
-
-def _short(value: Any) -> str:
-    text = f"{value:.7g}" if isinstance(value, float) else str(value)
-    return text if len(text) <= 100 else text[:97] + "..."

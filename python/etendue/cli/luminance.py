@@ -228,7 +228,7 @@ def luminance(
             raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
     else:
         upright = None if up is None else _three(up, "--up", "0,0,1")
-        who = [("", Observer(theta, phi, distance, up=upright, roll=roll)) for theta, phi in _angles(observer)]
+        who = [("", Observer(theta, phi, distance, up=upright, roll=roll)) for theta, phi in parse_angles(observer)]
     if orbit is not None:
         who = [("", one) for one in around([one for _, one in who], orbit)]
     moving, single = moving_outputs(output, orbit)
@@ -357,7 +357,14 @@ def _targets(output: list[Path], who: list[tuple[str, Observer]]) -> list[list[P
     return targets
 
 
-def _angles(observer: list[str] | None) -> list[tuple[float, ...]]:
+def parse_angles(observer: list[str] | None) -> list[tuple[float, ...]]:
+    """θ and φ of each observer that is stated.
+
+    Raises
+    ------
+    typer.BadParameter
+        If there is none, or one is no pair of numbers.
+    """
     if not observer:
         raise typer.BadParameter("give at least one, e.g. --observer 30,0", param_hint="--observer")
     return [numbers(text, 2, "--observer", "30,0") for text in observer]

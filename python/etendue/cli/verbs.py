@@ -25,6 +25,7 @@ VERBS = {
     "intensity": "etendue.cli.intensity:intensity",
     "draw": "etendue.cli.draw:draw",
     "plot": "etendue.cli.plot:plot",
+    "report": "etendue.cli.report:report",
     "trace": "etendue.cli.trace:trace",
     "sweep": "etendue.cli.sweep:sweep",
     "patches": "etendue.cli.patches:patches",

@@ -12,6 +12,7 @@ from etendue.plot.directional_picture import plot_directions
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import plot_map
 from etendue.plot.near_field_picture import plot_near_field
+from etendue.plot.report_page import plot_report
 from etendue.plot.scene_picture import draw_scene
 from etendue.plot.sweep_picture import plot_sweep
 from etendue.plot.threshold_picture import plot_threshold_sweep
@@ -28,6 +29,7 @@ __all__ = [
     "plot_intensity",
     "plot_map",
     "plot_near_field",
+    "plot_report",
     "plot_sweep",
     "plot_threshold_sweep",
 ]

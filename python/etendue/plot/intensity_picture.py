@@ -225,7 +225,9 @@ def _polar(axes: Axes, curves: list[_Curve], names: tuple[str, str], reach: floa
     axes.set_xlim(-1.16 * rim, 1.16 * rim)
     axes.set_ylim(-1.12 * rim, 1.12 * rim if reach > 90.0 else 0.12 * rim)
     arc = np.radians(np.linspace(-reach, reach, 361))
-    for radius in circles:
+    # A number takes some 0.4 inches: on small diagrams every second or third circle has one.
+    every = math.ceil(0.4 * circles.size / (min(style.inches_of(axes)) / 2.3))
+    for number, radius in enumerate(circles[::-1]):
         axes.plot(
             radius * np.sin(arc),
             -radius * np.cos(arc),
@@ -233,6 +235,8 @@ def _polar(axes: Axes, curves: list[_Curve], names: tuple[str, str], reach: floa
             linewidth=0.8 if radius == rim else 0.4,
             zorder=1,
         )
+        if number % every:
+            continue
         label = style.plain(radius) + (f" {names[1]}" if radius == rim else "")
         axes.text(
             radius, 0.015 * rim, label, size=style.TICK_SIZE - 0.5, color=style.FAINT, ha="center", va="bottom", zorder=4,

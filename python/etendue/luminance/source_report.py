@@ -1,0 +1,221 @@
+"""A ray file on a page: what it says, what its light field resolves, what it looks like, and how sure all that is."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from etendue.errors import ArgumentError
+from etendue.formats.rays import read_rays
+from etendue.formats.rays.facts import fact_rows, ray_facts
+from etendue.lightfield.diagnostics import Diagnostics, diagnose
+from etendue.lightfield.light_field import LightField
+from etendue.lightfield.surfaces import Surface
+from etendue.luminance.estimate import luminance_map
+from etendue.luminance.framing import centre_of_light, framed_screens, probe
+from etendue.quantities.data_sheet import DataSheet, data_sheet
+from etendue.quantities.intensity import Intensity
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.measured import measured
+from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.ray_set import RaySet
+from etendue.quantities.ray_stream import Progress
+
+VIEWS = ((0.0, 0.0), (30.0, 0.0), (60.0, 0.0), (60.0, 90.0))
+"""The standard set of observers: θ, φ [°]."""
+
+DISTANCE = 1000.0
+"""Of the observers from the light [mm]; further if the light is wider than a tenth of that."""
+
+PIXELS = 128
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SourceReport:
+    """What is to be said of a source of which there are rays; see `report_source`.
+
+    Parameters
+    ----------
+    title : str
+        First line.
+    facts : tuple of (str, str)
+        What the file says and what its rays do: label and text.
+    complaints : tuple of str
+        What is wrong with the file.
+    diagnostics : Diagnostics
+        How good the light field is, what it resolves, and what more rays would bring.
+    maps : tuple of LuminanceMap
+        From the observers, on one size of screen.
+    intensity : Intensity
+        Of the light field.
+    notes : tuple of str
+        What was done to the rays, oldest first.
+    provenance : tuple of (str, str)
+        File, fingerprint, program and steps.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> rays, disk = et.RingSource(rays=20_000).ray_set(), et.Disk(radius=30)
+    >>> found = report_source(rays, surface=disk, observers=[et.Observer(0, 0, 1000)], forecast=False)
+    >>> [row[0] for row in found.view_rows()[0]][:2], len(found.maps)
+    (['θ', 'φ'], 1)
+    """
+
+    title: str
+    facts: tuple[tuple[str, str], ...]
+    complaints: tuple[str, ...]
+    diagnostics: Diagnostics
+    maps: tuple[LuminanceMap, ...]
+    intensity: Intensity
+    notes: tuple[str, ...]
+    provenance: tuple[tuple[str, str], ...]
+
+    def __repr__(self) -> str:
+        """Title and number of views."""
+        return f"<SourceReport of {self.title}, {len(self.maps)} maps>"
+
+    @property
+    def sheet(self) -> DataSheet:
+        """Beam and field angle, cut-off, zonal flux."""
+        return data_sheet(self.intensity)
+
+    @property
+    def subtitle(self) -> str:
+        """What the report is, in a line."""
+        return f"report of a light source, {self.diagnostics.flux:.5g} {self.diagnostics.flux_unit}"
+
+    @property
+    def quality_lines(self) -> list[str]:
+        """What the light field is, resolves, and what more rays would bring."""
+        found = self.diagnostics
+        surface = re.sub(r"\d+\.\d+", lambda number: f"{float(number[0]):.4g}", found.surface)
+        lines = [f"on {surface}", *found.summary().splitlines()]
+        return [line for line in lines if not line.startswith("least certain")]
+
+    def view_rows(self) -> list[list[tuple[str, str]]]:
+        """For each map: name and text of its direction, size, maximum, intensity and errors."""
+        rows = []
+        for lmap in self.maps:
+            unit = lmap.unit
+            row, column = divmod(int(lmap.values.argmax()), lmap.screen.columns)
+            error = lmap.relative_error
+            rows.append(
+                [
+                    ("θ", f"{lmap.observer.theta:g}°"),
+                    ("φ", f"{lmap.observer.phi:g}°"),
+                    ("largest pixel", measured(lmap.values[row, column], lmap.standard_error[row, column], unit)),
+                    ("intensity", f"{lmap.intensity:.4g} {self.intensity.unit}"),
+                    ("error, weighted by flux", "unknown" if error is None else f"{error.flux_weighted:.2%}"),
+                ]
+            )
+        return rows
+
+    def to_dict(self) -> dict[str, Any]:
+        """In figures, as plain data."""
+        return {
+            "title": self.title,
+            "facts": [list(row) for row in self.facts],
+            "complaints": list(self.complaints),
+            "diagnostics": self.diagnostics.to_dict(),
+            "views": [dict(row) for row in self.view_rows()],
+            "data_sheet": self.sheet.to_dict(),
+            "notes": list(self.notes),
+            "provenance": [list(row) for row in self.provenance],
+        }
+
+
+def report_source(
+    source: RaySet | str | os.PathLike[str],
+    *,
+    surface: Surface | Literal["auto"] = "auto",
+    observers: Sequence[Observer] | None = None,
+    title: str | None = None,
+    forecast: bool = True,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    refits: Progress | None = None,
+) -> SourceReport:
+    """Fit a light field to rays, look at it from a standard set of directions, and say how sure everything is.
+
+    Parameters
+    ----------
+    source : RaySet or path
+        Rays, or a ray file of any format.
+    surface : Surface or "auto"
+        Carrier surface, as `LightField.fit` takes it.
+    observers : sequence of Observer, optional
+        (0°, 0°), (30°, 0°), (60°, 0°) and (60°, 90°) at 1 000 mm about the point that the light seems to come from, or ten
+        times as far as that light is wide, if not given.
+    title : str, optional
+        Name of the file if not given.
+    forecast : bool
+        Whether parts of the rays are fitted again to say what more of them would bring, for about the time of the fit.
+    seed : int
+        Of the rays held out.
+    threads : int, optional
+        All cores if not given; the result does not depend on it.
+    progress, refits : callable, optional
+        Told how many rays have been fitted, and how many refits are done.
+
+    Returns
+    -------
+    SourceReport
+        `etendue.plot_report` draws it as a page.
+
+    Raises
+    ------
+    FormatError
+        If the file is no ray file.
+    ArgumentError
+        If there are no rays with positions, or no observers.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> rays, disk = et.RingSource(rays=20_000).ray_set(), et.Disk(radius=30)
+    >>> report_source(rays, surface=disk, title="Rings", forecast=False)
+    <SourceReport of Rings, 4 maps>
+    """
+    rays = source if isinstance(source, RaySet) else read_rays(source)
+    name = rays.provenance.source if isinstance(source, RaySet) else str(source)
+    if observers is not None and not observers:
+        raise ArgumentError("report_source: the sequence of observers is empty; give at least one.")
+    facts = fact_rows(ray_facts(rays, name))
+    field = LightField.fit(rays, surface, seed=seed, threads=threads, progress=progress)
+    found = diagnose(field, rays if forecast else None, seed=seed, threads=threads, progress=refits)
+    views = list(observers) if observers is not None else _standard(field)
+    largest = max(framed_screens(field, views, PIXELS, PIXELS), key=lambda screen: screen.width)
+    screen = Screen(largest.width, largest.height, PIXELS, PIXELS)
+    maps = luminance_map(field, views, screen, threads=threads)
+    origin = field.provenance
+    steps = [("done", step) for step in origin.steps]
+    return SourceReport(
+        title=title if title is not None else Path(name).name,
+        facts=tuple(facts),
+        complaints=tuple(str(complaint) for complaint in rays.complaints),
+        diagnostics=found,
+        maps=tuple(maps),
+        intensity=field.intensity(),
+        notes=field.notes,
+        provenance=(
+            ("source", Path(name).name),
+            ("fingerprint", origin.fingerprint or "none: rays in memory"),
+            ("program", origin.software),
+            *steps,
+        ),
+    )
+
+
+def _standard(field: LightField) -> list[Observer]:
+    """The standard set about the light, far enough for its size."""
+    some = probe(field)
+    target = centre_of_light(some)
+    near = [Observer(theta, phi, DISTANCE, target=target) for theta, phi in VIEWS]
+    width = max(screen.width for screen in framed_screens(field, near, PIXELS, PIXELS))
+    return [Observer(theta, phi, max(DISTANCE, 10.0 * width), target=target) for theta, phi in VIEWS]

@@ -1,0 +1,145 @@
+"""A report says what single calls say, shows nothing else, loses nothing, and loads nothing."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import etendue as et
+import numpy as np
+import pytest
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.luminance.source_report import SourceReport
+from etendue.plot.report_page import PAGE_TYPES, report_html
+from etendue.quantities.measured import measured
+
+OBSERVERS = [et.Observer(10, 20, 800, target=(3, -2, 1)), et.Observer(50, 200, 800, target=(3, -2, 1))]
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two ring sources of different size side by side: nothing is symmetric."""
+    first = et.RingSource(radii=(2.0, 5.0), flux=(80, 30), rays=40_000, seed=3).ray_set().moved((3, -2, 1))
+    second = et.RingSource(radii=(1.0,), flux=(25,), rays=20_000, seed=4).ray_set().moved((-6, 1, 1))
+    path = tmp_path_factory.mktemp("report") / "two <rings> $x$.tm25ray"
+    et.write_rays(path, et.RaySet.merge([first, second]))
+    return path
+
+
+@pytest.fixture(scope="module")
+def report(file: Path) -> SourceReport:
+    return et.report_source(file, surface=et.Disk(radius=12, z=1), observers=OBSERVERS, forecast=False)
+
+
+class _Reader(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.images: list[str] = []
+        self.addresses: list[str] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name, value in attrs:
+            if name in {"src", "href", "data"}:
+                (self.images if tag == "img" else self.addresses).append(value or "")
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+@pytest.mark.slow
+def test_the_figures_are_those_of_single_calls(report: SourceReport, file: Path) -> None:
+    """Field, maps and intensity made one by one; flux, rays and format from the file itself."""
+    rays = et.read_rays(file)
+    field = et.LightField.fit(rays, et.Disk(radius=12, z=1))
+    assert [lmap.observer for lmap in report.maps] == OBSERVERS
+    for lmap, row in zip(report.maps, report.view_rows(), strict=True):
+        alone = et.luminance_map(field, lmap.observer, lmap.screen)
+        np.testing.assert_array_equal(lmap.values, alone.values)
+        brightest = np.unravel_index(alone.values.argmax(), alone.values.shape)
+        said = dict(row)
+        assert said["largest pixel"] == measured(alone.values[brightest], alone.standard_error[brightest], "cd/m²")
+        assert said["intensity"] == f"{alone.intensity:.4g} cd"
+        assert alone.relative_error is not None
+        assert said["error, weighted by flux"] == f"{alone.relative_error.flux_weighted:.2%}"
+    np.testing.assert_array_equal(report.intensity.values, field.intensity().values)
+    facts = dict(report.facts)
+    assert (facts["rays"], facts["format"]) == ("60,000", "IES TM-25 ray file")
+    assert float(facts["flux"].split()[0]) == pytest.approx(135.0)
+    assert report.notes == field.notes
+    assert dict(report.provenance)["fingerprint"] == rays.provenance.fingerprint
+
+
+@pytest.mark.slow
+def test_the_page_of_html_has_every_word_and_loads_nothing(report: SourceReport) -> None:
+    many = dataclasses.replace(report, complaints=tuple(f"complaint <{n}>" for n in range(9)), title="<b>$x$</b>")
+    reader = _Reader()
+    reader.feed(report_html(many))
+    assert len(reader.images) == len(report.maps) + 1
+    assert all(image.startswith("data:image/png;base64,") for image in reader.images)
+    assert not reader.addresses
+    text = " ".join(reader.text)
+    for words in (many.title, *many.complaints, *many.notes, *many.quality_lines, *many.sheet.lines()):
+        assert words in text
+    for label, value in (*many.facts, *many.provenance, *many.view_rows()[1]):
+        assert label in text
+        assert value in text
+    assert re.search(r"src:|url\(|@import|<script", report_html(many)) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("crowded", [False, True])
+def test_the_page_of_paper_is_whole(report: SourceReport, *, crowded: bool) -> None:
+    """Nothing is cut off at its edge, and what has no room is counted."""
+    shown = dataclasses.replace(report, facts=report.facts[:12])
+    if crowded:
+        shown = dataclasses.replace(
+            report,
+            complaints=tuple(f"warning: line {n}: {'a long complaint ' * 12}" for n in range(20)),
+            facts=tuple((f"fact {n}", "a long fact " * 9) for n in range(30)),
+            maps=report.maps * 6,
+        )
+    figure = et.plot_report(shown)
+    figure.canvas.draw()
+    wide, high = figure.canvas.get_width_height()
+    texts = [*figure.texts, *(text for axes in figure.axes for text in axes.texts)]
+    for text in texts:
+        box = text.get_window_extent()
+        assert 0 <= box.x0 < box.x1 <= wide or not text.get_text(), text
+        assert 0 <= box.y0 < box.y1 <= high or not text.get_text(), text
+    boxes = [text.get_window_extent().shrunk(0.98, 0.7) for text in figure.texts]
+    for number, box in enumerate(boxes):
+        assert box.count_overlaps(boxes[number + 1 :]) == 0, figure.texts[number]
+    words = " ".join(text.get_text() for text in texts)
+    left_out = [int(number) for number in re.findall(r"and (\d+) (?:more|other views)", words)]
+    # Facts of two lines, complaints of three, in rooms of 20 and 6 lines; 12 views in a table of six.
+    assert left_out == ([20, 18, 6] if crowded else [])
+    assert "signature" in words
+
+
+@pytest.mark.slow
+def test_files_repeat_their_bytes_and_unknown_ones_are_told(report: SourceReport, tmp_path: Path) -> None:
+    for suffix in PAGE_TYPES:
+        for name in ("a", "b"):
+            et.plot_report(report, tmp_path / f"{name}{suffix}")
+        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+    assert len((tmp_path / "a.html").read_bytes()) < 1_500_000
+    with pytest.raises(UnknownNameError, match=r"\.htlm.*\.html"):
+        et.plot_report(report, tmp_path / "a.htlm")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(f"{n}{s}" for n in "ab" for s in PAGE_TYPES)
+
+
+@pytest.mark.slow
+def test_the_standard_views_stand_about_the_light(file: Path) -> None:
+    found = et.report_source(et.read_rays(file), surface=et.Disk(radius=12, z=1), forecast=False, title="Mine")
+    assert [(lmap.observer.theta, lmap.observer.phi) for lmap in found.maps] == [(0, 0), (30, 0), (60, 0), (60, 90)]
+    assert len({(lmap.screen.width, lmap.screen.height) for lmap in found.maps}) == 1
+    assert found.maps[0].screen.width > 14  # from -7 to 8 mm
+    assert found.title == "Mine"
+
+
+def test_no_observers_are_refused(file: Path) -> None:
+    with pytest.raises(ArgumentError, match="observers is empty"):
+        et.report_source(file, observers=[])
