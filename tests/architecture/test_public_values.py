@@ -97,7 +97,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "ScatterEvents": lambda: result().events["scatter"],
     "Screen": lambda: et.Screen(2, 1, 8, 4),
     "SourceReport": lambda: et.report_source(
-        rays(), surface=et.Disk(radius=30), observers=[et.Observer()], forecast=False
+        rays(), surface=et.Disk(radius=30), observers=[et.Observer(10, 0, 500)], forecast=False
     ),
     "Spectrum": lambda: et.Spectrum([450.0, 650.0], [1.0, 0.5]),
     "SweepTable": lambda: et.sweep(scene(), {"paper.at.2": [20, 30]}, ["escaped", "absorbed:paper"], rays=1000),
