@@ -43,6 +43,9 @@ FACT_LINES, COMPLAINT_LINES = 20, 6
 MOST_ROWS = 6
 """Of the table of views."""
 
+LEAST = 1e-4
+"""Share of the flux above which a zone is worth a line."""
+
 LOW = 0.9
 """Height of the polar diagram where there is little room [inches]."""
 
@@ -213,8 +216,10 @@ def _draw_intensity(figure: Figure, report: SourceReport, y: float) -> None:
     y = _lines(figure, x, _heading(figure, x, y - 0.22, "As a data sheet has it"), words) - 0.5 * LINE
     unit = report.intensity.flux_unit
     y = _heading(figure, x, y, "Flux by zones of γ")
+    # Of the rest a page of HTML tells.
+    least = LEAST * report.intensity.flux
     zones = [
-        (f"{low:g}° to {high:g}°", f"{flux:.4g} {unit}") for low, high, flux, _ in report.sheet.zones if flux > 0.0
+        (f"{low:g}° to {high:g}°", f"{flux:.3g} {unit}") for low, high, flux, _ in report.sheet.zones if flux > least
     ]
     for number, (where, flux_text) in enumerate(zones):
         column, row = divmod(number, math.ceil(len(zones) / 3))
