@@ -20,6 +20,7 @@ RAYS = 500_000
 
 
 def main() -> None:
+    """Draw both."""
     source = PackagedLed()
     position, direction = source.rays(RAYS, seed=1)
     rays = et.RaySet(position, direction, np.full(RAYS, source.total_flux / RAYS))
