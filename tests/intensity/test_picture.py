@@ -73,7 +73,7 @@ def test_a_polar_picture_names_the_half_planes_and_marks_the_edges_of_the_beam()
     figure = plot_intensity(led)
     places = {text.get_text(): text.get_position()[0] for text in figure.axes[0].texts}
     assert places["C0, C90"] > 0 > places["C180, C270"]
-    dotted = [line for line in figure.axes[0].lines if line.get_linestyle() not in {"-", "--", "-."}]
+    dotted = [line for line in figure.axes[0].lines if line.is_dashed()]
     angles = [np.degrees(np.arctan2(line.get_xdata()[1], -line.get_ydata()[1])) for line in dotted]
     found = [one for sheet in et.data_sheet(led).beam for one in (sheet.left, sheet.right)]
     assert sorted(np.round(angles, 6)) == sorted(np.round(found, 6))

@@ -45,7 +45,7 @@ class DataSheet:
     --------
     >>> sheet = data_sheet(Intensity(c=[0], gamma=[0, 30, 60], values=[[100.0, 50, 0]]))
     >>> sheet.beam[0].right, round(sheet.zones[0][2], 2)
-    (30.0, 8.48)
+    (30.0, 8.49)
     """
 
     beam: tuple[BeamAngle, ...]
