@@ -69,7 +69,7 @@ def test_a_picture_per_klm_is_that_of_the_lamps_flux(kind: str) -> None:
 
 
 def test_a_polar_picture_names_the_half_planes_and_marks_the_edges_of_the_beam() -> None:
-    led = Intensity([0, 90, 180, 270], [0, 60, 180], [[10, 8, 0], [10, 2, 0], [10, 3, 0], [10, 4, 0]])
+    led = Intensity([0, 90, 180, 270], [0, 60, 120, 180], [[10, 8, 1, 0], [10, 2, 1, 0], [10, 3, 1, 0], [10, 4, 1, 0]])
     figure = plot_intensity(led)
     places = {text.get_text(): text.get_position()[0] for text in figure.axes[0].texts}
     assert places["C0, C90"] > 0 > places["C180, C270"]
