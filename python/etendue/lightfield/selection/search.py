@@ -124,7 +124,7 @@ def choose_surface(
     some = pilot_sample(rays, settings.compared_rays)
     if len(some) < FEWEST:
         raise ArgumentError(
-            f"{len(some)} rays with flux are too few to choose a surface by; state one, such as surface='sphere'."
+            f"{len(some)} rays with flux are too few to choose a carrier surface by; state one, such as sphere."
         )
     return _Search(some, seed, threads, settings, step).choice()
 
