@@ -193,6 +193,18 @@ def test_models_are_those_of_the_scatter_package(name: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", LOBE_MODELS)
+@pytest.mark.parametrize("aspect", [0.4, 3.0])
+def test_a_lobe_has_one_axis_along_which_it_is_narrow(name: str, aspect: float) -> None:
+    """The same f in every direction, however axis and aspect are told; only the aspect changes sides of 1."""
+    model = LOBE_MODELS[name]
+    told = model.start(peak=60.0, width=0.03, aspect=aspect, azimuth=0.7, floor=0.1)
+    found = model.normal_form(told)
+    off = np.random.default_rng(1).normal(scale=0.05, size=(100, 2))
+    np.testing.assert_allclose(model.f(found, off), model.f(told, off), rtol=1e-12)
+    assert np.exp(found[2]) == pytest.approx(max(aspect, 1 / aspect))
+
+
 def test_what_is_mirrored_is_told_apart() -> None:
     """2 % under a lobe, which Richardson and Lucy alone take for a part of it; where there is none, none is told."""
     lobe = et.bsdf.Gaussian(peak=60.0, sigma=0.02, aspect=2.0)

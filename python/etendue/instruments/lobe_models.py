@@ -48,6 +48,22 @@ class LobeModel(abc.ABC):
         """Parameters near those of another model."""
         return np.array([*other[:5], *self.extra])
 
+    def normal_form(self, parameters: Array) -> Array:
+        """The same lobe, wider across its axis than along it: axis and aspect can be told in two ways.
+
+        Examples
+        --------
+        >>> model = lobe_model("gaussian")
+        >>> flat = model.start(peak=60.0, width=0.016, aspect=0.5, azimuth=0.3, floor=0.1)
+        >>> np.exp(model.normal_form(flat)[1:3]).round(6).tolist()
+        [0.008, 2.0]
+        """
+        if parameters[2] >= 0.0:
+            return parameters
+        result = parameters.copy()
+        result[1:4] = parameters[1] + parameters[2], -parameters[2], parameters[3] + 0.5 * np.pi
+        return result
+
     def f(self, parameters: Array, off: Array) -> Array:
         """F [1/sr] at β − β₀ of shape (…, 2)."""
         peak, width, aspect = np.exp(np.clip(parameters[:3], -LARGEST_LOG, LARGEST_LOG))

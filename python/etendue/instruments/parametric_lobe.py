@@ -202,7 +202,7 @@ def parametric_lobe(
     least = min(scores, key=lambda name: scores[name])
     alike = [one for one in candidates if _alike(missed[one.name], missed[least])]
     best = min(alike, key=lambda one: (len(one.extra), scores[one.name]))
-    parameters = _fit(seen, counted.counts, best, [fits[best.name]])
+    parameters = best.normal_form(_fit(seen, counted.counts, best, [fits[best.name]]))
     expected = seen.expected(best, parameters)
     slopes = _slopes(lambda p: seen.expected(best, p), parameters)
     information = np.einsum("np,n,nq->pq", slopes, 1.0 / np.maximum(expected, 1e-9), slopes)
