@@ -6,6 +6,7 @@ usage: python docs/gallery_page.py [NAME …]      NAME: an example whose thumbn
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 import tempfile
@@ -59,10 +60,23 @@ def page() -> str:
         paragraphs = text.split("\n\n")
         title, colon, rest = " ".join(paragraphs[0].split()).rstrip(".").partition(": ")
         title = title if colon and len(title) < 60 else title.partition(",")[0]
-        words = [" ".join(one.split()) for one in paragraphs[1:] if not one.startswith((" ", "usage", "``"))]
-        said = " ".join([f"{rest[:1].upper()}{rest[1:]}." if rest else "", *words]).strip()
+        said = in_markdown([f"{rest[:1].upper()}{rest[1:]}." if rest else "", *paragraphs[1:]])
         parts.append(f"## {title}\n\n![{title}](figures/{picture})\n\n{said} [{name}.py](../examples/{name}.py)\n")
     return "\n".join(parts)
+
+
+def in_markdown(paragraphs: list[str]) -> str:
+    """Paragraphs of a docstring run on as one, but for lists, whose items stay lines; usage and blocks are left out."""
+    said = ""
+    for one in paragraphs:
+        if one.startswith((" ", "usage", "``")):
+            continue
+        items = re.split(r"^- ", one, flags=re.MULTILINE)
+        words = [" ".join(item.split()) for item in items]
+        said = f"{said} {words[0]}".strip() if words[0] else said
+        if words[1:]:
+            said = "\n".join([f"{said}\n", *(f"- {item}" for item in words[1:]), "\n"])
+    return re.sub(r"\n\n +", "\n\n", said).strip()
 
 
 def make_thumbnail(name: str) -> None:
