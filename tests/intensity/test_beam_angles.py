@@ -129,8 +129,8 @@ def test_the_angle_errs_as_stated(step: float, noise: float, share: float) -> No
 
 @pytest.mark.slow
 def test_the_angle_of_rays_errs_about_as_stated() -> None:
-    """Rays of cos⁴⁰ γ: of 60 sets, the truth lies within two stated errors of the angle in more than 80 %, as in 95 % of a
-    normal: steps that suit the rays widen a beam by a part of the error, which no error bar shows."""
+    """Rays of cos⁴⁰ γ, 60 sets: the truth lies within two stated errors in no less than 90 %. It is not 95, since steps that
+    suit the rays widen a beam by a part of the error, which no error bar shows."""
     wanted = 2 * math.degrees(math.acos(0.5 ** (1 / 40)))
     inside = 0
     for seed in range(60):
@@ -141,7 +141,6 @@ def test_the_angle_of_rays_errs_about_as_stated() -> None:
         rays = et.RaySet(np.zeros_like(direction), direction, np.full(20_000, 0.005))
         found = beam_angle(et.intensity_distribution(rays))
         inside += abs(found.angle - wanted) < 2 * found.standard_error
-    assert stats.binom.sf(inside, 60, 0.95) < 1 - SIGNIFICANCE
     assert stats.binom.cdf(inside, 60, 0.90) > SIGNIFICANCE
 
 

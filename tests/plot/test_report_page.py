@@ -140,6 +140,18 @@ def test_the_standard_views_stand_about_the_light(file: Path) -> None:
     assert found.title == "Mine"
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [3_000, 30_000])
+def test_what_more_rays_would_bring_is_told_or_why_not(number: int) -> None:
+    told: list[int] = []
+    rays = et.RingSource(rays=number).ray_set()
+    found = et.report_source(rays, surface=et.Disk(radius=30), observers=OBSERVERS[:1], progress=told.append)
+    few = [note for note in found.notes if "too few to forecast" in note]
+    assert (found.diagnostics.forecast is None) == (number < 4_000) == bool(few)
+    assert told == sorted(told)
+    assert told[-1] == (number if few else 2 * number)
+
+
 def test_no_observers_are_refused(file: Path) -> None:
     with pytest.raises(ArgumentError, match="observers is empty"):
         et.report_source(file, observers=[])

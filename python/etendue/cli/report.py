@@ -13,7 +13,6 @@ from etendue.cli.luminance import parse_angles
 from etendue.cli.options import Flux, Json, Threads, Unit
 from etendue.cli.terminal import check_outputs, complain, numbers, print_json, progress_bar, say
 from etendue.formats.rays import read_rays
-from etendue.lightfield.forecast import REFITS
 from etendue.luminance.source_report import DISTANCE, report_source
 from etendue.plot.report_page import PAGE_TYPES, plot_report
 from etendue.quantities.observer import Observer
@@ -63,7 +62,7 @@ def report(
     elif target is not None or distance != DISTANCE:
         raise typer.BadParameter("--target and --distance: for observers that are stated; give --observer too")
     rays = in_unit(with_flux(read_rays(file), flux), unit)
-    with progress_bar("rays", len(rays)) as progress, progress_bar("refits", REFITS) as refits:
+    with progress_bar("rays", (2 if forecast else 1) * len(rays)) as progress:
         found = report_source(
             rays,
             surface=carrier,
@@ -73,7 +72,6 @@ def report(
             seed=seed,
             threads=threads,
             progress=progress,
-            refits=refits,
         )
     for path in output:
         plot_report(found, path)

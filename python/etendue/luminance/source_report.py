@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 import re
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from etendue.errors import ArgumentError
 from etendue.formats.rays import read_rays
 from etendue.formats.rays.facts import fact_rows, ray_facts
 from etendue.lightfield.diagnostics import Diagnostics, diagnose
+from etendue.lightfield.forecast import FEWEST_RAYS, REFITS
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Surface
 from etendue.luminance.estimate import luminance_map
@@ -79,7 +81,7 @@ class SourceReport:
         """Title and number of views."""
         return f"<SourceReport of {self.title}, {len(self.maps)} maps>"
 
-    @property
+    @functools.cached_property
     def sheet(self) -> DataSheet:
         """Beam and field angle, cut-off, zonal flux."""
         return data_sheet(self.intensity)
@@ -139,7 +141,6 @@ def report_source(
     seed: int = 1,
     threads: int | None = None,
     progress: Progress | None = None,
-    refits: Progress | None = None,
 ) -> SourceReport:
     """Fit a light field to rays, look at it from a standard set of directions, and say how sure everything is.
 
@@ -155,13 +156,14 @@ def report_source(
     title : str, optional
         Name of the file if not given.
     forecast : bool
-        Whether parts of the rays are fitted again to say what more of them would bring, for about the time of the fit.
+        Whether parts of the rays are fitted again to say what more of them would bring, for about the time of the fit. A
+        note tells if there are too few, 4 000.
     seed : int
         Of the rays held out.
     threads : int, optional
         All cores if not given; the result does not depend on it.
-    progress, refits : callable, optional
-        Told how many rays have been fitted, and how many refits are done.
+    progress : callable, optional
+        Told how many rays have been fitted; with a forecast they count once more for its fits.
 
     Returns
     -------
@@ -188,7 +190,14 @@ def report_source(
         raise ArgumentError("report_source: the sequence of observers is empty; give at least one.")
     facts = fact_rows(ray_facts(rays, name))
     field = LightField.fit(rays, surface, seed=seed, threads=threads, progress=progress)
-    found = diagnose(field, rays if forecast else None, seed=seed, threads=threads, progress=refits)
+
+    def refitted(done: int) -> None:
+        if progress is not None:
+            progress(len(rays) * (REFITS + done) // REFITS)
+
+    enough = len(rays) >= FEWEST_RAYS
+    few = [f"{len(rays):,} rays are too few to forecast what more would bring; {FEWEST_RAYS:,} are not"]
+    found = diagnose(field, rays if forecast and enough else None, seed=seed, threads=threads, progress=refitted)
     views = list(observers) if observers is not None else _standard(field)
     largest = max(framed_screens(field, views, PIXELS, PIXELS), key=lambda screen: screen.width)
     screen = Screen(largest.width, largest.height, PIXELS, PIXELS)
@@ -202,7 +211,7 @@ def report_source(
         diagnostics=found,
         maps=tuple(maps),
         intensity=field.intensity(),
-        notes=field.notes,
+        notes=(*field.notes, *(few if forecast and not enough else [])),
         provenance=(
             ("source", Path(name).name),
             ("fingerprint", origin.fingerprint or "none: rays in memory"),

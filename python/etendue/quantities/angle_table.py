@@ -24,7 +24,7 @@ def gaps_of(c: Array) -> Array:
 
 
 def kinks_along(gamma: Array, values: Array) -> npt.NDArray[np.bool_]:
-    """Where rows of values are not linear across a node γ; the ends of a row, and what stands twice, always count.
+    """Where values, shape (rows, n_gamma), are not linear across a node γ [°]; the ends, and what stands twice, count.
 
     Examples
     --------

@@ -14,7 +14,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.angle_table import gaps_of, kinks_along, kinks_around
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import NEIGHBOURS
-from etendue.quantities.node_errors import covariance_around, known_errors
+from etendue.quantities.node_errors import known_errors, shared_around
 
 Array = npt.NDArray[np.float64]
 Reference = Literal["maximum", "centre"]
@@ -142,7 +142,7 @@ def beam_angle(
     left, right = (
         float(edge[0]) for edge in _edges(curve.gamma, curve.values[None], curve.errors, np.array([share * top]))
     )
-    error = _angle_error(curve, share * top, share * top_error, together=intensity.smooth)
+    error = _angle_error(intensity, plane, curve, share * top, share * top_error)
     return BeamAngle(plane, share, right - left, error, left, right)
 
 
@@ -177,7 +177,7 @@ def cut_off_angle(intensity: Intensity, share: float = CUT_OFF) -> float:
     dark = [] if intensity.gamma[-1] == 180.0 else [0.0]
     gamma = np.append(intensity.gamma, intensity.gamma[-1:] if dark else [])
     edge = np.zeros((intensity.c.size, len(dark)))
-    values, errors = np.hstack([intensity.values, edge]), np.hstack([intensity.standard_error, edge])
+    values, errors = np.hstack([intensity.values, edge]), np.hstack([known_errors(intensity), edge])
     # Between two planes the function lies between theirs, and so does its last edge.
     _, last = _edges(gamma, values, errors, np.full(intensity.c.size, share * intensity.peak_intensity))
     return float(np.nanmax(last, initial=0.0))
@@ -192,7 +192,6 @@ class _Curve(NamedTuple):
     gamma: Array
     values: Array
     errors: Array
-    alike: tuple[Array, Array]  # γ ≥ 0, and the correlation of the errors of both half planes there
 
 
 def _signed(intensity: Intensity, plane: float) -> _Curve:
@@ -206,7 +205,6 @@ def _signed(intensity: Intensity, plane: float) -> _Curve:
         np.concatenate([-angles[::-1], angles]),
         np.concatenate([np.pad(left, dark)[::-1], np.pad(right, dark)]),
         np.concatenate([np.pad(left_error, dark)[::-1], np.pad(right_error, dark)]),
-        _alike(intensity, plane),
     )
 
 
@@ -239,12 +237,12 @@ def _edges(gamma: Array, values: Array, errors: Array, limits: Array) -> tuple[A
     return np.where(none, np.nan, left), np.where(none, np.nan, right)
 
 
-def _angle_error(curve: _Curve, limit: float, limit_error: float, *, together: bool) -> float:
+def _angle_error(intensity: Intensity, plane: float, curve: _Curve, limit: float, limit_error: float) -> float:
     """Standard error of the angle between the edges [°]."""
     if np.isnan(curve.errors).any():
         return math.nan
     off = limit_error if math.isfinite(limit_error) else 0.0
-    if together:
+    if intensity.smooth:
         shifts = [
             curve.errors * (curve.gamma < 0.0),
             curve.errors * (curve.gamma >= 0.0),
@@ -261,7 +259,7 @@ def _angle_error(curve: _Curve, limit: float, limit_error: float, *, together: b
     right, other = math.cos(turn) * white[..., 1:] + math.sin(turn) * white[..., :-1]
     # What both half planes have in common stands at the same |γ|; the first draw is that of the right one.
     mirror = np.stack([np.interp(-gamma, gamma, row) for row in right])
-    alike = np.where(gamma < 0.0, np.interp(-gamma, *curve.alike), 0.0)
+    alike = np.where(gamma < 0.0, np.interp(-gamma, intensity.gamma, _alike(intensity, plane)), 0.0)
     noise = errors * (alike * mirror + np.sqrt(1.0 - alike**2) * np.where(gamma < 0.0, other, right))
     drawn = _widths(
         curve._replace(gamma=gamma, values=curve.values[nodes], errors=errors),
@@ -272,12 +270,12 @@ def _angle_error(curve: _Curve, limit: float, limit_error: float, *, together: b
     return float(drawn[known].std(ddof=1)) if known.sum() > 1 else math.nan
 
 
-def _alike(intensity: Intensity, plane: float) -> tuple[Array, Array]:
-    """Correlation of the errors of both half planes over γ: rows of few nodes around the axis have rays in common."""
+def _alike(intensity: Intensity, plane: float) -> Array:
+    """Correlation of the errors of both half planes at each γ: rows of few nodes around the axis have rays in common."""
     rows = np.ones(intensity.gamma.size)
     for row, around in enumerate(kinks_around(intensity.c, intensity.values).T):
         rows[row] = _alike_around(intensity.c[around], plane) if around.sum() > 1 else 1.0
-    return intensity.gamma, rows
+    return rows
 
 
 def _alike_around(c: Array, plane: float) -> float:
@@ -288,8 +286,8 @@ def _alike_around(c: Array, plane: float) -> float:
         share = np.mod(at - c[first], 360.0) / gaps_of(c)[first]
         weights[number, first] += 1.0 - share
         weights[number, (first + 1) % c.size] += share
-    found = weights @ covariance_around(c.size) @ weights.T
-    return float(found[0, 1] / math.sqrt(found[0, 0] * found[1, 1]))
+    right, left = weights
+    return shared_around(right, left) / math.sqrt(shared_around(right, right) * shared_around(left, left))
 
 
 def _widths(curve: _Curve, noise: Array, limits: Array) -> Array:

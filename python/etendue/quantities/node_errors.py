@@ -12,7 +12,9 @@ Array = npt.NDArray[np.float64]
 
 
 def known_errors(intensity: Intensity) -> Array:
-    """Standard errors of the nodes: where a table with errors knows none, that of a single ray, which is its value.
+    """Standard errors of the nodes, shape (n_c, n_gamma) [unit of the intensity].
+
+    Where a table with errors knows none, it is that of a single ray, which is its value.
 
     Examples
     --------
@@ -24,13 +26,19 @@ def known_errors(intensity: Intensity) -> Array:
     return np.where(np.isnan(errors) & np.isfinite(errors).any(), np.abs(intensity.values), errors)
 
 
-def covariance_around(nodes: int) -> Array:
-    """Of the errors of nodes around the axis, in units of their squares; of two, each is the other's neighbour twice.
+def shared_around(first: Array, second: Array) -> float:
+    """Covariance of two sums over nodes around the axis, in units of the squares of their errors.
+
+    Parameters
+    ----------
+    first, second : array, shape (n,)
+        Weight of each node in the two sums. Neighbours have the correlation ¼; of two nodes, each is the other's
+        neighbour twice.
 
     Examples
     --------
-    >>> covariance_around(2).tolist()
-    [[1.0, 0.5], [0.5, 1.0]]
+    >>> shared_around(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+    0.5
     """
-    one = np.eye(nodes)
-    return one + NEIGHBOURS * (np.roll(one, 1, axis=0) + np.roll(one, -1, axis=0))
+    beside = np.roll(second, 1) + np.roll(second, -1)
+    return float(first @ second + NEIGHBOURS * (first @ beside))

@@ -12,7 +12,7 @@ from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import gaps_of, hat_integrals, kinks_along, kinks_around
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import NEIGHBOURS
-from etendue.quantities.node_errors import covariance_around, known_errors
+from etendue.quantities.node_errors import known_errors, shared_around
 
 Array = npt.NDArray[np.float64]
 
@@ -59,15 +59,20 @@ def zonal_flux(intensity: Intensity, edges: npt.ArrayLike) -> tuple[Array, Array
     planes = (gaps + np.roll(gaps, 1)) / 2.0
     flux = np.asarray(weights @ (planes @ intensity.values))
     errors = known_errors(intensity)
+    if np.isnan(errors).all():
+        return flux, np.full(flux.size, np.nan)
     if intensity.smooth:
         return flux, np.asarray(weights @ (planes @ errors))
     kinks = kinks_around(intensity.c, intensity.values)
     around = np.array([_around(intensity.c, *row) for row in zip(kinks.T, errors.T, strict=True)])
     # Between two rows of nodes the function is linear in γ: its weight is that of the two.
     rows = kinks_along(intensity.gamma, intensity.values).any(axis=0)
-    gamma = intensity.gamma[rows]
-    hats = np.stack([np.interp(intensity.gamma, gamma, one) for one in np.eye(gamma.size)])
-    spread = (weights @ hats.T) * around[rows]
+    nodes = intensity.gamma[rows]
+    row, up = _between(nodes, intensity.gamma)
+    spread = np.zeros((wanted.size - 1, nodes.size))
+    np.add.at(spread.T, row, ((1.0 - up) * weights).T)
+    np.add.at(spread.T, row + 1, (up * weights).T)
+    spread *= around[rows]
     return flux, np.sqrt((spread**2).sum(axis=1) + 2.0 * NEIGHBOURS * (spread[:, 1:] * spread[:, :-1]).sum(axis=1))
 
 
@@ -78,12 +83,17 @@ def _zone_weights(gamma: Array, low: float, high: float) -> Array:
     if not high > low:
         return weights
     inner = np.concatenate([[low], gamma[(gamma > low) & (gamma < high)], [high]])
-    row = (np.searchsorted(gamma, inner, side="right") - 1).clip(0, gamma.size - 2)
-    up = (inner - gamma[row]) / (gamma[row + 1] - gamma[row])
+    row, up = _between(gamma, inner)
     hats = hat_integrals(inner)
     np.add.at(weights, row, (1.0 - up) * hats)
     np.add.at(weights, row + 1, up * hats)
     return weights
+
+
+def _between(gamma: Array, wanted: Array) -> tuple[npt.NDArray[np.intp], Array]:
+    """The node before each angle, and how far it is on the way to the next one, 0 to 1."""
+    row = (np.searchsorted(gamma, wanted, side="right") - 1).clip(0, gamma.size - 2)
+    return row, (wanted - gamma[row]) / (gamma[row + 1] - gamma[row])
 
 
 def _around(c: Array, kinks: npt.NDArray[np.bool_], errors: Array) -> float:
@@ -92,4 +102,4 @@ def _around(c: Array, kinks: npt.NDArray[np.bool_], errors: Array) -> float:
         return 2.0 * math.pi * float(errors[0])
     gaps = np.radians(gaps_of(c[kinks]))
     spread = errors[kinks] * (gaps + np.roll(gaps, 1)) / 2.0
-    return math.sqrt(float(spread @ covariance_around(spread.size) @ spread))
+    return math.sqrt(shared_around(spread, spread))
