@@ -17,6 +17,8 @@ from etendue.cli.field import complaints_of, read_source, surface_option
 from etendue.cli.options import Flux, Json, Regions, Threads, Unit
 from etendue.cli.orbit import alike, around, moving_outputs
 from etendue.cli.terminal import (
+    angles,
+    both_sides,
     check_outputs,
     complain,
     count,
@@ -228,7 +230,7 @@ def luminance(
             raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
     else:
         upright = None if up is None else _three(up, "--up", "0,0,1")
-        who = [("", Observer(theta, phi, distance, up=upright, roll=roll)) for theta, phi in parse_angles(observer)]
+        who = [("", Observer(theta, phi, distance, up=upright, roll=roll)) for theta, phi in angles(observer)]
     if orbit is not None:
         who = [("", one) for one in around([one for _, one in who], orbit)]
     moving, single = moving_outputs(output, orbit)
@@ -357,19 +359,6 @@ def _targets(output: list[Path], who: list[tuple[str, Observer]]) -> list[list[P
     return targets
 
 
-def parse_angles(observer: list[str] | None) -> list[tuple[float, ...]]:
-    """θ and φ of each observer that is stated.
-
-    Raises
-    ------
-    typer.BadParameter
-        If there is none, or one is no pair of numbers.
-    """
-    if not observer:
-        raise typer.BadParameter("give at least one, e.g. --observer 30,0", param_hint="--observer")
-    return [numbers(text, 2, "--observer", "30,0") for text in observer]
-
-
 def _views(
     source: Scene | RaySet | LightField | None,
     observers: list[Observer],
@@ -379,7 +368,7 @@ def _views(
     plane: str,
 ) -> tuple[list[Observer], list[Screen]]:
     """Observers of the target with their screens: of the stated size, or framed to what each sees of the source."""
-    columns, rows = whole_numbers(pixels if "," in pixels else f"{pixels},{pixels}", 2, "--pixels", "128,128")
+    columns, rows = whole_numbers(both_sides(pixels), 2, "--pixels", "128,128")
     to_frame = size is None and plane == "view"
     if target is not None:
         x, y, z = _three(target, "--target", "0,0,0")
@@ -393,7 +382,7 @@ def _views(
     if size is None:
         raise typer.BadParameter("give the screen's width and height in mm, e.g. --size 25,25", param_hint="--size")
     # One number is a square.
-    width, height = numbers(size if "," in size else f"{size},{size}", 2, "--size", "25,25")
+    width, height = numbers(both_sides(size), 2, "--size", "25,25")
     return observers, [Screen(width, height, columns, rows, "xy" if plane == "xy" else "view")] * len(observers)
 
 

@@ -9,9 +9,8 @@ import typer
 
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.field import surface_option
-from etendue.cli.luminance import parse_angles
 from etendue.cli.options import Flux, Json, Threads, Unit
-from etendue.cli.terminal import check_outputs, complain, numbers, print_json, progress_bar, say
+from etendue.cli.terminal import angles, check_outputs, complain, numbers, print_json, progress_bar, say
 from etendue.formats.rays import read_rays
 from etendue.luminance.source_report import DISTANCE, report_source
 from etendue.plot.report_page import PAGE_TYPES, plot_report
@@ -58,7 +57,7 @@ def report(
     views = None
     if observer is not None:
         x, y, z = (0.0, 0.0, 0.0) if target is None else numbers(target, 3, "--target", "0,0,0.3")
-        views = [Observer(theta, phi, distance, target=(x, y, z)) for theta, phi in parse_angles(observer)]
+        views = [Observer(theta, phi, distance, target=(x, y, z)) for theta, phi in angles(observer)]
     elif target is not None or distance != DISTANCE:
         raise typer.BadParameter("--target and --distance: for observers that are stated; give --observer too")
     rays = in_unit(with_flux(read_rays(file), flux), unit)

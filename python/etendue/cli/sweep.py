@@ -12,6 +12,8 @@ from etendue.cli.guard import require_apart
 from etendue.cli.options import Json, Threads
 from etendue.cli.terminal import (
     INTERRUPTED,
+    angles,
+    both_sides,
     check_outputs,
     complain,
     count,
@@ -173,8 +175,7 @@ def _observers(texts: list[str] | None, distance: float, target: str) -> list[Ob
     if not texts:
         return None
     x, y, z = numbers(target, 3, "--target", "0,0,0")
-    angles = [numbers(text, 2, "--observer", "30,0") for text in texts]
-    return [Observer(theta, phi, distance, (x, y, z)) for theta, phi in angles]
+    return [Observer(theta, phi, distance, (x, y, z)) for theta, phi in angles(texts)]
 
 
 def _screen(size: str | None, pixels: str, *, stated: bool) -> Screen | tuple[int, int] | None:
@@ -183,11 +184,10 @@ def _screen(size: str | None, pixels: str, *, stated: bool) -> Screen | tuple[in
         if size is not None:
             raise typer.BadParameter("--size: for --observer; the scene's own observers have screens of their own")
         return None
-    columns, rows = whole_numbers(pixels if "," in pixels else f"{pixels},{pixels}", 2, "--pixels", PIXELS)
+    columns, rows = whole_numbers(both_sides(pixels), 2, "--pixels", PIXELS)
     if size is None:
         return columns, rows
-    # One number is a square.
-    width, height = numbers(size if "," in size else f"{size},{size}", 2, "--size", "25,25")
+    width, height = numbers(both_sides(size), 2, "--size", "25,25")
     return Screen(width, height, columns, rows)
 
 

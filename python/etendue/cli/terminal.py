@@ -170,6 +170,30 @@ def numbers(text: str, count: int, option: str, example: str) -> tuple[float, ..
     return values
 
 
+def angles(texts: list[str] | None) -> list[tuple[float, ...]]:
+    """θ and φ of each observer that is stated [°].
+
+    Raises
+    ------
+    typer.BadParameter
+        If there is none, or one is no pair of numbers.
+    """
+    if not texts:
+        raise typer.BadParameter("give at least one, e.g. --observer 30,0", param_hint="--observer")
+    return [numbers(text, 2, "--observer", "30,0") for text in texts]
+
+
+def both_sides(text: str) -> str:
+    """Width and height of an option: one number is a square.
+
+    Examples
+    --------
+    >>> both_sides("25"), both_sides("25,10")
+    ('25,25', '25,10')
+    """
+    return text if "," in text else f"{text},{text}"
+
+
 def whole_numbers(text: str, count: int, option: str, example: str) -> tuple[int, ...]:
     """Like `numbers`, for counts: a fraction is refused, never cut off.
 
