@@ -17,8 +17,13 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.scene import compile_scene
+from oracles.samples import SAMPLES
+from oracles.step import half_ball
 
 from docs.pages import PAGES, ROOT, Block, blocks, name_of
+
+PUBLIC = "Cyl10k.1.tm25ray"
+"""The file of the tutorial."""
 
 LANGUAGES = {"python", "console", "toml", "text", "sh"}
 """``python`` and ``console`` run here, ``toml`` is a scene that is compiled; ``text`` is shown only; ``sh`` installs and
@@ -65,7 +70,34 @@ def materials(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "diffuser.toml").write_text(lobe_of, encoding="utf-8")
     brushed = 'kind = "gaussian"\npeak = 9.0\nsigma = 0.06\naspect = 3.0\naxis = [1, 0, 0]\n'
     (folder / "brushed.toml").write_text(brushed, encoding="utf-8")
+    shutil.copy(ROOT / "examples" / "half-ball.step", folder)
+    public = SAMPLES / "rays" / PUBLIC
+    if public.is_file():
+        shutil.copy(public, folder)
+    else:
+        et.write_rays(folder / PUBLIC, cylinder(rng, 10_000))
     return folder
+
+
+def cylinder(rng: np.random.Generator, n: int) -> et.RaySet:
+    """Rays of a Lambertian side of a cylinder, which stands in for the public file of the tutorial."""
+    phi, lean = rng.uniform(0, 2 * np.pi, n), rng.uniform(0, 2 * np.pi, n)
+    cos = np.sqrt(rng.random(n))
+    sin = np.sqrt(1 - cos**2)
+    out, around = np.stack([np.cos(phi), np.sin(phi), 0 * phi], 1), np.stack([-np.sin(phi), np.cos(phi), 0 * phi], 1)
+    up = np.array([0.0, 0.0, 1.0])
+    direction = cos[:, None] * out + sin[:, None] * (np.cos(lean)[:, None] * around + np.sin(lean)[:, None] * up)
+    position = 0.65 * out + rng.uniform(9, 13, n)[:, None] * up
+    return et.RaySet(position, direction, np.full(n, 1.0 / n))
+
+
+def test_the_tutorial_runs_on_its_public_file(samples: Path, materials: Path) -> None:
+    """Without the sample files another one stands in for it, and this test is skipped."""
+    assert (materials / PUBLIC).read_bytes() == (samples / "rays" / PUBLIC).read_bytes()
+
+
+def test_the_lens_of_the_tutorial_is_half_a_ball() -> None:
+    assert (ROOT / "examples" / "half-ball.step").read_text(encoding="ascii") == half_ball(8.0)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
