@@ -8,7 +8,6 @@ from pathlib import Path
 
 import hypothesis
 import pytest
-from oracles.samples import SAMPLES
 
 # The same examples in every run: a failure is a failure, not a draw.
 hypothesis.settings.register_profile("fixed", derandomize=True, deadline=None)
@@ -27,13 +26,16 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chro
 COUNTED = {NO_SAMPLES: "the sample files are not there", NO_BROWSER: NO_BROWSER, NO_NODE: NO_NODE}
 """Reasons for which tests are skipped that are counted at the end, and what is said of them."""
 
+ROOT = Path(__file__).resolve().parents[1]
+
 
 @pytest.fixture(scope="session")
 def samples() -> Path:
     """The folder of real, freely licensed ray and intensity files, which is kept beside the project."""
-    if not SAMPLES.is_dir():
+    folder = ROOT.parent / "shared" / "samples"
+    if not folder.is_dir():
         pytest.skip(NO_SAMPLES)
-    return SAMPLES
+    return folder
 
 
 @pytest.fixture(scope="session")
