@@ -38,6 +38,7 @@ SHOWN = {
     "prism": "gallery-prism.png",
     "ray_file_audit": "gallery-ray-file-audit.png",
     "ies_round_trip": "gallery-ies-round-trip.png",
+    "radiance_mitsuba": "gallery-radiance-mitsuba.png",
     "how_many_rays": "how-many-rays.png",
     "chapter_4": "chapter-4-images.png",
     "deconvolution_2d": "deconvolution-2d-cuts.png",

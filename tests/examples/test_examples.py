@@ -35,6 +35,7 @@ RUNS = {
     "near_field.py": ([], 4),
     "opal_diffuser.py": ([], 1),
     "prism.py": ([], 1),
+    "radiance_mitsuba.py": ([], 1),
     "ray_file_audit.py": ([], 1),
     "reflector_spot.py": ([], 1),
     "remote_phosphor.py": (["--rays", "20000"], 3),
