@@ -273,7 +273,7 @@ def test_light_towards_minus_z_gets_a_closed_surface_and_a_hint() -> None:
 @pytest.mark.slow
 def test_too_few_rays_say_what_to_do() -> None:
     position, direction = led_lines(25)
-    with pytest.raises(ArgumentError, match=r"24 rays with flux are too few.*surface="):
+    with pytest.raises(ArgumentError, match=r"24 rays with flux are too few.*surface.*sphere"):
         choose_surface(rays_of(position[:24], direction[:24]))
     surface = choose_surface(rays_of(position, direction)).surface
     assert surface.area < 20.0  # of a die of 1 mm²: crude, but no nonsense
