@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -41,7 +42,7 @@ def page_at(path: str) -> str | None:
     if path in ELSEWHERE:
         return ELSEWHERE[path]
     if path.startswith("docs/"):
-        return path.removeprefix("docs/")
+        return path.removeprefix("docs/").replace(".ipynb", ".md")
     if re.fullmatch(r"examples/\w+\.py", path):
         return path.removesuffix(".py") + ".md"
     return None
@@ -86,6 +87,15 @@ def example_page(path: Path) -> str:
     return f"# {title}\n\n`examples/{path.name}`, as the [gallery](../gallery.md) runs it:\n\n````python\n{code}````\n"
 
 
+def notebook_page(path: Path) -> str:
+    """Markdown of a notebook: its words and its cells, and where it is itself."""
+    parts = []
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+    return "\n\n".join([*parts, f"The notebook itself: [{path.name}]({path.name}).\n"])
+
+
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that docs/ does not hold."""
     made = {there: ROOT / here for here, there in ELSEWHERE.items()}
@@ -95,6 +105,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, page, content=text))
     for path in sorted((ROOT / "examples").glob("*.py")):
         files.append(File.generated(config, f"examples/{path.stem}.md", content=example_page(path)))
+    for path in sorted((ROOT / "docs" / "notebooks").glob("*.ipynb")):
+        files.append(File.generated(config, f"notebooks/{path.stem}.md", content=notebook_page(path)))
     for _, page, text in reference_pages():
         files.append(File.generated(config, page, content=text))
     return files
@@ -111,7 +123,7 @@ def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
     """Move links, draw equations, and link citations and public names."""
     here = page.file.src_uri
     bibliography = relpath("project/references.md", dirname(here) or ".")
-    made_here = here.startswith(("reference/", "examples/"))
+    made_here = here.startswith(("reference/", "examples/", "notebooks/"))
 
     def change(text: str) -> str:
         text = text if made_here else move_links(text, here)
