@@ -42,8 +42,10 @@ kind = "intensity"
 
 
 def started(folder: Path, *arguments: object, **environment: str) -> subprocess.Popen[str]:
+    # A shell that runs the tests in the background has its programs ignore SIGINT, and they theirs.
+    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
     return subprocess.Popen(
-        [sys.executable, "-c", "from etendue.cli import main; main()", *map(str, arguments)],
+        [sys.executable, "-c", f"{heed}; from etendue.cli import main; main()", *map(str, arguments)],
         cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ | environment,
     )  # fmt: skip
 
