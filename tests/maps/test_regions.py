@@ -14,6 +14,7 @@ from etendue.plot import plot_comparison, plot_map, style
 from etendue.plot.colour_scale import choose_scale
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.powers_of_ten import common_power
 
 
 def make_map(values: object, error: float = 0.5) -> LuminanceMap:
@@ -85,7 +86,11 @@ def test_regions_are_outlined_and_numbered() -> None:
     assert {tuple(map(float, c)) for c in second.get_xy()} == set(regions[1].corners)
     assert [text.get_text() for text in figure.axes[0].texts] == ["1", "2"]
     words = "\n".join(text.get_text() for text in figure.texts)
-    assert "1: mean 6.5 cd/m²" in words
+    assert "1: mean 6.5 ± 0.35 to 0.5 cd/m²  ·  min 6  ·  max 7" in words
+    bright = plot_map(make_map(1e7 * np.array([[1, 2, 3, 4], [5, 6, 7, 8]])), regions=regions)
+    words = "\n".join(text.get_text() for text in bright.texts)
+    assert "1 in 10⁶ cd/m²: mean 65" in words
+    assert "min 60  ·  max 70" in words
     with pytest.raises(ArgumentError, match="10 regions"):
         plot_map(make_map([[1, 2]]), regions=[Region(-1, 1, -1, 1)] * 10)
 
@@ -133,4 +138,4 @@ def test_numbers_have_one_notation() -> None:
     assert [style.plain(x) for x in (0.0, 12345.0, -0.5, 1e-5, -2.5e9, 1.23456e-12)] == [
         "0", "12\u2009340", "−0.5", "10⁻⁵", "−2.5 × 10⁹", "1.235 × 10⁻¹²",
     ]  # fmt: skip
-    assert [style.common_power(-x, x) for x in (0.0, 1e-3, 9e-4, 9.9e6, 1e7, 2e9)] == [0, 0, -6, 0, 6, 9]
+    assert [common_power(-x, x) for x in (0.0, 1e-3, 9e-4, 9.9e6, 1e7, 2e9)] == [0, 0, -6, 0, 6, 9]

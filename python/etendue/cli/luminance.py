@@ -49,7 +49,9 @@ from etendue.plot.animation import plot_animation
 from etendue.plot.colour_scale import SCALES, Scale
 from etendue.plot.map_picture import plot_map
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.measured import measured
 from etendue.quantities.observer import PLANES, Observer, Screen
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress
 from etendue.scene import Scene
@@ -457,19 +459,20 @@ def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = (), *, notes: b
     say(f"{facts['quantity']} from θ = {where.theta:g}°, φ = {where.phi:g}°, {where.distance:g} mm")
     if facts["maximum"] is not None:
         error = lmap.standard_error.flat[np.nanargmax(lmap.values)]
-        known = f" ± {error:.2g}" if np.isfinite(error) else ""
         say(
-            f"  mean of live pixels {facts['mean_of_live_pixels']:.5g} {lmap.unit}, maximum {facts['maximum']:.5g}{known}"
+            f"  mean of live pixels {counted(facts['mean_of_live_pixels'], lmap.unit)}, "
+            f"maximum {measured(facts['maximum'], error, lmap.unit)}"
         )
-        say(f"  intensity towards the observer {facts['intensity']:.5g} {'cd' if lmap.flux_unit == 'lm' else 'W/sr'}")
+        unit = "cd" if lmap.flux_unit == "lm" else "W/sr"
+        say(f"  intensity towards the observer {counted(facts['intensity'], unit)}")
     if lmap.relative_error is not None:
         say(f"  {lmap.relative_error.sentence(facts['quantity'])}")
     for number, region in enumerate(regions, 1):
         found = region_statistics(lmap, region)
-        known = f" ± {found.mean_error:.2g}" if np.isfinite(found.mean_error) else ""
         say(
-            f"  region {number}: mean {found.mean:.4g}{known} {found.unit}, minimum {found.minimum:.4g}, "
-            f"maximum {found.maximum:.4g}, minimum over mean {found.uniformity:.3g}"
+            f"  region {number}: mean {measured(found.mean, found.mean_error, found.unit)}, "
+            f"minimum {counted(found.minimum, found.unit)}, maximum {counted(found.maximum, found.unit)}, "
+            f"minimum over mean {found.uniformity:.3g}"
             + (f"; {found.dead_pixels} of {found.pixels} pixels are dead and count as 0" if found.dead_pixels else "")
         )
     for note in lmap.notes if notes else ():

@@ -20,6 +20,8 @@ from etendue.lightfield.forecast import Forecast, Predicted, make_forecast
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.resolution import Resolution
 from etendue.lightfield.trees import Base
+from etendue.quantities.measured import measured
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_stream import RayStream, checked_threads
 from etendue.units import LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
 
@@ -112,14 +114,14 @@ class Diagnostics:
             f"{report.effective_cells:,.0f} effective degrees of freedom",
             f"relative error at a ray by the error bars {self.expected_error:.1%}",
             f"half of the flux in {half:.4g} mm² sr, 99 % in {most:.4g} of {curve.total_etendue:.4g} mm² sr",
-            f"peak {curve.luminance[0]:.4g} {unit}",
+            f"peak {counted(curve.luminance[0], unit)}",
             f"resolves {self.resolution.summary()}",
         ]
         if self.forecast is not None:
             lines += _forecast_lines(self.forecast)
         lines += [
             f"least certain: ({', '.join(f'{c:.4g}' for c in s.point)}) mm towards θ = {s.theta:.0f}°, φ = {s.phi:.0f}° "
-            f"on the {s.part}: {s.luminance:.3g} ± {s.standard_error:.2g} {unit}, {s.share:.1%} of the expected loss"
+            f"on the {s.part}: {measured(s.luminance, s.standard_error, unit)}, {s.share:.1%} of the expected loss"
             for s in self.spots[:3]
         ]
         return "\n".join(lines)

@@ -15,6 +15,7 @@ from etendue.lightfield.characteristic import CharacteristicCurve
 from etendue.lightfield.diagnostics import Diagnostics, UncertainSpot
 from etendue.lightfield.forecast import Forecast
 from etendue.plot import style
+from etendue.quantities.measured import measured
 from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT, FluxUnit
 
 if TYPE_CHECKING:
@@ -198,8 +199,7 @@ def _draw_forecast(axes: Axes, forecast: Forecast) -> None:
         label=f"half the error: {then.value:.2g} times the rays ({then.low:.2g} to {then.high:.2g})",
     )  # fmt: skip
     axes.set_xlim(n[0] / 1.15, n[-1])
-    for place in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-        place(style.log_formatter())
+    style.put_log_numbers(axes.yaxis)
     axes.xaxis.set_major_formatter(style.log_formatter())
     axes.set_xlabel("rays")
     axes.set_ylabel("relative error at a ray [%]")
@@ -228,7 +228,7 @@ def _row(spot: UncertainSpot) -> tuple[str, ...]:
         spot.part,
         f"{spot.theta:.1f}",
         f"{spot.phi:.1f}",
-        f"{style.plain(float(f'{spot.luminance:.3g}'))} ± {style.plain(float(f'{spot.standard_error:.2g}'))}",
+        measured(spot.luminance, spot.standard_error, "").rstrip(),
         style.percent(100.0 * spot.share),
     )
 

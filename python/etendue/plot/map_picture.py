@@ -18,9 +18,11 @@ from etendue.plot.region_marks import draw_marks, marks_of
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
+from etendue.quantities.powers_of_ten import common_power
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Colormap, Normalize
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
@@ -307,12 +309,27 @@ def draw_colour_bar(image: AxesImage, data: Array, name: str, unit: str, axes: A
     else:
         # Numbers side by side need more room than one above the other.
         bar.locator = style.locator_for((place.height if upright else 0.85 * place.width) / style.figure_of(axes).dpi)
-        power = style.common_power(lowest or 0.0, highest or 0.0)
+        power = common_power(lowest or 0.0, highest or 0.0)
         bar.formatter = style.number_formatter(power)
     bar.update_ticks()
     bar.set_label(f"{name} [{style.in_powers(unit, power)}]", size=style.LABEL_SIZE, color=style.INK)
     bar.outline.set_linewidth(0.0)
     style.dress(axes)
+
+
+def draw_slim_bar(image: ScalarMappable, unit: str, beside: Axes) -> None:
+    """A narrow bar at the right edge of a diagram that has little room, its unit above it."""
+    from matplotlib.colors import LogNorm
+
+    place, figure = beside.get_position(), style.figure_of(beside)
+    axes = figure.add_axes((place.x1 + 0.006, place.y0, 0.009, place.height))
+    bar = figure.colorbar(image, cax=axes)
+    if isinstance(image.norm, LogNorm):
+        bar.formatter = bar.minorformatter = style.log_formatter()
+        bar.update_ticks()
+    bar.outline.set_linewidth(0.0)
+    style.dress(axes)
+    style.put_title(axes, unit)
 
 
 def _relative_error(lmap: LuminanceMap | IlluminanceMap) -> Array:

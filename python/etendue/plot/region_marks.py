@@ -15,6 +15,7 @@ from etendue.luminance.regions import AnyRegion, RegionStatistics, region_statis
 from etendue.plot import style
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.powers_of_ten import common_power
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,29 +49,33 @@ def marks_of(lmap: LuminanceMap | IlluminanceMap, regions: Sequence[AnyRegion]) 
     found = []
     for number, region in enumerate(regions, start=1):
         figures = region_statistics(lmap, region)
-        facts = (
-            f"{number}: mean {in_words(figures)}",
-            f"min {style.plain(figures.minimum)}",
-            f"max {style.plain(figures.maximum)}",
-            f"min/mean {style.plain(figures.uniformity)}",
-            ", ".join(f"{share:g} %: {style.plain(value)}" for share, value in figures.percentiles),
-            *(
-                [f"{figures.dead_pixels} of {figures.pixels} pixels are dead and count as 0"]
-                if figures.dead_pixels
-                else []
-            ),
-        )
+        facts = [f"{number}{in_words(figures)}"]
+        if figures.dead_pixels:
+            facts.append(f"{figures.dead_pixels} of {figures.pixels} pixels are dead and count as 0")
         found.append(Mark(number, _outline(region), style.SEPARATOR.join(facts)))
     return found
 
 
 def in_words(figures: RegionStatistics) -> str:
-    """The mean of a region with the errors that it has if its pixels err apart and together."""
-    mean = f"{style.plain(figures.mean)} {figures.unit}"
-    if not math.isfinite(figures.mean_error):
-        return mean
-    apart, together = (style.plain(float(f"{x:.2g}")) for x in (figures.mean_error_apart, figures.mean_error))
-    return f"{mean} ± {apart} to {together}" if apart != together else f"{mean} ± {apart}"
+    """Mean of a region, with the errors that it has if its pixels err apart and together, extremes and percentiles."""
+    power = common_power(figures.minimum, figures.maximum)
+
+    def told(value: float, digits: int = 4) -> str:
+        return style.plain(float(f"{value / 10.0**power:.{digits}g}"))
+
+    errors = dict.fromkeys(
+        told(error, 2) for error in (figures.mean_error_apart, figures.mean_error) if math.isfinite(error)
+    )
+    mean = " ± ".join(part for part in (told(figures.mean), " to ".join(errors)) if part)
+    # Either all numbers are counted in a power of ten, or none is.
+    facts = (
+        f" in {style.in_powers(figures.unit, power)}: mean {mean}" if power else f": mean {mean} {figures.unit}",
+        f"min {told(figures.minimum)}",
+        f"max {told(figures.maximum)}",
+        f"min/mean {style.plain(figures.uniformity)}",
+        ", ".join(f"{share:g} %: {told(value)}" for share, value in figures.percentiles),
+    )
+    return style.SEPARATOR.join(facts)
 
 
 def _outline(region: AnyRegion) -> Array:

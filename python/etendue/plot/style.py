@@ -17,6 +17,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
 from etendue.formats.output import atomic_output
 from etendue.quantities.observer import Observer
+from etendue.quantities.powers_of_ten import common_power, ten_to
 from etendue.quantities.printable import printable
 
 if TYPE_CHECKING:
@@ -194,29 +195,9 @@ def put_numbers(axis: Axis, name: str, unit: str, low: float, high: float) -> No
     axis.set_label_text(f"{name} [{in_powers(unit, power)}]")
 
 
-def common_power(low: float, high: float) -> int:
-    """The power of ten, a multiple of three, that numbers are counted in; 0 if the largest is neither tiny nor huge."""
-    size = max(abs(low), abs(high))
-    return 0 if size == 0.0 or not math.isfinite(size) or 1e-3 <= size < 1e7 else 3 * math.floor(math.log10(size) / 3.0)
-
-
 def in_powers(unit: str, power: int) -> str:
     """A unit with a power of ten before it, unless that is 1."""
     return f"{ten_to(power)} {unit}" if power else unit
-
-
-def ten_to(power: int) -> str:
-    """A power of ten.
-
-    Examples
-    --------
-    >>> ten_to(-12)
-    '10⁻¹²'
-    """
-    return "10" + str(power).translate(RAISED)
-
-
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number_formatter(power: int = 0) -> ScalarFormatter:
@@ -247,6 +228,12 @@ def log_formatter() -> LogFormatter:
             return plain(x) if super().__call__(x, pos) else ""
 
     return Plain(minor_thresholds=(1.5, 0.6))
+
+
+def put_log_numbers(axis: Axis) -> None:
+    """Ticks of a logarithmic axis, large and small ones, as `log_formatter` writes them."""
+    axis.set_major_formatter(log_formatter())
+    axis.set_minor_formatter(log_formatter())
 
 
 def grouped(text: str) -> str:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.plot import style
+from etendue.quantities.powers_of_ten import common_power, ten_to
 from etendue.sweeps.table import SweepTable
 from etendue.units import (
     ILLUMINANCE_NAME,
@@ -239,10 +240,10 @@ def _name(axis: Any, name: str, unit: str, low: float, high: float) -> None:
     """Numbers and label of an axis; of what has no unit without brackets."""
     style.put_numbers(axis, name, unit, low, high)
     if not unit:
-        power = style.common_power(low, high)
-        axis.set_label_text(f"{name} / {style.ten_to(power)}" if power else name)
+        power = common_power(low, high)
+        axis.set_label_text(f"{name} / {ten_to(power)}" if power else name)
     elif not name:
-        axis.set_label_text(f"[{style.in_powers(unit, style.common_power(low, high))}]")
+        axis.set_label_text(f"[{style.in_powers(unit, common_power(low, high))}]")
 
 
 def _legend_columns(table: SweepTable, panel: _Panel) -> int:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from etendue.quantities.powers_of_ten import common_power, counted, ten_to
+
 if TYPE_CHECKING:
     from etendue.quantities.intensity import Intensity
 
@@ -12,18 +14,24 @@ if TYPE_CHECKING:
 def measured(value: float, error: float, unit: str) -> str:
     """A value to the digits that its standard error leaves, two of the error's; to six digits if there is none.
 
+    Both are counted in the same power of ten, which is named if the value is very small or very large.
+
     Examples
     --------
     >>> measured(91.9955, 0.02714, "lm"), measured(45812.3, 1471.3, "cd"), measured(12.3456789, math.nan, "lm")
     ('91.996 ± 0.027 lm', '45800 ± 1500 cd', '12.3457 lm')
+    >>> measured(18.31e6, 2.1e6, "cd/m²"), measured(18.31e6, math.nan, "cd/m²")
+    ('(18.3 ± 2.1) × 10⁶ cd/m²', '18.31 × 10⁶ cd/m²')
     """
     if not (math.isfinite(error) and error > 0.0 and math.isfinite(value)):
-        return f"{value:.6g} {unit}"
+        return counted(value, unit, 6)
+    if power := common_power(value, error):
+        return f"({measured(value / 10.0**power, error / 10.0**power, '').rstrip()}) × {ten_to(power)} {unit}"
     digits = 1 - math.floor(math.log10(error))
     # 0.0996 has two digits as 0.10.
     digits = 1 - math.floor(math.log10(round(error, digits)))
     # A table of numbers that differ by more than a double holds is shown to what it holds.
-    if digits > 12 or abs(value) >= 1e15:
+    if digits > 12:
         return f"{value:.6g} ± {error:.2g} {unit}"
     places = max(digits, 0)
     return f"{round(value, digits):.{places}f} ± {round(error, digits):.{places}f} {unit}"
