@@ -96,7 +96,7 @@ def test_help_imports_no_verb() -> None:
     parts = {name.split(".")[1] for name in ours(modules) if "." in name}
     assert parts == {"_core", "cli", "errors", "extras", "formats", "quantities", "units"}
     commands = {name for name in ours(modules) if name.startswith("etendue.cli.")}
-    assert commands == {f"etendue.cli.{name}" for name in ("app", "guard", "stopping", "terminal", "verbs")}
+    assert commands == {f"etendue.cli.{name}" for name in ("app", "guard", "stopping", "terminal", "verbs", "wording")}
 
 
 @pytest.mark.slow

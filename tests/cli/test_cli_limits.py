@@ -18,7 +18,10 @@ GRID = {"name": "desk", "kind": "illuminance", "width": 9, "height": 9, "columns
 ABSURD: dict[str, tuple[str, tuple[object, ...]]] = {
     "pixels": ("Screen: columns is 1000000", ("luminance", "lamp.toml", "--pixels", "1000000,1000000", "-o", "a.npz")),
     "samples": ("samples is 1000000000", ("luminance", "led.h5", "--pixels", "2,2", "--samples", 10**9, "-o", "a.npz")),
-    "lines": ("rays_per_pixel is", ("luminance", "lamp.toml", "--pixels", "2,2", "--rays-per-pixel", 10**12, "-o", "a.npz")),
+    "lines": (
+        "--rays-per-pixel is",
+        ("luminance", "lamp.toml", "--pixels", "2,2", "--rays-per-pixel", 10**12, "-o", "a.npz"),
+    ),
     "planes": ("1,000,000,000 cells", ("intensity", "led.tm25ray", "--c-planes", 10**9, "-o", "a.ies")),
     "steps": ("180,000,001 cells", ("intensity", "led.tm25ray", "--gamma-step", "1e-6", "-o", "a.ies")),
     "rows": ('"desk": rows: is 1000000000', ("trace", "rows.toml", "--rays", 1000)),

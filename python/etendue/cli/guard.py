@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from etendue.cli.terminal import complain
+from etendue.cli.wording import speak_of
 from etendue.errors import ArgumentError, MemoryLimitError
 from etendue.extras import require_for
 from etendue.formats.input import is_stream, stream_in_file
@@ -26,6 +27,7 @@ def guarded(name: str, verb: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(verb)
     def run(**values: Any) -> None:
+        speak_of(values)
         inputs = {key: _paths(value) for key, value in values.items() if key not in OUTPUTS}
         outputs = [path for key, value in values.items() if key in OUTPUTS for path in _paths(value)]
         require_apart([path for key, paths in inputs.items() if key != GOES_ON for path in paths], outputs)

@@ -17,6 +17,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from etendue.cli.wording import in_options, of_parser, without_caller
 from etendue.errors import ArgumentError, SceneError, UnknownNameError
 from etendue.quantities.printable import printable
 from etendue.quantities.ray_stream import Progress as ProgressFunction
@@ -40,13 +41,17 @@ MISTAKE = 70
 
 
 def complain(message: str) -> None:
-    """Print one line to standard error, whatever the message holds."""
+    """Print one line to standard error, whatever the message holds, in the words of the command line."""
+    _print_as_is(in_options(message))
+
+
+def _print_as_is(message: str) -> None:
     errors.print(Text(printable(message)))
 
 
 def say(message: str = "") -> None:
-    """Print one line to standard output, whatever the message holds."""
-    output.print(Text(printable(message)))
+    """Print one line to standard output, whatever the message holds, in the words of the command line."""
+    output.print(Text(printable(in_options(message))))
 
 
 def complain_of(error: Exception) -> None:
@@ -55,7 +60,7 @@ def complain_of(error: Exception) -> None:
         complain(f"error: {error.filename}: {error.strerror}")
         return
     first, *more = error.lines if isinstance(error, SceneError) else (str(error),)
-    complain(f"error: {first}")
+    complain(f"error: {without_caller(first)}")
     for line in more:
         complain(f"  {line}")
 
@@ -68,14 +73,14 @@ def complain_of_mistake(error: BaseException) -> None:
         seen.append(link)
         link = link.__cause__ or (None if link.__suppress_context__ else link.__context__)
     for link in reversed(seen):
-        complain("Traceback (most recent call last):")
+        _print_as_is("Traceback (most recent call last):")
         for frame in traceback.extract_tb(link.__traceback__):
-            complain(f'  File "{frame.filename}", line {frame.lineno}, in {frame.name}')
+            _print_as_is(f'  File "{frame.filename}", line {frame.lineno}, in {frame.name}')
             if frame.line:
-                complain(f"    {frame.line}")
-        complain(f"{type(link).__qualname__}: {link}")
+                _print_as_is(f"    {frame.line}")
+        _print_as_is(f"{type(link).__qualname__}: {link}")
         for note in getattr(link, "__notes__", ()):
-            complain(f"  {note}")
+            _print_as_is(f"  {note}")
     complain("error: this is a mistake in etendue, not in what it was given; please report the lines above")
 
 
@@ -83,7 +88,7 @@ def complain_of_usage(error: typer.BadParameter) -> None:
     """Print what the parser has to say about arguments, with the usage of the verb, to standard error."""
     told, message = io.StringIO(), error.format_message()
     error.show(told)
-    for line in told.getvalue().replace(message, printable(message)).splitlines():
+    for line in told.getvalue().replace(message, printable(of_parser(message))).splitlines():
         complain(line)
     advice = INSTEAD.get(str(getattr(error, "option_name", "")))
     if advice:
