@@ -17,12 +17,14 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 from chapter_4 import PET
+from etendue.plot import style
 from etendue.quantities.bsdf_data import direction
 from etendue.scatter.scans import harvey_shack
 from etendue.scatter.scans.interpolations import METHODS, tabulated
 from experiments import goniometer
-from experiments.panels import FAINT, INK, LINES, new_figure, print_table, save
+from experiments.panels import FAINT, INK, LINES, legend_below, new_figure, print_table, put_bar, save
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 
 Array = npt.NDArray[np.float64]
 
@@ -31,8 +33,8 @@ SCHEMES = {"first scheme: U, V": "direction-cosines", "second scheme: about the 
 THESIS = {"direction-cosines": ("67 %", "75 %"), "specular-centred": ("99.5 %", "91.4 %")}
 
 
-LOWEST = -1.5
-"""Lowest lg f that is shown."""
+LOWEST = 0.03
+"""Lowest f that is shown [1/sr]."""
 
 POINTS = "#8fd3ff"
 """Colour of the points of a table's grid."""
@@ -68,7 +70,7 @@ def planar(theta: float, scattered: Array) -> tuple[Array, Array]:
 
 def draw_scans(path: Path) -> None:
     """B.1 and B.2: what was measured, over the angle and in the plane of direction cosines."""
-    figure = new_figure(9.6, 6.6)
+    figure = new_figure(9.6, 6.9, "A stand-in for microcellular PET: scans in two planes")
     for column, theta in enumerate(THETAS):
         scattered, f = scanned(theta)
         axes = figure.add_subplot(2, 2, column + 1)
@@ -76,10 +78,11 @@ def draw_scans(path: Path) -> None:
             own = np.abs(scattered[:, 1]) < 1e-6 if plane else np.abs(scattered[:, 1]) > 1e-6
             angle = np.degrees(np.arctan2(scattered[own, 0 if plane else 1], scattered[own, 2]))
             axes.semilogy(angle, f[own], ".", ms=3, color=colour, label=name)
-        axes.set(title=f"light from {theta:g}°", xlabel="scatter angle [°]", xlim=(-90, 90))
+        style.put_title(axes, f"light from {theta:g}°")
+        axes.set(xlabel="scatter angle [°]", xlim=(-90, 90))
         axes.set_ylabel("f [1/sr]" if not column else "")
         if not column:
-            axes.legend(frameon=False, fontsize=8)
+            style.put_legend(axes)
         axes = figure.add_subplot(2, 2, column + 3)
         rim(axes, theta)
         axes.plot(*planar(theta, scattered), ".", ms=2, color=INK)
@@ -90,7 +93,7 @@ def draw_scans(path: Path) -> None:
 
 def draw_edge(path: Path) -> None:
     """B.3: the largest |β − β₀| by azimuth, as it is and as the thesis prints it."""
-    figure = new_figure(7.4, 3.4)
+    figure = new_figure(7.4, 3.7, "How far directions are from the specular one at most, by incidence")
     axes = figure.add_subplot()
     a = np.linspace(0.0, 360.0, 361)
     for theta, colour in zip((5.0, 30.0, 60.0, 80.0), LINES, strict=False):
@@ -99,13 +102,13 @@ def draw_edge(path: Path) -> None:
     printed = np.sqrt(1.0 + s * s - 2.0 * s * np.cos(np.radians(a + 90.0)))
     axes.plot(a, printed, "--", lw=1, color=INK, label="60°, as printed")
     axes.set(xlabel="azimuth of β − β₀ [°]", ylabel="largest |β − β₀|", xlim=(0, 360))
-    figure.legend(loc="outside right upper", frameon=False, fontsize=8)
+    legend_below(figure, axes)
     save(figure, path)
 
 
 def draw_schemes(path: Path, tables: Mapping[str, et.BsdfTable]) -> None:
     """B.2, B.5 and B.6: what each scheme makes of the scans in U, V, and some points of the grid of the table."""
-    figure = new_figure(9.6, 8.0)
+    figure = new_figure(9.6, 8.3, "A stand-in for microcellular PET: the BRDF between its scans")
     turns = np.radians(np.arange(0.0, 360.0, 10.0))
     for line, (title, method) in enumerate(SCHEMES.items()):
         for column, theta in enumerate(THETAS):
@@ -117,16 +120,17 @@ def draw_schemes(path: Path, tables: Mapping[str, et.BsdfTable]) -> None:
             there = ~np.isnan(towards[..., 2])
             f = np.full(u.shape, np.nan)
             f[there] = tables[method].evaluate(incident, towards[there])
-            shown = np.log10(np.maximum(f, 10.0**LOWEST))
-            picture = axes.pcolormesh(u, v, shown, cmap="magma", vmin=LOWEST, rasterized=True)
+            norm = LogNorm(LOWEST, float(np.nanmax(f)))
+            picture = axes.pcolormesh(u, v, np.maximum(f, LOWEST), cmap=style.COLOUR_MAPS["value"], norm=norm)
             rim(axes, theta)
             for r in np.geomspace(1e-3, 2.0, 99)[58::10]:
                 kept = r < harvey_shack.farthest(theta, np.degrees(turns))
                 axes.plot(r * np.cos(turns[kept]), r * np.sin(turns[kept]), ".", ms=2, color=POINTS)
             axes.plot(*planar(theta, scattered[::3]), ".", ms=2.5, color="white")
-            axes.set(title=f"{title}, {theta:g}°", xlabel="U" if line else "")
+            style.put_title(axes, f"{title}, {theta:g}°")
+            axes.set_xlabel("U" if line else "")
             axes.set_ylabel("V" if not column else "")
-            figure.colorbar(picture, ax=axes, label="lg f [1/sr]", shrink=0.8)
+            put_bar(picture, f, "f", "1/sr", axes)
     save(figure, path)
 
 
@@ -163,7 +167,7 @@ def main() -> None:
     scans = all_scans()
     tables = {method: et.BsdfTable.from_scans(scans, method) for method in SCHEMES.values()}
     draw_schemes(folder / "appendix-b-schemes.png", tables)
-    figure = new_figure(9.6, 8.4)
+    figure = new_figure(9.6, 8.6, "Illuminance of a hemisphere of 1 m about 1 lm on microcellular PET, from above")
     rows = []
     for line, (title, method) in enumerate(SCHEMES.items()):
         table = tables[method]
@@ -172,10 +176,15 @@ def main() -> None:
             shown, flux = illuminance(table, theta, given.rays)
             lowest = 1e-3 * np.nanmax(shown)
             picture = axes.imshow(
-                np.log10(np.maximum(shown, lowest)), origin="lower", extent=(-1, 1, -1, 1), cmap="magma"
+                np.maximum(shown, lowest),
+                origin="lower",
+                extent=(-1, 1, -1, 1),
+                cmap=style.COLOUR_MAPS["value"],
+                norm=LogNorm(lowest, float(np.nanmax(shown))),
             )
-            axes.set(title=f"{title}, {theta:g}°", xticks=[], yticks=[])
-            figure.colorbar(picture, ax=axes, label="lg E [lx]", shrink=0.8)
+            style.put_title(axes, f"{title}, {theta:g}°")
+            axes.set(xlabel="x [m]" if line else "", ylabel="" if column else "y [m]")
+            put_bar(picture, shown, "illuminance", "lx", axes)
             (one,) = (s for s in table.data.slices if abs(s.theta - theta) < 1e-6)
             printed = THESIS[method][column]
             share = f"{100.0 * (one.stated or one.integral()):.1f} %"

@@ -15,21 +15,21 @@ import dataclasses
 import math
 import time
 from pathlib import Path
-from typing import Any
 
 import etendue as et
 import numpy as np
 import numpy.typing as npt
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from etendue.plot import style
+from experiments.panels import LINES, ROOT, legend_below, map_grid, new_figure, put_bar_at, save
 from matplotlib.colors import PowerNorm
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 ACCEPTANCE = 1.5  # α of section 2.3.2 [°]
 OBSERVER = et.Observer(theta=0, phi=0, distance=150)
 FINE, COARSE = et.Screen(70, 70, 128, 128), et.Screen(70, 70, 32, 32)
 FILTERS = ("average", "weighted", "selective", "selective-weighted")
-INK, TRUTH, GRAIN = "#1b1b1b", "#d1495b", "#2e6f95"
+SOURCE = "three Lambertian rings"
+GRAIN, TRUTH = LINES[:2]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,62 +115,45 @@ def true_map(source: et.RingSource, lmap: et.LuminanceMap) -> et.LuminanceMap:
     )
 
 
-def figure(width: float, height: float) -> Figure:
-    made = Figure(figsize=(width, height), dpi=110, layout="constrained")
-    FigureCanvasAgg(made)
-    return made
-
-
-def show(axes: Any, lmap: et.LuminanceMap, title: str, top: float) -> Any:
-    w, h = lmap.screen.width / 2, lmap.screen.height / 2
-    image = axes.imshow(
-        np.nan_to_num(lmap.values) / 1000,
-        cmap="inferno",
-        norm=PowerNorm(0.5, vmin=0, vmax=top),  # so that the third zone, 15 times darker than the first, is seen
-        extent=(-w, w, -h, h),
-        interpolation="nearest",
-    )
-    axes.set_title(title, fontsize=10)
-    axes.set_xlabel("x [mm]")
-    axes.set_ylabel("y [mm]")
-    return image
-
-
-def draw_maps(path: Path, rows: list[tuple[str, et.LuminanceMap]], top: float) -> None:
+def draw_maps(path: Path, heading: str, rows: list[tuple[str, et.LuminanceMap]], top: float) -> None:
     """Figures 2.6, 2.8, 2.9: each map, and a magnified part of it."""
-    made = figure(7.6, 3.5 * len(rows))
-    grid = made.subplots(len(rows), 2, squeeze=False)
-    for axes, (title, lmap) in zip(grid, rows, strict=True):
-        show(axes[0], lmap, title, top)
-        image = show(axes[1], lmap, "magnified", top)
-        axes[1].set_xlim(2, 24)
-        axes[1].set_ylim(-11, 11)
-        axes[1].set_ylabel("")
-        axes[0].add_patch(Rectangle((2, -11), 22, 22, fill=False, edgecolor="white", linewidth=0.9))
-        made.colorbar(image, ax=axes[1], label="luminance [10³ cd/m²]")
-    made.savefig(path, bbox_inches="tight", pad_inches=0.12, metadata={"Software": None})
+    names = [name for name, _ in rows]
+    grid = map_grid(
+        (2.7, 2.7), ["whole", "magnified"], names, {1: "each"},
+        heading=f"{heading}, {SOURCE}", facts=[ROOT], apart=(0.65, 0.55),
+    )  # fmt: skip
+    # So that the third zone, 15 times darker than the first, is seen.
+    norm = PowerNorm(0.5, vmin=0, vmax=top)
+    for row, (_, lmap) in enumerate(rows):
+        whole, part = (grid.panels[row, k] for k in range(2))
+        image = [grid.show(row, k, lmap, norm, own=True) for k in range(2)][-1]
+        part.set(xlim=(2, 24), ylim=(-11, 11), ylabel="")
+        whole.add_patch(Rectangle((2, -11), 22, 22, fill=False, edgecolor="white", linewidth=0.9))
+        put_bar_at(grid.bars[1][row], image, lmap.values, lmap.quantity, lmap.unit)
+    grid.save(path)
 
 
-def draw_sections(path: Path, panels: list[tuple[str, et.LuminanceMap]], truth: et.LuminanceMap, columns: int) -> None:
+def draw_sections(
+    path: Path, heading: str, panels: list[tuple[str, et.LuminanceMap]], truth: et.LuminanceMap, columns: int
+) -> None:
     """Figures 2.10, 2.11: the horizontal cut through the middle, over the true one."""
     rows = math.ceil(len(panels) / columns)
-    made = figure(4.4 * columns, 2.9 * rows)
+    made = new_figure(4.4 * columns, 2.6 * rows + 0.6, f"{heading}: horizontal cut through {SOURCE}")
     grid = made.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     exact = et.cross_section(truth, y=0)
     for axes, (title, lmap) in zip(grid.ravel(), panels, strict=True):
         cut = et.cross_section(lmap, y=0)
-        values, errors = np.nan_to_num(cut.values) / 1000, np.nan_to_num(cut.standard_error) / 1000
+        values, errors = np.nan_to_num(cut.values), np.nan_to_num(cut.standard_error)
         axes.fill_between(cut.position, values - errors, values + errors, color=GRAIN, alpha=0.25, linewidth=0)
         axes.plot(cut.position, values, color=GRAIN, linewidth=1.0, label="estimate, ±1 standard error")
-        axes.plot(exact.position, exact.values / 1000, color=TRUTH, linewidth=0.9, label="truth")
-        axes.set_title(title, fontsize=10)
-        axes.spines[["top", "right"]].set_visible(False)
+        axes.plot(exact.position, exact.values, color=TRUTH, linewidth=0.9, label="truth")
+        style.put_title(axes, title)
     for axes in grid[-1]:
-        axes.set_xlabel("x [mm]")
+        axes.set_xlabel(f"{style.HORIZONTAL} [mm]")
     for axes in grid[:, 0]:
-        axes.set_ylabel("luminance [10³ cd/m²]")
-    made.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncol=2, frameon=False, fontsize=9)
-    made.savefig(path, bbox_inches="tight", pad_inches=0.12, metadata={"Software": None})
+        axes.set_ylabel(f"{truth.quantity} [{truth.unit}]")
+    legend_below(made, grid[0, 0])
+    save(made, path)
 
 
 def main() -> None:
@@ -190,15 +173,15 @@ def main() -> None:
     smooth = {kind: et.filter_map(runs.fine, kind, size=5, gamma=0.2) for kind in FILTERS}
     print_tables(source, runs, {**smooth, "opt": et.denoise_map(runs.fine)}, options.seeds)
     truth = true_map(source, runs.fine)
-    top = 1.15 * source.zone_luminance[0] / 1000
-    draw_maps(options.output / "figure-2.6.png", [("line of sight (no noise), 128 × 128", truth)], top)
-    estimates = [("cone 1.5°, 128 × 128", runs.fine), ("cone 1.5°, 32 × 32", runs.coarse)]
-    draw_maps(options.output / "figure-2.8-2.9.png", estimates, top)
+    top = 1.15 * source.zone_luminance[0]
+    draw_maps(options.output / "figure-2.6.png", "Figure 2.6: no noise", [("lines of sight", truth)], top)
+    estimates = [("128 × 128 pixels", runs.fine), ("32 × 32 pixels", runs.coarse)]
+    draw_maps(options.output / "figure-2.8-2.9.png", f"Figures 2.8 and 2.9: cone of {ACCEPTANCE}°", estimates, top)
     seeds = options.seeds
     halves = [(f"{seeds // 2} seeds", runs.half), (f"{seeds} seeds", runs.fine)]
-    draw_sections(options.output / "figure-2.10.png", halves, truth, 2)
+    draw_sections(options.output / "figure-2.10.png", "Figure 2.10", halves, truth, 2)
     panels = [(f"{kind} 5 × 5" + (", γ = 0.2" if "selective" in kind else ""), m) for kind, m in smooth.items()]
-    draw_sections(options.output / "figure-2.11.png", panels, truth, 2)
+    draw_sections(options.output / "figure-2.11.png", f"Figure 2.11, {seeds} seeds, filtered", panels, truth, 2)
     print(f"\nfigures: {options.output}/")
 
 

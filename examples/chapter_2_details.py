@@ -15,41 +15,31 @@ from typing import Any
 import etendue as et
 import numpy as np
 import numpy.typing as npt
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from etendue.plot import style
+from experiments.panels import FAINT, INK, LINES, new_figure, save
 
 OBSERVER = et.Observer(theta=0, phi=0, distance=150)
 SIZE = 70.0  # of the screen [mm]
 RESOLUTIONS = (32, 128, 512)
 FILTERS = ("average", "weighted", "selective", "selective-weighted")
 GAMMAS = (0.1, 0.2, 0.4)
-INK, TRUTH, GRAIN, SOFT = "#1b1b1b", "#d1495b", "#2e6f95", "#8d99a6"
+GRAIN, TRUTH, *_ = LINES
 
 Array = npt.NDArray[np.float64]
-
-
-def figure(width: float, height: float) -> Figure:
-    made = Figure(figsize=(width, height), dpi=110, layout="constrained")
-    FigureCanvasAgg(made)
-    return made
-
-
-def save(made: Figure, path: Path) -> None:
-    made.savefig(path, bbox_inches="tight", pad_inches=0.12, metadata={"Software": None})
 
 
 def measure(
     axes: Any, start: tuple[float, float], end: tuple[float, float], text: str, aside: tuple[float, float]
 ) -> None:
     """A double arrow with its length."""
-    axes.annotate("", start, end, arrowprops={"arrowstyle": "<->", "color": SOFT, "linewidth": 0.9})
+    axes.annotate("", start, end, arrowprops={"arrowstyle": "<->", "color": FAINT, "linewidth": 0.9})
     middle = (np.array(start) + np.array(end)) / 2 + np.array(aside)
     axes.text(*middle, text, color=INK, fontsize=9, ha="center", va="center")
 
 
 def draw_set_up(path: Path) -> None:
     """Figures 2.1 and 2.5, seen from the side: observer, screen, ray collecting surface and lamp, with the measures."""
-    made = figure(8.4, 3.9)
+    made = new_figure(8.4, 3.9)
     left, right = made.subplots(1, 2, width_ratios=[1.25, 1])
     # Figure 2.1, not to scale: rays of the lamp are kept where they cross the collecting surface.
     rng = np.random.default_rng(2)
@@ -59,7 +49,7 @@ def draw_set_up(path: Path) -> None:
     left.plot([7, 7], [-0.35, 0.35], color=INK, linewidth=4, solid_capstyle="butt")
     for y, slope in zip(rng.uniform(-0.9, 0.9, 14), rng.uniform(-1.1, 1.1, 14), strict=True):
         at = y + 0.7 * slope
-        left.plot([0, 0.7], [y, at], color=SOFT, linewidth=0.8)
+        left.plot([0, 0.7], [y, at], color=FAINT, linewidth=0.8)
         left.plot(0.7, at, "o", color=GRAIN, markersize=3)
     for y in (-0.6, 0.1, 0.75):
         left.annotate("", (7, 0), (0.7, y), arrowprops={"arrowstyle": "->", "color": GRAIN, "linewidth": 0.9})
@@ -70,7 +60,7 @@ def draw_set_up(path: Path) -> None:
         (6.8, 0.75, "observer", INK),
     ):
         left.text(x, y, text, color=color, ha="center", va="center", fontsize=9)
-    left.set_title("Figure 2.1: rays that head for the observer", fontsize=10)
+    style.put_title(left, "Figure 2.1: rays that head for the observer, not to scale")
     left.set(xlim=(-0.8, 7.8), ylim=(-2.4, 2.4))
     # Figure 2.5, to scale.
     right.plot([-35, 35], [0.9, 0.9], color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
@@ -80,14 +70,14 @@ def draw_set_up(path: Path) -> None:
                 [side * inner, side * outer], [0, 0], color=TRUTH, alpha=shade, linewidth=5, solid_capstyle="butt"
             )
     right.plot(0, 150, "o", color=INK, markersize=6)
-    right.plot([-35, 0, 35], [0, 150, 0], color=SOFT, linewidth=0.7, linestyle=":")
+    right.plot([-35, 0, 35], [0, 150, 0], color=FAINT, linewidth=0.7, linestyle=":")
     right.text(7, 151, "observer", fontsize=9, va="center")
     measure(right, (48, 0), (48, 150), "150 mm", (18, 0))
     measure(right, (-35, -12), (35, -12), "screen 70 × 70 mm", (0, -8))
     measure(right, (-30, -32), (30, -32), "rings: radii 10, 20, 30 mm", (0, -8))
     right.set_aspect("equal")
     right.set(xlim=(-60, 90), ylim=(-48, 162))
-    right.set_title("Figure 2.5: the set-up, to scale", fontsize=10)
+    style.put_title(right, "Figure 2.5: the set-up, to scale")
     for axes in (left, right):
         axes.set_axis_off()
     save(made, path)
@@ -109,24 +99,23 @@ def transition(x: Array, values: Array, edge: float) -> float:
 
 def draw_cut(path: Path, source: et.RingSource) -> None:
     """Figure 2.7: the cut, and what a higher resolution does to its transitions."""
-    made = figure(8.4, 3.1)
+    made = new_figure(8.4, 3.3, "Figure 2.7: horizontal cut through three Lambertian rings, no noise")
     whole, near = made.subplots(1, 2, width_ratios=[1.5, 1])
     print("Map without noise: width of the transitions between the zones [mm]")
-    for pixels, color in zip(RESOLUTIONS, (SOFT, GRAIN, TRUTH), strict=True):
+    for pixels, color in zip(RESOLUTIONS, (FAINT, GRAIN, TRUTH), strict=True):
         x, values = exact_map(source, pixels)
-        near.step(x, values / 1000, where="mid", color=color, linewidth=1.1, label=f"{pixels} × {pixels}")
+        near.step(x, values, where="mid", color=color, linewidth=1.1, label=f"{pixels} × {pixels}")
         if pixels == 128:
-            whole.plot(x, values / 1000, color=GRAIN, linewidth=1.1)
+            whole.plot(x, values, color=GRAIN, linewidth=1.1)
         widths = ", ".join(f"{transition(x, values, edge):.2f}" for edge in (10.0, 20.0, 30.0))
         print(f"  {pixels:3} × {pixels:<3} pixels of {SIZE / pixels:.3f} mm: {widths} at r = 10, 20, 30 mm")
-    whole.set_title("Figure 2.7: 128 × 128 pixels", fontsize=10)
-    near.set_title("transition at r = 10 mm", fontsize=10)
+    style.put_title(whole, "128 × 128 pixels")
+    style.put_title(near, "transition at r = 10 mm")
     near.set_xlim(6.5, 13.5)
-    near.legend(frameon=False, fontsize=9)
+    style.put_legend(near)
     for axes in (whole, near):
-        axes.set_xlabel("x [mm]")
-        axes.spines[["top", "right"]].set_visible(False)
-    whole.set_ylabel("luminance [10³ cd/m²]")
+        axes.set_xlabel(f"{style.HORIZONTAL} [mm]")
+    whole.set_ylabel("luminance [cd/m²]")
     save(made, path)
 
 

@@ -17,25 +17,18 @@ import numpy as np
 import numpy.typing as npt
 from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
+from etendue.plot import style
 from etendue.quantities.patches import AngularGrid
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from experiments.panels import FAINT, INK, LINES, new_figure, save
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch, Polygon
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-INK, RED, BLUE, SOFT, PALE = "#1b1b1b", "#d1495b", "#2e6f95", "#8d99a6", "#e8eef3"
+BLUE, RED, *_ = LINES
+PALE = "#e8eef3"
+TITLES = {"size": style.LABEL_SIZE, "color": INK, "weight": "bold"}
 
 Array = npt.NDArray[np.float64]
-
-
-def figure(width: float, height: float) -> Figure:
-    made = Figure(figsize=(width, height), dpi=110)
-    FigureCanvasAgg(made)
-    return made
-
-
-def save(made: Figure, path: Path) -> None:
-    made.savefig(path, bbox_inches="tight", pad_inches=0.1, metadata={"Software": None})
 
 
 def solid(made: Figure, place: Any, size: float, height: tuple[float, float], view: tuple[float, float]) -> Any:
@@ -56,7 +49,7 @@ def on_sphere(theta: Array | float, phi: Array | float) -> Array:
 
 def draw_bins(path: Path) -> None:
     """Figure 3.1: the edges of the angular bins on the hemisphere, and the nodes of the table."""
-    made = figure(8.4, 4.0)
+    made = new_figure(8.4, 4.0, layout=None)
     for place, grid in ((121, AngularGrid(30, 90)), (122, AngularGrid(18, 72))):
         axes = solid(made, place, 1.0, (0.0, 1.0), (32, -52))
         around, up = np.linspace(0, 2 * np.pi, 181), np.linspace(0, np.pi / 2, 61)
@@ -71,7 +64,7 @@ def draw_bins(path: Path) -> None:
         axes.add_collection3d(Line3DCollection(pieces[near], colors=BLUE, linewidths=1.1))
         nodes = on_sphere(*(np.radians(v).ravel() for v in np.meshgrid(grid.theta[:-1], grid.phi)))
         axes.scatter(*nodes[nodes @ eye > 0.0].T, color=RED, s=14, depthshade=False)
-        axes.set_title(f"Δθ = {grid.theta_step}°, Δφ = {grid.phi_step}°: {grid.bins} bins", fontsize=10, y=0.96)
+        axes.set_title(f"Δθ = {grid.theta_step}°, Δφ = {grid.phi_step}°: {grid.bins} bins", **TITLES, y=0.96)
     save(made, path)
 
 
@@ -88,7 +81,7 @@ STEPS = (
 
 def draw_flow(path: Path) -> None:
     """Figure 3.2: the algorithm as a flowchart; steps 4 run for every lit pixel."""
-    made = figure(6.4, 6.6)
+    made = new_figure(6.4, 6.6, layout=None)
     axes = made.add_axes((0, 0, 1, 1))
     axes.set(xlim=(-1.0, 1.45), ylim=(-0.4, len(STEPS) - 0.6))
     axes.set_axis_off()
@@ -107,11 +100,11 @@ def draw_flow(path: Path) -> None:
         axes.text(0, y, text, ha="center", va="center", fontsize=9, color=INK)
         if i:
             last = 0.4 if STEPS[i - 1].startswith("4h") else 0.27
-            arrow = {"arrowstyle": "-|>", "color": SOFT, "linewidth": 1.1}
+            arrow = {"arrowstyle": "-|>", "color": FAINT, "linewidth": 1.1}
             axes.annotate("", (0, y + (0.4 if question else 0.27)), (0, y + 1 - last), arrowprops=arrow)
     asked, bins = 1, 3
-    axes.plot([0.85, 1.15, 1.15], [asked, asked, bins], color=SOFT, linewidth=1.1)
-    axes.annotate("", (0.85, bins), (1.15, bins), arrowprops={"arrowstyle": "-|>", "color": SOFT, "linewidth": 1.1})
+    axes.plot([0.85, 1.15, 1.15], [asked, asked, bins], color=FAINT, linewidth=1.1)
+    axes.annotate("", (0.85, bins), (1.15, bins), arrowprops={"arrowstyle": "-|>", "color": FAINT, "linewidth": 1.1})
     axes.text(
         1.27, 2, "no: next divisors\nof 90° and 360°", fontsize=9, color=INK, ha="center", va="center", rotation=90
     )
@@ -128,7 +121,7 @@ def outlines(pixels: PixelatedSurface, part: int) -> list[Array]:
 def draw_pixelations(path: Path) -> None:
     """Figure 3.11: the flat and the curved part of a dome of radius 2.5 mm."""
     dome = PixelatedSurface.cut(et.Dome(radius=2.5), pixel=0.5, parallels=5)
-    made = figure(8.4, 4.1)
+    made = new_figure(8.4, 4.1, layout=None)
     flat = made.add_subplot(121)
     around = np.linspace(0, 2 * np.pi, 181)
     squares = outlines(dome, 0)
@@ -138,12 +131,11 @@ def draw_pixelations(path: Path) -> None:
         flat.add_patch(Polygon(cell[:, :2], facecolor=PALE, edgecolor=BLUE, linewidth=0.8))
     flat.plot(2.5 * np.cos(around), 2.5 * np.sin(around), color=RED, linewidth=1.3)
     flat.set(xlim=(-2.8, 2.8), ylim=(-2.8, 2.8), xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    flat.spines[["top", "right"]].set_visible(False)
-    flat.set_title(f"flat part: {len(touched)} squares of 0.5 mm on the disk", fontsize=10)
+    flat.set_title(f"flat part: {len(touched)} squares of 0.5 mm on the disk", **TITLES)
     axes = solid(made, 122, 2.6, (0.0, 2.6), (35, -60))
     cells = outlines(dome, 1)
     axes.add_collection3d(Poly3DCollection(cells, facecolors=PALE, edgecolors=BLUE, linewidths=0.7))
-    axes.set_title(f"hemisphere: {len(cells)} cells by N = 5 parallels", fontsize=10, y=0.98)
+    axes.set_title(f"hemisphere: {len(cells)} cells by N = 5 parallels", **TITLES, y=0.98)
     save(made, path)
 
 
@@ -151,11 +143,11 @@ def draw_axes(path: Path) -> None:
     """Figure 3.12: local axes of one curved pixel: y = z × zproj, x = y × z."""
     dome = PixelatedSurface.cut(et.Dome(radius=2.5), pixel=0.5, parallels=5)
     curved = dome.pixels[1]
-    made = figure(5.6, 4.6)
+    made = new_figure(5.6, 4.6, layout=None)
     axes = solid(made, 111, 2.6, (0.0, 2.9), (24, -38))
     cells = outlines(dome, 1)
     edges = [np.vstack([cell, cell[:1]]) for cell in cells]
-    axes.add_collection3d(Line3DCollection(edges, colors=SOFT, linewidths=0.4))
+    axes.add_collection3d(Line3DCollection(edges, colors=FAINT, linewidths=0.4))
     # A cell in front, in the third ring below the cap.
     pixel = 25 + 24 - 4
     chosen = curved.cells(np.array([pixel]))
@@ -163,7 +155,7 @@ def draw_axes(path: Path) -> None:
     centre, frame = chosen.centre[0], chosen.axes[0]
     for name, direction, color in zip("xyz", frame, (BLUE, BLUE, RED), strict=True):
         axes.quiver(*centre, *(1.3 * direction), color=color, arrow_length_ratio=0.12, linewidth=1.6)
-        axes.text(*(centre + 1.5 * direction), name, color=color, fontsize=11, ha="center")
+        axes.text(*(centre + 1.62 * direction), name, color=color, fontsize=11, ha="right")
     for (name, direction), at in zip((("X", (1, 0, 0)), ("Y", (0, 1, 0)), ("Z", (0, 0, 1))), itertools.repeat(3.2)):
         axes.quiver(0, 0, 0, *(at * np.array(direction)), color=INK, arrow_length_ratio=0.06, linewidth=0.8)
         axes.text(*(1.06 * at * np.array(direction)), name, color=INK, fontsize=10, ha="center")

@@ -16,13 +16,19 @@ from pathlib import Path
 
 import etendue as et
 import numpy as np
+from etendue.plot import style
+from etendue.plot.region_marks import draw_marks, marks_of
 from experiments import goniometer
 from experiments.chamber import DIAMETER, FLUX, HEIGHT, SHEET, Finish, chamber
-from experiments.panels import FAINT, INK, LINES, new_figure, print_table, save
+from experiments.panels import LINES, ROOT, legend_below, map_grid, new_figure, print_table, put_bar_at, save
+from matplotlib.colors import Normalize, PowerNorm
 
 EYE = et.Observer(theta=55, phi=90, distance=1000, target=(0, 0, HEIGHT))
 REGION = et.Region(left=-10, right=10, bottom=-10.5, top=-2.5)
 """X 15 to 35 mm and Y 15 to 23 mm of a screen of 50 mm × 25 mm, from its upper left corner."""
+
+BRIGHTEST = 2500.0
+"""Luminance at the end of the colours of two lamps over a plate [cd/m²]."""
 
 PET = et.bsdf.RoughCoat(roughness=0.035, index=1.575, base_reflectance=0.9938)
 """Stand-in for microcellular PET: its index, R = 0.984, and a roughness with highlights as bright as in table 4.1."""
@@ -110,7 +116,7 @@ def numbers(lmap: et.LuminanceMap) -> tuple[str, str, str]:
 
 def draw_materials(path: Path) -> None:
     """Figures 4.3, 4.4, 4.12 and 4.13."""
-    made = new_figure(9.0, 6.0)
+    made = new_figure(9.0, 6.2, "Stand-ins for two wall materials, as a goniophotometer measures them")
     grid = made.subplots(2, 2)
     columns = [("PET", PET, PET_ANGLES, PET_ANGLES), ("gloss paint", GLOSS, GLOSS_ANGLES, GLOSS_SCANS)]
     for column, (name, bsdf, angles, scans) in enumerate(columns):
@@ -119,11 +125,11 @@ def draw_materials(path: Path) -> None:
         axes.plot(angles, specular, "o-", color=LINES[0], label="specular reflectance")
         rest = (goniometer.total_reflectance(bsdf) - specular) / np.pi
         axes.plot(angles, rest, "s--", color=LINES[1], label="diffuse BRDF [1/sr]")
-        axes.set_title(name, fontsize=10, color=INK)
+        style.put_title(axes, name)
         axes.set_xlabel("angle of incidence [°]")
-        axes.legend(frameon=False, fontsize=8)
+        style.put_legend(axes)
         axes = grid[1, column]
-        for theta, colour in zip(scans, [*LINES, FAINT], strict=False):
+        for theta, colour in zip(scans, LINES, strict=False):
             one = goniometer.scan(bsdf, theta)
             r, values = goniometer.OFFSETS, one.values
             axes.semilogy(
@@ -134,69 +140,61 @@ def draw_materials(path: Path) -> None:
             )
         axes.set_xlim(-60, 60)
         axes.set_xlabel("angle from the specular direction [°]")
-        axes.legend(frameon=False, fontsize=7, ncol=2)
-    grid[0, 0].set_ylabel("share, or 1/sr")
+        style.put_legend(axes, ncols=2)
+    grid[0, 0].set_ylabel("reflectance, or BRDF [1/sr]")
     grid[1, 0].set_ylabel("measured f [1/sr]")
-    for axes in grid.ravel():
-        axes.spines[["top", "right"]].set_visible(False)
     save(made, path)
 
 
-def draw_maps(path: Path, rows: Mapping[str, Mapping[str, et.LuminanceMap]]) -> None:
+def draw_maps(path: Path, heading: str, rows: Mapping[str, Mapping[str, et.LuminanceMap]]) -> None:
     """A row of maps for each material, a column for each description, the region of table 4.1 within them."""
     columns = list(max(rows.values(), key=len))
-    made = new_figure(2.6 * len(columns) + 1.0, 1.7 * len(rows) + 0.3)
-    grid = made.subplots(len(rows), len(columns), squeeze=False)
-    for panels, (name, maps) in zip(grid, rows.items(), strict=True):
+    last = len(columns) - 1
+    facts = ["1: the region of table 4.1"]
+    grid = map_grid((2.3, 1.15), columns, list(rows), {last: "each"}, heading=heading, facts=facts)
+    for row, maps in enumerate(rows.values()):
         most = 1.02 * max(float(np.quantile(lmap.values, 0.999)) for lmap in maps.values())
-        for axes, title in zip(panels, columns, strict=True):
-            if title not in maps:
-                axes.set_axis_off()
-                continue
-            image = axes.imshow(maps[title].values, cmap="gray", vmin=0, vmax=most, extent=(-25, 25, -12.5, 12.5))
-            axes.set_title(title, fontsize=9, color=INK)
-            axes.tick_params(labelsize=7, colors=FAINT)
-            axes.plot([-10, 10, 10, -10, -10], [-10.5, -10.5, -2.5, -2.5, -10.5], color=LINES[1], linewidth=0.8)
-        first = next(axes for axes, title in zip(panels, columns, strict=True) if title in maps)
-        first.set_ylabel(f"{name}\ny [mm]", fontsize=8, color=INK)
-        bar = made.colorbar(image, ax=panels.tolist(), fraction=0.02, pad=0.01, extend="max")
-        bar.ax.tick_params(labelsize=7)
-        bar.set_label("cd/m²", fontsize=8)
-    save(made, path)
+        for name, lmap in maps.items():
+            image = grid.show(row, columns.index(name), lmap, Normalize(0.0, most))
+            draw_marks(grid.panels[row, columns.index(name)], marks_of(lmap, [REGION]))
+        data = np.stack([lmap.values for lmap in maps.values()])
+        put_bar_at(grid.bars[last][row], image, data, lmap.quantity, lmap.unit)
+    grid.save(path)
 
 
 def draw_intensity(path: Path, found: Mapping[str, Mapping[str, et.Intensity]]) -> None:
     """Figures 4.8, 4.9 and 4.16: C0–C180 and C45–C225."""
-    made = new_figure(9.0, 3.2 * len(found))
+    made = new_figure(9.0, 2.9 * len(found) + 0.6, "A mixing chamber: intensity by what its wall is described by")
     grid = made.subplots(len(found), 2, squeeze=False)
-    gamma = np.arange(0.0, 90.1, 5.0)
+    gamma, names = np.arange(0.0, 90.1, 5.0), list(max(found.values(), key=len))
     for panels, (name, curves) in zip(grid, found.items(), strict=True):
         for axes, plane in zip(panels, (0.0, 45.0), strict=True):
-            for (title, intensity), colour in zip(curves.items(), LINES, strict=False):
+            for title, intensity in curves.items():
                 there, back = (np.array([float(intensity.at(c, g)) for g in gamma]) for c in (plane, plane + 180.0))
                 axes.plot(
                     np.concatenate([-gamma[:0:-1], gamma]),
                     np.concatenate([back[:0:-1], there]),
-                    color=colour,
+                    color=LINES[names.index(title)],
                     label=title,
                 )
-            axes.set_title(f"{name}, C{plane:g}–C{plane + 180:g}", fontsize=9, color=INK)
+            style.put_title(axes, f"{name}, C{plane:g}–C{plane + 180:g}")
             axes.set_xlabel("γ [°]")
             axes.set_ylim(bottom=0)
-            axes.spines[["top", "right"]].set_visible(False)
         panels[0].set_ylabel("intensity [cd]")
-        panels[0].legend(frameon=False, fontsize=8)
+    legend_below(made, grid[0, 0])
     save(made, path)
 
 
 def draw_images(path: Path, lines: int) -> None:
     """Figure 4.10: two lamps over a plate of each material."""
-    made = new_figure(9.0, 2.6)
     plain = et.bsdf.Mixture(parts=[GLOSS], weights=[1.0])
     painted = et.bsdf.RoughCoat(roughness=0.01, index=1.5, base_reflectance=0.9211)
     kinds = {"PET": PET, "painted PET": painted, "aluminium on PET": ALUMINIUM, "painted aluminium": plain}
     screen = et.Screen(40, 30, 80, 60)
-    for axes, (name, bsdf) in zip(made.subplots(1, len(kinds)), kinds.items(), strict=True):
+    last, norm = len(kinds) - 1, PowerNorm(0.5, 0.0, BRIGHTEST)
+    heading = "Two lamps of 1 lm over plates of four materials, from 45°"
+    grid = map_grid((2.0, 1.5), list(kinds), [""], {last: "each"}, heading=heading, facts=[ROOT])
+    for column, bsdf in enumerate(kinds.values()):
         lamps = [
             {
                 "kind": "surface",
@@ -212,10 +210,9 @@ def draw_images(path: Path, lines: int) -> None:
         eye = et.Observer(theta=45, phi=90, distance=400)
         method = et.PathTracing(rays_per_pixel=lines, forward_rays=0)
         lmap = et.luminance_map(scene, eye, screen, method=method)
-        axes.imshow(np.sqrt(lmap.values), cmap="gray", vmax=np.sqrt(2500.0))
-        axes.set_title(name, fontsize=9, color=INK)
-        axes.set_axis_off()
-    save(made, path)
+        image = grid.show(0, column, lmap, norm)
+    put_bar_at(grid.bars[last][0], image, lmap.values, lmap.quantity, lmap.unit)
+    grid.save(path)
 
 
 def describe() -> dict[str, dict[str, Finish]]:
@@ -328,9 +325,9 @@ def main() -> None:
     edges = look_at_edges(screen, lines)
     rest = look(without_specular(materials["PET"]["diffuse + specular"]), screen, lines)
     light = split(rest, pet["diffuse + specular"], pet["truth"])
-    draw_maps(options.output / "chapter-4-maps.png", maps)
-    draw_maps(options.output / "chapter-4-light.png", {"PET": light})
-    draw_maps(options.output / "chapter-4-edges.png", {"aluminium": edges})
+    draw_maps(options.output / "chapter-4-maps.png", "A mixing chamber: what its wall is described by", maps)
+    draw_maps(options.output / "chapter-4-light.png", "A mixing chamber: parts of its light", {"PET": light})
+    draw_maps(options.output / "chapter-4-edges.png", "A mixing chamber", {"aluminium": edges})
     draw_intensity(options.output / "chapter-4-intensity.png", far)
     draw_images(options.output / "chapter-4-images.png", 4 * lines)
     print(f"\nfigures: {options.output}/")

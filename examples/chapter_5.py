@@ -22,9 +22,10 @@ import numpy as np
 import numpy.typing as npt
 from etendue.instruments.agreement import variation
 from etendue.instruments.stopping import RULES
+from etendue.plot import style
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
-from experiments.panels import FAINT, INK, LINES, new_figure, print_table, save
-from matplotlib.ticker import NullFormatter
+from experiments.panels import FAINT, INK, LINES, legend_below, new_figure, print_table, save
+from matplotlib.axes import Axes
 from scipy.optimize import brentq
 
 Array = npt.NDArray[np.float64]
@@ -120,30 +121,24 @@ def print_instrument(output: Path) -> None:
         f"eq. 5.3 between a beam that is not quite parallel and S_sim: {100 * off.max():.0f} % at the edges, ", end=""
     )
     print(f"{100 * off[middle].max():.1f} % at most within 0.55° of the middle (budget 3 %)")
-    made = new_figure(9.0, 2.9)
+    made = new_figure(9.0, 3.2, "A scatter goniometer: its instrument function")
     left, centre, right = made.subplots(1, 3)
     left.plot(sim.angle, device.flux / device.peak, "--", color=LINES[1], label="S of a real beam")
     left.plot(sim.angle, sim.flux / sim.peak, color=LINES[0], label="S_sim")
-    left.set(xlabel="angle [°]", ylabel="S over its maximum", title="fig. 5.1", ylim=(0, 1.35))
+    left.set(xlabel="angle [°]", ylabel="S over its maximum", ylim=(0, 1.35))
     centre.plot(sim.angle, 100 * off, ".", color=LINES[0])
     centre.axhline(3.0, color=LINES[1], ls="--", lw=0.8)
-    centre.set(xlabel="angle [°]", ylabel="eq. 5.3 [%]", title="fig. 5.2, and the budget of 3 %")
+    centre.set(xlabel="angle [°]", ylabel="eq. 5.3 [%]")
     for diameter, colour in zip(APERTURES, LINES, strict=False):
         bare = et.ScatterGoniometer(14, diameter, 886).instrument_function(0.1, 1.8)
         right.plot(bare.angle, bare.flux / bare.peak, color=colour, label=f"{diameter:g} mm")
-    right.set(xlabel="angle [°]", title="fig. 5.6: four apertures", ylim=(0, 1.35))
-    left.legend(frameon=False, fontsize=7, loc="upper left")
-    right.legend(frameon=False, fontsize=7, loc="upper left", ncol=2)
-    finish(made, output / "chapter-5-instrument.png")
-
-
-def finish(made: object, path: Path) -> None:
-    """Frames and letters as in other figures, and the file."""
-    for axes in made.axes:  # type: ignore[attr-defined]
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.tick_params(which="both", labelsize=7, colors=FAINT)
-        axes.title.set(size=9, color=INK)
-    save(made, path)  # type: ignore[arg-type]
+    right.set(xlabel="angle [°]", ylim=(0, 1.35))
+    style.put_legend(left, loc="upper left")
+    style.put_legend(right, loc="upper left", ncols=2)
+    titles = ("Figure 5.1", "Figure 5.2, and the budget of 3 %", "Figure 5.6: four apertures")
+    for axes, title in zip((left, centre, right), titles, strict=True):
+        style.put_title(axes, title)
+    save(made, output / "chapter-5-instrument.png")
 
 
 def by_every_rule(name: str, scan: et.GoniometerScan, bare: et.GoniometerScan) -> list[str]:
@@ -156,12 +151,27 @@ def by_every_rule(name: str, scan: et.GoniometerScan, bare: et.GoniometerScan) -
     return row
 
 
+def draw_lobe(
+    axes: Axes, name: str, scan: et.GoniometerScan, truth: Array, found: Mapping[str, et.Deconvolution]
+) -> None:
+    """The truth, the scan and three ways back."""
+    axes.plot(scan.angle, truth, color=INK, lw=1.6, label="truth W")
+    axes.plot(scan.angle, scan.bsdf, "--", color=LINES[1], lw=1.0, label="measured H")
+    looks = ((":", FAINT), ("-.", LINES[2]), ("-", LINES[0]))
+    for (label, one), (dashes, colour) in zip(found.items(), looks, strict=True):
+        axes.plot(scan.angle, one.values, dashes, color=colour, lw=1.0, label=label)
+    reach = 3.5 if name in ("SD1", "SD4") else 1.8
+    axes.set(xlim=(-reach, reach), ylim=(0, 1.5 * truth.max()))
+    style.put_title(axes, name)
+
+
 def deconvolve_diffusers(output: Path, *, full: bool, fresh: bool) -> None:
     """Figs. 5.3, 5.4 and 5.5: 10⁴ iterations, E(i), and stops."""
     goniometer = et.ScatterGoniometer()
     bare = goniometer.instrument_function(0.1, rays=10**6)
     rows, rules = [], []
-    made, course = new_figure(9.0, 5.2), new_figure(9.0, 2.5)
+    made = new_figure(9.0, 5.6, "Four lobes (figs. 5.3 and 5.5): scanned, and without the instrument")
+    course = new_figure(9.0, 2.8, "Four lobes (fig. 5.4): the error function")
     panels, courses = made.subplots(2, 2), course.subplots(1, 4)
     for axes, under, name in zip(panels.ravel(), courses, STOPS, strict=True):
         start = time.perf_counter()
@@ -186,26 +196,21 @@ def deconvolve_diffusers(output: Path, *, full: bool, fresh: bool) -> None:
         rows.append([name, *(f"{100 * one:.1f} %" for one in told), *stops, *rest])
         if full:
             rules.append(by_every_rule(name, scan, bare))
-        axes.plot(scan.angle, truth, color=INK, lw=1.6, label="truth W")
-        axes.plot(scan.angle, scan.bsdf, "--", color=LINES[1], lw=1.0, label="measured H")
-        axes.plot(scan.angle, endless.values, ":", color=FAINT, lw=1.0, label=f"slice, {endless.iterations} iterations")
-        axes.plot(scan.angle, thesis.values, "-.", color=LINES[2], lw=1.0, label="slice, thesis' rule")
-        axes.plot(scan.angle, ours.values, color=LINES[0], lw=1.0, label="rings, penalised")
-        reach = 3.5 if name in ("SD1", "SD4") else 1.8
-        axes.set(xlim=(-reach, reach), ylim=(0, 1.5 * truth.max()), title=name)
+        found = {f"slice, {style.plain(endless.iterations)} iterations": endless, "slice, thesis' rule": thesis}
+        draw_lobe(axes, name, scan, truth, found | {"rings, penalised": ours})
         error = thesis.error_function
         under.loglog(np.arange(1, error.size + 1), error / error.max(), color=LINES[0])
         under.axvline(thesis.iterations, color=LINES[1], ls="--", lw=0.8)
-        under.yaxis.set_minor_formatter(NullFormatter())
-        under.set(xlabel="iteration i", title=f"{name}: stop {thesis.iterations}, printed {STOPS[name]}")
-    panels[0, 0].legend(frameon=False, fontsize=7, loc="upper left")
+        under.set_xlabel("iteration i")
+        style.put_title(under, f"{name}: stop {thesis.iterations}, printed {STOPS[name]}")
+    legend_below(made, panels[0, 0])
     for axes in panels[:, 0]:
-        axes.set_ylabel("f [1/sr]", fontsize=8)
+        axes.set_ylabel("f [1/sr]")
     for axes in panels[1]:
-        axes.set_xlabel("angle [°]", fontsize=8)
-    courses[0].set_ylabel("E(i) over its largest", fontsize=8)
-    finish(made, output / "chapter-5-lobes.png")
-    finish(course, output / "chapter-5-error-function.png")
+        axes.set_xlabel("angle [°]")
+    courses[0].set_ylabel("E(i) over its largest")
+    save(made, output / "chapter-5-lobes.png")
+    save(course, output / "chapter-5-error-function.png")
     head = ["L2 error", "measured", "slice, no stop", "slice, thesis", "matrix", "rings, held-out", "rings, penalised"]
     print_table([*head, "stop printed", "thesis' rule", "held-out", "least of matrix", "TIS kept to", "scan"], rows)
     names = [f"{kind} {rule}" for kind in ("rings", "slice") for rule in RULES]
@@ -313,16 +318,17 @@ def four_apertures(output: Path, fwhm: float, seeds: int) -> None:
     top = float(truth.evaluate([0, 0, 1], [0, 0, -1]))
     peak, width = np.mean([d.peak for d in one]) / top, np.mean([d.fwhm for d in one])
     print(f"  peak over that of the truth {peak:.3f}, FWHM {width:.3f}°; the peak rises by up to {max(rise):.0f} %")
-    made = new_figure(9.0, 2.9)
+    made = new_figure(9.0, 3.2, f"A lobe of {fwhm:g}°, scanned through four apertures")
     for axes, title in zip(made.subplots(1, 2), ("as measured", "without the instrument"), strict=True):
         for d, diameter, colour in zip(one, APERTURES, LINES, strict=False):
             values = d.raw if title == "as measured" else d.values
             axes.plot(d.angle - d.middle, values, color=colour, lw=1.1, label=f"{diameter:g} mm")
-        axes.set(xlim=(-1.6 * fwhm - 0.5, 1.6 * fwhm + 0.5), title=f"{fwhm:g}°, {title}", xlabel="angle [°]")
+        axes.set(xlim=(-1.6 * fwhm - 0.5, 1.6 * fwhm + 0.5), xlabel="angle [°]")
+        style.put_title(axes, title)
         axes.set_ylim(0, None)
-    made.axes[0].set_ylabel("f [1/sr]", fontsize=8)
-    made.axes[1].legend(frameon=False, fontsize=7)
-    finish(made, output / f"chapter-5-apertures-{fwhm:g}.png")
+    made.axes[0].set_ylabel("f [1/sr]")
+    style.put_legend(made.axes[1])
+    save(made, output / f"chapter-5-apertures-{fwhm:g}.png")
 
 
 def main() -> None:

@@ -17,8 +17,9 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import numpy.typing as npt
+from etendue.plot import style
 from experiments.luminaire import FLUX, FOCUS, HEIGHT, RADIUS, REFLECTANCE, SIDE, holographic, look, luminaire
-from experiments.panels import FAINT, INK, LINES, measures, new_figure, print_table, save, show_map
+from experiments.panels import FAINT, INK, LINES, map_grid, measures, print_table, put_bar_at
 from matplotlib.colors import Normalize
 
 Array = npt.NDArray[np.float64]
@@ -152,24 +153,22 @@ def print_maps(maps: Mapping[str, et.LuminanceMap], spread: Band) -> None:
 
 def draw(path: Path, maps: Mapping[str, et.LuminanceMap], spread: Band) -> None:
     """Figure 5.11, with what the thesis could not have: the truth, and by how much the maps miss it."""
-    made = new_figure(10.0, 5.6)
-    grid = made.add_gridspec(2, 4, height_ratios=[1.05, 1.0])
-    truth = maps["truth"]
-    norm = Normalize(0.0, 1.02 * float(np.quantile(truth.values, 0.999)) / 1e6)
-    panels = [made.add_subplot(grid[0, k]) for k in range(4)]
-    for axes, (name, lmap) in zip(panels, maps.items(), strict=True):
-        image = show_map(axes, lmap.replace(values=lmap.values / 1e6), norm)
-        image.set_cmap("gray")
-        axes.set_title(name, fontsize=9, color=INK)
-    panels[0].set_ylabel("y [mm]", fontsize=8)
-    bar = made.colorbar(image, ax=panels, fraction=0.015, pad=0.01, extend="max")
-    bar.ax.tick_params(labelsize=7)
-    bar.set_label("10⁶ cd/m²", fontsize=8)
+    truth, size, below = maps["truth"], 1.95, 3.0
+    last = len(maps) - 1
+    grid = map_grid(
+        (size, size), list(maps), [""], {last: "each"}, heading="LED, parabola and diffuser (fig. 5.11)", below=below
+    )
+    norm = Normalize(0.0, 1.02 * float(np.quantile(truth.values, 0.999)))
+    for column, lmap in enumerate(maps.values()):
+        image = grid.show(0, column, lmap, norm)
+    data = np.stack([lmap.values for lmap in maps.values()])
+    put_bar_at(grid.bars[last][0], image, data, truth.quantity, truth.unit)
+    width = (grid.figure.get_figwidth() - 2.0) / 2
+    left, right = (style.add_axes(grid.figure, x, 0.8, width, below - 1.1) for x in (0.7, width + 1.6))
     middle = 0.5 * (RINGS[1:] + RINGS[:-1])
-    left, right = made.add_subplot(grid[1, :2]), made.add_subplot(grid[1, 2:])
     for (name, lmap), colour in zip(maps.items(), (LINES[1], LINES[2], LINES[0], INK), strict=True):
         cut = et.cross_section(lmap, y=0.1)
-        left.plot(cut.position, cut.values / 1e6, color=colour, lw=1.0, label=name)
+        left.plot(cut.position, cut.values, color=colour, lw=1.0, label=name)
         ring = by_ring(lmap, lmap.values)
         known = by_ring(truth, truth.values)
         if name == "truth":
@@ -181,16 +180,20 @@ def draw(path: Path, maps: Mapping[str, et.LuminanceMap], spread: Band) -> None:
             error = 100 * spread.ring / np.where(lit, known, 1.0)
             right.fill_between(middle, ratio - error, ratio + error, where=lit, color=colour, alpha=0.25, lw=0)
     right.axhline(0.0, color=FAINT, lw=0.6)
-    left.set(xlabel="x [mm]", ylabel="luminance [10⁶ cd/m²]", ylim=(0, None))
-    right.set(xlabel="distance from the axis [mm]", ylabel="mean of a ring, less the truth [%]", xlim=(0, 9))
+    left.set(xlabel=f"{style.HORIZONTAL} [mm]", ylim=(0, None))
+    right.set(xlabel="distance from the axis [mm]", ylabel="ring, less the truth [%]", xlim=(0, 9))
     right.text(2.5, 0.5, "dark", fontsize=8, color=FAINT, ha="center", va="bottom")
-    left.set_title("cut through the middle", fontsize=9, color=INK)
-    right.set_title("rings of 0.5 mm, and the standard error of L_W", fontsize=9, color=INK)
-    made.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, fontsize=8)
-    for axes in (left, right):
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.tick_params(labelsize=7, colors=FAINT)
-    save(made, path)
+    for axes, title in (
+        (left, "Cut through the middle"),
+        (right, "Means of rings of 0.5 mm, and the standard error of L_W"),
+    ):
+        style.dress(axes)
+        style.put_title(axes, title)
+    style.put_numbers(left.yaxis, truth.quantity, truth.unit, *left.get_ylim())
+    handles, labels = left.get_legend_handles_labels()
+    place = {"loc": "lower center", "ncols": len(labels), "frameon": False}
+    grid.figure.legend(handles, labels, **place, fontsize=style.TICK_SIZE, labelcolor=INK)
+    grid.save(path)
 
 
 def main() -> None:

@@ -17,8 +17,9 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 from etendue.instruments.agreement import Agreement
+from etendue.plot import style
 from experiments.luminaire import holographic
-from experiments.panels import FAINT, INK, LINES, new_figure, print_table, save
+from experiments.panels import INK, LINES, legend_below, new_figure, print_table, save
 
 
 @dataclasses.dataclass(frozen=True)
@@ -191,7 +192,7 @@ def told(values: Sequence[float]) -> str:
 
 def draw(path: Path, rounds: Mapping[str, Round]) -> None:
     """A column for each material: as measured above, deconvolved below, the truth in black."""
-    made = new_figure(12.0, 5.4)
+    made = new_figure(12.0, 5.6, "Five scatter goniometers, three materials")
     grid = made.subplots(2, len(rounds), sharex="col")
     for column, (name, one) in zip(grid.T, rounds.items(), strict=True):
         material = MATERIALS[name]
@@ -202,17 +203,15 @@ def draw(path: Path, rounds: Mapping[str, Round]) -> None:
         reach = {"diffuser of 0.5°": 2.5, "lopsided, in one plane": 12.0}.get(name, 8.0)
         for axes, lobes in zip(column, (one.scans, one.found), strict=True):
             axes.plot(angle - first.regular, truth, color=INK, lw=2.2, alpha=0.35, label="truth")
-            for each, laboratory, colour in zip(lobes, LABORATORIES, LINES, strict=True):
+            for each, laboratory, colour in zip(lobes, LABORATORIES, LINES, strict=False):
                 values = each.bsdf if isinstance(each, et.GoniometerScan) else each.values
                 axes.plot(each.angle - first.regular, values, color=colour, lw=1.0, label=laboratory)
             axes.set(xlim=(-reach, reach), yscale="log", ylim=(1e-3 * truth.max(), 2 * truth.max()))
-            axes.spines[["top", "right"]].set_visible(False)
-            axes.tick_params(which="both", labelsize=7, colors=FAINT)
-        column[0].set_title(name, fontsize=9, color=INK)
-        column[1].set_xlabel("angle from the regular direction [°]", fontsize=8)
-    grid[0, 0].set_ylabel("measured f [1/sr]", fontsize=8)
-    grid[1, 0].set_ylabel("deconvolved f [1/sr]", fontsize=8)
-    made.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False, fontsize=8)
+        style.put_title(column[0], name)
+        column[1].set_xlabel("angle from the regular direction [°]")
+    grid[0, 0].set_ylabel("measured f [1/sr]")
+    grid[1, 0].set_ylabel("deconvolved f [1/sr]")
+    legend_below(made, grid[0, 0])
     save(made, path)
 
 

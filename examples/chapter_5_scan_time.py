@@ -19,8 +19,9 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 from etendue.instruments.detectors import Readings
+from etendue.plot import style
 from etendue.quantities.bsdf_data import direction
-from experiments.panels import FAINT, INK, LINES, new_figure, print_table, save
+from experiments.panels import LINES, legend_below, new_figure, print_table, save
 
 Array = npt.NDArray[np.float64]
 
@@ -105,7 +106,7 @@ def draw(path: Path, found: Mapping[str, tuple[Array, Array, Mapping[str, Readin
         "photometer, baffle",
         "CCD, up to 2 h",
     )
-    made = new_figure(9.6, 5.6)
+    made = new_figure(9.6, 5.8, "Readings of a scatter goniometer, by detector")
     grid = made.subplots(2, len(found), sharex=True, sharey="row")
     for column, (material, (at, flux, readings)) in zip(grid.T, found.items(), strict=True):
         theta = np.degrees(np.arccos(at[:, 2]))
@@ -117,14 +118,11 @@ def draw(path: Path, found: Mapping[str, tuple[Array, Array, Mapping[str, Readin
             for axes, values in ((column[0], off), (column[1], readings[name].seconds)):
                 curve = [np.median(values[band == k]) if (band == k).any() else np.nan for k in range(middle.size)]
                 axes.semilogy(middle, curve, "o-", ms=3, lw=1.1, color=colour, label=name)
-        column[0].set_title(material, fontsize=9, color=INK)
-        column[1].set_xlabel("angle from the normal [°]", fontsize=8)
-    grid[0, 0].set_ylabel("error of f, median [%]", fontsize=8)
-    grid[1, 0].set_ylabel("time of a position, median [s]", fontsize=8)
-    for axes in made.axes:
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.tick_params(which="both", labelsize=7, colors=FAINT)
-    made.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False, fontsize=8)
+        style.put_title(column[0], material)
+        column[1].set_xlabel("angle from the normal [°]")
+    grid[0, 0].set_ylabel("error of f, median [%]")
+    grid[1, 0].set_ylabel("time of a position, median [s]")
+    legend_below(made, grid[0, 0])
     save(made, path)
 
 

@@ -51,7 +51,8 @@ def main() -> None:
     if max(float(lmap.values.max()) for lmap in maps) > die:
         raise SystemExit("a lens in air raises no luminance")
     print("nowhere brighter than the die")
-    draw_maps(Path("collimator.png"), [f"{theta:g}° off the axis" for theta in looks], [("[mm]", maps)], size=3.4)
+    titles = [f"{theta:g}° off the axis" for theta in looks]
+    draw_maps(Path("collimator.png"), "A die behind a collimating lens", titles, [("", maps)], size=2.6)
     print("picture: collimator.png")
 
 

@@ -15,6 +15,7 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 from etendue.instruments.turned_sample import TurnedSample
+from etendue.plot import style
 from etendue.scatter.appearance import distinctness_of_image, haze_index, reflection_haze, specular_gloss
 from experiments.panels import FAINT, INK, LINES, new_figure, print_table, save
 
@@ -161,7 +162,9 @@ def look_at_gloss(seed: int) -> None:
 
 def draw_cuts(path: Path, names: tuple[str, ...], coarser: float) -> None:
     """Each lobe along the plane of incidence: truth, scan, and ways back."""
-    made = new_figure(3.0 * len(names) + 0.6, 2.9)
+    wide = len(names) > 1
+    heading = "Lobes at 60°, scanned, and without the instrument" if wide else ""
+    made = new_figure(3.0 * len(names) + 0.6, 3.2, heading)
     for axes, name in zip(made.subplots(1, len(names), squeeze=False)[0], names, strict=True):
         sample, step, span = LOBES[name]
         step *= coarser
@@ -183,13 +186,11 @@ def draw_cuts(path: Path, names: tuple[str, ...], coarser: float) -> None:
         axes.fill_between(angle, found.values[cut] - band, found.values[cut] + band, color=LINES[0], alpha=0.3, lw=0)
         axes.plot(fine, found.evaluate(to), color=LINES[0], lw=1.1, label="Richardson-Lucy")
         reach = min(span, float(np.abs(fine[truth > 0.01 * truth.max()]).max()) * 1.1)
-        axes.set(xlim=(-reach, reach), ylim=(-0.15 * truth.max(), 1.45 * truth.max()), title=name)
-        axes.set_xlabel("from the regular direction, in the plane of incidence [°]", fontsize=7)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.tick_params(labelsize=7, colors=FAINT)
-        axes.title.set(size=9, color=INK)
-    made.axes[0].set_ylabel("f [1/sr]", fontsize=8)
-    made.axes[0].legend(frameon=False, fontsize=7, loc="upper left", ncol=2)
+        axes.set(xlim=(-reach, reach), ylim=(-0.15 * truth.max(), 1.45 * truth.max()))
+        style.put_title(axes, name)
+        axes.set_xlabel("from the regular direction [°]")
+    made.axes[0].set_ylabel("f [1/sr]")
+    style.put_legend(made.axes[0], loc="upper left", ncols=2)
     save(made, path)
 
 

@@ -115,9 +115,11 @@ def main() -> None:
         (f"θ = {observer.theta:g}°", [*(methods[name][i] for name in shown), truth[i]])
         for i, observer in enumerate(OBSERVERS)
     ]
-    draw_maps(options.output / "dome-led.png", [*shown, "the LED itself"], pictures, kind="root", size=1.9)
+    heading = "An LED with a silicone dome, from its ray file and by itself"
+    draw_maps(options.output / "dome-led.png", heading, [*shown, "the LED itself"], pictures, kind="root", size=1.9)
     seen = {name: methods[name][-1] for name in shown if "dome" in name or name.startswith("gridded")}
-    draw_decades(options.output / "figure-3.10.png", seen | {"the LED itself": truth[-1]}, decades=4)
+    heading = "Figure 3.10: an LED with a silicone dome, from 70°"
+    draw_decades(options.output / "figure-3.10.png", heading, seen | {"the LED itself": truth[-1]}, decades=4)
     print(f"\nfigures and ray file: {options.output}/")
 
 

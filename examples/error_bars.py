@@ -14,8 +14,9 @@ from pathlib import Path
 
 import etendue as et
 import numpy as np
+from etendue.plot import style
 from experiments.checks import agree
-from experiments.panels import INK, LINES, new_figure, save
+from experiments.panels import LINES, new_figure, save
 
 SETS, RAYS = 20, 1_000_000
 
@@ -37,14 +38,14 @@ def main() -> None:
         share = math.erf(reach / math.sqrt(2.0))
         found, error = float(np.mean(np.abs(score) < reach)), math.sqrt(share * (1.0 - share) / score.size)
         agree(f"share within {reach:g} standard errors", found, share, error)
-    made = new_figure(6.0, 3.2)
+    made = new_figure(6.0, 3.4, f"Three Lambertian rings: the error bars of {SETS} maps")
     axes = made.subplots()
     axes.hist(score, bins=np.arange(-4, 4.1, 0.25), density=True, color=LINES[0], alpha=0.5, label="pixels")
     x = np.linspace(-4, 4, 200)
     axes.plot(x, np.exp(-(x**2) / 2) / math.sqrt(2 * math.pi), color=LINES[1], label="normal distribution")
-    axes.set_xlabel("(estimate − truth) / standard error", color=INK)
-    axes.set_ylabel("density", color=INK)
-    axes.legend(frameon=False)
+    axes.set_xlabel("(estimate − truth) / standard error")
+    axes.set_ylabel("density")
+    style.put_legend(axes)
     save(made, Path("error-bars.png"))
     print("picture: error-bars.png")
 

@@ -14,38 +14,30 @@ from pathlib import Path
 
 import etendue as et
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
+from experiments.panels import map_grid, put_bar_at
+from matplotlib.colors import LogNorm, Normalize
 
 OBSERVERS = [et.Observer(0, 0, 500), et.Observer(45, 0, 500), et.Observer(65, 120, 500)]
 SCREEN = et.Screen(66, 66, 128, 128)
 
 
 def draw(maps: list[et.LuminanceMap], path: Path) -> None:
-    made = Figure(figsize=(12.4, 3.3), dpi=110, layout="constrained")
-    FigureCanvasAgg(made)
-    panels = made.subplots(1, 4)
-    half_width, half_height = SCREEN.width / 2, SCREEN.height / 2
-    extent = (-half_width, half_width, -half_height, half_height)
+    """The maps on one logarithmic scale, and the relative error of the first [%]."""
+    seen = [f"θ = {lmap.observer.theta:g}°, φ = {lmap.observer.phi:g}°" for lmap in maps]
+    grid = map_grid(
+        (2.55, 2.55), [*seen, f"standard error, {seen[0]}"], [""], {2: "each", 3: "each"},
+        heading="Three Lambertian rings of 300, 200 and 100 lm",
+    )  # fmt: skip
     top = max(np.nanmax(m.values) for m in maps)
-    for axes, lmap in zip(panels, maps, strict=False):
-        norm = LogNorm(top / 60, top)
-        values = np.nan_to_num(lmap.values).clip(min=top / 60)
-        image = axes.imshow(values, cmap="inferno", norm=norm, extent=extent)
-        axes.set_title(f"θ = {lmap.observer.theta:g}°, φ = {lmap.observer.phi:g}°", fontsize=11)
-    made.colorbar(image, ax=panels[2], label="luminance [cd/m²]", fraction=0.035)
-    error = maps[0].standard_error / maps[0].values * 100
-    panels[3].set_facecolor("black")
-    image = panels[3].imshow(error, cmap="viridis", vmin=0, vmax=np.nanpercentile(error, 98), extent=extent)
-    panels[3].set_title("standard error, θ = 0°", fontsize=11)
-    made.colorbar(image, ax=panels[3], label="relative [%]", fraction=0.035)
-    for axes in panels:
-        axes.set_xlabel("mm")
-        axes.tick_params(labelsize=8)
-    for axes in panels[1:]:
-        axes.set_yticklabels([])
-    made.savefig(path, bbox_inches="tight", pad_inches=0.08, metadata={"Software": None})
+    for column, lmap in enumerate(maps):
+        image = grid.show(0, column, lmap, LogNorm(top / 60, top))
+    first = maps[0]
+    put_bar_at(grid.bars[2][0], image, first.values, first.quantity, first.unit)
+    error = 100.0 * first.standard_error / first.values
+    most = float(np.nanpercentile(error, 98))
+    image = grid.show(0, 3, (error, first.screen), Normalize(0, most), colours="error")
+    put_bar_at(grid.bars[3][0], image, error, "relative error", "%")
+    grid.save(path)
 
 
 def main() -> None:

@@ -22,8 +22,10 @@ from typing import Any
 
 import etendue as et
 import numpy as np
+from etendue.plot import style
 from experiments import led
-from experiments.panels import FAINT, INK, QUICK, new_figure, save, scale, show_map
+from experiments.panels import QUICK, ROOT, map_grid, put_bar_at, scale
+from matplotlib.colors import Normalize
 
 PLACES, HEIGHTS, TURNS = 12, 6, 8
 """Cells across the lines through the source along either axis, and of the cosine and the azimuth of their directions."""
@@ -68,33 +70,23 @@ def predicted(field: et.LightField, halves: tuple[et.RaySet, et.RaySet]) -> floa
     return float(np.sum((other - smooth) ** 2) / np.sum((other - own) ** 2))
 
 
-def draw(rows: list[tuple[str, list[et.LuminanceMap], Array]], path: Path) -> None:
+def draw(rows: list[tuple[str, list[et.LuminanceMap], Array]], heading: str, path: Path) -> None:
     """For each observer both maps, and their difference in standard errors."""
-    made = new_figure(8.2, 2.1 * len(rows) + 0.4)
-    grid = made.subplots(len(rows), 3, squeeze=False)
-    for panels, (name, maps, deviation) in zip(grid, rows, strict=True):
+    titles = ("first half", "second half", "difference, where lit")
+    names = [name for name, _, _ in rows]
+    each = {1: "each", 2: "each"}
+    grid = map_grid((1.9, 1.9), titles, names, each, heading=heading, facts=[ROOT], apart=(0.5, 0.55))
+    for row, (_, maps, deviation) in enumerate(rows):
         norm = scale(maps[0], "root")
-        for axes, lmap in zip(panels, maps, strict=False):
-            image = show_map(axes, lmap, norm)
-        bar = made.colorbar(image, ax=panels[1], fraction=0.05, extend="max")
-        bar.formatter.set_powerlimits((-2, 4))
-        bar.ax.yaxis.get_offset_text().set(size=7)
-        bar.ax.tick_params(labelsize=7)
-        bar.set_label(maps[0].unit, fontsize=7)
-        w, h = maps[0].screen.width / 2, maps[0].screen.height / 2
-        image = panels[2].imshow(
-            deviation, cmap="RdBu_r", vmin=-3, vmax=3, extent=(-w, w, -h, h), interpolation="nearest"
-        )
-        panels[2].set_facecolor("#dddddd")
-        panels[2].tick_params(labelsize=7, color=FAINT, labelcolor=FAINT)
-        bar = made.colorbar(image, ax=panels[2], fraction=0.05)
-        bar.ax.tick_params(labelsize=7)
-        bar.set_label("standard errors", fontsize=7)
-        panels[0].set_ylabel(f"{name}\n[mm]", fontsize=9, color=INK)
-    titles = ("first half", "second half (root scale)", "difference, where lit")
-    for axes, title in zip(grid[0], titles, strict=True):
-        axes.set_title(title, fontsize=9, color=INK)
-    save(made, path)
+        image = [grid.show(row, column, lmap, norm, own=True) for column, lmap in enumerate(maps)][-1]
+        both = np.stack([lmap.values for lmap in maps])
+        put_bar_at(grid.bars[1][row], image, both, maps[0].quantity, maps[0].unit)
+        off = (deviation, maps[0].screen)
+        image = grid.show(row, 2, off, Normalize(-3.0, 3.0), colours="difference", own=True)
+        put_bar_at(grid.bars[2][row], image, deviation, "difference", "standard errors")
+        for axes in grid.panels[row, 1:]:
+            axes.set_ylabel("")
+    grid.save(path)
 
 
 def main() -> None:
@@ -136,7 +128,8 @@ def main() -> None:
             f"{np.mean(seen < 1):.0%} and {np.mean(seen < 2):.0%} of {len(seen):,} lit pixels within 1 and 2 standard errors"
         )
         rows.append((f"({theta:g}°, {phi:g}°)", maps, deviation))
-    draw(rows, options.output)
+    heading = style.headed("Two halves of the rays", options.file or "an LED with a silicone dome", 8.0)
+    draw(rows, heading, options.output)
     print(f"picture: {options.output}")
 
 

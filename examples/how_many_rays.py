@@ -19,6 +19,7 @@ from pathlib import Path
 
 import etendue as et
 import numpy as np
+from etendue.plot import style
 from experiments import led
 from experiments.panels import FAINT, INK, LINES, QUICK, new_figure, save
 
@@ -76,7 +77,7 @@ def print_rows(rows: list[Row]) -> None:
 
 def draw(rows: list[Row], noise: float, path: Path) -> None:
     """Errors, and what is resolved, against the number of rays."""
-    made = new_figure(9.6, 3.7)
+    made = new_figure(9.6, 3.9, "An LED with a silicone dome: what more rays bring")
     left, right = made.subplots(1, 2)
     rays = [row.rays for row in rows]
     left.loglog(rays, [row.cone for row in rows], "s-", color=FAINT, label="cone, best acceptance")
@@ -89,7 +90,7 @@ def draw(rows: list[Row], noise: float, path: Path) -> None:
     for axes in (left, right):
         axes.set_xlabel("rays")
         axes.grid(visible=True, which="major", linewidth=0.4, alpha=0.5)
-        axes.legend(frameon=False, fontsize=9)
+        style.put_legend(axes)
     save(made, path)
 
 

@@ -50,7 +50,7 @@ def main() -> None:
     agree("luminance in the port [cd/m²]", float(values.mean()), truth, max(error, 0.002 * truth))
     print(f"least over largest in the port: {values.min() / values.max():.3f}")
     titles = [f"θ = {eye.theta:g}°" for eye in observers]
-    draw_maps(Path("integrating-sphere.png"), titles, [("[mm]", maps)], size=2.8)
+    draw_maps(Path("integrating-sphere.png"), "Port of a mixing chamber", titles, [("", maps)], size=2.3)
     print("picture: integrating-sphere.png")
 
 

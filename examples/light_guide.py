@@ -56,7 +56,8 @@ def main() -> None:
         et.luminance_map(guide(length), et.Observer(8, 30, 300, target=(0, 0, length)), screen, method=lines)
         for length in (10.0, 30.0, 60.0)
     ]
-    draw_maps(Path("light-guide.png"), ["10 mm of rod", "30 mm", "60 mm"], [("from 8° [mm]", maps)], size=2.8)
+    titles = ["10 mm of rod", "30 mm", "60 mm"]
+    draw_maps(Path("light-guide.png"), "A light guide, seen from 8°", titles, [("", maps)], size=2.3)
     print("picture: light-guide.png")
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import etendue as et
 from experiments import led
 from experiments.checks import agree, map_error, table_error
-from experiments.panels import QUICK, new_figure, save, scale, show_map
+from experiments.panels import QUICK, draw_maps
 
 ANGLES = [(theta, phi) for theta in (0, 25, 50, 70) for phi in (0, 120, 240)]
 
@@ -34,14 +34,12 @@ def main() -> None:
     for (theta, phi), found, other in zip(ANGLES, maps, lines, strict=True):
         error = math.hypot(table_error(table, phi, theta), map_error(other))
         agree(f"intensity at θ = {theta}°, φ = {phi}° [cd]", found.intensity, other.intensity, error)
-    made = new_figure(7.6, 6.2)
-    norm = scale(maps[0], "root")
-    panels = made.subplots(3, 4)
-    for axes, (theta, phi), lmap in zip(panels.T.ravel(), ANGLES, maps, strict=True):
-        image = show_map(axes, lmap, norm)
-        axes.set_title(f"θ = {theta}°, φ = {phi}°", fontsize=8)
-    made.colorbar(image, ax=panels, label=f"{maps[0].unit} (root scale)", fraction=0.03)
-    save(made, Path("many-observers.png"))
+    seen = dict(zip(ANGLES, maps, strict=True))
+    thetas, phis = (sorted({angles[k] for angles in ANGLES}) for k in range(2))
+    rows = [(f"φ = {phi}°", [seen[theta, phi] for theta in thetas]) for phi in phis]
+    heading = "An LED with a silicone dome: one light field"
+    titles = [f"θ = {theta}°" for theta in thetas]
+    draw_maps(Path("many-observers.png"), heading, titles, rows, "root", 1.65, together=True)
     print("picture: many-observers.png")
 
 

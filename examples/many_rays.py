@@ -37,6 +37,14 @@ from experiments.sweeping import (
 )
 
 LAMPS = {"bare": "Remote phosphor (fig. 3.8)", "film": "The same under a film (fig. 3.9)", "led": "LED (fig. 3.13)"}
+SOURCES = {"bare": "A remote phosphor", "film": "A remote phosphor under a film", "led": "An LED with a silicone dome"}
+CUTS = {
+    "bare": "Remote phosphor (fig. 3.4)",
+    "film": "Remote phosphor under a film (fig. 3.7)",
+    "led": "LED with a silicone dome (fig. 3.15)",
+}
+"""What the pictures show."""
+
 MARKS = (10**5, 10**6, 10**7, 10**8, 10**9)
 FIELDS = 10**7
 """Light fields are fitted up to so many rays."""
@@ -211,7 +219,8 @@ def draw(name: str, lamp: Lamp, truth: list[et.LuminanceMap], seen: Seen, folder
         for i, o in enumerate(lamp.observers)
         if o.theta or not o.phi  # from the axis all azimuths see the same
     ]
-    draw_differences(folder / f"{name}-differences.png", "the lamp itself", list(seen), rows, kind)
+    heading = f"{SOURCES[name]}: the lamp itself, patches and light field"
+    draw_differences(folder / f"{name}-differences.png", heading, "the lamp itself", list(seen), rows, kind)
     looks = ("o", LINES[0]), ("x", LINES[1])
     along = {"y": 0.5} if name == "bare" else {"x": 0.01} if name == "led" else None
     if along is not None:
@@ -235,7 +244,8 @@ def draw(name: str, lamp: Lamp, truth: list[et.LuminanceMap], seen: Seen, folder
             ]
             for label, maps in [*seen.items(), ("the lamp itself", truth)]
         }
-    draw_cuts(folder / f"{name}-cuts.png", panels, columns=2 if name == "led" else len(panels))
+    heading = CUTS[name] if len(panels) > 1 else f"{CUTS[name]}, {next(iter(panels))}"
+    draw_cuts(folder / f"{name}-cuts.png", heading, panels, columns=2 if name == "led" else len(panels))
 
 
 @dataclasses.dataclass

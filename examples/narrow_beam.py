@@ -19,7 +19,7 @@ import etendue as et
 import numpy as np
 from etendue.goniophotometry.comparison import compare_intensities
 from experiments import led
-from experiments.panels import INK, LINES, QUICK, draw_maps, measures, new_figure, print_table, save
+from experiments.panels import INK, LINES, QUICK, draw_maps, legend_below, measures, new_figure, print_table, save
 
 LENS = {
     "name": "lens",
@@ -107,19 +107,17 @@ def width(angle: Any, values: Any) -> float:
 
 def draw_profiles(path: Path, profiles: dict[str, tuple[Any, Any]]) -> None:
     """Figure 3.17."""
-    made = new_figure(8.4, 3.8)
+    made = new_figure(8.4, 4.0, "Figure 3.17: LED and lens, intensity in the C0–C180 plane")
     for axes, reach in zip(made.subplots(1, 2), (15, 20), strict=True):
         for (name, (angle, values)), colour in zip(profiles.items(), (INK, *LINES), strict=False):
             dashes = {"the LED itself": "-", "Lambertian square": "-."}.get(name, "--")
             shown = np.abs(angle) <= reach
             axes.plot(angle[shown], values[shown], dashes, color=colour, linewidth=1.2, label=name)
-        axes.set_xlabel("angle in the C0-C180 plane [°]")
-        axes.spines[["top", "right"]].set_visible(False)
+        axes.set_xlabel("γ, C180 left and C0 right [°]")
     made.axes[0].set_ylabel("intensity [cd]")
     made.axes[1].set_yscale("log")
     made.axes[1].set_ylim(bottom=made.axes[1].get_ylim()[1] * 1e-4)
-    handles, labels = made.axes[0].get_legend_handles_labels()
-    made.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=8)
+    legend_below(made, made.axes[0])
     save(made, path)
 
 
@@ -173,12 +171,13 @@ def main() -> None:
         cells = [cell for name in seen[1:] for cell in (" / ".join(measures(maps[name][i], truth)),)]
         rows.append([f"{observer.theta:g}°", *cells, " / ".join(f"{maps[name][i].intensity:,.0f}" for name in seen)])
     print_table(["θ", *seen[1:], "intensity: " + ", ".join(seen)], rows)
-    drawn = scenes["the LED itself"].replace(name="Figure 3.16", detectors=[])
+    drawn = scenes["the LED itself"].replace(name="Figure 3.16: LED and lens", detectors=[])
     et.draw_scene(drawn, options.output / "figure-3.16.png", section=["y=0"], rays=24, window=(-9.5, 9.5, -1.5, 20))
     draw_profiles(options.output / "figure-3.17.png", {name: profiles[name] for name in list(profiles)[:-1]})
     shown = [*seen[1:], seen[0]]
     pictures = [(f"θ = {o.theta:g}°", [maps[name][i] for name in shown]) for i, o in enumerate(OBSERVERS)]
-    draw_maps(options.output / "narrow-beam.png", shown, pictures, kind="root")
+    heading = "A lens for a narrow beam, lit by models of an LED"
+    draw_maps(options.output / "narrow-beam.png", heading, shown, pictures, kind="root")
     print(f"\nfigures: {options.output}/")
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import etendue as et
 import numpy as np
+from etendue.plot import style
 from experiments import closed_form_lamps as lamps
 from experiments.panels import QUICK, draw_maps, print_table
 
@@ -73,8 +74,9 @@ def round_trip(*, full: bool, folder: Path) -> None:
         (name, [*(et.luminance_map(f, exact[name].observer, SCREEN) for f in (field, whole)), exact[name]])
         for name in list(OBSERVERS)[1:3]
     ]
-    titles = [f"through {n:,} rays", "from all pixels", "the lamp itself"]
-    draw_maps(folder / "near-field-round-trip.png", titles, pictures, "root")
+    titles = [f"through {style.grouped(str(n))} rays", "from all pixels", "the lamp itself"]
+    heading = "An LED, measured by a near-field goniophotometer"
+    draw_maps(folder / "near-field-round-trip.png", heading, titles, pictures, "root")
 
 
 def led_flux() -> float:
@@ -119,8 +121,12 @@ def dynamic_range(*, full: bool, folder: Path) -> None:
             f"{bits} bits, times to {error:.0%}: exposures needed for 0.1 % of the flux: {run.exposures_needed(1e-3)}"
         )
         if bits == 12 and not error:
-            et.plot_near_field(run.using(1), folder / "near-field-one-exposure.png", title="One exposure")
-            et.plot_near_field(run.using(4), folder / "near-field-exposures.png", title="Four exposures")
+            et.plot_near_field(
+                run.using(1), folder / "near-field-one-exposure.png", title="Chip and reflector, one exposure"
+            )
+            et.plot_near_field(
+                run.using(4), folder / "near-field-exposures.png", title="Chip and reflector, four exposures"
+            )
     print()
     print_table(
         [
@@ -160,8 +166,10 @@ def from_the_side(*, full: bool, folder: Path) -> None:
     print("\nDome: NCC / NRMSE [%] against the lamp's own images\n")
     print_table(["exposures of 8 bits", "dark below, of full scale", "disagreement [%]", *heads], rows)
     exact = lamps.luminance_map(lamps.dome, pictures[0].observer, pictures[0].screen)
-    titles = [f"{row[0]} exposure{'s' * (row[0] != '1')}, dark below {row[1]}" for row in rows]
-    draw_maps(folder / "near-field-side.png", [*titles, "the lamp itself"], [("γ 90°", [*pictures, exact])], "root")
+    titles = [f"{row[0]} exposure{'s' * (row[0] != '1')}, dark below {row[1].replace('%', ' %')}" for row in rows]
+    heading = "A die under a glowing dome, images from the side"
+    rows = [("γ = 90°", [*pictures, exact])]
+    draw_maps(folder / "near-field-side.png", heading, [*titles, "the lamp itself"], rows, "root")
 
 
 def exact_maximum(run: et.NearFieldRun, gamma: float) -> float:

@@ -60,7 +60,7 @@ def main() -> None:
         middle = lmap.values[12:24, 12:24]
         print(f"  least over largest of the middle field: {middle.min() / middle.max():.3f}")
     titles = [f"{height:g} mm above the LEDs" for height in heights]
-    draw_maps(Path("opal-diffuser.png"), titles, [("[mm]", maps)], size=2.8)
+    draw_maps(Path("opal-diffuser.png"), "An opal diffuser over nine LEDs", titles, [("", maps)], size=2.3)
     print("picture: opal-diffuser.png")
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from etendue.description.files import Files
 from etendue.scene.media_library import MEDIA
 from experiments.checks import agree
-from experiments.panels import FAINT, INK, new_figure, save
+from experiments.panels import FAINT, new_figure, save
 
 GLASS, SIDE, RAYS = "BK7", 30.0, 40_000
 HEIGHT = SIDE * math.sqrt(3.0) / 2.0
@@ -58,14 +58,11 @@ def main() -> None:
     for low in (430, 540, 650):
         there = direct & (np.abs(out.wavelength - low) < 10)
         agree(f"deviation at {low} ± 10 nm [°]", *np.degrees([turned[there].mean(), expected[there].mean()]), 1e-5)
-    made = new_figure(6.4, 3.2)
+    made = new_figure(6.4, 3.4, "A prism of BK7: deviation by wavelength")
     axes = made.subplots()
-    colour = axes.scatter(
-        np.degrees(turned[direct]), out.wavelength[direct], c=out.wavelength[direct], s=3, cmap="turbo"
-    )
-    made.colorbar(colour, ax=axes, label="wavelength [nm]")
-    axes.set_xlabel("deviation [°]", color=INK)
-    axes.set_ylabel("wavelength [nm]", color=INK)
+    axes.scatter(np.degrees(turned[direct]), out.wavelength[direct], c=out.wavelength[direct], s=3, cmap="turbo")
+    axes.set_xlabel("deviation [°]")
+    axes.set_ylabel("wavelength [nm]")
     axes.grid(color=FAINT, alpha=0.25)
     save(made, Path("prism.png"))
     print("picture: prism.png")

@@ -20,7 +20,8 @@ import etendue as et
 import numpy as np
 from etendue.units import RADIANCE_WHITE_EFFICACY
 from experiments.checks import agree
-from experiments.panels import INK, new_figure, save
+from experiments.panels import map_grid, put_bar_at
+from matplotlib.colors import Normalize
 
 SIDE, PIXELS = 14.0, 48
 DISTANCE = 60.0
@@ -88,19 +89,13 @@ def main() -> None:
         found[name] = render(Path("patches") / name, points, -lines)
         worst = float(np.abs(found[name] - found["étendue"]).max() / found["étendue"].max())
         agree(f"{name}: largest difference of a pixel, of the maximum", worst, 0.0, CLOSE)
-    made = new_figure(3.1 * len(found), 3.1)
-    top = float(found["étendue"].max())
-    axes = made.subplots(1, len(found), squeeze=False, sharey=True)[0]
-    for one, (name, values) in zip(axes, found.items(), strict=True):
-        image = one.imshow(
-            values.reshape(PIXELS, PIXELS) / 1e3, cmap="inferno", vmin=0, vmax=top / 1e3,
-            extent=(-SIDE / 2, SIDE / 2, -SIDE / 2, SIDE / 2),
-        )  # fmt: skip
-        one.set_title(name, fontsize=9, color=INK)
-        one.set_xlabel("x [mm]", fontsize=8)
-    axes[0].set_ylabel("y [mm]", fontsize=8)
-    made.colorbar(image, ax=axes, label="10³ cd/m², from 35°")
-    save(made, Path("radiance-mitsuba.png"))
+    screen, last = et.Screen(SIDE, SIDE, PIXELS, PIXELS), len(found) - 1
+    grid = map_grid((2.2, 2.2), list(found), [""], {last: "each"}, heading="Patches of a lamp, seen from 35°")
+    norm = Normalize(0.0, float(found["étendue"].max()))
+    for column, values in enumerate(found.values()):
+        image = grid.show(0, column, (values.reshape(PIXELS, PIXELS), screen), norm)
+    put_bar_at(grid.bars[last][0], image, found["étendue"], "luminance", "cd/m²")
+    grid.save(Path("radiance-mitsuba.png"))
     print("picture: radiance-mitsuba.png")
 
 

@@ -45,7 +45,9 @@ def main() -> None:
     if not np.allclose(maps[1].values, maps[2].values, rtol=1e-5, equal_nan=True):
         raise SystemExit("the map of the file with its flux restated is that of the good file")
     titles = ["header 20 % too high", "flux restated", "the good file"]
-    draw_maps(Path("ray-file-audit.png"), titles, [("face on [mm]", maps)], size=2.8)
+    draw_maps(
+        Path("ray-file-audit.png"), "Two Lambertian rings from ray files, face on", titles, [("", maps)], size=2.3
+    )
     print("picture: ray-file-audit.png")
 
 

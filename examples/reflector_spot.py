@@ -51,7 +51,7 @@ def main() -> None:
     print(f"the whole mirror at that luminance would give {RHO * luminance * area:,.0f} cd")
     agree("intensity on the axis [cd]", maps[0].intensity, RHO * luminance * area, map_error(maps[0]))
     titles = [f"{eye.theta:g}° off the axis" for eye in observers]
-    draw_maps(Path("reflector-spot.png"), titles, [("[mm]", maps)], size=2.8)
+    draw_maps(Path("reflector-spot.png"), "A disk in a paraboloid", titles, [("", maps)], size=2.3)
     print("picture: reflector-spot.png")
 
 

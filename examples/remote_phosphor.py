@@ -17,8 +17,9 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 from etendue.luminance.gridded_map import gridded_luminance_map
+from etendue.plot import style
 from experiments import film
-from experiments.panels import LINES, QUICK, draw_maps, measures, new_figure, noise, print_table, save
+from experiments.panels import LINES, QUICK, draw_maps, legend_below, measures, new_figure, noise, print_table, save
 from experiments.phosphor import BOX, CARRIER, FLUX, TOP, lamp
 
 OBSERVERS = [et.Observer(theta, phi, 1000) for phi in (0, 90) for theta in (0, 30, 60, 80)]
@@ -136,29 +137,27 @@ def print_tables(kind: str, found: dict[float, dict[str, list[et.LuminanceMap]]]
 
 def draw_sections(path: Path, bare: list[et.LuminanceMap], film: list[et.LuminanceMap]) -> None:
     """Figure 3.7 and what it stands on: horizontal cuts at several angles, with and without the film."""
-    made = new_figure(8.8, 3.4)
-    for axes, phi in zip(made.subplots(1, 2, sharey=True), (0, 90), strict=True):
+    made = new_figure(8.8, 3.7, "A remote phosphor under a film of prisms, and bare (dotted): horizontal cuts by θ")
+    panels = made.subplots(1, 2, sharey=True)
+    for axes, phi in zip(panels, (0, 90), strict=True):
         for colour, theta in zip(LINES, (0, 30, 60, 80), strict=False):
-            for maps, style in ((film, "-"), (bare, ":")):
+            for maps, dashes in ((film, "-"), (bare, ":")):
                 (lmap,) = [m for m in maps if m.observer.theta == theta and m.observer.phi in {phi, 0}][-1:]
                 # The bare plate looks the same from all azimuths; but φ = 90° tilts the screen's other axis.
                 cut = et.cross_section(lmap, y=0.1) if lmap.observer.phi == phi else et.cross_section(lmap, x=0.1)
-                label = f"{theta}°" if style == "-" else None
+                label = f"{theta}°" if dashes == "-" else None
                 axes.stairs(
-                    cut.values / 1000,
+                    cut.values,
                     np.append(cut.position - cut.pitch / 2, cut.position[-1] + cut.pitch / 2),
                     baseline=None,
                     color=colour,
-                    linestyle=style,
+                    linestyle=dashes,
                     label=label,
                 )
-        axes.set_title("across the prisms (φ = 0°)" if phi == 0 else "along the prisms (φ = 90°)", fontsize=10)
-        axes.set_xlabel("x on the screen [mm]")
-        axes.spines[["top", "right"]].set_visible(False)
-    made.axes[0].set_ylabel("luminance [10³ cd/m²]")
-    title = "with film\n(dotted: bare)"
-    beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
-    made.axes[1].legend(title=title, **beside, frameon=False, fontsize=8, title_fontsize=8)
+        style.put_title(axes, "across the prisms (φ = 0°)" if phi == 0 else "along the prisms (φ = 90°)")
+        axes.set_xlabel(f"{style.HORIZONTAL} [mm]")
+    panels[0].set_ylabel(f"{cut.quantity} [{cut.unit}]")
+    legend_below(made, panels[0])
     save(made, path)
 
 
@@ -182,13 +181,14 @@ def main() -> None:
         print(f"\n{kind}: {truth[kind][i].intensity:.1f} cd on the axis", end="")
     print(f", {truth['film'][0].intensity / truth['bare'][0].intensity:.3f} times as much")
     maps = found["film"][options.pixels[0]]
-    shown = [name for name in maps if name not in {"truth", "gridded, 2.1 %"}]
+    shown = [name for name in maps if name not in {"truth", "gridded, 2.1 %", "field, automatic"}]
     rows = [
         (f"({t.observer.theta:g}°, {t.observer.phi:g}°)", [*(maps[name][i] for name in shown), t])
         for i, t in enumerate(maps["truth"])
         if t.observer.theta or not t.observer.phi  # from the axis all azimuths see the same
     ]
-    draw_maps(options.output / "remote-phosphor.png", [*shown, "the lamp itself"], rows, size=1.6)
+    heading = "A remote phosphor under a film of prisms, seen from (θ, φ)"
+    draw_maps(options.output / "remote-phosphor.png", heading, [*shown, "the lamp itself"], rows, size=1.6)
     draw_sections(options.output / "remote-phosphor-sections.png", truth["bare"], truth["film"])
     print(f"figures: {options.output}/")
 

@@ -19,6 +19,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import numpy.typing as npt
+from etendue.plot import style
 from experiments.panels import QUICK, draw_maps, print_table
 from scipy.stats import chi2
 
@@ -113,11 +114,16 @@ def main() -> None:
             print(
                 f"{name} against reverse: NCC {c.ncc:.3%}, NRMSE {c.nrmse_thesis:.3%} (eq. 3.6), {c.nrmse:.3%} (true)"
             )
-    titles = [f"cone {ACCEPTANCE}°, {runs * rays:.2g} rays", f"light field, {rays:.2g} rays", "reverse"]
+    titles = [
+        f"cone {ACCEPTANCE}°, {style.plain(runs * rays)} rays",
+        f"light field, {style.plain(rays)} rays",
+        "lines of sight backwards",
+    ]
     rows = [
         (f"θ = {o.theta:g}°, φ = {o.phi:g}°", maps) for o, *maps in zip(OBSERVERS, cones, fields, reverses, strict=True)
     ]
-    draw_maps(options.output / "rings-traced.png", titles, rows, kind="root")
+    heading = "Three Lambertian rings, traced"
+    draw_maps(options.output / "rings-traced.png", heading, titles, rows, kind="root")
     print(f"\nfigure: {options.output}/")
 
 

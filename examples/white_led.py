@@ -49,7 +49,8 @@ def main() -> None:
     sources = [parts["blue"].in_unit("lm"), parts["yellow"].in_unit("lm"), white]
     maps = [et.luminance_map(rays, seen, screen, method=et.Cone(acceptance=12)) for rays in sources]
     print(f"blue alone gives {sources[0].total_flux:.4g} lm, yellow alone {sources[1].total_flux:.4g} lm")
-    draw_maps(Path("white-led.png"), ["blue", "yellow", "white"], [("face on [mm]", maps)], size=2.8)
+    titles = ["blue", "yellow", "white"]
+    draw_maps(Path("white-led.png"), "A white LED from two ray files, face on", titles, [("", maps)], size=2.3)
     print("picture: white-led.png")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import numpy.typing as npt
+from etendue.plot import style
 from experiments.panels import LINES, new_figure, save
 
 SIDE = 300.0
@@ -49,7 +50,7 @@ def transmission(
 
 def print_and_draw(path: Path, lines: int) -> None:
     """How far the film is from the table, and both as a picture."""
-    made = new_figure(6.4, 3.2)
+    made = new_figure(6.4, 3.4, "The film of prisms alone: transmission of luminance")
     axes = made.subplots()
     for (phi, table), colour in zip(KNOWN.items(), LINES, strict=False):
         name = "across" if phi == 0 else "along"
@@ -62,8 +63,7 @@ def print_and_draw(path: Path, lines: int) -> None:
         axes.plot(theta, transmission(theta, phi, lines)[0], color=colour, linewidth=1.2, label=f"{name} the prisms")
         axes.plot(list(table), list(table.values()), "o", color=colour, markersize=4)
     axes.set_xlabel("θ [°]")
-    axes.set_ylabel("transmission of luminance")
+    axes.set_ylabel("share of luminance")
     axes.set_ylim(-0.02, 1.02)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, fontsize=8, loc="lower left")
+    style.put_legend(axes, loc="lower left")
     save(made, path)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.plot import style
+from etendue.plot.map_picture import draw_slim_bar
 from etendue.quantities.bsdf_data import direction
 
 if TYPE_CHECKING:
@@ -152,6 +153,7 @@ def _in_plane(axes: Axes, bsdf: Bsdf, *, behind: bool) -> None:
     if highest > 0.0:
         axes.set_yscale("log")
         axes.set_ylim(highest * 10.0**-DECADES, highest * 2.0)
+        style.put_log_numbers(axes.yaxis)
         style.put_legend(axes, loc="upper left")
     axes.set(xlim=(-90, 90), xticks=range(-90, 91, 30), xlabel="angle of scattered light [°]", ylabel="f [1/sr]")
     style.put_title(axes, "In the plane of incidence")
@@ -177,11 +179,7 @@ def _lobe(axes: Axes, bsdf: Bsdf, theta: float, *, behind: bool) -> None:
         image = axes.imshow(
             np.maximum(f, lowest), origin="lower", extent=(-1, 1, -1, 1), norm=norm, cmap=style.COLOUR_MAPS["value"]
         )
-        place, figure = axes.get_position(), style.figure_of(axes)
-        bar = figure.add_axes((place.x1 + 0.006, place.y0, 0.009, place.height))
-        figure.colorbar(image, cax=bar)
-        bar.tick_params(labelsize=style.TICK_SIZE, colors=style.FAINT)
-        style.put_title(bar, "1/sr")
+        draw_slim_bar(image, "1/sr", axes)
     axes.set(xlabel="β along the plane of incidence", ylabel="β across")
     way = "transmitted" if transmitted else "reflected"
     style.put_title(axes, f"f {way}, incidence {theta:g}°")

@@ -156,8 +156,7 @@ def _prepare(axes: Axes, sections: Sequence[CrossSection], scale: str) -> None:
         if positive.size:
             low, high = positive.min() / 2.0, 2.0 * top
             axes.set_ylim(low, high)
-            for place in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-                place(style.log_formatter())
+            style.put_log_numbers(axes.yaxis)
         axes.set_ylabel(f"{sections[0].quantity} [{sections[0].unit}]")
     else:
         low = min(0.0, float(shown.min(initial=0.0)))

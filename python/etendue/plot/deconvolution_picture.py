@@ -139,6 +139,7 @@ def _logarithmic(axes: Axes, found: Deconvolution) -> None:
     axes.semilogy(found.angle, shown(found.values), color=style.LINES[0], lw=1.2)
     axes.set(ylim=(least, 2.0 * max(found.peak, float(found.raw.max()))), xlabel="angle of the detector [°]")
     axes.set_ylabel("f [1/sr]")
+    style.put_log_numbers(axes.yaxis)
     style.put_title(axes, "The same, logarithmic")
 
 
@@ -168,5 +169,7 @@ def _error_function(axes: Axes, found: Deconvolution) -> None:
     axes.loglog(counted, error / error.max(), color=style.LINES[0], lw=1.2)
     axes.axvline(found.iterations, color=style.LINES[1], lw=1.0, ls="--", label=f"stop: {found.iterations}")
     axes.set(xlabel="iteration i", ylabel="E(i) over its largest value")
+    for axis in (axes.xaxis, axes.yaxis):
+        style.put_log_numbers(axis)
     style.put_legend(axes, loc="best")
     style.put_title(axes, "E(i), eq. 5.7")

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue.extras import scipy_part
 from etendue.plot import style
+from etendue.plot.map_picture import draw_slim_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -175,15 +176,7 @@ def _maps(panels: Sequence[Axes], raw: Array, after: Array, limits: tuple[float,
         style.put_title(axes, name)
     panels[0].set_ylabel("across it [°]")
     panels[1].set_yticklabels([])
-    _bar(panels[1], image, "1/sr")
-
-
-def _bar(axes: Axes, image: Any, unit: str) -> None:
-    place, figure = axes.get_position(), style.figure_of(axes)
-    bar = figure.add_axes((place.x1 + 0.006, place.y0, 0.009, place.height))
-    figure.colorbar(image, cax=bar)
-    bar.tick_params(labelsize=style.TICK_SIZE, colors=style.FAINT)
-    style.put_title(bar, unit)
+    draw_slim_bar(image, "1/sr", panels[1])
 
 
 def _residuals(
@@ -194,7 +187,7 @@ def _residuals(
     image = axes.scatter(along, across, (side**2), values, marker="s", lw=0, cmap="RdBu_r", vmin=-scale, vmax=scale)
     axes.set(xlabel="in the plane of incidence [°]", xlim=limits[:2], ylim=limits[2:])
     style.put_title(axes, "Residuals of the scan")
-    _bar(axes, image, "errors" if known else "flux")
+    draw_slim_bar(image, "errors" if known else "flux", axes)
 
 
 def _cuts(
@@ -212,6 +205,7 @@ def _cuts(
             axes.fill_between(t, np.maximum(f - e, 1e-300), f + e, color=colour, alpha=0.25, lw=0)
     top = max(found.peak, float(found.scan.bsdf.max()))
     axes.set_yscale("log")
+    style.put_log_numbers(axes.yaxis)
     low = max(top * 10.0**-DECADES, 0.3 * float(np.quantile(found.scan.bsdf[found.scan.bsdf > 0.0], 0.02)))
     axes.set(ylim=(low, 10.0 * top), xlabel="from the regular direction [°]", ylabel="f [1/sr]")
     style.put_legend(axes, loc="upper left")

@@ -92,13 +92,13 @@ def plot_near_field(
     image = _draw([style.add_axes(figure, LEFT + k * (PANEL + GAP), BOTTOM, PANEL, PANEL) for k in range(IMAGES)], maps)
     bar = style.add_axes(figure, LEFT + 4 * PANEL + 3 * GAP + 0.2, BOTTOM, 0.14, PANEL)
     draw_colour_bar(image, _all(maps), *_label(run), bar)
-    setting = run.setting
+    setting, exposures = run.setting, run.setting.camera.exposures
     facts = [
-        f"{len(setting.positions):,} positions at {setting.distance:g} mm",
-        f"{setting.camera.exposures} exposures of {setting.camera.bits} bits",
-        f"dynamic range {setting.camera.dynamic_range:,.0f} : 1",
+        f"{style.grouped(str(len(setting.positions)))} positions at {style.plain(setting.distance)} mm",
+        f"{exposures} exposure{'s' * (exposures != 1)} of {setting.camera.bits} bits",
+        f"dynamic range {style.grouped(f'{setting.camera.dynamic_range:.0f}')} : 1",
         f"total flux {run.total_flux:.5g} {run.flux_unit}",
-        f"{run.disagreement:.2%} of it elsewhere than by the photometer",
+        f"{style.percent(100.0 * run.disagreement)} of it elsewhere than by the photometer",
     ]
     for k, line in enumerate(style.wrapped(facts, WIDTH - 2 * LEFT)):
         style.add_text(figure, LEFT, 0.3 - 0.15 * k, line, size=style.CAPTION_SIZE, color=style.FAINT)
