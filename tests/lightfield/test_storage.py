@@ -247,7 +247,7 @@ def test_a_light_field_is_known_by_its_content(saved: dict[str, Path], tmp_path:
             if value is not None:
                 file.attrs["format"] = value
         assert not is_field_file(path)
-        with pytest.raises(FormatError, match="it is not 'etendue light field'"):
+        with pytest.raises(FormatError, match="not a light field"):
             LightField.load(path)
 
 

@@ -315,7 +315,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="TraceResult"):
         TraceResult.load(path)
     path.write_text("no")
-    with pytest.raises(FormatError, match="no HDF5"):
+    with pytest.raises(FormatError, match="not the result of a trace"):
         TraceResult.load(path)
     with pytest.raises(OSError, match="none"):
         TraceResult.load(tmp_path / "none.h5")

@@ -6,12 +6,40 @@ import contextvars
 import re
 from collections.abc import Iterable
 
-import etendue
-
 _arguments: contextvars.ContextVar[frozenset[str]] = contextvars.ContextVar("arguments", default=frozenset())
 
-INTERNAL = ("FieldRays", "smooth_counts")
-"""Names that messages begin with besides the public ones."""
+CALLERS = frozenset(
+    {
+        *("FieldRays", "IlluminanceMap", "LuminanceMap", "PolygonRegion", "RaySet", "RingSource", "SweepTable"),
+        *(
+            "beam_angle",
+            "combine_maps",
+            "compare_intensities",
+            "cross_section",
+            "cut_off_angle",
+            "denoise_map",
+            "draw_scene",
+        ),
+        *(
+            "filter_map",
+            "plot_animation",
+            "plot_cross_sections",
+            "plot_sweep",
+            "plot_threshold_sweep",
+            "propagated_to_plane",
+        ),
+        *(
+            "propagated_to_sphere",
+            "read_rays",
+            "region_statistics",
+            "report_source",
+            "smooth_counts",
+            "threshold_sweep",
+        ),
+        *("zonal_flux", "luminance_map"),
+    }
+)
+"""Functions and classes of Python that messages begin with, but for those whose name is a plain word."""
 
 PARSER = (
     (re.compile(r"Input should be a valid integer, .*"), "give a whole number in digits, e.g. 20"),
@@ -75,9 +103,8 @@ def without_caller(message: str) -> str:
     >>> print(without_caller("Observer: theta is 200°"), without_caller("lamp.ies: it is empty"), sep="; ")
     Observer: theta is 200°; lamp.ies: it is empty
     """
-    name, colon, rest = message.partition(": ")
-    plain = name.isidentifier() and "_" not in name and (name.islower() or name.istitle())
-    message = rest if colon and not plain and name in {*etendue.__all__, *INTERNAL} else message
+    caller, _, rest = message.partition(": ")
+    message = rest if caller in CALLERS else message
     argument = re.match(r"(\w+) is (?:'[^']*'|-?\d\S*|nan|-?inf)", message)
     if argument is None or argument[1] not in _arguments.get():
         return message

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
 from etendue.formats.input import as_path
+from etendue.formats.other_kind import foreign
 from etendue.formats.output import atomic_output
 from etendue.formats.strict_json import strict_json
 from etendue.lightfield.counting import MOST_CELLS
@@ -76,7 +77,7 @@ SAME_FLUX = 1e-9
 """Relative difference between the stated flux of a part and the one worked out that rounding may make."""
 
 DAMAGED = "The file is damaged or cut short: copy it again, or fit and save the field again."
-FOREIGN = "Give an HDF5 file that LightField.save wrote."
+FOREIGN = "Give a file that `etendue fit` or LightField.save wrote."
 
 
 def is_field_file(path: str | Path) -> bool:
@@ -120,7 +121,7 @@ def load_field(path: Path) -> EtendueDensity:
     import h5py  # noqa: PLC0415
 
     if not begins_as_hdf5(path):
-        raise FormatError(path, "byte 0", "this is no HDF5 file", FOREIGN)
+        raise foreign(path, "a light field", FOREIGN)
     with reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
         return _read(Node(path, file, DAMAGED))
 
@@ -212,7 +213,7 @@ def _put_array(group: Any, name: str, values: npt.NDArray[Any], meaning: str, un
 
 def _read(file: Node) -> EtendueDensity:
     if not file.has_text("format", FORMAT):
-        raise file.error("attribute 'format'", f"it is not {FORMAT!r}", FOREIGN)
+        raise foreign(file.path, "a light field", FOREIGN, "attribute 'format'")
     version = file.integer("version")
     if version != VERSION:
         raise file.error("attribute 'version'", f"version {version}", f"This étendue reads {VERSION}; update it.")

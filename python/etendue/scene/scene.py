@@ -17,6 +17,7 @@ from etendue.description.mistakes import mistakes_of
 from etendue.description.values import AsRow, Wavelength
 from etendue.errors import SceneError
 from etendue.formats.input import as_path, require_readable
+from etendue.formats.other_kind import other_kind
 from etendue.formats.output import atomic_output
 from etendue.quantities.notebook import InNotebook
 from etendue.scene.detectors import AnyDetector
@@ -192,6 +193,9 @@ class Scene(Description, InNotebook):
                 path,
                 [("", "more than 32 MiB; this is no description of a scene, whose meshes are in files of their own")],
             )
+        other = None if path.suffix.lower() == ".toml" else other_kind(path)
+        if other is not None:
+            raise SceneError(path, [("", f"this is {other.title}, not a scene (.toml). {other.advice}")])
         data = read_toml(path, raw)
         return cls.from_dict(data, folder=path.parent, source=path)
 

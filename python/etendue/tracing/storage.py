@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.errors import FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading, states_format
+from etendue.formats.other_kind import foreign
 from etendue.formats.output import atomic_output, require_room
 from etendue.formats.strict_json import strict_json
 from etendue.quantities.memory import require_memory
@@ -52,7 +52,7 @@ CELL_BYTES = 24
 """Of a cell in memory: two sums and a count."""
 
 DAMAGED = "The file is damaged or cut short: copy it again, or trace the scene again."
-FOREIGN = "Give an HDF5 file that TraceResult.save wrote."
+FOREIGN = "Give a file (.h5) that `etendue trace` or TraceResult.save wrote."
 
 MOST_SCENE_BYTES = 1 << 28
 """Of the scene: one that spells out a mesh of a million triangles has a third of it."""
@@ -99,11 +99,11 @@ def load_result(path: Path) -> tuple[Plan, Sums]:
     import h5py  # noqa: PLC0415
 
     if not begins_as_hdf5(path):
-        raise FormatError(path, "byte 0", "this is no HDF5 file", FOREIGN)
+        raise foreign(path, "the result of a trace", FOREIGN)
     with reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
         node = Node(path, file, DAMAGED)
         if not node.has_text("format", FORMAT):
-            raise node.error("attribute 'format'", f"it is not {FORMAT!r}", FOREIGN)
+            raise foreign(path, "the result of a trace", FOREIGN, "attribute 'format'")
         if node.integer("version") != VERSION:
             found = f"version {node.integer('version')}"
             older = node.integer("version") < VERSION

@@ -29,6 +29,7 @@ from etendue.formats.bsdf import (
 from etendue.formats.bsdf.bsdf_format import SNIFFED_BYTES, BsdfFormat, ShareTables
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import as_path, require_readable
+from etendue.formats.other_kind import other_kind
 from etendue.formats.output import atomic_output
 from etendue.quantities.bsdf_data import BsdfData
 
@@ -113,6 +114,9 @@ def read_bsdf_data(path: str | os.PathLike[str]) -> BsdfData:
         advice = "étendue reads BSDF, BRDF, scattering, simple scattering and coated surfaces, as text."
         raise UnsupportedFormatError(path, "first line", "this is a Speos file of another kind", advice)
     refuse_unmarked(path, head)
+    other = other_kind(path)
+    if other is not None:
+        raise UnsupportedFormatError(path, "first bytes", f"this is {other.title}, no BSDF", other.advice)
     found = f"no BSDF format begins with {head[:8]!r}" if head else "the file is empty"
     names = ", ".join(form.title for form in BSDF_FORMATS.values())
     raise FormatError(path, "first bytes", found, f"étendue reads {names}.")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from etendue.errors import FormatError, UnknownNameError
+from etendue.errors import FormatError, UnknownNameError, UnsupportedFormatError
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import as_path, is_stream, require_readable
 from etendue.formats.maps import csv, exr, hdr, npz, tiff
 from etendue.formats.maps.map_format import AnyMap, MapFormat
+from etendue.formats.other_kind import other_kind
 from etendue.formats.output import atomic_output
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
@@ -158,6 +159,9 @@ def read_any_map(path: str | os.PathLike[str]) -> AnyMap:
             if candidate.sniff(head):
                 return candidate.read(readable)
     refuse_unmarked(path, head)
+    other = other_kind(path)
+    if other is not None:
+        raise UnsupportedFormatError(path, "first bytes", f"this is {other.title}, no map", other.advice)
     found = f"no map format begins with {head[:8]!r}" if head else "the file is empty"
     raise FormatError(path, "first bytes", found, f"étendue reads the maps it wrote: {', '.join(MAP_EXTENSIONS)}.")
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.errors import ArgumentError, FormatError, UnknownNameError, UnsupportedFormatError
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.head import Head
 from etendue.formats.input import as_path, at_rest, is_stream, require_readable, stream_in_file
+from etendue.formats.other_kind import own_kind
 from etendue.formats.output import atomic_output
 from etendue.formats.rays import (
     asap,
@@ -60,6 +61,9 @@ def detect_format(path: str | os.PathLike[str]) -> RayFormat:
         if candidate.recognise(head):
             return candidate
     refuse_unmarked(head.path, head.data)
+    own = own_kind(head)
+    if own is not None:
+        raise UnsupportedFormatError(path, "byte 0", f"this is {own.title}, no ray file", own.advice)
     refused.refuse(head)
     known = ", ".join(f.title for f in RAY_FORMATS)
     raise FormatError(

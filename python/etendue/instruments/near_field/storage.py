@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import FormatError
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading, states_format
+from etendue.formats.other_kind import foreign
 from etendue.formats.output import atomic_output
 from etendue.formats.strict_json import strict_json
 from etendue.instruments.near_field.camera import Camera
@@ -28,7 +28,7 @@ CHUNK = 1 << 16
 """Pixels of a chunk."""
 
 DAMAGED = "The file is damaged or cut short: copy it again, or measure again."
-FOREIGN = "Give an HDF5 file that NearFieldRun.save wrote."
+FOREIGN = "Give a file (.h5) that `etendue goniophotometer` or NearFieldRun.save wrote."
 
 LENGTHS = ("distance", "photometer_distance", "field_of_view", "lamp_size")
 STEPS = ("step_gamma", "step_c")
@@ -87,11 +87,11 @@ def read_run(path: Path) -> Parts:
     import h5py  # noqa: PLC0415
 
     if not begins_as_hdf5(path):
-        raise FormatError(path, "byte 0", "this is no HDF5 file", FOREIGN)
+        raise foreign(path, "a near-field measurement", FOREIGN)
     with reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
         node = Node(path, file, DAMAGED)
         if not node.has_text("format", FORMAT):
-            raise node.error("attribute 'format'", f"it is not {FORMAT!r}", FOREIGN)
+            raise foreign(path, "a near-field measurement", FOREIGN, "attribute 'format'")
         if node.integer("version") != VERSION:
             found = f"version {node.integer('version')}"
             raise node.error("attribute 'version'", found, f"This étendue reads {VERSION}: update étendue.")
