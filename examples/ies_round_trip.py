@@ -15,7 +15,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 from experiments.checks import agree, table_error
-from experiments.panels import LINES, legend_below, new_figure, save
+from experiments.panels import LINES, new_figure, save
 from numpy.typing import NDArray
 
 RAYS, FLUX, LEAN = 150_000, 500.0, 20.0
@@ -68,8 +68,9 @@ def main() -> None:
         truth, source = (of_file, table) if name == "traced again" else (of_lamp, first)
         error = table_error(source, 0, LEAN)
         agree(f"on the lobe's axis, {name} [cd]", float(table.at(c=0, gamma=LEAN)), truth, error)
-    made = new_figure(6.4, 3.7, "A leaning lamp, to IES and EULUMDAT and back: C180 and C0 [cd]")
-    axes = made.subplots(subplot_kw={"projection": "polar"})
+    made = new_figure(6.4, 3.9, "A leaning lamp, to IES and EULUMDAT and back: C180 and C0 [cd]", layout=None)
+    # A half circle is laid out as a whole one: what is above and below the picture is empty.
+    axes = made.add_axes((0.14, -0.12, 0.72, 1.18), projection="polar")
     gamma = np.arange(0.0, 90.5, 1.0)
     for (name, table), colour, dashes in zip(tables.items(), LINES, ("-", "--", ":", "-."), strict=False):
         both = np.concatenate([table.at(c=180, gamma=gamma)[::-1], table.at(c=0, gamma=gamma)])
@@ -79,7 +80,7 @@ def main() -> None:
     axes.set_thetalim(-math.pi / 2, math.pi / 2)
     axes.set_rticks([100, 200, 300, 400])
     axes.set_thetagrids(np.arange(-90, 91, 30), [f"{abs(g)}°" for g in range(-90, 91, 30)])
-    legend_below(made, axes)
+    made.legend(loc="lower center", ncols=len(tables), frameon=False, fontsize=9)
     save(made, Path("ies-round-trip.png"))
     print("picture: ies-round-trip.png")
 
