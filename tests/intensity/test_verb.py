@@ -85,7 +85,7 @@ def test_files_are_turned_and_converted(run: Run) -> None:
     found, source = et.read_intensity("b.ldt"), et.read_intensity("a.ies")
     assert np.allclose(found.at(90 - c, [30, 100]), source.at(c, [30, 100]), rtol=1e-5)
     _, _, err = run("a.ies", "-o", "b.ldt")
-    assert "rotate=90 turns" in err
+    assert "--rotate 90 turns" in err
 
 
 def test_one_of_several_photometries(run: Run) -> None:

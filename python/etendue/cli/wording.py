@@ -74,7 +74,7 @@ def in_options(message: str) -> str:
         return message
     names = "|".join(map(re.escape, sorted(arguments, key=len, reverse=True)))
     return re.sub(
-        rf"(?<![\w.:/,=-])({names})(?:=(?:'([^']*)'|(True|\d[\d.]*\b))|(?![\w:/=]|\.\w))", _as_option, message
+        rf"(?<![\w.:/,=-])({names})(?:=(?:'([^']*)'|(True|-?\d[\d.]*\b))|(?![\w:/=]|\.\w))", _as_option, message
     )
 
 

@@ -206,7 +206,7 @@ class EtendueDensity:
         if self.spectrum is None:
             raise UnitError(
                 f"{self.provenance.source}: {self.flux_unit} cannot become {unit}: the light field knows no spectrum. Fit "
-                "it to rays with wavelengths or a spectrum, or give it one: field.replace(spectrum=Spectrum(...))."
+                "it to rays with wavelengths or a spectrum, or give it one in Python: field.replace(spectrum=Spectrum(...))."
             )
         efficacy = self.spectrum.luminous_efficacy
         if not efficacy > 0.0:
@@ -218,7 +218,7 @@ class EtendueDensity:
         notes = list(self.notes)
         if self.spectrum_is_mean:
             notes.append(
-                f"{self.flux_unit} became {unit} by {efficacy:.5g} lm/W, which all rays have together; where their colour "
+                f"{self.flux_unit} became {unit} by {efficacy:.4g} lm/W, which all rays have together; where their colour "
                 "changes with place or direction, convert the rays before the fit"
             )
         return self.replace(

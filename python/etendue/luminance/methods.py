@@ -106,7 +106,7 @@ class Cone(Method):
                 f"observer_radius is {radius!r}; give the radius of the observer's disk in mm, above 0."
             )
         if angle != type(self).acceptance:
-            raise ArgumentError("acceptance and observer_radius are both given; use one of them.")
+            raise ArgumentError("an acceptance and an observer of a radius are both stated; use one of them.")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -32,7 +32,7 @@ def in_unit(rays: Rays, unit: FluxUnit) -> Rays:
     if dark:
         raise UnitError(
             f"{rays.provenance.source}: lumens cannot become watts: some rays have a wavelength at which V(λ) is 0, "
-            "so their radiant flux is not determined. State the total in W (flux=, --flux 0.7W)."
+            "so their radiant flux is not determined. State the total in W (--flux 0.7W, or flux= in Python)."
         )
     return with_flux(rays, lambda batch: batch.flux / efficacy(batch), unit, how)
 
@@ -58,7 +58,7 @@ def _efficacy(rays: RayRecords) -> tuple[str, Callable[[RayBatch], FloatArray]]:
                 raise UnitError(
                     f"{rays.provenance.source}: ray {at + 1:,} has the wavelength {wavelength[first]:g} nm, "
                     "so its lumens are not determined. Ask for a file with a wavelength for every ray, or state the "
-                    "total in lm (flux=, --flux 54.6lm)."
+                    "total in lm (--flux 54.6lm, or flux= in Python)."
                 )
             return LUMINOUS_EFFICACY_MAX * photopic_efficiency(wavelength)
 
@@ -89,14 +89,14 @@ def _efficacy(rays: RayRecords) -> tuple[str, Callable[[RayBatch], FloatArray]]:
     of_file = bool({"total_flux", "overruled_total_flux"} & set(rays.header))
     if of_file and isinstance(lumens, float) and isinstance(watts, float) and lumens > 0 and watts > 0:
         ratio = lumens / watts
-        how = f"the totals of its header, {lumens:.6g} lm and {watts:.6g} W, as if all rays had one spectrum"
+        how = f"the totals of its header, {lumens:.4g} lm and {watts:.4g} W, as if all rays had one spectrum"
         return how, lambda batch: np.full(len(batch.flux), ratio)
     other = "lumens" if rays.flux_unit == "W" else "watts"
     raise UnitError(
         f"{rays.provenance.source}: {rays.flux_unit} cannot become {other}: the rays carry no wavelength and the file "
         "no spectrum, nor does it state both totals. Ask for a file with wavelengths, or, if all rays share one "
-        f"spectrum, state the total (flux=, --flux {'54.6lm' if rays.flux_unit == 'W' else '0.7W'}) or the spectrum "
-        "(RaySet.with_spectrum)."
+        f"spectrum, state the total (--flux {'54.6lm' if rays.flux_unit == 'W' else '0.7W'}, or flux= in Python) or, in "
+        "Python, the spectrum (RaySet.with_spectrum)."
     )
 
 

@@ -183,7 +183,7 @@ class ScatterEvents:
         if self.scene is None:
             raise ArgumentError(
                 f"the scatter events of {self.name!r} come without their scene, parts of which lived in memory only: "
-                "give it, as in events.replace(scene=scene)."
+                "give it in Python: events.replace(scene=scene)."
             )
         with warnings.catch_warnings():
             # What is doubtful about it was told when it was traced.
@@ -192,7 +192,7 @@ class ScatterEvents:
         if geometry_of(compiled) != self.geometry:
             raise ArgumentError(
                 f"the scatter events of {self.name!r} are of another scene, or a file that it names has changed: "
-                "trace it again, or give the scene as it was, as in events.replace(scene=scene)."
+                "trace it again, or, in Python, give the scene as it was: events.replace(scene=scene)."
             )
         return core_scene(compiled.record)
 

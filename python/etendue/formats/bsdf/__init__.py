@@ -173,7 +173,9 @@ def write_bsdf_data(path: str | os.PathLike[str], data: BsdfData, format: str | 
     path = as_path(path)
     form = bsdf_format(path, format)
     if form.write is None or form.fits is None or not form.fits(data):
-        raise FormatError(path, "layout", f"the table does not fit {form.title}", "Write it by write_bsdf.")
+        raise FormatError(
+            path, "layout", f"the table does not fit {form.title}", "In Python, write_bsdf brings it into that layout."
+        )
     with atomic_output(path) as temporary, temporary.open("w+b") as stream:
         return form.write(data, stream)
 
@@ -211,6 +213,8 @@ def write_bsdf_shares(path: str | os.PathLike[str], shares: ShareTables, format:
     path = as_path(path)
     form = bsdf_format(path, format)
     if form.write_shares is None:
-        raise ArgumentError(f"{form.title} holds tables: write them by write_bsdf.")
+        raise ArgumentError(
+            f"{form.title} holds tables, and these are shares: in Python, write_bsdf makes a table of them."
+        )
     with atomic_output(path) as temporary, temporary.open("w+b") as stream:
         form.write_shares(shares, stream)

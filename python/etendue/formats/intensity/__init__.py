@@ -94,7 +94,9 @@ def read_intensity(path: str | os.PathLike[str], photometry: str | None = None) 
     if photometry is None:
         return found.read(as_path(path))
     if found.pick is None:
-        raise ArgumentError(f"{path}: photometry: {found.title} files hold one distribution; leave it out.")
+        raise ArgumentError(
+            f"{path}: photometry {photometry!r}: {found.title} files hold one distribution; leave the name out."
+        )
     return found.pick(as_path(path), photometry)
 
 

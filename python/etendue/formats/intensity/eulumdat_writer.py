@@ -27,7 +27,7 @@ def write(intensity: Intensity, path: Path) -> tuple[str, ...]:
     if intensity.flux_unit != "lm":
         raise ArgumentError(
             f"EULUMDAT knows luminous intensity only, and this is {intensity.quantity} [{intensity.unit}]. "
-            "Convert the rays to lumens first (RaySet.in_unit), or write an .ies file."
+            "Write an .ies file, or convert the rays to lumens first: --unit lm, or RaySet.in_unit('lm') in Python."
         )
     whole, notes = whole_hemispheres(intensity)
     flux = whole.flux

@@ -64,7 +64,12 @@ def read_map(path: str | os.PathLike[str]) -> LuminanceMap:
     """
     lmap = read_any_map(path)
     if not isinstance(lmap, LuminanceMap):
-        raise FormatError(path, "header", f"this is a map of {lmap.quantity}", "Read it with read_illuminance_map.")
+        raise FormatError(
+            path,
+            "header",
+            f"this is a map of {lmap.quantity}",
+            "Give a luminance map; in Python, read_illuminance_map reads this one.",
+        )
     return lmap
 
 
@@ -98,7 +103,12 @@ def read_illuminance_map(path: str | os.PathLike[str]) -> IlluminanceMap:
     """
     lmap = read_any_map(path)
     if not isinstance(lmap, IlluminanceMap):
-        raise FormatError(path, "header", f"this is a map of {lmap.quantity}", "Read it with read_map.")
+        raise FormatError(
+            path,
+            "header",
+            f"this is a map of {lmap.quantity}",
+            "Give an illuminance map; in Python, read_map reads this one.",
+        )
     return lmap
 
 

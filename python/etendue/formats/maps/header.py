@@ -29,8 +29,8 @@ VERSION_KEY = "etendue_map"
 CHECKSUM_KEY = "sha256"
 
 FOREIGN = (
-    "A luminance map needs its observer, screen size and unit; étendue reads the maps it wrote itself "
-    "(LuminanceMap.save). Build a LuminanceMap from the pixels and the geometry you know."
+    "A luminance map needs its observer, screen size and unit; étendue reads the maps that `etendue luminance` or "
+    "LuminanceMap.save wrote. In Python, a LuminanceMap can be made of pixels and the geometry you know."
 )
 
 

@@ -15,7 +15,7 @@ from etendue.quantities.memory import require_memory
 AnyMap = LuminanceMap | IlluminanceMap
 """What a map file may hold: its header names the quantity."""
 
-DAMAGED = "The file is damaged or cut short: copy it again, or make it again with the map's save."
+DAMAGED = "The file is damaged or cut short: copy it again, or make the map again."
 
 PIXEL_BYTES = 48
 """Of a pixel in memory: as the file has it, and as the map has it."""

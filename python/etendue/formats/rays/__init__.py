@@ -166,7 +166,7 @@ def write_rays(
     if chosen.most_rays is not None and len(rays) > chosen.most_rays:
         raise ArgumentError(
             f"{path}: {len(rays):,} rays of {rays.provenance.source}; a file of the format {chosen.title} holds at most "
-            f"{chosen.most_rays:,}. Draw fewer (RaySet.subset) or write TM-25."
+            f"{chosen.most_rays:,}. Draw fewer (--subset, or RaySet.subset in Python) or write TM-25."
         )
     if not (rays.has_position or chosen.far_field):
         able = ", ".join(f.name for f in RAY_FORMATS if f.far_field)

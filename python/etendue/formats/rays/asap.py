@@ -136,7 +136,7 @@ def read(path: Path) -> RaySet:
     if word and word != "_" and word not in LENGTH_UNITS:
         raise FormatError(path, place, f"length unit {word!r} is unknown", f"Known: {', '.join(LENGTH_UNITS)}.")
     if word not in LENGTH_UNITS:
-        found = "no length unit; taken as mm (RaySet.scaled changes it)"
+        found = "no length unit; taken as mm (in Python, RaySet.scaled changes it)"
         complaints.append(Complaint("warning", place, found, CLAUSE))
     if header.number > 0:
         found = f"the number of rays is stored as {header.number}, not with a minus sign"

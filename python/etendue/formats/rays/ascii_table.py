@@ -40,7 +40,7 @@ FEWEST_NUMBERS = 6
 """A line of as many numbers is taken for a row of a table, if only to say what it lacks."""
 
 EXAMPLE = "x_mm,y_mm,z_mm,l,m,n,flux_lm"
-OVERRULE = "If it is another, say so: RaySet.with_total_flux(value, unit)"
+OVERRULE = "If it is another, say so: --flux 0.7W, or RaySet.with_total_flux(value, unit) in Python"
 
 
 def recognise(head: Head) -> bool:
@@ -171,7 +171,7 @@ class _Table:
             self.length_unit = next(iter(units["position"]), "")
             if not self.length_unit:
                 self.length_unit = "mm"
-                self.complain("the length unit is not stated; taken as mm (RaySet.scaled changes it)")
+                self.complain("the length unit is not stated; taken as mm (in Python, RaySet.scaled changes it)")
         flux = next(iter(units["flux"]), "")
         self.flux_unit = "W" if flux == "W" else "lm"
         if not flux:

@@ -180,7 +180,9 @@ def read_index(path: Path) -> tuple[AnyRecords, RaySetMeaning, IndexTables, Tall
     data = read_bytes(path, 0, HEADER.size, "header")
     magic, version, side, rays, leaves, leaf, width, text_bytes, start, checksum, rest = HEADER.unpack(data)
     if magic != MAGIC:
-        raise FormatError(path, "byte 0", f"{magic!r} begins no ray index", "Give a file that RayIndex.build wrote.")
+        raise FormatError(
+            path, "byte 0", f"{magic!r} begins no ray index", "Give a file (.etd) that `etendue convert` wrote."
+        )
     if version != VERSION:
         raise FormatError(path, "byte 8", f"version {version}", f"This étendue reads {VERSION}; update it.")
     if side not in SIDES or leaf != _core.index_leaf() or rest != 0 or rays == 0:

@@ -114,10 +114,10 @@ def read(path: Path) -> RaySet:
     if minor != 0:
         complaints.append(Complaint("warning", "byte 8", f"minor version {minor}, not 0; read as version 2.0", CLAUSE))
     if unit == 0:
-        found = "the length unit is 'system', which the file does not name; taken as mm (RaySet.scaled changes it)"
+        found = "the length unit is 'system', which the file does not name; taken as mm (RaySet.scaled in Python changes it)"
         complaints.append(Complaint("warning", "byte 24", found, CLAUSE))
     if any(value != 0 for value in origin):
-        found = f"data origin {origin} is not 0; positions are left as stored (RaySet.moved shifts them)"
+        found = f"data origin {origin} is not 0; positions are left as stored (in Python, RaySet.moved shifts them)"
         complaints.append(Complaint("warning", "byte 28", found, CLAUSE))
     if total is None:
         found = "the header does not know the total flux; the rays' own values are taken as absolute"

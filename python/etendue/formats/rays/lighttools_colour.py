@@ -27,7 +27,10 @@ def colour_losses(rays: RayStream, written: Written, colour: RayColour, held: st
     kept = TRISTIMULUS_COLUMNS if held == TRISTIMULUS else ()
     notes = list(losses(rays, written, colour, colour_kept=held == WAVELENGTH, kept=kept))
     if colour.kind is Colour.PER_RAY and held != WAVELENGTH:
-        notes.append("LightTools takes wavelengths only beside watts; convert with RaySet.in_unit('W') to keep them.")
+        notes.append(
+            "LightTools takes wavelengths only beside watts; to keep them, convert the rays to watts: --unit W, or "
+            "RaySet.in_unit('W') in Python."
+        )
     if colour.kind is Colour.ONE_SPECTRUM:
         notes.append("LightTools takes the spectrum from an .sre file that is chosen with the source.")
     return tuple(notes)

@@ -156,7 +156,7 @@ class _Header:
                 if value is None
                 else "lt_length_units is 'system', which the file does not name"
             )
-            self.complain("warning", "lt_length_units", f"{found}; taken as mm (RaySet.scaled changes it)")
+            self.complain("warning", "lt_length_units", f"{found}; taken as mm (in Python, RaySet.scaled changes it)")
             return "mm"
         for name, unit in LENGTH_UNITS.items():
             if value.lower() in (name, unit, name.replace("ter", "tre")):
@@ -169,7 +169,7 @@ class _Header:
         if origin is None:
             self.complain("warning", "lt_data_origin", f"lt_data_origin {value!r} is no position; it is ignored")
         elif any(origin):
-            found = f"data origin {origin} is not 0; positions are left as stored (RaySet.moved shifts them)"
+            found = f"data origin {origin} is not 0; positions are left as stored (in Python, RaySet.moved shifts them)"
             self.complain("warning", "lt_data_origin", found)
         return tuple(origin or ())
 

@@ -19,7 +19,7 @@ INTENSITY = (
     "An intensity distribution has no start points, so it has no luminance. Ask the maker for ray files (TM-25, "
     "LightTools or Zemax)."
 )
-INTENSITY_FILE = f"{INTENSITY} read_intensity and the verb `intensity` take this file as what it is."
+INTENSITY_FILE = f"{INTENSITY} `etendue intensity` and, in Python, read_intensity take this file as what it is."
 UNPACK = "Unpack it and read the ray file inside."
 
 

@@ -255,8 +255,8 @@ def _require_total(rays: RayStream, exact: float, stored: float) -> None:
     if stored > LARGEST_FLOAT or abs(header - exact) > 1e-4 * exact:
         wrong = "large" if stored > LARGEST_FLOAT else "small"
         raise ArgumentError(
-            f"{rays.provenance.source}: a flux of {exact:.6g} {rays.flux_unit} is too {wrong} for 32-bit floats, which "
-            "is what the file holds. Give another total (RaySet.with_total_flux)."
+            f"{rays.provenance.source}: a flux of {exact:.4g} {rays.flux_unit} is too {wrong} for 32-bit floats, which "
+            "is what the file holds. Give another total: --flux 54.6lm, or RaySet.with_total_flux in Python."
         )
 
 

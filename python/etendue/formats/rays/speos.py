@@ -79,7 +79,10 @@ def read(path: Path) -> RaySet:
         )
         complaints.append(Complaint("error", f"byte {size}", found, CLAUSE))
     if watts is None:
-        found = "the header does not know the total flux; the rays' energies are relative, so give it (flux=)"
+        found = (
+            "the header does not know the total flux; the rays' energies are relative: give the total, --flux 0.7W, "
+            "or flux= in Python"
+        )
         complaints.append(Complaint("warning", "byte 0", found, CLAUSE))
     header = {name: value for name, value in (("total_flux", watts), ("luminous_flux", lumens)) if value is not None}
     meaning = RaySetMeaning(
@@ -130,7 +133,7 @@ def in_watts(rays: RayStream, instead: str) -> tuple[RaySet, list[str]]:
     if not (colour.has_wavelengths and isinstance(rays, RaySet)):
         raise ArgumentError(
             f"{rays.provenance.source}: a Speos file holds the wavelength of every ray, but this set has rays with "
-            f"{colour.kind.value}. Write {instead}; or, if all rays have one wavelength, say so: "
+            f"{colour.kind.value}. Write {instead}; or, if all rays have one wavelength, say so in Python: "
             "RaySet.with_spectrum(Spectrum([wavelength], [1]))."
         )
     if rays.flux_unit == "W":

@@ -63,7 +63,7 @@ def read(path: Path) -> RaySet:
     rows = read_rows(path, layout, offset=first.end, line=first.number + 1)
     unknown_total = (
         "the rays' energies are relative and the total flux is not in the file; their sum is taken as W. "
-        "Give the total: RaySet.with_total_flux(value, 'W')"
+        "Give the total: --flux 0.7W, or RaySet.with_total_flux(value, 'W') in Python"
     )
     complaints = [Complaint("warning", "total flux", unknown_total, CLAUSE)]
     if columns == POLARISED:

@@ -65,7 +65,10 @@ def read(path: Path) -> RaySet:
     layout = RowLayout(fields=GEOMETRY, columns=columns, clause=CLAUSE, expected=count, stated_at=stated_at)
     length_scale, complaints = _length_scale(path, above)
     complaints += _placement_complaints(above)
-    unit = "the flux unit is not stated; taken as W. If it is lm, say so: RaySet.with_total_flux(value, 'lm')"
+    unit = (
+        "the flux unit is not stated; taken as W. "
+        "If it is lm, say so: --flux 54.6lm, or RaySet.with_total_flux(value, 'lm') in Python"
+    )
     complaints.append(Complaint("warning", f"line {names.number}", unit, CLAUSE))
     if columns == COLUMNS[1]:
         eighth = "what column 8 means is not known; it is ignored"
@@ -99,7 +102,7 @@ def _length_scale(path: Path, lines: list[TextLine]) -> tuple[float, list[Compla
                     f"It is the number of length units in a metre: 1 for m, 1000 for mm. [{CLAUSE}]",
                 )  # fmt: skip
             return MM_PER_LENGTH_UNIT["m"] / per_metre, []
-    found = "no line 'Conversion Factor From Meters'; lengths are taken as mm (RaySet.scaled changes it)"
+    found = "no line 'Conversion Factor From Meters'; lengths are taken as mm (in Python, RaySet.scaled changes it)"
     return 1.0, [Complaint("warning", "header", found, CLAUSE)]
 
 
@@ -107,7 +110,10 @@ def _placement_complaints(lines: list[TextLine]) -> Iterator[Complaint]:
     for line in lines:
         for name, neutral in PLACEMENTS:
             if line.text.lower().startswith(name) and any(float(v) != neutral for v in NUMBER.findall(line.text)):
-                found = f"{line.text!r} is not applied; positions are left as stored (RaySet.rotated, moved, scaled)"
+                found = (
+                    f"{line.text!r} is not applied; positions are left as stored "
+                    "(in Python, RaySet.rotated, moved and scaled do it)"
+                )
                 yield Complaint("warning", f"line {line.number}", found, CLAUSE)
 
 

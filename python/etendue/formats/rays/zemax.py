@@ -179,7 +179,10 @@ def zemax_losses(
     """What a Zemax file, binary or text, does not say of the rays, one sentence each."""
     notes = list(losses(rays, written, colour, colour_kept=colour_kept))
     if wavelengths_lost:
-        notes.append("Zemax files hold wavelengths only beside watts; convert with RaySet.in_unit('W') to keep them.")
+        notes.append(
+            "Zemax files hold wavelengths only beside watts; to keep them, convert the rays to watts: --unit W, or "
+            "RaySet.in_unit('W') in Python."
+        )
     if colour.kind is Colour.ONE_SPECTRUM:
         notes.append("OpticStudio takes the spectrum from a .spcd file (µm, weight) that is chosen with the source.")
     if written.dark_rays:

@@ -115,7 +115,7 @@ def _flux_unit(path: Path, place: str, stated: list[float], columns: int, compla
         if columns == 7:
             complain(
                 "the flux unit is not stated; taken as W, OpticStudio's default. "
-                "If it is lm, say so: RaySet.with_total_flux(value, 'lm')"
+                "If it is lm, say so: --flux 54.6lm, or RaySet.with_total_flux(value, 'lm') in Python"
             )
         return "W"
     expected = 8 if kind == SPECTRAL else 7

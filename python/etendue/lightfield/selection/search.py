@@ -287,7 +287,7 @@ class _Search:
             x, y, z = mean / np.linalg.norm(mean)
             yield (
                 f"the light heads towards ({x:.2f}, {y:.2f}, {z:.2f}) on average; planes, disks, hemispheres and domes "
-                "shine towards +Z: turn the rays with rays.rotated(axis, angle) if one of these would suit the source"
+                "shine towards +Z: if one of these would suit the source, turn the rays (in Python, rays.rotated)"
             )
 
 
