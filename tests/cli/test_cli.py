@@ -222,7 +222,7 @@ def test_wrong_usage_ends_with_status_2(run: Run, folder: Path, arguments: list[
         (["convert", "{}/led.tm25ray", "x.dat", "--flux", "0"], "finite flux > 0"),
         (["convert", "{}/led.tm25ray", "x.dat", "--flux", "1e300"], "32-bit"),
         (["convert", "{}/led.tm25ray", "{}/watts.tm25ray", "x.dat", "--unit", "W"], "lm cannot become watts"),
-        (["luminance", "{}/led.tm25ray", "--observer", "181,0", "--size", "1,1", "-o", "a.npz"], "0..180"),
+        (["luminance", "{}/led.tm25ray", "--observer", "181,0", "--size", "1,1", "-o", "a.npz"], "0° to 180°"),
         (
             ["luminance", "{}/led.tm25ray", "--observer", "90,0", "--size", "1,1", "-o", "a.npz", "--plane", "xy"],
             "area",

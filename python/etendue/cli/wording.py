@@ -10,7 +10,7 @@ _arguments: contextvars.ContextVar[frozenset[str]] = contextvars.ContextVar("arg
 
 CALLERS = frozenset(
     {
-        *("FieldRays", "IlluminanceMap", "LuminanceMap", "PolygonRegion", "RaySet", "RingSource", "SweepTable"),
+        *("FieldRays", "IlluminanceMap", "LuminanceMap", "RaySet", "RingSource", "SweepTable"),
         *(
             "beam_angle",
             "combine_maps",

@@ -53,10 +53,11 @@ class Aperture:
             raise UnknownNameError("shape of an aperture", self.shape, get_args(Shape))
         if self.shape == "ring" and not 0.0 < self.inner < self.diameter:
             raise ArgumentError(
-                f"a ring of {self.inner:g} to {self.diameter:g} mm; state inner_diameter below the outer one"
+                f"a ring-shaped aperture from {self.inner:g} to {self.diameter:g} mm; give an inner diameter above 0 mm and "
+                "below the outer one"
             )
         if self.shape != "ring" and self.inner != 0.0:
-            raise ArgumentError(f"a {self.shape} has no inner diameter; aperture='ring' has")
+            raise ArgumentError(f"a {self.shape} has no inner diameter; leave it out, or take a ring")
 
     @property
     def reach(self) -> float:

@@ -73,7 +73,8 @@ class Bench:
         reach = 0.5 * self.beam.diameter + self.aperture.reach
         if not reach < self.distance < np.inf:
             raise ArgumentError(
-                f"a distance of {self.distance:g} mm: beam and aperture reach {reach:g} mm; move it away"
+                f"a distance of {self.distance:g} mm from sample to aperture, but beam and aperture reach {reach:g} mm; "
+                "give more"
             )
 
     @property

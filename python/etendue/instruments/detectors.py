@@ -107,12 +107,14 @@ class Detector:
     def __post_init__(self) -> None:
         for name in ("rate", "full_well", "shortest", "longest"):
             if not 0.0 < getattr(self, name) < math.inf:
-                raise ArgumentError(f"{name} is {getattr(self, name)}; it is more than 0")
+                raise ArgumentError(f"{name} is {getattr(self, name)}; give more than 0")
         for name in ("read_noise", "dark", "filter_error", "pause", "stray"):
             if not 0.0 <= getattr(self, name) < math.inf:
-                raise ArgumentError(f"{name} is {getattr(self, name)}; it is not negative")
+                raise ArgumentError(f"{name} is {getattr(self, name)}; give 0 or more")
         if self.longest < self.shortest:
-            raise ArgumentError(f"times from {self.shortest:g} to {self.longest:g} s; the longest is no shorter")
+            raise ArgumentError(
+                f"times from {self.shortest:g} to {self.longest:g} s; give a longest that is no shorter than the shortest"
+            )
         if not 0.0 < self.fill <= 1.0:
             raise ArgumentError(f"a fill of {self.fill:g}; give a part of the well, above 0 and up to 1")
         given = np.asarray(self.filters, np.float64)
@@ -165,7 +167,7 @@ class Detector:
         if share.ndim != 1 or not np.isfinite(share).all() or (share < 0.0).any():
             raise ArgumentError("fluxes are a row of numbers that are not negative")
         if seed < 0:
-            raise ArgumentError(f"a seed of {seed}; it is not negative")
+            raise ArgumentError(f"a seed of {seed}; give 0 or more")
         rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 3))))
         seconds, transmittance = self.exposures(share)
         distinct, own = np.unique(transmittance, return_inverse=True)

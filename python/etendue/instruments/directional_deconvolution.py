@@ -246,7 +246,7 @@ def deconvolve_directions(
     elif 0.0 <= regular <= 1.0:
         share = RegularShare(float(regular), 0.0, "stated")
     else:
-        raise ArgumentError(f"a regular share of {regular:g}; it is from 0 to 1")
+        raise ArgumentError(f"a regular share of {regular:g}; give 0 to 1")
     counted = counted.with_regular(share.share)
     fitted = _WAYS[method](_Task(scan, of, counted, share, rule, tuple(models), replicates, seed))
     share = fitted.share or share

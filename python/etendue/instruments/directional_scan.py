@@ -109,11 +109,11 @@ class DirectionalScan:
         if self.standard_error is not None and (self.standard_error < 0.0).any():
             raise ArgumentError("standard errors are not negative")
         if not 0.0 <= self.incidence < 90.0:
-            raise ArgumentError(f"an angle of incidence of {self.incidence:g}°; it is from 0 to below 90°")
+            raise ArgumentError(f"an angle of incidence of {self.incidence:g}°; give 0 to below 90°")
         if self.solid_angle is not None and not self.solid_angle > 0.0:
-            raise ArgumentError(f"a solid angle of {self.solid_angle} sr; it is more than 0")
+            raise ArgumentError(f"a solid angle of {self.solid_angle} sr; give more than 0")
         if not self.background >= 0.0:
-            raise ArgumentError(f"a background of {self.background}; it is not negative")
+            raise ArgumentError(f"a background of {self.background}; give 0 or more")
 
     def __repr__(self) -> str:
         """Positions, and what was measured."""

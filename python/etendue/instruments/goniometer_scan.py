@@ -135,9 +135,9 @@ class GoniometerScan:
         if self.plane not in get_args(Plane):
             raise UnknownNameError("plane", self.plane, get_args(Plane))
         if self.solid_angle is not None and not self.solid_angle > 0.0:
-            raise ArgumentError(f"a solid angle of {self.solid_angle} sr; it is more than 0")
+            raise ArgumentError(f"a solid angle of {self.solid_angle} sr; give more than 0")
         if not self.background >= 0.0:
-            raise ArgumentError(f"a background of {self.background}; it is not negative")
+            raise ArgumentError(f"a background of {self.background}; give 0 or more")
 
     def __repr__(self) -> str:
         """Positions, and what was measured."""

@@ -123,7 +123,7 @@ def counted_flux(
     if rays < 1:
         raise ArgumentError(f"{rays} rays; draw at least one")
     if seed < 0:
-        raise ArgumentError(f"a seed of {seed}; it is not negative")
+        raise ArgumentError(f"a seed of {seed}; give 0 or more")
 
     def leaving(n: int, number: tuple[int, ...]) -> tuple[Array, Array]:
         """Where rays leave the sample [mm] and to where, shape (n, 3) each; NaN where they are absorbed."""

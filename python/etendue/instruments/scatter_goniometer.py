@@ -115,17 +115,22 @@ class ScatterGoniometer:
     def __post_init__(self) -> None:
         for name in ("beam_diameter", "aperture_diameter", "distance", "wavelength"):
             if not 0.0 < getattr(self, name) < np.inf:
-                raise ArgumentError(f"{name} is {getattr(self, name)}; it is more than 0")
+                unit = "nm" if name == "wavelength" else "mm"
+                stated = f"{name.replace('_', ' ')} of {getattr(self, name):g} {unit}"
+                raise ArgumentError(f"a {stated}; give one above 0 {unit}")
         if not abs(self.divergence) < 45.0 or not 0.0 <= self.source_angle < 90.0:
-            raise ArgumentError("a divergence is below 45°, and source_angle is from 0 to 90°")
+            raise ArgumentError(
+                f"a divergence of {self.divergence:g}° and a source_angle of {self.source_angle:g}°; give a divergence "
+                "below 45°, and a source that is seen under less than 90°"
+            )
         if self.photons is not None and not self.photons > 0.0:
             raise ArgumentError(f"{self.photons} photons; give more than 0, or None for no noise")
         if self.dark < 0.0 or (self.dark and self.photons is None):
-            raise ArgumentError("dark counts are not negative, and need photons to be counted with")
+            raise ArgumentError("dark counts are given without photons, or are negative; give both, and none below 0")
         if not self.head_diameter >= 0.0:
-            raise ArgumentError(f"head_diameter is {self.head_diameter}; it is not negative")
+            raise ArgumentError(f"a head of the detector of {self.head_diameter:g} mm; give its diameter, 0 or more")
         if not self.drift > -1.0:
-            raise ArgumentError(f"a drift of {self.drift}; the beam keeps more than nothing")
+            raise ArgumentError(f"a drift of {self.drift:g}; give more than -1, at which nothing is left of the beam")
         object.__setattr__(self, "profile", self.bench.beam.profile)
 
     @property
@@ -504,7 +509,7 @@ class ScatterGoniometer:
 
 def _require_incidence(theta: float) -> None:
     if not 0.0 <= theta < 90.0:
-        raise ArgumentError(f"an angle of incidence of {theta:g}°; it is from 0 to below 90°")
+        raise ArgumentError(f"an angle of incidence of {theta:g}°; give 0 to below 90°")
 
 
 def _way(bsdf: Bsdf, way: Way | None) -> Way:

@@ -57,9 +57,13 @@ class Region:
 
     def __post_init__(self) -> None:
         if not all(map(math.isfinite, dataclasses.astuple(self))):
-            raise ArgumentError(f"{self}: give four finite limits in mm.")
+            raise ArgumentError(f"{self._told}: give four finite limits in mm.")
         if not (self.left < self.right and self.bottom < self.top):
-            raise ArgumentError(f"{self}: left must be below right and bottom below top (x right, y up, in mm).")
+            raise ArgumentError(f"{self._told}: left must be below right and bottom below top (x right, y up, in mm).")
+
+    @property
+    def _told(self) -> str:
+        return f"region {self.left:g},{self.right:g},{self.bottom:g},{self.top:g}"
 
     def mask(self, screen: Screen) -> Mask:
         """Pixels of `screen` in the region, shape (rows, columns).
@@ -75,7 +79,7 @@ class Region:
         rows = (screen.y >= self.bottom - slack_y) & (screen.y <= self.top + slack_y)
         if not (columns.any() and rows.any()):
             raise ArgumentError(
-                f"{self}: no pixel centre lies in it. The screen spans x = ±{screen.width / 2:g} mm and "
+                f"{self._told}: no pixel centre lies in it. The screen spans x = ±{screen.width / 2:g} mm and "
                 f"y = ±{screen.height / 2:g} mm in {screen.columns} × {screen.rows} pixels."
             )
         return np.logical_and.outer(rows, columns)

@@ -50,10 +50,12 @@ class PolygonRegion:
     def __post_init__(self) -> None:
         corners = tuple((float(x), float(y)) for x, y in self.corners)
         if len(corners) < 3 or not all(math.isfinite(x) and math.isfinite(y) for x, y in corners):
-            raise ArgumentError(f"PolygonRegion: corners are {self.corners}; give three or more finite pairs in mm.")
+            raise ArgumentError(
+                f"region {_told(self.corners)}: give three or more corners with finite coordinates in mm."
+            )
         object.__setattr__(self, "corners", corners)
         if self.area == 0.0:
-            raise ArgumentError(f"PolygonRegion: the corners {corners} span no area.")
+            raise ArgumentError(f"region {_told(corners)}: the corners span no area.")
 
     @property
     def area(self) -> float:
@@ -82,13 +84,17 @@ class PolygonRegion:
             inside ^= crosses & (x <= a + (y - b) * (c - a) / (d - b) + slack)
         if not inside.any():
             raise ArgumentError(
-                f"PolygonRegion: no pixel centre lies in {self.corners}. The screen spans ±{screen.width / 2:g} mm across "
-                f"and ±{screen.height / 2:g} mm up in {screen.columns} × {screen.rows} pixels."
+                f"region {_told(self.corners)}: no pixel centre lies in it. The screen spans ±{screen.width / 2:g} mm "
+                f"across and ±{screen.height / 2:g} mm up in {screen.columns} × {screen.rows} pixels."
             )
         return inside
 
 
 AnyRegion = Region | PolygonRegion
+
+
+def _told(corners: Sequence[Corner]) -> str:
+    return ",".join("/".join(f"{coordinate:g}" for coordinate in corner) for corner in corners)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

@@ -191,14 +191,21 @@ def check_steps(c_planes: int | None, gamma_step: float | None) -> None:
         steps = 0
     else:
         if not (math.isfinite(gamma_step) and 0.0 < gamma_step <= 90.0):
-            raise ArgumentError(f"gamma_step is {gamma_step}°; give an angle above 0° and up to 90°.")
+            raise ArgumentError(f"gamma_step is {gamma_step:g}°; give an angle above 0° and up to 90°.")
         steps = round(180.0 / gamma_step)
         if not math.isclose(steps * gamma_step, 180.0, rel_tol=1e-9):
-            near = 180.0 / steps
-            raise ArgumentError(f"gamma_step is {gamma_step}°, which does not divide 180°; {near:.9g}° would do.")
+            raise ArgumentError(
+                f"gamma_step is {gamma_step:g}°, which does not divide 180°; {_round_step(steps):g}° would do."
+            )
     cells = (c_planes or 1) * (steps + 1)
     if cells > MOST_CELLS:
         raise ArgumentError(f"{cells:,} cells; give fewer c_planes or a larger gamma_step, at most {MOST_CELLS:,}.")
+
+
+def _round_step(steps: int) -> float:
+    """The step near that of so many steps in 180° that is a number of three digits [°]."""
+    counts = sorted(range(1, 2 * steps + 2), key=lambda count: abs(180.0 / count - 180.0 / steps))
+    return next(180.0 / count for count in counts if math.isclose(float(f"{180.0 / count:.3g}") * count, 180.0))
 
 
 def planes_of(number: int) -> tuple[float, ...]:

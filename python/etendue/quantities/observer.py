@@ -71,29 +71,31 @@ class Observer:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.theta <= 180.0:
-            raise ArgumentError(f"Observer: theta is {self.theta}°; it is measured from +Z and lies in 0..180°.")
+            raise ArgumentError(f"Observer: theta is {self.theta:g}°; give 0° to 180°, measured from +Z.")
         if not math.isfinite(self.phi):
-            raise ArgumentError(f"Observer: phi is {self.phi}°; give a finite azimuth.")
+            raise ArgumentError(f"Observer: phi is {self.phi:g}°; give a finite azimuth.")
         if not (math.isfinite(self.distance) and self.distance > 0.0):
-            raise ArgumentError(f"Observer: distance is {self.distance} mm; give a finite distance > 0.")
+            raise ArgumentError(f"Observer: distance is {self.distance:g} mm; give a finite distance above 0.")
         target = tuple(float(c) for c in self.target)
         if len(target) != 3 or not all(map(math.isfinite, target)):
-            raise ArgumentError(f"Observer: target is {self.target}; give three finite coordinates in mm.")
+            raise ArgumentError(f"Observer: target is {_told(target)}; give three finite coordinates in mm.")
         object.__setattr__(self, "target", target)
         if not math.isfinite(self.roll):
-            raise ArgumentError(f"Observer: roll is {self.roll}°; give a finite angle.")
+            raise ArgumentError(f"Observer: roll is {self.roll:g}°; give a finite angle.")
         if self.up is not None:
             self._check_up(self.up)
 
     def _check_up(self, up: tuple[float, ...]) -> None:
         upright = tuple(float(c) for c in up)
         if len(upright) != 3 or not all(map(math.isfinite, upright)) or not any(upright):
-            raise ArgumentError(f"Observer: up is {up}; give a direction as three finite numbers, not all 0.")
+            raise ArgumentError(
+                f"Observer: up is {_told(upright)}; give a direction as three finite numbers, not all 0."
+            )
         object.__setattr__(self, "up", upright)
         along = np.linalg.norm(np.cross(_unit(upright), self.direction))
         if along < ALONG_THE_LINE:
             raise ArgumentError(
-                f"Observer: up is {upright}, along the line of sight from theta = {self.theta:g}°, phi = {self.phi:g}°: "
+                f"Observer: up is {_told(upright)}, along the line of sight from θ = {self.theta:g}°, φ = {self.phi:g}°: "
                 "nothing stands upright there; give another direction, or roll alone."
             )
 
@@ -134,6 +136,10 @@ class Observer:
         right = (ct * c * c + s * s, (ct - 1.0) * c * s, -st * c)
         up = ((ct - 1.0) * c * s, ct * s * s + c * c, -st * s)
         return np.array(right), np.array(up), self.direction
+
+
+def _told(vector: tuple[float, ...]) -> str:
+    return f"({', '.join(f'{component:g}' for component in vector)})"
 
 
 def _unit(vector: npt.ArrayLike) -> Vector:
@@ -195,7 +201,7 @@ class Screen:
         for name in ("width", "height"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
-                raise ArgumentError(f"Screen: {name} is {value} mm; give a finite size > 0.")
+                raise ArgumentError(f"Screen: {name} is {value:g} mm; give a finite size above 0.")
         for name in ("columns", "rows"):
             value = getattr(self, name)
             if not 1 <= value <= 65536 or int(value) != value:  # in this order: NaN and infinity have no int
@@ -203,7 +209,7 @@ class Screen:
             object.__setattr__(self, name, int(value))
         if self.columns * self.rows > MAX_PIXELS:
             raise ArgumentError(
-                f"Screen: {self.columns} x {self.rows} pixels are more than {MAX_PIXELS:,}, which no memory is meant for."
+                f"Screen: {self.columns} × {self.rows} pixels are too many for any memory; give {MAX_PIXELS:,} at most."
             )
         if self.plane not in PLANES:
             raise UnknownNameError("screen plane", self.plane, PLANES)

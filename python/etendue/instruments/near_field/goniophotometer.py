@@ -179,7 +179,7 @@ class NearFieldGoniophotometer:
             As the reading of a file.
         """
         if seed < 0:
-            raise ArgumentError(f"a seed of {seed}; it is not negative.")
+            raise ArgumentError(f"a seed of {seed}; give 0 or more.")
         source = lamp_of(lamp, samples, size, seed, threads)
         setting, around = self._setting(source)
         stops, seen, light, light_error, brightest = self._look(source, setting, around, seed, progress)
