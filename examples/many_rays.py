@@ -57,10 +57,10 @@ Seen = dict[str, list[et.LuminanceMap]]
 
 
 def power(rays: int) -> str:
-    """4·10⁸ for 400 000 000."""
+    """4 × 10⁸ for 400 000 000."""
     digits, exponent = f"{rays:.0e}".split("e+")
     raised = f"10{str(int(exponent)).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
-    return raised if digits == "1" else f"{digits}·{raised}"
+    return raised if digits == "1" else f"{digits} × {raised}"
 
 
 def place(observer: et.Observer) -> str:
@@ -244,8 +244,7 @@ def draw(name: str, lamp: Lamp, truth: list[et.LuminanceMap], seen: Seen, folder
             ]
             for label, maps in [*seen.items(), ("the lamp itself", truth)]
         }
-    heading = CUTS[name] if len(panels) > 1 else f"{CUTS[name]}, {next(iter(panels))}"
-    draw_cuts(folder / f"{name}-cuts.png", heading, panels, columns=2 if name == "led" else len(panels))
+    draw_cuts(folder / f"{name}-cuts.png", CUTS[name], panels, columns=2 if name == "led" else len(panels))
 
 
 @dataclasses.dataclass

@@ -16,7 +16,7 @@ from etendue.plot.colour_scale import colour_map
 from etendue.plot.map_picture import axis_names, draw_colour_bar, draw_screen
 from matplotlib.axes import Axes
 from matplotlib.colorbar import make_axes
-from matplotlib.colors import Normalize, PowerNorm
+from matplotlib.colors import LogNorm, Normalize, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
@@ -72,10 +72,10 @@ def legend_below(made: Figure, axes: Axes) -> None:
 
 
 def put_bar_at(place: Axes, image: Any, data: Array, name: str, unit: str) -> None:
-    """A colour bar in axes of its own; on a root scale numbers crowd at its end, and one more or less is no matter."""
+    """A colour bar in axes of its own, with more numbers than a bar as short as these has elsewhere."""
     draw_colour_bar(image, data, name, unit, place)
-    if isinstance(image.norm, PowerNorm):
-        image.colorbar.locator = MaxNLocator(6, steps=[1, 2, 2.5, 5, 10])
+    if not isinstance(image.norm, LogNorm):
+        image.colorbar.locator = MaxNLocator(6 if isinstance(image.norm, PowerNorm) else 4, steps=[1, 2, 2.5, 5, 10])
         image.colorbar.update_ticks()
 
 
