@@ -101,7 +101,7 @@ def _patches(path: Path) -> Found | None:
     patches = GriddedSource.load(path)
 
     def show() -> None:
-        say(f"{path}: {len(patches.patches):,} patches on {patches.surface.surface.spec}")
+        say(f"{path}: {len(patches.patches):,} patches on {patches.surface.surface.told}")
         for note in patches.notes:
             say(f"  {note}")
 

@@ -103,7 +103,7 @@ def patches(
         return
     for line in complaints:
         complain(line)
-    say(f"{output}: {len(source.patches):,} patches on {source.surface.surface.spec}")
+    say(f"{output}: {len(source.patches):,} patches on {source.surface.surface.told}")
     for note in source.notes:
         say(f"  {note}")
     if swept is not None:

@@ -208,7 +208,7 @@ def count_rays(
         raise ArgumentError("these rays have no positions (a far-field set), so no surface can carry them.")
     grids = (grids,) * len(parts) if isinstance(grids, PartGrids) else tuple(grids)
     if len(grids) != len(parts):
-        raise ArgumentError(f"{len(grids)} grids for the {len(parts)} parts of {surface.spec}; give one for each.")
+        raise ArgumentError(f"{len(grids)} grids for the {len(parts)} parts of {surface.told}; give one for each.")
     deepest = [d for g in grids for d in (*g.depths, *g.fine)]
     if not all(0 <= d <= DEEPEST for d in deepest) or sum(g.cells for g in grids) > MOST_CELLS:
         told = ", ".join(f"{g.depths} and {g.fine}" for g in dict.fromkeys(grids))
@@ -233,7 +233,7 @@ def count_rays(
     counted = sum(float(c.grid.weight.sum()) for c in folds["all"])
     if counted == 0.0:
         raise ArgumentError(
-            f"none of {tally.rays:,} rays meets the surface {surface.spec}; move the surface, or give it more room."
+            f"none of {tally.rays:,} rays meets the surface {surface.told}; move the surface, or give it more room."
         )
     return EtendueCounts(
         surface=surface,

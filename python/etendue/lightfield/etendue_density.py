@@ -132,7 +132,7 @@ class EtendueDensity:
     def __post_init__(self) -> None:
         charts = self.surface.parts()
         if len(charts) != len(self.parts):
-            raise ArgumentError(f"{len(self.parts)} fields for the {len(charts)} parts of {self.surface.spec}.")
+            raise ArgumentError(f"{len(self.parts)} fields for the {len(charts)} parts of {self.surface.told}.")
         core = _core.LightField([core_part(chart.core(), part) for chart, part in zip(charts, self.parts, strict=True)])
         object.__setattr__(self, "_core", core)
 

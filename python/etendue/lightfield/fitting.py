@@ -145,7 +145,7 @@ def finest_for(surface: Surface, max_resolution: float | None) -> tuple[int, tup
         return wanted, ()
     told = (
         f"cells of {max_resolution:g} mm would be more than {2**MOST_FINEST:,} × {2**MOST_FINEST:,} on "
-        f"{surface.spec}: they have {side / 2**MOST_FINEST:.3g} mm; state a smaller surface for finer ones"
+        f"{surface.told}: they have {side / 2**MOST_FINEST:.3g} mm; state a smaller surface for finer ones"
     )
     return MOST_FINEST, (told,)
 
@@ -366,7 +366,7 @@ def _notes(counts: EtendueCounts) -> tuple[str, ...]:
         whole = counts.unmet_flux + sum(counts.part_flux)
         notes.append(
             f"{counts.unmet_rays:,} of {counts.rays:,} rays ({counts.unmet_flux / whole:.3%} of the flux) do not meet "
-            f"{counts.surface.spec} and are not in the field"
+            f"{counts.surface.told} and are not in the field"
         )
     if counts.tally.unusable:
         notes.append(f"{counts.tally.unusable:,} rays cannot be used and were left out; see the ray set's complaints")

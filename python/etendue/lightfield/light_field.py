@@ -54,7 +54,7 @@ class LightField(EtendueDensity, InNotebook):
     def __repr__(self) -> str:
         """Surface, rays that it rests on, flux and origin."""
         rests = f"{self.report.rays:,} rays, {self.total_flux:.6g} {self.flux_unit}"
-        return f"<LightField on {self.surface.spec} of {rests} from {self.provenance.source}>"
+        return f"<LightField on {self.surface.told} of {rests} from {self.provenance.source}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: the compiled part is made anew."""

@@ -180,8 +180,22 @@ class Surface(abc.ABC):
         >>> Dome(radius=1.264).spec
         'dome:radius=1.264,z=0,centre=0/0'
         """
+        return self._written(".12g")
+
+    @property
+    def told(self) -> str:
+        """The surface as messages tell it: as `spec`, to four digits.
+
+        Examples
+        --------
+        >>> Dome(radius=1.26412).told
+        'dome:radius=1.264,z=0,centre=0/0'
+        """
+        return self._written(".4g")
+
+    def _written(self, style: str) -> str:
         return f"{self.NAME}:" + ",".join(
-            f"{f.name}={_text(getattr(self, f.name))}"
+            f"{f.name}={_text(getattr(self, f.name), style)}"
             for f in dataclasses.fields(self)
             if getattr(self, f.name) is not None and not (f.name == "frames" and self.closed("frames") == 0)
         )
@@ -192,10 +206,10 @@ LENGTHS = {"width", "height", "depth", "radius", "window", "rest"}
 MOST_FRAMES = 16
 
 
-def _text(value: object) -> str:
+def _text(value: object, style: str) -> str:
     if isinstance(value, tuple):
-        return "/".join(_text(v) for v in value)
-    return str(value).lower() if isinstance(value, bool) else format(value, ".12g")
+        return "/".join(_text(v, style) for v in value)
+    return str(value).lower() if isinstance(value, bool) else format(value, style)
 
 
 @dataclasses.dataclass(frozen=True)

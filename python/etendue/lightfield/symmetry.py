@@ -141,14 +141,14 @@ def _images(counts: EtendueCounts, symmetry: str) -> tuple[Image, ...]:
     upright = all(abs(chart.axes[2][2]) == 1.0 for chart in charts)
     if not upright or any(chart.shape not in FLAT for chart in charts):
         raise ArgumentError(
-            f"the surface {counts.surface.spec} cannot carry the symmetry {symmetry}; planes, disks, hemispheres, spheres "
+            f"the surface {counts.surface.told} cannot carry the symmetry {symmetry}; planes, disks, hemispheres, spheres "
             "and domes can."
         )
     square = all(chart.shape != "rectangle" or math.isclose(*chart.size, rel_tol=1e-9) for chart in charts)
     even = all(g.depths[0] == g.depths[1] and g.depths[2] == g.depths[3] for g in counts.grids)
     if symmetry == "c4" and not (square and even):
         raise ArgumentError(
-            f"a quarter-turn needs a square surface and square grids, not {counts.surface.spec} with depths "
+            f"a quarter-turn needs a square surface and square grids, not {counts.surface.told} with depths "
             f"{counts.grids[0].depths}; state equal width and height, or take a disk."
         )
     return SYMMETRIES[symmetry]

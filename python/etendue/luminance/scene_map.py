@@ -338,7 +338,7 @@ def _fitted(source: Rays, scene: Scene, threads: int | None, fits: Fits, *, cach
         spectrum=source.spectrum,
         **place,
     )
-    return seen, field.surface.spec, 1.0 - field.total_flux / rays.total_flux
+    return seen, field.surface.told, 1.0 - field.total_flux / rays.total_flux
 
 
 def _unseen(compiled: Compiled, *, forwards: bool) -> list[str]:

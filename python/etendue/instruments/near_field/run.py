@@ -372,7 +372,7 @@ class NearFieldRun:
         in_blocks(n, seed, make, progress)
         records = spool.array()
         share = astray / float(records["flux"].sum(dtype=np.float64))
-        notes = [*self.notes, f"rays start on {at.spec}"]
+        notes = [*self.notes, f"rays start on {at.told}"]
         if share > 0.0:
             notes.append(f"{share:.3%} of the flux does not cross it: these rays start in the plane through the centre")
         drawn = "one ray for each lit pixel" if rays is None else f"{n} rays from the pixels, seed {seed}"

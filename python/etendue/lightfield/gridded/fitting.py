@@ -158,7 +158,7 @@ def lit_pixels(
     )
     if not len(found.pixels):
         raise ArgumentError(
-            f"no light crosses {surface.surface.spec} outwards: {account.missed:,} of {account.rays:,} rays miss it. "
+            f"no light crosses {surface.surface.told} outwards: {account.missed:,} of {account.rays:,} rays miss it. "
             "Look at the rays with `etendue info`, and choose a surface around the source."
         )
     order = np.argsort(found.pixels)

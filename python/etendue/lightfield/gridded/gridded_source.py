@@ -92,7 +92,7 @@ class GriddedSource:
     def __repr__(self) -> str:
         """Surface, patches and flux."""
         flux = f"{self.total_flux:.6g} {self.patches.flux_unit}"
-        return f"<GriddedSource of {len(self.patches):,} patches on {self.surface.surface.spec}, {flux}>"
+        return f"<GriddedSource of {len(self.patches):,} patches on {self.surface.surface.told}, {flux}>"
 
     @classmethod
     def fit(

@@ -92,14 +92,14 @@ class PixelatedSurface:
         parts = surface.parts()
         if any(part.focus != FLAT or part.hole > 0.0 for part in parts):
             raise ArgumentError(
-                f"pixels lie on surfaces without focus and frames, and {surface.spec} has them; state it without."
+                f"pixels lie on surfaces without focus and frames, and {surface.told} has them; state it without."
             )
         if parallels is not None:
             parallels = operator.index(parallels)
             if parallels < 1:
                 raise ArgumentError(f"parallels is {parallels}; give 1 or more.")
             if not any(part.shape == "hemisphere" for part in parts):
-                raise ArgumentError(f"parallels are those of a hemisphere, and the surface {surface.spec} has none.")
+                raise ArgumentError(f"parallels are those of a hemisphere, and the surface {surface.told} has none.")
         # Looked at first: of an absurdly small pixel not even the number can be counted.
         longest = max((max(p.size) for p in parts if parallels is None or p.shape != "hemisphere"), default=0.0)
         if longest / pixel < MOST_PIXELS:
@@ -107,7 +107,7 @@ class PixelatedSurface:
             if sum(p.count for p in pixels) <= MOST_PIXELS:
                 return cls(surface, pixels, centre_on, origin)
         raise ArgumentError(
-            f"more than {MOST_PIXELS:,} pixels on {surface.spec}; give a larger pixel than {pixel:g} mm."
+            f"more than {MOST_PIXELS:,} pixels on {surface.told}; give a larger pixel than {pixel:g} mm."
         )
 
     @property

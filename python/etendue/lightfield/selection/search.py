@@ -275,12 +275,12 @@ class _Search:
         """What the user should know of the choice."""
         others = ", ".join(self.compared(row) for row in table if row.surface != winner.surface)
         yield (
-            f"carrier surface {winner.surface.spec}: of those that take up the light, the simplest that none surpasses "
+            f"carrier surface {winner.surface.told}: of those that take up the light, the simplest that none surpasses "
             f"for sure in predicting rays held out of the fit ({len(self.scorer.flux):,} rays, the same for all; ln "
             f"likelihood per ray against it: {others})"
         )
         if depths is not None and isinstance(winner.surface, Plane | Disk | Dome):
-            yield f"depths between {depths[0]:.6g} and {depths[1]:.6g} mm cannot be told from that of {winner.surface.spec}"
+            yield f"depths between {depths[0]:.4g} and {depths[1]:.4g} mm cannot be told from that of {winner.surface.told}"
         mean = np.average(self.trials.direction, weights=self.trials.rays.flux, axis=0)
         aslant = self.settings.aslant
         if np.linalg.norm(mean) > aslant and mean[2] < aslant * np.linalg.norm(mean):
