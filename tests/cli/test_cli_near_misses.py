@@ -74,12 +74,83 @@ def test_a_format_goes_by_the_name_of_its_program(run: Run, lamp: Path) -> None:
         ('material = "PMMA"', "medium = 'PMMA'"),
         ("radius = 4", "shape = { kind = 'ball', radius = 4 }"),
         ("position = [0, 0, 7]", "at = [0, 0, 7]"),
+        ("normal = [0, 0, -1]", "toward = [0, 0, -1]"),
     ],
 )
 def test_keys_of_other_programs_are_answered(run: Run, tmp_path: Path, line: str, told: str) -> None:
     scene = f'[[solids]]\nname = "lens"\nshape = {{ kind = "ball", radius = 4 }}\n{line}\n'
     (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
     outcome = run("trace", "scene.toml")
+    assert outcome.status == 1
+    assert told in outcome.err
+
+
+def test_keys_of_the_wrong_table_are_answered(run: Run, tmp_path: Path) -> None:
+    scene = """
+        surfaces = [{ shape = { kind = "disk", diameter = 8, normal = [0, 1, 0], at = [0, 0, 7] }, finish = "mirror" }]
+        detectors = [{ kind = "illuminance", pixels = 8, width = 1, height = 1, columns = 8, rows = 8 }]
+        observers = [{ distance = 1000, at = [0, 0, 1000] }]
+    """
+    (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
+    told = run("draw", "scene.toml").err
+    for answer in (
+        "shape.diameter: unknown key. Give a radius, which is half of 8.",
+        "shape.normal: unknown key. Give the direction beside the shape: toward = [0, 1, 0].",
+        "shape.at: unknown key. Give the place beside the shape: at = [0, 0, 7].",
+        "pixels: unknown key. Give columns and rows.",
+        "at: unknown key. Give where it stands by theta, phi and distance, and what it looks at by target.",
+    ):
+        assert answer in told
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("luminance {} --observer 0,0 --size 1,1 --acceptance 95 -o a.npz", "error: --acceptance is 95.0°"),
+        ("luminance {} --observer 90,0 --size 1,1 --plane xy -o a.npz", "use --plane view or another theta"),
+        (
+            "luminance {} --observer 0,0 --size 1,1 --region 5,1,2,3 -o a.npz",
+            "error: region 5,1,2,3: left must be below",
+        ),
+        ("luminance {} --observer 0,0 --size 1,1 --threads 0 -o a.npz", "'--threads': give 1 or more"),
+        ("luminance {} --observer 0,0 --size 1,1 --samples 1e3 -o a.npz", "'--samples': give a whole number in digits"),
+        ("intensity {} --gamma-step 7", "error: --gamma-step is 7°, which does not divide 180°; 7.2° would do."),
+        ("convert {} a.dat --seed -1 --subset 3", "error: seed -1; give 0 to 2^64 - 1."),
+    ],
+)
+def test_messages_name_options(run: Run, lamp: Path, words: str, told: str) -> None:
+    outcome = run(*(str(lamp) if word == "{}" else word for word in words.split()))
+    assert outcome.status
+    assert told in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (
+            "trace lamp.tm25ray",
+            "lamp.tm25ray: this is a ray file (IES TM-25 ray file), not a scene (.toml). etendue info, fit",
+        ),
+        ("filter lamp.tm25ray --kind opt -o a.npz", "this is a ray file (IES TM-25 ray file), no map"),
+        ("sample lamp.tm25ray -n 9 -o a.dat", "this is a ray file (IES TM-25 ray file), not a light field"),
+        ("fit map.npz -o a.h5", "this is a luminance or illuminance map, no ray file. etendue plot, filter, compare"),
+        ("info scene.toml", "this is a scene, no ray file. etendue trace, luminance, draw"),
+        ("bsdf info scene.toml", "this is a scene, no BSDF"),
+        (
+            "fit result.h5 -o a.h5",
+            "this is the result of a trace, no ray file. etendue info, luminance and view take it",
+        ),
+        ("sample result.h5 -n 9 -o a.dat", "this is the result of a trace, not a light field"),
+        ("draw lamp.ies", "this is an intensity distribution (IES LM-63), not a scene (.toml)"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_by_name(run: Run, lamp: Path, words: str, told: str) -> None:
+    mapped(run, lamp, "--observer", "0,0", "--size", "9,9", "--pixels", "2,2")
+    et.write_intensity("lamp.ies", et.Intensity(c=[0], gamma=[0, 10, 90], values=[[9, 5, 0]]))
+    scene = et.Scene(sources=[{"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 1}])
+    scene.save("scene.toml")
+    et.trace(scene, 10).save("result.h5")
+    outcome = run(*words.split())
     assert outcome.status == 1
     assert told in outcome.err
 

@@ -200,7 +200,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"observers": [{"distance": -1, "screen": {"width": 1, "height": 1, "columns": 1, "rows": 1}}]},
-        ["observers[0]: Observer: distance is -1.0 mm"],
+        ["observers[0]: Observer: distance is -1 mm"],
     ),
     ({"media": {"air": {"index": 1.2}}}, ["media.air: 'air' is built in; choose another name"]),
     (

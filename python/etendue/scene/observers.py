@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal
 
 from etendue.description.keys import Description
 from etendue.description.values import Number, Vector
@@ -17,6 +19,11 @@ class ScreenKeys(Description):
     >>> ScreenKeys(width=25, height=25, columns=128, rows=128).screen().shape
     (128, 128)
     """
+
+    INSTEAD: ClassVar[Mapping[str, str]] = MappingProxyType({
+        "pixels": "columns and rows",
+        "size": "width and height in mm",
+    })  # fmt: skip
 
     width: Number
     height: Number
@@ -42,6 +49,13 @@ class ObserverKeys(Description):
     >>> ObserverKeys(name="side", theta=90, phi=0, distance=1000, screen=screen).observer().distance
     1000.0
     """
+
+    INSTEAD: ClassVar[Mapping[str, str]] = MappingProxyType({
+        "position": "where it stands by theta, phi and distance, and what it looks at by target",
+        "at": "where it stands by theta, phi and distance, and what it looks at by target",
+        "size": "its screen: screen = {{ width = 25, height = 25, columns = 128, rows = 128 }}",
+        "pixels": "its screen: screen = {{ width = 25, height = 25, columns = 128, rows = 128 }}",
+    })  # fmt: skip
 
     name: str = ""
     theta: Number = 0.0

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Self
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -90,6 +92,12 @@ class Placement(Description):
     >>> Placement(at=(0, 0, 9), toward=(1, 0, 0)).frame().record()
     [0.0, 0.0, 9.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0]
     """
+
+    INSTEAD: ClassVar[Mapping[str, str]] = MappingProxyType({
+        "position": "at = {}",
+        "normal": "toward = {}",
+        "direction": "toward = {}",
+    })  # fmt: skip
 
     at: Point = (0.0, 0.0, 0.0)
     toward: Vector | None = None

@@ -49,7 +49,7 @@ class Solid(Placement):
         "index": "medium = {{ index = {} }}",
         "radius": "the size in the shape, e.g. shape = {{ kind = 'ball', radius = {} }}",
         "height": "the size in the shape, e.g. shape = {{ kind = 'rod', radius = 5, height = {} }}",
-        "position": "at = {}",
+        **Placement.INSTEAD,
     })  # fmt: skip
 
     name: str = ""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+from collections.abc import Mapping
+from typing import ClassVar
 
 from etendue.description.files import Files
 from etendue.description.keys import Description
 from etendue.scene.placement import HERE, Frame
-from etendue.scene.shapes.shape import Record
+from etendue.scene.shapes.shape import BESIDE_A_SHAPE, Record
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,6 +57,8 @@ class Body(Description, abc.ABC):
 
     Bodies with a base stand on the plane z = 0; the others lie around the origin.
     """
+
+    INSTEAD: ClassVar[Mapping[str, str]] = BESIDE_A_SHAPE
 
     @abc.abstractmethod
     def faces(self, files: Files) -> tuple[Face, ...]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import ClassVar, Literal
 
 from etendue.description.files import Files
 from etendue.description.values import Length, Pixels
@@ -86,6 +87,12 @@ class Illuminance(Detector, Placement):
     """
 
     DETECTION = GridIlluminance
+
+    INSTEAD: ClassVar[Mapping[str, str]] = MappingProxyType({
+        "pixels": "columns and rows",
+        "shape": "its size, width and height in mm: it is a rectangle",
+        **Placement.INSTEAD,
+    })  # fmt: skip
 
     kind: Literal["illuminance"] = "illuminance"
     width: Length

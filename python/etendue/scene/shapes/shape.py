@@ -5,7 +5,9 @@ from __future__ import annotations
 import abc
 import dataclasses
 import math
-from typing import Annotated, Any, Self
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Self
 
 from annotated_types import MaxLen
 from pydantic import Field, model_validator
@@ -117,11 +119,21 @@ class Sheet:
     notes: tuple[str, ...] = ()
 
 
+BESIDE_A_SHAPE = MappingProxyType({
+    **dict.fromkeys(("at", "position", "centre", "center"), "the place beside the shape: at = {}"),
+    **dict.fromkeys(("normal", "toward", "direction"), "the direction beside the shape: toward = {}"),
+    "diameter": "a radius, which is half of {}",
+})  # fmt: skip
+"""What is meant by keys that shapes do not have."""
+
+
 class Shape(Description, abc.ABC):
     """A shape of a surface without thickness, in local coordinates.
 
     Every kind has its field ``kind`` and says where its origin is and on which side its normal stands.
     """
+
+    INSTEAD: ClassVar[Mapping[str, str]] = BESIDE_A_SHAPE
 
     @abc.abstractmethod
     def sheet(self, trim: Trim, files: Files) -> Sheet:
