@@ -95,7 +95,9 @@ def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
 def plot(
     file: File,
     output: Annotated[Path, typer.Option("--output", "-o", help="The picture, .png, .svg or .pdf.")],
-    incidence: Annotated[float, typer.Option("--incidence", help="Angle of the diagram in the middle [°].")] = 45.0,
+    incidence: Annotated[
+        float, typer.Option("--incidence", help="Angle of incidence of the lobe that is drawn, in °.")
+    ] = 45.0,
     side: Annotated[str, typer.Option("--side", help="The side that the light meets: front or back.")] = "front",
     json: Json = False,
 ) -> None:
@@ -170,13 +172,14 @@ def fit(
         str, typer.Option("--method", help=f"From scans to a grid: {', '.join(METHODS)}.")
     ] = "specular-centred",
     reflectance: Annotated[
-        float | None, typer.Option("--reflectance", help="Of an integrating sphere; each incidence is scaled to it.")
+        float | None,
+        typer.Option("--reflectance", help="Reflectance by an integrating sphere; each incidence is scaled to it."),
     ] = None,
     incident_flux: Annotated[
         Path | None, typer.Option("--incident-flux", help="For stages: the file with the flux on the sample.")
     ] = None,
     solid_angle: Annotated[
-        float | None, typer.Option("--solid-angle", help="For stages: that of the aperture [sr].")
+        float | None, typer.Option("--solid-angle", help="For stages: solid angle of the aperture in sr.")
     ] = None,
     blank: Annotated[
         Path | None, typer.Option("--blank", help="For .xls: the scan without a sample, which is subtracted.")

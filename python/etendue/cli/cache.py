@@ -11,7 +11,7 @@ from etendue.lightfield.fit_cache import FOLDER_VARIABLE, MOST_BYTES, cache_cont
 
 
 def cache(
-    clear: Annotated[bool, typer.Option("--clear", help="Remove them all.")] = False,
+    clear: Annotated[bool, typer.Option("--clear", help="Remove all light fields from the folder.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Show or clear the folder of light fields that were fitted for maps of rays and scenes and are not fitted again."""

@@ -17,7 +17,7 @@ from etendue.plot.comparison_picture import DIFFERENCES
 
 
 def compare(
-    test: Annotated[Path, typer.Argument(help="The map to judge.")],
+    test: Annotated[Path, typer.Argument(help="The map that is judged.")],
     reference: Annotated[Path, typer.Argument(help="The map it is judged by.")],
     region: Annotated[
         str | None, typer.Option("--region", help="Part of the screen, in mm.", metavar="LEFT,RIGHT,BOTTOM,TOP")

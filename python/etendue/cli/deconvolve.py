@@ -59,9 +59,13 @@ def deconvolve(
             "in two dimensions total-variation and parametric.",
         ),
     ] = None,
-    stop: Annotated[str | None, typer.Option("--stop", help=f"{', '.join(RULES)}, or a number of iterations.")] = None,
+    stop: Annotated[
+        str | None,
+        typer.Option("--stop", help=f"When the iteration ends: {', '.join(RULES)}, or a number of iterations."),
+    ] = None,
     models: Annotated[
-        str | None, typer.Option("--models", help=f"To choose from if parametric: {', '.join(LOBE_MODELS)}.")
+        str | None,
+        typer.Option("--models", help=f"Lobes that --method parametric chooses from: {', '.join(LOBE_MODELS)}."),
     ] = None,
     regular: Annotated[
         float | None,
@@ -75,10 +79,14 @@ def deconvolve(
         float | None, typer.Option("--beam", help="Diameter of the beam in mm, if the file does not say.")
     ] = None,
     distance: Annotated[
-        float | None, typer.Option("--distance", help="From sample to aperture in mm, if the file does not say.")
+        float | None,
+        typer.Option("--distance", help="Distance from sample to aperture in mm, if the file does not say."),
     ] = None,
-    replicates: Annotated[int, typer.Option("--replicates", help="Scans that error bands are made of.")] = REPLICATES,
-    seed: Annotated[int, typer.Option("--seed", help="Of them, and of counts kept back.")] = 1,
+    replicates: Annotated[
+        int,
+        typer.Option("--replicates", help="Number of repeated scans, with new noise, that error bands are made of."),
+    ] = REPLICATES,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the repeated scans, and of counts kept back.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Take the instrument out of a scan, and say how the iteration stopped and what it is sure of."""

@@ -29,7 +29,7 @@ def draw(
         ),
     ] = None,
     rays: Annotated[int, typer.Option("--rays", help="Rays in each section, 0 to 1000.")] = 30,
-    seed: Annotated[int, typer.Option("--seed", help="0 to 2^64 - 1.", min=0)] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the rays, 0 to 2^64 - 1.", min=0)] = 1,
     window: Annotated[
         str | None,
         typer.Option(
@@ -38,7 +38,9 @@ def draw(
             metavar="LEFT,RIGHT,BOTTOM,TOP",
         ),
     ] = None,
-    title: Annotated[str | None, typer.Option("--title", help="First line; the scene's name if not given.")] = None,
+    title: Annotated[
+        str | None, typer.Option("--title", help="Title of the picture; the scene's name if not given.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Draw sections of a scene to scale, with a few rays; say how large it is and what stands in it."""

@@ -20,7 +20,7 @@ KINDS = ("opt", *FILTERS)
 
 def filter_(
     file: Annotated[Path, typer.Argument(help="A map written by étendue.")],
-    kind: Annotated[str, typer.Option("--kind", help=f"{', '.join(KINDS)}.")],
+    kind: Annotated[str, typer.Option("--kind", help=f"Filter: {', '.join(KINDS)}.")],
     output: Annotated[list[Path], typer.Option("-o", "--output", help="Map to write; several are allowed.")],
     size: Annotated[int, typer.Option("--size", help="Pixels along each side of the kernel, odd.")] = 5,
     gamma: Annotated[

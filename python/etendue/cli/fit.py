@@ -32,7 +32,8 @@ def fit(
         ),
     ] = "auto",
     symmetry: Annotated[
-        str, typer.Option("--symmetry", help="Of the source: none, auto, mirror-x, mirror-y, mirror-xy, c2 or c4.")
+        str,
+        typer.Option("--symmetry", help="Symmetry of the source: none, auto, mirror-x, mirror-y, mirror-xy, c2 or c4."),
     ] = "none",
     depths: Annotated[
         str | None,
@@ -48,7 +49,9 @@ def fit(
             metavar="MM",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Decides which rays are held out.")] = 1,
+    seed: Annotated[
+        int, typer.Option("--seed", help="Seed: decides which rays are held out of the fit to judge it.")
+    ] = 1,
     threads: Threads = None,
     flux: Flux = None,
     unit: Unit = None,

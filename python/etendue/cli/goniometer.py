@@ -29,7 +29,9 @@ def goniometer(
     aperture: Annotated[
         float, typer.Option("--aperture", help="Diameter of the aperture, or side of a square in mm.")
     ] = 25.0,
-    aperture_shape: Annotated[str, typer.Option("--aperture-shape", help="disk, square or ring.")] = "disk",
+    aperture_shape: Annotated[
+        str, typer.Option("--aperture-shape", help="Shape of the aperture: disk, square or ring.")
+    ] = "disk",
     inner: Annotated[float, typer.Option("--inner", help="Inner diameter of a ring in mm.")] = 0.0,
     beam: Annotated[float, typer.Option("--beam", help="Diameter of the beam in mm.")] = 14.0,
     profile: Annotated[
@@ -42,16 +44,19 @@ def goniometer(
     source_angle: Annotated[
         float, typer.Option("--source-angle", help="Diameter of the source of light, seen from the sample in °.")
     ] = COLLIMATED,
-    distance: Annotated[float, typer.Option("--distance", help="From the sample to the aperture in mm.")] = 886.0,
+    distance: Annotated[
+        float, typer.Option("--distance", help="Distance from the sample to the aperture in mm.")
+    ] = 886.0,
     incidence: Annotated[float, typer.Option("--incidence", help="Angle of incidence in °.")] = 0.0,
     step: Annotated[
         float | None,
-        typer.Option("--step", help=f"Between positions in °; {STEP:g}, or {BARE_STEP:g} of the bare beam."),
+        typer.Option("--step", help=f"Step between positions in °; {STEP:g}, or {BARE_STEP:g} of the bare beam."),
     ] = None,
     span: Annotated[
         float | None,
         typer.Option(
-            "--span", help=f"To which angle in ° on both sides; {SPAN:g} with a sample, {WINDOW:g} of a window."
+            "--span",
+            help=f"Angle up to which the scan goes on both sides, in °; {SPAN:g} with a sample, {WINDOW:g} of a window.",
         ),
     ] = None,
     window: Annotated[
@@ -68,22 +73,34 @@ def goniometer(
         float,
         typer.Option("--head", help="With --window: diameter of the detector's head in mm, which shadows the sample."),
     ] = 0.0,
-    plane: Annotated[str, typer.Option("--plane", help="Of the scan: in-plane or cross-plane.")] = "in-plane",
+    plane: Annotated[
+        str, typer.Option("--plane", help="Plane of the scan: in-plane (that of incidence) or cross-plane.")
+    ] = "in-plane",
     way: Annotated[
-        str | None, typer.Option("--way", help="transmitted or reflected, of a sample that does both.")
+        str | None,
+        typer.Option("--way", help="Light that is measured, transmitted or reflected, of a sample that does both."),
     ] = None,
-    method: Annotated[str, typer.Option("--method", help="trace or quadrature.")] = "trace",
-    rays: Annotated[int, typer.Option("--rays", parser=count(), help="At each position.", metavar="N")] = 10**6,
+    method: Annotated[
+        str, typer.Option("--method", help="How it is computed: trace (rays) or quadrature (an integral).")
+    ] = "trace",
+    rays: Annotated[int, typer.Option("--rays", parser=count(), help="Rays at each position.", metavar="N")] = 10**6,
     fresh: Annotated[
-        bool, typer.Option("--fresh", help="Rays of its own for each position: ten times the work.")
+        bool,
+        typer.Option(
+            "--fresh", help="Draw new rays for each position, so that errors are independent: ten times the work."
+        ),
     ] = False,
     photons: Annotated[
         float | None,
-        typer.Option("--photons", help="As how many the whole beam is counted at a position: photon noise."),
+        typer.Option(
+            "--photons", help="Photons of the whole beam at each position, for photon noise; none if not given."
+        ),
     ] = None,
     dark: Annotated[float, typer.Option("--dark", help="Counts without light at a position.")] = 0.0,
-    drift: Annotated[float, typer.Option("--drift", help="By which share the beam changes during the scan.")] = 0.0,
-    seed: Annotated[int, typer.Option("--seed", help="Of rays and noise.")] = 1,
+    drift: Annotated[
+        float, typer.Option("--drift", help="Share by which the beam changes during the scan, e.g. 0.01.")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of rays and noise.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Measure a sample, or the bare beam, with a virtual goniometer."""

@@ -37,10 +37,14 @@ def goniophotometer(
         ),
     ] = None,
     rays: Annotated[
-        int, typer.Option("-n", "--rays", help="Of ray files, e.g. 1e7.", parser=count(), metavar="NUMBER")
+        int,
+        typer.Option(
+            "-n", "--rays", help="Rays of the ray files to be written, e.g. 1e7.", parser=count(), metavar="NUMBER"
+        ),
     ] = 10**6,
     format: Annotated[
-        str | None, typer.Option("--format", help="Of ray files; from the extension of the output if not given.")
+        str | None,
+        typer.Option("--format", help="Format of the ray files; from the extension of the output if not given."),
     ] = None,
     surface: Annotated[
         str, typer.Option("--surface", help="Where rays start: closest, sphere, box, cylinder:radius=2 …")
@@ -50,32 +54,45 @@ def goniophotometer(
     ] = "5",
     distance: Annotated[
         float | None,
-        typer.Option("--distance", help="Of camera and photometer in mm; 15 sizes of the lamp if left out."),
+        typer.Option(
+            "--distance",
+            help="Distance of camera and photometer from the centre in mm; 15 sizes of the lamp if left out.",
+        ),
     ] = None,
     photometer_distance: Annotated[
-        float | None, typer.Option("--photometer-distance", help="If it is another, in mm.")
+        float | None,
+        typer.Option(
+            "--photometer-distance", help="Distance of the photometer in mm, if it is another than the camera's."
+        ),
     ] = None,
     centre: Annotated[
         str | None,
-        typer.Option("--centre", help="About which the arm turns: X,Y,Z in mm; the lamp's middle if left out."),
+        typer.Option("--centre", help="Point about which the arm turns: X,Y,Z in mm; the lamp's middle if left out."),
     ] = None,
     field_of_view: Annotated[
         float | None, typer.Option("--field-of-view", help="Side of the image in mm; just the lamp if left out.")
     ] = None,
-    camera_pixels: Annotated[int, typer.Option("--camera-pixels", help="Along each side of the image.")] = 512,
-    exposures: Annotated[int, typer.Option("--exposures", help="Of each position.")] = 1,
+    camera_pixels: Annotated[int, typer.Option("--camera-pixels", help="Pixels along each side of the image.")] = 512,
+    exposures: Annotated[int, typer.Option("--exposures", help="Exposures at each position.")] = 1,
     exposure_ratio: Annotated[
-        float, typer.Option("--exposure-ratio", help="From each exposure to the next, longer one.")
+        float, typer.Option("--exposure-ratio", help="Ratio of each exposure time to the one before, which is shorter.")
     ] = 10.0,
     level: Annotated[
         float,
-        typer.Option("--level", help="Of the brightest pixel in the shortest exposure, as a share of full scale."),
+        typer.Option(
+            "--level", help="Signal of the brightest pixel in the shortest exposure, as a share of full scale."
+        ),
     ] = 0.9,
-    bits: Annotated[int, typer.Option("--bits", help="Of the camera's converter, 4 to 16.")] = 12,
-    full_well: Annotated[float, typer.Option("--full-well", help="Electrons of full scale.")] = 20_000.0,
-    read_noise: Annotated[float, typer.Option("--read-noise", help="Of a pixel in electrons.")] = 10.0,
+    bits: Annotated[
+        int, typer.Option("--bits", help="Bits of the camera's analogue-to-digital converter, 4 to 16.")
+    ] = 12,
+    full_well: Annotated[float, typer.Option("--full-well", help="Electrons of a pixel at full scale.")] = 20_000.0,
+    read_noise: Annotated[float, typer.Option("--read-noise", help="Read noise of a pixel in electrons.")] = 10.0,
     threshold: Annotated[
-        float, typer.Option("--threshold", help="Of dark pixels, in standard deviations of their noise.")
+        float,
+        typer.Option(
+            "--threshold", help="Signal below which a pixel counts as dark, in standard deviations of its noise."
+        ),
     ] = 5.0,
     blur: Annotated[float, typer.Option("--blur", help="Width of the image of a point in pixels.")] = 0.0,
     exposure_error: Annotated[
@@ -94,7 +111,7 @@ def goniophotometer(
         int | None,
         typer.Option("--samples", help="Lines of sight per pixel; if left out, 65 536 in each image, 4 at least."),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Of noise, errors and rays.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of noise, errors and rays.")] = 1,
     threads: Threads = None,
     json: Json = False,
 ) -> None:

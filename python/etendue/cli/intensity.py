@@ -45,7 +45,7 @@ def intensity(
     ] = None,
     c_planes: Annotated[
         int | None,
-        typer.Option("--c-planes", help="Half planes C (chosen from the light).", min=1, show_default=False),
+        typer.Option("--c-planes", help="Number of half planes C (chosen from the light).", min=1, show_default=False),
     ] = None,
     gamma_step: Annotated[
         float | None,
@@ -65,7 +65,7 @@ def intensity(
         float, typer.Option("--rotate", help="Turn about the axis: C becomes C + this, in degrees.")
     ] = 0.0,
     mirror: Annotated[bool, typer.Option("--mirror", help="C becomes -C (before --rotate).")] = False,
-    kind: Annotated[str, typer.Option("--kind", help="Picture: polar or cartesian.")] = "polar",
+    kind: Annotated[str, typer.Option("--kind", help="Kind of picture: polar or cartesian.")] = "polar",
     per_klm: Annotated[bool, typer.Option("--per-klm", help="Picture in cd/klm, of the lamps where known.")] = False,
     json: Json = False,
 ) -> None:

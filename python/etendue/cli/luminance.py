@@ -84,7 +84,8 @@ def luminance(
         list[str] | None,
         typer.Option(
             "--observer",
-            help="θ,φ in degrees; may be given several times. Of a scene, its own observers if not given.",
+            help="Direction θ,φ of the observer in degrees; may be given several times. "
+            "Of a scene, its own observers if not given.",
             metavar="THETA,PHI",
         ),
     ] = None,
@@ -98,13 +99,13 @@ def luminance(
         int | None,
         typer.Option(
             "--orbit",
-            help="Go around: so many observers at the θ of --observer, φ from his on in even steps over 360°, +Z upright "
-            "unless --up says what is. For moving pictures (.gif, .mp4, .html), on one scale; or a file each with {phi}.",
+            help="Go around: so many observers at the θ of --observer, from its φ on in even steps over 360°, "
+            "+Z upright unless --up says what is. For moving pictures (.gif, .mp4, .html), on one scale; or a file each with {phi}.",
             metavar="NUMBER",
             show_default=False,
         ),
     ] = None,
-    distance: Annotated[float, typer.Option("--distance", help="From target to observer in mm.")] = 1000.0,
+    distance: Annotated[float, typer.Option("--distance", help="Distance from target to observer in mm.")] = 1000.0,
     target: Annotated[
         str | None,
         typer.Option(
@@ -120,8 +121,10 @@ def luminance(
     ] = None,
     roll: Annotated[float, typer.Option("--roll", help="Tilt of the observer's head to its left in °.")] = 0.0,
     region: Regions = None,
-    pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = "128,128",
-    plane: Annotated[str, typer.Option("--plane", help="view or xy.")] = "view",
+    pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows of the map.", metavar="C,R")] = "128,128",
+    plane: Annotated[
+        str, typer.Option("--plane", help="Plane of the screen: view (facing the observer) or xy (fixed).")
+    ] = "view",
     method: Annotated[
         str,
         typer.Option(
@@ -169,10 +172,13 @@ def luminance(
         float | None,
         typer.Option(
             "--until",
-            help="Of a scene: follow more until this error, weighted by flux, is reached, e.g. 0.01.",
+            help="Of a scene: follow more lines of sight until this error, weighted by flux, is reached, e.g. 0.01.",
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Of a scene (1).", min=0, show_default=False)] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", help="Of a scene: seed of the lines of sight (1).", min=0, show_default=False),
+    ] = None,
     forward_rays: Annotated[
         float | None,
         typer.Option(

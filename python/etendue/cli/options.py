@@ -9,8 +9,10 @@ import typer
 from etendue.errors import UnknownNameError
 
 Flux = Annotated[str | None, typer.Option("--flux", help="Total flux that overrides the file's: 337, 337lm.")]
-Unit = Annotated[str | None, typer.Option("--unit", help="lm or W: convert through the file's spectrum.")]
-Threads = Annotated[int | None, typer.Option("--threads", help="Threads; all cores if not given.", min=1)]
+Unit = Annotated[
+    str | None, typer.Option("--unit", help="Unit of flux, lm or W: rays are converted through the file's spectrum.")
+]
+Threads = Annotated[int | None, typer.Option("--threads", help="Number of threads; all cores if not given.", min=1)]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 Regions = Annotated[

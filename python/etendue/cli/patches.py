@@ -23,7 +23,7 @@ from etendue.plot.threshold_picture import plot_threshold_sweep
 
 def patches(
     file: Annotated[Path, typer.Argument(help="A ray file of any format.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to be made.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to be written, which is made.")],
     surface: Annotated[
         str, typer.Option("--surface", help="Carrier surface: plane:z=0, disk:radius=11.5, dome:radius=1.264 …")
     ] = "plane:z=0",
@@ -31,7 +31,7 @@ def patches(
     centre_on: Annotated[
         str,
         typer.Option(
-            "--centre-on", help="What of the squares lies at the centre, or at x = y = 0: corner, pixel or auto."
+            "--centre-on", help="What lies at the centre, or at x = y = 0: a corner of squares, a pixel, or auto."
         ),
     ] = "auto",
     threshold: Annotated[
@@ -45,19 +45,20 @@ def patches(
         int | None, typer.Option("--parallels", help="Cut a hemisphere into (2N-1)² cells; from --pixel if not given.")
     ] = None,
     coarsest: Annotated[
-        str, typer.Option("--coarsest", help="Δθ and Δφ that are tried first, in degrees.", metavar="N,N")
+        str,
+        typer.Option("--coarsest", help="Largest bins Δθ and Δφ, which are tried first, in degrees.", metavar="N,N"),
     ] = "30,90",
     finest: Annotated[
-        str, typer.Option("--finest", help="Δθ and Δφ that are tried last, in degrees.", metavar="N,N")
+        str, typer.Option("--finest", help="Smallest bins Δθ and Δφ, which are tried last, in degrees.", metavar="N,N")
     ] = "1,1",
-    format: Annotated[str, typer.Option("--format", help="Of the intensity files: ies or ldt.")] = "ies",
+    format: Annotated[str, typer.Option("--format", help="Format of the intensity files: ies or ldt.")] = "ies",
     scene: Annotated[
         list[str] | None, typer.Option("--scene", help="Add a scene: radiance or mitsuba; several are allowed.")
     ] = None,
     sweep: Annotated[
         bool, typer.Option("--sweep", help="Also judge nine thresholds and this one: sweep.csv and sweep.png.")
     ] = False,
-    seed: Annotated[int, typer.Option("--seed", help="Chooses the rays that --sweep keeps back.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed: chooses the rays that --sweep keeps back.")] = 1,
     flux: Flux = None,
     unit: Unit = None,
     json: Json = False,

@@ -37,10 +37,12 @@ def plot(
     ],
     scale: Annotated[str, typer.Option("--scale", help="Colours: auto, linear or log.")] = "auto",
     log: Annotated[bool, typer.Option("--log", help="The same as --scale log.")] = False,
-    vmin: Annotated[float | None, typer.Option("--vmin", help="What the lower end of the colours means.")] = None,
-    vmax: Annotated[float | None, typer.Option("--vmax", help="What their upper end means.")] = None,
-    title: Annotated[str | None, typer.Option("--title", help="First line; quantity and source if not given.")] = None,
-    show: Annotated[str, typer.Option("--show", help="value or relative-error.")] = "value",
+    vmin: Annotated[float | None, typer.Option("--vmin", help="Value at the lower end of the colours.")] = None,
+    vmax: Annotated[float | None, typer.Option("--vmax", help="Value at the upper end of the colours.")] = None,
+    title: Annotated[
+        str | None, typer.Option("--title", help="Title of the picture; quantity and source if not given.")
+    ] = None,
+    show: Annotated[str, typer.Option("--show", help="What is drawn: value or relative-error.")] = "value",
     region: Regions = None,
     per_klm: Annotated[bool, typer.Option("--per-klm", help="Intensity in cd/klm, of the lamps where known.")] = False,
     json: Json = False,

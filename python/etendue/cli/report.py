@@ -26,26 +26,30 @@ def report(
         list[str] | None,
         typer.Option(
             "--observer",
-            help="θ,φ in degrees; may be given several times (0,0 30,0 60,0 60,90).",
+            help="Direction θ,φ of an observer in degrees; may be given several times (0,0 30,0 60,0 60,90).",
             metavar="THETA,PHI",
             show_default=False,
         ),
     ] = None,
     distance: Annotated[
-        float, typer.Option("--distance", help="Of stated observers from the target in mm.")
+        float, typer.Option("--distance", help="Distance of stated observers from the target in mm.")
     ] = DISTANCE,
     target: Annotated[
         str | None,
         typer.Option(
-            "--target", help="What stated observers look at, in mm (0,0,0).", metavar="X,Y,Z", show_default=False
+            "--target", help="Point that stated observers look at, in mm (0,0,0).", metavar="X,Y,Z", show_default=False
         ),
     ] = None,
     surface: Annotated[str, typer.Option("--surface", help="Carrier surface, as for fit.")] = "auto",
-    title: Annotated[str | None, typer.Option("--title", help="First line; name of the file if not given.")] = None,
+    title: Annotated[
+        str | None, typer.Option("--title", help="Title of the page; name of the file if not given.")
+    ] = None,
     forecast: Annotated[
         bool, typer.Option("--forecast/--no-forecast", help="Say what more rays would bring, for the time of a fit.")
     ] = True,
-    seed: Annotated[int, typer.Option("--seed", help="Decides which rays are held out.")] = 1,
+    seed: Annotated[
+        int, typer.Option("--seed", help="Seed: decides which rays are held out of the fit to judge it.")
+    ] = 1,
     threads: Threads = None,
     flux: Flux = None,
     unit: Unit = None,

@@ -65,11 +65,12 @@ def sweep(
         list[str] | None,
         typer.Option(
             "--observer",
-            help="θ,φ in degrees; may be given several times. The scene's own observers if not given.",
+            help="Direction θ,φ of the observer in degrees; may be given several times. "
+            "The scene's own observers if not given.",
             metavar="THETA,PHI",
         ),
     ] = None,
-    distance: Annotated[float, typer.Option("--distance", help="From target to observer in mm.")] = 1000.0,
+    distance: Annotated[float, typer.Option("--distance", help="Distance from target to observer in mm.")] = 1000.0,
     target: Annotated[
         str, typer.Option("--target", help="Point looked at, in mm.", metavar="X,Y,Z", show_default=True)
     ] = "0,0,0",
@@ -81,7 +82,7 @@ def sweep(
             metavar="W,H",
         ),
     ] = None,
-    pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows.", metavar="C,R")] = PIXELS,
+    pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows of each map.", metavar="C,R")] = PIXELS,
     region: Annotated[
         str | None,
         typer.Option(
@@ -100,7 +101,7 @@ def sweep(
             "--rays-per-pixel", help="Lines of sight per pixel of each map.", parser=count(), metavar="NUMBER"
         ),
     ] = LINES,
-    seed: Annotated[int, typer.Option("--seed", help="Of every step, 0 to 2^64 - 1.", min=0)] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of every step, 0 to 2^64 - 1.", min=0)] = 1,
     cache: Annotated[
         bool, typer.Option("--cache/--no-cache", help="Take light fields from those fitted before (etendue cache).")
     ] = True,

@@ -87,7 +87,7 @@ def trace(
             show_default=False,
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="0 to 2^64 - 1.", min=0)] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the rays, 0 to 2^64 - 1.", min=0)] = 1,
     until: Annotated[
         float | None,
         typer.Option(

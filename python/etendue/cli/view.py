@@ -32,7 +32,8 @@ def view(
         ),
     ] = None,
     detector: Annotated[
-        str | None, typer.Option("--detector", help="Of the result of a trace: whose map or rays are shown.")
+        str | None,
+        typer.Option("--detector", help="Of the result of a trace: the detector whose map or rays are shown."),
     ] = None,
     rays: Annotated[
         int | None,
@@ -44,12 +45,14 @@ def view(
             show_default=False,
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Of that trace.", min=0)] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of that trace.", min=0)] = 1,
     flux: Flux = None,
     unit: Unit = None,
-    title: Annotated[str | None, typer.Option("--title", help="Of the page; the file's name if not given.")] = None,
+    title: Annotated[
+        str | None, typer.Option("--title", help="Title of the page; the file's name if not given.")
+    ] = None,
     port: Annotated[
-        int, typer.Option("--port", help="On which the page is served; 0: any that is free.", min=0, max=65535)
+        int, typer.Option("--port", help="Port on which the page is served; 0: any that is free.", min=0, max=65535)
     ] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     cache: Annotated[
