@@ -105,7 +105,7 @@ def plot_report(report: SourceReport, path: str | os.PathLike[str] | None = None
 
 def _lines(figure: Figure, x: float, y: float, lines: Sequence[str], colour: str = style.INK) -> float:
     for line in lines:
-        style.add_text(figure, x, y, line, size=style.CAPTION_SIZE, color=colour)
+        style.add_text(figure, x, y, style.regrouped(line), size=style.CAPTION_SIZE, color=colour)
         y -= LINE
     return y
 

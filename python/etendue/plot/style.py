@@ -242,6 +242,17 @@ def grouped(text: str) -> str:
     return f"{match[1]}{int(match[2]):,}{match[3] or ''}".replace(",", "\u2009") if match else text
 
 
+def regrouped(text: str) -> str:
+    """A text of the command line, its numbers grouped as those of pictures are.
+
+    Examples
+    --------
+    >>> regrouped("1,234,567 rays at (0,5), 12,5") == "1\u2009234\u2009567 rays at (0,5), 12,5"
+    True
+    """
+    return re.sub(r"(?<=\d),(?=\d{3}\b)", "\u2009", text)
+
+
 def plain(number: float) -> str:
     """A number to four digits, in powers of ten only if it is very small or very large."""
     if not math.isfinite(number):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from etendue.formats.rays import RAY_FORMATS
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress
 
@@ -131,13 +132,14 @@ def _range(pair: list[float] | None, unit: str) -> str:
     if pair is None:
         return "none"
     low, high = pair
-    return f"{low:.4g} {unit} each" if low == high else f"{low:.4g} to {high:.4g} {unit}"
+    return f"{counted(low, unit)} each" if low == high else f"{counted(low, unit)} to {counted(high, unit)}"
 
 
 def _box(bounds: list[list[float]] | None) -> str:
     if bounds is None:
         return "none (far-field data)"
-    return ", ".join(f"{axis} {low:.5g} to {high:.5g}" for axis, (low, high) in zip("xyz", bounds, strict=True)) + " mm"
+    sides = [f"{low:.5g}" if low == high else f"{low:.5g} to {high:.5g}" for low, high in bounds]
+    return ", ".join(f"{axis} {side}" for axis, side in zip("xyz", sides, strict=True)) + " mm"
 
 
 def _point(point: list[float] | None, unit: str) -> str | None:
