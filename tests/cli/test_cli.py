@@ -234,7 +234,10 @@ def test_wrong_usage_ends_with_status_2(run: Run, folder: Path, arguments: list[
             "acceptance is 0",
         ),
         (["luminance", "{}/nonsense.ray", "--observer", "0,0", "--size", "1,1", "-o", "a.npz"], "nonsense.ray"),
-        (["filter", "{}/led.tm25ray", "--kind", "average", "-o", "b.npz"], "this is a ray file (IES TM-25 ray file), no map"),
+        (
+            ["filter", "{}/led.tm25ray", "--kind", "average", "-o", "b.npz"],
+            "this is a ray file (IES TM-25 ray file), no map",
+        ),
         (["compare", "{}/nothere.npz", "{}/nothere.npz"], "No such file"),
         (["demo", "--seed", "-1", "-o", "d.png"], "seed -1"),
         (["demo", "-o", "d.exe"], ".png"),

@@ -95,7 +95,7 @@ def test_fit_for_people_says_the_same_and_info_says_it_again(run: Run, folder: P
     report = field.report
     assert report.unmet_rays > 0
     pieces = [
-        f"{field.total_flux:.7g} lm",
+        f"{field.total_flux:.4g} lm",
         f"{report.rays - report.unmet_rays:,}; {report.unmet_rays:,} more (",
         "disk:radius=9,z=0,centre=1/0",
         "8 × 8 × 4 × 4 cells",
@@ -212,7 +212,7 @@ def test_sample_draws_the_rays_of_the_api(run: Run, folder: Path, name: str) -> 
     assert facts["total_flux"] == field.total_flux
     assert facts["outputs"] == ["a.tm25ray", "a.csv"]
     other = run("sample", folder / name, "-n", 5000, "-o", "b.tm25ray", "--seed", 4)
-    assert other.out == f"b.tm25ray: 5,000 rays, {field.total_flux:.7g} {field.flux_unit}\n"
+    assert other.out == f"b.tm25ray: 5,000 rays, {field.total_flux:.4g} {field.flux_unit}\n"
     assert (et.read_rays("b.tm25ray").position != et.read_rays("a.tm25ray").position).any()
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import etendue as et
 import pytest
+from etendue.quantities.measured import measured
 
 from cli.outcome import Run
 
@@ -43,7 +44,8 @@ def test_a_scene_is_measured_and_becomes_rays_a_table_a_picture_and_a_file(run: 
     )
     assert again.status == 0, again.err
     assert "note: rays start on box:" in again.err
-    assert f"total flux {facts['total_flux']:.6g}" in again.out
+    total = measured(facts["total_flux"], facts["total_flux_error"], facts["flux_unit"])
+    assert f"total flux {total} by the photometer" in again.out
     assert len(et.read_rays("lamp.ray")) == 1000
 
 

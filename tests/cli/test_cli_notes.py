@@ -16,6 +16,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.cli.verbs import VERBS
+from etendue.cli.wording import in_options
 from etendue.goniophotometry.far_field import intensity_distribution
 from etendue.lightfield.fit_cache import FOLDER_VARIABLE
 from etendue.lightfield.gridded.gridded_source import GriddedSource
@@ -404,7 +405,7 @@ def test_what_python_knows_is_printed(
         assert notes, f"{arguments}: an input that gives no notes shows nothing"
         plain = run(*arguments)
         assert plain.status == 0, plain.err
-        missing = [note for note in notes if printable(note) not in plain.out + plain.err]
+        missing = [note for note in notes if in_options(printable(note)) not in plain.out + plain.err]
         assert not missing, f"{arguments} does not print {missing}"
         document = run(*arguments, "--json")
         assert document.status == 0, document.err

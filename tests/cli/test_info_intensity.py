@@ -10,6 +10,7 @@ from pathlib import Path
 import etendue as et
 import pytest
 from etendue.cli import main
+from etendue.quantities.powers_of_ten import rounded
 from oracles.intensity import lid
 from oracles.luminaire_files import archive, emitter, gldf_of, product, tm33
 
@@ -32,7 +33,7 @@ def test_intensity_files(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
         return capsys.readouterr().out
 
     out = run("a.ies", "b.gldf", "c.xml")
-    assert out.count(f"flux {led.flux:.6g} lm, symmetry none") == 2
+    assert out.count(f"flux {rounded(led.flux)} lm, symmetry none") == 2
     assert "photometry p of the container" in out
     assert "there are 2 of this emitter" in out
     facts = json.loads(run("--json", "a.ies", "c.xml"))

@@ -162,7 +162,10 @@ def test_an_origin_is_not_applied(read: Read) -> None:
     rays = read(lt_data_origin="   1  0 -2.5 ")
     assert rays.position[0].tolist() == [1.5, -2, 3]
     assert found_in(rays) == [
-        ("line 9", "data origin [1.0, 0.0, -2.5] is not 0; positions are left as stored (in Python, RaySet.moved shifts them)")
+        (
+            "line 9",
+            "data origin [1.0, 0.0, -2.5] is not 0; positions are left as stored (in Python, RaySet.moved shifts them)",
+        )
     ]
     assert "no position" in found_in(read(lt_data_origin="here"))[0][1]
 

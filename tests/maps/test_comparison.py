@@ -149,7 +149,7 @@ def test_ncc_of_a_constant_map_is_undefined_not_wrong(swap: bool) -> None:
     result = compare(*(pair[::-1] if swap else pair))
     assert math.isnan(result.ncc)
     assert result.notes == ("NCC is undefined: a map is constant over the pixels compared",)
-    assert "nan" in result.summary()
+    assert "NCC undefined" in result.summary()
 
 
 def test_black_maps_are_told_about() -> None:
@@ -191,7 +191,7 @@ def test_a_region_without_pixels_says_where_the_screen_is() -> None:
 
 @pytest.mark.parametrize("limits", [(1, 1, 0, 1), (0, 1, 2, 1), (0, 1, 0, NAN), (-math.inf, 1, 0, 1)])
 def test_regions_that_are_none_are_refused(limits: tuple[float, float, float, float]) -> None:
-    with pytest.raises(ArgumentError, match="region .*in mm"):
+    with pytest.raises(ArgumentError, match=r"region .*in mm"):
         Region(*limits)
 
 

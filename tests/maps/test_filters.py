@@ -213,7 +213,7 @@ def test_flux_before_and_after_is_told(name: str) -> None:
     label = f"{name} 3×3" + (", γ = 0.2" if "selective" in name else "")
     change = f"{100 * (filtered.intensity / lmap.intensity - 1):+.2f} %".replace("-", "−")
     assert filtered.notes[0] == "first"
-    assert filtered.notes[1] == f"{label}: intensity {lmap.intensity:.5g} → {filtered.intensity:.5g} cd ({change})"
+    assert filtered.notes[1] == f"{label}: intensity {lmap.intensity:.4g} → {filtered.intensity:.4g} cd ({change})"
     assert filtered.provenance.steps == (*lmap.provenance.steps, f"filter {label}")
 
 

@@ -115,7 +115,7 @@ def test_the_account_of_a_trace_is_a_table() -> None:
     texts = Reader(result._repr_html_()).texts
     for _, name, entry in result.ledger.rows():
         at = next(i for i, text in enumerate(texts) if text.strip("\u2003") == name.replace("\x1b", "\\x1b"))
-        assert texts[at + 1].startswith(f"{entry.flux:.6g} lm")
+        assert texts[at + 1].startswith(f"{entry.flux:.4g} lm")
 
 
 def test_large_ray_sets_are_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,7 +29,7 @@ def print_bodies(bodies: list[StepBody]) -> None:
     """A line for each body."""
     for facts in describe_bodies(bodies)["bodies"]:
         size = " × ".join(f"{side:.5g}" for side in facts["size"])
-        inside = f"volume {facts['volume']:.5g} mm³" if facts["closed"] else "open"
+        inside = f"volume {facts['volume']:.4g} mm³" if facts["closed"] else "open"
         error = f"chord error {facts['chord_error']:.2g} mm" if facts["chord_error"] else "all faces plane"
         say(f"  {facts['name']:<22} {size} mm, {inside}, {facts['triangles']:,} triangles, {error}")
     if len(bodies) > 1:

@@ -12,6 +12,7 @@ from etendue.cli.options import ray_format
 from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, progress_bar, say
 from etendue.formats.rays import read_rays, write_rays
 from etendue.lightfield.light_field import LightField
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.units import FLUX_UNITS, FluxUnit
 
@@ -67,7 +68,7 @@ def convert(
         return
     for line in (*complaints, *(f"note: {note}" for note in notes)):
         complain(line)
-    say(f"{output}: {len(rays):,} rays, {rays.total_flux:.7g} {rays.flux_unit}")
+    say(f"{output}: {len(rays):,} rays, {counted(rays.total_flux, rays.flux_unit)}")
 
 
 def _unit(stated: str | None, fluxes: list[str | None], sets: list[RaySet]) -> FluxUnit | None:
@@ -88,7 +89,7 @@ def _changes(old: RaySet, new: RaySet) -> list[str]:
     steps = new.provenance.steps[len(old.provenance.steps) :]
     if not steps:
         return []
-    told = f"{old.total_flux:.6g} {old.flux_unit} became {new.total_flux:.6g} {new.flux_unit}"
+    told = f"{counted(old.total_flux, old.flux_unit)} became {counted(new.total_flux, new.flux_unit)}"
     return [f"{old.provenance.source}: {told}: {'; '.join(steps)}"]
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from etendue.cli.terminal import check_outputs, complain, one_of, print_json, say
+from etendue.cli.terminal import check_outputs, complain, half_width, one_of, print_json, say
 from etendue.errors import ArgumentError
 from etendue.instruments.bench import Bench
 from etendue.instruments.deconvolution import REPLICATES, Deconvolution, Method
@@ -25,6 +25,7 @@ from etendue.instruments.operators import OperatorName
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.stopping import RULES
 from etendue.plot import plot_deconvolution, plot_directions
+from etendue.quantities.powers_of_ten import rounded
 
 METHODS = sorted({*get_args(Method), *get_args(DirectionalMethod)})
 
@@ -192,9 +193,9 @@ def _tell(found: Deconvolution, scan: Path, outputs: list[Path], *, json: bool) 
     before, after = found.total_scatter
     told = "" if error is None else f" ± {error:.2g}"
     say(f"stop after {found.iterations} iterations, {found.stop}" if found.iterations else found.stop)
-    say(f"peak {found.raw.max():.5g} as measured, {found.peak:.5g}{told} without the instrument")
-    say(f"full width at half maximum {found.fwhm:.3f}°, middle at {found.middle:.3f}°")
-    say(f"total scatter {before:.6g} before, {after:.6g} after")
+    say(f"peak {rounded(float(found.raw.max()))} as measured, {rounded(found.peak)}{told} without the instrument")
+    say(f"{half_width(found.fwhm)}, middle at {found.middle:.3f}°")
+    say(f"total scatter {before:.4g} before, {after:.4g} after")
     for path in outputs:
         say(f"{path}: written")
 
@@ -229,11 +230,11 @@ def _tell_directions(found: DirectionalDeconvolution, scan: Path, outputs: list[
         say(f"stop after {found.iterations} iterations, {found.stop}")
     else:
         say(found.stop)
-    say(f"peak {raw:.5g} as measured, {found.peak:.5g}{told} without the instrument")
+    say(f"peak {rounded(raw)} as measured, {rounded(found.peak)}{told} without the instrument")
     say(
         f"in a single direction {found.regular.share:.4g} ± {found.regular.error:.1g} of the light; {found.regular.why}"
     )
-    say(f"flux of all positions {before:.6g} before, {after:.6g} after")
+    say(f"flux of all positions {before:.4g} before, {after:.4g} after")
     if found.model is not None:
         for part in found.model.bsdf.parts:
             say(f"  {part!r}")

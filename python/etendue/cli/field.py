@@ -14,6 +14,7 @@ from etendue.formats.rays import read_rays
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import is_field_file
 from etendue.lightfield.surfaces import Surface, parse_surface
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
@@ -90,7 +91,7 @@ def print_field(field: LightField) -> None:
     ahead = report.score - report.histogram_score
     rows = [
         ("surface", field.surface.spec),
-        ("flux", f"{field.total_flux:.7g} {field.flux_unit}"),
+        ("flux", counted(field.total_flux, field.flux_unit)),
         ("spectrum", spectrum_text(field.spectrum)),
         *([] if report.symmetry == "none" else [("symmetry", report.symmetry)]),
         ("rays", f"{report.rays - report.unmet_rays:,}{unmet}"),

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, say
+from etendue.cli.terminal import check_folder, complain, count, half_width, one_of, print_json, say
 from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.goniometer_scan import Way
 from etendue.instruments.positions import Plane
 from etendue.instruments.samples import read_sample
 from etendue.instruments.scatter_goniometer import BARE_STEP, SPAN, STEP, Method, ScatterGoniometer
+from etendue.quantities.powers_of_ten import counted
 
 COLLIMATED = 0.0
 
@@ -189,9 +190,9 @@ def goniometer(
         f"{scan.angle.size} positions from {scan.angle[0]:g}° to {scan.angle[-1]:g}°, Ω = {instrument.solid_angle:.4g} sr"
     )
     if sample is None:
-        say(f"instrument function: full width at half maximum {scan.fwhm:.3f}°")
+        say(f"instrument function: {half_width(scan.fwhm)}")
     else:
-        say(f"peak {scan.bsdf.max():.5g} 1/sr, full width at half maximum {scan.fwhm:.3f}°")
+        say(f"peak {counted(float(scan.bsdf.max()), '1/sr')}, {half_width(scan.fwhm)}")
         say(f"total scatter {scan.total_scatter:.4f}, if the lobe is round and the scan reaches its end")
     if output is not None:
         say(f"{output}: written")
@@ -216,6 +217,6 @@ def _tell_directions(scan: DirectionalScan, sample: Path | None, output: Path | 
     say(
         f"{scan.flux.size} positions in two dimensions, {scan.way} at {scan.incidence:g}°, Ω = {scan.solid_angle:.4g} sr"
     )
-    say(f"peak {peak:.5g} 1/sr")
+    say(f"peak {counted(peak, '1/sr')}")
     if output is not None:
         say(f"{output}: written")

@@ -18,6 +18,7 @@ from etendue.instruments.near_field.run import NearFieldRun
 from etendue.instruments.near_field.storage import is_run_file
 from etendue.lightfield.surfaces import Surface, parse_surface
 from etendue.plot import plot_near_field
+from etendue.quantities.measured import measured
 
 RUN_EXTENSIONS = (".h5", ".hdf5")
 CLOSEST = "closest"
@@ -251,8 +252,7 @@ def _tell(run: NearFieldRun) -> None:
         f"{len(setting.positions):,} positions {setting.distance:g} mm from the centre, images of "
         f"{setting.field_of_view:g} mm, pixels of {pixel:.3g} mm"
     )
-    error = f" ± {run.total_flux_error:.1g}" if run.total_flux_error else ""
-    say(f"total flux {run.total_flux:.6g}{error} {run.flux_unit} by the photometer")
+    say(f"total flux {measured(run.total_flux, run.total_flux_error, run.flux_unit)} by the photometer")
     say(
         f"{run.lit_pixels:,} lit pixels; dynamic range {setting.camera.dynamic_range:,.0f} : 1; the images put "
         f"{run.disagreement:.2%} of the flux elsewhere than the photometer"

@@ -100,7 +100,8 @@ def luminance(
         typer.Option(
             "--orbit",
             help="Go around: so many observers at the θ of --observer, from its φ on in even steps over 360°, "
-            "+Z upright unless --up says what is. For moving pictures (.gif, .mp4, .html), on one scale; or a file each with {phi}.",
+            "+Z upright unless --up says what is. For moving pictures (.gif, .mp4, .html), on one scale; "
+            "or a file each with {phi}.",
             metavar="NUMBER",
             show_default=False,
         ),

@@ -9,6 +9,7 @@ from etendue.cli.luminance import print_map, summary
 from etendue.cli.terminal import say
 from etendue.formats.maps.map_format import AnyMap
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.powers_of_ten import counted
 
 
 def describe_map(found: AnyMap) -> dict[str, Any]:
@@ -43,7 +44,8 @@ def print_map_file(found: AnyMap) -> None:
     x, y, z = found.centre
     say(f"{found.quantity} around ({x:g}, {y:g}, {z:g}) mm")
     say(
-        f"  mean {found.mean:.6g} {found.unit}, least/mean {found.uniformity:.3f}, flux {found.flux:.6g} {found.flux_unit}"
+        f"  mean {counted(found.mean, found.unit)}, least/mean {found.uniformity:.3f}, "
+        f"flux {counted(found.flux, found.flux_unit)}"
     )
     if found.relative_error is not None:
         say(f"  {found.relative_error.sentence(found.quantity)}")

@@ -14,6 +14,7 @@ from etendue.formats.patch_folder import is_patch_folder
 from etendue.formats.rays import RAY_FORMATS, write_rays
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_stream import RayStream
 
 
@@ -58,7 +59,7 @@ def sample(
     for note in (*source.notes, *losses):
         complain(f"note: {note}")
     for path in output:
-        say(f"{path}: {rays:,} rays, {stream.total_flux:.7g} {stream.flux_unit}")
+        say(f"{path}: {rays:,} rays, {counted(stream.total_flux, stream.flux_unit)}")
 
 
 def _check_extension(path: Path) -> None:

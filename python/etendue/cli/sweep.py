@@ -29,6 +29,7 @@ from etendue.luminance.regions import parse_region
 from etendue.plot.sweep_picture import plot_sweep
 from etendue.quantities.measured import measured
 from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.powers_of_ten import counted
 from etendue.scene import Scene
 from etendue.sweeps.measures import NOUNS
 from etendue.sweeps.parameter import parse_setting
@@ -220,4 +221,4 @@ def _say_best(table: SweepTable) -> None:
             place = ", ".join(
                 f"{path} = {value:g} {table.unit(path)}".rstrip() for path, value in table.best(name).items()
             )
-            say(f"  largest {name}: {known.max():.5g} {table.unit(name)} at {place}")
+            say(f"  largest {name}: {counted(float(known.max()), table.unit(name))} at {place}")

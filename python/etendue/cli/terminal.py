@@ -143,6 +143,17 @@ def _plain(data: Any) -> Any:
     return str(data)
 
 
+def half_width(degrees: float) -> str:
+    """The full width of a lobe at half of its maximum, if the scan reaches that.
+
+    Examples
+    --------
+    >>> half_width(1.5284), half_width(math.nan)
+    ('full width at half maximum 1.528°', 'full width at half maximum beyond the scan')
+    """
+    return f"full width at half maximum {f'{degrees:.3f}°' if math.isfinite(degrees) else 'beyond the scan'}"
+
+
 @contextlib.contextmanager
 def progress_bar(title: str, total: int) -> Iterator[ProgressFunction | None]:
     """A bar over `total` rays while the block runs; nothing when standard error is no terminal."""

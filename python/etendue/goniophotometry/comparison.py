@@ -57,7 +57,7 @@ class IntensityComparison:
             f"over {self.nodes:,} nodes: NCC {100 * self.ncc:.3f} %, NRMSE {100 * self.nrmse:.3f} % "
             f"(true RMSE / max of the reference), {100 * self.nrmse_thesis:.3f} % (eq. 3.6)\n"
             f"over the sphere: NCC {100 * self.ncc_sphere:.3f} %, NRMSE {100 * self.nrmse_sphere:.3f} %, "
-            f"flux ratio {self.flux_ratio:.5g}"
+            f"flux ratio {self.flux_ratio:.4g}"
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -92,7 +92,7 @@ class Deconvolution:
         """Peak, width and stop."""
         rule = self.stop.partition(":")[0]
         return (
-            f"Deconvolution(peak={self.peak:.5g}, fwhm={self.fwhm:.4g}°, iterations={self.iterations}, stop={rule!r})"
+            f"Deconvolution(peak={self.peak:.4g}, fwhm={self.fwhm:.4g}°, iterations={self.iterations}, stop={rule!r})"
         )
 
     @property

@@ -107,7 +107,7 @@ class DirectionalDeconvolution:
 
     def __repr__(self) -> str:
         """Peak, and how it was found."""
-        what = f"peak={self.peak:.5g}, regular={self.regular.share:.4g}"
+        what = f"peak={self.peak:.4g}, regular={self.regular.share:.4g}"
         return f"DirectionalDeconvolution({what}, method={self.method!r}, iterations={self.iterations})"
 
     @property

@@ -16,6 +16,7 @@ from etendue.lightfield.storage import load_field, save_field
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.notebook import InNotebook
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream
 
@@ -53,7 +54,7 @@ class LightField(EtendueDensity, InNotebook):
 
     def __repr__(self) -> str:
         """Surface, rays that it rests on, flux and origin."""
-        rests = f"{self.report.rays:,} rays, {self.total_flux:.6g} {self.flux_unit}"
+        rests = f"{self.report.rays:,} rays, {counted(self.total_flux, self.flux_unit)}"
         return f"<LightField on {self.surface.told} of {rests} from {self.provenance.source}>"
 
     def __reduce__(self) -> tuple[Any, ...]:

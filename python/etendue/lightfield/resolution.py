@@ -13,6 +13,7 @@ from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.lightfield.marginals import marginals
 from etendue.lightfield.nodes import node_values
+from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.ray_stream import checked_threads
 
 PITCHES = tuple(2.13 * 2.0 ** (k / 2.0) for k in range(13))
@@ -66,10 +67,9 @@ class Resolution:
         more = dict.fromkeys(
             {"rays": "more rays", "cells": "finer cells"}[k] for k in (self.place_limit, self.direction_limit)
         )
-        shared = (
-            f"{self.place:.2g} mm and {self.direction:.2g}° at half contrast ({', '.join(more)} would resolve more)"
-        )
-        return f"{shared}; {self.cell_place:.2g} mm × {self.cell_direction:.2g}° for what changes with both"
+        wanted = f"{', '.join(more)} would resolve more"
+        shared = f"{rounded(self.place, 2)} mm and {rounded(self.direction, 2)}° at half contrast ({wanted})"
+        return f"{shared}; {rounded(self.cell_place, 2)} mm × {rounded(self.cell_direction, 2)}° for what changes with both"
 
 
 def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = None) -> Resolution:

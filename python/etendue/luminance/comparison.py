@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterator
 from typing import Any, Literal, get_args
 
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
+from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.printable import printable
 from etendue.units import MM2_PER_M2
 
@@ -112,7 +114,7 @@ class MapStatistics:
     def summary(self, unit: str) -> str:
         """The figures in one line of text, luminances in `unit`."""
         return (
-            f"mean {self.mean:.5g}, max {self.maximum:.5g}, min {self.minimum:.5g} {unit}, "
+            f"mean {rounded(self.mean)}, max {rounded(self.maximum)}, min {rounded(self.minimum)} {unit}, "
             f"uniformity {self.uniformity:.3g}, dead pixels {self.dead_pixels}"
         )
 
@@ -215,11 +217,12 @@ class Comparison:
         )
         significance = (
             f"reduced χ² {self.reduced_chi_square:.4g} over {self.chi_square_pixels} pixels, "
-            f"intensity ratio {self.intensity_ratio:.5g}, median difference {self.median_difference:.3g} %"
+            f"intensity ratio {self.intensity_ratio:.4g}, median difference {self.median_difference:.3g} %"
         )
         maps = (("test", self.test_statistics), ("reference", self.reference_statistics))
         figures = (f"{name}: {statistics.summary(self.reference.unit)}" for name, statistics in maps)
-        return "\n".join((agreement, significance, *figures, *(f"note: {printable(note)}" for note in self.notes)))
+        told = re.sub(r"\bnan( %)?", "undefined", "\n".join((agreement, significance, *figures)))
+        return "\n".join((told, *(f"note: {printable(note)}" for note in self.notes)))
 
     def to_dict(self) -> dict[str, Any]:
         """Every number as plain data for JSON (undefined numbers are None): all but the maps and the image."""

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.powers_of_ten import counted, rounded
 
 Array = npt.NDArray[np.float64]
 Counts = npt.NDArray[np.int64]
@@ -111,7 +112,7 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     >>> smooth.values.round(2).tolist()
     [[105.33, 105.33, 510.0], [99.0, nan, 510.0]]
     >>> smooth.notes[0]
-    'selective 3×3, γ = 0.2: intensity 0.001336 → 0.0013297 cd (−0.47 %); dead pixels 1 → 1'
+    'selective 3×3, γ = 0.2: intensity 0.001336 → 0.00133 cd (−0.47 %); dead pixels 1 → 1'
     """
     if kind not in FILTERS:
         raise UnknownNameError("filter", kind, FILTERS)
@@ -303,6 +304,6 @@ def _report(before: LuminanceMap, after: LuminanceMap, label: str, kind: FilterK
     old, new = before.intensity, after.intensity
     change = f" ({100.0 * (new - old) / old:+.2f} %)".replace("-", "−") if old else ""
     dead = f"; dead pixels {before.dead_pixels} → {after.dead_pixels}" if before.dead_pixels else ""
-    yield f"{label}: intensity {old:.5g} → {new:.5g} {unit}{change}{dead}"
+    yield f"{label}: intensity {rounded(old)} → {counted(new, unit)}{change}{dead}"
     if kind.selective:
         yield f"{label}: standard errors are optimistic, because the noise itself selected the pixels that are averaged"

@@ -24,6 +24,7 @@ from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.measured import measured
 from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress
 
@@ -89,7 +90,7 @@ class SourceReport:
     @property
     def subtitle(self) -> str:
         """What the report is, in a line."""
-        return f"report of a light source, {self.diagnostics.flux:.5g} {self.diagnostics.flux_unit}"
+        return f"report of a light source, {counted(self.diagnostics.flux, self.diagnostics.flux_unit)}"
 
     @property
     def quality_lines(self) -> list[str]:

@@ -98,7 +98,7 @@ def plot_deconvolution(
     figure = style.new_figure(WIDTH, HEIGHT)
     _draw([style.add_axes(figure, LEFT + k * (PANEL + GAP), BOTTOM, PANEL, TALL) for k in range(3)], found)
     before, after = found.total_scatter
-    facts = [found.stop, f"total scatter {before:.6g} before, {after:.6g} after", f"operator: {found.operator}"]
+    facts = [found.stop, f"total scatter {before:.4g} before, {after:.4g} after", f"operator: {found.operator}"]
     for k, line in enumerate(style.wrapped(facts, WIDTH - 2 * LEFT)):
         style.add_text(figure, LEFT, 0.34 - 0.15 * k, line, size=style.CAPTION_SIZE, color=style.FAINT)
     if title:

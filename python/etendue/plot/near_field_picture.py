@@ -12,6 +12,7 @@ import numpy.typing as npt
 from etendue.plot import style
 from etendue.plot.colour_scale import colour_map
 from etendue.plot.map_picture import axis_names, bar_beside, draw_colour_bar, draw_screen
+from etendue.quantities.powers_of_ten import counted
 from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def plot_near_field(
         f"{style.grouped(str(len(setting.positions)))} positions at {style.plain(setting.distance)} mm",
         f"{exposures} exposure{'s' * (exposures != 1)} of {setting.camera.bits} bits",
         f"dynamic range {style.grouped(f'{setting.camera.dynamic_range:.0f}')} : 1",
-        f"total flux {run.total_flux:.5g} {run.flux_unit}",
+        f"total flux {counted(run.total_flux, run.flux_unit)}",
         f"{style.percent(100.0 * run.disagreement)} of it elsewhere than by the photometer",
     ]
     for k, line in enumerate(style.wrapped(facts, WIDTH - 2 * LEFT)):

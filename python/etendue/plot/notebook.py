@@ -25,6 +25,7 @@ from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.pixel_map import PixelMap
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.printable import printable
 from etendue.quantities.ray_set import RaySet
 from etendue.scene import Scene
@@ -90,7 +91,7 @@ def _(value: LightField) -> Iterator[str]:
     yield _table(
         [
             ("surface", str(value.surface.spec)),
-            ("flux", f"{value.total_flux:.6g} {value.flux_unit}"),
+            ("flux", counted(value.total_flux, value.flux_unit)),
             ("rays", f"{report.rays - report.unmet_rays:,}"),
             ("held-out score", f"{report.score:.4f} ± {report.score_error:.4f} nat per ray"),
         ]
@@ -130,8 +131,8 @@ def _(value: TraceResult) -> Iterator[str]:
     rows = [
         (
             f"{'&emsp;' * depth}{_text(name)}",
-            f"{entry.flux:.6g} {ledger.flux_unit}",
-            f"{entry.flux / total:.4%}",
+            counted(entry.flux, ledger.flux_unit),
+            f"{entry.flux / total:.2%}",
             f"{entry.rays:,}",
         )
         for depth, name, entry in ledger.rows()
@@ -168,9 +169,9 @@ def _seen(field: LightField) -> LuminanceMap:
 def _ray_facts(rays: RaySet) -> Iterator[Row]:
     yield "rays", f"{len(rays):,}"
     if len(rays) <= QUICK_RAYS:
-        yield "flux", f"{rays.total_flux:.6g} {rays.flux_unit}"
+        yield "flux", counted(rays.total_flux, rays.flux_unit)
     elif isinstance(stated := rays.header.get("total_flux"), float):
-        yield "flux stated by the file", f"{stated:.6g} {rays.flux_unit}"
+        yield "flux stated by the file", counted(stated, rays.flux_unit)
     if len(rays) <= QUICK_RAYS and rays.has_position:
         low, high = rays.position.min(axis=0), rays.position.max(axis=0)
         for axis, first, last in zip("xyz", low, high, strict=True):

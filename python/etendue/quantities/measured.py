@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
 
 def measured(value: float, error: float, unit: str) -> str:
-    """A value to the digits that its standard error leaves, two of the error's; to six digits if there is none.
+    """A value to the digits that its standard error leaves, two of the error's; to four digits if there is none.
 
     Both are counted in the same power of ten, which is named if the value is very small or very large.
 
     Examples
     --------
     >>> measured(91.9955, 0.02714, "lm"), measured(45812.3, 1471.3, "cd"), measured(12.3456789, math.nan, "lm")
-    ('91.996 ± 0.027 lm', '45800 ± 1500 cd', '12.3457 lm')
+    ('91.996 ± 0.027 lm', '45800 ± 1500 cd', '12.35 lm')
     >>> measured(18.31e6, 2.1e6, "cd/m²"), measured(18.31e6, math.nan, "cd/m²")
     ('(18.3 ± 2.1) × 10⁶ cd/m²', '18.31 × 10⁶ cd/m²')
     """
     if not (math.isfinite(error) and error > 0.0 and math.isfinite(value)):
-        return counted(value, unit, 6)
+        return counted(value, unit)
     if power := common_power(value, error):
         return f"({measured(value / 10.0**power, error / 10.0**power, '').rstrip()}) × {ten_to(power)} {unit}"
     digits = 1 - math.floor(math.log10(error))

@@ -30,6 +30,18 @@ def common_power(low: float, high: float) -> int:
     return 0 if size == 0.0 or not math.isfinite(size) or 1e-3 <= size < 1e7 else 3 * math.floor(math.log10(size) / 3.0)
 
 
+def rounded(value: float, digits: int = 4) -> str:
+    """A number to so many digits, without a power of ten unless it is very small or very large.
+
+    Examples
+    --------
+    >>> rounded(12345.678), rounded(0.021834567), rounded(500.0)
+    ('12350', '0.02183', '500')
+    """
+    text = f"{value:.{digits}g}"
+    return text if common_power(value, value) or not math.isfinite(value) else f"{float(text):.12g}"
+
+
 def counted(value: float, unit: str, digits: int = 4) -> str:
     """A number to so many digits with its unit, in a power of ten only if it is very small or very large.
 
@@ -39,4 +51,4 @@ def counted(value: float, unit: str, digits: int = 4) -> str:
     ('18.31 × 10⁶ cd/m²', '0.25 lm', '420 × 10⁻⁹ cd')
     """
     power = common_power(value, value)
-    return f"{value / 10.0**power:.{digits}g} × {ten_to(power)} {unit}" if power else f"{value:.{digits}g} {unit}"
+    return f"{value / 10.0**power:.{digits}g} × {ten_to(power)} {unit}" if power else f"{rounded(value, digits)} {unit}"

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.printable import printable
 from etendue.units import FluxUnit
 
@@ -77,11 +78,11 @@ class Ledger:
     >>> ledger.closes, ledger.absorbed.flux
     (True, 2.5)
     >>> print(ledger.table())
-    emitted         10 lm  100.0000%         4 rays
-      led           10 lm  100.0000%         4 rays
-    escaped        7.5 lm   75.0000%         3 rays
-    absorbed       2.5 lm   25.0000%         1 rays
-      wall         2.5 lm   25.0000%         1 rays
+    emitted         10 lm  100.00%         4 rays
+      led           10 lm  100.00%         4 rays
+    escaped        7.5 lm   75.00%         3 rays
+    absorbed       2.5 lm   25.00%         1 rays
+      wall         2.5 lm   25.00%         1 rays
     """
 
     flux_unit: FluxUnit
@@ -150,7 +151,7 @@ class Ledger:
         rows = [("  " * depth + printable(name), entry) for depth, name, entry in self.rows()]
         width = max(len(name) for name, _ in rows)
         return "\n".join(
-            f"{name:<{width}}  {entry.flux:>8.6g} {self.flux_unit}  {entry.flux / total:>9.4%}  {entry.rays:>8,} rays"
+            f"{name:<{width}}  {rounded(entry.flux):>8} {self.flux_unit}  {entry.flux / total:>7.2%}  {entry.rays:>8,} rays"
             for name, entry in rows
         )
 

@@ -112,7 +112,7 @@ class TraceResult(InNotebook):
         notes = [*self.plan.notes, *self._copies_told(), *self.ledger.notes()]
         if not self.complete:
             notes.append(
-                f"{self.rays_done:,} of {self.rays_asked:,} rays were traced; every flux is scaled by {self.scale:.6g}"
+                f"{self.rays_done:,} of {self.rays_asked:,} rays were traced; every flux is scaled by {self.scale:.4g}"
             )
         return tuple(notes)
 

@@ -13,6 +13,7 @@ from etendue.lightfield.light_field import LightField
 from etendue.luminance.framing import centre_of_light, framed, probe
 from etendue.quantities.observer import Observer
 from etendue.quantities.pixel_map import PixelMap
+from etendue.quantities.powers_of_ten import counted
 from etendue.units import LUMINANCE_UNIT
 from etendue.viewer.field_tables import FieldTables
 
@@ -184,4 +185,4 @@ def _facts(field: LightField) -> str:
     report = field.report
     unmet = report.unmet_flux / (report.unmet_flux + field.total_flux) if field.total_flux > 0 else 0.0
     left = f", {unmet:.2%} of the flux not met" if math.isfinite(unmet) and unmet > 0.001 else ""
-    return f"{field.total_flux:.5g} {field.flux_unit} · {report.rays:,} rays on {field.surface.NAME}{left}"
+    return f"{counted(field.total_flux, field.flux_unit)} · {report.rays:,} rays on {field.surface.NAME}{left}"

@@ -18,6 +18,7 @@ from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
 from etendue.lightfield.gridded.pixels import Array, Cells, Indices
 from etendue.quantities.patches import AngularGrid, Patches
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, RayBatch, RayStream
 from etendue.units import FluxUnit
@@ -64,7 +65,7 @@ class Account:
         ):
             if rays:
                 share = flux / self.flux if self.flux > 0 else 0.0
-                found.append(f"{rays:,} of {self.rays:,} rays ({flux:.6g} {unit}, {share:.3%}) {why}: left out")
+                found.append(f"{rays:,} of {self.rays:,} rays ({counted(flux, unit)}, {share:.3%}) {why}: left out")
         return found
 
 

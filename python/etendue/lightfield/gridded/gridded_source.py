@@ -25,6 +25,7 @@ from etendue.lightfield.pilot_sample import check_near_field
 from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.patches import Patches
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream
@@ -91,7 +92,7 @@ class GriddedSource:
 
     def __repr__(self) -> str:
         """Surface, patches and flux."""
-        flux = f"{self.total_flux:.6g} {self.patches.flux_unit}"
+        flux = counted(self.total_flux, self.patches.flux_unit)
         return f"<GriddedSource of {len(self.patches):,} patches on {self.surface.surface.told}, {flux}>"
 
     @classmethod
@@ -249,15 +250,14 @@ class GriddedSource:
     @property
     def flux_note(self) -> str:
         """The flux of the rays, of the tables and of what is made of them, with the factor between."""
-        unit, given = self.flux_unit, f"{self.emitted_flux:.7g} {self.flux_unit}"
+        unit, given = self.flux_unit, counted(self.emitted_flux, self.flux_unit)
         share = f"{self.table_flux / self.total_flux - 1:+.3%}".replace("-", "−")
-        found = (
-            f"the rays on patches have {self.total_flux:.7g} {unit}, the tables {self.table_flux:.7g} {unit} ({share})"
-        )
+        rays, tables = counted(self.total_flux, unit), counted(self.table_flux, unit)
+        found = f"the rays on patches have {rays}, the tables {tables} ({share})"
         if self.factor == 1.0:
             return f"{found}; the light is as the tables have it"
         stated = "" if self.stated_flux is None else " as stated"
-        return f"{found}; all light is theirs multiplied by {self.factor:.7g}, to {given}{stated}"
+        return f"{found}; all light is theirs multiplied by {self.factor:.4g}, to {given}{stated}"
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from etendue.description.files import Files
 from etendue.description.values import Length, Pixels
 from etendue.quantities.illuminance_map import IlluminanceMap, Point
 from etendue.quantities.observer import Screen
+from etendue.quantities.powers_of_ten import counted
 from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
@@ -64,7 +65,7 @@ class GridIlluminance(Detection[IlluminanceMap]):
 
     def summary(self, quantity: IlluminanceMap) -> str:
         """Mean and uniformity."""
-        return f"mean {quantity.mean:.6g} {quantity.unit}, least/mean {quantity.uniformity:.3f}"
+        return f"mean {counted(quantity.mean, quantity.unit)}, least/mean {quantity.uniformity:.3f}"
 
 
 class Illuminance(Detector, Placement):

@@ -10,6 +10,7 @@ from etendue.description.files import Files
 from etendue.errors import UnknownNameError
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
+from etendue.quantities.powers_of_ten import counted
 from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
 from etendue.scene.observers import ObserverKeys
 from etendue.units import MM2_PER_M2
@@ -62,7 +63,7 @@ class DiffuseLuminance(Detection[LuminanceMap]):
 
     def summary(self, quantity: LuminanceMap) -> str:
         """The brightest pixel."""
-        return f"maximum {quantity.values.max():.6g} {quantity.unit}"
+        return f"maximum {counted(float(quantity.values.max()), quantity.unit)}"
 
 
 class LightImage(Detector):

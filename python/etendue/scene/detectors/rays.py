@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from etendue.description.families import Family
 from etendue.description.files import Files
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
 from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
@@ -43,7 +44,7 @@ class IncidentRays(Detection[RaySet]):
 
     def summary(self, quantity: RaySet) -> str:
         """Number and flux."""
-        return f"{len(quantity):,} rays, {quantity.total_flux:.6g} {quantity.flux_unit}"
+        return f"{len(quantity):,} rays, {counted(quantity.total_flux, quantity.flux_unit)}"
 
     def figures(self, quantity: RaySet) -> dict[str, Any]:
         """How many there are."""

@@ -16,6 +16,7 @@ from etendue.description.files import Files
 from etendue.description.values import AsNumber, AsRow, Finite, Length, Positive
 from etendue.errors import ArgumentError
 from etendue.quantities.intensity import Intensity
+from etendue.quantities.powers_of_ten import counted
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.flat import FLAT, Plane
 from etendue.scene.shapes.shape import WHOLE, Shape, Trim, is_bounded
@@ -115,8 +116,8 @@ class Surface(Source):
         if not math.isclose(flux, table.flux, rel_tol=STATED):
             unit = table.flux_unit
             notes.append(
-                f"the distribution has {table.flux:.7g} {unit} up to γ = 90°; it is multiplied by "
-                f"{flux / table.flux:.7g}, to {flux:.7g} {unit} as stated"
+                f"the distribution has {counted(table.flux, unit)} up to γ = 90°; it is multiplied by "
+                f"{flux / table.flux:.4g}, to {counted(flux, unit)} as stated"
             )
         return (
             Emitter(
