@@ -200,7 +200,7 @@ def test_no_flux_at_all() -> None:
         (2.5, 5, "whole number"),
         (4, 0, "gamma_step"),
         (4, -5, "gamma_step"),
-        (4, 7, "6.92307692°"),
+        (4, 7, "7.2° would do"),
         (4, 120, "gamma_step"),
         (4, float("nan"), "gamma_step"),
         (10**7, 0.1, "cells"),

@@ -102,7 +102,7 @@ def test_what_cannot_be() -> None:
     rays, screen = lambertian(10, 1), et.Screen(4, 4, 2, 2, plane="xy")
     with pytest.raises(ArgumentError, match="reaches behind the plane of the screen"):
         et.luminance_map(rays, et.Observer(80, 0, 100), screen, observer_radius=20)
-    with pytest.raises(ArgumentError, match="both given"):
+    with pytest.raises(ArgumentError, match="both stated"):
         et.Cone(acceptance=3, observer_radius=2)
     for bad in (0.0, -1.0, float("nan"), float("inf"), "wide"):
         with pytest.raises(ArgumentError, match="radius of the observer's disk"):

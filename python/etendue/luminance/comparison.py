@@ -65,6 +65,7 @@ class Region:
 
     @property
     def _told(self) -> str:
+        """The region as the command line takes it."""
         return f"region {self.left:g},{self.right:g},{self.bottom:g},{self.top:g}"
 
     def mask(self, screen: Screen) -> Mask:

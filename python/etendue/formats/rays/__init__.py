@@ -9,8 +9,8 @@ from etendue.errors import ArgumentError, FormatError, UnknownNameError, Unsuppo
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.head import Head
 from etendue.formats.input import as_path, at_rest, is_stream, require_readable, stream_in_file
-from etendue.formats.other_kind import own_kind
 from etendue.formats.output import atomic_output
+from etendue.formats.own_kind import own_kind
 from etendue.formats.rays import (
     asap,
     ascii_table,

@@ -1,0 +1,69 @@
+"""What a file is that étendue itself wrote, or reads as a scene, and what takes it."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from pathlib import Path
+
+from etendue.formats.head import Head
+
+
+@dataclasses.dataclass(frozen=True)
+class Kind:
+    """A kind of file that étendue takes elsewhere.
+
+    Parameters
+    ----------
+    title : str
+        With its article.
+    advice : str
+        What takes it.
+    """
+
+    title: str
+    advice: str
+
+
+MAP = Kind("a luminance or illuminance map", "etendue plot, filter, compare and view take it.")
+SCENE = Kind("a scene", "etendue trace, luminance, draw, sweep and view take it.")
+BSDF = Kind(
+    "scatter data (étendue BSDF)", "etendue bsdf info says what it holds; in a scene it is the file of a finish."
+)
+OF_HDF5 = {
+    "etendue light field": Kind("a light field", "etendue luminance, view, intensity, sample and info take it."),
+    "etendue trace result": Kind("the result of a trace", "etendue info, luminance and view take it."),
+    "etendue near-field measurement": Kind("a near-field measurement", "etendue goniophotometer takes it."),
+}
+"""By the attribute ``format`` of an HDF5 file."""
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def own_kind(head: Head) -> Kind | None:
+    """What a file is that étendue wrote or reads as a scene: told without a reader of rays, intensity or scatter.
+
+    Examples
+    --------
+    >>> own_kind(Head(Path("lamp.toml"), 17, b'name = "downlight"')).title
+    'a scene'
+    """
+    data = head.data
+    if data.startswith(HDF5):
+        return _of_hdf5(head.path)
+    if (data.startswith(b"PK\x03\x04") and b"header.npy" in data[:128]) or data.startswith(
+        (b"# etendue luminance map", b"# etendue illuminance map")
+    ):
+        return MAP
+    return SCENE if head.path.suffix.lower() == ".toml" else None
+
+
+def _of_hdf5(path: Path) -> Kind | None:
+    import h5py
+
+    with contextlib.suppress(OSError, KeyError, ValueError, TypeError), h5py.File(path, "r") as file:
+        if "slices" in file.attrs and "format" not in file.attrs:
+            return BSDF
+        stated = file.attrs.get("format")
+        return OF_HDF5.get(stated.decode("utf-8", "replace") if isinstance(stated, bytes) else str(stated))
+    return None
