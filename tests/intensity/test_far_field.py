@@ -201,6 +201,7 @@ def test_no_flux_at_all() -> None:
         (4, 0, "gamma_step"),
         (4, -5, "gamma_step"),
         (4, 7, "7.2° would do"),
+        (4, 1.23e-5, "1.25e-05° would do"),
         (4, 120, "gamma_step"),
         (4, float("nan"), "gamma_step"),
         (10**7, 0.1, "cells"),

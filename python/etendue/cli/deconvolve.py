@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
@@ -25,7 +26,8 @@ from etendue.instruments.operators import OperatorName
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.stopping import RULES
 from etendue.plot import plot_deconvolution, plot_directions
-from etendue.quantities.powers_of_ten import rounded
+from etendue.quantities.measured import measured
+from etendue.quantities.powers_of_ten import counted
 
 METHODS = sorted({*get_args(Method), *get_args(DirectionalMethod)})
 
@@ -191,13 +193,17 @@ def _tell(found: Deconvolution, scan: Path, outputs: list[Path], *, json: bool) 
     for note in found.notes:
         complain(f"note: {note}")
     before, after = found.total_scatter
-    told = "" if error is None else f" ± {error:.2g}"
     say(f"stop after {found.iterations} iterations, {found.stop}" if found.iterations else found.stop)
-    say(f"peak {rounded(float(found.raw.max()))} as measured, {rounded(found.peak)}{told} without the instrument")
+    say(_peak_line(float(found.raw.max()), found.peak, error))
     say(f"{half_width(found.fwhm)}, middle at {found.middle:.3f}°")
     say(f"total scatter {before:.4g} before, {after:.4g} after")
     for path in outputs:
         say(f"{path}: written")
+
+
+def _peak_line(before: float, after: float, error: float | None) -> str:
+    known = measured(after, math.nan if error is None else error, "").rstrip()
+    return f"peak {counted(before, '').rstrip()} as measured, {known} without the instrument"
 
 
 def _tell_directions(found: DirectionalDeconvolution, scan: Path, outputs: list[Path], *, json: bool) -> None:
@@ -225,12 +231,11 @@ def _tell_directions(found: DirectionalDeconvolution, scan: Path, outputs: list[
     for note in found.notes:
         complain(f"note: {note}")
     before, after = found.total_flux
-    told = "" if error is None else f" ± {error:.2g}"
     if found.iterations:
         say(f"stop after {found.iterations} iterations, {found.stop}")
     else:
         say(found.stop)
-    say(f"peak {rounded(raw)} as measured, {rounded(found.peak)}{told} without the instrument")
+    say(_peak_line(raw, found.peak, error))
     say(
         f"in a single direction {found.regular.share:.4g} ± {found.regular.error:.1g} of the light; {found.regular.why}"
     )

@@ -8,37 +8,13 @@ from collections.abc import Iterable
 
 _arguments: contextvars.ContextVar[frozenset[str]] = contextvars.ContextVar("arguments", default=frozenset())
 
-CALLERS = frozenset(
-    {
-        *("FieldRays", "IlluminanceMap", "LuminanceMap", "RaySet", "RingSource", "SweepTable"),
-        *(
-            "beam_angle",
-            "combine_maps",
-            "compare_intensities",
-            "cross_section",
-            "cut_off_angle",
-            "denoise_map",
-            "draw_scene",
-        ),
-        *(
-            "filter_map",
-            "plot_animation",
-            "plot_cross_sections",
-            "plot_sweep",
-            "plot_threshold_sweep",
-            "propagated_to_plane",
-        ),
-        *(
-            "propagated_to_sphere",
-            "read_rays",
-            "region_statistics",
-            "report_source",
-            "smooth_counts",
-            "threshold_sweep",
-        ),
-        *("zonal_flux", "luminance_map"),
-    }
-)
+CALLERS = frozenset({
+    "beam_angle", "combine_maps", "compare_intensities", "cross_section", "cut_off_angle", "denoise_map", "draw_scene",
+    "FieldRays", "filter_map", "IlluminanceMap", "luminance_map", "LuminanceMap", "plot_animation",
+    "plot_cross_sections", "plot_sweep", "plot_threshold_sweep", "propagated_to_plane", "propagated_to_sphere",
+    "RaySet", "read_rays", "region_statistics", "report_source", "RingSource", "smooth_counts", "SweepTable",
+    "threshold_sweep", "zonal_flux",
+})  # fmt: skip
 """Functions and classes of Python that messages begin with, but for those whose name is a plain word."""
 
 PARSER = (

@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 from pathlib import Path
 
+from etendue.formats.hdf5 import SIGNATURE
 from etendue.formats.head import Head
 
 
@@ -25,19 +26,23 @@ class Kind:
     advice: str
 
 
+LIGHT_FIELD, TRACE_RESULT, NEAR_FIELD = "etendue light field", "etendue trace result", "etendue near-field measurement"
+"""What the attribute ``format`` of HDF5 files says."""
+
+MAP_TITLE, ILLUMINANCE_TITLE = "# etendue luminance map", "# etendue illuminance map"
+"""First lines of maps as CSV."""
+
 MAP = Kind("a luminance or illuminance map", "etendue plot, filter, compare and view take it.")
 SCENE = Kind("a scene", "etendue trace, luminance, draw, sweep and view take it.")
 BSDF = Kind(
     "scatter data (étendue BSDF)", "etendue bsdf info says what it holds; in a scene it is the file of a finish."
 )
 OF_HDF5 = {
-    "etendue light field": Kind("a light field", "etendue luminance, view, intensity, sample and info take it."),
-    "etendue trace result": Kind("the result of a trace", "etendue info, luminance and view take it."),
-    "etendue near-field measurement": Kind("a near-field measurement", "etendue goniophotometer takes it."),
+    LIGHT_FIELD: Kind("a light field", "etendue luminance, view, intensity, sample and info take it."),
+    TRACE_RESULT: Kind("the result of a trace", "etendue info, luminance and view take it."),
+    NEAR_FIELD: Kind("a near-field measurement", "etendue goniophotometer takes it."),
 }
-"""By the attribute ``format`` of an HDF5 file."""
-
-HDF5 = b"\x89HDF\r\n\x1a\n"
+"""By the attribute ``format``."""
 
 
 def own_kind(head: Head) -> Kind | None:
@@ -49,11 +54,10 @@ def own_kind(head: Head) -> Kind | None:
     'a scene'
     """
     data = head.data
-    if data.startswith(HDF5):
+    if data.startswith(SIGNATURE):
         return _of_hdf5(head.path)
-    if (data.startswith(b"PK\x03\x04") and b"header.npy" in data[:128]) or data.startswith(
-        (b"# etendue luminance map", b"# etendue illuminance map")
-    ):
+    titles = (MAP_TITLE.encode("ascii"), ILLUMINANCE_TITLE.encode("ascii"))
+    if (data.startswith(b"PK\x03\x04") and b"header.npy" in data[:128]) or data.startswith(titles):
         return MAP
     return SCENE if head.path.suffix.lower() == ".toml" else None
 

@@ -23,6 +23,7 @@ from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading
 from etendue.formats.input import as_path
 from etendue.formats.other_kind import foreign
 from etendue.formats.output import atomic_output
+from etendue.formats.own_kind import LIGHT_FIELD
 from etendue.formats.strict_json import strict_json
 from etendue.lightfield.counting import MOST_CELLS
 from etendue.lightfield.etendue_density import EtendueDensity, FineErrors, FitReport, PartField
@@ -37,7 +38,6 @@ from etendue.units import LUMINANCE_UNIT, FluxUnit
 
 Density = TypeVar("Density", bound=EtendueDensity)
 
-FORMAT = "etendue light field"
 VERSION = 1
 
 STEPS = 16.0
@@ -96,7 +96,7 @@ def is_field_file(path: str | Path) -> bool:
     if not begins_as_hdf5(path):
         return False
     with contextlib.suppress(FormatError), reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
-        return Node(path, file, DAMAGED).has_text("format", FORMAT)
+        return Node(path, file, DAMAGED).has_text("format", LIGHT_FIELD)
     return True
 
 
@@ -155,7 +155,7 @@ def _rounded_part(part: PartField) -> PartField:
 
 def _write(file: Any, field: EtendueDensity) -> None:
     unit = f"{field.flux_unit}/(mm2 sr)"
-    put(file, format=FORMAT, version=VERSION, flux_unit=field.flux_unit, length_unit="mm", level_unit=unit)
+    put(file, format=LIGHT_FIELD, version=VERSION, flux_unit=field.flux_unit, length_unit="mm", level_unit=unit)
     put(file, provenance=json.dumps(field.provenance.to_dict(), sort_keys=True), notes=json.dumps(field.notes))
     surface = {f.name: getattr(field.surface, f.name) for f in dataclasses.fields(field.surface)}
     known = {name: value for name, value in surface.items() if value is not None}
@@ -212,7 +212,7 @@ def _put_array(group: Any, name: str, values: npt.NDArray[Any], meaning: str, un
 
 
 def _read(file: Node) -> EtendueDensity:
-    if not file.has_text("format", FORMAT):
+    if not file.has_text("format", LIGHT_FIELD):
         raise foreign(file.path, "a light field", FOREIGN, "attribute 'format'")
     version = file.integer("version")
     if version != VERSION:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from collections.abc import Iterator
 from typing import Any, Literal, get_args
 
@@ -116,8 +115,12 @@ class MapStatistics:
         """The figures in one line of text, luminances in `unit`."""
         return (
             f"mean {rounded(self.mean)}, max {rounded(self.maximum)}, min {rounded(self.minimum)} {unit}, "
-            f"uniformity {self.uniformity:.3g}, dead pixels {self.dead_pixels}"
+            f"uniformity {rounded(self.uniformity, 3)}, dead pixels {self.dead_pixels}"
         )
+
+
+def _percent(share: float, style: str = ".3f") -> str:
+    return "undefined" if np.isnan(share) else f"{100.0 * share:{style}} %"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -213,17 +216,17 @@ class Comparison:
     def summary(self) -> str:
         """The result in a few lines of text."""
         agreement = (
-            f"NCC {100 * self.ncc:.3f} %, NRMSE {100 * self.nrmse:.3f} % (true RMSE / max of the reference), "
-            f"{100 * self.nrmse_thesis:.3f} % (eq. 3.6), {self.pixels} pixels"
+            f"NCC {_percent(self.ncc)}, NRMSE {_percent(self.nrmse)} (true RMSE / max of the reference), "
+            f"{_percent(self.nrmse_thesis)} (eq. 3.6), {self.pixels} pixels"
         )
         significance = (
-            f"reduced χ² {self.reduced_chi_square:.4g} over {self.chi_square_pixels} pixels, "
-            f"intensity ratio {self.intensity_ratio:.4g}, median difference {self.median_difference:.3g} %"
+            f"reduced χ² {rounded(self.reduced_chi_square)} over {self.chi_square_pixels} pixels, "
+            f"intensity ratio {rounded(self.intensity_ratio)}, "
+            f"median difference {_percent(self.median_difference / 100.0, '.3g')}"
         )
         maps = (("test", self.test_statistics), ("reference", self.reference_statistics))
         figures = (f"{name}: {statistics.summary(self.reference.unit)}" for name, statistics in maps)
-        told = re.sub(r"\bnan( %)?", "undefined", "\n".join((agreement, significance, *figures)))
-        return "\n".join((told, *(f"note: {printable(note)}" for note in self.notes)))
+        return "\n".join((agreement, significance, *figures, *(f"note: {printable(note)}" for note in self.notes)))
 
     def to_dict(self) -> dict[str, Any]:
         """Every number as plain data for JSON (undefined numbers are None): all but the maps and the image."""

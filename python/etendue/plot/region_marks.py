@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -49,33 +49,29 @@ def marks_of(lmap: LuminanceMap | IlluminanceMap, regions: Sequence[AnyRegion]) 
     found = []
     for number, region in enumerate(regions, start=1):
         figures = region_statistics(lmap, region)
-        facts = [f"{number}{in_words(figures)}"]
+        facts = [*_facts(number, figures)]
         if figures.dead_pixels:
             facts.append(f"{figures.dead_pixels} of {figures.pixels} pixels are dead and count as 0")
         found.append(Mark(number, _outline(region), style.SEPARATOR.join(facts)))
     return found
 
 
-def in_words(figures: RegionStatistics) -> str:
+def _facts(number: int, figures: RegionStatistics) -> Iterator[str]:
     """Mean of a region, with the errors that it has if its pixels err apart and together, extremes and percentiles."""
+    # Either all numbers are counted in a power of ten, or none is.
     power = common_power(figures.minimum, figures.maximum)
 
     def told(value: float, digits: int = 4) -> str:
         return style.plain(float(f"{value / 10.0**power:.{digits}g}"))
 
-    errors = dict.fromkeys(
-        told(error, 2) for error in (figures.mean_error_apart, figures.mean_error) if math.isfinite(error)
-    )
-    mean = " ± ".join(part for part in (told(figures.mean), " to ".join(errors)) if part)
-    # Either all numbers are counted in a power of ten, or none is.
-    facts = (
-        f" in {style.in_powers(figures.unit, power)}: mean {mean}" if power else f": mean {mean} {figures.unit}",
-        f"min {told(figures.minimum)}",
-        f"max {told(figures.maximum)}",
-        f"min/mean {style.plain(figures.uniformity)}",
-        ", ".join(f"{share:g} %: {told(value)}" for share, value in figures.percentiles),
-    )
-    return style.SEPARATOR.join(facts)
+    known = [told(error, 2) for error in (figures.mean_error_apart, figures.mean_error) if math.isfinite(error)]
+    mean = " ± ".join([told(figures.mean), *([" to ".join(dict.fromkeys(known))] if known else [])])
+    unit = style.in_powers(figures.unit, power)
+    yield f"{number} in {unit}: mean {mean}" if power else f"{number}: mean {mean} {unit}"
+    yield f"min {told(figures.minimum)}"
+    yield f"max {told(figures.maximum)}"
+    yield f"min/mean {style.plain(figures.uniformity)}"
+    yield ", ".join(f"{share:g} %: {told(value)}" for share, value in figures.percentiles)
 
 
 def _outline(region: AnyRegion) -> Array:

@@ -203,9 +203,18 @@ def check_steps(c_planes: int | None, gamma_step: float | None) -> None:
 
 
 def _round_step(steps: int) -> float:
-    """The step near that of so many steps in 180° that is a number of three digits [°]."""
-    counts = sorted(range(1, 2 * steps + 2), key=lambda count: abs(180.0 / count - 180.0 / steps))
-    return next(180.0 / count for count in counts if math.isclose(float(f"{180.0 / count:.3g}") * count, 180.0))
+    """The step nearest to that of so many steps in 180° which divides 180° and has three digits at most [°].
+
+    Examples
+    --------
+    >>> _round_step(26), _round_step(2), _round_step(14_634_146)
+    (7.2, 90.0, 1.25e-05)
+    """
+    near = 180.0 / steps
+    # In units of its third digit.
+    places = 2 - math.floor(math.log10(near))
+    candidates: list[float] = [digits / 10**places for digits in range(100, 1001) if 180 * 10**places % digits == 0]
+    return min(candidates, key=lambda step: abs(step - near))
 
 
 def planes_of(number: int) -> tuple[float, ...]:

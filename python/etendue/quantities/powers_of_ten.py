@@ -31,13 +31,15 @@ def common_power(low: float, high: float) -> int:
 
 
 def rounded(value: float, digits: int = 4) -> str:
-    """A number to so many digits, without a power of ten unless it is very small or very large.
+    """A number to so many digits, without a power of ten unless it is very small or very large; NaN is "undefined".
 
     Examples
     --------
-    >>> rounded(12345.678), rounded(0.021834567), rounded(500.0)
-    ('12350', '0.02183', '500')
+    >>> rounded(12345.678), rounded(0.021834567), rounded(500.0), rounded(math.nan)
+    ('12350', '0.02183', '500', 'undefined')
     """
+    if math.isnan(value):
+        return "undefined"
     text = f"{value:.{digits}g}"
     return text if common_power(value, value) or not math.isfinite(value) else f"{float(text):.12g}"
 

@@ -51,10 +51,12 @@ class ObserverKeys(Description):
     """
 
     INSTEAD: ClassVar[Mapping[str, str]] = MappingProxyType({
-        "position": "where it stands by theta, phi and distance, and what it looks at by target",
-        "at": "where it stands by theta, phi and distance, and what it looks at by target",
-        "size": "its screen: screen = {{ width = 25, height = 25, columns = 128, rows = 128 }}",
-        "pixels": "its screen: screen = {{ width = 25, height = 25, columns = 128, rows = 128 }}",
+        **dict.fromkeys(
+            ("position", "at"), "where it stands by theta, phi and distance, and what it looks at by target"
+        ),
+        **dict.fromkeys(
+            ("size", "pixels"), "its screen: screen = {{ width = 25, height = 25, columns = 128, rows = 128 }}"
+        ),
     })  # fmt: skip
 
     name: str = ""

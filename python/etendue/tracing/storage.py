@@ -19,6 +19,7 @@ from etendue import _core
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading, states_format
 from etendue.formats.other_kind import foreign
 from etendue.formats.output import atomic_output, require_room
+from etendue.formats.own_kind import TRACE_RESULT
 from etendue.formats.strict_json import strict_json
 from etendue.quantities.memory import require_memory
 from etendue.quantities.spool import MEMORY_LIMIT, Spool
@@ -32,7 +33,6 @@ from etendue.tracing.scattered import STRETCH, Scattered
 from etendue.tracing.sums import ENTRIES, RECORD, Collected, Sums
 from etendue.units import FLUX_UNITS
 
-FORMAT = "etendue trace result"
 VERSION = 3
 """Far fields are shared by nodes since version 3, and copies of rays are counted together since version 2."""
 
@@ -69,7 +69,7 @@ def is_result_file(path: Path) -> bool:
     OSError
         If there is no such file.
     """
-    return states_format(path, FORMAT, DAMAGED)
+    return states_format(path, TRACE_RESULT, DAMAGED)
 
 
 def save_result(plan: Plan, sums: Sums, path: Path) -> None:
@@ -102,7 +102,7 @@ def load_result(path: Path) -> tuple[Plan, Sums]:
         raise foreign(path, "the result of a trace", FOREIGN)
     with reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
         node = Node(path, file, DAMAGED)
-        if not node.has_text("format", FORMAT):
+        if not node.has_text("format", TRACE_RESULT):
             raise foreign(path, "the result of a trace", FOREIGN, "attribute 'format'")
         if node.integer("version") != VERSION:
             found = f"version {node.integer('version')}"
@@ -117,7 +117,7 @@ def load_result(path: Path) -> tuple[Plan, Sums]:
 
 
 def _write(file: Any, plan: Plan, sums: Sums, folder: Path) -> None:
-    put(file, format=FORMAT, version=VERSION, length_unit="mm", wavelength_unit="nm", flux_unit=plan.flux_unit)
+    put(file, format=TRACE_RESULT, version=VERSION, length_unit="mm", wavelength_unit="nm", flux_unit=plan.flux_unit)
     group = file.create_group("plan")
     put(group, scene_name=plan.scene_name, fingerprint=plan.fingerprint, flux_unit=plan.flux_unit)
     put(group, **{name: np.uint64(getattr(plan, name)) for name in NUMBERS})

@@ -12,11 +12,10 @@ import numpy as np
 from etendue.errors import FormatError
 from etendue.formats.maps.header import FOREIGN, MOST_HEADER_BYTES, MapHeader, header_text
 from etendue.formats.maps.map_format import DAMAGED, AnyMap, MapFormat, parsing
+from etendue.formats.own_kind import ILLUMINANCE_TITLE, MAP_TITLE
 from etendue.units import ILLUMINANCE_NAME
 
-TITLE = "# etendue luminance map"
-ILLUMINANCE_TITLE = "# etendue illuminance map"
-TITLES = (TITLE.encode("ascii"), ILLUMINANCE_TITLE.encode("ascii"))
+TITLES = (MAP_TITLE.encode("ascii"), ILLUMINANCE_TITLE.encode("ascii"))
 COLUMNS = {
     "row": np.int64,
     "column": np.int64,
@@ -34,7 +33,7 @@ def write(lmap: AnyMap, path: Path) -> tuple[str, ...]:
     Numbers have as many digits as it takes to read the same float64 back; ``nan`` stands for a dead pixel.
     """
     with path.open("w", encoding="ascii", newline="\n") as stream:
-        title = ILLUMINANCE_TITLE if lmap.quantity in ILLUMINANCE_NAME.values() else TITLE
+        title = ILLUMINANCE_TITLE if lmap.quantity in ILLUMINANCE_NAME.values() else MAP_TITLE
         stream.write(f"{title}\n# {header_text(lmap)}\n{','.join(COLUMNS)}\n")
         stream.writelines(_rows(lmap))
     return ()

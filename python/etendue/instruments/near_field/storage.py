@@ -13,6 +13,7 @@ import numpy.typing as npt
 from etendue.formats.hdf5 import LIBRARY, Node, begins_as_hdf5, put, reading, states_format
 from etendue.formats.other_kind import foreign
 from etendue.formats.output import atomic_output
+from etendue.formats.own_kind import NEAR_FIELD
 from etendue.formats.strict_json import strict_json
 from etendue.instruments.near_field.camera import Camera
 from etendue.instruments.near_field.positions import ArmPositions
@@ -21,7 +22,6 @@ from etendue.quantities.memory import require_memory
 from etendue.quantities.provenance import Provenance
 from etendue.units import FLUX_UNITS, FluxUnit
 
-FORMAT = "etendue near-field measurement"
 VERSION = 1
 
 CHUNK = 1 << 16
@@ -45,7 +45,7 @@ def is_run_file(path: Path) -> bool:
     OSError
         If there is no such file.
     """
-    return states_format(path, FORMAT, DAMAGED)
+    return states_format(path, NEAR_FIELD, DAMAGED)
 
 
 def write_run(
@@ -64,7 +64,7 @@ def write_run(
 
     # The temporary file is locked already: that no other process takes it for one that was left behind.
     with atomic_output(path) as temporary, h5py.File(temporary, "w", libver=LIBRARY, locking=False) as file:
-        put(file, format=FORMAT, version=VERSION, flux_unit=flux_unit)
+        put(file, format=NEAR_FIELD, version=VERSION, flux_unit=flux_unit)
         put(file, provenance=json.dumps(provenance.to_dict()), notes=json.dumps(list(notes)))
         put(file, centre=np.array(setting.centre), **{name: getattr(setting, name) for name in LENGTHS})
         put(file, **{name: getattr(setting.positions, name) for name in STEPS})
@@ -90,7 +90,7 @@ def read_run(path: Path) -> Parts:
         raise foreign(path, "a near-field measurement", FOREIGN)
     with reading(path, "HDF5", DAMAGED), h5py.File(path, "r") as file:
         node = Node(path, file, DAMAGED)
-        if not node.has_text("format", FORMAT):
+        if not node.has_text("format", NEAR_FIELD):
             raise foreign(path, "a near-field measurement", FOREIGN, "attribute 'format'")
         if node.integer("version") != VERSION:
             found = f"version {node.integer('version')}"
