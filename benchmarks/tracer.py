@@ -9,8 +9,8 @@ when it leaves, is absorbed by chance, or meets a black disk. The same loop, and
   `embreex` by an array of the rays of the loop, as our index of triangles is; the loop asking Embree has our time for all
   else;
 - map: the reverse map seen from 55°, 250 × 125 pixels of 0.2 mm; efficiency is 1/(variance · time), the variance that of a
-  pixel over independent runs, relative to its mean over all of them; gathered maps have 1024 paths a pixel and their survey,
-  lines that go on 16, Mitsuba 64;
+  pixel over independent runs, relative to its mean over all of them; `luminance_map` as it is, with a survey, a pilot and a
+  comparison in its time, and with lines that go on only; Mitsuba 64 paths a pixel;
 - field: maps of a light field, bare and behind a lens, 50 × 50 pixels and 1 000 paths each;
 - patches: time per ray of a gridded source of 16 to 100 000 patches, through a lens.
 
@@ -234,18 +234,10 @@ def job_mesh(rays: int) -> None:
 def job_map(_rays: int) -> None:
     observer, screen = et.Observer(55, 0, 1000), et.Screen(50, 25, 250, 125)
     scene = analytic()
-    core = _core.Scene(compile_scene(scene).record)
-    view = screen.core_view(observer)
 
-    def ours(seed: int) -> Array:
-        return _core.look_at_scene(core, view, 16, seed, 1_000_000, "nothing", 0, 1)[0]
-
-    def gathered(seed: int) -> Array:
-        """A map of 16 passes of 64 paths a pixel, with its survey."""
-        survey = _core.Survey(core, seed, 1_000_000)
-        how = (core, view, 64, seed, 1_000_000, "nothing")
-        passes = [_core.look_at_scene(*how, i, i + 1, None, survey)[0] for i in range(16)]
-        return sum(passes) / len(passes)
+    def seen(seed: int, **how: Any) -> Array:
+        lmap = et.luminance_map(scene, observer, screen, seed=seed + 100, **how)
+        return np.nan_to_num(lmap.values) * 1e-6
 
     mi.set_variant("llvm_ad_rgb")
     transform = mi.ScalarTransform4f
@@ -282,7 +274,7 @@ def job_map(_rays: int) -> None:
         return np.array(image)[..., 0]
 
     # The pixels in which the inside of the cavity is seen.
-    inside = gathered(0)
+    inside = seen(0)
     inside = inside > 0.2 * np.median(inside[inside > 0])
 
     def judged(look: Callable[[int], Array], runs: int) -> tuple[float, float, float]:
@@ -295,17 +287,18 @@ def job_map(_rays: int) -> None:
         dr.sync_thread()
         return 1.0 / (relative * seconds), math.sqrt(relative), float(np.median(mean[inside]))
 
-    mine, noise, level = judged(ours, 16)
-    known, little_noise, known_level = judged(gathered, 6)
     yours, their_noise, their_level = judged(theirs, 16)
-    for way, efficiency in (("gathered", known), ("lines that go on", mine)):
-        row(
-            f"map of the cavity, {way}: 1/(variance · time)",
-            f"{efficiency:.0f} /s",
-            f"{efficiency / yours:.1f} × Mitsuba's path tracer",
-        )
-    row("map of the cavity: noise of a run", f"{little_noise:.1%}, {noise:.1%}, {their_noise:.1%}")
-    row("map of the cavity: median luminance", f"{known_level:.5f}, {level:.5f}, {their_level:.5f} lm/(mm² sr)")
+    row("map of the cavity, Mitsuba's path tracer: noise of a run", f"{their_noise:.1%}", f"median {their_level:.5f}")
+    ways: dict[str, dict[str, Any]] = {
+        "default": {},
+        "default, 1 024 lines a pixel": {"rays_per_pixel": 1024},
+        "lines that go on": {"gather": False},
+    }
+    for way, how in ways.items():
+        mine, noise, level = judged(lambda seed, how=how: seen(seed, **how), 8)
+        job = f"map of the cavity, {way}"
+        row(f"{job}: 1/(variance · time)", f"{mine:.0f} /s", f"{mine / yours:.1f} × Mitsuba's path tracer")
+        row(f"{job}: noise of a run", f"{noise:.1%}", f"median {level:.5f} lm/(mm² sr)")
 
 
 def job_field(_rays: int) -> None:

@@ -11,6 +11,7 @@ import pytest
 from etendue.quantities.observer import Observer, Screen
 from etendue.tracing.result import TraceResult
 from numpy.polynomial.legendre import leggauss
+from oracles.gathered import common_error
 from oracles.radiosity import Cavity, wall_from_wall, wall_to_disk
 from oracles.verdicts import REVERSE, assert_agree, assert_differ, assert_drawn_with
 
@@ -158,3 +159,18 @@ def test_reverse_map() -> None:
     assert_agree(values=seen.values, expected=expected, standard_error=seen.standard_error, degrees=REVERSE)
     assert_differ(values=seen.values, other=expected[::-1], standard_error=seen.standard_error)
     assert_differ(values=seen.values, other=expected[:, ::-1], standard_error=seen.standard_error)
+
+
+@pytest.mark.slow
+def test_default_map() -> None:
+    """What nothing is said about: lines of sight end at patches, as a pilot finds that better."""
+    screen = et.Screen(SCREEN["width"], SCREEN["height"], 32, 24)
+    observer = cavity().observers[0].observer()
+    lmap = et.luminance_map(cavity(), observer, screen, rays_per_pixel=1024, seed=4)
+    assert any("in a pilot" in note for note in lmap.notes)
+    expected = expected_map(observer, screen) * 1e6
+    assert np.median(lmap.standard_error / lmap.values) < 0.012
+    # The error that all pixels have in common is no spread: without it.
+    spread = np.sqrt(lmap.standard_error**2 - (common_error(lmap=lmap) * lmap.values) ** 2)
+    assert_agree(values=lmap.values, expected=expected, standard_error=spread, degrees=REVERSE)
+    assert_differ(values=lmap.values, other=expected[:, ::-1], standard_error=spread)

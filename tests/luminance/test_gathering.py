@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
-from etendue.luminance.gathering import BLOCKS, blocks, comparison_note
+from etendue import _core
+from etendue.luminance.gathering import BLOCKS, LEAST_LINES, NOT_TAKEN, PILOT, Comparison, blocks
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from oracles.gathered import common_error
 from oracles.verdicts import REVERSE, assert_agree
 
 Array = npt.NDArray[np.float64]
@@ -212,10 +215,13 @@ def test_triangles_of_a_mesh_are_patches(tmp_path: Any) -> None:
 
 @pytest.mark.slow
 def test_the_same_bits_for_any_number_of_threads() -> None:
-    maps = [seen(et.Scene(**tray()), rays_per_pixel=64, seed=3, gather=True, threads=n) for n in (1, 2, 7)]
-    for other in maps[1:]:
-        assert np.array_equal(maps[0].values, other.values)
-        assert np.array_equal(maps[0].standard_error, other.standard_error)
+    asked = partial(seen, et.Scene(**tray()), rays_per_pixel=64, seed=3, gather=True)
+    for look in (asked, looked_into):
+        maps = [look(threads=n) for n in (1, 2, 7)]
+        for other in maps[1:]:
+            assert np.array_equal(maps[0].values, other.values)
+            assert np.array_equal(maps[0].standard_error, other.standard_error)
+            assert maps[0].notes == other.notes
 
 
 def test_nothing_diffuse_is_told() -> None:
@@ -233,10 +239,93 @@ def test_a_difference_is_told() -> None:
     exact = [rng.normal(10.0, 1.0, (40, 30)) for _ in range(2)]
     for shift, told in ((0.0, False), (0.5, True)):
         passes = [blocks(rng.normal(10.0 + shift, 0.3, (40, 30))) for _ in range(16)]
-        note = comparison_note(passes, exact)
-        assert ("leave gather out" in note) is told
+        found = Comparison.of(passes, exact)
+        assert found is not None
+        assert found.differs is told
+        assert found.bias >= max(abs(found.difference), found.error)
+        assert abs(found.difference - shift / 10) < 3.9 * found.error
+        # Of 1 200 pixels twice.
+        assert found.error == pytest.approx(0.1 / math.sqrt(2400), rel=0.1)
     assert len(passes[0]) == BLOCKS**2 + 1
-    assert "too few" in comparison_note(passes, [np.diag([1.0, 0, 0, 0, 0]) * k for k in (1.0, 2.0)])
+    assert Comparison.of(passes, [np.diag([1.0, 0, 0, 0, 0]) * k for k in (1.0, 2.0)]) is None
+
+
+LINES = 656
+"""For each of the 800 pixels of the cup: enough that patches are tried unasked."""
+
+
+def looked_into(**how: Any) -> et.LuminanceMap:
+    """A white cup, open above, with a lamp beside its axis and a grey base: most light has been scattered many times."""
+    white, grey = ({"kind": "lambertian", "reflectance": share} for share in (0.95, 0.9))
+    cup = {"shape": {"kind": "cylinder", "radius": 20, "height": 25}, "finish": white}
+    base = {"shape": {"kind": "disk", "radius": 20}, "finish": grey}
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 4}, "flux": 10, "at": [9, 2, 1]}
+    scene = et.Scene(sources=[lamp], surfaces=[cup, base])
+    return et.luminance_map(
+        scene,
+        et.Observer(35, 30, 400, target=(0, 0, 12)),
+        et.Screen(20, 18, 32, 25),
+        rays_per_pixel=LINES,
+        seed=5,
+        **how,
+    )
+
+
+def planted(monkeypatch: pytest.MonkeyPatch, *, factor: float, first: int) -> None:
+    """Patches that send out too much light, from a pass on."""
+    real = _core.look_at_scene
+
+    def look(*arguments: Any) -> list[Array]:
+        values, *rest = real(*arguments)
+        number, known = arguments[6], arguments[9]
+        return [values * factor if known is not None and number >= first else values, *rest]
+
+    monkeypatch.setattr(_core, "look_at_scene", look)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("first", "told"), [(0, False), (2 * PILOT, True)])
+def test_patches_that_differ_from_lines_are_left_out(monkeypatch: pytest.MonkeyPatch, first: int, told: bool) -> None:
+    """In the pilot or after it; what is left is the map of lines that go on, bit by bit."""
+    assert 800 * LINES >= LEAST_LINES
+    plain, unspoilt = looked_into(gather=False), looked_into()
+    assert any("in a pilot" in note for note in unspoilt.notes)
+    assert not np.array_equal(unspoilt.values, plain.values)
+    planted(monkeypatch, factor=1.2, first=first)
+    spoilt = looked_into()
+    assert np.array_equal(spoilt.values, plain.values)
+    assert np.array_equal(spoilt.standard_error, plain.standard_error)
+    assert (NOT_TAKEN in spoilt.notes) is told
+
+
+@pytest.mark.slow
+def test_what_the_comparison_leaves_open_is_in_the_errors() -> None:
+    """The spread of the passes and, in common, the difference to lines that go on, or what of it these cannot tell."""
+    lmap = looked_into()
+    common = common_error(lmap=lmap)
+    assert 1e-4 < common < 0.05
+    lit = lmap.values > 0
+    assert (lmap.standard_error[lit] > 0.98 * common * lmap.values[lit]).all()
+
+
+@pytest.mark.slow
+def test_lines_go_on_where_patches_do_not_pay() -> None:
+    """One diffuse plate under a lamp: nothing to gather, and the map is that of lines alone, bit by bit."""
+    lamp = {
+        "kind": "surface",
+        "shape": {"kind": "disk", "radius": 1},
+        "flux": 5,
+        "at": [3, 1, 20],
+        "toward": [0, 0, -1],
+    }
+    plate = {"shape": {"kind": "rectangle", "width": 40, "height": 30}, "finish": WHITE}
+    scene = et.Scene(sources=[lamp], surfaces=[plate])
+    eye, screen = et.Observer(30, 40, 300), et.Screen(20, 20, 64, 64)
+    unasked, plain = (
+        et.luminance_map(scene, eye, screen, rays_per_pixel=128, gather=gather) for gather in (None, False)
+    )
+    assert np.array_equal(unasked.values, plain.values)
+    assert unasked.notes == plain.notes
 
 
 @pytest.mark.slow

@@ -190,11 +190,14 @@ def luminance(
         ),
     ] = None,
     gather: Annotated[
-        bool,
+        bool | None,
         typer.Option(
-            "--gather", help="Of a scene: lines of sight end at the second diffuse surface, whose light is found first."
+            "--gather/--no-gather",
+            help="Of a scene: lines of sight end at the second diffuse surface, whose light is found first (if a pilot "
+            "finds it better).",
+            show_default=False,
         ),
-    ] = False,
+    ] = None,
     detector: Annotated[
         str | None,
         typer.Option(
@@ -225,7 +228,7 @@ def luminance(
         "until": until,
         "seed": seed,
         "forward_rays": forward_rays,
-        "gather": gather or None,
+        "gather": gather,
     }
     scene = Scene.load(file) if file.suffix.lower() == SCENE_EXTENSION else None
     detected = _detected(file, detector)

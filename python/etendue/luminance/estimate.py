@@ -58,7 +58,7 @@ class _SceneOptions(_Options, total=False):
     until: float | None
     seed: int | None
     forward_rays: float | None
-    gather: bool
+    gather: bool | None
 
 
 @overload
@@ -110,7 +110,7 @@ def luminance_map(
     until: float | None = None,
     seed: int | None = None,
     forward_rays: float | None = None,
-    gather: bool = False,
+    gather: bool | None = None,
     cache: bool = True,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -201,7 +201,7 @@ def luminance_map(
         "until": until,
         "seed": seed,
         "forward_rays": forward_rays,
-        "gather": gather or None,
+        "gather": gather,
     }
     stated = {name: value for name, value in options.items() if value is not None} | unknown
     how = choose_method(method, stated, kind_of_source(source))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable
 from statistics import NormalDist
 
 import numpy as np
@@ -17,13 +19,22 @@ BLOCKS = 4
 FEWEST = 12.0
 """Degrees of freedom that the error of a block needs, to be judged as if it were normal."""
 
-CHECKS = 2
-"""Passes whose lines of sight go on to the sources, for comparison: two, so that each pixel tells its error."""
-
 FIRST_CHECK = 1 << 20
-"""Number of the first of them: beyond all passes of a map, so that no random number is shared."""
+"""Number of the first pass for comparison alone: beyond all passes of a map, so that no random number is shared."""
 
 SIGNIFICANCE = 1e-4
+
+PILOT = 2
+"""Passes of a map that are made both ways: the fewest that tell an error, and as many as a comparison takes."""
+
+GAIN = 3.0
+"""Ratio of variances from which patches are used unasked: their rays cost up to as much as the lines themselves."""
+
+LEAST_LINES = 1 << 19
+"""Lines of sight of a map from which it is tried: of fewer, the survey alone would take longer."""
+
+Look = Callable[[int, "_core.Survey | None"], list[Array]]
+"""The sums of a pass of a map, by its number, with patches or without."""
 
 
 def survey_notes(survey: _core.Survey) -> list[str]:
@@ -48,44 +59,148 @@ def blocks(values: Array) -> Array:
     return np.array([*(part.sum() for part in parts), values.sum()])
 
 
-def comparison_note(gathered: list[Array], exact: list[Array]) -> str:
-    """What a comparison of the map with lines of sight that go on to the sources says.
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """How a map of lines that end at patches compares with lines that go on to the sources.
 
     Parameters
     ----------
-    gathered : list of ndarray
-        `blocks` of each pass of the map.
-    exact : list of ndarray, shape (rows, columns)
-        Two passes of lines of sight that go on.
-
-    Returns
-    -------
-    str
-        A note for the map. It asks to leave gathering out if a block differs by more than chance does in one map of 10 000
-        (normal errors, Šidák's bound over the blocks).
+    difference, error : float
+        What the map has more of all light, and its standard error, relative to the lines that go on.
+    farthest : float
+        Difference of the block that differs most, in its standard errors.
+    most : float
+        What chance exceeds in one map of 10 000 (normal errors, Šidák's bound over the blocks).
 
     Examples
     --------
     >>> import numpy as np
     >>> rng = np.random.default_rng(1)
     >>> exact = [rng.normal(10.0, 1.0, (40, 30)) for _ in range(2)]
-    >>> comparison_note([blocks(rng.normal(10.0, 0.3, (40, 30))) for _ in range(16)], exact)
-    'compared with lines of sight that go on to the sources: +0.10% ± 0.20% of all light'
+    >>> found = Comparison.of([blocks(rng.normal(10.0, 0.3, (40, 30))) for _ in range(16)], exact)
+    >>> found.sentence, found.differs
+    ('compared with lines of sight that go on to the sources: +0.10% ± 0.20% of all light', False)
+    >>> round(found.bias, 4)
+    0.002
     """
-    passes = np.array(gathered)
-    value, variance = passes.mean(axis=0), passes.var(axis=0, ddof=1) / len(passes)
-    one, two = exact
-    # Pixels are independent of each other: the variance of a mean of two is a quarter of the square of their difference.
-    other, apart = blocks(one + two) / 2.0, blocks((one - two) ** 2) / 4.0
-    error = np.sqrt(variance + apart)
-    # As many pixels as bear the variance: of few, two passes do not tell it.
-    known = 16.0 * apart**2 > FEWEST * blocks((one - two) ** 4)
-    if not known.any():
-        return "too few pixels with light for a comparison with lines of sight that go on to the sources"
-    z = np.abs(value - other)[known] / error[known]
-    most = -NormalDist().inv_cdf(-np.expm1(np.log1p(-SIGNIFICANCE) / known.sum()) / 2)
-    total = f"{value[-1] / other[-1] - 1:+.2%} ± {error[-1] / other[-1]:.2%}" if other[-1] > 0 else "dark"
-    said = f"compared with lines of sight that go on to the sources: {total} of all light"
-    if z.max() > most:
-        said += f"; a part of the map differs by {z.max():.1f} standard errors: leave gather out, or add forward_rays"
-    return said
+
+    difference: float
+    error: float
+    farthest: float
+    most: float
+
+    @classmethod
+    def of(cls, gathered: list[Array], exact: list[Array]) -> Comparison | None:
+        """The comparison of a map; None if too few pixels have light for one.
+
+        Parameters
+        ----------
+        gathered : list of ndarray
+            `blocks` of each pass of the map.
+        exact : list of ndarray, shape (rows, columns)
+            Two passes of lines of sight that go on.
+        """
+        passes = np.array(gathered)
+        value, variance = passes.mean(axis=0), passes.var(axis=0, ddof=1) / len(passes)
+        one, two = exact
+        # Pixels are independent of each other: the variance of a mean of two is a quarter of the square of their difference.
+        other, apart = blocks(one + two) / 2.0, blocks((one - two) ** 2) / 4.0
+        error = np.sqrt(variance + apart)
+        # As many pixels as bear the variance: of few, two passes do not tell it.
+        known = 16.0 * apart**2 > FEWEST * blocks((one - two) ** 4)
+        if not known.any() or not other[-1] > 0.0:
+            return None
+        z = np.abs(value - other)[known] / error[known]
+        most = -NormalDist().inv_cdf(-np.expm1(np.log1p(-SIGNIFICANCE) / known.sum()) / 2)
+        return cls(float(value[-1] / other[-1] - 1.0), float(error[-1] / other[-1]), float(z.max()), float(most))
+
+    @property
+    def differs(self) -> bool:
+        """Whether a block differs by more than chance does."""
+        return self.farthest > self.most
+
+    @property
+    def bias(self) -> float:
+        """What all pixels may err by in common, relative: the difference, or what of it cannot be told from chance."""
+        return max(abs(self.difference), self.error)
+
+    @property
+    def sentence(self) -> str:
+        """A note for the map."""
+        light = f"{self.difference:+.2%} ± {self.error:.2%} of all light"
+        return f"compared with lines of sight that go on to the sources: {light}"
+
+    @property
+    def warning(self) -> str:
+        """What is added where the map differs, though patches were asked for."""
+        return (
+            f"; a part of the map differs by {self.farthest:.1f} standard errors: leave gather out, or add forward_rays"
+        )
+
+
+UNKNOWN = "too few pixels with light for a comparison with lines of sight that go on to the sources"
+
+NOT_TAKEN = (
+    "patches of diffuse surfaces with known light were tried and left out: a part of the map differed from lines of sight "
+    "that go on to the sources by more than chance does"
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Pilot:
+    """The first passes of a map both ways, which tell the better one.
+
+    Parameters
+    ----------
+    exact, gathered : list of list of ndarray
+        `PILOT` passes each, of lines that go on to the sources and of lines that end at patches.
+    gain : float
+        Square of the ratio of their errors, weighted by flux.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rng = np.random.default_rng(2)
+    >>> noisy = lambda number, survey: [rng.normal(10.0, 1.0 if survey is None else 0.25, (40, 30))]
+    >>> found = Pilot.of(noisy, "a survey", np.ones((40, 30)))
+    >>> bool(12 < found.gain < 20), found.pays
+    (True, True)
+    """
+
+    exact: list[list[Array]]
+    gathered: list[list[Array]]
+    gain: float
+
+    @classmethod
+    def of(cls, look: Look, survey: _core.Survey, area: Array) -> Pilot:
+        """Made with the first passes of a map, those that go on to the sources before the others.
+
+        Parameters
+        ----------
+        look : callable
+            The sums of a pass, by its number, with or without patches.
+        survey : Survey
+            The patches.
+        area : ndarray
+            Apparent area of the pixels, up to a factor.
+        """
+        exact = [look(number, None) for number in range(PILOT)]
+        gathered = [look(PILOT + number, survey) for number in range(PILOT)]
+        (one, two), (three, four) = ([found[0] * area for found in passes] for passes in (exact, gathered))
+        apart = np.abs(three - four).sum() * (one + two).sum()
+        whole = np.abs(one - two).sum() * (three + four).sum()
+        return cls(exact, gathered, float((whole / apart) ** 2) if apart > 0.0 else 0.0)
+
+    @property
+    def pays(self) -> bool:
+        """Whether patches are worth their rays, and show what is there."""
+        seen = Comparison.of([blocks(found[0]) for found in self.gathered], [found[0] for found in self.exact])
+        return self.gain > GAIN and seen is not None and not seen.differs
+
+    @property
+    def sentence(self) -> str:
+        """A note for the map."""
+        return (
+            f"in a pilot, the variance of lines of sight that go on to the sources was {self.gain:.1f} times that of lines "
+            "that end there"
+        )

@@ -178,11 +178,12 @@ class PathTracing(Method):
         such light, and how many rays balance its error with that of the rest; 0: none, and the map's notes say that it may
         be too low. With `until` their number grows with that of the lines of sight. Not of scatter events, which are rays
         traced forwards already.
-    gather : bool
-        Lines of sight end at the second diffuse surface, whose light is then known from rays traced forwards, as a mean
-        over small patches; of finishes that are not Lambertian a part of it is known, and lines go on for the rest. Many
-        times as fast where light goes to and fro between diffuse surfaces. Patches that light
-        does not reach evenly are not used; the map's notes tell how it compares with lines that go on.
+    gather : bool, optional
+        Whether lines of sight end at the second diffuse surface, whose light is then known from rays traced forwards, as a
+        mean over small patches; of finishes that are not Lambertian a part of it is known, and lines go on for the rest.
+        Many times as fast where light goes to and fro between diffuse surfaces. Patches that light does not reach evenly
+        are not used. The map's notes tell how it compares with lines that go on, and its errors hold what that leaves open.
+        If None, a pilot of a map of half a million lines or more tells whether it is better; not beside rays forwards.
 
     Raises
     ------
@@ -206,7 +207,7 @@ class PathTracing(Method):
     until: float | None = None
     seed: int = 1
     forward_rays: float | None = None
-    gather: bool = False
+    gather: bool | None = None
 
     NAME: ClassVar[str] = "pathtracing"
     SOURCES: ClassVar[str] = "scenes and scatter events"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -14,15 +14,25 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
-from etendue.luminance.caustics import Forward, LightImages, Plan, at_least_nearby, plan
-from etendue.luminance.gathering import CHECKS, FIRST_CHECK, blocks, comparison_note, survey_notes
+from etendue.luminance.caustics import Forward, LightImages, Plan, plan
+from etendue.luminance.gathering import (
+    FIRST_CHECK,
+    LEAST_LINES,
+    NOT_TAKEN,
+    PILOT,
+    UNKNOWN,
+    Comparison,
+    Look,
+    Pilot,
+    survey_notes,
+)
 from etendue.luminance.methods import PathTracing
+from etendue.luminance.passes import MOST_TIMES, Passes
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, checked_threads
-from etendue.quantities.relative_error import RelativeError
 from etendue.scatter.building import core_scene
 from etendue.scene import Compiled, Scene, compile_scene
 from etendue.scene.placement import Placement
@@ -33,9 +43,6 @@ from etendue.units import MM2_PER_M2
 Array = npt.NDArray[np.float64]
 Left = Literal["nothing", "caustics", "scattered"]
 """Light that lines of sight leave to rays traced forwards."""
-
-MOST_TIMES = 64
-"""How many times `rays_per_pixel` are followed at most to reach `until`."""
 
 MOST_EVENTS = 10_000
 """Surfaces that a line of sight may meet."""
@@ -70,42 +77,38 @@ def look_at_scene(
     if not compiled.record["sources"]:
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
     core = core_scene({**compiled.record, "detectors": []})
-    survey = _core.Survey(core, how.seed, MOST_EVENTS, threads) if how.gather else None
     forward = _forward(core, compiled, views, how, threads, wanted=scattered is None)
     images = forward.images
     notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=scattered is not None or images is not None)]
-    notes += [] if survey is None else survey_notes(survey)
     notes += [] if scattered is not None else forward.notes(how)
     left: Left = "scattered" if scattered is not None else "caustics" if images is not None else "nothing"
     origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
+    surveys = _Surveys(core, how.seed, threads)
     maps, done = [], 0
     for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, forward.plan.glints, strict=True)):
-        passes, gathered = _Passes(screen.shape, screen.cosine(observer)), []
+        lines = how.paths * screen.columns * screen.rows
 
         def look(
-            number: int, known: _core.Survey | None, view: _core._View = view, small: _core.Glints = small
+            number: int,
+            known: _core.Survey | None,
+            view: _core._View = view,
+            small: _core.Glints = small,
+            lines: int = lines,
         ) -> list[Array]:
+            nonlocal done
             guides = forward.shared, forward.plan.guide, small
-            return _core.look_at_scene(
+            found = _core.look_at_scene(
                 core, view, how.paths, how.seed, MOST_EVENTS, left, number, number + 1, threads, known, *guides
             )
-
-        wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
-        image = None if scattered is None else scattered[number]
-        while passes.done < wanted:
-            sum_, chance, deviation, *met = look(passes.done, survey)
-            passes.add(sum_, chance, deviation, *met)
-            gathered.append(blocks(sum_))
-            done += how.paths * screen.columns * screen.rows
+            done += lines
             if progress is not None:
                 progress(done)
-            if passes.done == wanted:
-                if images is not None:
-                    # Rays forwards keep their number for each line of sight.
-                    images.trace(-(-passes.done // how.passes))
-                    image = images.seen(number)
-                if how.until is not None:
-                    wanted = passes.wanted(how.until, most, image)
+            return found
+
+        image = None if scattered is None else scattered[number]
+        eye = _Eye(look, how, screen, screen.cosine(observer), images, number, image)
+        passes, common, about = eye.best(surveys)
+        image = eye.image
         paths = how.paths * passes.done
         told = [
             f"{paths:,} lines of sight per pixel, in {passes.done} independent passes",
@@ -117,8 +120,7 @@ def look_at_scene(
                 "as many lines of sight again look there; what the search for them missed is left to chance, and a pixel "
                 "that no line of sight lit states no error"
             )
-        if survey is not None and survey.patches()[0]:
-            told.append(comparison_note(gathered, [look(FIRST_CHECK + i, None)[0] for i in range(CHECKS)]))
+        told += about
         values, error = passes.total(image)
         if not values.any():
             told.append("the map is dark")
@@ -129,7 +131,7 @@ def look_at_scene(
         maps.append(
             LuminanceMap(
                 values * MM2_PER_M2,
-                error * MM2_PER_M2,
+                np.hypot(error, common * values) * MM2_PER_M2,
                 np.full(screen.shape, paths),
                 observer,
                 screen,
@@ -139,6 +141,97 @@ def look_at_scene(
             )
         )
     return maps
+
+
+class _Surveys:
+    """The patches of a scene, surveyed when they are first asked for."""
+
+    def __init__(self, core: _core.Scene, seed: int, threads: int | None) -> None:
+        self._made_of = core, seed, MOST_EVENTS, threads
+
+    @cached_property
+    def found(self) -> _core.Survey:
+        """The survey."""
+        return _core.Survey(*self._made_of)
+
+
+@dataclasses.dataclass(eq=False)
+class _Eye:
+    """The map of one observer in the making.
+
+    Parameters
+    ----------
+    look : callable
+        The sums of a pass.
+    how : PathTracing
+        What was asked for.
+    screen : Screen
+        Its pixels.
+    area : ndarray
+        Their apparent area, up to a factor.
+    images : LightImages, optional
+        Rays forwards, which keep their number for each line of sight.
+    number : int
+        Of the observer among those of the rays forwards.
+    image : Forward, optional
+        What comes by another route.
+    """
+
+    look: Look
+    how: PathTracing
+    screen: Screen
+    area: Array
+    images: LightImages | None
+    number: int
+    image: Forward | None
+
+    def best(self, surveys: _Surveys) -> tuple[Passes, float, list[str]]:
+        """The passes of the map, what all its pixels may err by in common (relative), and notes about both.
+
+        Lines of sight end at patches if that is asked for, or if nothing is said and a pilot finds it better. The passes of
+        the pilot are those of the map, or what the map is compared with.
+        """
+        if self.how.gather:
+            survey = surveys.found
+            passes, told = self._followed(survey), survey_notes(survey)
+            if not survey.patches()[0]:
+                return passes, 0.0, told
+            exact = [self.look(FIRST_CHECK + number, None)[0] for number in range(PILOT)]
+            seen = Comparison.of(passes.blocks, exact)
+            if seen is None:
+                return passes, 0.0, [*told, UNKNOWN]
+            return passes, seen.bias, [*told, seen.sentence + (seen.warning if seen.differs else "")]
+        if not self._may_gather() or not surveys.found.patches()[1]:
+            return self._followed(None), 0.0, []
+        survey = surveys.found
+        pilot = Pilot.of(self.look, survey, self.area)
+        if not pilot.pays:
+            return self._followed(None, pilot.exact), 0.0, []
+        passes = self._followed(survey, pilot.gathered, PILOT)
+        seen = Comparison.of(passes.blocks, [found[0] for found in pilot.exact])
+        if seen is None or seen.differs:
+            return self._followed(None, pilot.exact), 0.0, [NOT_TAKEN]
+        return passes, seen.bias, [*survey_notes(survey), pilot.sentence, seen.sentence]
+
+    def _may_gather(self) -> bool:
+        """Whether to try patches unasked: not beside light by another route, which is shared out differently then."""
+        lines = self.how.paths * self.how.passes * self.screen.columns * self.screen.rows
+        return self.how.gather is None and self.images is None and self.image is None and lines >= LEAST_LINES
+
+    def _followed(self, known: _core.Survey | None, made: Sequence[list[Array]] = (), first: int = 0) -> Passes:
+        """As many passes as the map needs, from number `first` on; those that are made already come before others."""
+        how, passes = self.how, Passes(self.screen.shape, self.area)
+        wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
+        while passes.done < wanted:
+            passes.add(*(made[passes.done] if passes.done < len(made) else self.look(first + passes.done, known)))
+            if passes.done == wanted:
+                if self.images is not None:
+                    # Rays forwards keep their number for each line of sight.
+                    self.images.trace(-(-passes.done // how.passes))
+                    self.image = self.images.seen(self.number)
+                if how.until is not None:
+                    wanted = passes.wanted(how.until, most, self.image)
+        return passes
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -190,101 +283,6 @@ def _forward(
         shared = None if how.gather else found.rays / lines
         images = LightImages(compiled.record, views, found, shared, how.seed, MOST_EVENTS, threads)
     return _Forward(found, images, shared, possible)
-
-
-class _Passes:
-    """Mean and spread of independent passes, updated pass by pass (Welford): no difference of large numbers."""
-
-    def __init__(self, shape: tuple[int, int], area: Array) -> None:
-        self.done = 0
-        self._area = area
-        self._all = _Spread(shape)
-        self._chance = _Spread(shape)
-        self._lucky = np.zeros(shape, dtype=np.int64)
-        self._smooth = np.zeros(shape, dtype=bool)
-        self._diffuse = np.zeros(shape, dtype=bool)
-        self._deviation = np.zeros(shape)
-
-    def add(self, values: Array, chance: Array, deviation: Array, smooth: Array, diffuse: Array) -> None:
-        """One pass more.
-
-        Its mean luminances, what of them was found by chance, the deviation that sources state of theirs, and the shares of
-        the lines that met a smooth surface first, and that saw a diffuse one directly.
-        """
-        self.done += 1
-        self._all.add(values, self.done)
-        self._chance.add(chance, self.done)
-        self._lucky += chance > 0.0
-        self._smooth |= smooth > 0.0
-        self._diffuse |= diffuse > 0.0
-        self._deviation = self._deviation + (deviation - self._deviation) / self.done
-
-    def total(self, image: Forward | None, *, known: bool = True) -> tuple[Array, Array]:
-        """The luminance of both routes and its standard error; with what the sources know of their own, if `known`.
-
-        What is found by chance, in few passes of a pixel, errs by no less than in its neighbourhood.
-        """
-        chance = self._chance.variance(self.done)
-        variance = self._all.variance(self.done) + (at_least_nearby(chance, self._lucky, self._smooth) - chance)
-        values = self._all.mean
-        if image is not None:
-            values = values + image.values
-            variance = variance + image.with_neighbours(self._diffuse).error ** 2
-        return values, np.sqrt(variance + (self._deviation**2 if known else 0.0))
-
-    def relative_error(self, image: Forward | None) -> float:
-        """Sampling error over the luminance, weighted by flux (`RelativeError`); 0 if there is no light."""
-        found = RelativeError.of(*self.total(image, known=False), self._area)
-        return 0.0 if found is None else found.flux_weighted
-
-    def wanted(self, until: float, most: int, image: Forward | None) -> int:
-        """Passes that should be made to reach a relative error: as many as its fall with 1/√n asks for, twice at most."""
-        error = self.relative_error(image)
-        if error < until:
-            return self.done
-        return min(most, 2 * self.done, max(self.done + 1, math.ceil(1.1 * self.done * (error / until) ** 2)))
-
-    def notes(self, until: float | None, image: Forward | None) -> list[str]:
-        """How sure the map is."""
-        values, _ = self.total(image)
-        notes = [] if (self._all.mean > 0.0).any() else ["no line of sight met light"]
-        if not (values > 0.0).any():
-            return notes
-        reached = self.relative_error(image)
-        notes.append(
-            f"sampling error {reached:.2%} of the luminance, weighted by flux; that of lines of sight has "
-            f"{self.done - 1} degrees of freedom"
-        )
-        if until is not None and reached >= until:
-            notes.append(f"stopped before {until:.2%} was reached, at {MOST_TIMES} times rays_per_pixel")
-        rare = (self._lucky > 0) & (self._lucky < self.done / 2)
-        if rare.any():
-            part = float(self._chance.mean.sum() / values.sum())
-            largest = np.unravel_index(np.argmax(np.where(rare, self._chance.mean, 0.0)), values.shape)
-            row, column = (int(i) for i in largest)
-            notes.append(
-                f"{part:.2%} of the light was found by chance, behind lenses or in mirrors; pixels where fewer than half "
-                f"of the passes found any: {int(rare.sum()):,}, most in row {row}, column {column} (from 0); single ones "
-                "may err by more than their errors say"
-            )
-        return notes
-
-
-class _Spread:
-    """Mean of passes, and the sum of the squares of what they differ from it."""
-
-    def __init__(self, shape: tuple[int, int]) -> None:
-        self.mean = np.zeros(shape)
-        self._squares = np.zeros(shape)
-
-    def add(self, values: Array, number: int) -> None:
-        off = values - self.mean
-        self.mean = self.mean + off / number
-        self._squares = self._squares + off * (values - self.mean)
-
-    def variance(self, passes: int) -> Array:
-        """Of the mean."""
-        return self._squares / ((passes - 1) * passes)
 
 
 Fits = dict[tuple[object, ...], LightField]

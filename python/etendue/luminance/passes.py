@@ -1,0 +1,116 @@
+"""Mean and spread of the independent passes of a map, and what they tell of its error."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue.luminance.caustics import Forward, at_least_nearby
+from etendue.luminance.gathering import blocks
+from etendue.quantities.relative_error import RelativeError
+
+Array = npt.NDArray[np.float64]
+
+MOST_TIMES = 64
+"""How many times `rays_per_pixel` are followed at most to reach `until`."""
+
+
+class Passes:
+    """Mean and spread of independent passes, updated pass by pass (Welford): no difference of large numbers."""
+
+    def __init__(self, shape: tuple[int, int], area: Array) -> None:
+        self.done = 0
+        self.blocks: list[Array] = []
+        """The light of each pass by blocks of the map (`etendue.luminance.gathering.blocks`)."""
+        self._area = area
+        self._all = Spread(shape)
+        self._chance = Spread(shape)
+        self._lucky = np.zeros(shape, dtype=np.int64)
+        self._smooth = np.zeros(shape, dtype=bool)
+        self._diffuse = np.zeros(shape, dtype=bool)
+        self._deviation = np.zeros(shape)
+
+    def add(self, values: Array, chance: Array, deviation: Array, smooth: Array, diffuse: Array) -> None:
+        """One pass more.
+
+        Its mean luminances, what of them was found by chance, the deviation that sources state of theirs, and the shares of
+        the lines that met a smooth surface first, and that saw a diffuse one directly.
+        """
+        self.done += 1
+        self.blocks.append(blocks(values))
+        self._all.add(values, self.done)
+        self._chance.add(chance, self.done)
+        self._lucky += chance > 0.0
+        self._smooth |= smooth > 0.0
+        self._diffuse |= diffuse > 0.0
+        self._deviation = self._deviation + (deviation - self._deviation) / self.done
+
+    def total(self, image: Forward | None, *, known: bool = True) -> tuple[Array, Array]:
+        """The luminance of both routes and its standard error; with what the sources know of their own, if `known`.
+
+        What is found by chance, in few passes of a pixel, errs by no less than in its neighbourhood.
+        """
+        chance = self._chance.variance(self.done)
+        variance = self._all.variance(self.done) + (at_least_nearby(chance, self._lucky, self._smooth) - chance)
+        values = self._all.mean
+        if image is not None:
+            values = values + image.values
+            variance = variance + image.with_neighbours(self._diffuse).error ** 2
+        return values, np.sqrt(variance + (self._deviation**2 if known else 0.0))
+
+    def relative_error(self, image: Forward | None) -> float:
+        """Sampling error over the luminance, weighted by flux (`RelativeError`); 0 if there is no light."""
+        found = RelativeError.of(*self.total(image, known=False), self._area)
+        return 0.0 if found is None else found.flux_weighted
+
+    def wanted(self, until: float, most: int, image: Forward | None) -> int:
+        """Passes that should be made to reach a relative error: as many as its fall with 1/√n asks for, twice at most."""
+        error = self.relative_error(image)
+        if error < until:
+            return self.done
+        return min(most, 2 * self.done, max(self.done + 1, math.ceil(1.1 * self.done * (error / until) ** 2)))
+
+    def notes(self, until: float | None, image: Forward | None) -> list[str]:
+        """How sure the map is."""
+        values, _ = self.total(image)
+        notes = [] if (self._all.mean > 0.0).any() else ["no line of sight met light"]
+        if not (values > 0.0).any():
+            return notes
+        reached = self.relative_error(image)
+        notes.append(
+            f"sampling error {reached:.2%} of the luminance, weighted by flux; that of lines of sight has "
+            f"{self.done - 1} degrees of freedom"
+        )
+        if until is not None and reached >= until:
+            notes.append(f"stopped before {until:.2%} was reached, at {MOST_TIMES} times rays_per_pixel")
+        rare = (self._lucky > 0) & (self._lucky < self.done / 2)
+        if rare.any():
+            part = float(self._chance.mean.sum() / values.sum())
+            largest = np.unravel_index(np.argmax(np.where(rare, self._chance.mean, 0.0)), values.shape)
+            row, column = (int(i) for i in largest)
+            notes.append(
+                f"{part:.2%} of the light was found by chance, behind lenses or in mirrors; pixels where fewer than half "
+                f"of the passes found any: {int(rare.sum()):,}, most in row {row}, column {column} (from 0); single ones "
+                "may err by more than their errors say"
+            )
+        return notes
+
+
+class Spread:
+    """Mean of passes, and the sum of the squares of what they differ from it."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.mean = np.zeros(shape)
+        self._squares = np.zeros(shape)
+
+    def add(self, values: Array, number: int) -> None:
+        """One pass more, the so many-th."""
+        off = values - self.mean
+        self.mean = self.mean + off / number
+        self._squares = self._squares + off * (values - self.mean)
+
+    def variance(self, passes: int) -> Array:
+        """Of the mean."""
+        return self._squares / ((passes - 1) * passes)
