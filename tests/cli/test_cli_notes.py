@@ -18,7 +18,7 @@ import pytest
 from etendue.cli.verbs import VERBS
 from etendue.cli.wording import in_options
 from etendue.goniophotometry.far_field import intensity_distribution
-from etendue.lightfield.fit_cache import FOLDER_VARIABLE
+from etendue.lightfield.fit_cache import FOLDER_VARIABLE, fit_or_recall
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.surfaces import parse_surface
 from etendue.plot.scene_layout import lay_out_scene
@@ -110,6 +110,12 @@ def led_rays() -> et.RaySet:
 DIFFUSER = et.bsdf.Gaussian(peak=500.0, sigma=0.015, way="transmitted")
 
 
+@pytest.fixture(scope="session")
+def kept_fields(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for the light fields that the calls fit."""
+    return tmp_path_factory.mktemp("kept")
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("notes")
@@ -125,8 +131,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         warnings.simplefilter("ignore")
         spoilt = et.read_rays(place / "led.tm25ray")
         et.LightField.fit(spoilt, "auto", symmetry="auto", depths=(2, 2, 2, 2)).save(place / "led.h5")
-        for name in ("scene", "events", "rcs"):
-            et.trace(et.Scene.load(place / f"{name}.toml"), 50_000, 2).save(place / f"{name}.result.h5")
+        for name, number in (("scene", 50_000), ("events", 50_000), ("rcs", 5_000)):
+            et.trace(et.Scene.load(place / f"{name}.toml"), number, 2).save(place / f"{name}.result.h5")
         cone = et.luminance_map(spoilt, OBSERVER, SCREEN, method="cone", acceptance=8)
         cone.save(place / "map.npz")
         black = cone.replace(values=np.zeros(cone.values.shape), standard_error=np.zeros(cone.values.shape))
@@ -321,10 +327,10 @@ def view(place: Path) -> Iterator[Case]:
     field = et.LightField.load(place / "led.h5")
     yield Case(("view", place / "led.h5", "-o", "out.html"), field.notes)
     rays = et.read_rays(place / "led.tm25ray")
-    yield Case(("view", place / "led.tm25ray", "-o", "out.html"), (*et.LightField.fit(rays).notes, *of_rays(rays)))
+    yield Case(("view", place / "led.tm25ray", "-o", "out.html"), (*fit_or_recall(rays).notes, *of_rays(rays)))
     yield Case(("view", place / "map.npz", "-o", "out.html"), et.read_map(place / "map.npz").notes)
     kept = et.TraceResult.load(place / "rcs.result.h5").rays.only
-    yield Case(("view", place / "rcs.result.h5", "-o", "out.html"), (*et.LightField.fit(kept).notes, *of_rays(kept)))
+    yield Case(("view", place / "rcs.result.h5", "-o", "out.html"), (*fit_or_recall(kept).notes, *of_rays(kept)))
 
 
 def goniophotometer(place: Path) -> Iterator[Case]:
@@ -392,10 +398,10 @@ def test_every_verb_is_here() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("verb", [verb for verb in VERBS if CASES.get(verb)])
 def test_what_python_knows_is_printed(
-    verb: str, run: Run, folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+    verb: str, run: Run, folder: Path, kept_fields: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The light field of a file is fitted once for all calls.
-    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path_factory.mktemp("kept")))
+    monkeypatch.setenv(FOLDER_VARIABLE, str(kept_fields))
     call = CASES[verb]
     assert call is not None
     with warnings.catch_warnings():

@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from etendue.lightfield.fit_cache import FOLDER_VARIABLE
 from oracles.step import half_ball
 
 from docs.materials import PUBLIC, write_materials
@@ -30,6 +31,12 @@ def materials(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureR
     with contextlib.suppress(pytest.skip.Exception):
         shutil.copy(request.getfixturevalue("samples") / "rays" / PUBLIC, folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def kept_fields(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for the light fields that pages fit."""
+    return tmp_path_factory.mktemp("kept")
 
 
 def test_the_tutorial_runs_on_its_public_file(samples: Path, materials: Path) -> None:
@@ -58,9 +65,12 @@ def test_the_blocks_were_found() -> None:
 # A page is many commands, each of which has a limit of its own; on a busy machine they add up.
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("page", [p for p in PAGES if any(b.language in RUNNABLE for b in blocks(p))], ids=name_of)
-def test_blocks_run(page: Path, materials: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In one folder that holds the ray files the pages speak of."""
+def test_blocks_run(
+    page: Path, materials: Path, kept_fields: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In one folder that holds the ray files the pages speak of; fits are kept as a reader's are."""
     for file in materials.iterdir():
         shutil.copy(file, tmp_path)
+    monkeypatch.setenv(FOLDER_VARIABLE, str(kept_fields))
     monkeypatch.chdir(tmp_path)
     run_page(page)

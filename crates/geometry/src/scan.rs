@@ -2,9 +2,11 @@
 
 use std::ops::ControlFlow;
 
+use multiversion::multiversion;
+
 use crate::pass::{Sums, over_all_rays};
 use crate::pass_account::PassAccount;
-use crate::ray_batch::RayBatch;
+use crate::ray_batch::{LANES, RayBatch};
 use crate::source::RaySource;
 
 /// What a ray set amounts to. Sums run over the usable rays, in file order by batches.
@@ -46,24 +48,23 @@ impl Default for Scan {
 impl Sums for Scan {
     fn add_block(&mut self, batch: &RayBatch) {
         self.tally.add_block(batch);
-        for i in (0..batch.len).filter(|&i| batch.usable(i)) {
-            let (x, k, w) = (batch.position(i), batch.direction(i), batch.flux[i]);
-            self.zero_flux += u64::from(w == 0.0);
-            widen(&mut self.flux_range, w);
-            let kx = x.dot(k);
-            for (axis, (p, d)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
-                widen(&mut self.bounds[axis], p);
-                self.weighted_position[axis] += w * p;
-                self.weighted_direction[axis] += w * d;
-                self.focus_rhs[axis] += w * (p - kx * d);
-            }
-            for (sum, product) in
-                self.weighted_outer
-                    .iter_mut()
-                    .zip([k.x * k.x, k.x * k.y, k.x * k.z, k.y * k.y, k.y * k.z, k.z * k.z])
-            {
-                *sum += w * product;
-            }
+        let n = batch.len;
+        let position = batch.position.each_ref().map(|axis| &axis[..n]);
+        let direction = batch.direction.each_ref().map(|axis| &axis[..n]);
+        let found = lanes(position, direction, &batch.flux[..n]);
+        self.zero_flux += found.zeros.iter().sum::<u64>();
+        let ranges = self.bounds.iter_mut().chain(std::iter::once(&mut self.flux_range));
+        for ((range, low), high) in ranges.zip(found.low).zip(found.high) {
+            widen_by(
+                range,
+                low.into_iter().fold(f64::INFINITY, f64::min),
+                high.into_iter().fold(f64::NEG_INFINITY, f64::max),
+            );
+        }
+        let targets = self.weighted_position.iter_mut().chain(&mut self.weighted_direction);
+        let targets = targets.chain(&mut self.focus_rhs).chain(&mut self.weighted_outer);
+        for (target, sum) in targets.zip(found.sums) {
+            *target += sum.into_iter().sum::<f64>();
         }
     }
 
@@ -73,8 +74,7 @@ impl Sums for Scan {
         for (range, o) in
             std::iter::once((&mut self.flux_range, other.flux_range)).chain(self.bounds.iter_mut().zip(other.bounds))
         {
-            widen(range, o[0]);
-            widen(range, o[1]);
+            widen_by(range, o[0], o[1]);
         }
         let add = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         add(&mut self.weighted_position, &other.weighted_position);
@@ -84,9 +84,102 @@ impl Sums for Scan {
     }
 }
 
-fn widen(range: &mut [f64; 2], value: f64) {
-    range[0] = range[0].min(value);
-    range[1] = range[1].max(value);
+fn widen_by(range: &mut [f64; 2], low: f64, high: f64) {
+    range[0] = range[0].min(low);
+    range[1] = range[1].max(high);
+}
+
+/// One value for each lane.
+type Lane<T> = [T; LANES];
+
+/// What a block amounts to, lane by lane.
+struct Lanes {
+    /// Σ w x, Σ w k, Σ w (x − (x·k) k) and Σ w k kᵀ; rays that cannot be used have no flux.
+    sums: [Lane<f64>; 15],
+    /// Smallest coordinates and flux of the usable rays.
+    low: [Lane<f64>; 4],
+    /// Largest ones.
+    high: [Lane<f64>; 4],
+    /// Usable rays without flux.
+    zeros: Lane<u64>,
+}
+
+/// Sums and extremes of a block.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn lanes(position: [&[f64]; 3], direction: [&[f64]; 3], flux: &[f64]) -> Lanes {
+    let mut found = Lanes {
+        sums: [[0.0; LANES]; 15],
+        low: [[f64::INFINITY; LANES]; 4],
+        high: [[f64::NEG_INFINITY; LANES]; 4],
+        zeros: [0; LANES],
+    };
+    let [px, py, pz] = position.map(|axis| axis.as_chunks::<LANES>());
+    let [kx, ky, kz] = direction.map(|axis| axis.as_chunks::<LANES>());
+    let w = flux.as_chunks::<LANES>();
+    let rays = px.0.iter().zip(py.0).zip(pz.0).zip(kx.0).zip(ky.0).zip(kz.0).zip(w.0);
+    for ((((((px, py), pz), kx), ky), kz), w) in rays {
+        add(&mut found, [px, py, pz], [kx, ky, kz], w);
+    }
+    // The last ones beside lanes with nothing in them.
+    let last = |rest: &[f64]| -> Lane<f64> { std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0)) };
+    let (position, direction) = (
+        [px, py, pz].map(|axis| last(axis.1)),
+        [kx, ky, kz].map(|axis| last(axis.1)),
+    );
+    add(&mut found, position.each_ref(), direction.each_ref(), &last(w.1));
+    found
+}
+
+/// Adds a ray to each lane.
+#[inline(always)]
+fn add(found: &mut Lanes, [px, py, pz]: [&Lane<f64>; 3], [kx, ky, kz]: [&Lane<f64>; 3], w: &Lane<f64>) {
+    let (mut along, mut usable) = ([0.0; LANES], [0_u64; LANES]);
+    for lane in 0..LANES {
+        along[lane] = px[lane] * kx[lane] + py[lane] * ky[lane] + pz[lane] * kz[lane];
+        usable[lane] = u64::from((kx[lane] != 0.0) | (ky[lane] != 0.0) | (kz[lane] != 0.0));
+        found.zeros[lane] += usable[lane] & u64::from(w[lane] == 0.0);
+    }
+    for (extremes, value) in found.low.iter_mut().zip(&mut found.high).zip([px, py, pz, w]) {
+        let (low, high) = extremes;
+        for lane in 0..LANES {
+            let value = value[lane];
+            low[lane] = if (usable[lane] != 0) & (value < low[lane]) {
+                value
+            } else {
+                low[lane]
+            };
+            high[lane] = if (usable[lane] != 0) & (value > high[lane]) {
+                value
+            } else {
+                high[lane]
+            };
+        }
+    }
+    let [x, y, z, u, v, t, fx, fy, fz, xx, xy, xz, yy, yz, zz] = &mut found.sums;
+    for (sum, value) in [(x, px), (y, py), (z, pz), (u, kx), (v, ky), (t, kz)] {
+        add_up(sum, w, |lane| value[lane]);
+    }
+    for (sum, p, k) in [(fx, px, kx), (fy, py, ky), (fz, pz, kz)] {
+        add_up(sum, w, |lane| p[lane] - along[lane] * k[lane]);
+    }
+    for (sum, a, b) in [
+        (xx, kx, kx),
+        (xy, kx, ky),
+        (xz, kx, kz),
+        (yy, ky, ky),
+        (yz, ky, kz),
+        (zz, kz, kz),
+    ] {
+        add_up(sum, w, |lane| a[lane] * b[lane]);
+    }
+}
+
+/// Adds a term of each ray, times its flux, to the sum of its lane.
+#[inline(always)]
+fn add_up(sum: &mut Lane<f64>, w: &Lane<f64>, term: impl Fn(usize) -> f64) {
+    for (lane, sum) in sum.iter_mut().enumerate() {
+        *sum += w[lane] * term(lane);
+    }
 }
 
 /// Scans a whole source. Ends early, with the sums so far, if `progress` breaks.
@@ -139,5 +232,45 @@ mod tests {
         let rhs = plain(&|r| r[6] * (r[2] - (r[0] * r[3] + r[1] * r[4] + r[2] * r[5]) * r[5]));
         assert!((scanned.focus_rhs[2] / rhs - 1.0).abs() < 1e-12);
         assert!((scanned.bounds[0][0] + 1.0).abs() < 1e-15 && (scanned.flux_range[0] - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn rays_that_cannot_be_used_widen_nothing() {
+        // Eleven rays: one lane is longer than others. Every ray lies off the origin, where defective ones are put.
+        let ray = |i: usize| {
+            let t = i as f64;
+            let spoilt = [f64::NAN, 0.0, f64::INFINITY][i % 3];
+            let flux = [2.0, 0.0, 3.0 + t][i % 3];
+            let k = if i == 4 { 0.0 } else { 0.6 };
+            let z = if i % 4 == 3 { spoilt } else { 0.8 };
+            [
+                3.0 + t,
+                -2.0 - t,
+                5.0,
+                0.0,
+                k,
+                if i == 4 { 0.0 } else { z },
+                if i == 8 { -1.0 } else { flux },
+            ]
+        };
+        let bytes: Vec<u8> = (0..11).flat_map(ray).flat_map(f64::to_le_bytes).collect();
+        let layout = Layout {
+            stride: 56,
+            position: Some(0),
+            direction: 24,
+            flux: 48,
+            float: Float::F64,
+            colour: None,
+            length_scale: 1.0,
+        };
+        let table = RayTable::new(&bytes, layout).expect("valid");
+        let scanned = scan(&table, 1, |_| ControlFlow::Continue(()));
+        // 3: not a number; 4: no direction; 8: negative flux. That z is 0 at 7 is no defect.
+        assert_eq!(scanned.tally.defects, [1, 1, 1]);
+        assert_eq!(scanned.bounds, [[3.0, 13.0], [-12.0, -2.0], [5.0, 5.0]]);
+        assert_eq!((scanned.flux_range, scanned.zero_flux), ([0.0, 8.0], 3));
+        let used = [0, 1, 2, 5, 6, 7, 9, 10].map(ray);
+        let first: f64 = used.iter().map(|r| r[6] * r[0]).sum();
+        assert!((scanned.weighted_position[0] / first - 1.0).abs() < 1e-14);
     }
 }

@@ -180,8 +180,8 @@ impl<'a> RayTable<'a> {
                 column.append(records, self.layout.stride, &mut batch.colour);
             }
             match self.layout.float {
-                Float::F32 => decode(records, &self.layout, batch, 4, read_f32),
-                Float::F64 => decode(records, &self.layout, batch, 8, read_f64),
+                Float::F32 => decode::<4, 12>(records, &self.layout, batch, |b| f64::from(f32::from_le_bytes(b))),
+                Float::F64 => decode::<8, 24>(records, &self.layout, batch, f64::from_le_bytes),
             }
         }
         batch.room = room;
@@ -213,24 +213,46 @@ fn read_i32(record: &[u8], offset: usize) -> f64 {
 }
 
 /// One pass over the records with the column reader known at compile time; they come behind those of the batch.
-fn decode(records: &[u8], layout: &Layout, batch: &mut RayBatch, width: usize, read: impl Fn(&[u8], usize) -> f64) {
-    let [px, py, pz] = &mut batch.position;
-    let [kx, ky, kz] = &mut batch.direction;
-    let scale = layout.length_scale;
-    let first = batch.len;
-    batch.len += records.len() / layout.stride;
-    for (i, record) in (first..).zip(records.chunks_exact(layout.stride)) {
-        if let Some(p) = layout.position {
-            px[i] = read(record, p) * scale;
-            py[i] = read(record, p + width) * scale;
-            pz[i] = read(record, p + 2 * width) * scale;
-        } else {
-            (px[i], py[i], pz[i]) = (0.0, 0.0, 0.0);
+///
+/// `W` is the width of a float, `W3` that of three.
+#[inline(always)]
+fn decode<const W: usize, const W3: usize>(
+    records: &[u8],
+    layout: &Layout,
+    batch: &mut RayBatch,
+    read: impl Fn([u8; W]) -> f64,
+) {
+    let one = |record: &[u8], offset: usize| -> f64 {
+        let mut bytes = [0; W];
+        bytes.copy_from_slice(&record[offset..offset + W]);
+        read(bytes)
+    };
+    // One look at the bounds for three columns.
+    let three = |record: &[u8], offset: usize| -> [f64; 3] {
+        let columns = &record[offset..offset + W3];
+        std::array::from_fn(|axis| one(columns, axis * W))
+    };
+    let (direction, flux, scale) = (layout.direction, layout.flux, layout.length_scale);
+    let count = records.len() / layout.stride;
+    let range = batch.len..batch.len + count;
+    batch.len = range.end;
+    let [px, py, pz] = batch.position.each_mut().map(|axis| &mut axis[range.clone()]);
+    let [kx, ky, kz] = batch.direction.each_mut().map(|axis| &mut axis[range.clone()]);
+    let w = &mut batch.flux[range];
+    let each = || records.chunks_exact(layout.stride);
+    if let Some(position) = layout.position {
+        for (((x, y), z), record) in px.iter_mut().zip(py).zip(pz).zip(each()) {
+            let found = three(record, position);
+            (*x, *y, *z) = (found[0] * scale, found[1] * scale, found[2] * scale);
         }
-        kx[i] = read(record, layout.direction);
-        ky[i] = read(record, layout.direction + width);
-        kz[i] = read(record, layout.direction + 2 * width);
-        batch.flux[i] = read(record, layout.flux);
+    } else {
+        for axis in [px, py, pz] {
+            axis.fill(0.0);
+        }
+    }
+    for ((((x, y), z), w), record) in kx.iter_mut().zip(ky).zip(kz).zip(w).zip(each()) {
+        [*x, *y, *z] = three(record, direction);
+        *w = one(record, flux);
     }
 }
 
