@@ -101,3 +101,20 @@ def test_volume(kind: str) -> None:
                 t = [hit[0] for hit in hits(faces, o=o, d=axes[:, 2])]
                 total += sum(t[1::2]) - sum(t[::2])
     assert total * (side / n) ** 2 == pytest.approx(volume, rel=8e-3)
+
+
+def test_equal_bodies_share_their_faces_and_stand_where_they_are_put() -> None:
+    """The frame of each face is that of its body, then its own; what is shared is not moved."""
+    shape = {"kind": "prism", "vertices": [[0, 0], [4, 1], [1, 3]], "height": 2}
+    places = [{"at": [1, 2, 3], "rotation": [20, 30, 40]}, {"at": [-5, 0, 9], "toward": [1, -2, 0.5], "spin": 70}]
+    solids = [{"shape": shape, "medium": "BK7", **place} for place in places]
+    scene = Scene(solids=[*solids, {"shape": {**shape, "height": 3}, "medium": "BK7", "at": [20, 0, 0]}])
+    faces = compile_scene(scene).record["faces"]
+    assert len(faces) == 15
+    for number, solid in enumerate(scene.solids):
+        own = [face for face in faces if face["solid"] == number]
+        for face, row in zip(solid.shape.faces(scene.files), own, strict=True):
+            expected = solid.frame().then(face.frame).record()
+            assert row["frame"] == pytest.approx(expected, abs=1e-15)
+    assert all(a["shape"] is b["shape"] for a, b in zip(faces[:5], faces[5:10], strict=True))
+    assert not any(a["shape"] is b["shape"] for a, b in zip(faces[:5], faces[10:], strict=True))

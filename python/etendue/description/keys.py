@@ -56,9 +56,9 @@ class Description(BaseModel):
         return f" Give {cls.INSTEAD[key].format(shown(value))}." if key in cls.INSTEAD else _hint(key, known)
 
     @classmethod
-    def names_by_key(cls) -> dict[str, str]:
+    def names_by_key(cls) -> Mapping[str, str]:
         """The name of the attribute under each key; they differ where a method has the name of the key."""
-        return {field.alias or name: name for name, field in cls.model_fields.items()}
+        return _names_by_key(cls)
 
     @model_validator(mode="wrap")
     @classmethod
@@ -100,6 +100,11 @@ class Description(BaseModel):
             if name == "kind" or value != field.get_default(call_default_factory=True):
                 written[key] = _plain(value)
         return written
+
+
+@functools.cache
+def _names_by_key(kind: type[Description]) -> Mapping[str, str]:
+    return MappingProxyType({field.alias or name: name for name, field in kind.model_fields.items()})
 
 
 def _plain(value: Any) -> Any:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from etendue.description.mistakes import join
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
 from etendue.quantities.fingerprint import fingerprint
+from etendue.scene.bodies.body import Body, Face
 from etendue.scene.colour_dependence import telling_finishes, telling_media
 from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
@@ -96,6 +97,30 @@ def compile_scene(scene: Scene) -> Compiled:
     return _Compiler(scene).compiled()
 
 
+class _Faces:
+    """The faces of a body, wherever it stands.
+
+    Parameters
+    ----------
+    faces : tuple of Face
+        In the coordinates of the body.
+    """
+
+    def __init__(self, faces: tuple[Face, ...]) -> None:
+        self.faces = faces
+        self.doubts = [doubt for face in faces for doubt in face.doubts]
+        self._origins = np.array([face.frame.origin for face in faces])
+        # Transposed: the axes of a face are the rows.
+        self._axes = np.array([face.frame.axes.T for face in faces])
+
+    def placed(self, frame: Frame) -> list[list[float]]:
+        """The records of all frames (`Frame.record`) in a body that stands so."""
+        origins = frame.origin + self._origins @ frame.axes.T
+        axes = self._axes @ frame.axes.T
+        rows: list[list[float]] = np.concatenate([origins, axes.reshape(-1, 9)], axis=1).tolist()
+        return rows
+
+
 class _Compiler:
     """The rows under construction, and the mistakes found so far."""
 
@@ -115,6 +140,8 @@ class _Compiler:
         self.sets: list[Any] = []
         self.used: list[npt.NDArray[np.float64]] = []
         self.means: dict[str, npt.NDArray[np.float64]] = {}
+        self.bodies: dict[Body, _Faces] = {}
+        self.named_finishes: dict[str, tuple[int, bool, Axis]] = {}
 
     def compiled(self) -> Compiled:
         """Everything, or all mistakes."""
@@ -188,6 +215,8 @@ class _Compiler:
     def _finish(self, place: str, owner: str, given: Finish | str) -> tuple[int, bool, Axis]:
         """Number of a finish, written down when it is first met; whether it lets light in; its axis, if it has one."""
         if isinstance(given, str):
+            if given in self.named_finishes:
+                return self.named_finishes[given]
             name = given
             finish = self.scene.finishes.get(given) or BUILT_IN.get(given)
             if finish is None:
@@ -202,7 +231,10 @@ class _Compiler:
             with self._at(f"finishes.{name}" if given in self.scene.finishes else place):
                 self.rows["finishes"].append(finish.record(self.files))
                 self.names["finishes"].append(name)
-        return self.numbers[key], finish.lets_light_in(self.files), getattr(finish, "axis", None)
+        found = self.numbers[key], finish.lets_light_in(self.files), getattr(finish, "axis", None)
+        if isinstance(given, str):
+            self.named_finishes[given] = found
+        return found
 
     def _check_indices(self) -> None:
         """Every medium has an index at every wavelength of the sources; a library's range is a note."""
@@ -252,13 +284,12 @@ class _Compiler:
         frame = solid.frame()
         entered = closed = False
         with self._at(join(place, "shape")):
-            faces = solid.shape.faces(self.files)
-            doubts = [doubt for face in faces for doubt in face.doubts]
-            closed = not doubts
-            for doubt in doubts:
+            body = self._body(solid.shape)
+            closed = not body.doubts
+            for doubt in body.doubts:
                 self._doubt(f"{place}: {doubt}", 5)
-            self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(faces)]
-            for face in faces:
+            self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(body.faces)]
+            for face, placed in zip(body.faces, body.placed(frame), strict=True):
                 key, given = solid.finish_of(face)
                 where, owner = ("finish", name) if key is None else (f"finishes.{key}", f"{name}.{key}")
                 finish, lets_in, axis = self._finish(join(place, where), owner, given)
@@ -267,7 +298,7 @@ class _Compiler:
                 self.rows["faces"].append(
                     {
                         "shape": face.shape,
-                        "frame": frame.then(face.frame).record(),
+                        "frame": placed,
                         "trims": [],
                         "solid": number,
                         "flip": face.flip,
@@ -283,6 +314,17 @@ class _Compiler:
         self.rows["solids"].append({"medium": medium})
         self.kinds.append(Kind(name, not entered, closed))
         self.names["solids"].append(name)
+
+    def _body(self, body: Body) -> _Faces:
+        """The faces of a body; equal ones share theirs, so that a file is read once and its numbers are worked out once."""
+        try:
+            hash(body)
+        except TypeError:
+            # It holds arrays.
+            return _Faces(body.faces(self.files))
+        if body not in self.bodies:
+            self.bodies[body] = _Faces(body.faces(self.files))
+        return self.bodies[body]
 
     def _surface(self, place: str, name: str, surface: Surface) -> None:
         with self._at(join(place, "shape")):

@@ -84,7 +84,7 @@ def _quadric(shape: Record) -> tuple[float, float, float]:
     reach: list[tuple[float, float, float]] = []
     for start, end in itertools.pairwise(ends):
         between = _between(start, end)
-        r2 = float(np.polyval(squared, between))
+        r2 = _value(squared, between)
         if start < end and inner**2 <= r2 <= outer**2:
             radius = max(_radius(squared, start), _radius(squared, end))
             reach.append((min(radius, outer), start, end))
@@ -117,7 +117,12 @@ def _radius(squared: Array, z: float) -> float:
     if math.isinf(z):
         leading = next((a * (1.0 if power % 2 == 0 or z > 0.0 else -1.0) for power, a in _terms(squared) if a), 0.0)
         return math.inf if leading > 0.0 and any(squared[:2]) else math.sqrt(max(float(squared[2]), 0.0))
-    return math.sqrt(max(float(np.polyval(squared, z)), 0.0))
+    return math.sqrt(max(_value(squared, z), 0.0))
+
+
+def _value(polynomial: Array, z: float) -> float:
+    a, b, c = polynomial.tolist()
+    return float((a * z + b) * z + c)
 
 
 def _terms(squared: Array) -> list[tuple[int, float]]:

@@ -116,11 +116,13 @@ class _Solids:
         self.names = [f'"{kind.name}"' for kind in kinds]
         self.opaque = [kind.opaque for kind in kinds]
         closed = [face for face in record["faces"] if face["solid"] is not None and kinds[face["solid"]].closed]
-        boxes = [box_of(face["shape"]) for face in closed]
+        # Equal bodies share the shapes of their faces.
+        shapes = {id(face["shape"]): face["shape"] for face in closed}
+        boxes = {key: box_of(shape) for key, shape in shapes.items()}
         # A face of absurd numbers may have no place.
-        known = [bool(np.isfinite(box).all()) for box in boxes]
-        self.faces = list(itertools.compress(closed, known))
-        self.boxes = np.array(list(itertools.compress(boxes, known))).reshape(-1, 2, 3)
+        known = {key: box for key, box in boxes.items() if np.isfinite(box).all()}
+        self.faces = [face for face in closed if id(face["shape"]) in known]
+        self.boxes = np.array([known[id(face["shape"])] for face in self.faces]).reshape(-1, 2, 3)
         self.owner = np.array([face["solid"] for face in self.faces], dtype=np.int64)
         self.low, self.high = np.full((len(kinds), 3), np.inf), np.full((len(kinds), 3), -np.inf)
         self.frames = np.array([face["frame"] for face in self.faces], dtype=np.float64).reshape(-1, 4, 3)

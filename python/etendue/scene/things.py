@@ -67,6 +67,8 @@ class Solid(Placement):
 
     def check_names(self, faces: tuple[Face, ...]) -> Iterator[tuple[str, str]]:
         """Mistakes in `finishes`: names that no face has."""
+        if not self.finishes:
+            return
         known = dict.fromkeys(name for face in faces for name in (face.group or face.name, face.name))
         for name in self.finishes:
             if name not in known:
