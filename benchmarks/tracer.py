@@ -36,8 +36,6 @@ import etendue as et
 import mitsuba as mi
 import numpy as np
 import trimesh
-from embreex import rtcore_scene
-from embreex.mesh_construction import TriangleMesh
 from etendue import _core
 from etendue.scene import compile_scene
 from timing import best, load
@@ -174,6 +172,9 @@ def rays_of_the_loop(scene: et.Scene) -> tuple[Array, Array]:
 
 def queries_alone(scene: et.Scene, vertices: Array, triangles: Array, folder: Path) -> tuple[float, float]:
     """Nearest hits per second of one thread for the rays of the loop: ours, and Embree's."""
+    from embreex import rtcore_scene  # noqa: PLC0415 - the other jobs go without
+    from embreex.mesh_construction import TriangleMesh  # noqa: PLC0415
+
     origin, direction = rays_of_the_loop(scene)
     vertices.tofile(folder / "vertices.f64")
     triangles.tofile(folder / "triangles.u32")
