@@ -3,8 +3,8 @@
     python benchmarks/limits.py [--rays 10000000] [--cores 64] [--bandwidth 300]
 
 For each job: the time of a ray on one thread; the share of the work that was not shared here (Amdahl's law, from one thread
-and all of them); the bytes that a ray moves between memory and processor. The last columns are what `--cores` such cores with so
-much memory bandwidth [GB/s] would give at most: cores over time, serial share or bandwidth, whichever is least.
+and all of them); the bytes that a ray moves between memory and processor. The last columns are what `--cores` such cores
+with so much memory bandwidth [GB/s] would give at most: cores over time, serial share or bandwidth, whichever is least.
 """
 
 from __future__ import annotations
