@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Literal
 
@@ -86,27 +86,26 @@ def look_at_scene(
     surveys = _Surveys(core, how.seed, threads)
     maps, done = [], 0
     for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, forward.plan.glints, strict=True)):
-        lines = how.paths * screen.columns * screen.rows
 
         def look(
             number: int,
             known: _core.Survey | None,
             view: _core._View = view,
             small: _core.Glints = small,
-            lines: int = lines,
         ) -> list[Array]:
-            nonlocal done
             guides = forward.shared, forward.plan.guide, small
-            found = _core.look_at_scene(
+            return _core.look_at_scene(
                 core, view, how.paths, how.seed, MOST_EVENTS, left, number, number + 1, threads, known, *guides
             )
+
+        def advance(lines: int = how.paths * screen.columns * screen.rows) -> None:
+            nonlocal done
             done += lines
             if progress is not None:
                 progress(done)
-            return found
 
         image = None if scattered is None else scattered[number]
-        eye = _Eye(look, how, screen, screen.cosine(observer), images, number, image)
+        eye = _Eye(look, advance, how, screen, screen.cosine(observer), images, number, image)
         passes, common, about = eye.best(surveys)
         image = eye.image
         paths = how.paths * passes.done
@@ -163,6 +162,8 @@ class _Eye:
     ----------
     look : callable
         The sums of a pass.
+    advance : callable
+        Called after each pass of the map.
     how : PathTracing
         What was asked for.
     screen : Screen
@@ -178,6 +179,7 @@ class _Eye:
     """
 
     look: Look
+    advance: Callable[[], None]
     how: PathTracing
     screen: Screen
     area: Array
@@ -224,6 +226,7 @@ class _Eye:
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
         while passes.done < wanted:
             passes.add(*(made[passes.done] if passes.done < len(made) else self.look(first + passes.done, known)))
+            self.advance()
             if passes.done == wanted:
                 if self.images is not None:
                     # Rays forwards keep their number for each line of sight.
