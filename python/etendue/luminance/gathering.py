@@ -33,6 +33,10 @@ GAIN = 3.0
 LEAST_LINES = 1 << 19
 """Lines of sight of a map from which it is tried: of fewer, the survey alone would take longer."""
 
+MOST_COLOURS, MOST_FACES = 8, 10_000
+"""Wavelengths and faces of a scene up to which it is tried: a patch has cells for each wavelength, a face one patch or more,
+and of many cells each is met by few."""
+
 Look = Callable[[int, "_core.Survey | None"], list[Array]]
 """The sums of a pass of a map, by its number, with patches or without."""
 

@@ -18,6 +18,8 @@ from etendue.luminance.caustics import Forward, LightImages, Plan, plan
 from etendue.luminance.gathering import (
     FIRST_CHECK,
     LEAST_LINES,
+    MOST_COLOURS,
+    MOST_FACES,
     NOT_TAKEN,
     PILOT,
     UNKNOWN,
@@ -35,6 +37,7 @@ from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scatter.building import core_scene
 from etendue.scene import Compiled, Scene, compile_scene
+from etendue.scene.compiling import Record
 from etendue.scene.placement import Placement
 from etendue.scene.sources.from_files import Field, Rays
 from etendue.scene.sources.gridded import Gridded
@@ -83,7 +86,7 @@ def look_at_scene(
     notes += [] if scattered is not None else forward.notes(how)
     left: Left = "scattered" if scattered is not None else "caustics" if images is not None else "nothing"
     origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
-    surveys = _Surveys(core, how.seed, threads)
+    surveys = _Surveys(core, compiled.record, how.seed, threads)
     maps, done = [], 0
     for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, forward.plan.glints, strict=True)):
 
@@ -145,8 +148,11 @@ def look_at_scene(
 class _Surveys:
     """The patches of a scene, surveyed when they are first asked for."""
 
-    def __init__(self, core: _core.Scene, seed: int, threads: int | None) -> None:
+    def __init__(self, core: _core.Scene, record: Record, seed: int, threads: int | None) -> None:
         self._made_of = core, seed, MOST_EVENTS, threads
+        colours = np.unique(np.concatenate([source["wavelengths"] for source in record["sources"]]))
+        self.few = len(colours) <= MOST_COLOURS and len(record["faces"]) <= MOST_FACES
+        """Whether there are few enough to be tried unasked."""
 
     @cached_property
     def found(self) -> _core.Survey:
@@ -203,7 +209,7 @@ class _Eye:
             if seen is None:
                 return passes, 0.0, [*told, UNKNOWN]
             return passes, seen.bias, [*told, seen.sentence + (seen.warning if seen.differs else "")]
-        if not self._may_gather() or not surveys.found.patches()[1]:
+        if not self._may_gather(few=surveys.few) or not surveys.found.patches()[1]:
             return self._followed(None), 0.0, []
         survey = surveys.found
         pilot = Pilot.of(self.look, survey, self.area)
@@ -215,10 +221,14 @@ class _Eye:
             return self._followed(None, pilot.exact), 0.0, [NOT_TAKEN]
         return passes, seen.bias, [*survey_notes(survey), pilot.sentence, seen.sentence]
 
-    def _may_gather(self) -> bool:
-        """Whether to try patches unasked: not beside light by another route, which is shared out differently then."""
+    def _may_gather(self, *, few: bool) -> bool:
+        """Whether to try patches unasked; `few`: of few faces and colours.
+
+        Not beside light by another route, which is shared out differently then.
+        """
         lines = self.how.paths * self.how.passes * self.screen.columns * self.screen.rows
-        return self.how.gather is None and self.images is None and self.image is None and lines >= LEAST_LINES
+        alone = self.images is None and self.image is None
+        return self.how.gather is None and few and alone and lines >= LEAST_LINES
 
     def _followed(self, known: _core.Survey | None, made: Sequence[list[Array]] = (), first: int = 0) -> Passes:
         """As many passes as the map needs, from number `first` on; those that are made already come before others."""
