@@ -11,6 +11,7 @@ least and the largest ratio are printed.
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import os
 import platform
@@ -18,7 +19,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -224,10 +224,12 @@ def start(_: argparse.Namespace, folder: Path) -> Iterator[Row]:
     path = folder / "small.tm25ray"
     et.write_rays(path, et.RingSource(rays=100_000))
     program = Path(sys.executable).with_name("etendue")
+    # Modules are compiled once, as they are for whoever does not forbid it.
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
 
     def took(*command: object) -> float:
         run = list(map(str, command))
-        return best(lambda: subprocess.run(run, check=True, capture_output=True), 6)
+        return best(lambda: subprocess.run(run, check=True, capture_output=True, env=environment), 6)
 
     peer = "import mitsuba"
     theirs = took(sys.executable, "-c", peer)
@@ -262,6 +264,7 @@ def main() -> None:
     parser.add_argument("--only", default=",".join(JOBS), help=f"some of {', '.join(JOBS)}")
     parser.add_argument("--repeats", type=int, default=1)
     parser.add_argument("--rays", type=int, default=20_000_000, help="in the ray file")
+    parser.add_argument("--one", choices=JOBS, help=argparse.SUPPRESS)
     options = parser.parse_args()
     chosen = options.only.split(",")
     if unknown := set(chosen) - set(JOBS):
@@ -269,22 +272,35 @@ def main() -> None:
     if LIBRARY.exists():
         os.environ.setdefault("DRJIT_LIBLLVM_PATH", str(LIBRARY))
     warnings.simplefilter("ignore")
+    if options.one:
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                for row in JOBS[options.one](options, Path(folder)):
+                    print(json.dumps(row), flush=True)
+            except ImportError as error:
+                print(json.dumps(f"skipped: {error}"), flush=True)
+        return
     print(machine(), flush=True)
     ratios: defaultdict[str, list[float]] = defaultdict(list)
     for repeat in range(options.repeats):
         for name in chosen:
-            begun = time.perf_counter()
-            with tempfile.TemporaryDirectory() as folder:
-                try:
-                    for row in JOBS[name](options, Path(folder)):
-                        ratios[row.job].append(row.ratio)
-                        bar = f"bar {row.bar:.3g}" if row.bar is not None else ""
-                        print(
-                            f"{row.job:<48} {row.ours:>14}  {row.peer:<44} {row.ratio:6.2f}  {bar}".rstrip(), flush=True
-                        )
-                except ImportError as error:
-                    print(f"skipped {name}: {error}", flush=True)
-            print(f"  {name}: {time.perf_counter() - begun:.0f} s, {load()}", file=sys.stderr, flush=True)
+            # A peer that dies (LLVM of a version that does not know the processor) takes nobody with it.
+            command = [sys.executable, __file__, "--one", name, "--rays", str(options.rays)]
+            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as job:
+                for line in job.stdout or ():
+                    found = json.loads(line)
+                    if isinstance(found, str):
+                        print(f"{name}: {found}", flush=True)
+                        continue
+                    row = Row(*found)
+                    ratios[f"{row.job}, {row.peer.rsplit(' ', 2)[0]}"].append(row.ratio)
+                    bar = f"bar {row.bar:.3g}" if row.bar is not None else ""
+                    print(f"{row.job:<48} {row.ours:>12}  {row.peer:<40} {row.ratio:6.2f}  {bar}".rstrip(), flush=True)
+                told = job.stderr.read().strip().splitlines() if job.stderr else []
+            if job.returncode:
+                print(
+                    f"{name} ended with status {job.returncode}: {told[-1] if told else 'nothing was said'}", flush=True
+                )
         print(f"end of run {repeat + 1}; {load()}", flush=True)
     if options.repeats > 1:
         print("\nratio, least to largest:")

@@ -101,7 +101,7 @@ def test_help_imports_no_verb() -> None:
 
 @pytest.mark.slow
 def test_info_imports_what_the_file_asks_for(tmp_path: Path) -> None:
-    """An intensity file needs no scenes, no light fields and none of the libraries of other formats."""
+    """Intensity and rays need no scenes, no light fields; intensity none of the libraries of other formats."""
     path = tmp_path / "small.ies"
     etendue.write_intensity(path, etendue.Intensity(c=[0], gamma=[0, 10, 90], values=[[1000, 10, 0]]))
     modules = program(arguments=["info", str(path)])
@@ -111,7 +111,10 @@ def test_info_imports_what_the_file_asks_for(tmp_path: Path) -> None:
     for part in ("scene", "scatter", "lightfield", "luminance", "tracing", "plot", "formats.rays", "formats.maps"):
         assert f"etendue.{part}" not in modules
     etendue.write_rays(tmp_path / "led.tm25ray", etendue.RingSource(rays=100).ray_set())
-    assert "etendue.formats.rays" in program(arguments=["info", str(tmp_path / "led.tm25ray")])
+    modules = program(arguments=["info", str(tmp_path / "led.tm25ray")])
+    assert "etendue.formats.rays" in modules
+    for part in ("scene", "scatter", "lightfield", "luminance", "tracing", "plot"):
+        assert f"etendue.{part}" not in modules
 
 
 @pytest.mark.parametrize("name", [*VERBS, *FAMILIES_OF_VERBS])

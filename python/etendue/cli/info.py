@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -20,6 +20,10 @@ class Found(NamedTuple):
 
     facts: dict[str, Any]
     show: Callable[[], None]
+
+
+STEP = b"ISO-10303-21"
+"""How STEP files begin."""
 
 
 def info(
@@ -69,11 +73,24 @@ def _opened(path: Path, photometry: str | None) -> Found:
         return _intensity(path, read_intensity(path, photometry))
     if photometry is not None:
         raise ArgumentError(f"{path}: --photometry is for intensity files, and this is none.")
-    for look in (_light_field, _trace_result, _map, _bodies):
+    for look in _looks(path):
         found = look(path)
         if found is not None:
             return found
     return _plainly(describe(path))
+
+
+def _looks(path: Path) -> Iterator[Callable[[Path], Found | None]]:
+    """The looks that are worth it: by the first bytes, so that nobody waits for the parts of other files to be imported."""
+    from etendue.formats.hdf5 import SIGNATURE
+    from etendue.formats.head import Head
+
+    head = Head.of(path)
+    if head.data.startswith(SIGNATURE):
+        yield from (_light_field, _trace_result)
+    yield _map
+    if head.data.lstrip().startswith(STEP):
+        yield _bodies
 
 
 def _found(path: Path, name: str, what: str, facts: dict[str, Any], show: Callable[[], None]) -> Found:

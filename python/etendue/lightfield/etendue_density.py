@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -142,9 +143,9 @@ class EtendueDensity:
         core: _core.LightField = self._core  # type: ignore[attr-defined]
         return core
 
-    @property
+    @cached_property
     def part_flux(self) -> tuple[float, ...]:
-        """∫ L dU over each part [flux unit]."""
+        """∫ L dU over each part [flux unit]; worked out once, as every map asks for it."""
         return tuple(self.core.flux())
 
     @property
