@@ -61,8 +61,31 @@ impl Factor {
         if self.n == 1 {
             return self.values[0];
         }
-        let x = Tent::at(point[0], self.n, self.wraps);
-        let y = Tent::at(point[1], self.n, false);
+        self.between(&self.tents(point))
+    }
+
+    /// The tents over a point.
+    #[inline(always)]
+    fn tents(&self, point: [f64; 2]) -> [Tent; 2] {
+        [
+            Tent::at(point[0], self.n, self.wraps),
+            Tent::at(point[1], self.n, false),
+        ]
+    }
+
+    /// The values of this factor and of another one at a point: where their grids are the same, it is looked for once.
+    #[inline(always)]
+    pub(super) fn both(&self, other: &Self, point: [f64; 2]) -> [f64; 2] {
+        if self.n == 1 || (self.n, self.wraps) != (other.n, other.wraps) {
+            return [self.at(point), other.at(point)];
+        }
+        let tents = self.tents(point);
+        [self.between(&tents), other.between(&tents)]
+    }
+
+    /// The value under two tents.
+    #[inline(always)]
+    fn between(&self, [x, y]: &[Tent; 2]) -> f64 {
         let row = |i: usize| {
             let row = &self.values[i * self.n..][..self.n];
             row[y.cells[0]] * y.weights[0] + row[y.cells[1]] * y.weights[1]

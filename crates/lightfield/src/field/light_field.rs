@@ -59,7 +59,7 @@ impl PartField {
     }
 
     /// The same with the kinds of errors apart. Cells side by side err together, so that those of the tents add up.
-    #[inline]
+    #[inline(always)]
     pub(super) fn parsed(&self, place: [f64; 2], direction: [f64; 2]) -> Parsed {
         let wraps = self.part.wraps();
         let [n1, n2, n3, n4] = self.cells;
@@ -78,12 +78,13 @@ impl PartField {
             }
         }
         let [mean, deviation] = sum;
-        let base = self.level * self.space.at(place) * self.direction.at(direction);
+        let [space, of_place] = self.space.both(&self.errors.space, place);
+        let [aim, of_direction] = self.direction.both(&self.errors.direction, direction);
+        let base = self.level * space * aim;
         let value = base * mean;
-        let place = value * self.errors.space.at(place);
         Parsed {
             value,
-            deviations: [base * deviation, place, value * self.errors.direction.at(direction)],
+            deviations: [base * deviation, value * of_place, value * of_direction],
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use etendue_geometry::RayBatch;
@@ -52,21 +53,28 @@ fn see(field: &LightField, view: &View, first: usize, points: &[[f64; 2]], pixel
     let mut batch = RayBatch::default();
     let mut at = Coordinates::default();
     aim(view, first, points, pixels.len(), &mut batch);
-    let share = 1.0 / points.len() as f64;
     for part in &field.parts {
         carry(std::slice::from_ref(&part.part), &batch, &mut at);
-        let [s1, s2, a, b] = &at.values;
-        for (pixel, start) in pixels.iter_mut().zip((0..).step_by(points.len())) {
-            let mut sums = PixelSums::default();
-            for i in start..start + points.len() {
-                if at.part[i] != Coordinates::NONE {
-                    let place = [s1[i], s2[i]];
-                    sums.add(part.part.wraps(), place, &part.parsed(place, [a[i], b[i]]));
-                }
+        average(part, &at, points.len(), pixels);
+    }
+}
+
+/// Adds to each pixel what its points, so many one after the other, see on a part: compiled for each instruction set.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn average(part: &PartField, at: &Coordinates, points: usize, pixels: &mut [Reading]) {
+    let share = 1.0 / points as f64;
+    let wraps = part.part.wraps();
+    let [s1, s2, a, b] = &at.values;
+    for (pixel, start) in pixels.iter_mut().zip((0..).step_by(points)) {
+        let mut sums = PixelSums::default();
+        for i in start..start + points {
+            if at.part[i] != Coordinates::NONE {
+                let place = [s1[i], s2[i]];
+                sums.add(wraps, place, &part.parsed(place, [a[i], b[i]]));
             }
-            pixel.value += share * sums.value;
-            pixel.deviation = pixel.deviation.hypot(share * sums.deviation(part));
         }
+        pixel.value += share * sums.value;
+        pixel.deviation = pixel.deviation.hypot(share * sums.deviation(part));
     }
 }
 
@@ -83,7 +91,7 @@ struct PixelSums {
 }
 
 impl PixelSums {
-    #[inline]
+    #[inline(always)]
     fn add(&mut self, wraps: bool, place: [f64; 2], read: &Parsed) {
         if self.points == 0.0 {
             self.first = place;
