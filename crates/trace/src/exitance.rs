@@ -45,6 +45,10 @@ const LINES: u64 = 1;
 /// Rays that a bin has on average in a survey: of as many, hardly one in 10⁶ gets none by chance.
 const FILL: f64 = 16.0;
 
+/// Patches of all faces together, beside one for each: where light goes to and fro for long, rays would fill more than there is
+/// memory for.
+const MOST_PATCHES: f64 = 65_536.0;
+
 /// Distance from which a patch counts as smooth, in sides of it.
 const NEAR: f64 = 2.0;
 
@@ -113,11 +117,11 @@ impl ExitanceSurvey {
         // Scouts: how much light falls on each face.
         let whole = Arc::new(ExitanceCells::cut(scene.face_set.faces(), wavelengths.clone(), &areas));
         let found = count(&whole, 0..SCOUTS);
-        let pieces: Vec<Option<f64>> = whole
+        // How many patches rays of a survey would fill on each face.
+        let filled: Vec<Option<f64>> = whole
             .faces
             .iter()
-            .zip(&areas)
-            .map(|(chart, area)| {
+            .map(|chart| {
                 let (chart, first) = chart.as_ref()?;
                 let from = 2 * *first as usize;
                 let to = from + 2 * BINS as usize * chart.areas().len();
@@ -125,11 +129,21 @@ impl ExitanceSurvey {
                     .chunks(2)
                     .fold((0, 0), |sum, pair| (sum.0 + pair[1], sum.1 + pair[0]));
                 let hits = front.max(back) as f64 * (SURVEYORS as f64 / SCOUTS as f64);
-                (hits > 0.0).then_some((*area)? / (hits / (FILL * f64::from(BINS))).max(1.0))
+                (hits > 0.0).then_some(hits / (FILL * f64::from(BINS)))
             })
             .collect();
+        let share = (MOST_PATCHES / filled.iter().flatten().sum::<f64>()).min(1.0);
+        let piece = |(filled, area): (&Option<f64>, &Option<f64>)| Some((*area)? / ((*filled)? * share).max(1.0));
+        let pieces: Vec<Option<f64>> = filled.iter().zip(&areas).map(piece).collect();
         let patches = Arc::new(ExitanceCells::cut(scene.face_set.faces(), wavelengths.clone(), &pieces));
-        let found = count(&patches, SCOUTS..SCOUTS + SURVEYORS);
+        // Fewer patches are filled by fewer rays.
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "from 0 to all of them"
+        )]
+        let surveyors = ((SURVEYORS as f64 * share).ceil() as u64).max(1);
+        let found = count(&patches, SCOUTS..SCOUTS + surveyors);
         let mut sides = Vec::new();
         for (chart, first) in patches.faces.iter().flatten() {
             for (number, area) in chart.areas().iter().enumerate() {

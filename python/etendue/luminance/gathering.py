@@ -37,6 +37,11 @@ MOST_COLOURS, MOST_FACES = 8, 10_000
 """Wavelengths and faces of a scene up to which it is tried: a patch has cells for each wavelength, a face one patch or more,
 and of many cells each is met by few."""
 
+MOST_SEGMENTS, SCOUTS = 100, 2000
+"""Segments of a ray, the mean of so many rays, up to which it is tried: what a ray does is kept until its batch is done,
+and where light goes to and fro for longer, rays take longer than lines.
+"""
+
 Look = Callable[[int, "_core.Survey | None"], list[Array]]
 """The sums of a pass of a map, by its number, with patches or without."""
 
@@ -166,7 +171,8 @@ class Pilot:
     >>> import numpy as np
     >>> rng = np.random.default_rng(2)
     >>> noisy = lambda number, survey: [rng.normal(10.0, 1.0 if survey is None else 0.25, (40, 30))]
-    >>> found = Pilot.of(noisy, "a survey", np.ones((40, 30)))
+    >>> exact = [noisy(number, None) for number in range(PILOT)]
+    >>> found = Pilot.of(exact, noisy, "a survey", np.ones((40, 30)))
     >>> bool(12 < found.gain < 20), found.pays
     (True, True)
     """
@@ -176,11 +182,13 @@ class Pilot:
     gain: float
 
     @classmethod
-    def of(cls, look: Look, survey: _core.Survey, area: Array) -> Pilot:
-        """Made with the first passes of a map, those that go on to the sources before the others.
+    def of(cls, exact: list[list[Array]], look: Look, survey: _core.Survey, area: Array) -> Pilot:
+        """The passes that follow `exact`, made with patches, beside these.
 
         Parameters
         ----------
+        exact : list of list of ndarray
+            The first `PILOT` passes of a map.
         look : callable
             The sums of a pass, by its number, with or without patches.
         survey : Survey
@@ -188,7 +196,6 @@ class Pilot:
         area : ndarray
             Apparent area of the pixels, up to a factor.
         """
-        exact = [look(number, None) for number in range(PILOT)]
         gathered = [look(PILOT + number, survey) for number in range(PILOT)]
         (one, two), (three, four) = ([found[0] * area for found in passes] for passes in (exact, gathered))
         apart = np.abs(three - four).sum() * (one + two).sum()

@@ -20,8 +20,10 @@ from etendue.luminance.gathering import (
     LEAST_LINES,
     MOST_COLOURS,
     MOST_FACES,
+    MOST_SEGMENTS,
     NOT_TAKEN,
     PILOT,
+    SCOUTS,
     UNKNOWN,
     Comparison,
     Look,
@@ -151,8 +153,16 @@ class _Surveys:
     def __init__(self, core: _core.Scene, record: Record, seed: int, threads: int | None) -> None:
         self._made_of = core, seed, MOST_EVENTS, threads
         colours = np.unique(np.concatenate([source["wavelengths"] for source in record["sources"]]))
-        self.few = len(colours) <= MOST_COLOURS and len(record["faces"]) <= MOST_FACES
-        """Whether there are few enough to be tried unasked."""
+        self._few = len(colours) <= MOST_COLOURS and len(record["faces"]) <= MOST_FACES
+
+    @cached_property
+    def may_pay(self) -> bool:
+        """Whether to try them unasked: of few faces and colours, and rays that come to an end."""
+        core, seed, events, threads = self._made_of
+        if not self._few:
+            return False
+        segments = _core.work_unit(core, SCOUTS, seed, events, 0, 1, threads)["ledger"]["segments"]
+        return bool(segments <= MOST_SEGMENTS * SCOUTS)
 
     @cached_property
     def found(self) -> _core.Survey:
@@ -204,31 +214,30 @@ class _Eye:
             passes, told = self._followed(survey), survey_notes(survey)
             if not survey.patches()[0]:
                 return passes, 0.0, told
-            exact = [self.look(FIRST_CHECK + number, None)[0] for number in range(PILOT)]
-            seen = Comparison.of(passes.blocks, exact)
+            others = [self.look(FIRST_CHECK + number, None)[0] for number in range(PILOT)]
+            seen = Comparison.of(passes.blocks, others)
             if seen is None:
                 return passes, 0.0, [*told, UNKNOWN]
             return passes, seen.bias, [*told, seen.sentence + (seen.warning if seen.differs else "")]
-        if not self._may_gather(few=surveys.few) or not surveys.found.patches()[1]:
+        if not self._may_gather() or not surveys.may_pay:
             return self._followed(None), 0.0, []
+        exact = [self.look(number, None) for number in range(PILOT)]
         survey = surveys.found
-        pilot = Pilot.of(self.look, survey, self.area)
+        if not survey.patches()[1]:
+            return self._followed(None, exact), 0.0, []
+        pilot = Pilot.of(exact, self.look, survey, self.area)
         if not pilot.pays:
-            return self._followed(None, pilot.exact), 0.0, []
+            return self._followed(None, exact), 0.0, []
         passes = self._followed(survey, pilot.gathered, PILOT)
-        seen = Comparison.of(passes.blocks, [found[0] for found in pilot.exact])
+        seen = Comparison.of(passes.blocks, [found[0] for found in exact])
         if seen is None or seen.differs:
-            return self._followed(None, pilot.exact), 0.0, [NOT_TAKEN]
+            return self._followed(None, exact), 0.0, [NOT_TAKEN]
         return passes, seen.bias, [*survey_notes(survey), pilot.sentence, seen.sentence]
 
-    def _may_gather(self, *, few: bool) -> bool:
-        """Whether to try patches unasked; `few`: of few faces and colours.
-
-        Not beside light by another route, which is shared out differently then.
-        """
+    def _may_gather(self) -> bool:
+        """Whether to try patches unasked: not beside light by another route, which is shared out differently then."""
         lines = self.how.paths * self.how.passes * self.screen.columns * self.screen.rows
-        alone = self.images is None and self.image is None
-        return self.how.gather is None and few and alone and lines >= LEAST_LINES
+        return self.how.gather is None and self.images is None and self.image is None and lines >= LEAST_LINES
 
     def _followed(self, known: _core.Survey | None, made: Sequence[list[Array]] = (), first: int = 0) -> Passes:
         """As many passes as the map needs, from number `first` on; those that are made already come before others."""
