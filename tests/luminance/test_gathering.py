@@ -11,8 +11,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue import _core
+from etendue.luminance import scene_map
 from etendue.luminance.gathering import BLOCKS, LEAST_LINES, MOST_COLOURS, NOT_TAKEN, PILOT, Comparison, blocks
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.scatter.building import core_scene
+from etendue.scene import compile_scene
 from oracles.gathered import common_error
 from oracles.verdicts import REVERSE, assert_agree
 
@@ -368,3 +371,16 @@ def test_it_is_not_tried_of_many_colours(spread: int, monkeypatch: pytest.Monkey
     scene = et.Scene(sources=[lamp], surfaces=[plate])
     et.luminance_map(scene, et.Observer(30, 40, 300), et.Screen(20, 20, 64, 64), rays_per_pixel=128)
     assert len(surveys) == (spread <= MOST_COLOURS)
+
+
+def test_it_is_not_tried_where_rays_hardly_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a white ball: what rays do on their way would fill the memory, and take longer than lines of sight."""
+    surveys: list[int] = []
+    monkeypatch.setattr(_core, "Survey", lambda *_: surveys.append(1))
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 5}
+    for reflectance, few in ((0.5, True), (0.995, False)):
+        white = {"kind": "lambertian", "reflectance": reflectance}
+        scene = et.Scene(sources=[lamp], surfaces=[{"shape": {"kind": "sphere", "radius": 10}, "finish": white}])
+        core = core_scene({**compile_scene(scene).record, "detectors": []})
+        assert scene_map._Surveys(core, compile_scene(scene).record, 1, None).may_pay is few
+    assert not surveys

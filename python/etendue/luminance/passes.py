@@ -18,15 +18,34 @@ MOST_TIMES = 64
 
 
 class Passes:
-    """Mean and spread of independent passes, updated pass by pass (Welford): no difference of large numbers."""
+    """Mean and spread of independent passes, updated pass by pass (Welford): no difference of large numbers.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Rows and columns of the map.
+    area : ndarray
+        Apparent area of its pixels, up to a factor.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> one = np.ones((1, 1))
+    >>> passes = Passes((1, 1), one)
+    >>> for light in (1.0, 2.0, 3.0, 2.0):
+    ...     passes.add(light * one, 0 * one, 0 * one, 0 * one, one)
+    >>> values, error = passes.total(None)
+    >>> float(values[0, 0]), round(float(error[0, 0]) ** -2)     # (1 + 0 + 1 + 0)/(3 · 4) = 1/6
+    (2.0, 6)
+    """
 
     def __init__(self, shape: tuple[int, int], area: Array) -> None:
         self.done = 0
         self.blocks: list[Array] = []
         """The light of each pass by blocks of the map (`etendue.luminance.gathering.blocks`)."""
         self._area = area
-        self._all = Spread(shape)
-        self._chance = Spread(shape)
+        self._all = _Spread(shape)
+        self._chance = _Spread(shape)
         self._lucky = np.zeros(shape, dtype=np.int64)
         self._smooth = np.zeros(shape, dtype=bool)
         self._diffuse = np.zeros(shape, dtype=bool)
@@ -98,7 +117,7 @@ class Passes:
         return notes
 
 
-class Spread:
+class _Spread:
     """Mean of passes, and the sum of the squares of what they differ from it."""
 
     def __init__(self, shape: tuple[int, int]) -> None:
