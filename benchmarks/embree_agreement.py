@@ -33,7 +33,7 @@ import numpy as np
 import trimesh
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
-from tracer import mesh as cavity_mesh
+from scenes import mesh as cavity_mesh
 
 Array = Any
 CHUNK = 1 << 20

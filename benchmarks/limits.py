@@ -23,10 +23,10 @@ from etendue.lightfield.counting import count_rays
 from etendue.lightfield.fitting import grids_for
 from etendue.scene import compile_scene
 from light_field_speed import DEPTHS, RINGS
+from scenes import analytic
 from timing import best, load
 
 CORES = os.cpu_count() or 1
-HOLES = ((10.0, 0.0), (-10.0, 0.0), (0.0, 10.0), (0.0, -10.0))
 
 
 class Job(NamedTuple):
@@ -38,19 +38,6 @@ class Job(NamedTuple):
     """With so many threads; None: all."""
     traffic: float
     """Bytes of memory that each moves, beyond what caches hold."""
-
-
-def cavity() -> _core.Scene:
-    """The white cavity of thesis chapter 4."""
-    white = {"kind": "lambertian", "reflectance": 0.984}
-    disk = {"kind": "disk", "radius": 2.5}
-    holes = [{"shape": disk, "at": [x, y, 5e-4], "finish": "absorber"} for x, y in HOLES]
-    lamps = [{"kind": "surface", "shape": disk, "flux": 0.96, "at": [x, y, 1e-3]} for x, y in HOLES]
-    walls = [
-        {"shape": {"kind": "cylinder", "radius": 21.5, "height": 21.4}, "finish": white},
-        {"shape": {"kind": "disk", "radius": 21.5}, "finish": white},
-    ]
-    return _core.Scene(compile_scene(et.Scene(sources=lamps, surfaces=[*walls, *holes])).record)
 
 
 def jobs(path: Path, rays: int) -> Iterator[Job]:
@@ -75,7 +62,7 @@ def jobs(path: Path, rays: int) -> Iterator[Job]:
         lambda n: count_rays(et.read_rays(path), RINGS, grids, threads=n),
         record + 128.0 * (finest > 32e6),
     )
-    core, traced = cavity(), max(rays // 20, 1 << 18)
+    core, traced = _core.Scene(compile_scene(analytic()).record), max(rays // 20, 1 << 18)
     batches = -(-traced // _core.batch_size())
     segments = _core.work_unit(core, traced, 1, 1_000_000, 0, batches)["ledger"]["segments"]
     yield Job(

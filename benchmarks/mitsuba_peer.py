@@ -15,7 +15,7 @@ import drjit as dr
 import etendue as et
 import mitsuba as mi
 import numpy as np
-import tracer
+import scenes
 import trimesh
 
 Array = Any
@@ -31,8 +31,8 @@ def _about_the_cavity(scene: Any, rays: int, seed: int) -> tuple[Any, Any]:
     """Segments and rays that left; the black holes are found by their place, which costs no shapes."""
     rng = mi.PCG32(size=rays, initstate=seed)
     turn = mi.Float(dr.arange(mi.UInt32, rays) & 3) * (dr.pi / 2)
-    spot = mi.warp.square_to_uniform_disk(mi.Point2f(rng.next_float32(), rng.next_float32())) * tracer.HOLE
-    origin = mi.Point3f(tracer.AWAY * dr.cos(turn) + spot.x, tracer.AWAY * dr.sin(turn) + spot.y, 1e-3)
+    spot = mi.warp.square_to_uniform_disk(mi.Point2f(rng.next_float32(), rng.next_float32())) * scenes.HOLE
+    origin = mi.Point3f(scenes.AWAY * dr.cos(turn) + spot.x, scenes.AWAY * dr.sin(turn) + spot.y, 1e-3)
     direction = mi.Vector3f(_cosine(rng))
     active, segments, left = mi.Bool(True), mi.UInt32(0), mi.Bool(False)
     while active:
@@ -45,8 +45,8 @@ def _about_the_cavity(scene: Any, rays: int, seed: int) -> tuple[Any, Any]:
         normal = mi.Vector3f(dr.select(dr.dot(at.n, direction) > 0, -at.n, at.n))
         far = dr.maximum(dr.abs(at.p.x), dr.abs(at.p.y))
         near = dr.minimum(dr.abs(at.p.x), dr.abs(at.p.y))
-        black = (at.p.z < 1e-4) & (dr.square(far - tracer.AWAY) + dr.square(near) < tracer.HOLE**2)
-        active = hit & (rng.next_float32() < tracer.REFLECTANCE) & ~black
+        black = (at.p.z < 1e-4) & (dr.square(far - scenes.AWAY) + dr.square(near) < scenes.HOLE**2)
+        active = hit & (rng.next_float32() < scenes.REFLECTANCE) & ~black
         direction = mi.Vector3f(mi.Frame3f(normal).to_world(_cosine(rng)))
         origin = mi.Point3f(at.p + normal * 1e-4)
     return dr.sum(mi.Float(segments)), dr.sum(mi.Float(left))
@@ -135,19 +135,19 @@ def cavity_map(observer: et.Observer, screen: et.Screen, samples: int) -> Callab
     """The map of the cavity by the path tracer, with walls of triangles: the analytic cylinder leaks in single precision."""
     mi.set_variant(VARIANTS[0])
     transform = mi.ScalarTransform4f
-    light = {"type": "area", "radiance": _level(tracer.FLUX / (math.pi**2 * tracer.HOLE**2))}
+    light = {"type": "area", "radiance": _level(scenes.FLUX / (math.pi**2 * scenes.HOLE**2))}
     black = {"type": "diffuse", "reflectance": _level(0.0)}
     lamps = {
         f"lamp{i}": {
             "type": "disk",
-            "to_world": transform().translate([x, y, 1e-3]) @ transform().scale(tracer.HOLE),
+            "to_world": transform().translate([x, y, 1e-3]) @ transform().scale(scenes.HOLE),
             "emitter": light,
             "bsdf": black,
         }
-        for i, (x, y) in enumerate(tracer.HOLES)
+        for i, (x, y) in enumerate(scenes.HOLES)
     }
-    vertices, triangles = tracer.mesh()
-    white = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": _level(tracer.REFLECTANCE)}}
+    vertices, triangles = scenes.mesh()
+    white = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": _level(scenes.REFLECTANCE)}}
     scene = mi.load_dict(
         {
             "type": "scene",
@@ -203,15 +203,15 @@ def rings_seconds(observer: et.Observer, screen: et.Screen, samples: int, repeat
 
 
 def _lens_mesh(rings: int = 96, sectors: int = 256) -> tuple[Array, Array]:
-    """The lens of `tracer.LENS` as triangles, closed."""
-    shape = tracer.LENS["shape"]
+    """The lens of `scenes.LENS` as triangles, closed."""
+    shape = scenes.LENS["shape"]
     r = np.linspace(0, shape["radius"], rings + 1)[1:]
 
     def sag(radius_of_curvature: float, conic: float = 0.0) -> Array:
         c = 1 / radius_of_curvature
         return c * r * r / (1 + np.sqrt(1 - (1 + conic) * c * c * r * r))
 
-    front, back = tracer.LENS["at"][2], tracer.LENS["at"][2] + shape["thickness"]
+    front, back = scenes.LENS["at"][2], scenes.LENS["at"][2] + shape["thickness"]
     turn = 2 * np.pi * np.arange(sectors) / sectors
     i, j = np.arange(sectors), (np.arange(sectors) + 1) % sectors
 
@@ -234,7 +234,7 @@ def _lens_mesh(rings: int = 96, sectors: int = 256) -> tuple[Array, Array]:
 
 def mesh_walls(folder: Path) -> tuple[Path, Callable[[], dict[str, Any]]]:
     """The cavity as a file of triangles, and what Mitsuba makes of it."""
-    vertices, triangles = tracer.mesh()
+    vertices, triangles = scenes.mesh()
     path = folder / "cavity.ply"
     trimesh.Trimesh(vertices, triangles, process=False).export(path)
     return path, lambda: {"walls": {"type": "ply", "filename": str(path), "face_normals": True}}
@@ -242,6 +242,6 @@ def mesh_walls(folder: Path) -> tuple[Path, Callable[[], dict[str, Any]]]:
 
 def analytic_walls() -> dict[str, Any]:
     """The cavity as a cylinder and a disk."""
-    wall = {"type": "cylinder", "p0": [0, 0, 0], "p1": [0, 0, tracer.HEIGHT], "radius": tracer.RADIUS}
-    base = {"type": "disk", "to_world": mi.ScalarTransform4f().scale(tracer.RADIUS)}
+    wall = {"type": "cylinder", "p0": [0, 0, 0], "p1": [0, 0, scenes.HEIGHT], "radius": scenes.RADIUS}
+    base = {"type": "disk", "to_world": mi.ScalarTransform4f().scale(scenes.RADIUS)}
     return {"wall": {**wall, "flip_normals": True}, "base": base}

@@ -12,7 +12,7 @@ from typing import Any
 import etendue as et
 import numpy as np
 import pyradiance
-import tracer
+import scenes
 
 Array = Any
 HOME = Path(pyradiance.__file__).parent
@@ -29,13 +29,13 @@ def _run(*command: object, **how: Any) -> subprocess.CompletedProcess[bytes]:
 
 def cavity_map(folder: Path, observer: et.Observer, screen: et.Screen) -> Callable[[int], Array]:
     """Maps of the cavity [lm/(mm² sr)], each with a cache of its own."""
-    rho, level = tracer.REFLECTANCE, tracer.FLUX / (math.pi**2 * tracer.HOLE**2)
+    rho, level = scenes.REFLECTANCE, scenes.FLUX / (math.pi**2 * scenes.HOLE**2)
     lines = [
         f"void plastic white 0 0 5 {rho} {rho} {rho} 0 0",
         f"void light lamp 0 0 3 {level} {level} {level}",
-        f"white tube wall 0 0 7 0 0 0 0 0 {tracer.HEIGHT} {tracer.RADIUS}",
-        f"white ring base 0 0 8 0 0 0 0 0 1 0 {tracer.RADIUS}",
-        *(f"lamp ring l{i} 0 0 8 {x} {y} 1e-3 0 0 1 0 {tracer.HOLE}" for i, (x, y) in enumerate(tracer.HOLES)),
+        f"white tube wall 0 0 7 0 0 0 0 0 {scenes.HEIGHT} {scenes.RADIUS}",
+        f"white ring base 0 0 8 0 0 0 0 0 1 0 {scenes.RADIUS}",
+        *(f"lamp ring l{i} 0 0 8 {x} {y} 1e-3 0 0 1 0 {scenes.HOLE}" for i, (x, y) in enumerate(scenes.HOLES)),
     ]
     (folder / "cavity.rad").write_text("\n".join(lines), encoding="ascii")
     octree = folder / "cavity.oct"

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import platform
 import shutil
@@ -27,12 +26,14 @@ from typing import Any, NamedTuple
 
 import etendue as et
 import numpy as np
+import scenes
 from etendue import _core
 from etendue.lightfield.counting import count_rays
 from etendue.lightfield.fitting import grids_for
 from etendue.scene import compile_scene
 from light_field import families
 from light_field_speed import DEPTHS, RINGS, SAMPLES
+from scenes import glass, lattice
 from timing import best, load, timed
 
 HERE = Path(__file__).parent
@@ -72,8 +73,8 @@ def forward(_: argparse.Namespace, folder: Path) -> Iterator[Row]:
     path, mesh = peer.mesh_walls(folder)
     walls = {"name": "walls", "shape": {"kind": "mesh", "file": str(path)}, "finish": "white"}
     for name, scene, theirs, bar in (
-        ("analytic cavity", tracer.analytic(), peer.analytic_walls, 2.5),
-        ("cavity of 24 064 triangles", tracer.cavity([walls]), mesh, 1.1),
+        ("analytic cavity", scenes.analytic(), peer.analytic_walls, 2.5),
+        ("cavity of 24 064 triangles", scenes.cavity([walls]), mesh, 1.1),
     ):
         core = _core.Scene(compile_scene(scene).record)
         tracer.forward(core, 1 << 18, None)
@@ -105,33 +106,15 @@ def solids(_: argparse.Namespace, __: Path) -> Iterator[Row]:
             yield seconds("set-up of 10 000 blocks, beside 10 000 balls", setting, "Mitsuba", loading, 1.0)
 
 
-def lattice(count: int) -> tuple[Any, float]:
-    """Places of solids in a box of side 100 above a lamp, and their pitch."""
-    side = math.ceil(count ** (1 / 3))
-    grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)
-    chosen = grid[np.random.default_rng(count).permutation(len(grid))[:count]]
-    return (chosen + 0.5) * (100 / side) - [50, 50, -10], 100 / side
-
-
-def glass(shape: dict[str, Any], places: Any) -> _core.Scene:
-    """Equal solids above a Lambertian disk."""
-    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 40}, "flux": 1}
-    things = [
-        {"name": f"s{i}", "shape": shape, "medium": "PMMA", "at": list(at)} for i, at in enumerate(places.tolist())
-    ]
-    return _core.Scene(compile_scene(et.Scene(sources=[lamp], solids=things)).record)
-
-
 # --- maps ------------------------------------------------------------------------------------------------------------
 
 
 def field(_: argparse.Namespace, __: Path) -> Iterator[Row]:
     import mitsuba_peer as peer  # noqa: PLC0415
-    import tracer  # noqa: PLC0415
 
     observer, screen = RING_VIEW
     rings = et.LightField.fit(et.RingSource(rays=1_000_000), et.Disk(radius=30), depths=(5, 5, 5, 5))
-    for name, lenses, bar in (("bare", [], 0.6), ("behind a lens", [tracer.LENS], 1.3)):
+    for name, lenses, bar in (("bare", [], 0.6), ("behind a lens", [scenes.LENS], 1.3)):
         scene = et.Scene(sources=[{"kind": "light-field", "field": rings}], solids=lenses)
         ours = best(lambda scene=scene: et.luminance_map(scene, observer, screen, rays_per_pixel=1000, gather=False), 4)
         theirs = peer.rings_seconds(observer, screen, 1000, 3, lens=bool(lenses))
@@ -140,9 +123,8 @@ def field(_: argparse.Namespace, __: Path) -> Iterator[Row]:
 
 def cavity(_: argparse.Namespace, folder: Path) -> Iterator[Row]:
     import mitsuba_peer as peer  # noqa: PLC0415
-    import tracer  # noqa: PLC0415
 
-    scene = tracer.analytic()
+    scene = scenes.analytic()
 
     def ours(seed: int) -> Any:
         return np.nan_to_num(et.luminance_map(scene, *CAVITY, seed=seed + 100).values) * 1e-6

@@ -22,9 +22,8 @@ import numpy as np
 import trimesh
 from etendue import _core
 from etendue.scene import compile_scene
+from scenes import LENS, glass, lattice
 from timing import best, load, timed
-
-LENS = {"kind": "lens", "radius": 40, "thickness": 20, "front": {"radius_of_curvature": 200}}
 
 
 def told(family: str, unit: str, numbers: Sequence[float], values: Sequence[float]) -> None:
@@ -54,23 +53,16 @@ def powers(most: float) -> list[int]:
 def solids(options: argparse.Namespace) -> None:
     """Glass balls and blocks on a lattice above a lamp."""
     numbers = powers(options.most)
-    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 40}, "flux": 1}
     for kind in ("ball", "block"):
         setting, tracing = [], []
         for count in numbers:
-            side = math.ceil(count ** (1 / 3))
-            grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:count]
-            pitch = 100 / side
+            places, pitch = lattice(count)
             size = (
                 {"radius": 0.35 * pitch} if kind == "ball" else dict.fromkeys(("width", "height", "depth"), 0.5 * pitch)
             )
-            places = ((grid + 0.5) * pitch - [50, 50, -10]).tolist()
 
-            def made(size: dict[str, float] = size, places: list[Any] = places, kind: str = kind) -> _core.Scene:
-                things = [{"shape": {"kind": kind, **size}, "medium": "PMMA", "at": at} for at in places]
-                return _core.Scene(compile_scene(et.Scene(sources=[lamp], solids=things)).record)
-
-            seconds, core = timed(made)
+            shape = {"kind": kind, **size}
+            seconds, core = timed(lambda shape=shape, places=places: glass(shape, places))
             setting.append(seconds)
             tracing.append(segment_time(core))
         told(f"set-up of {kind}s", "s", numbers, setting)
@@ -104,12 +96,11 @@ def triangles(options: argparse.Namespace) -> None:
 
 def patches(_: argparse.Namespace) -> None:
     """Rays of a gridded source of more and more patches through a lens."""
-    lens = {"shape": LENS, "medium": "PMMA", "at": [0, 0, 10]}
     numbers, drawing = [], []
     for pixel in (20.0, 1.7, 0.165):
         gridded = et.GriddedSource.fit(et.RingSource(rays=2_000_000), et.Disk(radius=30), pixel=pixel, threshold=5.0)
         source = {"kind": "gridded", "gridded": gridded, "draws": 1_000_000}
-        core = _core.Scene(compile_scene(et.Scene(sources=[source], solids=[lens])).record)
+        core = _core.Scene(compile_scene(et.Scene(sources=[source], solids=[LENS])).record)
         numbers.append(len(gridded.patches))
         drawing.append(segment_time(core, 1_000_000))
     told("a segment of a gridded source, by patches", "ns", numbers, drawing)

@@ -114,7 +114,10 @@ def test_equal_bodies_share_their_faces_and_stand_where_they_are_put() -> None:
     for number, solid in enumerate(scene.solids):
         own = [face for face in faces if face["solid"] == number]
         for face, row in zip(solid.shape.faces(scene.files), own, strict=True):
-            expected = solid.frame().then(face.frame).record()
-            assert row["frame"] == pytest.approx(expected, abs=1e-15)
+            body = solid.frame()
+            origin, *axes = np.array(row["frame"]).reshape(4, 3)
+            assert origin == pytest.approx(body.origin + body.axes @ face.frame.origin, abs=1e-14)
+            for axis, own in zip(axes, face.frame.axes.T, strict=True):
+                assert axis == pytest.approx(body.axes @ own, abs=1e-15)
     assert all(a["shape"] is b["shape"] for a, b in zip(faces[:5], faces[5:10], strict=True))
     assert not any(a["shape"] is b["shape"] for a, b in zip(faces[:5], faces[10:], strict=True))

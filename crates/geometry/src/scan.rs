@@ -192,6 +192,17 @@ mod tests {
     use super::*;
     use crate::table::{Float, Layout, RayTable};
 
+    /// x, y, z, the direction and the flux, one after the other.
+    const LAYOUT: Layout = Layout {
+        stride: 56,
+        position: Some(0),
+        direction: 24,
+        flux: 48,
+        float: Float::F64,
+        colour: None,
+        length_scale: 1.0,
+    };
+
     #[test]
     fn sums_of_an_asymmetric_set_match_a_plain_loop() {
         let n = 200_001_u64;
@@ -212,16 +223,7 @@ mod tests {
             })
             .collect();
         let bytes: Vec<u8> = rays.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
-        let layout = Layout {
-            stride: 56,
-            position: Some(0),
-            direction: 24,
-            flux: 48,
-            float: Float::F64,
-            colour: None,
-            length_scale: 1.0,
-        };
-        let table = RayTable::new(&bytes, layout).expect("valid");
+        let table = RayTable::new(&bytes, LAYOUT).expect("valid");
         let scanned = scan(&table, 2, |_| ControlFlow::Continue(()));
         let plain = |f: &dyn Fn(&[f64; 7]) -> f64| rays.iter().map(f).sum::<f64>();
         assert_eq!(scanned.tally.rays, n);
@@ -254,16 +256,7 @@ mod tests {
             ]
         };
         let bytes: Vec<u8> = (0..11).flat_map(ray).flat_map(f64::to_le_bytes).collect();
-        let layout = Layout {
-            stride: 56,
-            position: Some(0),
-            direction: 24,
-            flux: 48,
-            float: Float::F64,
-            colour: None,
-            length_scale: 1.0,
-        };
-        let table = RayTable::new(&bytes, layout).expect("valid");
+        let table = RayTable::new(&bytes, LAYOUT).expect("valid");
         let scanned = scan(&table, 1, |_| ControlFlow::Continue(()));
         // 3: not a number; 4: no direction; 8: negative flux. That z is 0 at 7 is no defect.
         assert_eq!(scanned.tally.defects, [1, 1, 1]);

@@ -22,10 +22,6 @@ class Found(NamedTuple):
     show: Callable[[], None]
 
 
-STEP = b"ISO-10303-21"
-"""How STEP files begin."""
-
-
 def info(
     files: Annotated[
         list[Path],
@@ -83,13 +79,13 @@ def _opened(path: Path, photometry: str | None) -> Found:
 def _looks(path: Path) -> Iterator[Callable[[Path], Found | None]]:
     """The looks that are worth it: by the first bytes, so that nobody waits for the parts of other files to be imported."""
     from etendue.formats.hdf5 import SIGNATURE
-    from etendue.formats.head import Head
+    from etendue.formats.head import STEP_SIGNATURE, Head
 
     head = Head.of(path)
     if head.data.startswith(SIGNATURE):
         yield from (_light_field, _trace_result)
     yield _map
-    if head.data.lstrip().startswith(STEP):
+    if head.data.lstrip().startswith(STEP_SIGNATURE):
         yield _bodies
 
 

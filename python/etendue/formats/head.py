@@ -14,6 +14,9 @@ from etendue.quantities.provenance import Provenance
 HEAD_BYTES = 1 << 16
 """Bytes from the beginning of a file by which its format is recognised."""
 
+STEP_SIGNATURE = b"ISO-10303-21"
+"""How STEP files begin, after white space."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Head:

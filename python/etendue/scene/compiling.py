@@ -318,13 +318,12 @@ class _Compiler:
     def _body(self, body: Body) -> _Faces:
         """The faces of a body; equal ones share theirs, so that a file is read once and its numbers are worked out once."""
         try:
-            hash(body)
-        except TypeError:
-            # It holds arrays.
+            found = self.bodies.get(body)
+        except TypeError:  # it holds arrays, which have no hash
             return _Faces(body.faces(self.files))
-        if body not in self.bodies:
-            self.bodies[body] = _Faces(body.faces(self.files))
-        return self.bodies[body]
+        if found is None:
+            found = self.bodies[body] = _Faces(body.faces(self.files))
+        return found
 
     def _surface(self, place: str, name: str, surface: Surface) -> None:
         with self._at(join(place, "shape")):

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
+from etendue.formats.head import STEP_SIGNATURE
 from etendue.quantities.memory import require_memory
 from etendue.scene.mesh_limits import LARGEST_FILE, check_mesh, require_mesh_memory
 from etendue.scene.stated_normals import states_normals
@@ -68,7 +69,7 @@ MESH_FORMATS: dict[str, MeshFormat] = {
     for form in (
         MeshFormat("ply", "PLY", lambda head, _: head.startswith(b"ply")),
         MeshFormat("glb", "binary glTF", lambda head, _: head.startswith(b"glTF"), 1000.0),
-        MeshFormat("step", "STEP", lambda head, _: head.lstrip().startswith(b"ISO-10303-21")),
+        MeshFormat("step", "STEP", lambda head, _: head.lstrip().startswith(STEP_SIGNATURE)),
         MeshFormat("gltf", "glTF", lambda head, _: head.lstrip().startswith(b"{"), 1000.0),
         # Binary STL before text: there are binary files that begin with "solid".
         MeshFormat("stl", "binary STL", _is_binary_stl),

@@ -32,17 +32,12 @@ class Frame:
 
     Examples
     --------
-    >>> lifted = Frame(np.array([0.0, 0.0, 5.0]), np.diag([1.0, -1.0, -1.0]))
-    >>> lifted.then(lifted).origin.tolist()
-    [0.0, 0.0, 0.0]
+    >>> Frame.along((0, 0, 5), (2, 0, 0), (0, 0, -1)).record()
+    [0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0]
     """
 
     origin: Array
     axes: Array
-
-    def then(self, inner: Frame) -> Frame:
-        """The frame `inner`, which is given in the coordinates of this one, in those of the world."""
-        return Frame(self.origin + self.axes @ inner.origin, self.axes @ inner.axes)
 
     def record(self) -> list[float]:
         """Origin, x, y and z axis as 12 numbers."""

@@ -9,7 +9,7 @@ import dataclasses
 from pathlib import PurePath
 
 from etendue.errors import UnsupportedFormatError
-from etendue.formats.head import Head
+from etendue.formats.head import STEP_SIGNATURE, Head
 
 OTHER_EXPORT = (
     "Its layout is not public. Ask for the same rays as TM-25 (.tm25ray), LightTools (.ray) or Zemax (.dat, .sdf); LED "
@@ -72,7 +72,7 @@ REFUSALS = (
     Refusal(
         "STEP or IGES geometry",
         "It shows where the rays start; the rays are in another file.",
-        signatures=(b"ISO-10303-21",),
+        signatures=(STEP_SIGNATURE,),
         extensions=(".step", ".stp", ".igs", ".iges"),
     ),
     Refusal("an IES LM-63 intensity file", INTENSITY_FILE, signatures=(b"IESNA", b"IES:LM-63"), extensions=(".ies",)),
