@@ -68,16 +68,6 @@ def test_spin_comes_first() -> None:
     assert spun[:, 2] == pytest.approx(plain[:, 2])
 
 
-def test_frames_within_frames() -> None:
-    """A point goes through both frames, one after the other."""
-    outer = Placement(at=[1, 2, 3], rotation=[10, 20, 30]).frame()
-    inner = Placement(at=[-4, 5, 6], axis=[1, 1, 0], angle=50).frame()
-    p = np.array([0.3, -0.7, 2.0])
-    both = outer.then(inner)
-    there = outer.origin + outer.axes @ (inner.origin + inner.axes @ p)
-    assert both.origin + both.axes @ p == pytest.approx(there, rel=1e-14)
-
-
 def test_the_record_lists_the_axes_one_after_the_other() -> None:
     frame = Frame.along((1, 2, 3), (0, 5, 0), (2, 0, 0))
     assert frame.record() == [1, 2, 3, 0, 1, 0, 0, 0, 1, 1, 0, 0]
