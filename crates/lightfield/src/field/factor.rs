@@ -1,6 +1,8 @@
 //! A factor of a light field over the place or over the direction: bilinear between the centres of a fine grid.
 
-use super::tent::{Tent, inside};
+use std::ops::Range;
+
+use super::tent::{Tent, Tents, inside};
 
 /// A positive function on the unit square.
 #[derive(Clone, Debug)]
@@ -55,42 +57,71 @@ impl Factor {
     }
 
     /// The value at a point of the square.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn at(&self, point: [f64; 2]) -> f64 {
         if self.n == 1 {
             return self.values[0];
         }
-        self.between(&self.tents(point))
-    }
-
-    /// The tents over a point.
-    #[inline(always)]
-    fn tents(&self, point: [f64; 2]) -> [Tent; 2] {
-        [
+        let [x, y] = [
             Tent::at(point[0], self.n, self.wraps),
             Tent::at(point[1], self.n, false),
-        ]
+        ];
+        bilinear(&self.corners([x.cells, y.cells]), [x.weights, y.weights])
     }
 
-    /// The values of this factor and of another one at a point: where their grids are the same, it is looked for once.
+    /// The values at the corners of a point among several cells; those of the second axis lie side by side.
     #[inline(always)]
-    pub(super) fn both(&self, other: &Self, point: [f64; 2]) -> [f64; 2] {
-        if self.n == 1 || (self.n, self.wraps) != (other.n, other.wraps) {
-            return [self.at(point), other.at(point)];
+    fn corners(&self, [x, y]: [[usize; 2]; 2]) -> [[f64; 2]; 2] {
+        x.map(|row| next_to(&self.values, row * self.n + y[0]))
+    }
+
+    /// Asks for the entries between two corners of the square, a few at a time: as points ask for them, one after the other,
+    /// the processor would wait for most of them. Not if there are more than `most`.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "0 to n: the corners lie in the square"
+    )]
+    pub(super) fn fetch(&self, lower: [f64; 2], upper: [f64; 2], most: usize) {
+        /// Entries that come from memory together.
+        const LINE: usize = 8;
+        let cell = |x: f64| ((x * self.n as f64) as usize).min(self.n - 1);
+        let [rows, columns] = [0, 1].map(|k| cell(lower[k])..cell(upper[k]) + 1);
+        if rows.len() * columns.len() > LINE * most {
+            return;
         }
-        let tents = self.tents(point);
-        [self.between(&tents), other.between(&tents)]
+        let row = |row: usize| self.values[row * self.n..][columns.clone()].iter().step_by(LINE);
+        std::hint::black_box(rows.flat_map(row).sum::<f64>());
     }
 
-    /// The value under two tents.
+    /// The values at some points of the square, at most [`Tents::MOST`], given by their coordinates.
     #[inline(always)]
-    fn between(&self, [x, y]: &[Tent; 2]) -> f64 {
-        let row = |i: usize| {
-            let row = &self.values[i * self.n..][..self.n];
-            row[y.cells[0]] * y.weights[0] + row[y.cells[1]] * y.weights[1]
-        };
-        row(x.cells[0]) * x.weights[0] + row(x.cells[1]) * x.weights[1]
+    pub(super) fn fill(&self, points: [&[f64]; 2], [x, y]: [&mut Tents; 2], values: &mut [f64]) {
+        if self.n == 1 {
+            values.fill(self.values[0]);
+            return;
+        }
+        x.look_up(points[0], self.n, self.wraps);
+        y.look_up(points[1], self.n, false);
+        for (some, values) in groups(values) {
+            let weights = x.weights(some.clone()).iter().zip(y.weights(some.clone()));
+            let weights = weights.map(|(x, y)| [[1.0 - x, *x], [1.0 - y, *y]]);
+            if let (Some(rows), Some(columns)) = (x.shared(some.clone()), y.shared(some.clone())) {
+                let corners = self.corners([rows, columns]);
+                for (value, weights) in values.iter_mut().zip(weights) {
+                    *value = bilinear(&corners, weights);
+                }
+            } else {
+                for ((value, weights), i) in values.iter_mut().zip(weights).zip(some) {
+                    let [lower, upper] = x
+                        .get(i)
+                        .cells
+                        .map(|row| &self.values[row * self.n + y.get(i).cells[0]..][..2]);
+                    *value = bilinear(&[[lower[0], lower[1]], [upper[0], upper[1]]], weights);
+                }
+            }
+        }
     }
 
     /// The sampler of this factor under tents of a grid of `cells` cells along each axis.
@@ -98,6 +129,28 @@ impl Factor {
     pub fn under_tents(&self, cells: [usize; 2]) -> UnderTents {
         UnderTents::new(self, cells)
     }
+}
+
+/// Between four corners.
+#[inline(always)]
+fn bilinear([lower, upper]: &[[f64; 2]; 2], [x, y]: [[f64; 2]; 2]) -> f64 {
+    let along: [f64; 2] = std::array::from_fn(|k| lower[k] * x[0] + upper[k] * x[1]);
+    along[0] * y[0] + along[1] * y[1]
+}
+
+/// Points that are asked whether they share their cells: about those of a pixel.
+const GROUP: usize = 16;
+
+/// The numbers of some points in groups, with the numbers of the points.
+pub(super) fn groups(values: &mut [f64]) -> impl Iterator<Item = (Range<usize>, &mut [f64])> {
+    let groups = values.chunks_mut(GROUP).enumerate();
+    groups.map(|(index, values)| (index * GROUP..index * GROUP + values.len(), values))
+}
+
+/// N numbers from place `at` on.
+#[inline(always)]
+pub(super) fn next_to<const N: usize, T: Copy>(values: &[T], at: usize) -> [T; N] {
+    *values[at..].first_chunk().expect("neighbours lie within the table")
 }
 
 /// Draws points under `factor · tent`, for each tent of a coarser grid, exactly.

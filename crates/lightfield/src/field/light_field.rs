@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use etendue_math::Vec3;
 
 use super::errors::FineErrors;
-use super::factor::Factor;
+use super::factor::{Factor, next_to};
 use super::tent::Tent;
 use crate::surface::CarrierPart;
 
@@ -28,14 +28,6 @@ pub struct PartField {
     pub errors: FineErrors,
 }
 
-/// Luminance with its errors by their kind: each kind has neighbours of its own with which it errs together.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Parsed {
-    pub value: f64,
-    /// Standard deviations: of the cells, of the place within a cell, of the direction within one.
-    pub deviations: [f64; 3],
-}
-
 /// Luminance with its standard deviation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
@@ -50,7 +42,17 @@ impl PartField {
     #[inline]
     #[must_use]
     pub fn at(&self, place: [f64; 2], direction: [f64; 2]) -> Reading {
-        let Parsed { value, deviations } = self.parsed(place, direction);
+        let wraps = self.part.wraps();
+        let [n1, n2, n3, n4] = self.cells;
+        let ratio = self.ratio_under(&[
+            Tent::at(place[0], n1, wraps),
+            Tent::at(place[1], n2, false),
+            Tent::at(direction[0], n3, false),
+            Tent::at(direction[1], n4, false),
+        ]);
+        let factors = [self.space.at(place), self.direction.at(direction)];
+        let errors = [self.errors.space.at(place), self.errors.direction.at(direction)];
+        let (value, deviations) = joined(self.level, ratio, factors, errors);
         let variance: f64 = deviations.iter().map(|d| d * d).sum();
         Reading {
             value,
@@ -58,35 +60,60 @@ impl PartField {
         }
     }
 
-    /// The same with the kinds of errors apart. Cells side by side err together, so that those of the tents add up.
+    /// The ratio and its standard deviation under the tents over a point.
     #[inline(always)]
-    pub(super) fn parsed(&self, place: [f64; 2], direction: [f64; 2]) -> Parsed {
-        let wraps = self.part.wraps();
-        let [n1, n2, n3, n4] = self.cells;
-        let (x, y) = (Tent::at(place[0], n1, wraps), Tent::at(place[1], n2, false));
-        let (u, v) = (Tent::at(direction[0], n3, false), Tent::at(direction[1], n4, false));
-        let mut sum = [0.0; 2];
-        let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
-        let aims = pairs.map(|(k, l)| (u.cells[k] * n4 + v.cells[l], u.weights[k] * v.weights[l]));
-        for (i, j) in pairs {
-            let layer = &self.ratio[(x.cells[i] * n2 + y.cells[j]) * (n3 * n4)..][..n3 * n4];
-            let near = x.weights[i] * y.weights[j];
-            for (cell, weight) in aims {
-                for (s, c) in sum.iter_mut().zip(layer[cell]) {
-                    *s += near * weight * f64::from(c);
+    pub(super) fn ratio_under(&self, [x, y, u, v]: &[Tent; 4]) -> [f64; 2] {
+        let corners = self.corners([x.cells, y.cells, u.cells, v.cells]);
+        weighed(&corners, [x.weights, y.weights, u.weights, v.weights])
+    }
+
+    /// Ratio and deviation of the cells of tents. Along the last axis the two cells lie beside one another.
+    #[inline(always)]
+    pub(super) fn corners(&self, [x, y, u, v]: [[usize; 2]; 4]) -> Corners {
+        let [_, n2, n3, n4] = self.cells;
+        let values = self.ratio.as_flattened();
+        let row = |i: usize, j: usize, k: usize| {
+            let cell = ((x[i] * n2 + y[j]) * n3 + u[k]) * n4 + v[0];
+            if n4 > 1 {
+                next_to(values, 2 * cell)
+            } else {
+                [values[2 * cell], values[2 * cell + 1], 0.0, 0.0]
+            }
+        };
+        [
+            [[row(0, 0, 0), row(0, 0, 1)], [row(0, 1, 0), row(0, 1, 1)]],
+            [[row(1, 0, 0), row(1, 0, 1)], [row(1, 1, 0), row(1, 1, 1)]],
+        ]
+    }
+}
+
+/// The luminance and its deviations by their kind, from the ratio with its deviation, the values of the factors and those of
+/// their errors.
+#[inline(always)]
+pub(super) fn joined(level: f64, ratio: [f64; 2], factors: [f64; 2], errors: [f64; 2]) -> (f64, [f64; 3]) {
+    let base = level * factors[0] * factors[1];
+    let value = base * ratio[0];
+    (value, [base * ratio[1], value * errors[0], value * errors[1]])
+}
+
+/// Ratio and deviation, then the same of the next cell along the last axis: for either cell of the first three axes.
+pub(super) type Corners = [[[[f32; 4]; 2]; 2]; 2];
+
+/// The sum of corners with the weights of their tents. Cells side by side err together, so that their deviations add up.
+#[inline(always)]
+pub(super) fn weighed(corners: &Corners, [x, y, u, v]: [[f64; 2]; 4]) -> [f64; 2] {
+    let mut sums = [0.0; 4];
+    for (x, corners) in x.into_iter().zip(corners) {
+        for (y, corners) in y.into_iter().zip(corners) {
+            for (u, pair) in u.into_iter().zip(corners) {
+                let weight = x * y * u;
+                for (sum, value) in sums.iter_mut().zip(pair) {
+                    *sum += weight * f64::from(*value);
                 }
             }
         }
-        let [mean, deviation] = sum;
-        let [space, of_place] = self.space.both(&self.errors.space, place);
-        let [aim, of_direction] = self.direction.both(&self.errors.direction, direction);
-        let base = self.level * space * aim;
-        let value = base * mean;
-        Parsed {
-            value,
-            deviations: [base * deviation, value * of_place, value * of_direction],
-        }
     }
+    [0, 1].map(|k| sums[k] * v[0] + sums[k + 2] * v[1])
 }
 
 /// The light of a source: the fields of the parts of its carrier surface.

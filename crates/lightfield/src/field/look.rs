@@ -10,7 +10,8 @@ use etendue_geometry::ray_batch::BLOCK;
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 
-use super::light_field::{LightField, Parsed, PartField, Reading, stopped};
+use super::light_field::{LightField, PartField, Reading, stopped};
+use super::points::Points;
 use crate::surface::{Coordinates, carry};
 use crate::view::View;
 
@@ -25,52 +26,111 @@ const CHUNK: usize = 256;
 #[must_use]
 pub fn look(field: &LightField, view: &View, samples: u32, threads: usize, stop: Option<&AtomicBool>) -> Vec<Reading> {
     let points = lattice(samples);
-    let chunk = (BLOCK / points.len()).max(1);
-    let work = |(index, pixels): (usize, &mut [Reading])| {
+    let tiles = Tile::all(view, (BLOCK / points.len()).max(1));
+    let work = |scratch: &mut Scratch, tile: &Tile| {
+        let mut pixels = vec![Reading::default(); tile.pixels()];
         if !stopped(stop) {
-            see(field, view, index * chunk, &points, pixels);
-        }
-    };
-    let serial = threads == 1 || view.pixels() <= 4 * chunk;
-    let paint = |parallel: bool| {
-        let mut pixels = vec![Reading::default(); view.pixels()];
-        if parallel {
-            pixels.par_chunks_mut(chunk).enumerate().for_each(work);
-        } else {
-            pixels.chunks_mut(chunk).enumerate().for_each(work);
+            see(field, view, *tile, &points, scratch, &mut pixels);
         }
         pixels
     };
-    if serial {
-        paint(false)
+    let one_by_one = || {
+        let mut scratch = Scratch::default();
+        tiles.iter().map(|tile| work(&mut scratch, tile)).collect()
+    };
+    let seen: Vec<Vec<Reading>> = if threads == 1 || tiles.len() <= 4 {
+        one_by_one()
     } else {
-        ordered::within(threads, paint)
+        ordered::within(threads, |parallel| {
+            if parallel {
+                tiles.par_iter().map_init(Scratch::default, work).collect()
+            } else {
+                one_by_one()
+            }
+        })
+    };
+    let mut map = vec![Reading::default(); view.pixels()];
+    for (tile, seen) in tiles.iter().zip(&seen) {
+        for (row, seen) in (tile.row..).zip(seen.chunks_exact(tile.columns)) {
+            map[row * view.columns as usize + tile.column..][..tile.columns].copy_from_slice(seen);
+        }
+    }
+    map
+}
+
+/// Some pixels beside and above one another: they see parts of the tables that lie together, whichever way the rows of these
+/// run over the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Tile {
+    row: usize,
+    column: usize,
+    rows: usize,
+    columns: usize,
+}
+
+impl Tile {
+    /// The tiles of a view, of so many pixels at most.
+    fn all(view: &View, most: usize) -> Vec<Self> {
+        let [rows, columns] = [view.rows as usize, view.columns as usize];
+        let tall = rows.min(1 << (most.ilog2() / 2));
+        let wide = columns.min(most / tall);
+        let mut tiles = Vec::with_capacity(rows.div_ceil(tall) * columns.div_ceil(wide));
+        for row in (0..rows).step_by(tall) {
+            for column in (0..columns).step_by(wide) {
+                tiles.push(Self {
+                    row,
+                    column,
+                    rows: tall.min(rows - row),
+                    columns: wide.min(columns - column),
+                });
+            }
+        }
+        tiles
+    }
+
+    const fn pixels(&self) -> usize {
+        self.rows * self.columns
     }
 }
 
-/// Fills pixels from number `first` on: all their points are carried to each part as one block.
-fn see(field: &LightField, view: &View, first: usize, points: &[[f64; 2]], pixels: &mut [Reading]) {
-    let mut batch = RayBatch::default();
-    let mut at = Coordinates::default();
-    aim(view, first, points, pixels.len(), &mut batch);
+/// Room for the points of some pixels.
+#[derive(Default)]
+struct Scratch {
+    batch: RayBatch,
+    at: Coordinates,
+    points: Points,
+}
+
+/// Fills the pixels of a tile: all their points are carried to each part as one block.
+fn see(
+    field: &LightField,
+    view: &View,
+    tile: Tile,
+    points: &[[f64; 2]],
+    scratch: &mut Scratch,
+    pixels: &mut [Reading],
+) {
+    aim(view, tile, points, &mut scratch.batch);
     for part in &field.parts {
-        carry(std::slice::from_ref(&part.part), &batch, &mut at);
-        average(part, &at, points.len(), pixels);
+        carry(std::slice::from_ref(&part.part), &scratch.batch, &mut scratch.at);
+        scratch.points.read(part, &scratch.at, scratch.batch.len);
+        average(part, &scratch.at, &scratch.points, points.len(), pixels);
     }
 }
 
 /// Adds to each pixel what its points, so many one after the other, see on a part: compiled for each instruction set.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn average(part: &PartField, at: &Coordinates, points: usize, pixels: &mut [Reading]) {
+fn average(part: &PartField, at: &Coordinates, read: &Points, points: usize, pixels: &mut [Reading]) {
     let share = 1.0 / points as f64;
+    let [of_cells, by_place, by_direction] = &read.deviations;
     let wraps = part.part.wraps();
-    let [s1, s2, a, b] = &at.values;
+    let [s1, s2, ..] = &at.values;
     for (pixel, start) in pixels.iter_mut().zip((0..).step_by(points)) {
         let mut sums = PixelSums::default();
         for i in start..start + points {
             if at.part[i] != Coordinates::NONE {
-                let place = [s1[i], s2[i]];
-                sums.add(wraps, place, &part.parsed(place, [a[i], b[i]]));
+                let deviations = [of_cells[i], by_place[i], by_direction[i]];
+                sums.add(wraps, [s1[i], s2[i]], read.value[i], deviations);
             }
         }
         pixel.value += share * sums.value;
@@ -92,12 +152,12 @@ struct PixelSums {
 
 impl PixelSums {
     #[inline(always)]
-    fn add(&mut self, wraps: bool, place: [f64; 2], read: &Parsed) {
+    fn add(&mut self, wraps: bool, place: [f64; 2], value: f64, deviations: [f64; 3]) {
         if self.points == 0.0 {
             self.first = place;
         }
         self.points += 1.0;
-        self.value += read.value;
+        self.value += value;
         for (axis, at) in place.iter().enumerate() {
             let mut away = at - self.first[axis];
             if wraps && axis == 0 {
@@ -106,7 +166,7 @@ impl PixelSums {
             self.away[axis] += away;
             self.squares[axis] += away * away;
         }
-        for (sum, d) in self.deviations.iter_mut().zip(read.deviations) {
+        for (sum, d) in self.deviations.iter_mut().zip(deviations) {
             *sum += d;
         }
     }
@@ -131,21 +191,24 @@ impl PixelSums {
     }
 }
 
-/// The lines from the points of `count` pixels to the observer.
-fn aim(view: &View, first: usize, points: &[[f64; 2]], count: usize, batch: &mut RayBatch) {
-    batch.len = count * points.len();
-    let columns = view.columns as usize;
-    for (pixel, start) in (first..first + count).zip((0..).step_by(points.len())) {
-        let (row, column) = ((pixel / columns) as f64, (pixel % columns) as f64);
-        for (i, [du, dv]) in (start..).zip(points) {
+/// The lines from the points of the pixels of a tile to the observer: compiled for each instruction set.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn aim(view: &View, tile: Tile, points: &[[f64; 2]], batch: &mut RayBatch) {
+    batch.len = tile.pixels() * points.len();
+    let [x, y, z] = batch.position.each_mut().map(|v| v.chunks_exact_mut(points.len()));
+    let [kx, ky, kz] = batch.direction.each_mut().map(|v| v.chunks_exact_mut(points.len()));
+    for (pixel, (((x, y), z), ((kx, ky), kz))) in (0..tile.pixels()).zip(x.zip(y).zip(z).zip(kx.zip(ky).zip(kz))) {
+        let row = (tile.row + pixel / tile.columns) as f64;
+        let column = (tile.column + pixel % tile.columns) as f64;
+        let places = x.iter_mut().zip(y).zip(z);
+        let directions = kx.iter_mut().zip(ky).zip(kz);
+        for ((((x, y), z), ((kx, ky), kz)), [du, dv]) in places.zip(directions).zip(points) {
             let u = ((column + du) / f64::from(view.columns) - 0.5) * view.width;
             let v = (0.5 - (row + dv) / f64::from(view.rows)) * view.height;
             let point = view.target + view.right * u + view.up * v;
             let k = (view.observer - point).normalized();
-            for (axis, (x, k)) in [(point.x, k.x), (point.y, k.y), (point.z, k.z)].into_iter().enumerate() {
-                batch.position[axis][i] = x;
-                batch.direction[axis][i] = k;
-            }
+            (*x, *y, *z) = (point.x, point.y, point.z);
+            (*kx, *ky, *kz) = (k.x, k.y, k.z);
         }
     }
 }
@@ -261,6 +324,34 @@ mod tests {
             sum += field.luminance(point, (v.observer - point).normalized()).value / 16.0;
         }
         assert!((coarse[pixel].value / sum - 1.0).abs() < 1e-12 && sum > 0.0);
+    }
+
+    #[test]
+    fn tiles_cover_each_pixel_once() {
+        for (columns, rows, most) in [
+            (40, 30, 128),
+            (1, 1, 128),
+            (1, 500, 128),
+            (500, 1, 128),
+            (7, 5, 1),
+            (33, 9, 2048),
+        ] {
+            let view = View {
+                columns,
+                rows,
+                ..view()
+            };
+            let mut seen = vec![0; view.pixels()];
+            for tile in Tile::all(&view, most) {
+                assert!(tile.pixels() <= most);
+                for row in tile.row..tile.row + tile.rows {
+                    for column in tile.column..tile.column + tile.columns {
+                        seen[row * columns as usize + column] += 1;
+                    }
+                }
+            }
+            assert!(seen.iter().all(|n| *n == 1));
+        }
     }
 
     #[test]

@@ -11,6 +11,7 @@ pub mod factor;
 pub mod intensity;
 mod light_field;
 pub mod look;
+mod points;
 pub mod tent;
 
 pub use errors::{Averaging, FineErrors};

@@ -1,43 +1,128 @@
 //! Tents: the hat functions of linear interpolation between cell centres.
 
-/// The two cells between whose centres a coordinate lies, and the weight of the second.
-#[derive(Clone, Copy, Debug)]
+use std::ops::Range;
+
+/// The two cells between whose centres a coordinate lies, and the weight of either.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tent {
-    /// Lower and upper cell.
+    /// Lower and upper cell: neighbours, unless the axis has one cell only, or closes upon itself between them.
     pub cells: [usize; 2],
-    /// Weights of the two: they add up to one.
+    /// Weights of the two: they add up to one. On an axis with two ends and one cell the first has it all.
     pub weights: [f64; 2],
 }
 
 impl Tent {
-    /// The tents over `x` in \[0, 1\] on an axis of `n` cells.
+    /// The tents over `x` in \[0, 1\] on an axis of `n` cells, a power of two.
     ///
     /// Before the first centre and after the last the value stays that of the cell, or, if the axis `wraps`, runs over to
     /// the cell at the other end. Either way the tent of every cell has the area of one cell.
     #[inline(always)]
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "0 to n by construction"
-    )]
     pub fn at(x: f64, n: usize, wraps: bool) -> Self {
-        let t = x * n as f64 + 0.5; // in cells, from half a cell before the first centre
-        // Cut off, not `floor`: that is a call where the processor is not known to round.
-        let upper = t as usize; // 0 ..= n: the cell after the interval
-        let upper_weight = t - upper as f64;
-        let cells = if wraps {
-            [
-                if upper == 0 { n - 1 } else { upper - 1 },
-                if upper >= n { 0 } else { upper },
-            ]
-        } else {
-            [upper.saturating_sub(1).min(n - 1), upper.min(n - 1)]
-        };
+        let (lower, weight) = if wraps { around(x, n) } else { along(x, n) };
+        Self::of(lower, weight, n)
+    }
+
+    /// From the lower cell and the weight of the upper one.
+    #[inline(always)]
+    fn of(lower: u32, weight: f64, n: usize) -> Self {
+        let lower = lower as usize;
         Self {
-            cells,
-            weights: [1.0 - upper_weight, upper_weight],
+            cells: [lower, (lower + 1) & (n - 1)],
+            weights: [1.0 - weight, weight],
         }
+    }
+}
+
+/// Added to a number, it leaves the nearest integer in the low bits: 1.5 · 2⁵².
+const INTEGER: f64 = 6_755_399_441_055_744.0;
+
+/// The integer below a number, and what is beyond it. Of an integer it is either this one or, with a rest of 1, the one before:
+/// the even one. In a few steps that every processor takes for several numbers at a time.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, reason = "the low bits")]
+fn cut(t: f64) -> (u32, f64) {
+    let lower = (t - 0.5) + INTEGER;
+    (lower.to_bits() as u32, t - (lower - INTEGER))
+}
+
+/// The lower cell and the weight of the upper one on an axis with two ends.
+#[inline(always)]
+fn along(x: f64, n: usize) -> (u32, f64) {
+    let (t, last) = (x * n as f64 - 0.5, (n - 1) as f64); // in cells, from the first centre
+    let t = if t > 0.0 { t } else { 0.0 };
+    // The last centre is an odd number, so that the cell before it is found; of a single cell it is 0, and found itself.
+    cut(if t < last { t } else { last })
+}
+
+/// The same on an axis that closes upon itself.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, reason = "cells of an axis")]
+fn around(x: f64, n: usize) -> (u32, f64) {
+    let (lower, weight) = cut(x * n as f64 - 0.5);
+    (lower & (n as u32 - 1), weight)
+}
+
+/// The tents over several points on one axis.
+pub struct Tents {
+    lower: [u32; Self::MOST],
+    /// Of the upper cells.
+    weight: [f64; Self::MOST],
+    /// Of the axis.
+    cells: usize,
+}
+
+impl Default for Tents {
+    /// None yet.
+    fn default() -> Self {
+        Self {
+            lower: [0; Self::MOST],
+            weight: [0.0; Self::MOST],
+            cells: 1,
+        }
+    }
+}
+
+impl Tents {
+    /// Points that are looked up at a time: their numbers stay in the processor's nearest memory.
+    pub const MOST: usize = 128;
+
+    /// Looks up points `x` on an axis of `n` cells; see [`Tent::at`].
+    #[inline(always)]
+    pub fn look_up(&mut self, x: &[f64], n: usize, wraps: bool) {
+        self.cells = n;
+        let places = self.lower.iter_mut().zip(&mut self.weight).zip(x);
+        if wraps {
+            places.for_each(|((lower, weight), x)| (*lower, *weight) = around(*x, n));
+        } else {
+            places.for_each(|((lower, weight), x)| (*lower, *weight) = along(*x, n));
+        }
+    }
+
+    /// The tent over a point.
+    #[inline(always)]
+    #[must_use]
+    pub fn get(&self, point: usize) -> Tent {
+        Tent::of(self.lower[point], self.weight[point], self.cells)
+    }
+
+    /// The cells of points, if they are the same for all.
+    #[inline(always)]
+    #[must_use]
+    pub fn shared(&self, points: Range<usize>) -> Option<[usize; 2]> {
+        let first = self.lower[points.start];
+        // All of them, without a way out: several at a time.
+        let others = self.lower[points]
+            .iter()
+            .fold(0, |found, lower| found | (lower ^ first));
+        (others == 0).then(|| Tent::of(first, 0.0, self.cells).cells)
+    }
+
+    /// The weights of the upper cells of points.
+    #[inline(always)]
+    #[must_use]
+    pub fn weights(&self, points: Range<usize>) -> &[f64] {
+        &self.weight[points]
     }
 }
 
@@ -92,8 +177,31 @@ mod tests {
             }
             assert!(area.iter().all(|a| (a - 1.0).abs() < 1e-9), "{n} {area:?}");
         }
-        assert_eq!(Tent::at(1.0, 4, false).cells, [3, 3]);
+        assert_eq!(
+            (Tent::at(1.0, 4, false).cells, Tent::at(1.0, 4, false).weights),
+            ([2, 3], [0.0, 1.0])
+        );
+        assert_eq!(
+            (Tent::at(0.0, 4, false).cells, Tent::at(0.0, 4, false).weights),
+            ([0, 1], [1.0, 0.0])
+        );
+        assert_eq!(
+            (Tent::at(0.7, 1, false).cells, Tent::at(0.7, 1, false).weights),
+            ([0, 0], [1.0, 0.0])
+        );
         assert_eq!(Tent::at(0.0, 4, true).cells, [3, 0]);
+    }
+
+    #[test]
+    fn many_at_a_time_are_those_of_each() {
+        let x: Vec<f64> = (0..100).map(|i| f64::from(i) / 99.0).collect();
+        for (n, wraps) in [(1, false), (1, true), (2, true), (8, false), (8, true)] {
+            let mut tents = Tents::default();
+            tents.look_up(&x, n, wraps);
+            for (i, x) in x.iter().enumerate() {
+                assert_eq!(tents.get(i), Tent::at(*x, n, wraps));
+            }
+        }
     }
 
     #[test]
