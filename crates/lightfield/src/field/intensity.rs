@@ -4,10 +4,14 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
+use etendue_geometry::RayBatch;
+use etendue_geometry::ray_batch::BLOCK;
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 
 use super::light_field::{LightField, PartField, stopped};
+use super::points::Points;
+use crate::surface::{Coordinates, carry};
 
 /// I(k) = Σ ∫ L(x, k) (n·k) dA over the parts, for each direction: a midpoint rule of `side`² points on every part.
 ///
@@ -20,38 +24,88 @@ pub fn intensity(
     threads: usize,
     stop: Option<&AtomicBool>,
 ) -> Vec<f64> {
-    let towards = |k: &[f64; 3]| {
+    let places: Vec<_> = field.parts.iter().map(|part| Places::new(part, side)).collect();
+    let towards = |scratch: &mut Scratch, k: &[f64; 3]| {
         if stopped(stop) {
             return 0.0;
         }
         let k = Vec3::from(*k).normalized();
-        field.parts.iter().map(|part| of_part(part, k, side)).sum()
+        let parts = field.parts.iter().zip(&places);
+        parts.map(|(part, places)| of_part(part, places, k, scratch)).sum()
     };
     ordered::within(threads, |parallel| {
         if parallel {
-            directions.par_iter().map(towards).collect()
+            directions.par_iter().map_init(Scratch::default, towards).collect()
         } else {
-            directions.iter().map(towards).collect()
+            let mut scratch = Scratch::default();
+            directions.iter().map(|k| towards(&mut scratch, k)).collect()
         }
     })
 }
 
-fn of_part(field: &PartField, k: Vec3, side: u32) -> f64 {
-    let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
-    let mut sum = 0.0;
-    for i in 0..side {
-        for j in 0..side {
-            let (point, cosine) = field.part.leaving([middle(i), middle(j)], k);
-            if cosine > 0.0 {
-                // Along k from the inside: the line leaves the part at this very point.
-                let crossing = field.part.cross(point, k);
-                if crossing.met {
-                    sum += cosine * field.at(crossing.place, crossing.direction).value;
-                }
-            }
+/// The points of a midpoint rule on a part, with the normals there.
+struct Places {
+    points: Vec<(Vec3, Vec3)>,
+    /// Area that each stands for \[mm²\].
+    area: f64,
+}
+
+impl Places {
+    fn new(field: &PartField, side: u32) -> Self {
+        let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
+        let place = |(i, j)| field.part.ray([middle(i), middle(j)], [0.5, 0.5]);
+        Self {
+            points: (0..side)
+                .flat_map(|i| (0..side).map(move |j| (i, j)))
+                .map(place)
+                .collect(),
+            area: field.part.area() / (f64::from(side) * f64::from(side)),
         }
     }
-    sum * field.part.area() / (f64::from(side) * f64::from(side))
+}
+
+/// Room for the lines of some points.
+#[derive(Default)]
+struct Scratch {
+    batch: RayBatch,
+    at: Coordinates,
+    points: Points,
+    cosine: Vec<f64>,
+}
+
+fn of_part(field: &PartField, places: &Places, k: Vec3, scratch: &mut Scratch) -> f64 {
+    let Scratch {
+        batch,
+        at,
+        points,
+        cosine,
+    } = scratch;
+    let mut sum = 0.0;
+    for some in places.points.chunks(BLOCK) {
+        cosine.clear();
+        batch.len = 0;
+        for (point, normal) in some {
+            let c = k.dot(*normal);
+            if c > 0.0 {
+                // Along k from the inside: the line leaves the part at this very point.
+                let start = field.part.leaving(*point, *normal, c);
+                for (axis, (x, k)) in [(start.x, k.x), (start.y, k.y), (start.z, k.z)].into_iter().enumerate() {
+                    batch.position[axis][batch.len] = x;
+                    batch.direction[axis][batch.len] = k;
+                }
+                cosine.push(c);
+                batch.len += 1;
+            }
+        }
+        carry(std::slice::from_ref(&field.part), batch, at);
+        points.read(field, at, batch.len);
+        let seen = cosine.iter().zip(&points.value).zip(&at.part);
+        sum += seen
+            .filter(|(_, owner)| **owner != Coordinates::NONE)
+            .map(|((c, value), _)| c * value)
+            .sum::<f64>();
+    }
+    sum * places.area
 }
 
 #[cfg(test)]
