@@ -19,6 +19,7 @@ PACKAGE = ROOT / "python" / "etendue"
 CRATES = ROOT / "crates"
 
 
+@functools.cache
 def project() -> dict[str, Any]:
     return tomllib.loads((ROOT / "pyproject.toml").read_text())
 
@@ -30,6 +31,12 @@ class Module:
     name: str
     path: Path
     tree: ast.Module
+
+    @functools.cached_property
+    def calls(self) -> tuple[tuple[str, int], ...]:
+        """What is called, as it is written, with the line."""
+        calls = (node for node in ast.walk(self.tree) if isinstance(node, ast.Call))
+        return tuple((ast.unparse(node.func), node.lineno) for node in calls)
 
     def names(self) -> Iterator[tuple[str, int]]:
         """Everything of the package that the module imports, as dotted names, with the line."""
@@ -58,6 +65,7 @@ def is_within(name: str, place: str) -> bool:
 # --- Python floors ---------------------------------------------------------------------------------------------------
 
 
+@functools.cache
 def layers() -> list[list[str]]:
     """The layers of the import contract, top first; the compiled core stands beside the lowest."""
     (contract,) = (c for c in project()["tool"]["importlinter"]["contracts"] if c["type"] == "layers")
@@ -66,6 +74,7 @@ def layers() -> list[list[str]]:
     return floors
 
 
+@functools.cache
 def place(name: str) -> tuple[int, str] | None:
     """Number of the floor (0 is the top) and part of it that a dotted name belongs to."""
     found = [(floor, part) for floor, parts in enumerate(layers()) for part in parts if is_within(name, part)]
@@ -114,11 +123,9 @@ def test_only_the_command_line_prints() -> None:
         if is_within(module.name, "etendue.cli"):
             continue
         looked += 1
-        for node in ast.walk(module.tree):
-            if isinstance(node, ast.Call):
-                called = ast.unparse(node.func)
-                assert called != "print", f"{module.path}:{node.lineno}"
-                assert not called.startswith(("sys.stdout", "sys.stderr")), f"{module.path}:{node.lineno}"
+        for called, line in module.calls:
+            assert called != "print", f"{module.path}:{line}"
+            assert not called.startswith(("sys.stdout", "sys.stderr")), f"{module.path}:{line}"
     assert looked > 20
 
 
@@ -127,13 +134,9 @@ def test_no_memory_is_used_before_it_is_filled() -> None:
     seen = 0
     for module in modules():
         assert not {"numpy.empty", "numpy.empty_like"} & {name for name, _ in module.names()}
-        for node in ast.walk(module.tree):
-            if isinstance(node, ast.Call):
-                called = ast.unparse(node.func)
-                seen += called.startswith("np.")
-                assert called not in banned, (
-                    f"{module.path}:{node.lineno}: {called} is filled with what was there before"
-                )
+        for called, line in module.calls:
+            seen += called.startswith("np.")
+            assert called not in banned, f"{module.path}:{line}: {called} is filled with what was there before"
     assert seen > 100
 
 

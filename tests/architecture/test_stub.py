@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import ast
-import importlib.util
 import inspect
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -135,12 +132,3 @@ def test_records_that_reach_outside_their_bytes_are_refused(size: int, layout: t
 def test_subsets_that_do_not_exist_are_refused(arguments: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="subset"):
         _core.select_subset(*arguments)
-
-
-@pytest.mark.slow
-def test_type_checkers_find_nothing_to_object_to() -> None:
-    """mypy's own comparison of stub and module; the tests above stand where mypy is not installed."""
-    if importlib.util.find_spec("mypy") is not None:
-        command = [sys.executable, "-m", "mypy.stubtest", "etendue._core"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=STUB.parents[2])
-        assert done.returncode == 0, done.stdout

@@ -273,8 +273,14 @@ def _angle_error(intensity: Intensity, plane: float, curve: _Curve, limit: float
 def _alike(intensity: Intensity, plane: float) -> Array:
     """Correlation of the errors of both half planes at each γ: rows of few nodes around the axis have rays in common."""
     rows = np.ones(intensity.gamma.size)
+    # Most rows have their nodes at the same angles.
+    known: dict[bytes, float] = {}
     for row, around in enumerate(kinks_around(intensity.c, intensity.values).T):
-        rows[row] = _alike_around(intensity.c[around], plane) if around.sum() > 1 else 1.0
+        if around.sum() > 1:
+            nodes = around.tobytes()
+            if nodes not in known:
+                known[nodes] = _alike_around(intensity.c[around], plane)
+            rows[row] = known[nodes]
     return rows
 
 

@@ -96,7 +96,7 @@ class SurfaceScorer:
         Of the dealing.
     threads : int or None
     one_fold_from : int
-        Rays from which on one fold is enough.
+        Rays from which on one fold is enough; of fewer, as many folds are held out in turn as hold out as many rays.
     settings : SelectionSettings
     """
 
@@ -166,7 +166,7 @@ class SurfaceScorer:
         """The scores of a surface on several grids."""
         owner, coordinates = _core.cross_parts([part.core() for part in parts], self.position, self.direction)
         met = np.bincount(owner[owner >= 0], minlength=len(parts))
-        folds = range(1 if len(owner) >= self.one_fold_from else self.settings.folds)
+        folds = range(min(math.ceil(self.one_fold_from / len(owner)), self.settings.folds))
         weights = np.concatenate([self.flux[self.fold == fold] for fold in folds])
         unmet = float(self.flux[owner < 0].sum() / self.flux.sum())
         few = [bool(n < FEW * met.max()) for n in met]

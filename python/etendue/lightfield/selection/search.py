@@ -154,7 +154,7 @@ class _Search:
         self.scorer = SurfaceScorer.of(rays, even, seed, threads, settings.one_fold_from, settings)
         few = pilot_sample(rays, settings.search_rays)
         self.coarse_scorer = SurfaceScorer.of(few, even, seed, threads, settings.search_one_fold_from, settings)
-        self.less = 0 if len(rays) >= settings.fine_grids_from else 1
+        self.less = settings.coarser(len(rays))
         self.most_unmet = settings.most_unmet + 1.0 - float(self.trials.rays.flux.sum() / rays.flux.sum())
 
     def choice(self) -> SurfaceChoice:
@@ -188,13 +188,18 @@ class _Search:
         able = [t for t in tried if t.held_out.unmet <= self.most_unmet]
         return max(able or tried, key=lambda t: t.mean).surface
 
+    def reduced(self, grid: Grid) -> Grid:
+        """A grid as so few rays fill it."""
+        place, turn = grid
+        return max(place - self.less, 1), max(turn - self.less, 1)
+
     def finals(self, surfaces: list[Surface]) -> list[_Scored]:
         """The surfaces scored with all rays, each on the grid that suits it; finer ones unless it is hopeless."""
         finer = dict(self.settings.kind_grids)
 
         def scored(pairs: list[tuple[Surface, Grid]]) -> dict[tuple[Surface, Grid], HeldOutScore]:
             self.step()
-            grids = [(surface.parts(), (place - self.less, turn - self.less)) for surface, (place, turn) in pairs]
+            grids = [(surface.parts(), self.reduced(grid)) for surface, grid in pairs]
             return dict(zip(pairs, self.scorer.score_all(grids, WITH_IMAGES), strict=True))
 
         seen = scored([(surface, grid) for surface in surfaces for grid in finer])
@@ -221,7 +226,7 @@ class _Search:
             flats, key=lambda f: self.coarse_scorer.score(flats[f].parts(), settings.coarse_grid).score.mean
         )
         seen: dict[float, HeldOutScore] = {}
-        grid = (settings.depth_grid[0] - self.less, settings.depth_grid[1] - self.less)
+        grid = self.reduced(settings.depth_grid)
 
         def score(z: float) -> float:
             self.step()

@@ -27,13 +27,14 @@ class SelectionSettings:
     folds : int
         One ray in so many is held out. More leave more rays to the fit and fewer to the score.
     one_fold_from : int
-        Compared rays from which on one fold is enough; of fewer each ray is held out once, in turn, which takes `folds`
-        times as long.
+        Compared rays from which on one fold is enough. Of fewer, folds are held out in turn until as many rays have been as
+        one fold of these holds, or all of them; each takes as long as the first.
     search_one_fold_from : int
         The same for the search rays, whose scores need to be less certain.
     fine_grids_from : int
-        Compared rays from which on the grids below are used as they stand; with fewer, each coordinate is halved once less.
-        Finer grids show sharper edges, but only if their cells hold rays.
+        Compared rays from which on the grids below are used as they stand. With fewer, each coordinate is halved once less,
+        and with fewer than a sixteenth of them twice less: as many rays are then left for each cell. Finer grids show
+        sharper edges, but only if their cells hold rays.
     concentration : float
         Of the trees that are scored: between ½ and 3 the scores of 100 thousand rays change by 0.001 nat.
     lead : float
@@ -108,6 +109,16 @@ class SelectionSettings:
     depth_tolerance: float = 0.01
     most_backwards: float = 0.5
     aslant: float = 0.3
+
+    def coarser(self, rays: int) -> int:
+        """Halvings of each coordinate that are left out where so many rays are compared; see `fine_grids_from`.
+
+        Examples
+        --------
+        >>> [SelectionSettings().coarser(rays) for rays in (100_000, 65_000, 4_000)]
+        [0, 1, 2]
+        """
+        return int(rays < self.fine_grids_from) + int(16 * rays < self.fine_grids_from)
 
 
 DEFAULT = SelectionSettings()
