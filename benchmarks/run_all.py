@@ -199,7 +199,13 @@ def files(options: argparse.Namespace, folder: Path) -> Iterator[Row]:
     yield seconds(f"cone map of {rays:.0e} rays", ours, peer, plain("cone", 30, 1.5, 70, 128), 0.5)
     grids = grids_for(rays, DEPTHS)
     ours = best(lambda: count_rays(et.read_rays(path), RINGS, grids), 3)
-    yield per_second("étendue counts", rays / ours, peer, rays / plain("counts", 60, *grids.fine), 1.0)
+    theirs = plain("counts", 60, *grids.fine)
+    yield per_second("étendue counts, Σ w and Σ w²", rays / ours, f"{peer}, number only", rays / theirs, 1.0)
+    # Of equal rays the number is all there is to know, here as there.
+    et.write_rays(path, et.RingSource((30.0,), (600.0,), rays=options.rays))
+    ours = best(lambda: count_rays(et.read_rays(path), RINGS, grids), 3)
+    theirs = plain("counts", 60, *grids.fine)
+    yield per_second("étendue counts of equal rays", rays / ours, peer, rays / theirs, 1.0)
 
 
 def start(_: argparse.Namespace, folder: Path) -> Iterator[Row]:

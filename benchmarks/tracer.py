@@ -2,7 +2,8 @@
 
 The cavity of thesis chapter 4: a cylinder of radius 21.5 and height 21.4, closed below by a disk, Lambertian with
 reflectance 0.984; four black disks in the base that emit from 1 µm above. A segment is one nearest-hit query; a ray ends
-when it leaves, is absorbed by chance, or meets a black disk. The same loop, and the same exit fraction, in both.
+when it leaves, is absorbed by chance, or meets a black disk. The same loop, and the same exit fraction, in both; what is
+asked of Mitsuba stands in `mitsuba_peer.py`.
 
 - analytic: the faces as they are;
 - mesh: 24 064 triangles (23 bands of 1 024 and a fan of 512), flat normals; beside Mitsuba also Embree, asked through
@@ -31,14 +32,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
 import etendue as et
 import mitsuba as mi
 import numpy as np
 import trimesh
 from etendue import _core
 from etendue.scene import compile_scene
-from scenes import AWAY, FLUX, HEIGHT, HOLE, HOLES, LENS, RADIUS, REFLECTANCE, analytic, cavity, mesh
+from mitsuba_peer import cavity_map, cavity_rate
+from scenes import FLUX, HEIGHT, LENS, RADIUS, analytic, cavity, mesh
 from timing import best, load
 
 Array = Any
@@ -56,54 +57,6 @@ def forward(scene: _core.Scene, rays: int, threads: int | None) -> tuple[float, 
     ledger = _core.work_unit(scene, rays, 1, 1_000_000, 0, batches, threads)["ledger"]
     seconds = time.perf_counter() - start
     return ledger["segments"] / seconds, ledger["escaped"][0][0] / (4 * FLUX)
-
-
-@dr.syntax
-def bounce_about(scene: Any, black: list[Any], rays: int, seed: int) -> tuple[Any, Any]:
-    """The loop of the cavity in Mitsuba: segments and rays that left."""
-    rng = mi.PCG32(size=rays, initstate=seed)
-    index = dr.arange(mi.UInt32, rays) % len(HOLES)
-    turn = index * mi.Float(math.pi / 2)
-    spot = HOLE * mi.warp.square_to_uniform_disk_concentric(mi.Point2f(rng.next_float32(), rng.next_float32()))
-    origin = mi.Point3f(AWAY * dr.cos(turn) + spot.x, AWAY * dr.sin(turn) + spot.y, 1e-3)
-    direction = mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32()))
-    ray = mi.Ray3f(origin, direction)
-    active = mi.Mask(True)
-    segments, left = mi.UInt32(0), mi.UInt32(0)
-    while active:
-        si = scene.ray_intersect(ray, active)
-        segments += dr.select(active, 1, 0)
-        hit = active & si.is_valid()
-        left += dr.select(active & ~hit, 1, 0)
-        dark = mi.Mask(False)
-        for shape in black:
-            dark |= si.shape == mi.ShapePtr(shape)
-        active = hit & ~dark & (rng.next_float32() < REFLECTANCE)
-        local = mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32()))
-        local.z = dr.select(si.wi.z < 0, -local.z, local.z)
-        ray = si.spawn_ray(si.to_world(local))
-    return dr.sum(mi.Float(segments)), dr.sum(mi.Float(left))
-
-
-def mitsuba_forward(walls: Callable[[], dict[str, Any]], rays: int) -> tuple[float, float]:
-    """The same loop in Mitsuba: segments per second and exit fraction."""
-    mi.set_variant("llvm_ad_rgb")
-    shift = mi.ScalarTransform4f().translate
-    scale = mi.ScalarTransform4f().scale
-    spots = [shift([x, y, 5e-4]) @ scale(HOLE) for x, y in HOLES]
-    parts = {f"hole{i}": {"type": "disk", "to_world": spot} for i, spot in enumerate(spots)}
-    scene = mi.load_dict({"type": "scene", **walls(), **parts})
-    black = [shape for shape in scene.shapes() if "hole" in shape.id()]
-
-    def timed(seed: int) -> tuple[float, float]:
-        start = time.perf_counter()
-        segments, left = bounce_about(scene, black, rays, seed)
-        dr.eval(segments, left)
-        dr.sync_thread()
-        return segments[0] / (time.perf_counter() - start), left[0] / rays
-
-    timed(1)  # compiles
-    return max(timed(seed) for seed in (2, 3, 4))
 
 
 def rays_of_the_loop(scene: et.Scene) -> tuple[Array, Array]:
@@ -140,10 +93,10 @@ def job_forward(name: str, scene: et.Scene, walls: Callable[[], dict[str, Any]],
     forward(core, 1 << 18, None)
     ours, left = max(forward(core, rays, None) for _ in range(3))
     one, _ = max(forward(core, rays, 1) for _ in range(2))
-    theirs, their_left = mitsuba_forward(walls, rays)
+    theirs, their_left = cavity_rate(walls, rays, 3)
     row(f"{name}: all cores", f"{ours / 1e6:.1f} M segments/s", f"{ours / theirs:.2f} × Mitsuba")
     row(f"{name}: one thread", f"{one / 1e6:.1f} M segments/s")
-    row(f"{name}: Mitsuba, llvm_ad_rgb", f"{theirs / 1e6:.1f} M segments/s")
+    row(f"{name}: Mitsuba, its faster variant", f"{theirs / 1e6:.1f} M segments/s")
     error = math.sqrt(0.955 * 0.045 / rays)
     row(f"{name}: exit fraction", f"{left:.4f}, {their_left:.4f}", f"± {error:.4f}")
     return one
@@ -188,40 +141,7 @@ def job_map(_rays: int) -> None:
         lmap = et.luminance_map(scene, observer, screen, seed=seed + 100, **how)
         return np.nan_to_num(lmap.values) * 1e-6
 
-    mi.set_variant("llvm_ad_rgb")
-    transform = mi.ScalarTransform4f
-    luminance = FLUX / (math.pi * math.pi * HOLE**2)
-    parts = {}
-    for i, (x, y) in enumerate(HOLES):
-        lamp = {"type": "area", "radiance": {"type": "rgb", "value": luminance}}
-        to_world = transform().translate([x, y, 1e-3]) @ transform().scale(HOLE)
-        black = {"type": "diffuse", "reflectance": 0.0}
-        parts[f"lamp{i}"] = {"type": "disk", "to_world": to_world, "emitter": lamp, "bsdf": black}
-    white = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": REFLECTANCE}}}
-    film = {"type": "hdrfilm", "width": 250, "height": 125, "rfilter": {"type": "box"}, "pixel_format": "luminance"}
-    eye, up, across = observer.position, screen.axes(observer)[1], 2 * math.degrees(math.atan(25 / 1000))
-    theirs_scene = mi.load_dict(
-        {
-            "type": "scene",
-            "wall": {"type": "cylinder", "p0": [0, 0, 0], "p1": [0, 0, HEIGHT], "radius": RADIUS, "bsdf": white},
-            "base": {"type": "disk", "to_world": transform().scale(RADIUS), "bsdf": white},
-            **parts,
-            "integrator": {"type": "path", "max_depth": -1, "rr_depth": 5},
-            "sensor": {
-                "type": "perspective",
-                "fov": across,
-                "fov_axis": "x",
-                "to_world": transform().look_at(origin=eye.tolist(), target=[0, 0, 0], up=up.tolist()),
-                "film": film,
-                "sampler": {"type": "independent", "sample_count": 64},
-            },
-        }
-    )
-
-    def theirs(seed: int) -> Array:
-        image = mi.render(theirs_scene, seed=seed, spp=64)
-        return np.array(image)[..., 0]
-
+    theirs = cavity_map(observer, screen, 64)
     # The pixels in which the inside of the cavity is seen.
     inside = seen(0)
     inside = inside > 0.2 * np.median(inside[inside > 0])
@@ -233,7 +153,6 @@ def job_map(_rays: int) -> None:
         seconds = (time.perf_counter() - start) / runs
         mean = maps.mean(0)
         relative = np.median(maps.var(0, ddof=1)[inside] / mean[inside] ** 2)
-        dr.sync_thread()
         return 1.0 / (relative * seconds), math.sqrt(relative), float(np.median(mean[inside]))
 
     yours, their_noise, their_level = judged(theirs, 16)

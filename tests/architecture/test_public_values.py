@@ -149,6 +149,7 @@ def test_there_is_a_value_of_every_public_class() -> None:
     assert {name for name in errors if not name.endswith("Warning")} == set(ERRORS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(MAKERS))
 def test_it_can_be_pickled_and_says_what_it_is_in_a_line(name: str) -> None:
     value = MAKERS[name]()

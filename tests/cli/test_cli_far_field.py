@@ -13,6 +13,7 @@ from oracles.beams import beam, rays_of, searchlight
 from cli.outcome import Run
 
 
+@pytest.mark.slow
 def test_asked_steps_that_cannot_hold_the_beam_are_told(run: Run, tmp_path: Path) -> None:
     et.write_rays(tmp_path / "spot.tm25ray", rays_of((beam(50_000, exponent=3e3, c=0.0, gamma=0.0, seed=5), 10.0)))
     status, out, _ = run(

@@ -124,6 +124,7 @@ def test_messages_name_options(run: Run, lamp: Path, words: str, told: str) -> N
     assert told in outcome.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "told"),
     [

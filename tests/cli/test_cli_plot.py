@@ -27,6 +27,7 @@ def maps(tmp_path: Path) -> tuple[Path, Path]:
     return tmp_path / "dim.npz", tmp_path / "bright.exr"
 
 
+@pytest.mark.slow
 def test_pictures_of_every_type(run: Run, maps: tuple[Path, Path]) -> None:
     outcome = run("plot", maps[0], "-o", "a.png", "-o", "a.svg", "-o", "a.pdf", "--title", "My lamp")
     assert outcome.status == 0, outcome.err
@@ -35,6 +36,7 @@ def test_pictures_of_every_type(run: Run, maps: tuple[Path, Path]) -> None:
     assert Path("a.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
 def test_several_maps_share_a_scale(run: Run, maps: tuple[Path, Path]) -> None:
     """The range is that of all pixels; the brightest of the dim map is not as bright as that of the other."""
     assert _common([a_map(), a_map(factor=3.0)], "linear", None, None) == ("linear", 0.0, 3.0 * 160.0)

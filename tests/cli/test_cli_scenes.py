@@ -231,6 +231,7 @@ VIEW = ["--observer", "60,190", "--distance", "90", "--target", "9,0,5", "--size
 EYE, GRID = et.Observer(60, 190, 90, target=(9, 0, 5)), et.Screen(10, 8, 5, 4)
 
 
+@pytest.mark.slow
 def test_luminance_of_scatter_events(run: Run, traced: et.TraceResult, tmp_path: Path) -> None:
     status, out, _ = run("luminance", "r.h5", "--detector", "scatter", *VIEW, "-o", "a.npz", "--json")
     assert status == 0

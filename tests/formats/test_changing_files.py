@@ -55,6 +55,7 @@ def coloured(seed: int) -> RaySet:
     return RaySet(rays.position, rays.direction, rays.flux, wavelength=np.linspace(450, 650, RAYS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BINARY)
 @pytest.mark.parametrize("use", USES)
 def test_a_file_that_shrinks_is_an_error_that_names_it(name: str, use: str, written: RaySet, tmp_path: Path) -> None:

@@ -99,6 +99,7 @@ def test_uneven_trees_against_a_look_up(rank: int, way: str, tmp_path: Path) -> 
         assert one.values.tolist() == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_values_that_are_written_are_means_over_cells(tmp_path: Path) -> None:
     """Against random directions, even in projected solid angle, sorted into cells by the other map."""
     assert FORMAT.tabulate is not None

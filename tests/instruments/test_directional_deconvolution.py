@@ -205,6 +205,7 @@ def test_a_lobe_has_one_axis_along_which_it_is_narrow(name: str, aspect: float) 
     assert np.exp(found[2]) == pytest.approx(max(aspect, 1 / aspect))
 
 
+@pytest.mark.slow
 def test_what_is_mirrored_is_told_apart() -> None:
     """2 % under a lobe, which Richardson and Lucy alone take for a part of it; where there is none, none is told."""
     lobe = et.bsdf.Gaussian(peak=60.0, sigma=0.02, aspect=2.0)

@@ -46,6 +46,7 @@ def test_the_registry_holds_every_module_that_has_a_format() -> None:
 # --- round trips -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @WRITTEN
 @pytest.mark.parametrize("symmetry", TERMS)
 @pytest.mark.parametrize(

@@ -43,6 +43,7 @@ def led(tmp_path: Path) -> et.RaySet:
     return et.read_rays(tmp_path / "led.tm25ray")
 
 
+@pytest.mark.slow
 def test_rays_to_files_and_pictures(run: Run, led: et.RaySet, tmp_path: Path) -> None:
     outputs = ["a.ies", "a.ldt", "a.png", "a.pdf"]
     options = [part for name in outputs for part in ("-o", name)]
@@ -59,6 +60,7 @@ def test_rays_to_files_and_pictures(run: Run, led: et.RaySet, tmp_path: Path) ->
     assert {p.name for p in tmp_path.iterdir()} == {"led.tm25ray", *outputs}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("led")
 def test_defaults_flux_and_text(run: Run) -> None:
     status, out, _ = run("led.tm25ray", "--flux", "500lm")
@@ -74,6 +76,7 @@ def test_defaults_flux_and_text(run: Run) -> None:
     assert facts["flux_error"] > 0.0
 
 
+@pytest.mark.slow
 def test_files_are_turned_and_converted(run: Run) -> None:
     et.write_intensity("a.ies", lid("none").replace(luminaire={"lamp": "x", "input_power": 12.5}))
     status, out, err = run("a.ies", "-o", "b.ldt", "--rotate", 90, "--mirror", "-o", "b.png", "--kind", "cartesian")

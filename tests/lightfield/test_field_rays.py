@@ -65,6 +65,7 @@ def coordinates(request: pytest.FixtureRequest) -> tuple[LightField, Array]:
     return field, at
 
 
+@pytest.mark.slow
 def test_the_density_integrates_to_one(coordinates: tuple[LightField, Array]) -> None:
     """Gauss rules are exact for it, so that the oracle of the tests below is; and total_flux is what it should be."""
     rules = [gauss(n, 2) for n in PIECES]

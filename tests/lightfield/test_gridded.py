@@ -513,6 +513,7 @@ def test_summed_intensity() -> None:
             source.intensity(*arguments)
 
 
+@pytest.mark.slow
 def test_summed_intensity_of_curved_patches() -> None:
     x, d = from_sphere(20_000, 15, 1.0)
     flux = 1 + 0.5 * d[:, 0]

@@ -36,6 +36,7 @@ def source() -> GriddedSource:
     return GriddedSource.fit(dome_rays(), Dome(radius=1.264, window=0.7), pixel=0.3, threshold=2.0, parallels=4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("format", ["ies", "ldt"])
 def test_manifest_and_files_say_the_same(source: GriddedSource, tmp_path: Path, format: str) -> None:
     source.save_patches(tmp_path / "p", format)
@@ -193,6 +194,7 @@ def test_text_says_what_was_left_out(run: Run) -> None:
     assert "all light is theirs multiplied by" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "status", "hint"),
     [

@@ -158,6 +158,7 @@ def test_mitsuba_shows_the_same_luminance(name: str, tmp_path: Path, mi: Any) ->
     assert np.allclose(seen[:, 0], luminance, rtol=3e-5, atol=1e-6 * luminance.max())
 
 
+@pytest.mark.slow
 def test_mitsuba_lights_a_wall(tmp_path: Path, mi: Any) -> None:
     """What the emitter sends by its own sampling, against a quadrature over the source: within 4 standard errors."""
     source, *_ = fitted("film")
@@ -187,6 +188,7 @@ def test_mitsuba_lights_a_wall(tmp_path: Path, mi: Any) -> None:
     assert abs(seen.mean() - 0.5 * illuminance / np.pi) < 4 * error
 
 
+@pytest.mark.slow
 def test_mitsuba_rays_from_the_emitter_carry_the_flux(tmp_path: Path, mi: Any) -> None:
     """Mean weight of emitted rays: the flux of each patch's table times the factor, within 4 standard errors."""
     source, *_ = fitted("watts")

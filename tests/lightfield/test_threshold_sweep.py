@@ -77,6 +77,7 @@ def test_the_far_field_rises_while_the_light_field_drowns() -> None:
     assert sweep["score"][by_score] - sweep["score"][by_ncc] > 20 * sweep["score_error"].max()
 
 
+@pytest.mark.slow
 def test_no_score_is_above_that_of_the_truth() -> None:
     """The mean of ln(p) over held-out rays is largest for the true density: by Gibbs, up to noise of 1 in 10⁴."""
     rays = film_rays(60_000)
@@ -150,6 +151,7 @@ def test_the_table() -> None:
         sweep["ncc"][0] = 1
 
 
+@pytest.mark.slow
 def test_the_picture(tmp_path: Path) -> None:
     sweep = sweep_of(threshold=[0.1, 5.0, 1.0], score=[-0.1, 0.3, 0.2], ncc=[0.99, 0.9, 0.95], bins=[12_345.0, 20, 100])
     figure = plot_threshold_sweep(sweep, tmp_path / "a.png")

@@ -81,6 +81,7 @@ def test_the_solution_loses_no_light_and_has_converged() -> None:
 # --- forwards --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_where_the_light_ends(traced: TraceResult) -> None:
     ledger = traced.ledger
     n = traced.rays_done
@@ -141,6 +142,7 @@ def expected_map(observer: Observer, screen: Screen) -> Array:
     return CAVITY.reflectance / math.pi * seen.mean(axis=-1)
 
 
+@pytest.mark.slow
 def test_light_image(traced: TraceResult) -> None:
     image = traced.images["image"]
     assert_agree(

@@ -41,6 +41,7 @@ def grids() -> dict[str, et.GriddedSource]:
     return {name: et.GriddedSource.fit(rays, surface, 0.5, 5.0) for name, surface in SURFACES.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", SURFACES)
 def test_a_line_of_sight_reads_what_the_gridded_source_says(grids: dict[str, et.GriddedSource], surface: str) -> None:
     """Line by line, through pixels of a nanometre, in a place that is turned and shifted: equal to 1e-9."""

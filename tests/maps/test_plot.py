@@ -162,6 +162,7 @@ def test_nothing_to_show_has_no_colour_bar(which: str, scale: Any) -> None:
     assert figure.axes[0].texts[0].get_text().startswith("no ray" if which == "all dead" else "nothing")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("which", "options", "limits"),
     [

@@ -138,6 +138,7 @@ def test_a_map_has_its_values_and_its_colour_bar() -> None:
     assert bar.get_ylim()[1] == pytest.approx(np.nanmax(lmap.values))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", ["map", "comparison"])
 def test_colours_are_those_that_are_asked_for(which: str) -> None:
     _, draw = DRAWN[which]

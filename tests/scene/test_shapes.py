@@ -34,6 +34,7 @@ def test_every_shape_is_tested() -> None:
     assert set(SHAPES) == set(REGISTRY)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SHAPES)
 def test_shapes_can_be_met_and_their_normal_can_be_turned_into_place(kind: str) -> None:
     """Every shape is met by some line; placing shape and lines alike changes no distance."""

@@ -98,6 +98,7 @@ def traced(tmp_path: Path) -> et.TraceResult:
     return et.trace(scene, 150_000, seed=5)
 
 
+@pytest.mark.slow
 def test_the_same_picture_as_a_light_image_of_the_same_rays(traced: et.TraceResult) -> None:
     """Each scatter is connected to the eye at once, or later: the same sums, but for the order in which they are made."""
     events = traced.events["scatter"]

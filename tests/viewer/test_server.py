@@ -110,6 +110,7 @@ def test_no_other_name_no_other_page_and_no_file(visitor: Visitor, tmp_path: Pat
     assert visitor.ask("PUT", "/map", b"").status == 501
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "words"),
     [
