@@ -104,6 +104,10 @@ def test_what_cannot_be() -> None:
         et.luminance_map(rays, et.Observer(80, 0, 100), screen, observer_radius=20)
     with pytest.raises(ArgumentError, match="both stated"):
         et.Cone(acceptance=3, observer_radius=2)
+    # The value that an acceptance has unless it is stated is no exception.
+    with pytest.raises(ArgumentError, match="both stated"):
+        et.Cone(acceptance=1.5, observer_radius=2)
+    assert (et.Cone().acceptance, et.Cone(observer_radius=2).acceptance) == (1.5, None)
     for bad in (0.0, -1.0, float("nan"), float("inf"), "wide"):
         with pytest.raises(ArgumentError, match="radius of the observer's disk"):
             et.Cone(observer_radius=bad)  # type: ignore[arg-type]

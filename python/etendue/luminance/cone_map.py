@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
 from etendue.formats.rays.ray_index import RayIndex
@@ -31,7 +33,7 @@ def look_through_cone(
         return [_map(rays, estimate, 0, tally, None) for estimate in estimates]
     if how.acceptance == "auto":
         return _automatic(rays, pairs, threads, progress)
-    angle = float(how.acceptance)
+    angle = float(cast("float", how.acceptance))
     estimates, tally = cone_estimates(rays, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
     return [_map(rays, estimate, 0, tally, None) for estimate in estimates]
 

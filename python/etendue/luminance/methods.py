@@ -57,6 +57,10 @@ class Method:
         return super().__new__(cls)
 
 
+ACCEPTANCE = 1.5
+"""Half-angle of a cone that nobody states [°]: that of [Audenaert2014]_."""
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Cone(Method):
     """The method of [Audenaert2014]_ chapter 2 (eqs. 2.2 to 2.4): only rays that head for the observer are counted.
@@ -65,7 +69,7 @@ class Cone(Method):
     ----------
     acceptance : float or "auto"
         Half-angle α of the cone about the line from each pixel to the observer [°], above 0 and at most 90; ``"auto"``: the
-        one of least estimated error, and the map's notes say why.
+        one of least estimated error, and the map's notes say why. 1.5 unless a radius is stated.
     observer_radius : float, optional
         Instead of an acceptance: the observer is a disk of this radius [mm] that faces the target, as in figure 2.2, and a
         ray counts if it crosses the disk. How far α reaches then differs from pixel to pixel; the étendue between each
@@ -87,25 +91,29 @@ class Cone(Method):
     'luminance by cone, acceptance 5°'
     """
 
-    acceptance: float | Literal["auto"] = 1.5
+    acceptance: float | Literal["auto"] | None = None
     observer_radius: float | None = None
 
     NAME: ClassVar[str] = "cone"
     SOURCES: ClassVar[str] = "rays"
 
     def __post_init__(self) -> None:
+        radius: Any = self.observer_radius
+        if radius is None and self.acceptance is None:
+            object.__setattr__(self, "acceptance", ACCEPTANCE)
         angle: Any = self.acceptance
-        if not (angle == "auto" or (isinstance(angle, numbers.Real) and 0.0 < float(angle) <= 90.0)):
+        if angle is not None and not (
+            angle == "auto" or (isinstance(angle, numbers.Real) and 0.0 < float(angle) <= 90.0)
+        ):
             shown = repr(angle) if isinstance(angle, str) else f"{angle}°"
             raise ArgumentError(f"acceptance is {shown}; give a half-angle above 0° and at most 90°, or 'auto'.")
-        radius: Any = self.observer_radius
         if radius is None:
             return
         if not (isinstance(radius, numbers.Real) and 0.0 < float(radius) < math.inf):
             raise ArgumentError(
                 f"observer_radius is {radius!r}; give the radius of the observer's disk in mm, above 0."
             )
-        if angle != type(self).acceptance:
+        if angle is not None:
             raise ArgumentError("an acceptance and an observer of a radius are both stated; use one of them.")
 
 
@@ -490,9 +498,9 @@ def _meaningless(stated: Mapping[str, object], source: SourceKind, spelling: Spe
 
 def _idle(method: Method, source: SourceKind) -> str | None:
     """Options of an object, other than their defaults, that mean nothing for the source."""
-    given = {field.name: getattr(method, field.name) for field in dataclasses.fields(method)}
-    defaults = {field.name: field.default for field in dataclasses.fields(method)}
-    return _meaningless({name: value for name, value in given.items() if value != defaults[name]}, source, PYTHON)
+    plain = type(method)()
+    given = {name: getattr(method, name) for name in option_names(type(method))}
+    return _meaningless({n: value for n, value in given.items() if value != getattr(plain, n)}, source, PYTHON)
 
 
 def _of_several(stated: Mapping[str, object], source: SourceKind, spelling: Spelling) -> str | None:
