@@ -24,8 +24,9 @@ use crate::detector::{Detector, Exitance};
 use crate::exitance_cells::{ExitanceCells, FacePoint};
 use crate::forward::run::Run;
 use crate::lit_scene::LitScene;
+use crate::records::Cell;
 use crate::scene::{Act, Role, Scene};
-use crate::work_unit::{work_unit, work_unit_of};
+use crate::work_unit::work_unit_of;
 
 /// Batches of rays from which the sizes of patches are chosen.
 const SCOUTS: u64 = 1;
@@ -58,6 +59,10 @@ const SURVEY: u64 = 0x5355_5256;
 /// More rays than any map takes: the run whose batches are dealt to the passes.
 const RUN: u64 = 1 << 44;
 
+/// Segments of rays whose contributions are kept at a time: some hundred megabytes. Where light goes to and fro for long, a
+/// batch alone holds as many.
+const KEPT: u64 = 1 << 24;
+
 /// Patches, and which of them can be used.
 #[derive(Clone, Debug)]
 pub struct ExitanceSurvey {
@@ -66,6 +71,8 @@ pub struct ExitanceSurvey {
     sides: Vec<[f64; 2]>,
     seed: u64,
     most_events: u32,
+    /// Batches of the survey that would be traced at a time.
+    round: u64,
 }
 
 /// The luminance of the patches, by the rays of one pass.
@@ -95,24 +102,19 @@ impl ExitanceSurvey {
             cut.then(|| AreaSampler::new(&face.shape).map(|sampler| sampler.area()))?
         };
         let areas: Vec<Option<f64>> = scene.face_set.faces().iter().zip(&scene.roles).map(own).collect();
-        let count = |patches: &Arc<ExitanceCells>, batches: Range<u64>| -> Vec<u64> {
+        let (run, mut round) = (run_of(lit, seed, most_events), 1);
+        let mut count = |patches: &Arc<ExitanceCells>, batches: Range<u64>| -> Vec<u64> {
             // Where nothing is cut there is nothing to look for.
             if patches.bins == 0 {
                 return Vec::new();
             }
-            let detectors = [Detector::Exitance(Exitance(Arc::clone(patches)))];
-            let run = Run {
-                rays: RUN,
-                seed,
-                most_events,
-                sets: &[],
-                stop: lit.stop,
-                light_samplers: &[],
-            };
-            let sums = work_unit(scene, &detectors, &run, batches);
-            let cells = &sums.tallies[0].cells;
-            let sides = cells.chunks(2 * wavelengths.len());
-            sides.map(|lines| lines.iter().map(|cell| cell.rays).sum()).collect()
+            let mut found = vec![0; 2 * patches.bins as usize];
+            trace(lit, patches, &run, (BATCH, batches), &mut round, |cells| {
+                for (found, lines) in found.iter_mut().zip(cells.chunks(2 * wavelengths.len())) {
+                    *found += lines.iter().map(|cell| cell.rays).sum::<u64>();
+                }
+            });
+            found
         };
         // Scouts: how much light falls on each face.
         let whole = Arc::new(ExitanceCells::cut(scene.face_set.faces(), wavelengths.clone(), &areas));
@@ -162,6 +164,7 @@ impl ExitanceSurvey {
             sides,
             seed,
             most_events,
+            round,
         }
     }
 
@@ -187,20 +190,8 @@ impl ExitanceSurvey {
     /// What the patches send out, by the rays of a pass of so many lines of sight.
     #[must_use]
     pub fn exitance(&self, lit: &LitScene<'_>, pass: u32, lines: u64) -> ExitanceCache<'_> {
-        let detectors = [Detector::Exitance(Exitance(Arc::clone(&self.patches)))];
-        let run = Run {
-            rays: RUN,
-            seed: self.seed,
-            most_events: self.most_events,
-            sets: &[],
-            stop: lit.stop,
-            light_samplers: &[],
-        };
-        let dealing = Dealing::of(lit.scene, RUN, &[]).in_batches_of(FEW);
         let first = (SCOUTS + SURVEYORS) * BATCH / FEW + u64::from(pass) * EACH[1];
         let batches = (2 * lines / (LINES * FEW)).clamp(EACH[0], EACH[1]);
-        let sums = work_unit_of(lit.scene, &detectors, &run, &dealing, first..first + batches);
-        let cells = &sums.tallies[0].cells;
         // The rays stand for the whole run.
         let scale = RUN as f64 / (batches * FEW) as f64;
         let lines = lit.lines.len();
@@ -211,18 +202,65 @@ impl ExitanceSurvey {
             .map(|line| line.0 - std::mem::replace(&mut below, line.0))
             .collect();
         let mut luminance = vec![[0.0; 2]; self.sides.len() * lines];
-        for (number, pair) in cells.chunks(2).enumerate() {
-            let (side, line) = (number / lines, number % lines);
-            let side = side / (2 * BINS as usize) * 2 + side % 2;
-            let unit = scale * FRAC_1_PI / (self.sides[side][0] * shares[line]);
-            let found = &mut luminance[side * lines + line];
-            found[0] += pair[0].sum * unit;
-            found[1] += (pair[0].sum + pair[1].sum) * unit;
-        }
+        let (run, mut round) = (run_of(lit, self.seed, self.most_events), self.round * (BATCH / FEW));
+        trace(
+            lit,
+            &self.patches,
+            &run,
+            (FEW, first..first + batches),
+            &mut round,
+            |cells| {
+                for (number, pair) in cells.chunks(2).enumerate() {
+                    let (side, line) = (number / lines, number % lines);
+                    let side = side / (2 * BINS as usize) * 2 + side % 2;
+                    let unit = scale * FRAC_1_PI / (self.sides[side][0] * shares[line]);
+                    let found = &mut luminance[side * lines + line];
+                    found[0] += pair[0].sum * unit;
+                    found[1] += (pair[0].sum + pair[1].sum) * unit;
+                }
+            },
+        );
         ExitanceCache {
             survey: self,
             luminance,
         }
+    }
+}
+
+/// The run whose batches are dealt to the survey and to the passes.
+fn run_of<'a>(lit: &LitScene<'a>, seed: u64, most_events: u32) -> Run<'a> {
+    Run {
+        rays: RUN,
+        seed,
+        most_events,
+        sets: &[],
+        stop: lit.stop,
+        light_samplers: &[],
+    }
+}
+
+/// Traces batches of `each` rays, so many at a time as there is room for, and hands on what each round adds to the cells.
+///
+/// `round` is the number of batches of the next round; how many segments their rays have tells it. It is the same for any number
+/// of threads.
+fn trace(
+    lit: &LitScene<'_>,
+    patches: &Arc<ExitanceCells>,
+    run: &Run<'_>,
+    (each, batches): (u64, Range<u64>),
+    round: &mut u64,
+    mut take: impl FnMut(&[Cell]),
+) {
+    let detectors = [Detector::Exitance(Exitance(Arc::clone(patches)))];
+    let dealing = Dealing::of(lit.scene, RUN, &[]).in_batches_of(each);
+    let mut next = batches.start;
+    while next < batches.end {
+        let some = next..batches.end.min(next + *round);
+        let traced = some.end - some.start;
+        next = some.end;
+        let sums = work_unit_of(lit.scene, &detectors, run, &dealing, some);
+        take(&sums.tallies[0].cells);
+        *round = (KEPT * traced / sums.ledger.segments.max(1)).max(1);
     }
 }
 
