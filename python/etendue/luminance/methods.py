@@ -67,7 +67,7 @@ class Cone(Method):
 
     Parameters
     ----------
-    acceptance : float or "auto"
+    acceptance : float or "auto", optional
         Half-angle α of the cone about the line from each pixel to the observer [°], above 0 and at most 90; ``"auto"``: the
         one of least estimated error, and the map's notes say why. 1.5 unless a radius is stated.
     observer_radius : float, optional

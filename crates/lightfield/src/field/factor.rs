@@ -114,11 +114,7 @@ impl Factor {
                 }
             } else {
                 for ((value, weights), i) in values.iter_mut().zip(weights).zip(some) {
-                    let [lower, upper] = x
-                        .get(i)
-                        .cells
-                        .map(|row| &self.values[row * self.n + y.get(i).cells[0]..][..2]);
-                    *value = bilinear(&[[lower[0], lower[1]], [upper[0], upper[1]]], weights);
+                    *value = bilinear(&self.corners([x.get(i).cells, y.get(i).cells]), weights);
                 }
             }
         }
