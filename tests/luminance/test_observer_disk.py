@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import etendue as et
@@ -107,7 +108,8 @@ def test_what_cannot_be() -> None:
     # The value that an acceptance has unless it is stated is no exception.
     with pytest.raises(ArgumentError, match="both stated"):
         et.Cone(acceptance=1.5, observer_radius=2)
-    assert (et.Cone().acceptance, et.Cone(observer_radius=2).acceptance) == (1.5, None)
+    assert (et.Cone().half_angle, et.Cone(observer_radius=2).half_angle) == (1.5, None)
+    assert dataclasses.replace(et.Cone(), observer_radius=2) == et.Cone(observer_radius=2)
     for bad in (0.0, -1.0, float("nan"), float("inf"), "wide"):
         with pytest.raises(ArgumentError, match="radius of the observer's disk"):
             et.Cone(observer_radius=bad)  # type: ignore[arg-type]

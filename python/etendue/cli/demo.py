@@ -90,7 +90,7 @@ def demo(
         )
         return
     say(f"Three Lambertian rings (300, 200, 100 lm; radii 10, 20, 30 mm), {len(source):,} rays in {seconds:.1f} s,")
-    say(f"seen face on from {observer.distance:g} mm within {method.acceptance}°:")
+    say(f"seen face on from {observer.distance:g} mm within {method.half_angle}°:")
     table = Table(
         "ring", "truth Φ/(πA)", "estimate", "standard error", "deviation", "rays seen", box=None, pad_edge=False
     )

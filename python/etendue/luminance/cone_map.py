@@ -31,9 +31,9 @@ def look_through_cone(
         views = [ConeView(o, s, (widest_angle(o, s, radius),), radius) for o, s in pairs]
         estimates, tally = cone_estimates(rays, views, threads, progress)
         return [_map(rays, estimate, 0, tally, None) for estimate in estimates]
-    if how.acceptance == "auto":
+    if how.half_angle == "auto":
         return _automatic(rays, pairs, threads, progress)
-    angle = float(cast("float", how.acceptance))
+    angle = float(cast("float", how.half_angle))
     estimates, tally = cone_estimates(rays, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
     return [_map(rays, estimate, 0, tally, None) for estimate in estimates]
 

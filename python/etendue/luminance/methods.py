@@ -99,8 +99,6 @@ class Cone(Method):
 
     def __post_init__(self) -> None:
         radius: Any = self.observer_radius
-        if radius is None and self.acceptance is None:
-            object.__setattr__(self, "acceptance", ACCEPTANCE)
         angle: Any = self.acceptance
         if angle is not None and not (
             angle == "auto" or (isinstance(angle, numbers.Real) and 0.0 < float(angle) <= 90.0)
@@ -115,6 +113,12 @@ class Cone(Method):
             )
         if angle is not None:
             raise ArgumentError("an acceptance and an observer of a radius are both stated; use one of them.")
+
+    @property
+    def half_angle(self) -> float | Literal["auto"] | None:
+        """The acceptance, with that of a cone that nobody states filled in [°]; None if a radius is stated."""
+        unstated = self.acceptance is None and self.observer_radius is None
+        return ACCEPTANCE if unstated else self.acceptance
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
