@@ -109,6 +109,48 @@ impl Bounds {
     }
 }
 
+/// A ball that holds something, a little larger than need be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    centre: Vec3,
+    /// Square of the radius \[mm²\].
+    square: f64,
+}
+
+impl Ball {
+    /// Share by which its radius is larger than that of the ball around a box.
+    const SLACK: f64 = 1e-6;
+
+    /// What roundings may make of the square of a distance, as a share of that to the start of the ray: a hundred times
+    /// what a sum of six products and the unit direction are off by.
+    const ROUNDING: f64 = 1e-12;
+
+    /// The ball of a centre and a radius; None if they are not finite.
+    #[must_use]
+    pub fn new(centre: Vec3, radius: f64) -> Option<Self> {
+        let radius = radius * (1.0 + Self::SLACK);
+        let square = radius * radius;
+        (square + centre.dot(centre)).is_finite().then_some(Self { centre, square })
+    }
+
+    /// Square of its radius \[mm²\].
+    #[must_use]
+    pub const fn square(&self) -> f64 {
+        self.square
+    }
+
+    /// Whether the ray from o into the unit direction d has points in it; now and then true of one that passes close by,
+    /// false of one that is not finite.
+    #[inline(always)]
+    #[must_use]
+    pub fn meets(&self, o: Vec3, d: Vec3) -> bool {
+        let to = self.centre - o;
+        let (along, away) = (to.dot(d), to.dot(to));
+        let beside = away - along * along;
+        ((along >= 0.0) | (away <= self.square)) & (beside <= self.square + Self::ROUNDING * away)
+    }
+}
+
 /// The largest f32 that is not above `v`; NaN stays NaN.
 #[inline(always)]
 #[must_use]

@@ -2,7 +2,7 @@
 
 use etendue_math::{Frame, Interval, Vec3};
 
-use crate::bounds::Bounds;
+use crate::bounds::{Ball, Bounds};
 use crate::shape::{Crossing, ROUNDING, Shape, size};
 
 /// The points p with n·p ≤ d, in the coordinates of the shape.
@@ -58,6 +58,14 @@ impl Face {
         };
         let bounds = Bounds::of((0..8).map(corner));
         bounds.widened(2.0 * ROUNDING * (size(self.frame.origin) + size(local.lo) + size(local.hi)))
+    }
+
+    /// A ball in the world that holds the face; None if it has no end.
+    #[must_use]
+    pub fn ball(&self) -> Option<Ball> {
+        let (centre, radius) = self.shape.ball();
+        let moved = self.frame.point_to_world(centre);
+        Ball::new(moved, radius + 2.0 * ROUNDING * (size(self.frame.origin) + size(centre) + radius))
     }
 
     /// The normal that a ray sees: that of the surface, or that which a mesh states at its corners, interpolated.

@@ -6,10 +6,10 @@ use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
 use crate::bounds::Bounds;
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, Probe, Stack, Walk};
 use crate::face::Face;
 use crate::hits::{Hits, MeshRays, TIE};
-use crate::intersect_block::try_simple;
+use crate::intersect_block::{BoundedFace, try_simple};
 use crate::mesh::{Found, Rays};
 use crate::origin_faces::{MOST_ORIGIN_FACES, NONE, OriginFaces};
 use crate::ray_block::RayBlock;
@@ -34,8 +34,15 @@ fn to_local(frame: &Frame, rays: &RayBlock, met: &[f64], scratch: &mut MeshRays)
     }
 }
 
-/// Up to this number of faces, all of them are tried on every ray; of more, those that a tree does not rule out.
-const FEW: usize = 24;
+/// Up to this number of faces, all of them, or balls around them, are tried on every ray; of more, those that a tree does not
+/// rule out. Where a tree begins to pay: a ray's way through it takes as long as that many balls.
+const FEW: usize = 256;
+
+/// Faces that are met by so many rays that no tree would rule them out: as many of the largest as this at most.
+const MOST_LARGE: usize = 24;
+
+/// Share of the area of the whole scene, as balls have it, from which on a face is tried on every ray.
+const LARGE: f64 = 0.2;
 
 /// All faces of a scene.
 #[derive(Clone, Debug, Default)]
@@ -43,13 +50,13 @@ pub struct FaceSet {
     faces: Vec<Face>,
     bounds: Vec<Bounds>,
     /// Faces that a whole block is tried on at once.
-    simple: Vec<u32>,
+    simple: Vec<BoundedFace>,
     /// Meshes, which a whole block is sent through.
     meshes: Vec<u32>,
     /// Faces that are tried ray by ray.
     others: Vec<u32>,
-    /// Faces behind a tree, and their numbers.
-    tree: Option<(Arc<Bvh>, Vec<u32>)>,
+    /// The tree of the other faces, and these in the order of its leaves.
+    tree: Option<(Arc<Bvh>, Vec<BoundedFace>)>,
 }
 
 impl FaceSet {
@@ -62,22 +69,33 @@ impl FaceSet {
             bounds,
             ..Self::default()
         };
+        let large = large_faces(&faces, &set.bounds);
         let mut inner = Vec::new();
         for (index, face) in (0..).zip(&faces) {
             let trimmed = !face.trims.is_empty();
-            if faces.len() > FEW && set.bounds[index as usize].is_finite() {
+            let large = large[index as usize];
+            if faces.len() > FEW && !large {
                 inner.push(index);
             } else if matches!(face.shape, Shape::Mesh(_)) && !trimmed {
                 set.meshes.push(index);
             } else if is_simple(&face.shape) && !trimmed {
-                set.simple.push(index);
+                let ball = if large { None } else { face.ball() };
+                set.simple.push(BoundedFace { index, ball });
             } else {
                 set.others.push(index);
             }
         }
         let boxes: Vec<Bounds> = inner.iter().map(|i| set.bounds[*i as usize]).collect();
         if !inner.is_empty() {
-            set.tree = Bvh::new(&boxes, LEAF).map(|tree| (Arc::new(tree), inner));
+            set.tree = Bvh::new(&boxes, LEAF).map(|tree| {
+                let bounded = |place: &u32| {
+                    let index = inner[*place as usize];
+                    let ball = faces[index as usize].ball();
+                    BoundedFace { index, ball }
+                };
+                let inner = tree.leaves().flatten().map(bounded).collect();
+                (Arc::new(tree), inner)
+            });
         }
         set.faces = faces;
         set
@@ -103,27 +121,8 @@ impl FaceSet {
         for &index in &self.meshes {
             self.try_mesh(index, rays, hits);
         }
-        if !one_by_one {
-            return;
-        }
-        for i in 0..rays.len() {
-            let mut one = One {
-                t: hits.t[i],
-                second: hits.second[i],
-                face: hits.face[i],
-                part: hits.part[i],
-            };
-            self.try_one(
-                &self.others,
-                rays.origin(i),
-                rays.direction(i),
-                &rays.origin_faces(i),
-                &mut one,
-            );
-            hits.t[i] = one.t;
-            hits.second[i] = one.second;
-            hits.face[i] = one.face;
-            hits.part[i] = one.part;
+        if one_by_one {
+            try_one_by_one(self, rays, hits, &mut Stack::lend());
         }
     }
 
@@ -166,33 +165,42 @@ impl FaceSet {
         }
     }
 
-    /// Tries faces on one ray: a list, and those in the tree.
-    fn try_one(&self, list: &[u32], o: Vec3, d: Vec3, origin_faces: &OriginFaces, one: &mut One) {
-        for &index in list {
+    /// Tries faces on one ray: those that no block is tried on, and those in the tree.
+    #[inline(always)]
+    fn try_one(&self, o: Vec3, d: Vec3, origin_faces: &OriginFaces, one: &mut One, stack: &mut Stack) {
+        for &index in &self.others {
             self.try_face(index, o, d, origin_faces, one);
         }
-        if let Some((tree, numbers)) = &self.tree {
-            let mut reach = one.reach(o);
-            tree.traverse(o, d, 0.0, &mut reach, |primitive, reach| {
-                self.try_face(numbers[primitive as usize], o, d, origin_faces, one);
-                *reach = one.reach(o);
-            });
+        if let Some((tree, faces)) = &self.tree {
+            let probe = Probe::new(o, d, 0.0);
+            let mut walk = Walk::new(tree, &probe, stack);
+            while let Some(leaf) = walk.next(one.reach(o)) {
+                for face in &faces[tree.places(leaf)] {
+                    if face.ball.is_none_or(|ball| ball.meets(o, d)) {
+                        self.try_face(face.index, o, d, origin_faces, one);
+                    }
+                }
+            }
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn try_face(&self, index: u32, o: Vec3, d: Vec3, origin_faces: &OriginFaces, one: &mut One) {
+        let face = &self.faces[index as usize];
+        if let (Shape::Quadric(quadric), true) = (&face.shape, face.trims.is_empty()) {
+            // The most common kind, and short enough to be worked on in place.
+            let (p, k) = (face.frame.point_to_local(o), face.frame.direction_to_local(d));
+            for t in quadric.crossings(p, k, origin_faces.face.contains(&index)) {
+                if t > 0.0 && t < f64::INFINITY {
+                    one.meets(index, t, (0, [0.0; 2]));
+                }
+            }
+            return;
+        }
         let mut room = [NONE; MOST_ORIGIN_FACES];
         let parts = origin_faces.parts(index, &mut room);
-        if let Some(crossing) = self.faces[index as usize].first(o, d, one.reach(o), parts) {
-            if crossing.t < one.t {
-                one.second = one.t;
-                one.t = crossing.t;
-                one.face = index;
-                one.part = (crossing.part, crossing.uv);
-            } else {
-                one.second = one.second.min(crossing.t);
-            }
+        if let Some(crossing) = face.first(o, d, one.reach(o), parts) {
+            one.meets(index, crossing.t, (crossing.part, crossing.uv));
         }
     }
 
@@ -206,12 +214,10 @@ impl FaceSet {
             face: NONE,
             part: (0, [0.0; 2]),
         };
-        for list in [&self.simple, &self.meshes] {
-            for &index in list {
-                self.try_face(index, o, d, origin_faces, &mut one);
-            }
+        for index in self.simple.iter().map(|simple| simple.index).chain(self.meshes.iter().copied()) {
+            self.try_face(index, o, d, origin_faces, &mut one);
         }
-        self.try_one(&self.others, o, d, origin_faces, &mut one);
+        self.try_one(o, d, origin_faces, &mut one, &mut Stack::lend());
         let (part, uv) = one.part;
         (one.face != NONE).then_some((one.face, Crossing { t: one.t, part, uv }, one.second))
     }
@@ -230,16 +236,42 @@ impl FaceSet {
             let parts = origin_faces.parts(index, &mut room);
             self.faces[index as usize].crossings(o, d, range, parts, |crossing| visit(index, crossing));
         };
-        for list in [&self.simple, &self.meshes, &self.others] {
-            list.iter().copied().for_each(&mut look);
-        }
-        if let Some((tree, numbers)) = &self.tree {
-            let mut reach = range[1];
-            tree.traverse(o, d, range[0], &mut reach, |primitive, _| {
-                look(numbers[primitive as usize]);
+        self.simple.iter().for_each(|simple| look(simple.index));
+        self.meshes.iter().chain(&self.others).copied().for_each(&mut look);
+        if let Some((tree, faces)) = &self.tree {
+            tree.walk(&Probe::new(o, d, range[0]), &mut range[1].clone(), &mut Stack::lend(), |leaf, _| {
+                faces[tree.places(leaf)].iter().for_each(|face| look(face.index));
             });
         }
     }
+}
+
+/// The faces that no block is tried on, ray by ray.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn try_one_by_one(set: &FaceSet, rays: &RayBlock, hits: &mut Hits, stack: &mut Stack) {
+    for i in 0..rays.len() {
+        let mut one = One {
+            t: hits.t[i],
+            second: hits.second[i],
+            face: hits.face[i],
+            part: hits.part[i],
+        };
+        set.try_one(rays.origin(i), rays.direction(i), &rays.origin_faces(i), &mut one, stack);
+        (hits.t[i], hits.second[i], hits.face[i], hits.part[i]) = (one.t, one.second, one.face, one.part);
+    }
+}
+
+/// Of each face whether no tree would rule it out: the largest ones, and those without end.
+fn large_faces(faces: &[Face], bounds: &[Bounds]) -> Vec<bool> {
+    let finite = bounds.iter().copied().filter(|b| b.is_finite());
+    let half = finite.fold(Bounds::EMPTY, Bounds::union).sides() * 0.5;
+    let least = LARGE * half.dot(half);
+    let area = |face: &Face| face.ball().map_or(f64::INFINITY, |ball| ball.square());
+    let areas: Vec<f64> = faces.iter().map(area).collect();
+    let mut ranked: Vec<f64> = areas.iter().copied().filter(|a| a.is_finite() && *a >= least).collect();
+    ranked.sort_by(f64::total_cmp);
+    let least = ranked.iter().rev().take(MOST_LARGE).next_back().map_or(f64::INFINITY, |a| *a);
+    areas.iter().map(|area| *area >= least).collect()
 }
 
 /// Faces in a leaf of the tree of a scene.
@@ -262,6 +294,17 @@ struct One {
 }
 
 impl One {
+    /// One more crossing.
+    #[inline(always)]
+    fn meets(&mut self, face: u32, t: f64, part: (u32, [f64; 2])) {
+        if t < self.t {
+            self.second = self.t;
+            (self.t, self.face, self.part) = (t, face, part);
+        } else {
+            self.second = self.second.min(t);
+        }
+    }
+
     /// How far crossings are of interest: those that are tied with the nearest one are.
     #[inline(always)]
     fn reach(&self, o: Vec3) -> f64 {

@@ -16,7 +16,7 @@ pub struct Hits {
     pub second: Vec<f64>,
     /// Its face.
     pub face: Vec<u32>,
-    /// Its part and coordinates, for faces that have them.
+    /// Its part and coordinates, for faces that have them; of as many rays as there are, or more.
     pub part: Vec<(u32, [f64; 2])>,
     /// Whether parts were written since all of them were reset.
     parted: bool,
@@ -65,7 +65,10 @@ impl Hits {
         if self.parted || parted {
             self.part.clear();
         }
-        self.part.resize(n, (0, [0.0; 2]));
+        // Parts that nobody writes stay what they are: there may be more of them than rays.
+        if self.part.len() < n {
+            self.part.resize(n, (0, [0.0; 2]));
+        }
         self.parted = parted;
     }
 

@@ -5,8 +5,10 @@ use std::ops::Range;
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
+use crate::bounds::Ball;
 use crate::face::Face;
 use crate::hits::Hits;
+use crate::origin_faces::MOST_ORIGIN_FACES;
 use crate::ray_block::RayBlock;
 use crate::shape::flat::{Annulus, Rectangle};
 use crate::shape::{Outline, Quadric, Shape};
@@ -14,26 +16,37 @@ use crate::shape::{Outline, Quadric, Shape};
 /// Rays that are tried on all simple faces before the next ones are: what they need stays in the cache of first level.
 const CHUNK: usize = 256;
 
-/// Tries a block of rays on the faces `which`, several rays at a time.
+/// A face, and what rules out most rays that miss it.
+#[derive(Clone, Copy, Debug)]
+pub struct BoundedFace {
+    /// Its number.
+    pub index: u32,
+    /// A ball around it: only rays that meet it are tried on the face. None: all are.
+    pub ball: Option<Ball>,
+}
+
+/// Tries a block of rays on some faces, several rays at a time.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub fn try_simple(faces: &[Face], which: &[u32], block: &RayBlock, hits: &mut Hits) {
+pub fn try_simple(faces: &[Face], which: &[BoundedFace], block: &RayBlock, hits: &mut Hits) {
     for start in (0..block.len()).step_by(CHUNK) {
         let rays = start..(start + CHUNK).min(block.len());
-        for &index in which {
-            let face = &faces[index as usize];
+        for simple in which {
+            let face = &faces[simple.index as usize];
             let frame = &face.frame;
             match &face.shape {
                 Shape::Flat(flat) => match flat.outline {
                     Outline::Annulus { inner, outer } => {
-                        sweep(frame, index, block, hits, &rays, &Annulus { inner, outer });
+                        sweep(frame, simple, block, hits, &rays, &Annulus { inner, outer });
                     }
                     Outline::Rectangle { width, height } => {
                         let half = [0.5 * width, 0.5 * height];
-                        sweep(frame, index, block, hits, &rays, &Rectangle { half });
+                        sweep(frame, simple, block, hits, &rays, &Rectangle { half });
                     }
-                    Outline::Whole | Outline::Polygon { .. } => sweep(frame, index, block, hits, &rays, &Annulus::ALL),
+                    Outline::Whole | Outline::Polygon { .. } => {
+                        sweep(frame, simple, block, hits, &rays, &Annulus::ALL);
+                    }
                 },
-                Shape::Quadric(quadric) => sweep(frame, index, block, hits, &rays, quadric),
+                Shape::Quadric(quadric) => sweep(frame, simple, block, hits, &rays, quadric),
                 Shape::Asphere(_) | Shape::Torus(_) | Shape::Mesh(_) => {}
             }
         }
@@ -70,16 +83,18 @@ impl Simple for Quadric {
 }
 
 #[inline(always)]
-fn sweep(frame: &Frame, index: u32, block: &RayBlock, hits: &mut Hits, rays: &Range<usize>, shape: &impl Simple) {
-    if frame.is_straight() {
-        sweep_turned::<false>(frame, index, block, hits, rays, shape);
-    } else {
-        sweep_turned::<true>(frame, index, block, hits, rays, shape);
+fn sweep(frame: &Frame, face: &BoundedFace, block: &RayBlock, hits: &mut Hits, rays: &Range<usize>, shape: &impl Simple) {
+    match (face.ball, frame.is_straight()) {
+        (None, true) => sweep_all::<false>(frame, face.index, block, hits, rays, shape),
+        (None, false) => sweep_all::<true>(frame, face.index, block, hits, rays, shape),
+        (Some(ball), true) => sift::<false>(&ball, frame, face.index, block, hits, rays, shape),
+        (Some(ball), false) => sift::<true>(&ball, frame, face.index, block, hits, rays, shape),
     }
 }
 
+/// Tries rays on a face.
 #[inline(always)]
-fn sweep_turned<const TURNED: bool>(
+fn sweep_all<const TURNED: bool>(
     frame: &Frame,
     index: u32,
     block: &RayBlock,
@@ -87,32 +102,116 @@ fn sweep_turned<const TURNED: bool>(
     rays: &Range<usize>,
     shape: &impl Simple,
 ) {
-    let n = rays.len();
-    let [ox, oy, oz] = block.origin.each_ref().map(|v| &v[rays.clone()][..n]);
-    let [dx, dy, dz] = block.direction.each_ref().map(|v| &v[rays.clone()][..n]);
-    let [l0, l1, l2, l3] = block.faces().map(|v| &v[rays.clone()][..n]);
-    let (best, second, owner) = (
-        &mut hits.t[rays.clone()][..n],
-        &mut hits.second[rays.clone()][..n],
-        &mut hits.face[rays.clone()][..n],
-    );
-    for i in 0..n {
-        let (mut o, mut d) = (Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]));
-        o = o - frame.origin;
-        if TURNED {
-            (o, d) = (frame.direction_to_local(o), frame.direction_to_local(d));
-        }
-        let starts_on = (l0[i] == index) | (l1[i] == index) | (l2[i] == index) | (l3[i] == index);
-        let (mut first, mut next, mut face) = (best[i], second[i], owner[i]);
-        for t in shape.crossings(o, d, starts_on) {
-            // Neither behind nor NaN.
-            let t = if t > 0.0 { t } else { f64::INFINITY };
-            face = if t < first { index } else { face };
-            next = least(next, if t < first { first } else { t });
-            first = least(first, t);
-        }
-        (best[i], second[i], owner[i]) = (first, next, face);
+    let (lines, mut found) = (Lines::of(block, rays), Nearest::of(hits, rays));
+    for i in 0..rays.len() {
+        meet::<TURNED>(frame, index, &lines, &mut found, i, shape);
     }
+}
+
+/// Tries the rays on a face that meet the ball around it.
+#[inline(always)]
+fn sift<const TURNED: bool>(
+    ball: &Ball,
+    frame: &Frame,
+    index: u32,
+    block: &RayBlock,
+    hits: &mut Hits,
+    rays: &Range<usize>,
+    shape: &impl Simple,
+) {
+    let (lines, mut found) = (Lines::of(block, rays), Nearest::of(hits, rays));
+    let n = rays.len();
+    let mut met = [[0_u8; 8]; CHUNK / 8];
+    {
+        let [ox, oy, oz] = lines.origin.map(|axis| &axis[..n]);
+        let [dx, dy, dz] = lines.direction.map(|axis| &axis[..n]);
+        let met = &mut met.as_flattened_mut()[..n];
+        for i in 0..n {
+            let (o, d) = (Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]));
+            met[i] = u8::from(ball.meets(o, d));
+        }
+    }
+    for (word, first) in met.iter().zip((0..n).step_by(8)) {
+        let mut word = u64::from_le_bytes(*word);
+        while word != 0 {
+            let i = first + (word.trailing_zeros() >> 3) as usize;
+            word &= word.wrapping_sub(1);
+            meet::<TURNED>(frame, index, &lines, &mut found, i, shape);
+        }
+    }
+}
+
+/// Some rays of a block.
+struct Lines<'a> {
+    origin: [&'a [f64]; 3],
+    direction: [&'a [f64]; 3],
+    /// Faces that each starts on.
+    faces: [&'a [u32]; MOST_ORIGIN_FACES],
+}
+
+impl<'a> Lines<'a> {
+    #[inline(always)]
+    fn of(block: &'a RayBlock, rays: &Range<usize>) -> Self {
+        let n = rays.len();
+        Self {
+            origin: block.origin.each_ref().map(|v| &v[rays.clone()][..n]),
+            direction: block.direction.each_ref().map(|v| &v[rays.clone()][..n]),
+            faces: block.faces().map(|v| &v[rays.clone()][..n]),
+        }
+    }
+
+    #[inline(always)]
+    fn line(&self, i: usize) -> (Vec3, Vec3) {
+        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin, self.direction);
+        (Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]))
+    }
+}
+
+/// What they met so far.
+struct Nearest<'a> {
+    t: &'a mut [f64],
+    second: &'a mut [f64],
+    face: &'a mut [u32],
+}
+
+impl<'a> Nearest<'a> {
+    #[inline(always)]
+    fn of(hits: &'a mut Hits, rays: &Range<usize>) -> Self {
+        let n = rays.len();
+        Self {
+            t: &mut hits.t[rays.clone()][..n],
+            second: &mut hits.second[rays.clone()][..n],
+            face: &mut hits.face[rays.clone()][..n],
+        }
+    }
+}
+
+/// Tries a ray on a face.
+#[inline(always)]
+fn meet<const TURNED: bool>(
+    frame: &Frame,
+    index: u32,
+    lines: &Lines<'_>,
+    found: &mut Nearest<'_>,
+    i: usize,
+    shape: &impl Simple,
+) {
+    let (mut o, mut d) = lines.line(i);
+    o = o - frame.origin;
+    if TURNED {
+        (o, d) = (frame.direction_to_local(o), frame.direction_to_local(d));
+    }
+    let [l0, l1, l2, l3] = lines.faces;
+    let starts_on = (l0[i] == index) | (l1[i] == index) | (l2[i] == index) | (l3[i] == index);
+    let (mut first, mut next, mut face) = (found.t[i], found.second[i], found.face[i]);
+    for t in shape.crossings(o, d, starts_on) {
+        // Neither behind nor NaN.
+        let t = if t > 0.0 { t } else { f64::INFINITY };
+        face = if t < first { index } else { face };
+        next = least(next, if t < first { first } else { t });
+        first = least(first, t);
+    }
+    (found.t[i], found.second[i], found.face[i]) = (first, next, face);
 }
 
 /// The lesser of two numbers that are not NaN: one instruction, as `f64::min` is not.

@@ -87,6 +87,23 @@ impl RayBlock {
         parts: impl ExactSizeIterator<Item = u32>,
     ) {
         let n = self.len() + parts.len();
+        self.faces[0].resize(n, face);
+        self.extend_lines(origin, direction, parts);
+    }
+
+    /// Rays more, each of which starts on a part of a face.
+    pub fn extend_each(&mut self, origin: [&[f64]; 3], direction: [&[f64]; 3], (faces, parts): (&[u32], &[u32])) {
+        self.faces[0].extend_from_slice(faces);
+        self.extend_lines(origin, direction, parts.iter().copied());
+    }
+
+    /// Rays more whose first faces are there already.
+    fn extend_lines(
+        &mut self,
+        origin: [&[f64]; 3],
+        direction: [&[f64]; 3],
+        parts: impl ExactSizeIterator<Item = u32>,
+    ) {
         for (mine, more) in self
             .origin
             .iter_mut()
@@ -96,9 +113,8 @@ impl RayBlock {
             mine.extend_from_slice(more);
         }
         let [first, others @ ..] = &mut self.faces;
-        first.resize(n, face);
         for slot in others {
-            slot.resize(n, NONE);
+            slot.resize(first.len(), NONE);
         }
         self.parts.extend(parts.map(|part| [part, NONE, NONE, NONE]));
     }

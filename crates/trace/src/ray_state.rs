@@ -1,5 +1,7 @@
 //! What a ray carries on its way.
 
+use crate::guide::family;
+
 /// What a ray carries.
 #[derive(Clone, Copy, Debug)]
 pub struct RayState {
@@ -20,4 +22,15 @@ pub struct RayState {
     pub family: u32,
     /// How often the stored events can be thinned before those of this ray are dropped.
     pub depth: u32,
+}
+
+impl RayState {
+    /// The ray was mirrored or refracted at a smooth surface, which matters before it meets the first diffuse one.
+    #[inline(always)]
+    pub const fn go_smoothly(&mut self, face: u32, transmitted: bool) {
+        if !self.scattered {
+            self.unseen = true;
+            self.family = family(self.family, face, transmitted);
+        }
+    }
 }

@@ -50,19 +50,16 @@ impl SolidStack {
     #[inline]
     #[must_use]
     pub fn crossed(self, solid: u16) -> Option<Self> {
-        let mut list = self.solids();
-        if let Some(at) = list.iter().position(|s| *s == solid) {
-            list[at..].rotate_left(1);
-            list[3] = 0;
-        } else {
-            if list[3] != 0 {
-                return None;
-            }
-            list[3] = solid;
-            list.sort_unstable_by(|a, b| b.cmp(a));
+        // The numbers are sorted: where it is, or where it belongs.
+        let at = self.solids().iter().position(|s| *s <= solid)?;
+        let shift = 48 - 16 * at as u32;
+        let (mine, below) = (0xFFFF << shift, self.0 & ((1 << shift) - 1));
+        let above = self.0 & !(mine | ((1 << shift) - 1));
+        if self.0 & mine == u64::from(solid) << shift {
+            return Some(Self(above | below << 16));
         }
-        let [a, b, c, d] = list.map(u64::from);
-        Some(Self(a << 48 | b << 32 | c << 16 | d))
+        let rest = self.0 & (mine | ((1 << shift) - 1));
+        (self.0 & 0xFFFF == 0).then_some(Self(above | u64::from(solid) << shift | rest >> 16))
     }
 }
 
@@ -81,5 +78,7 @@ mod tests {
         let full = cross(both, 65_535);
         assert_eq!(full.crossed(12), None);
         assert_eq!(cross(full, 3).solids(), [65_535, 9, 7, 0]);
+        assert_eq!(full.crossed(1), None);
+        assert_eq!(cross(full, 65_535), both);
     }
 }

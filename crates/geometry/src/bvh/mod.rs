@@ -14,4 +14,4 @@ mod tests;
 mod tree;
 
 pub use probe::Probe;
-pub use tree::{Bvh, Stack};
+pub use tree::{Bvh, LentStack, Stack, Walk};

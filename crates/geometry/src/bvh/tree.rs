@@ -1,5 +1,8 @@
 //! A tree of boxes, and rays through it.
 
+use std::cell::RefCell;
+use std::ops::{Deref, DerefMut, Range};
+
 use etendue_math::Vec3;
 
 use super::probe::{Lanes, Probe, WIDTH};
@@ -53,6 +56,45 @@ impl Default for Stack {
     }
 }
 
+thread_local! {
+    /// Stacks that nobody uses at present: to clear one takes as long as many a walk.
+    static SPARE: RefCell<Vec<Box<Stack>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// A stack that is given back when it is dropped.
+#[derive(Debug)]
+pub struct LentStack(Option<Box<Stack>>);
+
+impl Stack {
+    /// One for some walks of this thread.
+    #[must_use]
+    pub fn lend() -> LentStack {
+        LentStack(Some(SPARE.with_borrow_mut(Vec::pop).unwrap_or_default()))
+    }
+}
+
+impl Drop for LentStack {
+    fn drop(&mut self) {
+        if let Some(stack) = self.0.take() {
+            SPARE.with_borrow_mut(|spare| spare.push(stack));
+        }
+    }
+}
+
+impl Deref for LentStack {
+    type Target = Stack;
+
+    fn deref(&self) -> &Stack {
+        self.0.as_ref().expect("there until it is dropped")
+    }
+}
+
+impl DerefMut for LentStack {
+    fn deref_mut(&mut self) -> &mut Stack {
+        self.0.as_mut().expect("there until it is dropped")
+    }
+}
+
 impl Bvh {
     /// A box around everything.
     #[must_use]
@@ -84,8 +126,7 @@ impl Bvh {
                 open.extend((0..WIDTH).filter(|lane| touches(*lane)).map(|lane| node.child[lane]));
             } else {
                 let leaf = (child & !LEAF) as usize;
-                let primitives = &self.order[self.leaves[leaf] as usize..self.leaves[leaf + 1] as usize];
-                if primitives.iter().any(|primitive| visit(*primitive)) {
+                if self.leaf(leaf).iter().any(|primitive| visit(*primitive)) {
                     return true;
                 }
             }
@@ -100,67 +141,109 @@ impl Bvh {
     #[inline(always)]
     pub fn traverse(&self, o: Vec3, d: Vec3, t_lo: f64, t_max: &mut f64, mut visit: impl FnMut(u32, &mut f64)) {
         let probe = Probe::new(o, d, t_lo);
-        self.walk(&probe, t_max, &mut Stack::default(), |leaf, t_max| {
-            for &primitive in &self.order[self.leaves[leaf] as usize..self.leaves[leaf + 1] as usize] {
+        self.walk(&probe, t_max, &mut Stack::lend(), |leaf, t_max| {
+            for &primitive in self.leaf(leaf) {
                 visit(primitive, t_max);
             }
         });
     }
 
+    /// The primitives of a leaf.
+    #[inline(always)]
+    fn leaf(&self, leaf: usize) -> &[u32] {
+        &self.order[self.places(leaf)]
+    }
+
+    /// Where the primitives of a leaf are among those of all leaves, one after the other.
+    #[inline(always)]
+    #[must_use]
+    pub fn places(&self, leaf: usize) -> Range<usize> {
+        self.leaves[leaf] as usize..self.leaves[leaf + 1] as usize
+    }
+
     /// As [`Bvh::traverse`], leaf by leaf: leaves are numbered as [`Bvh::leaves`] yields them.
     #[inline(always)]
     pub fn walk(&self, probe: &Probe, t_max: &mut f64, stack: &mut Stack, mut visit: impl FnMut(usize, &mut f64)) {
-        let Some(mut limit) = probe.limit(*t_max) else {
-            return;
-        };
-        let Stack { entries, lanes } = stack;
-        let mut top = 0;
-        let mut child = 0_u32;
+        let mut walk = Walk::new(self, probe, stack);
+        while let Some(leaf) = walk.next(*t_max) {
+            visit(leaf, t_max);
+        }
+    }
+}
+
+/// The leaves that a ray comes by, the nearest ones first.
+#[derive(Debug)]
+pub struct Walk<'a> {
+    tree: &'a Bvh,
+    probe: &'a Probe,
+    stack: &'a mut Stack,
+    /// Entries on the stack.
+    top: usize,
+}
+
+impl<'a> Walk<'a> {
+    /// From the root.
+    #[inline(always)]
+    #[must_use]
+    pub fn new(tree: &'a Bvh, probe: &'a Probe, stack: &'a mut Stack) -> Self {
+        stack.entries[0] = 0;
+        Self {
+            tree,
+            probe,
+            stack,
+            top: 1,
+        }
+    }
+
+    /// The next leaf whose box the ray enters before `t_max`.
+    #[inline(always)]
+    pub fn next(&mut self, t_max: f64) -> Option<usize> {
+        let limit = self.probe.limit(t_max)?;
+        let Stack { entries, lanes } = &mut *self.stack;
+        let mut top = self.top;
         loop {
-            if child & LEAF == 0 {
-                let node = &self.nodes[child as usize];
-                probe.enter(&node.planes, limit, lanes);
+            let mut child = loop {
+                if top == 0 {
+                    self.top = 0;
+                    return None;
+                }
+                top -= 1;
+                if enter(entries[top]) <= limit {
+                    break low(entries[top]);
+                }
+            };
+            loop {
+                if child & LEAF != 0 {
+                    self.top = top;
+                    return Some((child & !LEAF) as usize);
+                }
+                let node = &self.tree.nodes[child as usize];
+                self.probe.enter(&node.planes, limit, lanes);
                 let mut hits = u64::from_le_bytes(lanes.hit) & node.used;
+                if hits == 0 {
+                    break;
+                }
                 let mut next = || {
                     let lane = (hits.trailing_zeros() >> 3) as usize % WIDTH;
                     hits &= hits.wrapping_sub(1);
                     let entry = u64::from(lanes.enter[lane].to_bits()) << 32 | u64::from(node.child[lane]);
                     (entry, hits != 0)
                 };
-                if node.used & u64::from_le_bytes(lanes.hit) != 0 {
-                    let (mut nearest, mut more) = next();
-                    let first = top;
-                    while more {
-                        let (mut entry, still) = next();
-                        more = still;
-                        (nearest, entry) = (nearest.min(entry), nearest.max(entry));
-                        let mut at = top;
-                        while at > first && entries[at - 1] < entry {
-                            entries[at] = entries[at - 1];
-                            at -= 1;
-                        }
-                        entries[at] = entry;
-                        top += 1;
+                let (mut nearest, mut more) = next();
+                let first = top;
+                while more {
+                    let (mut entry, still) = next();
+                    more = still;
+                    (nearest, entry) = (nearest.min(entry), nearest.max(entry));
+                    let mut at = top;
+                    while at > first && entries[at - 1] < entry {
+                        entries[at] = entries[at - 1];
+                        at -= 1;
                     }
-                    child = low(nearest);
-                    continue;
+                    entries[at] = entry;
+                    top += 1;
                 }
-            } else {
-                visit((child & !LEAF) as usize, t_max);
-                let Some(lower) = probe.limit(*t_max) else {
-                    return;
-                };
-                limit = lower;
-            }
-            loop {
-                if top == 0 {
-                    return;
-                }
-                top -= 1;
-                if enter(entries[top]) <= limit {
-                    child = low(entries[top]);
-                    break;
-                }
+                child = low(nearest);
             }
         }
     }

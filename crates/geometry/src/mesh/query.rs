@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::block::{Lanes, MeshHit, NO_TRIANGLE, Shear};
 use super::triangle_mesh::Mesh;
-use crate::bvh::{Probe, Stack};
+use crate::bvh::{LentStack, Probe, Stack};
 
 /// Triangles that a ray of a block may start on.
 pub const MOST_ORIGIN_TRIANGLES: usize = 4;
@@ -34,10 +34,18 @@ pub struct Found<'a> {
 }
 
 /// What a search keeps in memory.
-#[derive(Default)]
 pub(super) struct Scratch {
-    stack: Stack,
+    stack: LentStack,
     pub(super) lanes: Lanes,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self {
+            stack: Stack::lend(),
+            lanes: Lanes::default(),
+        }
+    }
 }
 
 impl Mesh {

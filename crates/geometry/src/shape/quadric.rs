@@ -102,6 +102,20 @@ pub(super) fn reach(q: &Quadric) -> Option<(f64, [f64; 2])> {
     Some((most.min(q.r[1]), z))
 }
 
+/// The height of the centre of a ball that holds a quadric, and its radius; None if the quadric has no end or no points.
+pub(super) fn ball(q: &Quadric) -> Option<(f64, f64)> {
+    let (most, [from, to]) = reach(q)?;
+    let centre = 0.5 * (from + to);
+    // r² + (z - centre)² is of second order in z: largest at an end, or where its slope is 0.
+    let square = |z: f64| squared_radius(q, z) + (z - centre) * (z - centre);
+    let flat = (0.5 * q.z1 / q.r2 + centre) / (1.0 - q.z2 / q.r2);
+    let places = [from, to, flat.max(from).min(to)];
+    let furthest = places.map(square).into_iter().fold(0.0, f64::max);
+    // Where the range of r cuts something out, the sum is not of one order from end to end.
+    let around = most * most + 0.25 * (to - from) * (to - from);
+    Some((centre, if q.r[1] <= most { around } else { furthest }.sqrt()))
+}
+
 /// Where, on the z axis, `lowest` ≤ r² ≤ `highest`: between the zeros of two functions of second order.
 pub(super) fn ranges_of_z(q: &Quadric) -> Option<Vec<[f64; 2]>> {
     let zeros = |level: f64| -> Vec<f64> {

@@ -6,7 +6,7 @@ use etendue_math::Vec3;
 
 use super::asphere::Asphere;
 use super::flat::{Flat, Outline};
-use super::quadric::{Quadric, reach};
+use super::quadric::{Quadric, ball, reach};
 use super::torus::Torus;
 use crate::bounds::Bounds;
 use crate::mesh::Mesh;
@@ -99,6 +99,24 @@ impl Shape {
     #[must_use]
     pub fn is_smooth(&self) -> bool {
         matches!(self, Self::Mesh(mesh) if mesh.is_smooth())
+    }
+
+    /// Centre and radius of a ball that holds the shape \[mm\]; not finite if the shape has no end.
+    #[must_use]
+    pub fn ball(&self) -> (Vec3, f64) {
+        if let Self::Quadric(quadric) = self
+            && let Some((z, radius)) = ball(quadric)
+        {
+            return (Vec3::new(0.0, 0.0, z), radius);
+        }
+        if let Self::Flat(Flat {
+            outline: Outline::Annulus { outer, .. },
+        }) = self
+        {
+            return (Vec3::default(), *outer);
+        }
+        let bounds = self.bounds();
+        ((bounds.lo + bounds.hi) * 0.5, 0.5 * bounds.sides().length())
     }
 
     /// A box that holds the shape; not finite if the shape has no end.

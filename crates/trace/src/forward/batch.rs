@@ -10,11 +10,12 @@ use etendue_sampling::ordered::BATCH;
 use etendue_sampling::philox::{Pairs, fill_pairs};
 
 use super::block_trace::BlockTrace;
+use super::interfaces::{Crossed, InterfaceRays};
 use super::lambertian_sheet::{LambertianSheet, SheetRay, SheetRays};
 use super::queue::RayQueue;
 use super::run::Run;
 use super::scattering_sheet::ScatteringSheet;
-use super::sorter::{Sheet, Sorter, sheets};
+use super::sorter::{Sheet, Sorter, interfaces, sheets};
 use crate::dealing::Dealing;
 use crate::detector::Detector;
 use crate::events::depth;
@@ -48,6 +49,7 @@ struct BatchTrace<'a> {
     /// Those of the rays that meet a face which are not absorbed.
     going: Vec<u32>,
     sheet_rays: SheetRays,
+    interface_rays: InterfaceRays,
     /// Fluxes of the rays that leave the scene.
     fluxes: Vec<f64>,
 }
@@ -78,7 +80,7 @@ pub fn trails(scene: &Scene, run: &Run<'_>, far: f64) -> Vec<Vec<Vec3>> {
     let dealing = Dealing::of(scene, run.rays, run.sets);
     let mut trace = BatchTrace::new(scene, &[], run, &dealing);
     trace.block.trails = Some(Vec::new());
-    trace.sorter = Sorter::new(scene, Vec::new());
+    trace.sorter = Sorter::one_by_one(scene);
     trace.block.far = far;
     trace.batch(0);
     trace.block.trails.unwrap_or_default()
@@ -105,11 +107,12 @@ impl<'a> BatchTrace<'a> {
             now: RayQueue::default(),
             next: RayQueue::default(),
             hits: Hits::default(),
-            sorter: Sorter::new(scene, sheets(scene, wants)),
+            sorter: Sorter::new(scene, sheets(scene, wants), &interfaces(scene)),
             addresses: Vec::new(),
             numbers: Default::default(),
             going: Vec::new(),
             sheet_rays: SheetRays::default(),
+            interface_rays: InterfaceRays::default(),
             fluxes: Vec::new(),
         }
     }
@@ -235,6 +238,8 @@ impl<'a> BatchTrace<'a> {
                     Sheet::Scattering(sheet) => self.scatter(sheet, which, &now, &hits, &mut next),
                 }
             }
+            self.draw(&now, sorter.interfaces(), event);
+            self.cross(sorter.interfaces(), &now, &hits, event, &mut next);
             self.draw(&now, sorter.single(), event);
             for (k, i) in sorter.single().iter().enumerate() {
                 let numbers = self.numbers.each_ref().map(|list| list[k]);
@@ -291,6 +296,30 @@ impl<'a> BatchTrace<'a> {
         let face = &self.block.scene.face_set.faces()[sheet.face as usize];
         self.sheet_rays.bounce(face, sheet, &self.numbers);
         self.sheet_rays.go_on(sheet.face, next);
+    }
+
+    /// Rays that meet smooth interfaces of solids go on, mirrored or refracted.
+    fn cross(&mut self, which: &[u32], now: &RayQueue, hits: &Hits, event: u32, next: &mut RayQueue) {
+        self.interface_rays.make_room(which.len());
+        let mut place = 0;
+        for (k, i) in which.iter().enumerate() {
+            let (i, block) = (*i as usize, &mut self.block);
+            let who = now.who[i];
+            let wavelength = block.states[who as usize].wavelength;
+            if let Some(met) = Crossed::new(block.scene, now, hits, i, wavelength, &mut block.media) {
+                self.interface_rays.put(place, who, &met, self.numbers[0][k]);
+                place += 1;
+            } else {
+                let numbers = self.numbers.each_ref().map(|list| list[k]);
+                block.step(now, hits, i, numbers, event, next);
+            }
+        }
+        self.interface_rays.make_room(place);
+        self.interface_rays.pass();
+        for (who, face, passed) in self.interface_rays.passed() {
+            self.block.states[who as usize].go_smoothly(face, passed);
+        }
+        self.interface_rays.go_on(next);
     }
 
     /// Rays that meet one face go on, each by itself, or are absorbed.

@@ -44,6 +44,20 @@ impl RayQueue {
         self.stack.resize(self.who.len(), SolidStack::default());
     }
 
+    /// Rays more, each of which starts on a part of a face.
+    pub fn extend_each(
+        &mut self,
+        o: [&[f64]; 3],
+        d: [&[f64]; 3],
+        who: &[u32],
+        starts: (&[u32], &[u32]),
+        stacks: impl Iterator<Item = SolidStack>,
+    ) {
+        self.lines.extend_each(o, d, starts);
+        self.who.extend_from_slice(who);
+        self.stack.extend(stacks);
+    }
+
     /// One ray more.
     #[inline(always)]
     pub fn push(&mut self, who: u32, (o, d, origin_faces): (Vec3, Vec3, OriginFaces), stack: SolidStack) {

@@ -58,11 +58,22 @@ pub fn sheets(scene: &Scene, wants: Wants) -> Vec<Sheet<'_>> {
     faces.filter_map(sheet).collect()
 }
 
+/// Of each face of a scene whether it is a smooth interface of a solid.
+#[must_use]
+pub fn interfaces(scene: &Scene) -> Vec<bool> {
+    let roles = scene.roles.iter().zip(scene.face_set.faces());
+    let is_smooth = |finish: u32| scene.finishes[finish as usize].facts().fresnel;
+    let interface = |(role, face): (&Role, &Face)| {
+        role.solid != 0 && !face.shape.is_smooth() && matches!(role.act, Act::Optical(finish) if is_smooth(finish))
+    };
+    roles.map(interface).collect()
+}
+
 /// Sorts the rays of a queue by what comes next.
 #[derive(Default)]
 pub struct Sorter<'a> {
-    /// For each face, and for none, the number of the list of most rays that meet it: [`GONE`], [`SINGLE`], or from [`FIRST`] on
-    /// for faces off which many are bounced at once.
+    /// For each face, and for none, the number of the list of most rays that meet it: [`GONE`], [`SINGLE`], [`INTERFACE`], or from
+    /// [`FIRST`] on for faces off which many are bounced at once.
     list_of: Vec<usize>,
     sheets: Vec<Sheet<'a>>,
     lists: Buckets,
@@ -78,18 +89,27 @@ const GONE: usize = 0;
 /// The list of rays that are worked on one by one.
 const SINGLE: usize = 1;
 
+/// The list of rays that meet smooth interfaces of solids.
+const INTERFACE: usize = 2;
+
 /// The list of the first bouncer.
-const FIRST: usize = 2;
+const FIRST: usize = 3;
 
 impl<'a> Sorter<'a> {
-    /// Of a scene, and those of its faces off which many rays are bounced at once.
+    /// For rays that are worked on one by one all the time.
+    pub fn one_by_one(scene: &Scene) -> Self {
+        Self::new(scene, Vec::new(), &vec![false; scene.roles.len()])
+    }
+
+    /// Of a scene, those of its faces off which many rays are bounced at once, and whether each is a smooth interface.
     #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^16 solids")]
-    pub fn new(scene: &Scene, sheets: Vec<Sheet<'a>>) -> Self {
+    pub fn new(scene: &Scene, sheets: Vec<Sheet<'a>>, interfaces: &[bool]) -> Self {
         let solids = 0..=scene.solids.len();
         let clear = |solid: usize| scene.media[scene.medium(solid as u16)].absorption.range() == [0.0, 0.0];
         let clear: Vec<bool> = solids.map(clear).collect();
-        let mut list_of = vec![SINGLE; scene.roles.len() + 1];
-        list_of[scene.roles.len()] = if clear[0] { GONE } else { SINGLE };
+        let list = |smooth: &bool| if *smooth { INTERFACE } else { SINGLE };
+        let mut list_of: Vec<usize> = interfaces.iter().map(list).collect();
+        list_of.push(GONE);
         for (list, sheet) in (FIRST..).zip(&sheets) {
             list_of[sheet.face() as usize] = list;
         }
@@ -111,15 +131,16 @@ impl<'a> Sorter<'a> {
         for i in 0..queue.len() {
             let face = (hits.face[i] as usize).min(faces);
             let mut list = self.list_of[face];
-            // Few rays are special: their branch costs nothing, and none is on the way of the others.
-            let nested = queue.stack[i] != SolidStack::default();
-            if nested | ended | self.tied[i] {
-                let leaves = face == faces && self.clear[usize::from(queue.stack[i].top())];
-                list = if leaves { GONE } else { SINGLE };
+            // In a solid rays are bounced one by one.
+            let stack = queue.stack[i];
+            let special = ended | self.tied[i] | ((list >= FIRST) & (stack != SolidStack::default()));
+            let clear = self.clear[usize::from(stack.top())];
+            if (special & (list != GONE)) | (!clear & (list < FIRST)) {
+                list = SINGLE;
             }
             self.lists.push(list, i);
         }
-        self.lists.join_short(FIRST, SINGLE);
+        self.lists.join_short(INTERFACE, SINGLE);
     }
 
     /// Places of the rays that meet nothing and cannot be absorbed on their way.
@@ -130,6 +151,11 @@ impl<'a> Sorter<'a> {
     /// Places of the rays that are worked on one by one.
     pub fn single(&self) -> &[u32] {
         self.lists.get(SINGLE)
+    }
+
+    /// Places of the rays that meet smooth interfaces.
+    pub fn interfaces(&self) -> &[u32] {
+        self.lists.get(INTERFACE)
     }
 
     /// Places of the rays that are bounced, face by face.

@@ -9,7 +9,6 @@ use super::block_trace::BlockTrace;
 use super::queue::RayQueue;
 use crate::detector::{Light, Scatter};
 use crate::events::ScatterEvent;
-use crate::guide::family;
 use crate::interaction::interaction_of;
 use crate::ledger::Fate;
 use crate::ray_state::RayState;
@@ -95,12 +94,11 @@ impl BlockTrace<'_> {
         let Some((component, d, stack)) = met.sample([number, turn]) else {
             return Err(Fate::OnFace(interaction.face));
         };
-        // Smooth surfaces before the first diffuse one.
-        if component.is_specular() && !state.scattered {
-            state.unseen = true;
-            state.family = family(state.family, interaction.face, component.is_transmitted());
+        if component.is_specular() {
+            state.go_smoothly(interaction.face, component.is_transmitted());
+        } else {
+            state.scattered = true;
         }
-        state.scattered |= !component.is_specular();
         Ok(((interaction.point, d, interaction.origin_faces), stack))
     }
 

@@ -1,0 +1,181 @@
+//! Many rays at once through smooth interfaces of solids, whichever these are: what is there for each of them, then which way
+//! they go, several at a time.
+//!
+//! What [`scatter`](crate::scatter) comes to there, to the same bits.
+
+use etendue_geometry::hits::Hits;
+use etendue_geometry::surface_points::Vectors;
+use etendue_math::Vec3;
+use etendue_optics::fresnel::{fresnel, reflect, refract};
+use multiversion::multiversion;
+
+use super::queue::RayQueue;
+use crate::medium_cache::MediumCache;
+use crate::scene::Scene;
+use crate::solid_stack::SolidStack;
+
+/// An interface where a ray meets it.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossed {
+    face: u32,
+    /// The part of the face.
+    part: u32,
+    /// \[mm\].
+    point: Vec3,
+    /// Along which the ray came.
+    d: Vec3,
+    /// Against the ray.
+    normal: Vec3,
+    /// Refractive indices where the ray comes from and on the other side.
+    n: [f64; 2],
+    /// The solids on both sides.
+    sides: [SolidStack; 2],
+}
+
+impl Crossed {
+    /// Where ray `i` of a queue meets an interface of a solid by itself; None if the face is hidden there, or the ray goes on as
+    /// if nothing were there, or cannot.
+    #[inline(always)]
+    pub fn new(
+        scene: &Scene,
+        queue: &RayQueue,
+        hits: &Hits,
+        i: usize,
+        wavelength: f64,
+        media: &mut MediumCache,
+    ) -> Option<Self> {
+        let (face, crossing, before) = (hits.face[i], hits.crossing(i), queue.stack[i]);
+        let solid = scene.roles[face as usize].solid;
+        let d = queue.lines.direction(i);
+        let foot = scene.face_set.faces()[face as usize].surface_point(queue.lines.origin(i), d, &crossing);
+        let front = d.dot(foot.normal) < 0.0;
+        if front == before.contains(solid) {
+            return None;
+        }
+        let after = before.crossed(solid)?;
+        let n = [before, after].map(|stack| media.at(scene, stack.top(), wavelength).n);
+        let meets = solid >= before.top().min(after.top()) && n[0] > 0.0 && n[1] > 0.0 && n[0] != n[1];
+        meets.then_some(Self {
+            face,
+            part: crossing.part,
+            point: foot.point,
+            d,
+            normal: if front { foot.normal } else { -foot.normal },
+            n,
+            sides: [before, after],
+        })
+    }
+}
+
+/// Rays that meet interfaces, and what becomes of them. Structure of arrays.
+#[derive(Default)]
+pub struct InterfaceRays {
+    who: Vec<u32>,
+    face: Vec<u32>,
+    part: Vec<u32>,
+    sides: Vec<[SolidStack; 2]>,
+    points: Vectors,
+    directions: Vectors,
+    normals: Vectors,
+    n: [Vec<f64>; 2],
+    /// Random numbers that decide which way each goes.
+    numbers: Vec<f64>,
+    /// Whether it is mirrored.
+    mirrored: Vec<bool>,
+}
+
+impl InterfaceRays {
+    /// Room for so many rays.
+    pub fn make_room(&mut self, n: usize) {
+        for list in [&mut self.who, &mut self.face, &mut self.part] {
+            list.resize(n, 0);
+        }
+        self.sides.resize(n, [SolidStack::default(); 2]);
+        let vectors = self.points.iter_mut().chain(&mut self.directions).chain(&mut self.normals);
+        for list in vectors.chain(&mut self.n).chain([&mut self.numbers]) {
+            list.resize(n, 0.0);
+        }
+    }
+
+    /// Puts a ray in its place, by the number of its state and a random number.
+    #[inline(always)]
+    pub fn put(&mut self, place: usize, who: u32, met: &Crossed, number: f64) {
+        (self.who[place], self.face[place], self.part[place]) = (who, met.face, met.part);
+        self.sides[place] = met.sides;
+        let lists = [&mut self.points, &mut self.directions, &mut self.normals];
+        for (list, vector) in lists.into_iter().zip([met.point, met.d, met.normal]) {
+            (list[0][place], list[1][place], list[2][place]) = (vector.x, vector.y, vector.z);
+        }
+        (self.n[0][place], self.n[1][place]) = (met.n[0], met.n[1]);
+        self.numbers[place] = number;
+    }
+
+    /// Turns the lines to the interfaces into those from there.
+    pub fn pass(&mut self) {
+        self.mirrored.resize(self.who.len(), false);
+        turn(self);
+    }
+
+    /// The state of each ray, the face that it met, and whether it passed it.
+    pub fn passed(&self) -> impl Iterator<Item = (u32, u32, bool)> {
+        let rays = self.who.iter().zip(&self.face).zip(&self.mirrored);
+        rays.map(|((who, face), mirrored)| (*who, *face, !mirrored))
+    }
+
+    /// Adds the rays to a queue.
+    pub fn go_on(&self, queue: &mut RayQueue) {
+        let [o, d] = [&self.points, &self.directions].map(|lists| lists.each_ref().map(|list| &list[..]));
+        let stacks = self.sides.iter().zip(&self.mirrored);
+        queue.extend_each(
+            o,
+            d,
+            &self.who,
+            (&self.face, &self.part),
+            stacks.map(|(sides, mirrored)| sides[usize::from(!mirrored)]),
+        );
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn turn(rays: &mut InterfaceRays) {
+    let n = rays.who.len();
+    let [dx, dy, dz] = rays.directions.each_mut().map(|v| &mut v[..n]);
+    let [nx, ny, nz] = rays.normals.each_ref().map(|v| &v[..n]);
+    let [n1, n2] = rays.n.each_ref().map(|v| &v[..n]);
+    let (numbers, mirrors) = (&rays.numbers[..n], &mut rays.mirrored[..n]);
+    for k in 0..n {
+        let d = Vec3::new(dx[k], dy[k], dz[k]);
+        let normal = Vec3::new(nx[k], ny[k], nz[k]);
+        let height = normal.dot(-d);
+        let cosine = if height < 1.0 { height } else { 1.0 };
+        let ratio = n1[k] / n2[k];
+        let f = fresnel(cosine, n1[k], n2[k]);
+        let mirror = numbers[k] < f.reflectance;
+        // On the sides where they belong: where light grazes, rounding may send it to the other one.
+        let back = beside(reflect(d, normal, cosine), normal, 1.0);
+        let through = beside(refract(d, normal, cosine, ratio, f.cosine), normal, -1.0);
+        let straight = ratio == 1.0;
+        dx[k] = pick(mirror, back.x, pick(straight, d.x, through.x));
+        dy[k] = pick(mirror, back.y, pick(straight, d.y, through.y));
+        dz[k] = pick(mirror, back.z, pick(straight, d.z, through.z));
+        mirrors[k] = mirror;
+    }
+}
+
+#[inline(always)]
+fn pick(first: bool, a: f64, b: f64) -> f64 {
+    if first { a } else { b }
+}
+
+/// A direction, or what it is mirrored to if it is on the wrong side of a surface.
+#[inline(always)]
+fn beside(d: Vec3, normal: Vec3, sign: f64) -> Vec3 {
+    let height = d.dot(normal);
+    let wrong = height * sign < 0.0;
+    let turned = d - normal * (2.0 * height);
+    Vec3::new(
+        pick(wrong, turned.x, d.x),
+        pick(wrong, turned.y, d.y),
+        pick(wrong, turned.z, d.z),
+    )
+}
