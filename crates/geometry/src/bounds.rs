@@ -130,7 +130,9 @@ impl Ball {
     pub fn new(centre: Vec3, radius: f64) -> Option<Self> {
         let radius = radius * (1.0 + Self::SLACK);
         let square = radius * radius;
-        (square + centre.dot(centre)).is_finite().then_some(Self { centre, square })
+        (square + centre.dot(centre))
+            .is_finite()
+            .then_some(Self { centre, square })
     }
 
     /// Square of its radius \[mm²\].

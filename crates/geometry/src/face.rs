@@ -65,7 +65,10 @@ impl Face {
     pub fn ball(&self) -> Option<Ball> {
         let (centre, radius) = self.shape.ball();
         let moved = self.frame.point_to_world(centre);
-        Ball::new(moved, radius + 2.0 * ROUNDING * (size(self.frame.origin) + size(centre) + radius))
+        Ball::new(
+            moved,
+            radius + 2.0 * ROUNDING * (size(self.frame.origin) + size(centre) + radius),
+        )
     }
 
     /// The normal that a ray sees: that of the surface, or that which a mesh states at its corners, interpolated.

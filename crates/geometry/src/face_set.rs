@@ -36,7 +36,7 @@ fn to_local(frame: &Frame, rays: &RayBlock, met: &[f64], scratch: &mut MeshRays)
 
 /// Up to this number of faces, all of them, or balls around them, are tried on every ray; of more, those that a tree does not
 /// rule out. Where a tree begins to pay: a ray's way through it takes as long as that many balls.
-const FEW: usize = 256;
+const FEW: usize = 128;
 
 /// Faces that are met by so many rays that no tree would rule them out: as many of the largest as this at most.
 const MOST_LARGE: usize = 24;
@@ -57,6 +57,8 @@ pub struct FaceSet {
     others: Vec<u32>,
     /// The tree of the other faces, and these in the order of its leaves.
     tree: Option<(Arc<Bvh>, Vec<BoundedFace>)>,
+    /// Whether crossings of any of them have parts.
+    has_parts: bool,
 }
 
 impl FaceSet {
@@ -97,6 +99,7 @@ impl FaceSet {
                 (Arc::new(tree), inner)
             });
         }
+        set.has_parts = faces.iter().any(|face| matches!(face.shape, Shape::Mesh(_)));
         set.faces = faces;
         set
     }
@@ -116,7 +119,7 @@ impl FaceSet {
     /// The first crossing of each ray of the block, at t > 0.
     pub fn nearest(&self, rays: &RayBlock, hits: &mut Hits) {
         let one_by_one = !self.others.is_empty() || self.tree.is_some();
-        hits.reset(rays.len(), one_by_one || !self.meshes.is_empty());
+        hits.reset(rays.len(), self.has_parts);
         try_simple(&self.faces, &self.simple, rays, hits);
         for &index in &self.meshes {
             self.try_mesh(index, rays, hits);
@@ -214,7 +217,12 @@ impl FaceSet {
             face: NONE,
             part: (0, [0.0; 2]),
         };
-        for index in self.simple.iter().map(|simple| simple.index).chain(self.meshes.iter().copied()) {
+        for index in self
+            .simple
+            .iter()
+            .map(|simple| simple.index)
+            .chain(self.meshes.iter().copied())
+        {
             self.try_face(index, o, d, origin_faces, &mut one);
         }
         self.try_one(o, d, origin_faces, &mut one, &mut Stack::lend());
@@ -239,9 +247,14 @@ impl FaceSet {
         self.simple.iter().for_each(|simple| look(simple.index));
         self.meshes.iter().chain(&self.others).copied().for_each(&mut look);
         if let Some((tree, faces)) = &self.tree {
-            tree.walk(&Probe::new(o, d, range[0]), &mut range[1].clone(), &mut Stack::lend(), |leaf, _| {
-                faces[tree.places(leaf)].iter().for_each(|face| look(face.index));
-            });
+            tree.walk(
+                &Probe::new(o, d, range[0]),
+                &mut range[1].clone(),
+                &mut Stack::lend(),
+                |leaf, _| {
+                    faces[tree.places(leaf)].iter().for_each(|face| look(face.index));
+                },
+            );
         }
     }
 }
@@ -256,7 +269,13 @@ fn try_one_by_one(set: &FaceSet, rays: &RayBlock, hits: &mut Hits, stack: &mut S
             face: hits.face[i],
             part: hits.part[i],
         };
-        set.try_one(rays.origin(i), rays.direction(i), &rays.origin_faces(i), &mut one, stack);
+        set.try_one(
+            rays.origin(i),
+            rays.direction(i),
+            &rays.origin_faces(i),
+            &mut one,
+            stack,
+        );
         (hits.t[i], hits.second[i], hits.face[i], hits.part[i]) = (one.t, one.second, one.face, one.part);
     }
 }
@@ -270,7 +289,12 @@ fn large_faces(faces: &[Face], bounds: &[Bounds]) -> Vec<bool> {
     let areas: Vec<f64> = faces.iter().map(area).collect();
     let mut ranked: Vec<f64> = areas.iter().copied().filter(|a| a.is_finite() && *a >= least).collect();
     ranked.sort_by(f64::total_cmp);
-    let least = ranked.iter().rev().take(MOST_LARGE).next_back().map_or(f64::INFINITY, |a| *a);
+    let least = ranked
+        .iter()
+        .rev()
+        .take(MOST_LARGE)
+        .next_back()
+        .map_or(f64::INFINITY, |a| *a);
     areas.iter().map(|area| *area >= least).collect()
 }
 
@@ -309,5 +333,176 @@ impl One {
     #[inline(always)]
     fn reach(&self, o: Vec3) -> f64 {
         self.t + TIE * (o.x.abs() + o.y.abs() + o.z.abs() + self.t)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use etendue_sampling::philox::Stream;
+
+    use crate::face::HalfSpace;
+    use crate::shape::{Flat, Quadric};
+
+    const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+    fn quadric([r2, z2, z1, z0]: [f64; 4], z: [f64; 2], r: [f64; 2]) -> Shape {
+        let shape = Quadric { r2, z2, z1, z0, z, r };
+        Shape::Quadric(shape)
+    }
+
+    /// Ball, piece of a ball, cylinder, cone, ellipsoids long and flat, paraboloid, hyperboloids, and plane pieces, about 1 mm large.
+    fn shapes() -> Vec<Shape> {
+        let whole = [0.0, f64::INFINITY];
+        let flat = |outline| Shape::Flat(Flat { outline });
+        vec![
+            quadric([1.0, 1.0, 0.0, -1.0], EVERYWHERE, whole),
+            quadric([1.0, 1.0, -2.0, 0.0], [0.0, 0.4], [0.3, 0.7]),
+            quadric([1.0, 0.0, 0.0, -0.25], [-1.0, 2.0], whole),
+            quadric([1.0, -0.5, 0.0, 0.0], [0.2, 1.5], whole),
+            quadric([1.0, 0.1, 0.3, -0.2], EVERYWHERE, whole),
+            quadric([1.0, 4.0, 0.0, -1.0], EVERYWHERE, whole),
+            quadric([1.0, 4.0, 4.0, 0.0], [-0.95, 0.0], whole),
+            quadric([1.0, 0.0, -1.0, 0.0], [0.0, 1.3], whole),
+            quadric([1.0, -0.3, 0.0, -0.1], [-0.9, 1.1], whole),
+            quadric([1.0, -0.7, 0.0, 0.2], [-1.4, 1.1], whole),
+            flat(Outline::Annulus { inner: 0.2, outer: 1.0 }),
+            flat(Outline::Rectangle {
+                width: 2.0,
+                height: 0.3,
+            }),
+        ]
+    }
+
+    fn point(stream: Stream, i: u64, block: u64) -> Vec3 {
+        let [x, y, z, _] = stream.uniforms(i, block).map(|u| 2.0 * u - 1.0);
+        Vec3::new(x, y, z)
+    }
+
+    /// Faces in a cube of side 2 · `range`, every third of them straight, every seventh trimmed.
+    fn faces(count: u64, range: f64, away: f64) -> Vec<Face> {
+        let (stream, shapes) = (Stream::new(3, 7), shapes());
+        let turned = |i: u64| {
+            let z = point(stream, i, 1).normalized();
+            let x = z.cross(point(stream, i, 2)).normalized();
+            [x, z.cross(x), z]
+        };
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|[x, y, z]| Vec3::new(x, y, z));
+        let face = |i: u64| {
+            let [x, y, z] = if i % 3 == 0 { axes } else { turned(i) };
+            let origin = point(stream, i, 0) * range + Vec3::new(away, -away, 0.0);
+            let half = HalfSpace {
+                normal: Vec3::new(0.6, 0.0, 0.8),
+                offset: 0.2,
+            };
+            Face {
+                shape: shapes[i as usize % shapes.len()].clone(),
+                frame: Frame { origin, x, y, z },
+                trims: if i % 7 == 6 { vec![half] } else { vec![] },
+                flipped: false,
+            }
+        };
+        (0..count).map(face).collect()
+    }
+
+    /// Blocks, trees and lists find what trying all faces one by one finds, to the bit.
+    #[test]
+    fn the_nearest_face_is_that_of_all_faces_tried() {
+        for (count, range, away) in [
+            (10, 4.0, 0.0),
+            (FEW as u64, 9.0, 1e5),
+            (FEW as u64 + 1, 9.0, 0.0),
+            (700, 20.0, 1e3),
+        ] {
+            let set = FaceSet::new(faces(count, range, away));
+            assert_eq!(set.tree.is_some(), count > FEW as u64);
+            let stream = Stream::new(4, count);
+            let middle = Vec3::new(away, -away, 0.0);
+            let (mut block, rays) = (RayBlock::default(), 6000);
+            for i in 0..rays {
+                let far = if i % 5 == 0 { 40.0 } else { 1.0 };
+                let o = point(stream, i, 0) * (range * far) + middle;
+                let to = point(stream, i, 1) * range + middle;
+                let d = (to - o).normalized();
+                let d = if i % 400 == 3 { d * f64::NAN } else { d };
+                // Some start on a face, at a point of it.
+                let mut start = (o, OriginFaces::default());
+                if i % 2 == 0 {
+                    let nearest = set.faces.iter().zip(0..).filter_map(|(face, index)| {
+                        let crossing = face.first(o, d, f64::INFINITY, &[])?;
+                        Some((crossing.t, index, face.surface_point(o, d, &crossing).point))
+                    });
+                    if let Some((_, index, at)) = nearest.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                        start.0 = at;
+                        start.1.add(index, 0);
+                    }
+                }
+                block.push(start.0, d, start.1);
+            }
+            let mut hits = Hits::default();
+            set.nearest(&block, &mut hits);
+            let mut met = 0;
+            for i in 0..block.len() {
+                let (o, d, origin) = (block.origin(i), block.direction(i), block.origin_faces(i));
+                let first = |(face, index): (&Face, u32)| {
+                    let parts: &[u32] = if origin.face[0] == index { &[0] } else { &[] };
+                    face.first(o, d, f64::INFINITY, parts)
+                        .map(|crossing| (crossing.t, index))
+                };
+                let all = set.faces.iter().zip(0..).filter_map(first);
+                let expected = all.min_by(|a, b| a.0.total_cmp(&b.0));
+                let expected = expected.map_or((f64::INFINITY, NONE), |nearest| nearest);
+                assert_eq!((hits.t[i], hits.face[i]), expected, "ray {i} among {count}");
+                let single = set.first(o, d, &origin, f64::INFINITY);
+                assert_eq!(single.map_or(NONE, |(face, ..)| face), expected.1);
+                met += usize::from(expected.1 != NONE);
+            }
+            assert!(met > 1000, "{met}");
+        }
+    }
+
+    /// Wherever a line crosses a face, it meets the ball around it; and a ball is no larger than the half diagonal of the box.
+    #[test]
+    fn no_crossing_is_ruled_out_by_a_ball() {
+        for (range, away) in [(2.0, 0.0), (2.0, 1e6)] {
+            let stream = Stream::new(6, 2);
+            let mut crossed = 0;
+            for (face, number) in faces(33, range, away).iter().zip(0..) {
+                let ball = face.ball().expect("it has an end");
+                let half = face.bounds().sides() * 0.5;
+                assert!(ball.square() <= half.dot(half) * 2.01, "{face:?}");
+                for i in 0..2000 {
+                    let o = face.frame.origin + point(stream, i, number) * [1.5, 8.0, 1e4][i as usize % 3];
+                    let d = (face.frame.origin + point(stream, i, number + 50) * 1.5 - o).normalized();
+                    if face.first(o, d, f64::INFINITY, &[]).is_some() {
+                        assert!(ball.meets(o, d), "{face:?} {o:?} {d:?}");
+                        crossed += 1;
+                    }
+                }
+                assert!(!ball.meets(Vec3::new(f64::NAN, 0.0, 0.0), Vec3::new(0.0, 0.0, 1.0)));
+            }
+            assert!(crossed > 10_000, "{crossed}");
+        }
+    }
+
+    #[test]
+    fn large_faces_are_tried_on_all_rays() {
+        let mut all = faces(400, 9.0, 0.0);
+        let wall = quadric([1.0, 0.0, 0.0, -100.0], [-10.0, 10.0], [0.0, f64::INFINITY]);
+        let floor = Shape::Flat(Flat {
+            outline: Outline::Whole,
+        });
+        for shape in [wall, floor] {
+            let face = Face {
+                shape,
+                ..all[0].clone()
+            };
+            all.push(face);
+        }
+        let set = FaceSet::new(all);
+        let simple: Vec<u32> = set.simple.iter().map(|face| face.index).collect();
+        assert_eq!(simple, [400, 401]);
+        assert!(set.simple.iter().all(|face| face.ball.is_none()));
     }
 }

@@ -83,7 +83,14 @@ impl Simple for Quadric {
 }
 
 #[inline(always)]
-fn sweep(frame: &Frame, face: &BoundedFace, block: &RayBlock, hits: &mut Hits, rays: &Range<usize>, shape: &impl Simple) {
+fn sweep(
+    frame: &Frame,
+    face: &BoundedFace,
+    block: &RayBlock,
+    hits: &mut Hits,
+    rays: &Range<usize>,
+    shape: &impl Simple,
+) {
     match (face.ball, frame.is_straight()) {
         (None, true) => sweep_all::<false>(frame, face.index, block, hits, rays, shape),
         (None, false) => sweep_all::<true>(frame, face.index, block, hits, rays, shape),

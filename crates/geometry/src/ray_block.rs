@@ -98,12 +98,7 @@ impl RayBlock {
     }
 
     /// Rays more whose first faces are there already.
-    fn extend_lines(
-        &mut self,
-        origin: [&[f64]; 3],
-        direction: [&[f64]; 3],
-        parts: impl ExactSizeIterator<Item = u32>,
-    ) {
+    fn extend_lines(&mut self, origin: [&[f64]; 3], direction: [&[f64]; 3], parts: impl ExactSizeIterator<Item = u32>) {
         for (mine, more) in self
             .origin
             .iter_mut()

@@ -51,15 +51,15 @@ impl SolidStack {
     #[must_use]
     pub fn crossed(self, solid: u16) -> Option<Self> {
         // The numbers are sorted: where it is, or where it belongs.
-        let at = self.solids().iter().position(|s| *s <= solid)?;
-        let shift = 48 - 16 * at as u32;
+        let at = (0_u32..).zip(self.solids()).find(|(_, s)| *s <= solid)?.0;
+        let shift = 48 - 16 * at;
         let (mine, below) = (0xFFFF << shift, self.0 & ((1 << shift) - 1));
         let above = self.0 & !(mine | ((1 << shift) - 1));
         if self.0 & mine == u64::from(solid) << shift {
             return Some(Self(above | below << 16));
         }
         let rest = self.0 & (mine | ((1 << shift) - 1));
-        (self.0 & 0xFFFF == 0).then_some(Self(above | u64::from(solid) << shift | rest >> 16))
+        (self.solids()[3] == 0).then_some(Self(above | u64::from(solid) << shift | rest >> 16))
     }
 }
 

@@ -57,7 +57,8 @@ impl Default for Stack {
 }
 
 thread_local! {
-    /// Stacks that nobody uses at present: to clear one takes as long as many a walk.
+    /// Stacks that nobody uses at present: to clear one, or to move it, takes as long as many a walk.
+    #[allow(clippy::vec_box, reason = "they change hands")]
     static SPARE: RefCell<Vec<Box<Stack>>> = const { RefCell::new(Vec::new()) };
 }
 
