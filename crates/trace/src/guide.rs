@@ -44,18 +44,8 @@ pub struct Arrival {
     pub point: Vec3,
     /// Unit vector to where it came from.
     pub towards: Vec3,
-    /// Its source and the smooth surfaces on its way, see [`family`].
+    /// Its source and the smooth surfaces on its way (see `ray_state`).
     pub family: u32,
-}
-
-/// The family of light beyond one more smooth surface.
-#[inline]
-#[must_use]
-pub const fn family(before: u32, face: u32, transmitted: bool) -> u32 {
-    before
-        .wrapping_add(1)
-        .wrapping_mul(0x9E37_79B1)
-        .wrapping_add(2 * face + transmitted as u32)
 }
 
 /// The arrivals of all families near to a point.

@@ -1,7 +1,5 @@
 //! What a ray carries on its way.
 
-use crate::guide::family;
-
 /// What a ray carries.
 #[derive(Clone, Copy, Debug)]
 pub struct RayState {
@@ -30,7 +28,11 @@ impl RayState {
     pub const fn go_smoothly(&mut self, face: u32, transmitted: bool) {
         if !self.scattered {
             self.unseen = true;
-            self.family = family(self.family, face, transmitted);
+            self.family = self
+                .family
+                .wrapping_add(1)
+                .wrapping_mul(0x9E37_79B1)
+                .wrapping_add(2 * face + transmitted as u32);
         }
     }
 }

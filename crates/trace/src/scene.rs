@@ -174,6 +174,16 @@ impl Scene {
         any(Facts::is_diffuse) && (any(Facts::is_specular) || !self.sources.iter().all(Source::is_visible))
     }
 
+    /// Of each face whether it is a smooth interface of a solid, which light meets at the normal of the surface itself.
+    #[must_use]
+    pub fn interfaces(&self) -> Vec<bool> {
+        let smooth = |finish: u32| self.finishes[finish as usize].facts().fresnel;
+        let interface = |(role, face): (&Role, &Face)| {
+            role.solid != 0 && !face.shape.is_smooth() && matches!(role.act, Act::Optical(finish) if smooth(finish))
+        };
+        self.roles.iter().zip(self.face_set.faces()).map(interface).collect()
+    }
+
     /// The medium that fills the space of a solid, 0 being the surroundings.
     #[inline]
     #[must_use]

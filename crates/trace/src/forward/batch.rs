@@ -15,7 +15,7 @@ use super::lambertian_sheet::{LambertianSheet, SheetRay, SheetRays};
 use super::queue::RayQueue;
 use super::run::Run;
 use super::scattering_sheet::ScatteringSheet;
-use super::sorter::{Sheet, Sorter, interfaces, sheets};
+use super::sorter::{Sheet, Sorter, sheets};
 use crate::dealing::Dealing;
 use crate::detector::Detector;
 use crate::events::depth;
@@ -107,7 +107,7 @@ impl<'a> BatchTrace<'a> {
             now: RayQueue::default(),
             next: RayQueue::default(),
             hits: Hits::default(),
-            sorter: Sorter::new(scene, sheets(scene, wants), &interfaces(scene)),
+            sorter: Sorter::new(scene, sheets(scene, wants), &scene.interfaces()),
             addresses: Vec::new(),
             numbers: Default::default(),
             going: Vec::new(),

@@ -58,17 +58,6 @@ pub fn sheets(scene: &Scene, wants: Wants) -> Vec<Sheet<'_>> {
     faces.filter_map(sheet).collect()
 }
 
-/// Of each face of a scene whether it is a smooth interface of a solid.
-#[must_use]
-pub fn interfaces(scene: &Scene) -> Vec<bool> {
-    let roles = scene.roles.iter().zip(scene.face_set.faces());
-    let is_smooth = |finish: u32| scene.finishes[finish as usize].facts().fresnel;
-    let interface = |(role, face): (&Role, &Face)| {
-        role.solid != 0 && !face.shape.is_smooth() && matches!(role.act, Act::Optical(finish) if is_smooth(finish))
-    };
-    roles.map(interface).collect()
-}
-
 /// Sorts the rays of a queue by what comes next.
 #[derive(Default)]
 pub struct Sorter<'a> {

@@ -31,13 +31,8 @@ const SINGLE: usize = 0;
 
 impl Sorter {
     fn new(scene: &Scene) -> Self {
-        let roles = scene.roles.iter().zip(scene.face_set.faces());
-        let splits = roles.map(|(role, face)| {
-            let interface = |f: u32| scene.finishes[f as usize].facts().fresnel;
-            role.solid != 0 && !face.shape.is_smooth() && matches!(role.act, Act::Optical(f) if interface(f))
-        });
         Self {
-            splits: splits.collect(),
+            splits: scene.interfaces(),
             lists: Buckets::new(scene.roles.len() + 1),
             tied: Vec::new(),
         }
