@@ -14,7 +14,7 @@ use super::path_block::{Branch, PathBlock, Seen};
 use crate::buckets::Buckets;
 use crate::medium_cache::MediumCache;
 use crate::scatter::SPLIT;
-use crate::scene::{Act, Scene};
+use crate::scene::Scene;
 use crate::solid_stack::SolidStack;
 
 /// Sorts branches by the faces that they meet.
