@@ -1,10 +1,11 @@
 """Where the time of each job goes, by kind of work: shares of the samples that `perf` takes, on all cores.
 
-    python benchmarks/where_time_goes.py [--only balls,fit] [--seconds 6]
+    python benchmarks/where_time_goes.py [--only balls-10,fit] [--seconds 6]
 
-Needs `perf` (Linux) and a package that was built with its symbols, as it is. A job is set up, runs alone for a while to warm
-up, and is then watched; nothing is counted of what came before. Work that is inlined counts as what it is inlined into, so
-that "rays on their way" holds the decisions at surfaces, too.
+Needs `perf` (Linux) and a core that names its functions. That of the package does not; one that does is built by
+`cargo build --release -p etendue-bindings` and put in its place (`target/release/lib_core.so` as `_core.abi3.so`). A job is
+set up, runs once, and is then watched; nothing is counted of what came before. Work that is inlined counts as what it is
+inlined into, so that "rays on their way" holds the decisions at surfaces, too.
 """
 
 from __future__ import annotations
@@ -164,6 +165,8 @@ def shares(name: str, seconds: float, folder: Path, perf: str) -> Counter[str]:
         capture_output=True,
         text=True,
     ).stdout
+    if re.search(r"_core\.abi3\.so *\|[^|]*0x0{4}", report):
+        sys.exit("The core has no names of functions: see --help.")
     found: Counter[str] = Counter()
     for line in report.splitlines():
         if line.startswith("#") or line.count("|") < 2:
