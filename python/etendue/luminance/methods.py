@@ -426,7 +426,7 @@ def choose_method(method: AnyMethod | str, stated: Mapping[str, Any], source: So
     >>> choose_method("auto", {"acceptance": 3}, RAYS)
     Cone(acceptance=3, observer_radius=None)
     >>> choose_method("auto", {}, INDEX), choose_method("auto", {}, EVENTS)
-    (Cone(acceptance=1.5, observer_radius=None), None)
+    (Cone(acceptance=None, observer_radius=None), None)
     """
     complaint = mismatch(method, stated, source)
     if complaint is not None:
