@@ -118,14 +118,14 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// Share by which its radius is larger than that of the ball around a box.
+    /// Share by which its radius is larger than the one that is stated.
     const SLACK: f64 = 1e-6;
 
     /// What roundings may make of the square of a distance, as a share of that to the start of the ray: a hundred times
     /// what a sum of six products and the unit direction are off by.
     const ROUNDING: f64 = 1e-12;
 
-    /// The ball of a centre and a radius; None if they are not finite.
+    /// The ball of a centre and a radius \[mm\]; None if they are not finite.
     #[must_use]
     pub fn new(centre: Vec3, radius: f64) -> Option<Self> {
         let radius = radius * (1.0 + Self::SLACK);
@@ -141,7 +141,7 @@ impl Ball {
         self.square
     }
 
-    /// Whether the ray from o into the unit direction d has points in it; now and then true of one that passes close by,
+    /// Whether the ray from o \[mm\] into the unit direction d has points in it; now and then true of one that passes close by,
     /// false of one that is not finite.
     #[inline(always)]
     #[must_use]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
-use crate::bounds::Bounds;
+use crate::bounds::{Ball, Bounds};
 use crate::bvh::{Bvh, Probe, Stack, Walk};
 use crate::face::Face;
 use crate::hits::{Hits, MeshRays, TIE};
@@ -71,7 +71,8 @@ impl FaceSet {
             bounds,
             ..Self::default()
         };
-        let large = large_faces(&faces, &set.bounds);
+        let balls: Vec<Option<Ball>> = faces.iter().map(Face::ball).collect();
+        let large = large_faces(&balls, &set.bounds);
         let mut inner = Vec::new();
         for (index, face) in (0..).zip(&faces) {
             let trimmed = !face.trims.is_empty();
@@ -81,7 +82,7 @@ impl FaceSet {
             } else if matches!(face.shape, Shape::Mesh(_)) && !trimmed {
                 set.meshes.push(index);
             } else if is_simple(&face.shape) && !trimmed {
-                let ball = if large { None } else { face.ball() };
+                let ball = if large { None } else { balls[index as usize] };
                 set.simple.push(BoundedFace { index, ball });
             } else {
                 set.others.push(index);
@@ -92,7 +93,7 @@ impl FaceSet {
             set.tree = Bvh::new(&boxes, LEAF).map(|tree| {
                 let bounded = |place: &u32| {
                     let index = inner[*place as usize];
-                    let ball = faces[index as usize].ball();
+                    let ball = balls[index as usize];
                     BoundedFace { index, ball }
                 };
                 let inner = tree.leaves().flatten().map(bounded).collect();
@@ -281,12 +282,12 @@ fn try_one_by_one(set: &FaceSet, rays: &RayBlock, hits: &mut Hits, stack: &mut S
 }
 
 /// Of each face whether no tree would rule it out: the largest ones, and those without end.
-fn large_faces(faces: &[Face], bounds: &[Bounds]) -> Vec<bool> {
+fn large_faces(balls: &[Option<Ball>], bounds: &[Bounds]) -> Vec<bool> {
     let finite = bounds.iter().copied().filter(|b| b.is_finite());
     let half = finite.fold(Bounds::EMPTY, Bounds::union).sides() * 0.5;
     let least = LARGE * half.dot(half);
-    let area = |face: &Face| face.ball().map_or(f64::INFINITY, |ball| ball.square());
-    let areas: Vec<f64> = faces.iter().map(area).collect();
+    let area = |ball: &Option<Ball>| ball.map_or(f64::INFINITY, |ball| ball.square());
+    let areas: Vec<f64> = balls.iter().map(area).collect();
     let mut ranked: Vec<f64> = areas.iter().copied().filter(|a| a.is_finite() && *a >= least).collect();
     ranked.sort_by(f64::total_cmp);
     let least = ranked

@@ -91,42 +91,30 @@ fn sweep(
     rays: &Range<usize>,
     shape: &impl Simple,
 ) {
-    match (face.ball, frame.is_straight()) {
-        (None, true) => sweep_all::<false>(frame, face.index, block, hits, rays, shape),
-        (None, false) => sweep_all::<true>(frame, face.index, block, hits, rays, shape),
-        (Some(ball), true) => sift::<false>(&ball, frame, face.index, block, hits, rays, shape),
-        (Some(ball), false) => sift::<true>(&ball, frame, face.index, block, hits, rays, shape),
+    if frame.is_straight() {
+        sweep_turned::<false>(frame, face, block, hits, rays, shape);
+    } else {
+        sweep_turned::<true>(frame, face, block, hits, rays, shape);
     }
 }
 
-/// Tries rays on a face.
+/// Tries rays on a face: all of them, or those that meet the ball around it.
 #[inline(always)]
-fn sweep_all<const TURNED: bool>(
+fn sweep_turned<const TURNED: bool>(
     frame: &Frame,
-    index: u32,
+    face: &BoundedFace,
     block: &RayBlock,
     hits: &mut Hits,
     rays: &Range<usize>,
     shape: &impl Simple,
 ) {
     let (lines, mut found) = (Lines::of(block, rays), Nearest::of(hits, rays));
-    for i in 0..rays.len() {
-        meet::<TURNED>(frame, index, &lines, &mut found, i, shape);
-    }
-}
-
-/// Tries the rays on a face that meet the ball around it.
-#[inline(always)]
-fn sift<const TURNED: bool>(
-    ball: &Ball,
-    frame: &Frame,
-    index: u32,
-    block: &RayBlock,
-    hits: &mut Hits,
-    rays: &Range<usize>,
-    shape: &impl Simple,
-) {
-    let (lines, mut found) = (Lines::of(block, rays), Nearest::of(hits, rays));
+    let Some(ball) = face.ball else {
+        for i in 0..rays.len() {
+            meet::<TURNED>(frame, face.index, &lines, &mut found, i, shape);
+        }
+        return;
+    };
     let n = rays.len();
     let mut met = [[0_u8; 8]; CHUNK / 8];
     {
@@ -143,7 +131,7 @@ fn sift<const TURNED: bool>(
         while word != 0 {
             let i = first + (word.trailing_zeros() >> 3) as usize;
             word &= word.wrapping_sub(1);
-            meet::<TURNED>(frame, index, &lines, &mut found, i, shape);
+            meet::<TURNED>(frame, face.index, &lines, &mut found, i, shape);
         }
     }
 }

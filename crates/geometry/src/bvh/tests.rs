@@ -9,7 +9,10 @@ use crate::bounds::Bounds;
 fn visited(tree: &Bvh, o: Vec3, d: Vec3, t_lo: f64, t_max: f64) -> Vec<u32> {
     let mut seen = Vec::new();
     let mut end = t_max;
-    tree.traverse(o, d, t_lo, &mut end, |primitive, _| seen.push(primitive));
+    let leaves: Vec<&[u32]> = tree.leaves().collect();
+    tree.walk(&Probe::new(o, d, t_lo), &mut end, &mut Stack::lend(), |leaf, _| {
+        seen.extend_from_slice(leaves[leaf]);
+    });
     seen
 }
 

@@ -3,8 +3,6 @@
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut, Range};
 
-use etendue_math::Vec3;
-
 use super::probe::{Lanes, Probe, WIDTH};
 use crate::bounds::Bounds;
 
@@ -135,20 +133,6 @@ impl Bvh {
         false
     }
 
-    /// Visits all primitives whose bounds the ray o + t d meets for a t in \[`t_lo`, `t_max`\], and few others: boxes in
-    /// the order in which the ray enters them, those behind `t_max` left out. `visit` may lower `t_max` as it finds hits.
-    ///
-    /// A ray that is not finite meets nothing. Compile the caller with `multiversion`.
-    #[inline(always)]
-    pub fn traverse(&self, o: Vec3, d: Vec3, t_lo: f64, t_max: &mut f64, mut visit: impl FnMut(u32, &mut f64)) {
-        let probe = Probe::new(o, d, t_lo);
-        self.walk(&probe, t_max, &mut Stack::lend(), |leaf, t_max| {
-            for &primitive in self.leaf(leaf) {
-                visit(primitive, t_max);
-            }
-        });
-    }
-
     /// The primitives of a leaf.
     #[inline(always)]
     fn leaf(&self, leaf: usize) -> &[u32] {
@@ -162,7 +146,11 @@ impl Bvh {
         self.leaves[leaf] as usize..self.leaves[leaf + 1] as usize
     }
 
-    /// As [`Bvh::traverse`], leaf by leaf: leaves are numbered as [`Bvh::leaves`] yields them.
+    /// Visits all leaves with primitives whose bounds the ray meets before `t_max`, and few others: boxes in the order in
+    /// which the ray enters them, those behind `t_max` left out. `visit` may lower `t_max` as it finds hits. Leaves are numbered
+    /// as [`Bvh::leaves`] yields them.
+    ///
+    /// A ray that is not finite meets nothing. Compile the caller with `multiversion`.
     #[inline(always)]
     pub fn walk(&self, probe: &Probe, t_max: &mut f64, stack: &mut Stack, mut visit: impl FnMut(usize, &mut f64)) {
         let mut walk = Walk::new(self, probe, stack);
