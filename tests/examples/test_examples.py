@@ -10,7 +10,7 @@ import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RUNS = {
-    "appendix_b.py": (["--rays", "50000"], 4),
+    "appendix_b.py": (["--rays", "50000"], 7),
     "chapter_2.py": (["--rays", "200000", "--seeds", "4"], 4),
     "chapter_2_details.py": ([], 2),
     "chapter_3_drawings.py": ([], 4),
