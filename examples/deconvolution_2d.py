@@ -88,13 +88,14 @@ def compare_methods(seeds: int, names: tuple[str, ...], coarser: float) -> None:
                 found[method].append([loss(one.values, truth), inside, float(one.values.min()), seconds])
         for method, values in found.items():
             error, inside, _, seconds = np.mean(values, axis=0)
+            spread = np.std([value[1] for value in values], ddof=1) / len(values) ** 0.5 if len(values) > 1 else np.nan
             lowest = np.min([value[2] for value in values])
             cells = [
                 name,
                 f"{np.mean(raw):.1f} %",
                 method,
                 f"{error:.2f} %",
-                f"{inside:.0f} %",
+                f"{inside:.0f} %" if np.isnan(spread) else f"{inside:.0f} ± {spread:.0f} %",
                 f"{lowest:.2g}",
                 f"{seconds:.1f} s",
             ]
@@ -207,13 +208,13 @@ PARTS = ("methods", "mirrors", "gloss", "figures")
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--full", action="store_true", help="all lobes, twelve seeds, gloss and mirrors")
+    parser.add_argument("--full", action="store_true", help="all lobes, forty seeds, gloss and mirrors")
     parser.add_argument("--only", choices=("methods", "mirrors", "gloss", "figures"), help="one part of it")
     parser.add_argument("--seeds", type=int, help="scans of each lobe")
     parser.add_argument("--output", type=Path, default=Path("deconvolution-2d"), help="folder for the figures")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    seeds = options.seeds or (12 if options.full else 1)
+    seeds = options.seeds or (40 if options.full else 1)
     names = tuple(LOBES) if options.full else ("Gaussian",)
     coarser = 1.0 if options.full else 2.0
     parts = (options.only,) if options.only else PARTS if options.full else ("methods", "figures")

@@ -37,6 +37,9 @@ fn media([wavelength, front, back]: [f64; 3]) -> Media {
     }
 }
 
+/// How many rays are drawn for together.
+const TOGETHER: usize = 1024;
+
 /// Directions of light that is mirrored or refracted.
 fn specular(incident: Vec3, media: &Media, cosine: Option<f64>) -> Vec3 {
     match cosine {
@@ -57,18 +60,28 @@ impl Bsdf {
 
     fn drawn(&self, n: usize, seed: u64, media: &Media, incident: impl Fn(usize) -> Vec3) -> Vec<f64> {
         let stream = Stream::new(seed, 0);
-        let one = |k: usize| {
-            let [a, b, ..] = stream.uniforms(k as u64, 0);
-            let i = incident(k);
-            let d = match self.core.sample(i, media, [a, b]) {
-                Drawn::Absorbed => Vec3::new(f64::NAN, f64::NAN, f64::NAN),
-                Drawn::Mirrored => specular(i, media, None),
-                Drawn::Refracted(cosine) => specular(i, media, Some(cosine)),
-                Drawn::Scattered(d) => d,
-            };
-            [d.x, d.y, d.z]
-        };
-        (0..n).flat_map(one).collect()
+        let mut found = Vec::with_capacity(3 * n);
+        let mut drawn = Vec::new();
+        for first in (0..n).step_by(TOGETHER) {
+            let rays = first..n.min(first + TOGETHER);
+            let pairs: Vec<_> = rays.clone().map(|k| stream.uniforms(k as u64, 0)).collect();
+            let numbers = [0, 1].map(|i| pairs.iter().map(|pair| pair[i]).collect::<Vec<f64>>());
+            let incident: Vec<Vec3> = rays.map(&incident).collect();
+            let media = vec![*media; incident.len()];
+            drawn.clear();
+            self.core
+                .sample_many(&incident, &media, [&numbers[0], &numbers[1]], &mut drawn);
+            found.extend(incident.iter().zip(&media).zip(&drawn).flat_map(|((i, media), drawn)| {
+                let d = match *drawn {
+                    Drawn::Absorbed => Vec3::new(f64::NAN, f64::NAN, f64::NAN),
+                    Drawn::Mirrored => specular(*i, media, None),
+                    Drawn::Refracted(cosine) => specular(*i, media, Some(cosine)),
+                    Drawn::Scattered(d) => d,
+                };
+                [d.x, d.y, d.z]
+            }));
+        }
+        found
     }
 
     fn of_pairs<'py>(

@@ -1,5 +1,7 @@
 //! Exact sampling of a table: one uniform number, two look-ups.
 
+use crate::warp::part_of;
+
 /// Alias table (Walker 1977; construction of Vose 1991, `[Vose1991]`) over weights that need not add up to one.
 #[derive(Clone, Debug)]
 pub struct Alias {
@@ -40,19 +42,27 @@ impl Alias {
     /// The entry for a uniform number in (0, 1).
     #[inline]
     #[must_use]
+    pub fn pick(&self, u: f64) -> usize {
+        self.pick_and_rest(u).0
+    }
+
+    /// The entry for a uniform number in (0, 1), and what is left of the number: uniform again, less than 1.
+    #[inline]
+    #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "below the number of slots"
     )]
-    pub fn pick(&self, u: f64) -> usize {
+    pub fn pick_and_rest(&self, u: f64) -> (usize, f64) {
         let scaled = u * self.slots.len() as f64;
         let slot = (scaled as usize).min(self.slots.len() - 1);
         let (chance, alias) = self.slots[slot];
-        if scaled - (slot as f64) < chance {
-            slot
+        let within = scaled - slot as f64;
+        if within < chance {
+            (slot, part_of(within, chance))
         } else {
-            alias as usize
+            (alias as usize, part_of(within - chance, 1.0 - chance))
         }
     }
 }

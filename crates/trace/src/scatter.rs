@@ -2,7 +2,6 @@
 
 use etendue_math::Vec3;
 use etendue_optics::bsdf::{Bsdf, Component, Drawn, Media, Parts, Shares};
-use etendue_optics::fresnel::reflect;
 use etendue_optics::source::surface::across;
 
 use crate::interaction::Interaction;
@@ -67,26 +66,6 @@ impl<'a> Surface<'a> {
         })
     }
 
-    /// The direction of light that arrived along `d` after it met a surface without interpolated normals that lets nothing
-    /// through, from two numbers; None: absorbed.
-    #[inline]
-    #[must_use]
-    pub fn bounced(&self, d: Vec3, numbers: [f64; 2]) -> Option<Vec3> {
-        let outward = local(&self.axes, -d);
-        match self.bsdf.sample(outward, &self.media, numbers) {
-            Drawn::Scattered(v) => {
-                let [x, y, z] = self.axes;
-                let d = x * v.x + y * v.y + z * v.z;
-                self.keeps_side(d).then_some(d)
-            }
-            Drawn::Mirrored => {
-                let facing = if outward.z > 0.0 { self.side } else { -self.side };
-                Some(reflect(d, facing, outward.z.abs()))
-            }
-            Drawn::Absorbed | Drawn::Refracted(_) => None,
-        }
-    }
-
     /// What f is multiplied by where normals are interpolated: the light that leaves in a direction is f cosθ about the
     /// interpolated normal, forwards, and the same light is seen backwards, where the cosine is that of the surface itself
     /// `[Veach1997]`, section 5.3. 0 where either direction is on the other side of the surface itself.
@@ -102,14 +81,17 @@ impl<'a> Surface<'a> {
     }
 }
 
+/// Axes of which the third is the normal.
 #[inline(always)]
-fn axes(normal: Vec3) -> [Vec3; 3] {
+#[must_use]
+pub fn axes(normal: Vec3) -> [Vec3; 3] {
     let [x, y] = across(normal);
     [x, y, normal]
 }
 
 /// Axes of which the first is a direction laid on the surface; any, where it stands upright on it.
-fn axes_along(normal: Vec3, axis: Vec3) -> [Vec3; 3] {
+#[must_use]
+pub fn axes_along(normal: Vec3, axis: Vec3) -> [Vec3; 3] {
     let laid = axis - normal * axis.dot(normal);
     let length = laid.length();
     if length <= 1e-9 * axis.length() {
@@ -121,9 +103,18 @@ fn axes_along(normal: Vec3, axis: Vec3) -> [Vec3; 3] {
 
 /// Components of a unit vector along axes.
 #[inline(always)]
-fn local(axes: &[Vec3; 3], v: Vec3) -> Vec3 {
+#[must_use]
+pub fn local(axes: &[Vec3; 3], v: Vec3) -> Vec3 {
     let [x, y, z] = axes.map(|axis| axis.dot(v));
     Vec3::new(x, y, z.clamp(-1.0, 1.0))
+}
+
+/// The vector that has these components along axes.
+#[inline(always)]
+#[must_use]
+pub fn along(axes: &[Vec3; 3], v: Vec3) -> Vec3 {
+    let [x, y, z] = *axes;
+    x * v.x + y * v.y + z * v.z
 }
 
 /// Light, or a line of sight, at a surface.
@@ -295,13 +286,12 @@ impl<'a> SurfaceEvent<'a> {
     #[inline]
     #[must_use]
     pub fn scattered(&self, direction: Vec3) -> (Vec3, SolidStack) {
-        let [x, y, z] = self.surface.axes;
         let stack = if (direction.z > 0.0) == self.interaction.front {
             self.interaction.before
         } else {
             self.interaction.after
         };
-        (x * direction.x + y * direction.y + z * direction.z, stack)
+        (along(&self.surface.axes, direction), stack)
     }
 
     /// How much diffuse light that goes where the line of sight came from may have come from its side and from the other one

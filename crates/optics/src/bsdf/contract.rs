@@ -237,6 +237,13 @@ pub trait Bsdf: Debug + Send + Sync {
         }
     }
 
+    /// What becomes of many rays, each as [`sample`](Bsdf::sample) says: added to `drawn` in their order.
+    fn sample_many(&self, incident: &[Vec3], media: &[Media], numbers: [&[f64]; 2], drawn: &mut Vec<Drawn>) {
+        let numbers = numbers[0].iter().zip(numbers[1]);
+        let rays = incident.iter().zip(media).zip(numbers);
+        drawn.extend(rays.map(|((incident, media), (a, b))| self.sample(*incident, media, [*a, *b])));
+    }
+
     /// Shares of the radiance along the mirrored and the refracted line that is seen by who looks along −`towards`; and the
     /// shares of light from `towards`.
     ///

@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 
 use etendue_math::special::{exp, ln};
 use etendue_math::trig::sin_cos_turns;
-use etendue_sampling::guide::Guide;
+use etendue_sampling::alias::Alias;
+use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
 /// f on a polar grid in the plane of direction cosines.
@@ -24,34 +25,51 @@ pub struct Slice {
     pub floor: f64,
 }
 
-/// A slice with its integrals.
+/// A slice that can be asked and drawn from.
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     pub sine: f64,
     /// From 0 to the end of the plane.
     radial: Vec<f64>,
     azimuths: usize,
-    /// Azimuth by azimuth, at each radial coordinate.
-    nodes: Vec<Node>,
-    /// ∫ f r dr along each azimuth, all over the plane.
-    wholes: Vec<f64>,
-    /// Running sum over the sectors between azimuths, of the whole plane.
-    sectors: Vec<f64>,
-    /// Of `sectors`, and of the sums along each azimuth.
-    sector_guide: Guide,
-    guides: Vec<Guide>,
+    /// f, azimuth by azimuth, at each radial coordinate.
+    f: Vec<f64>,
+    /// Of `f`, by what each value contributes to the integral over the plane; None if that is 0.
+    nodes: Option<Alias>,
+    /// For each radial coordinate.
+    hats: Vec<Hat>,
     /// Of the radial coordinates, by the leading bits of a number: coordinates rise by ratios.
     first_below: Vec<u16>,
     /// Leading bits of the second radial coordinate.
     lowest: u64,
 }
 
-/// What a slice holds at a point of its grid.
+/// A slice with its integrals along each azimuth.
+pub(super) struct Integrals<'a> {
+    grid: &'a Grid,
+    /// ∫ f r dr from 0, azimuth by azimuth, at each radial coordinate.
+    sums: Vec<f64>,
+}
+
+/// The function of r that is 1 at a radial coordinate, 0 at those next to it, and linear in between, times r: the density of
+/// what belongs to that coordinate.
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    f: f64,
-    /// ∫ f r dr along its azimuth from 0.
-    sum: f64,
+struct Hat {
+    node: f64,
+    /// Its integral.
+    whole: f64,
+    /// The part of it that lies nearer to 0.
+    inner: f64,
+    /// Towards 0, and away from it.
+    slopes: [Slope; 2],
+}
+
+/// One side of a hat. With s from 0 at the far end to 1 at its top the density is s (far + s (node − far)).
+#[derive(Clone, Copy, Debug)]
+struct Slope {
+    far: f64,
+    /// The part of it that goes with s; the rest goes with s² towards 0, and with s (1 − s) away from it.
+    linear: f64,
 }
 
 /// Farthest |β − β₀|.
@@ -130,7 +148,7 @@ impl Slice {
         self.f.chunks(n).flat_map(along).collect()
     }
 
-    /// With its integrals.
+    /// Ready to be asked.
     ///
     /// # Errors
     /// What is wrong with the slice.
@@ -162,47 +180,77 @@ impl Slice {
         if radial[radial.len() - 1] < END {
             all.push(END);
         }
-        let mut nodes = Vec::with_capacity(azimuths * all.len());
-        for row in f.chunks(radial.len()) {
-            let mut sum = 0.0;
-            for (i, r) in all.iter().enumerate() {
-                // Constant beyond the last of its coordinates.
-                let f = row[i.min(row.len() - 1)];
-                if i > 0 {
-                    sum += moment(all[i - 1], *r, row[i - 1], f, *r);
-                }
-                nodes.push(Node { f, sum });
-            }
-        }
-        let rows = || nodes.chunks(all.len());
-        let sums = |row: &[Node]| row.iter().map(|node| node.sum).collect::<Vec<f64>>();
-        let mut grid = Grid {
+        // Constant beyond the last of its coordinates.
+        let on_all = |row: &[f64]| (0..all.len()).map(|i| row[i.min(row.len() - 1)]).collect::<Vec<f64>>();
+        let f: Vec<f64> = f.chunks(radial.len()).flat_map(on_all).collect();
+        let hats: Vec<Hat> = (0..all.len()).map(|i| Hat::of(&all, i)).collect();
+        let weights: Vec<f64> = f
+            .iter()
+            .zip(hats.iter().cycle())
+            .map(|(f, hat)| f * hat.whole)
+            .collect();
+        let lowest = all.get(1).map_or(0, |r| leading(*r));
+        let first_above = |bits: u64| all.partition_point(|r| *r < f64::from_bits(bits << SHIFT));
+        Ok(Grid {
             sine: self.sine,
             azimuths: *azimuths,
-            guides: rows().map(|row| Guide::new(&sums(row))).collect(),
-            wholes: rows().map(|row| row[row.len() - 1].sum).collect(),
-            nodes,
-            sectors: Vec::new(),
-            sector_guide: Guide::default(),
-            first_below: Vec::new(),
-            lowest: all.get(1).map_or(0, |r| leading(*r)),
+            f,
+            nodes: Alias::new(&weights),
+            hats,
+            first_below: (lowest..=leading(END))
+                .map(|bits| first_above(bits).max(1) as u16 - 1)
+                .collect(),
+            lowest,
             radial: all,
+        })
+    }
+}
+
+impl Hat {
+    fn of(radial: &[f64], i: usize) -> Self {
+        let node = radial[i];
+        let side = |other: Option<&f64>| {
+            // Nothing beyond the first and the last coordinate.
+            let far = other.copied().unwrap_or(node);
+            let step = (node - far).abs();
+            let straight = 0.5 * far.min(node);
+            let bent = if far < node { step / 3.0 } else { step / 6.0 };
+            let linear = if bent > 0.0 { straight / (straight + bent) } else { 1.0 };
+            (step * (straight + bent), Slope { far, linear })
         };
-        let mut sum = 0.0;
-        for j in 0..*azimuths {
-            sum += 0.5 * (grid.wholes[j] + grid.wholes[grid.after(j)]) * TAU / *azimuths as f64;
-            grid.sectors.push(sum);
+        let (inner, towards) = side(i.checked_sub(1).map(|below| &radial[below]));
+        let (outer, away) = side(radial.get(i + 1));
+        let whole = inner + outer;
+        Self {
+            node,
+            whole,
+            inner: if whole > 0.0 { inner / whole } else { 0.0 },
+            slopes: [towards, away],
         }
-        grid.sector_guide = Guide::new(&grid.sectors);
-        grid.first_below = (grid.lowest..=leading(END))
-            .map(|bits| {
-                grid.radial
-                    .partition_point(|r| *r < f64::from_bits(bits << SHIFT))
-                    .max(1) as u16
-                    - 1
-            })
-            .collect();
-        Ok(grid)
+    }
+
+    /// A radial coordinate with its density, from two numbers of which the second is not used up.
+    #[inline]
+    fn draw(&self, number: f64, other: f64) -> f64 {
+        let (slope, rest, inwards) = if number < self.inner {
+            (&self.slopes[0], part_of(number, self.inner), true)
+        } else {
+            (&self.slopes[1], part_of(number - self.inner, 1.0 - self.inner), false)
+        };
+        let s = if rest < slope.linear {
+            part_of(rest, slope.linear).sqrt()
+        } else {
+            // The largest of three numbers has the density 3 s², the middle one 6 s (1 − s).
+            let first = part_of(rest - slope.linear, 1.0 - slope.linear);
+            let [second, third] = MoreNumbers::new([rest, other]).pair();
+            let [low, high] = [first.min(second), first.max(second)];
+            if inwards {
+                high.max(third)
+            } else {
+                third.clamp(low, high)
+            }
+        };
+        slope.far + s * (self.node - slope.far)
     }
 }
 
@@ -222,18 +270,11 @@ impl Grid {
         if j + 1 == self.azimuths { 0 } else { j + 1 }
     }
 
-    /// What is held along an azimuth.
+    /// f along an azimuth.
     #[inline]
-    fn row(&self, j: usize) -> &[Node] {
+    fn row(&self, j: usize) -> &[f64] {
         let n = self.radial.len();
-        &self.nodes[j * n..(j + 1) * n]
-    }
-
-    /// ∫ f r dr along an azimuth up to `r`, which is beyond radial coordinate `i`.
-    #[inline]
-    fn up_to(&self, j: usize, i: usize, r: f64) -> f64 {
-        let row = self.row(j);
-        row[i].sum + moment(self.radial[i], self.radial[i + 1], row[i].f, row[i + 1].f, r)
+        &self.f[j * n..(j + 1) * n]
     }
 
     /// The last radial coordinate not above `r`, but for the very last.
@@ -259,7 +300,7 @@ impl Grid {
         let (j, k, v) = self.around(turn);
         let along = |j: usize| {
             let row = self.row(j);
-            row[i].f + u * (row[i + 1].f - row[i].f)
+            row[i] + u * (row[i + 1] - row[i])
         };
         let (near, far) = (along(j), along(k));
         near + v * (far - near)
@@ -277,101 +318,87 @@ impl Grid {
         (j, self.after(j), place - j as f64)
     }
 
+    /// A point of the plane with density f over its integral: distance and azimuth \[turns\].
+    pub(super) fn draw(&self, [number, turn]: [f64; 2]) -> (f64, f64) {
+        self.about(self.node(number), turn)
+    }
+
+    /// The first part of it: a node, and what is left of the number. f is a sum of hats in both directions, one for each node
+    /// of the grid, and a node is picked by what it contributes.
+    #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "a slice has fewer than 2^32 values")]
+    pub(super) fn node(&self, number: f64) -> (u32, f64) {
+        self.nodes.as_ref().map_or((0, number), |nodes| {
+            let (node, rest) = nodes.pick_and_rest(number);
+            (node as u32, rest)
+        })
+    }
+
+    /// The second part: a point from the hats of a node.
+    #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "fewer than 2^16 radial coordinates")]
+    pub(super) fn about(&self, (node, rest): (u32, f64), number: f64) -> (f64, f64) {
+        let n = self.radial.len() as u32;
+        let (azimuth, i) = (node / n, node % n);
+        let aside = if number < 0.5 {
+            (2.0 * number).sqrt() - 1.0
+        } else {
+            1.0 - (2.0 - 2.0 * number).sqrt()
+        };
+        let turn = (f64::from(azimuth) + aside) / self.azimuths as f64;
+        let r = self.hats[i as usize].draw(rest, number);
+        (r, if turn < 0.0 { turn + 1.0 } else { turn })
+    }
+
+    /// With its integrals.
+    pub(super) fn integrals(&self) -> Integrals<'_> {
+        let n = self.radial.len();
+        let along = |row: &[f64]| {
+            let mut sum = 0.0;
+            let mut step = |i: usize| {
+                if let Some(before) = i.checked_sub(1) {
+                    let [from, to] = [self.radial[before], self.radial[i]];
+                    sum += moment(from, to, row[before], row[i], to);
+                }
+                sum
+            };
+            (0..n).map(&mut step).collect::<Vec<f64>>()
+        };
+        Integrals {
+            grid: self,
+            sums: self.f.chunks(n).flat_map(along).collect(),
+        }
+    }
+}
+
+impl Integrals<'_> {
+    /// ∫ f r dr along an azimuth up to `r`, which is beyond radial coordinate `i`.
+    #[inline]
+    fn up_to(&self, j: usize, i: usize, r: f64) -> f64 {
+        let (row, radial) = (self.grid.row(j), &self.grid.radial);
+        self.sums[j * radial.len() + i] + moment(radial[i], radial[i + 1], row[i], row[i + 1], r)
+    }
+
     /// The integral over the unit circle about −β₀.
     pub(super) fn integral(&self, sine: f64) -> f64 {
         // Gauss and Legendre, in parts of at most 5°; finer towards grazing incidence, where the circle is all on one side.
         const NODES: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
-        let parts = 72_usize.div_ceil(self.azimuths) * if sine > 0.9 { 4 } else { 1 };
+        let parts = 72_usize.div_ceil(self.grid.azimuths) * if sine > 0.9 { 4 } else { 1 };
         let mut sum = 0.0;
-        for j in 0..self.azimuths {
-            let k = self.after(j);
+        for j in 0..self.grid.azimuths {
+            let k = self.grid.after(j);
             for part in 0..parts {
                 for (node, weight) in NODES {
                     let v = (part as f64 + node) / parts as f64;
-                    let (s, c) = sin_cos_turns((j as f64 + v) / self.azimuths as f64);
+                    let (s, c) = sin_cos_turns((j as f64 + v) / self.grid.azimuths as f64);
                     let r = rim(sine, s, c).min(END);
-                    let i = self.below(r);
+                    let i = self.grid.below(r);
                     let (near, far) = (self.up_to(j, i, r), self.up_to(k, i, r));
                     sum += weight / parts as f64 * (near + v * (far - near));
                 }
             }
         }
-        sum * TAU / self.azimuths as f64
-    }
-
-    /// A point of the plane with density f over its integral: distance and azimuth \[turns\].
-    pub(super) fn draw(&self, numbers: [f64; 2]) -> (f64, f64) {
-        let all = self.sectors[self.azimuths - 1];
-        let wanted = numbers[1] * all;
-        let j = self
-            .sector_guide
-            .not_above(&self.sectors, wanted, |sum| *sum)
-            .min(self.azimuths - 1);
-        let before = if j == 0 { 0.0 } else { self.sectors[j - 1] };
-        let k = self.after(j);
-        let (near, far) = (self.wholes[j], self.wholes[k]);
-        // Within the sector the density is linear from one azimuth to the next.
-        let v = of_linear(part_of(wanted - before, self.sectors[j] - before), near, far);
-        // There it is a mixture of those along both azimuths.
-        let far_part = v * far;
-        let share = far_part / ((1.0 - v) * near + far_part);
-        let (row, number) = if numbers[0] < share {
-            (k, part_of(numbers[0], share))
-        } else {
-            (j, part_of(numbers[0] - share, 1.0 - share))
-        };
-        (self.draw_along(row, number), (j as f64 + v) / self.azimuths as f64)
-    }
-
-    /// A distance along an azimuth, with density f r.
-    fn draw_along(&self, j: usize, number: f64) -> f64 {
-        let row = self.row(j);
-        let wanted = number * self.wholes[j];
-        let steps = row.len() - 1;
-        let i = (self.guides[j].not_above(row, wanted, |node| node.sum).max(1) - 1).min(steps - 1);
-        let (mut low, mut high) = (self.radial[i], self.radial[i + 1]);
-        let (Node { f: f0, sum: before }, Node { f: f1, sum: after }) = (row[i], row[i + 1]);
-        let (start, width) = (low, high - low);
-        let slope = (f1 - f0) / width;
-        let left = wanted - before;
-        // ∫ f r dr from the start of the step on, as `moment` has it.
-        let linear = f0 + slope * start;
-        let moment = |h: f64| h * (f0 * start + h * (0.5 * linear + h * slope / 3.0));
-        // Newton's method, kept between ends that close in, from where f r would be if it were linear in r.
-        let mut r = low + width * of_linear(part_of(left, after - before), f0 * start, f1 * high);
-        for _ in 0..60 {
-            let h = r - start;
-            let off = moment(h) - left;
-            if off > 0.0 {
-                high = r;
-            } else {
-                low = r;
-            }
-            let density = (f0 + slope * h) * r;
-            let next = r - off / density;
-            let next = if next > low && next < high {
-                next
-            } else {
-                0.5 * (low + high)
-            };
-            if (next - r).abs() <= 1e-12 * next {
-                return next;
-            }
-            r = next;
-        }
-        r
-    }
-}
-
-/// The number from 0 to 1 below which lies a part of a density that is linear from `a` to `b`.
-#[inline]
-fn of_linear(part: f64, a: f64, b: f64) -> f64 {
-    let root = (a * a + part * (b * b - a * a)).max(0.0).sqrt();
-    let below = a + root;
-    if below > 0.0 {
-        (part * (a + b) / below).min(1.0)
-    } else {
-        part
+        sum * TAU / self.grid.azimuths as f64
     }
 }
 
@@ -385,5 +412,61 @@ fn rim(sine: f64, s: f64, c: f64) -> f64 {
         ((1.0 - sine) * (1.0 + sine)) / (half + along)
     } else {
         half - along
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use etendue_sampling::philox::Stream;
+
+    use super::super::tests::{CRITICAL, deviate};
+    use super::*;
+
+    #[test]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "small numbers that are not negative"
+    )]
+    fn points_have_the_density_f_within_each_step_too() {
+        // Steep within few steps, one of them empty; cells are much smaller than the steps.
+        let slice = Slice {
+            sine: 0.0,
+            radial: vec![0.0, 0.2, 0.9, 1.4],
+            azimuths: 3,
+            f: vec![1.0, 5.0, 0.1, 0.0, 2.0, 0.3, 4.0, 0.0, 0.5, 0.0, 0.0, 0.7],
+            share: 0.5,
+            floor: 0.0,
+        };
+        let grid = slice.grid().expect("sound");
+        let (radii, turns) = (40, 24);
+        let cell = |r: f64, turn: f64| (r / END * f64::from(radii), turn * f64::from(turns));
+        let mut counts = vec![0_u64; 40 * 24];
+        let drawn = 200_000_u32;
+        let stream = Stream::new(7, 0);
+        for k in 0..drawn {
+            let [a, b, ..] = stream.uniforms(u64::from(k), 0);
+            let (r, turn) = grid.draw([a, b]);
+            assert!((0.0..=END).contains(&r) && (0.0..1.0).contains(&turn));
+            let (i, j) = cell(r, turn);
+            counts[(i as usize).min(39) * 24 + (j as usize).min(23)] += 1;
+        }
+        // f r by the rule of midpoints, 20 × 20 in each cell.
+        let fine = 20;
+        let masses: Vec<f64> = (0..radii * turns)
+            .map(|cell| {
+                let (i, j) = (f64::from(cell / turns), f64::from(cell % turns));
+                let points = (0..fine * fine).map(|k| {
+                    let [u, v] = [k / fine, k % fine].map(|k| (f64::from(k) + 0.5) / f64::from(fine));
+                    let r = (i + u) / f64::from(radii) * END;
+                    grid.at(r, (j + v) / f64::from(turns)) * r
+                });
+                points.sum()
+            })
+            .collect();
+        let all: f64 = masses.iter().sum();
+        let expected: Vec<f64> = masses.iter().map(|mass| mass / all * f64::from(drawn)).collect();
+        let z = deviate(&counts, &expected);
+        assert!(z < CRITICAL, "{z}");
     }
 }

@@ -9,7 +9,7 @@ use etendue_sampling::guide::Guide;
 use etendue_sampling::warp::part_of;
 
 use super::monotone_cubic::Cubic;
-use super::table_grid::{Grid, Slice};
+use super::table_grid::{Grid, Integrals, Slice};
 
 /// Slices at one azimuth of incidence, with rising sines.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,6 +106,7 @@ impl Lobe {
     /// Tables how light is shared, in steps that are halved until everything is linear within them.
     fn fill(&mut self, share: &Cubic, floor: &Cubic) {
         let slices = Arc::clone(&self.slices);
+        let integrals: Vec<Integrals<'_>> = slices.iter().map(Grid::integrals).collect();
         let count = slices.len();
         // From 0 to the first slice, from each to the next, from the last to 1.
         let mut ends: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
@@ -118,17 +119,17 @@ impl Lobe {
             }
             let beyond = k == 0 || k == count;
             let first = k.saturating_sub(1).min(count - 1);
-            let own = slices[first].integral(slices[first].sine);
+            let own = integrals[first].integral(slices[first].sine);
             let at = |sine: f64| {
                 let square = sine * sine;
                 let (rho, floor) = (share.at(square), floor.at(square));
                 let (shares, factors) = if beyond {
                     // The slice moves on unchanged.
                     let factor = if own > 0.0 { rho / own } else { 0.0 };
-                    ([factor * slices[first].integral(sine), 0.0], [factor, 0.0])
+                    ([factor * integrals[first].integral(sine), 0.0], [factor, 0.0])
                 } else {
                     let part = (sine - from) / (to - from);
-                    let energies = [slices[first].integral(sine), slices[first + 1].integral(sine)];
+                    let energies = [integrals[first].integral(sine), integrals[first + 1].integral(sine)];
                     let all = (1.0 - part) * energies[0] + part * energies[1];
                     let factor = if all > 0.0 { rho / all } else { 0.0 };
                     let factors = [factor * (1.0 - part), factor * part];
@@ -195,11 +196,11 @@ impl Lobe {
         f
     }
 
-    /// A slice or a floor (None), picked by its share, with what is left of the number.
+    /// A slice or a floor (None), picked by its share, with what is left of a number that is less than the share of all, as a
+    /// number from 0 to 1.
     #[inline]
-    pub(super) fn pick(&self, blend: &Blend, number: f64) -> (Option<&Grid>, f64) {
-        let mut left = number * blend.share();
-        let mut last = (None, number);
+    pub(super) fn pick(&self, blend: &Blend, mut left: f64) -> (Option<&Grid>, f64) {
+        let mut last = (None, left);
         for (k, share) in blend.shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
             last = (self.slices.get(blend.first + k).filter(|_| k < 2), part_of(left, share));
             if left < share {
@@ -340,6 +341,7 @@ impl<'a> Lit<'a> {
 }
 
 /// Where light comes from, as the tables are asked.
+#[derive(Clone, Copy)]
 pub(super) struct Incidence {
     /// Of the angle of incidence.
     pub(super) sine: f64,
@@ -351,7 +353,8 @@ impl Incidence {
     pub(super) fn new(incident: Vec3) -> Self {
         let sine = (incident.x * incident.x + incident.y * incident.y).sqrt();
         let forward = if sine > 0.0 {
-            [-incident.x / sine, -incident.y / sine]
+            let scale = -1.0 / sine;
+            [incident.x * scale, incident.y * scale]
         } else {
             [-1.0, 0.0]
         };

@@ -9,8 +9,8 @@
 //! apart get others in between, ln f being linear in the angle of incidence. Beyond the first and the last angle the nearest
 //! slice moves on unchanged, and what leaves the unit circle of direction cosines is absorbed.
 //!
-//! **Drawing** is exact: a slice by its share, a point of its grid by the inverse of its distribution in the plane of direction
-//! cosines, where area is projected solid angle, and again if the point lies outside the unit circle.
+//! **Drawing** is exact: a slice by its share, a node of its grid by what it contributes, a point by the hats about that node in
+//! the plane of direction cosines, where area is projected solid angle; and again if the point lies outside the unit circle.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use etendue_math::Vec3;
 use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
-use super::contract::{Bsdf, Component, Drawn, Facts, Media, Parts, Product, Shares, by_cosine};
+use super::contract::{Bsdf, Drawn, Facts, Media, Parts, Product, Shares, by_cosine};
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lit, Lobe, Lobes, Way};
 
@@ -107,6 +107,36 @@ impl Tabulated {
         }
     }
 
+    /// What scatters light; None: it is absorbed.
+    #[inline]
+    fn picked(&self, incident: Vec3, media: &Media, numbers: [f64; 2]) -> Option<Picked<'_>> {
+        let incidence = Incidence::new(incident);
+        let front = incident.z > 0.0;
+        let (way, (grid, number)) = if let Some((way, lobe)) = self.lone(front) {
+            let blend = lobe.blend(incidence.sine);
+            let share = blend.share();
+            // Shares that should add up to 1 may fall short of it by rounding.
+            let scattered = numbers[0] < share || share >= 1.0 - 1e-12;
+            (way, scattered.then(|| lobe.pick(&blend, numbers[0]))?)
+        } else {
+            let ways = [false, true].map(|way| self.lit(&incidence, front, way, media.wavelength));
+            let shares = Shares {
+                specular: [0.0; 2],
+                diffuse: ways.each_ref().map(share),
+                refraction: incident.z.abs(),
+            };
+            let (component, rest) = shares.pick(numbers[0])?;
+            let way = component.is_transmitted();
+            (way, pick(&ways[usize::from(way)], rest))
+        };
+        Some(Picked {
+            incidence,
+            grid,
+            numbers: [number, numbers[1]],
+            up: front != way,
+        })
+    }
+
     /// What one way of light is shared by: next to a wavelength, each with its part.
     fn lit(&self, incidence: &Incidence, front: bool, transmitted: bool, wavelength: f64) -> Ways<'_> {
         self.sheets(front, wavelength).map(|(ways, part)| {
@@ -130,10 +160,10 @@ fn share(ways: &Ways<'_>) -> f64 {
         .fold(0.0, |sum, (lit, part)| sum + part * lit.share())
 }
 
-/// A direction in which light leaves.
-fn drawn(ways: &Ways<'_>, incidence: &Incidence, incident: Vec3, up: bool, numbers: [f64; 2]) -> Vec3 {
-    let mut left = numbers[0] * share(ways);
-    let mut picked = (None, numbers[0]);
+/// A slice or a floor (None), picked by its share, with what is left of the number.
+fn pick<'a>(ways: &Ways<'a>, number: f64) -> (Option<&'a Grid>, f64) {
+    let mut left = number * share(ways);
+    let mut picked = (None, number);
     for (lit, part) in ways.iter().flatten() {
         let share = part * lit.share();
         picked = lit.pick(part_of(left, share));
@@ -142,30 +172,40 @@ fn drawn(ways: &Ways<'_>, incidence: &Incidence, incident: Vec3, up: bool, numbe
         }
         left -= share;
     }
-    placed(picked, incidence, incident, up, numbers)
+    picked
 }
 
-/// A direction from a slice, or from a floor.
-#[inline]
-fn placed(
-    (grid, number): (Option<&Grid>, f64),
-    incidence: &Incidence,
-    incident: Vec3,
-    up: bool,
+/// Light that is scattered by a slice or a floor, before it is known where to.
+#[derive(Clone, Copy)]
+struct Picked<'a> {
+    incidence: Incidence,
+    /// None: a floor.
+    grid: Option<&'a Grid>,
+    /// Two numbers that have not been used.
     numbers: [f64; 2],
-) -> Vec3 {
-    let Some(grid) = grid else {
-        return by_cosine(up, [number, numbers[1]]);
-    };
-    let mut pair = [number, numbers[1]];
-    let mut more = MoreNumbers::new(numbers);
-    for _ in 0..TRIES {
-        if let Some(d) = incidence.direction(incident, grid.draw(pair), up) {
-            return d;
-        }
-        pair = more.pair();
+    up: bool,
+}
+
+impl Picked<'_> {
+    /// The node of the grid, and what is left of the number.
+    #[inline]
+    fn node(&self) -> (u32, f64) {
+        self.grid.map_or((0, 0.0), |grid| grid.node(self.numbers[0]))
     }
-    by_cosine(up, numbers)
+
+    /// The direction.
+    #[inline]
+    fn direction(&self, incident: Vec3, node: (u32, f64)) -> Vec3 {
+        let Some(grid) = self.grid else {
+            return by_cosine(self.up, self.numbers);
+        };
+        let place = |point| self.incidence.direction(incident, point, self.up);
+        place(grid.about(node, self.numbers[1])).unwrap_or_else(|| {
+            let mut more = MoreNumbers::new(self.numbers);
+            let again = (1..TRIES).find_map(|_| place(grid.draw(more.pair())));
+            again.unwrap_or_else(|| by_cosine(self.up, self.numbers))
+        })
+    }
 }
 
 impl Side {
@@ -187,6 +227,9 @@ impl Side {
 
 /// How often is tried again for a point within the unit circle.
 const TRIES: u32 = 10_000;
+
+/// How many rays are drawn for together.
+const TOGETHER: usize = 64;
 
 impl Bsdf for Tabulated {
     fn facts(&self) -> &Facts {
@@ -233,43 +276,52 @@ impl Bsdf for Tabulated {
     fn draw(&self, incident: Vec3, transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3 {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;
-        if let Some((_, lobe)) = self.lone(front) {
-            let picked = lobe.pick(&lobe.blend(incidence.sine), numbers[0]);
-            return placed(picked, &incidence, incident, front != transmitted, numbers);
-        }
-        let ways = self.lit(&incidence, front, transmitted, media.wavelength);
-        drawn(&ways, &incidence, incident, front != transmitted, numbers)
+        let (grid, number) = match self.lone(front) {
+            Some((_, lobe)) => {
+                let blend = lobe.blend(incidence.sine);
+                lobe.pick(&blend, numbers[0] * blend.share())
+            }
+            None => pick(&self.lit(&incidence, front, transmitted, media.wavelength), numbers[0]),
+        };
+        let picked = Picked {
+            incidence,
+            grid,
+            numbers: [number, numbers[1]],
+            up: front != transmitted,
+        };
+        picked.direction(incident, picked.node())
     }
 
     /// As any BSDF does, but what light is shared by is looked up once.
     fn sample(&self, incident: Vec3, media: &Media, numbers: [f64; 2]) -> Drawn {
-        let incidence = Incidence::new(incident);
-        let front = incident.z > 0.0;
-        if let Some((way, lobe)) = self.lone(front) {
-            let blend = lobe.blend(incidence.sine);
-            let shares = Shares {
-                specular: [0.0; 2],
-                diffuse: on_its_way(way, blend.share()),
-                refraction: incident.z.abs(),
-            };
-            return shares.pick(numbers[0]).map_or(Drawn::Absorbed, |(_, rest)| {
-                let picked = lobe.pick(&blend, rest);
-                Drawn::Scattered(placed(picked, &incidence, incident, front != way, [rest, numbers[1]]))
-            });
-        }
-        let ways = [false, true].map(|way| self.lit(&incidence, front, way, media.wavelength));
-        let shares = Shares {
-            specular: [0.0; 2],
-            diffuse: ways.each_ref().map(share),
-            refraction: incident.z.abs(),
-        };
-        match shares.pick(numbers[0]) {
-            Some((Component::Diffuse(transmitted), rest)) => {
-                let own = &ways[usize::from(transmitted)];
-                let numbers = [rest, numbers[1]];
-                Drawn::Scattered(drawn(own, &incidence, incident, front != transmitted, numbers))
+        let picked = self.picked(incident, media, numbers);
+        picked.map_or(Drawn::Absorbed, |picked| {
+            Drawn::Scattered(picked.direction(incident, picked.node()))
+        })
+    }
+
+    /// As any BSDF does, but the nodes of many rays are looked up together: they are all over a memory that no cache holds, and
+    /// the processor waits for many of them at once.
+    fn sample_many(&self, incident: &[Vec3], media: &[Media], numbers: [&[f64]; 2], drawn: &mut Vec<Drawn>) {
+        let mut group = [None; TOGETHER];
+        let mut nodes = [(0, 0.0); TOGETHER];
+        for (first, incident) in (0..).step_by(TOGETHER).zip(incident.chunks(TOGETHER)) {
+            for (k, i) in (first..).enumerate().take(incident.len()) {
+                group[k] = self.picked(incident[k], &media[i], numbers.map(|list| list[i]));
             }
-            _ => Drawn::Absorbed,
+            for (node, picked) in nodes.iter_mut().zip(&group) {
+                *node = picked.as_ref().map_or((0, 0.0), Picked::node);
+            }
+            drawn.extend(
+                incident
+                    .iter()
+                    .zip(&group)
+                    .zip(nodes)
+                    .map(|((incident, picked), node)| {
+                        let direction = picked.map(|picked| picked.direction(*incident, node));
+                        direction.map_or(Drawn::Absorbed, Drawn::Scattered)
+                    }),
+            );
         }
     }
 }

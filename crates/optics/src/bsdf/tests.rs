@@ -144,7 +144,7 @@ fn cell_of(d: Vec3) -> usize {
 /// χ² of counts against their expectations, as a normal deviate (Wilson and Hilferty), cells of less than 8 taken together.
 ///
 /// Counts where nothing is expected are an infinite one.
-fn deviate(counts: &[u64], expected: &[f64]) -> f64 {
+pub(super) fn deviate(counts: &[u64], expected: &[f64]) -> f64 {
     assert_eq!(counts.len(), expected.len());
     let (mut sum, mut cells, mut few) = (0.0, 0, (0.0, 0.0));
     for (count, mean) in counts.iter().zip(expected) {
@@ -171,7 +171,7 @@ fn deviate(counts: &[u64], expected: &[f64]) -> f64 {
 }
 
 /// One in 2·10⁵ deviates is above: one in a few hundred runs of all tests here.
-const CRITICAL: f64 = 4.42;
+pub(super) const CRITICAL: f64 = 4.42;
 
 const DRAWN: u64 = 20_000;
 
@@ -210,6 +210,26 @@ fn samples_have_their_shares_and_density() {
         let z = deviate(&counts, &expected);
         assert!(z < CRITICAL, "{name}, {media:?}, {incident:?}: {z}");
     });
+}
+
+#[test]
+fn many_rays_are_drawn_for_as_each_by_itself() {
+    let stream = Stream::new(41, 0);
+    for Example { name, bsdf, .. } in kinds().iter().flatten() {
+        // More than are ever worked on together.
+        let numbers = [0, 1].map(|k| (0..150).map(|i| stream.uniforms(i, 0)[k]).collect::<Vec<f64>>());
+        let incident: Vec<Vec3> = (0..150)
+            .map(|i| direction(HEIGHTS[i % HEIGHTS.len()], 0.137 * i as f64))
+            .collect();
+        let media: Vec<Media> = (0..150).map(|i| MEDIA[i % MEDIA.len()]).collect();
+        let mut drawn = vec![Drawn::Absorbed];
+        bsdf.sample_many(&incident, &media, numbers.each_ref().map(|list| &list[..]), &mut drawn);
+        assert_eq!(drawn.len(), 151, "{name}");
+        for i in 0..150 {
+            let alone = bsdf.sample(incident[i], &media[i], [numbers[0][i], numbers[1][i]]);
+            assert_eq!(drawn[i + 1], alone, "{name}");
+        }
+    }
 }
 
 #[test]

@@ -11,10 +11,10 @@ use etendue_sampling::philox::{Pairs, fill_pairs};
 
 use super::block_trace::BlockTrace;
 use super::interfaces::{Crossed, InterfaceRays};
-use super::lambertian_sheet::{LambertianSheet, SheetRay, SheetRays};
+use super::lambertian_sheet::{LambertianSheet, SheetRays};
 use super::queue::RayQueue;
 use super::run::Run;
-use super::scattering_sheet::ScatteringSheet;
+use super::scattering_sheet::{ScatteredRays, ScatteringSheet};
 use super::sorter::{Sheet, Sorter, sheets};
 use crate::dealing::Dealing;
 use crate::detector::Detector;
@@ -49,6 +49,7 @@ struct BatchTrace<'a> {
     /// Those of the rays that meet a face which are not absorbed.
     going: Vec<u32>,
     sheet_rays: SheetRays,
+    scattered_rays: ScatteredRays,
     interface_rays: InterfaceRays,
     /// Fluxes of the rays that leave the scene.
     fluxes: Vec<f64>,
@@ -112,6 +113,7 @@ impl<'a> BatchTrace<'a> {
             numbers: Default::default(),
             going: Vec::new(),
             sheet_rays: SheetRays::default(),
+            scattered_rays: ScatteredRays::default(),
             interface_rays: InterfaceRays::default(),
             fluxes: Vec::new(),
         }
@@ -322,7 +324,7 @@ impl<'a> BatchTrace<'a> {
         self.interface_rays.go_on(next);
     }
 
-    /// Rays that meet one face go on, each by itself, or are absorbed.
+    /// Rays that meet one face go on, each as it is drawn, or are absorbed.
     fn scatter(&mut self, sheet: ScatteringSheet<'_>, which: &[u32], now: &RayQueue, hits: &Hits, next: &mut RayQueue) {
         let BlockTrace {
             scene,
@@ -333,44 +335,51 @@ impl<'a> BatchTrace<'a> {
             out,
             ..
         } = &mut self.block;
-        let [numbers, turns] = &self.numbers;
-        self.sheet_rays.gather(now, hits, which);
-        let face = &scene.face_set.faces()[sheet.face as usize];
-        self.sheet_rays.bounce_each(face, |k, ray| {
-            let SheetRay { d, normal, .. } = *ray;
-            let state = &mut states[ray.who as usize];
-            let RayState { flux, wavelength, .. } = *state;
-            let n = media.at(scene, 0, wavelength).n;
+        let (rays, scattered) = (&mut self.sheet_rays, &mut self.scattered_rays);
+        let [numbers, turns] = &mut self.numbers;
+        scattered.media.clear();
+        self.going.clear();
+        for (k, i) in which.iter().enumerate() {
+            let state = &states[now.who[*i as usize] as usize];
+            let n = media.at(scene, 0, state.wavelength).n;
             // Not so if it is NaN, either.
             if n > 0.0 {
-                let around = Media {
-                    wavelength,
+                // No later than where it is: the numbers move up.
+                let place = self.going.len();
+                (numbers[place], turns[place]) = (numbers[k], turns[k]);
+                self.going.push(*i);
+                scattered.media.push(Media {
+                    wavelength: state.wavelength,
                     front: n,
                     back: n,
-                };
-                if wants.exitance {
-                    let place = FacePoint {
-                        face: sheet.face,
-                        part: ray.part,
-                        front: d.dot(normal) < 0.0,
-                        point: ray.point,
-                    };
-                    let share = sheet.product(d, normal, around);
-                    for (detector, out) in detectors.iter().zip(&mut out.detectors) {
-                        detector.sheet(scene, place, share, state, out);
-                    }
-                    state.scattered = true;
-                }
-                let bounced = sheet.bounced(d, normal, around, [numbers[k], turns[k]]);
-                if bounced.is_none() {
-                    out.ledger.book(Fate::OnFace(sheet.face), flux);
-                }
-                bounced
+                });
             } else {
-                out.ledger.book(Fate::Lost(Loss::NoIndex, sheet.face), flux);
-                None
+                out.ledger.book(Fate::Lost(Loss::NoIndex, sheet.face), state.flux);
             }
+        }
+        rays.gather(now, hits, &self.going);
+        rays.reach(&scene.face_set.faces()[sheet.face as usize]);
+        let all = 0..self.going.len();
+        for k in all.filter(|_| wants.exitance) {
+            let ray = rays.get(k);
+            let place = FacePoint {
+                face: sheet.face,
+                part: ray.part,
+                front: ray.d.dot(ray.normal) < 0.0,
+                point: ray.point,
+            };
+            let share = sheet.product(ray.d, ray.normal, scattered.media[k]);
+            let state = &mut states[ray.who as usize];
+            for (detector, out) in detectors.iter().zip(&mut out.detectors) {
+                detector.sheet(scene, place, share, state, out);
+            }
+            state.scattered = true;
+        }
+        scattered.sample(&sheet, rays, [numbers, turns]);
+        scattered.turn(&sheet, rays, |who| {
+            let flux = states[who as usize].flux;
+            out.ledger.book(Fate::OnFace(sheet.face), flux);
         });
-        self.sheet_rays.go_on(sheet.face, next);
+        rays.go_on(sheet.face, next);
     }
 }

@@ -82,24 +82,49 @@ impl SheetRays {
 
     /// Turns the lines to the face into those from there.
     pub fn bounce(&mut self, face: &Face, sheet: LambertianSheet, numbers: &[Vec<f64>; 2]) {
-        surface_points(face, &mut self.o, &self.d, &self.t, &self.part, &mut self.normal);
+        self.reach(face);
         turn(sheet, numbers, &self.normal, &mut self.d);
     }
 
-    /// Turns the lines to the face into those from there, as `bounced` says for each; those for which there is none are left
-    /// out.
-    pub fn bounce_each(&mut self, face: &Face, mut bounced: impl FnMut(usize, &SheetRay) -> Option<Vec3>) {
+    /// Follows the lines to the face.
+    pub fn reach(&mut self, face: &Face) {
         surface_points(face, &mut self.o, &self.d, &self.t, &self.part, &mut self.normal);
-        let at = |lists: &Vectors, k: usize| Vec3::new(lists[0][k], lists[1][k], lists[2][k]);
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.who.len()
+    }
+
+    /// Directions of the lines.
+    pub const fn directions(&self) -> &Vectors {
+        &self.d
+    }
+
+    /// Normals of the front where they have reached the face.
+    pub const fn normals(&self) -> &Vectors {
+        &self.normal
+    }
+
+    /// One of those that have reached the face.
+    #[inline]
+    pub fn get(&self, k: usize) -> SheetRay {
+        let at = |lists: &Vectors| Vec3::new(lists[0][k], lists[1][k], lists[2][k]);
+        SheetRay {
+            who: self.who[k],
+            part: self.part[k],
+            point: at(&self.o),
+            d: at(&self.d),
+            normal: at(&self.normal),
+        }
+    }
+
+    /// Turns the lines that have reached the face into those from there, as `bounced` says for each; those for which there is
+    /// none are left out.
+    pub fn turn_each(&mut self, mut bounced: impl FnMut(usize, &SheetRay) -> Option<Vec3>) {
         let mut place = 0;
-        for k in 0..self.who.len() {
-            let ray = SheetRay {
-                who: self.who[k],
-                part: self.part[k],
-                point: at(&self.o, k),
-                d: at(&self.d, k),
-                normal: at(&self.normal, k),
-            };
+        for k in 0..self.len() {
+            let ray = self.get(k);
             let Some(d) = bounced(k, &ray) else {
                 continue;
             };

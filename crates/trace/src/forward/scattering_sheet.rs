@@ -3,10 +3,14 @@
 //!
 //! What [`scatter`](crate::scatter) comes to for such a sheet, to the same bits.
 
+use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
-use etendue_optics::bsdf::{Bsdf, Media};
+use etendue_optics::bsdf::{Bsdf, Drawn, Media};
+use etendue_optics::fresnel::reflect;
+use multiversion::multiversion;
 
-use crate::scatter::Surface;
+use super::lambertian_sheet::SheetRays;
+use crate::scatter::{Surface, along, axes, axes_along, local};
 
 /// A sheet that mirrors and scatters light back, or absorbs it.
 #[derive(Clone, Copy, Debug)]
@@ -27,19 +31,117 @@ impl<'a> ScatteringSheet<'a> {
         back.then_some(Self { face, bsdf, axis })
     }
 
-    /// The direction of a ray after it met the sheet, from two random numbers; None: absorbed. `normal` is that of the front.
-    #[inline]
-    #[must_use]
-    pub fn bounced(&self, d: Vec3, normal: Vec3, media: Media, numbers: [f64; 2]) -> Option<Vec3> {
-        Surface::new(self.bsdf, media, [normal; 2], self.axis).bounced(d, numbers)
-    }
-
     /// The share of light along `d` that its product sends back (see `Parts`).
     #[inline]
     #[must_use]
     pub fn product(&self, d: Vec3, normal: Vec3, media: Media) -> f64 {
         Surface::new(self.bsdf, media, [normal; 2], self.axis).product(d)
     }
+}
+
+/// Rays that meet one such sheet, and what becomes of them.
+#[derive(Debug, Default)]
+pub struct ScatteredRays {
+    /// The medium about each.
+    pub media: Vec<Media>,
+    /// To where each comes from, and where it goes, in the frame of the surface.
+    towards: Vectors,
+    incident: Vec<Vec3>,
+    drawn: Vec<Drawn>,
+}
+
+impl ScatteredRays {
+    /// Draws what becomes of rays that have reached the sheet, and whose media are known, from two random numbers for each.
+    pub fn sample(&mut self, sheet: &ScatteringSheet<'_>, rays: &SheetRays, numbers: [&[f64]; 2]) {
+        let n = rays.normals()[0].len();
+        for list in &mut self.towards {
+            list.resize(n, 0.0);
+        }
+        match sheet.axis {
+            None => outward(rays.normals(), rays.directions(), &mut self.towards),
+            Some(axis) => outward_along(axis, rays.normals(), rays.directions(), &mut self.towards),
+        }
+        self.incident.clear();
+        self.incident.extend((0..n).map(|k| at(&self.towards, k)));
+        self.drawn.clear();
+        sheet
+            .bsdf
+            .sample_many(&self.incident, &self.media, numbers, &mut self.drawn);
+    }
+
+    /// Turns the lines to the sheet into those from there; rays that are absorbed are told, and left out.
+    pub fn turn(&mut self, sheet: &ScatteringSheet<'_>, rays: &mut SheetRays, mut absorbed: impl FnMut(u32)) {
+        for (k, drawn) in self.drawn.iter().enumerate() {
+            if let Drawn::Scattered(v) = drawn {
+                for (list, component) in self.towards.iter_mut().zip([v.x, v.y, v.z]) {
+                    list[k] = component;
+                }
+            }
+        }
+        match sheet.axis {
+            None => in_space(rays.normals(), &mut self.towards),
+            Some(axis) => in_space_along(axis, rays.normals(), &mut self.towards),
+        }
+        rays.turn_each(|k, ray| match self.drawn[k] {
+            Drawn::Scattered(_) => Some(at(&self.towards, k)),
+            Drawn::Mirrored => {
+                let height = self.incident[k].z;
+                let facing = if height > 0.0 { ray.normal } else { -ray.normal };
+                Some(reflect(ray.d, facing, height.abs()))
+            }
+            Drawn::Absorbed | Drawn::Refracted(_) => {
+                absorbed(ray.who);
+                None
+            }
+        });
+    }
+}
+
+/// One of many vectors.
+#[inline(always)]
+fn at(vectors: &Vectors, k: usize) -> Vec3 {
+    Vec3::new(vectors[0][k], vectors[1][k], vectors[2][k])
+}
+
+/// Changes each of many vectors, told the normal there.
+#[inline(always)]
+fn each(normals: &Vectors, vectors: &mut Vectors, change: impl Fn(usize, Vec3, Vec3) -> Vec3) {
+    let [x, y, z] = vectors.each_mut();
+    let n = x.len();
+    let [x, y, z] = [x, y, z].map(|list| &mut list[..n]);
+    let [nx, ny, nz] = normals.each_ref().map(|list| &list[..n]);
+    for k in 0..n {
+        let v = change(k, Vec3::new(nx[k], ny[k], nz[k]), Vec3::new(x[k], y[k], z[k]));
+        (x[k], y[k], z[k]) = (v.x, v.y, v.z);
+    }
+}
+
+/// To where rays come from, in the frame of the surface.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn outward(normals: &Vectors, directions: &Vectors, towards: &mut Vectors) {
+    let n = towards[0].len();
+    let [dx, dy, dz] = directions.each_ref().map(|list| &list[..n]);
+    each(normals, towards, |k, normal, _| {
+        local(&axes(normal), -Vec3::new(dx[k], dy[k], dz[k]))
+    });
+}
+
+/// The same where the first axis follows a direction.
+fn outward_along(axis: Vec3, normals: &Vectors, directions: &Vectors, towards: &mut Vectors) {
+    each(normals, towards, |k, normal, _| {
+        local(&axes_along(normal, axis), -at(directions, k))
+    });
+}
+
+/// From the frame of the surface into space.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn in_space(normals: &Vectors, vectors: &mut Vectors) {
+    each(normals, vectors, |_, normal, v| along(&axes(normal), v));
+}
+
+/// The same where the first axis follows a direction.
+fn in_space_along(axis: Vec3, normals: &Vectors, vectors: &mut Vectors) {
+    each(normals, vectors, |_, normal, v| along(&axes_along(normal, axis), v));
 }
 
 #[cfg(test)]
@@ -68,7 +170,7 @@ mod tests {
 
     /// A ball that mirrors a fifth, scatters about the mirrored direction with an axis along which the lobe is narrow, and evenly,
     /// the less the steeper light comes, and absorbs the rest.
-    fn ball() -> Scene {
+    fn ball(axis: Option<Vec3>) -> Scene {
         let [mirrored, none] = [0.2, 0.0].map(Table::constant);
         let mirror = Mixture::of_shares([mirrored, none.clone()], [none.clone(), none]).expect("at most 1");
         let profile = Profile::Gaussian { peak: 1.0, sigma: 0.15 };
@@ -100,7 +202,6 @@ mod tests {
             index: Index::Table(Curve::constant(1.0)),
             absorption: Curve::constant(0.0),
         };
-        let axis = Some(Vec3::new(0.3, 0.1, 0.9));
         let face = SceneFace {
             face,
             solid: None,
@@ -112,7 +213,11 @@ mod tests {
 
     #[test]
     fn a_bounce_is_what_the_surface_event_comes_to() {
-        let scene = ball();
+        compare(&ball(None));
+        compare(&ball(Some(Vec3::new(0.3, 0.1, 0.9))));
+    }
+
+    fn compare(scene: &Scene) {
         let sheet = ScatteringSheet::of(0, &*scene.finishes[0], scene.axes[0]).expect("nothing passes");
         let (stream, rays) = (Stream::new(5, 6), 3000_u32);
         let mut queue = RayQueue::default();
@@ -129,30 +234,50 @@ mod tests {
         }
         let mut hits = Hits::default();
         scene.face_set.nearest(&queue.lines, &mut hits);
-        let mut media = MediumCache::new(&scene);
+        let mut media = MediumCache::new(scene);
         let mut ends = [0; 3];
-        for i in (0..rays as usize).filter(|i| hits.face[*i] == 0) {
-            let [number, turn, ..] = stream.uniforms(i as u64, 1);
+        let which: Vec<u32> = (0..rays).filter(|i| hits.face[*i as usize] == 0).collect();
+        let pairs: Vec<_> = which.iter().map(|i| stream.uniforms(u64::from(*i), 1)).collect();
+        let numbers = [0, 1].map(|k| pairs.iter().map(|pair| pair[k]).collect::<Vec<f64>>());
+        let around = Media {
+            wavelength: 555.0,
+            front: 1.0,
+            back: 1.0,
+        };
+        let mut gathered = SheetRays::default();
+        gathered.gather(&queue, &hits, &which);
+        gathered.reach(&scene.face_set.faces()[0]);
+        let mut scattered = ScatteredRays {
+            media: vec![around; which.len()],
+            ..ScatteredRays::default()
+        };
+        scattered.sample(&sheet, &gathered, numbers.each_ref().map(|list| &list[..]));
+        let mut absorbed = Vec::new();
+        let mut turned = gathered.clone();
+        scattered.turn(&sheet, &mut turned, |who| absorbed.push(who));
+        let mut found = 0;
+        for (k, i) in which.iter().enumerate() {
+            let place = *i as usize;
             let met =
-                interaction_of(&scene, &queue.lines, &hits, i, SolidStack::default(), |_, _, _| {}).expect("sound");
-            let d = queue.lines.direction(i);
-            let event = SurfaceEvent::new(&scene, &met, d, 555.0, &mut media)
+                interaction_of(scene, &queue.lines, &hits, place, SolidStack::default(), |_, _, _| {}).expect("sound");
+            let d = queue.lines.direction(place);
+            let event = SurfaceEvent::new(scene, &met, d, 555.0, &mut media)
                 .expect("air")
                 .expect("a surface");
-            let expected = event.sample([number, turn]);
-            let around = Media {
-                wavelength: 555.0,
-                front: 1.0,
-                back: 1.0,
-            };
+            let expected = event.sample([numbers[0][k], numbers[1][k]]);
+            assert_eq!(absorbed.contains(i), expected.is_none());
+            if let Some((_, d, _)) = expected {
+                let ray = turned.get(found);
+                assert_eq!((ray.who, ray.point, ray.d), (*i, met.point, d));
+                found += 1;
+            }
             let front = if met.front { met.side } else { -met.side };
-            let found = sheet.bounced(d, front, around, [number, turn]);
-            assert_eq!(found, expected.map(|(_, d, _)| d));
             let known = event.arriving(event.parts().expect("a Lambertian part"));
             assert_eq!([sheet.product(d, front, around), 0.0], known);
             assert!(known[0] > 0.1 && known[0] < 0.3);
             ends[expected.map_or(0, |(component, ..)| 1 + usize::from(component.is_specular()))] += 1;
         }
+        assert_eq!(found, turned.len());
         assert!(ends.iter().all(|count| *count > 100), "{ends:?}");
     }
 }
