@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use crate::pass::{Sums, over_all_rays};
 use crate::pass_account::PassAccount;
-use crate::ray_batch::{LANES, RayBatch};
+use crate::ray_batch::{Defect, LANES, RayBatch};
 use crate::source::RaySource;
 
 /// What a ray set amounts to. Sums run over the usable rays, in file order by batches.
@@ -51,7 +51,12 @@ impl Sums for Scan {
         let n = batch.len;
         let position = batch.position.each_ref().map(|axis| &axis[..n]);
         let direction = batch.direction.each_ref().map(|axis| &axis[..n]);
-        let found = lanes(position, direction, &batch.flux[..n]);
+        let found = lanes(
+            position,
+            direction,
+            &batch.flux[..n],
+            batch.defects == [0; Defect::COUNT],
+        );
         self.zero_flux += found.zeros.iter().sum::<u64>();
         let ranges = self.bounds.iter_mut().chain(std::iter::once(&mut self.flux_range));
         for ((range, low), high) in ranges.zip(found.low).zip(found.high) {
@@ -104,82 +109,191 @@ struct Lanes {
     zeros: Lane<u64>,
 }
 
-/// Sums and extremes of a block.
+/// Lanes that are summed at a time: so few that their sums stay in registers.
+const GROUP: usize = 8;
+
+/// One value for each of them.
+type Group<T> = [T; GROUP];
+
+/// The arrays of a block.
+const PX: usize = 0;
+const PY: usize = 1;
+const PZ: usize = 2;
+const KX: usize = 3;
+const KY: usize = 4;
+const KZ: usize = 5;
+const W: usize = 6;
+
+/// Its rays in rows of lanes: whole ones, and the last one with zeros behind its end.
+struct Rows<'a> {
+    whole: [&'a [Lane<f64>]; 7],
+    last: [Lane<f64>; 7],
+}
+
+impl<'a> Rows<'a> {
+    fn new(arrays: [&'a [f64]; 7]) -> Self {
+        let parted = arrays.map(|array| array.as_chunks::<LANES>());
+        Self {
+            whole: parted.map(|(whole, _)| whole),
+            last: parted.map(|(_, rest)| std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0))),
+        }
+    }
+
+    /// Goes through the whole rows, for the lanes of one group: `add` is given one row of the arrays that it wants.
+    #[inline(always)]
+    fn whole<const ARRAYS: usize>(
+        &self,
+        group: usize,
+        wanted: [usize; ARRAYS],
+        mut add: impl FnMut([&Group<f64>; ARRAYS]),
+    ) {
+        let count = self.whole[0].len();
+        let whole = wanted.map(|array| &self.whole[array][..count]);
+        for row in 0..count {
+            add(whole.map(|rows| of_group(&rows[row], group)));
+        }
+    }
+
+    /// Sums over all rows, likewise.
+    #[inline(always)]
+    fn sums<const SUMS: usize, const ARRAYS: usize>(
+        &self,
+        group: usize,
+        wanted: [usize; ARRAYS],
+        add: impl Fn(&mut [Group<f64>; SUMS], [&Group<f64>; ARRAYS]),
+    ) -> [Group<f64>; SUMS] {
+        let mut sums = [[0.0; GROUP]; SUMS];
+        self.whole(group, wanted, |row| add(&mut sums, row));
+        add(&mut sums, wanted.map(|array| of_group(&self.last[array], group)));
+        sums
+    }
+
+    /// Smallest and largest values of one array over the usable rays.
+    #[inline(always)]
+    fn extremes(&self, group: usize, array: usize, all: bool) -> [Group<f64>; 2] {
+        let mut found = [[f64::INFINITY; GROUP], [f64::NEG_INFINITY; GROUP]];
+        if all {
+            let [low, high] = &mut found;
+            self.whole(group, [array], |[value]| {
+                for lane in 0..GROUP {
+                    low[lane] = if value[lane] < low[lane] {
+                        value[lane]
+                    } else {
+                        low[lane]
+                    };
+                    high[lane] = if value[lane] > high[lane] {
+                        value[lane]
+                    } else {
+                        high[lane]
+                    };
+                }
+            });
+        }
+        let [low, high] = &mut found;
+        let mut add = |[value, x, y, z]: [&Group<f64>; 4]| {
+            for lane in 0..GROUP {
+                let (value, usable) = (value[lane], is_usable([x[lane], y[lane], z[lane]]));
+                low[lane] = if usable & (value < low[lane]) { value } else { low[lane] };
+                high[lane] = if usable & (value > high[lane]) {
+                    value
+                } else {
+                    high[lane]
+                };
+            }
+        };
+        let wanted = [array, KX, KY, KZ];
+        if !all {
+            self.whole(group, wanted, &mut add);
+        }
+        add(wanted.map(|array| of_group(&self.last[array], group)));
+        found
+    }
+}
+
+/// Adds a term of each ray, times its flux, to the sum of its lane.
+#[inline(always)]
+fn add_up(sum: &mut Group<f64>, w: &Group<f64>, term: impl Fn(usize) -> f64) {
+    for (lane, sum) in sum.iter_mut().enumerate() {
+        *sum += w[lane] * term(lane);
+    }
+}
+
+/// Whether a ray has a direction: one that cannot be used has none.
+#[inline(always)]
+fn is_usable([x, y, z]: [f64; 3]) -> bool {
+    (x != 0.0) | (y != 0.0) | (z != 0.0)
+}
+
+/// The lanes of one group.
+#[inline(always)]
+fn of_group<T>(lanes: &Lane<T>, group: usize) -> &Group<T> {
+    &lanes.as_chunks::<GROUP>().0[group]
+}
+
+/// Sums and extremes of a block. `all` says that all its rays can be used.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn lanes(position: [&[f64]; 3], direction: [&[f64]; 3], flux: &[f64]) -> Lanes {
+fn lanes(position: [&[f64]; 3], direction: [&[f64]; 3], flux: &[f64], all: bool) -> Lanes {
+    let [[px, py, pz], [kx, ky, kz]] = [position, direction];
+    let rows = Rows::new([px, py, pz, kx, ky, kz, flux]);
     let mut found = Lanes {
         sums: [[0.0; LANES]; 15],
         low: [[f64::INFINITY; LANES]; 4],
         high: [[f64::NEG_INFINITY; LANES]; 4],
         zeros: [0; LANES],
     };
-    let [px, py, pz] = position.map(|axis| axis.as_chunks::<LANES>());
-    let [kx, ky, kz] = direction.map(|axis| axis.as_chunks::<LANES>());
-    let w = flux.as_chunks::<LANES>();
-    let rays = px.0.iter().zip(py.0).zip(pz.0).zip(kx.0).zip(ky.0).zip(kz.0).zip(w.0);
-    for ((((((px, py), pz), kx), ky), kz), w) in rays {
-        add(&mut found, [px, py, pz], [kx, ky, kz], w);
-    }
-    // The last ones beside lanes with nothing in them.
-    let last = |rest: &[f64]| -> Lane<f64> { std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0)) };
-    let (position, direction) = (
-        [px, py, pz].map(|axis| last(axis.1)),
-        [kx, ky, kz].map(|axis| last(axis.1)),
-    );
-    add(&mut found, position.each_ref(), direction.each_ref(), &last(w.1));
-    found
-}
-
-/// Adds a ray to each lane.
-#[inline(always)]
-fn add(found: &mut Lanes, [px, py, pz]: [&Lane<f64>; 3], [kx, ky, kz]: [&Lane<f64>; 3], w: &Lane<f64>) {
-    let (mut along, mut usable) = ([0.0; LANES], [0_u64; LANES]);
-    for lane in 0..LANES {
-        along[lane] = px[lane] * kx[lane] + py[lane] * ky[lane] + pz[lane] * kz[lane];
-        usable[lane] = u64::from((kx[lane] != 0.0) | (ky[lane] != 0.0) | (kz[lane] != 0.0));
-        found.zeros[lane] += usable[lane] & u64::from(w[lane] == 0.0);
-    }
-    for (extremes, value) in found.low.iter_mut().zip(&mut found.high).zip([px, py, pz, w]) {
-        let (low, high) = extremes;
-        for lane in 0..LANES {
-            let value = value[lane];
-            low[lane] = if (usable[lane] != 0) & (value < low[lane]) {
-                value
-            } else {
-                low[lane]
-            };
-            high[lane] = if (usable[lane] != 0) & (value > high[lane]) {
-                value
-            } else {
-                high[lane]
-            };
+    for g in 0..LANES / GROUP {
+        let own = g * GROUP..(g + 1) * GROUP;
+        let mut put = |at: usize, sums: &[Group<f64>]| {
+            for (into, sum) in found.sums[at..].iter_mut().zip(sums) {
+                into[own.clone()].copy_from_slice(sum);
+            }
+        };
+        let weighted = |sums: &mut [Group<f64>; 3], [x, y, z, w]: [&Group<f64>; 4]| {
+            for (sum, value) in sums.iter_mut().zip([x, y, z]) {
+                add_up(sum, w, |lane| value[lane]);
+            }
+        };
+        put(0, &rows.sums(g, [PX, PY, PZ, W], weighted));
+        put(3, &rows.sums(g, [KX, KY, KZ, W], weighted));
+        let across = |sums: &mut [Group<f64>; 3], [px, py, pz, kx, ky, kz, w]: [&Group<f64>; 7]| {
+            let along: Group<f64> =
+                std::array::from_fn(|lane| px[lane] * kx[lane] + py[lane] * ky[lane] + pz[lane] * kz[lane]);
+            for (sum, (p, k)) in sums.iter_mut().zip([(px, kx), (py, ky), (pz, kz)]) {
+                add_up(sum, w, |lane| p[lane] - along[lane] * k[lane]);
+            }
+        };
+        put(6, &rows.sums(g, [PX, PY, PZ, KX, KY, KZ, W], across));
+        let outer = |sums: &mut [Group<f64>; 6], [x, y, z, w]: [&Group<f64>; 4]| {
+            for (sum, (a, b)) in sums.iter_mut().zip([(x, x), (x, y), (x, z), (y, y), (y, z), (z, z)]) {
+                add_up(sum, w, |lane| a[lane] * b[lane]);
+            }
+        };
+        put(9, &rows.sums(g, [KX, KY, KZ, W], outer));
+        for (k, array) in [PX, PY, PZ, W].into_iter().enumerate() {
+            let [low, high] = rows.extremes(g, array, all);
+            found.low[k][own.clone()].copy_from_slice(&low);
+            found.high[k][own.clone()].copy_from_slice(&high);
         }
+        let mut zeros = [0; GROUP];
+        let mut add = |[x, y, z, w]: [&Group<f64>; 4]| {
+            for lane in 0..GROUP {
+                zeros[lane] += u64::from(is_usable([x[lane], y[lane], z[lane]]) & (w[lane] == 0.0));
+            }
+        };
+        if !all {
+            rows.whole(g, [KX, KY, KZ, W], &mut add);
+        }
+        add([KX, KY, KZ, W].map(|array| of_group(&rows.last[array], g)));
+        if all {
+            rows.whole(g, [W], |[w]| {
+                for (zeros, w) in zeros.iter_mut().zip(w) {
+                    *zeros += u64::from(*w == 0.0);
+                }
+            });
+        }
+        found.zeros[own].copy_from_slice(&zeros);
     }
-    let [x, y, z, u, v, t, fx, fy, fz, xx, xy, xz, yy, yz, zz] = &mut found.sums;
-    for (sum, value) in [(x, px), (y, py), (z, pz), (u, kx), (v, ky), (t, kz)] {
-        add_up(sum, w, |lane| value[lane]);
-    }
-    for (sum, p, k) in [(fx, px, kx), (fy, py, ky), (fz, pz, kz)] {
-        add_up(sum, w, |lane| p[lane] - along[lane] * k[lane]);
-    }
-    for (sum, a, b) in [
-        (xx, kx, kx),
-        (xy, kx, ky),
-        (xz, kx, kz),
-        (yy, ky, ky),
-        (yz, ky, kz),
-        (zz, kz, kz),
-    ] {
-        add_up(sum, w, |lane| a[lane] * b[lane]);
-    }
-}
-
-/// Adds a term of each ray, times its flux, to the sum of its lane.
-#[inline(always)]
-fn add_up(sum: &mut Lane<f64>, w: &Lane<f64>, term: impl Fn(usize) -> f64) {
-    for (lane, sum) in sum.iter_mut().enumerate() {
-        *sum += w[lane] * term(lane);
-    }
+    found
 }
 
 /// Scans a whole source. Ends early, with the sums so far, if `progress` breaks.
