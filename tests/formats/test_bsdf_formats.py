@@ -21,11 +21,13 @@ from formats.slanted import Slanted
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from oracles.bsdf_files import READ_ONLY
+from oracles.tracepro_files import small_files
 
 Array = npt.NDArray[np.float64]
 
 
 FORMATS = list(BSDF_FORMATS.values())
+KINDS = small_files()
 WRITTEN = [form for form in FORMATS if form.write is not None]
 
 
@@ -135,7 +137,10 @@ def test_cut_anywhere(form: BsdfFormat, written: Callable[[BsdfFormat], bytes], 
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 def test_damaged_bytes(form: BsdfFormat, written: Callable[[BsdfFormat], bytes], tmp_path: Path) -> None:
     """A table or an error of ours, whatever stands there."""
-    whole = written(form)
+    damage(written(form), tmp_path)
+
+
+def damage(whole: bytes, tmp_path: Path) -> None:
     path = tmp_path / "damaged"
 
     @settings(max_examples=12 if len(whole) < 1 << 24 else 2, deadline=None, suppress_health_check=list(HealthCheck))
@@ -146,6 +151,18 @@ def test_damaged_bytes(form: BsdfFormat, written: Callable[[BsdfFormat], bytes],
             read_bsdf_data(path)
 
     check()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_of_scatter_of_tracepro(kind: str, tmp_path: Path) -> None:
+    """As the files of all formats: recognised by one, and after damage a BSDF or an error of ours.
+
+    Cut at every byte they are in test_tracepro_damage.py.
+    """
+    whole = KINDS[kind]
+    assert [form.name for form in FORMATS if form.recognise(whole[:4096])] == ["tracepro"]
+    damage(whole, tmp_path)
 
 
 @pytest.mark.slow

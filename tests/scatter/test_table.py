@@ -62,6 +62,24 @@ def table() -> et.BsdfTable:
     return table_of(known, thetas=SIX)
 
 
+def test_a_single_azimuth_stands_for_all() -> None:
+    """A/(B + r²) in 400 steps about the specular direction at 60°: its share by midpoints of the disk, at any azimuth.
+
+    Forwards the hemisphere ends at r = 0.134, backwards at 1.866.
+    """
+    sine = math.sin(math.radians(60.0))
+    side = (np.arange(1000) + 0.5) / 500.0 - 1.0
+    x, y = np.meshgrid(side, side)
+    f = 0.01 / (0.05 + (x - sine) ** 2 + y**2)
+    share = float(f[x * x + y * y < 1.0].sum()) / 500.0**2
+    for azimuth in (0.0, 90.0, 180.0):
+        grid = PolarGrid("cosines", np.linspace(0.0, 2.0, 401), np.array([azimuth]))
+        values = 0.01 / (0.05 + grid.radial**2)
+        one = BsdfSlice(np.array([-sine, 0.0, 0.5]), values[None], grid=grid)
+        assert one.integral() == pytest.approx(share, rel=1e-3)
+        assert float(one.at([-0.5, 0.0, math.sqrt(0.75)])) == pytest.approx(0.01 / (0.05 + (0.5 + sine) ** 2), rel=1e-3)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("theta", "bar"), [(0, 0.005), (10, 0.005), (30, 0.005), (50, 0.005), (60, 0.005), (70, 0.005), (82.5, 0.03)]

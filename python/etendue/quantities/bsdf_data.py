@@ -284,7 +284,12 @@ class BsdfSlice:
     @functools.cached_property
     def held(self) -> Array:
         """Values of the grid, those that lie beyond the hemisphere or were not measured replaced by the last before them."""
-        known = ~(np.isnan(self.directions[..., 0]) | np.isnan(self.values))
+        assert self.grid is not None  # noqa: S101 - `at` says so
+        beyond = np.isnan(self.directions[..., 0])
+        if self.grid.azimuth.size == 1:
+            # It stands for all azimuths, some of which reach farther within the hemisphere than its own.
+            beyond = self.grid.radial > _reach(self.grid, self)
+        known = ~(beyond | np.isnan(self.values))
         last = np.maximum.accumulate(np.where(known, np.arange(self.values.shape[1]), -1), axis=1)
         held = np.take_along_axis(self.values, np.maximum(last, 0), axis=1)
         return np.asarray(np.where(last >= 0, held, self.values[known].min() if known.any() else np.nan))
@@ -338,6 +343,13 @@ def _around(nodes: Array, x: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[n
     i = np.searchsorted(starts, x, side="right") - 1
     following = np.append(starts[1:], 360.0)
     return i, (i + 1) % ring.size, (x - starts[i]) / (following[i] - starts[i])
+
+
+def _reach(grid: PolarGrid, one: BsdfSlice) -> float:
+    """The largest radial coordinate of any direction on the side where light leaves."""
+    if grid.frame == "cosines":
+        return 1.0 + math.hypot(one.incident[0], one.incident[1])
+    return 90.0 + (one.theta if grid.frame == "specular" else 0.0)
 
 
 NODES = 4

@@ -103,8 +103,9 @@ class BsdfTable(Bsdf):
         if self.data.slices:
             sides = [[one for one in self.data.slices if one.front is front] for front in (True, False)]
             if self.data.both_sides:
-                sides = [sides[0] or sides[1]] * 2
-            front, back = (_sheets(side, self.data) for side in sides)
+                front = back = _sheets(sides[0] or sides[1], self.data)
+            else:
+                front, back = (_sheets(side, self.data) for side in sides)
             members.append((1.0, {"kind": "table", "front": front, "back": back}))
         return members[0][1] if len(members) == 1 else {"kind": "sum", "members": members}
 

@@ -1,0 +1,53 @@
+"""Small TracePro properties of each kind of scatter, cut at every byte, and with absurd numbers."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from pathlib import Path
+
+import pytest
+from etendue.errors import EtendueError, FormatError
+from etendue.formats.bsdf import read_bsdf_data
+from oracles.tracepro_files import small_files
+
+FILES = small_files()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FILES)
+def test_cut_at_every_byte(tmp_path: Path, kind: str) -> None:
+    """An error that says so; but a file without tables that is cut after a row is a property of fewer rows."""
+    whole = FILES[kind]
+    path = tmp_path / "cut.txt"
+    path.write_bytes(whole)
+    assert read_bsdf_data(path).name == "by hand"
+    read_in_part = 0
+    for cut in range(len(whole)):
+        path.write_bytes(whole[:cut])
+        if kind in ("ABg", "elliptical ABg", "elliptical Gaussian", "1D ABg") and whole[:cut].endswith(b"\n"):
+            with contextlib.suppress(FormatError):
+                read_bsdf_data(path)
+                read_in_part += 1
+            continue
+        with pytest.raises(FormatError):
+            read_bsdf_data(path)
+    assert read_in_part <= 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FILES)
+def test_absurd_numbers(tmp_path: Path, kind: str) -> None:
+    """Each number of the last row by something absurd: a BSDF or an error of ours, and no warning."""
+    text = FILES[kind].decode()
+    path = tmp_path / "absurd.txt"
+    lines = text.splitlines()
+    sections = [k for k, line in enumerate(lines) if line.startswith("[Table") or k == len(lines) - 1]
+    # The last row of shares, and of the table.
+    for k in {max(j for j in range(end + 1) if lines[j].startswith("300")) for end in sections}:
+        fields = lines[k].split()
+        for j, absurd in itertools.product(range(len(fields)), ("0", "-1", "1e300", "1e-300", "360")):
+            changed = [*fields[:j], absurd, *fields[j + 1 :]]
+            path.write_text("\n".join([*lines[:k], " ".join(changed), *lines[k + 1 :], ""]))
+            with contextlib.suppress(EtendueError):
+                read_bsdf_data(path)
