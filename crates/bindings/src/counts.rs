@@ -15,10 +15,10 @@ use crate::surface::Part;
 fn sums(py: Python<'_>, sums: Sums) -> (Bound<'_, PyAny>, Option<Bound<'_, PyArray1<f64>>>) {
     match sums {
         Sums::Equal(counts) => (PyArray1::from_vec(py, counts).into_any(), None),
-        Sums::Weighted(sum, squares) => (
-            PyArray1::from_vec(py, sum).into_any(),
-            Some(PyArray1::from_vec(py, squares)),
-        ),
+        Sums::Weighted(sums) => {
+            let [sum, squares] = [0, 1].map(|k| PyArray1::from_iter(py, sums.iter().map(|both| both[k])));
+            (sum.into_any(), Some(squares))
+        }
     }
 }
 

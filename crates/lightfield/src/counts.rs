@@ -92,18 +92,19 @@ impl Plan {
 pub enum Sums {
     /// All rays so far have the same weight: their numbers.
     Equal(Vec<u32>),
-    /// Σ w and Σ w².
-    Weighted(Vec<f64>, Vec<f64>),
+    /// Σ w and Σ w², side by side: a ray adds to both, somewhere in a memory that no cache holds.
+    Weighted(Vec<[f64; 2]>),
 }
 
 impl Sums {
     fn add(&mut self, cells: &[u32], weights: &[f64]) {
         match self {
             Self::Equal(counts) => cells.iter().for_each(|c| counts[*c as usize] += 1),
-            Self::Weighted(sum, squares) => {
+            Self::Weighted(sums) => {
                 for (c, w) in cells.iter().zip(weights) {
-                    sum[*c as usize] += w;
-                    squares[*c as usize] += w * w;
+                    let [sum, squares] = &mut sums[*c as usize];
+                    *sum += w;
+                    *squares += w * w;
                 }
             }
         }
@@ -111,9 +112,8 @@ impl Sums {
 
     fn weighted(&mut self, weight: f64) {
         if let Self::Equal(counts) = self {
-            let sum: Vec<f64> = counts.iter().map(|n| f64::from(*n) * weight).collect();
-            let squares = sum.iter().map(|s| s * weight).collect();
-            *self = Self::Weighted(sum, squares);
+            let sum = |n: &u32| f64::from(*n) * weight;
+            *self = Self::Weighted(counts.iter().map(|n| [sum(n), sum(n) * weight]).collect());
         }
     }
 }
@@ -261,11 +261,13 @@ fn cell(value: f64, cells: f64) -> u32 {
 fn chances(seed: u64, first: u64, len: usize) -> Vec<u16> {
     let stream = Stream::new(seed, PURPOSE_HOLD_OUT);
     let last = first + len as u64;
-    let mut numbers: Vec<u16> = (first / 16..last.div_ceil(16))
-        .flat_map(|block| stream.words(block))
-        .flat_map(|word| [0, 16, 32, 48].map(|shift| (word >> shift) as u16))
-        .skip((first % 16) as usize)
-        .collect();
+    let mut numbers = Vec::with_capacity(len + 30);
+    for block in first / 16..last.div_ceil(16) {
+        for word in stream.words(block) {
+            numbers.extend([0, 16, 32, 48].map(|shift| (word >> shift) as u16));
+        }
+    }
+    numbers.drain(..(first % 16) as usize);
     numbers.truncate(len);
     numbers
 }
@@ -406,10 +408,10 @@ mod tests {
         let late = |i| if i == n - 1 { 7.0 } else { 2.5 };
         let counts = run(&bytes(n, late), 2);
         assert_eq!(counts.weight, None);
-        let Sums::Weighted(sum, squares) = &counts.grid else {
+        let Sums::Weighted(sums) = &counts.grid else {
             panic!("unequal weights")
         };
-        let (w1, w2) = (sum.iter().sum::<f64>(), squares.iter().sum::<f64>());
+        let [w1, w2] = [0, 1].map(|k| sums.iter().map(|both| both[k]).sum::<f64>());
         let met = f64::from(n) - counts.unmet_rays as f64;
         assert!((w1 - (met * 2.5 + 4.5)).abs() < 1e-6 && (w2 - (met * 6.25 + 49.0 - 6.25)).abs() < 1e-5);
     }
