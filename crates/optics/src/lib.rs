@@ -4,6 +4,8 @@
 //! reflection and refraction. `table`: quantities that depend on angle and wavelength.
 
 pub mod bsdf;
+#[cfg(test)]
+mod chi_squared;
 pub mod fresnel;
 pub mod light_sampler;
 pub mod medium;

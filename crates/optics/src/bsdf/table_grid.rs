@@ -419,8 +419,8 @@ fn rim(sine: f64, s: f64, c: f64) -> f64 {
 mod tests {
     use etendue_sampling::philox::Stream;
 
-    use super::super::tests::{CRITICAL, deviate};
     use super::*;
+    use crate::chi_squared::{CRITICAL, deviate};
 
     #[test]
     #[allow(
