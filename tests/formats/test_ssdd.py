@@ -76,6 +76,23 @@ def test_offsets_move_the_lobe_to_where_light_is_refracted(tmp_path: Path) -> No
     assert at == pytest.approx([0.25, 1.0, 0.5], abs=0.02)
 
 
+@pytest.mark.parametrize("theta", [0.0, 3.0])
+def test_offsets_across_the_normal(tmp_path: Path, theta: float) -> None:
+    """The table begins on the near side of the normal; azimuth 0 leads on towards the light, and 90° stays on the left."""
+    values = np.array([0.1, 0.2, 0.3, 0.4])[:, None, None, None] * np.array([0.0, 1.0])[:, None, None] + 0.01
+    text = block(
+        "brdf", "specular", [[theta], [30.0, 120.0], [0, 20], [0, 90, 180, 270], [-8.0]], values.repeat(2, axis=2)
+    )
+    for one in read_bsdf_data(written(tmp_path, text)).slices:
+        phi = one.phi
+        middle = direction(8.0 - theta, phi)
+        assert float(one.at(middle)) == pytest.approx(0.01, abs=0.004)
+        assert float(one.at(direction(28.0 - theta, phi))) == pytest.approx(0.11, abs=0.004)
+        assert float(one.at(direction(12.0 + theta, phi + 180.0))) == pytest.approx(0.31, abs=0.004)
+        left = math.cos(math.radians(20)) * middle + math.sin(math.radians(20)) * direction(90.0, phi + 90.0)
+        assert float(one.at(left)) == pytest.approx(0.21, abs=0.004)
+
+
 def test_half_vectors(tmp_path: Path) -> None:
     """A function of the half angle, and of φd on both halves of a turn, read back at directions of ours."""
     h, d, p = np.linspace(0, 90, 46), np.linspace(0, 90, 31), np.linspace(0, 360, 73)

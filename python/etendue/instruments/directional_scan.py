@@ -17,7 +17,7 @@ from etendue.formats.scans_csv import DIRECTIONS, ERROR, POLAR, read_columns, re
 from etendue.instruments.bench import Bench
 from etendue.instruments.goniometer_scan import GoniometerScan, Way, flux_of_unit_bsdf, known_of, read_goniometer_scan
 from etendue.instruments.lobe_table import polar_slice
-from etendue.quantities.bsdf_data import BsdfSlice, direction
+from etendue.quantities.bsdf_data import BsdfSlice, direction, light_from
 
 Array = npt.NDArray[np.float64]
 
@@ -132,7 +132,7 @@ class DirectionalScan:
     @property
     def incident(self) -> Array:
         """To where the light comes from, shape (3,)."""
-        return direction(self.incidence, 180.0)
+        return light_from(self.incidence, 180.0)
 
     @property
     def regular(self) -> Array:

@@ -16,7 +16,7 @@ from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, POSITIONS, read_columns, read_remarks
 from etendue.instruments.positions import Plane, detector_directions
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_data import light_from
 from etendue.scatter.scans.scans import Scans
 
 Array = npt.NDArray[np.float64]
@@ -224,7 +224,7 @@ class GoniometerScan:
         """
         if not self.sample or self.way == "transmitted":
             raise ArgumentError("scans for tables are of light that a sample reflects")
-        incident = np.tile(direction(self.incidence, 180.0), (self.angle.size, 1))
+        incident = np.tile(light_from(self.incidence, 180.0), (self.angle.size, 1))
         scattered = detector_directions(self.angle, self.incidence, self.plane, behind=False)
         return Scans(incident, scattered, self.bsdf, self.bsdf_error)
 

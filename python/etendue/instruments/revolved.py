@@ -8,7 +8,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.instruments.goniometer_scan import GoniometerScan, cubic
 from etendue.instruments.operators import middle_of
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.scatter.table import BsdfTable
 
 Array = npt.NDArray[np.float64]
@@ -77,5 +77,5 @@ def revolved(
     both = np.append(np.maximum(both, 0.0), 0.0)
     grid = PolarGrid("specular", radial, np.zeros(1))
     behind = scan.way == "transmitted"
-    one = BsdfSlice(direction(0.0, 180.0), both[None, :], behind, grid=grid)
+    one = BsdfSlice(light_from(0.0, 180.0), both[None, :], behind, grid=grid)
     return BsdfTable(BsdfData((one,), name=name))

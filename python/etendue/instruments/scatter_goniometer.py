@@ -24,7 +24,7 @@ from etendue.instruments.positions import (
 from etendue.instruments.ray_counting import counted_flux
 from etendue.instruments.sight_quadrature import integrated_flux
 from etendue.instruments.turned_sample import TurnedSample
-from etendue.quantities.bsdf_data import BsdfSlice, direction
+from etendue.quantities.bsdf_data import BsdfSlice, direction, light_from
 from etendue.scatter.bsdf import Bsdf
 
 Array = npt.NDArray[np.float64]
@@ -329,7 +329,7 @@ class ScatterGoniometer:
         per = self.solid_angle * np.abs(flat[:, 2])
         shape = grid.shape
         return BsdfSlice(
-            direction(theta, 180.0),
+            light_from(theta, 180.0),
             (flux / per).reshape(shape),
             behind,
             grid=grid,

@@ -27,6 +27,10 @@ GRID_FRAMES: tuple[str, ...] = get_args(GridFrame)
 GRAZING = 1e-9
 """Heights below which a direction lies in the surface."""
 
+LEAN = 1e-100
+"""Sine of the angle of light that comes along the normal and keeps an azimuth: its square is still a number that is not 0
+(they begin at 1e-308), and the cosine beside it is 1 exactly."""
+
 
 def direction(theta: npt.ArrayLike, phi: npt.ArrayLike, *, behind: bool = False) -> Array:
     """Unit vectors at angles θ [°] from the normal of a side and azimuths φ [°] from +x towards +y.
@@ -50,6 +54,36 @@ def direction(theta: npt.ArrayLike, phi: npt.ArrayLike, *, behind: bool = False)
     t, p = np.broadcast_arrays(np.radians(theta), np.radians(phi))
     height = -np.cos(t) if behind else np.cos(t)
     return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), height], axis=-1)
+
+
+def light_from(theta: float, phi: float, *, behind: bool = False) -> Array:
+    """To where light comes from at an angle θ [°] from the normal of a side and an azimuth φ [°], also along the normal.
+
+    There light comes from no azimuth, but what a file says of it counts from the plane of incidence in which it was
+    measured. So the direction leans towards φ, by `LEAN`, which is lost in any sum.
+
+    Parameters
+    ----------
+    theta, phi : float
+        As of `direction`, of one direction.
+    behind : bool
+        Whether the light meets the back.
+
+    Returns
+    -------
+    array, shape (3,)
+
+    Examples
+    --------
+    >>> grid = PolarGrid("specular", [0.0, 90.0], [0.0])
+    >>> one, other = (BsdfSlice(light_from(0.0, phi), [[0.1, 0.1]], grid=grid) for phi in (90.0, 180.0))
+    >>> one.theta, one.phi, other.phi
+    (0.0, 90.0, 180.0)
+    """
+    found = direction(theta, phi, behind=behind)
+    if not found[:2].any():
+        found[:2] = LEAN * np.cos(np.radians(phi)), LEAN * np.sin(np.radians(phi))
+    return found
 
 
 def mirrored(incident: npt.ArrayLike) -> Array:
@@ -77,7 +111,8 @@ class PolarGrid:
         s × e. If s is the normal, e points to −β₀ of a slightly larger incidence at the same azimuth.
         ``"cosines"``: it is |β − β₀|, β and β₀ being the projections of the scattered and the specular direction on the
         surface, and the azimuth [°] turns from the direction of β₀ towards +90° about +z (Harvey and Shack). At normal
-        incidence the direction of β₀ is that of a slightly larger incidence at the same azimuth.
+        incidence the direction of β₀ is that of a slightly larger incidence at the same azimuth, if `light_from` made the
+        incident direction; if it is the normal exactly, light counts as from azimuth 0, and β₀ points to −x.
     radial : array, shape (n,)
         Increasing, not negative.
     azimuth : array, shape (m,)
@@ -179,7 +214,7 @@ class BsdfSlice:
     Parameters
     ----------
     incident : array, shape (3,)
-        Unit vector to where the light comes from.
+        Unit vector to where the light comes from; along the normal as `light_from` has it, to keep its azimuth.
     values : array
         f [1/sr], the cosine not included: shape (m, n) on a `PolarGrid` of m azimuths and n radial coordinates, or (n,) at
         single `points`. NaN: not measured.
@@ -245,11 +280,14 @@ class BsdfSlice:
     @property
     def theta(self) -> float:
         """Angle of incidence [°], from the normal of the side that the light meets."""
-        return math.degrees(math.atan2(math.hypot(self.incident[0], self.incident[1]), abs(self.incident[2])))
+        sine = math.hypot(self.incident[0], self.incident[1])
+        return math.degrees(math.atan2(sine, abs(self.incident[2]))) if sine > 2.0 * LEAN else 0.0
 
     @property
     def phi(self) -> float:
-        """Azimuth of the incident direction [°], 0 to 360."""
+        """Azimuth of the incident direction [°], 0 to 360; 0 of the normal exactly."""
+        if not self.incident[:2].any():
+            return 0.0
         return math.degrees(math.atan2(self.incident[1], self.incident[0])) % 360.0
 
     @property

@@ -14,7 +14,7 @@ from etendue.description.tables import constant, on_common_nodes
 from etendue.errors import ArgumentError
 from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data, write_bsdf_shares
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, ShareTables
-from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_data import LEAN, BsdfData
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf
 from etendue.scatter.models import MODELS
@@ -110,7 +110,12 @@ class _Asked:
     def evaluate(
         self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None
     ) -> npt.NDArray[np.float64]:
-        return self._bsdf.evaluate(incident, scattered, wavelength=WAVELENGTH if wavelength is None else wavelength)
+        i = np.asarray(incident, np.float64)
+        if not self.isotropic:
+            # Along the normal a sample that can be turned sees light from no azimuth: nothing is to be interpolated there.
+            along = np.hypot(i[..., 0], i[..., 1]) <= 2.0 * LEAN
+            i = np.where(along[..., None], i * [0.0, 0.0, 1.0], i)
+        return self._bsdf.evaluate(i, scattered, wavelength=WAVELENGTH if wavelength is None else wavelength)
 
 
 def write_bsdf(path: str | os.PathLike[str], bsdf: Bsdf, format: str | None = None) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -65,6 +66,10 @@ def lobes_of(
     on in proportion to that of the slice before; that of the first is held constant. Single points stand for what is nearest
     to them. If incidences are not known at the same azimuths, f is interpolated between azimuths, turned with them.
 
+    Light along the normal comes from no azimuth. Unless the sample is isotropic, f stays where it is in the frame of the
+    sample: there is a row at azimuth 0, from which the core takes such light to come, and if no slice is known there, the
+    mean of those of the least incidence stands for it. Of several the first counts.
+
     Parameters
     ----------
     slices : sequence of BsdfSlice
@@ -90,24 +95,28 @@ def lobes_of(
     for one, share in zip(slices, shares, strict=True):
         phi = 0.0 if isotropic or one.theta < NORMAL else round(one.phi, 6) % 360.0
         by_theta.setdefault(round(one.theta, 6), {}).setdefault(phi, (one, share))
-    oblique = [known for theta, known in by_theta.items() if theta >= NORMAL]
-    most = max((len(known) for known in oblique), default=0)
-    rows = sorted(next(known for known in oblique if len(known) == most)) if oblique else [0.0]
+    oblique = [by_theta[theta] for theta in sorted(by_theta) if theta >= NORMAL]
+    rows = _rows(oblique, isotropic=isotropic)
+    unknown = not isotropic and bool(oblique) and min(by_theta) >= NORMAL
+    normal = _mean(oblique[0], radial, azimuths) if unknown else None
     found: dict[float, list[Lobe]] = {}
     kept: dict[tuple[float, float], Array] = {}
     for row in rows:
         before: Array | None = None
         lobes = []
+        if normal is not None:
+            before = _swung(normal[0], row)
+            lobes.append(_lobe(0.0, radial, before, normal[1], floor=float(before.min())))
         for theta in sorted(by_theta):
             known = by_theta[theta]
             f, share, sine = np.zeros((azimuths, radial.size)), 0.0, 0.0
             for phi, part in [(row, 1.0)] if theta < NORMAL else _around(sorted(known), row):
                 one, own = known[0.0] if theta < NORMAL else known[phi]
                 if (theta, phi) not in kept:
-                    turned = one.phi if isotropic and theta >= NORMAL else phi
+                    turned = _plane(one, oblique) if isotropic else phi
                     kept[theta, phi] = _values(one, _directions(one, radial, azimuths, turned))
                 f, share = f + part * kept[theta, phi], share + part * own
-                sine = float(np.hypot(one.incident[0], one.incident[1]))
+                sine = math.sin(math.radians(one.theta))
             if mirrored:
                 f = 0.5 * (f + f[(-np.arange(azimuths)) % azimuths])
             before = _continued(f, before)
@@ -118,6 +127,47 @@ def lobes_of(
 
 NORMAL = 1e-4
 """Angles of incidence [°] below which light comes along the normal, and from no azimuth."""
+
+TURN = 10.0
+"""Between rows [°] where light was measured along the normal alone."""
+
+Known = dict[float, tuple[BsdfSlice, float]]
+"""Slices of one angle of incidence, with what they scatter of the flux, by azimuth [°]."""
+
+
+def _rows(oblique: Sequence[Known], *, isotropic: bool) -> list[float]:
+    """Azimuths of incidence [°]: all that are known where most are; and 0."""
+    if not oblique:
+        return [0.0] if isotropic else np.arange(0.0, 360.0, TURN).tolist()
+    most = max(len(known) for known in oblique)
+    rows = set(next(known for known in oblique if len(known) == most))
+    return sorted(rows if isotropic else rows | {0.0})
+
+
+def _plane(one: BsdfSlice, oblique: Sequence[Known]) -> float:
+    """The azimuth [°] from which the light of a slice comes, if that of others does not matter.
+
+    Along the normal a grid that counts from the plane of incidence knows its own. If directions stand for themselves, the
+    plane is that of the other slices, whatever azimuth was written down.
+    """
+    itself = one.grid is None or one.grid.frame == "normal"
+    if one.theta < NORMAL and itself and oblique:
+        return next(iter(oblique[0].values()))[0].phi
+    return one.phi
+
+
+def _mean(known: Known, radial: Array, azimuths: int) -> tuple[Array, float]:
+    """The mean of slices from several azimuths, moved to the normal: f from azimuth 180° of β − β₀ on, and the share."""
+    moved = [_continued(_values(one, _directions(one, radial, azimuths, 0.0)), None) for one, _ in known.values()]
+    return np.mean(moved, axis=0), float(np.mean([share for _, share in known.values()]))
+
+
+def _swung(f: Array, row: float) -> Array:
+    """What a row at another azimuth of incidence holds of f of light along the normal, from 180° on; linear in azimuth."""
+    place = np.arange(len(f)) + row * len(f) / 360.0
+    low = np.floor(place).astype(np.intp)
+    part = (place - low)[:, None]
+    return np.asarray((1.0 - part) * f[low % len(f)] + part * f[(low + 1) % len(f)])
 
 
 def _around(known: list[float], wanted: float) -> list[tuple[float, float]]:

@@ -15,7 +15,7 @@ from etendue.formats.bsdf.points import slices_of
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number, whole
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -162,7 +162,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
         for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
             for turn in turns if is_there else ():
                 for theta in bsdf.incidences:
-                    incident = direction(theta, (180.0 + turn) % 360.0, behind=not front)
+                    incident = light_from(theta, (180.0 + turn) % 360.0, behind=not front)
                     grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP))
                     scattered = grid.directions(incident, transmitted=transmitted)
                     slices.append(BsdfSlice(incident, bsdf.evaluate(incident, scattered), transmitted, grid=grid))

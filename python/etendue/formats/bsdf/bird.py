@@ -15,7 +15,7 @@ from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.points import slices_of
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.strict_json import strict_json
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -179,7 +179,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     slices = []
     for turn in (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN)):
         for theta in bsdf.incidences:
-            incident = direction(theta, (180.0 + turn) % 360.0)
+            incident = light_from(theta, (180.0 + turn) % 360.0)
             grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP))
             f = bsdf.evaluate(incident, grid.directions(incident, transmitted=False))
             slices.append(BsdfSlice(incident, f, grid=grid))

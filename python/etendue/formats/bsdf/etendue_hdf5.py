@@ -14,7 +14,7 @@ from etendue.errors import ArgumentError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.hdf5 import LIBRARY, SIGNATURE, Node, put, reading
 from etendue.formats.strict_json import strict_json
-from etendue.quantities.bsdf_data import GRID_FRAMES, BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import GRID_FRAMES, BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 
 KIND, VERSION = "etendue BSDF", 1
@@ -91,7 +91,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     backs = (False,) if bsdf.both_sides else (False, True)
     colours: tuple[float | None, ...] = bsdf.wavelengths or (None,)
     for behind, way, phi, theta, colour in itertools.product(backs, ways, phis, bsdf.incidences, colours):
-        incident = direction(theta, phi, behind=behind)
+        incident = light_from(theta, phi, behind=behind)
         d = grid.directions(incident, transmitted=way)
         there = ~np.isnan(d[..., 0])
         values = np.full(grid.shape, np.nan)

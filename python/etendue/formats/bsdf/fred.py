@@ -15,7 +15,7 @@ from etendue.formats.bsdf.points import on_grid
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -143,7 +143,7 @@ def _slices(path: Path, block: Block, scale: float, *, mirrored: bool) -> list[B
             azimuth = np.concatenate([azimuth, 2.0 * turn + 360.0 - azimuth[inner][::-1]])
             values = np.concatenate([values, values[inner][::-1]])
         grid = PolarGrid("normal", radial, azimuth)
-        found.append(BsdfSlice(direction(theta, (180.0 + turn) % 360.0), values, transmitted, grid=grid))
+        found.append(BsdfSlice(light_from(theta, (180.0 + turn) % 360.0), values, transmitted, grid=grid))
     return found
 
 
@@ -171,7 +171,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
         radial = THETA[:-1] if transmitted else THETA
         for turn, theta in itertools.product(turns if is_there else (), bsdf.incidences):
-            incident = direction(theta, (180.0 + turn) % 360.0)
+            incident = light_from(theta, (180.0 + turn) % 360.0)
             grid = PolarGrid("normal", radial, np.arange(0.0, 360.0, PHI_STEP) + turn)
             scattered = direction(np.minimum(radial, 90.0 - 1e-7)[None, :], grid.azimuth[:, None], behind=transmitted)
             slices.append(BsdfSlice(incident, bsdf.evaluate(incident, scattered), transmitted, grid=grid))

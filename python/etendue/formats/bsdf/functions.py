@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, light_from
 
 Array = npt.NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def sampled(
     found = []
     grid = PolarGrid("specular", RADIAL, np.arange(0.0, 360.0, AZIMUTH_STEP))
     for theta, phi in incidences:
-        incident = direction(theta, phi)
+        incident = light_from(theta, phi)
         scattered = grid.directions(incident, transmitted=transmitted)
         there = ~np.isnan(scattered[..., 0])
         values = np.full(grid.shape, np.nan)

@@ -15,7 +15,7 @@ from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.window_xml import DAMAGED, WAYS, azimuth_of, block_of, document, read_window
 from etendue.formats.rays.text_rows import number
 from etendue.formats.xml_tree import Element
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -156,7 +156,7 @@ def _slices(
     thetas, phis = incident.centres
     return [
         BsdfSlice(
-            direction(theta, azimuth_of(phi + 180.0), behind=not front),
+            light_from(float(theta), float(azimuth_of(phi + 180.0)), behind=not front),
             column,
             transmitted,
             points=points,
@@ -203,7 +203,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
                 order = np.arange(theta.size) * 7 % theta.size
                 incident = direction(theta[order], azimuth_of(phi[order] + 180.0), behind=not front)
                 values = bsdf.evaluate(incident, scattered).mean(axis=1)
-                centre = direction(thetas[k], azimuth_of(phis[k] + 180.0), behind=not front)
+                centre = light_from(float(thetas[k]), float(azimuth_of(phis[k] + 180.0)), behind=not front)
                 points = _points(basis, behind=behind)
                 slices.append(BsdfSlice(centre, values, transmitted, points=points, projected=basis.projected))
     return BsdfData(tuple(slices), isotropic=False, mirrored=False, both_sides=False, name=bsdf.name)

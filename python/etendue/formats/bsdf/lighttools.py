@@ -12,7 +12,7 @@ import numpy.typing as npt
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.shares import disagreements
 from etendue.formats.bsdf.tokens import Tokens
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -150,7 +150,7 @@ def _slice(
     if theta < 0.0:
         tokens.refuse(f"the angle of incidence is {theta:g}°")
     return BsdfSlice(
-        direction(theta, (INCIDENT + block.get("POI", 0.0)) % 360.0, behind=block.get("Side", "Front") == "Back"),
+        light_from(theta, (INCIDENT + block.get("POI", 0.0)) % 360.0, behind=block.get("Side", "Front") == "Back"),
         values,
         block.get("ScatterType", "BRDF") == "BTDF",
         grid=grid,
@@ -183,7 +183,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
         for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
             for turn in turns if is_there else ():
                 for theta in bsdf.incidences:
-                    incident = direction(theta, (INCIDENT + turn) % 360.0, behind=not front)
+                    incident = light_from(theta, (INCIDENT + turn) % 360.0, behind=not front)
                     # Along the surface, where a BSDF may have no value: just above it.
                     behind = front == transmitted
                     polar = np.minimum(THETA, RIGHT_ANGLE - 1e-7)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction, light_from
 
 Array = npt.NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def slices_of(
         own = (np.abs(of - key) < 2.0).all(axis=1)
         theta, phi = angles[np.flatnonzero(own)[0], :2]
         behind = bool(theta > 90.0)
-        incident = direction(180.0 - theta if behind else theta, phi, behind=behind)
+        incident = light_from(180.0 - theta if behind else theta, phi, behind=behind)
         for transmitted in (False, True):
             below = behind != transmitted
             there = own & ((angles[:, 2] > 90.0) == below)

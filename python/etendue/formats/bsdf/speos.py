@@ -12,7 +12,7 @@ from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.tokens import ADVICE, Tokens
 from etendue.formats.encodings import decoded
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
 from etendue.quantities.report import Complaint
 from etendue.quantities.spectrum import photopic_efficiency
 
@@ -148,7 +148,7 @@ def slice_of(tokens: Tokens, theta: float, turn: float, transmitted: bool, *, in
         with np.errstate(divide="ignore", invalid="ignore"):
             values = np.where(cosine > 1e-6, values / cosine, np.nan)
     grid = PolarGrid("normal", polar, phi + turn)
-    return BsdfSlice(direction(theta, (180.0 + turn) % 360.0), np.maximum(values, 0.0).T, transmitted, grid=grid)
+    return BsdfSlice(light_from(theta, (180.0 + turn) % 360.0), np.maximum(values, 0.0).T, transmitted, grid=grid)
 
 
 def _scaled(
@@ -200,7 +200,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
         for turn in turns if is_there else ():
             for theta in bsdf.incidences:
-                incident = direction(theta, 180.0 + turn)
+                incident = light_from(theta, 180.0 + turn)
                 grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP) + turn)
                 # Along the surface, where a BSDF may have no value: just above it.
                 scattered = direction(

@@ -14,7 +14,7 @@ from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.speos import PHI_STEP, THETA, WAYS, flag, past_header, slice_of, table_rows
 from etendue.formats.bsdf.tokens import Tokens
 from etendue.formats.encodings import decoded
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
 
 Array = npt.NDArray[np.float64]
 
@@ -110,7 +110,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
         scattered = direction(polar[None, :], grid.azimuth[:, None], behind=transmitted)
         for theta, wave in itertools.product(bsdf.incidences if is_there else (), bsdf.wavelengths or (None,)):
-            incident = direction(theta, 180.0)
+            incident = light_from(theta, 180.0)
             values = bsdf.evaluate(incident, scattered, wavelength=wave)
             slices.append(BsdfSlice(incident, values, transmitted, grid=grid, wavelength=wave))
     return BsdfData(tuple(slices), isotropic=True, mirrored=False, name=bsdf.name)

@@ -18,7 +18,7 @@ from etendue.formats.bsdf.functions import AZIMUTH_STEP, RADIAL, sampled
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 from etendue.quantities.spectrum import photopic_efficiency
 
@@ -235,7 +235,7 @@ def _polar(path: Path, block: Block, values: Array) -> list[BsdfSlice]:
             if system == "normal":
                 # Counted from where the light comes from, unless the azimuth of incidence is stated.
                 found.append(
-                    BsdfSlice(direction(theta, phi), table, transmitted, grid=PolarGrid("normal", radial, around))
+                    BsdfSlice(light_from(theta, phi), table, transmitted, grid=PolarGrid("normal", radial, around))
                 )
                 continue
             if transmitted:
@@ -248,7 +248,7 @@ def _polar(path: Path, block: Block, values: Array) -> list[BsdfSlice]:
             grid = PolarGrid("specular", radial, around)
             offset = float(offsets[i]) if offsets.size else 0.0
             if offset == 0.0:
-                found.append(BsdfSlice(direction(theta, phi), table, transmitted, grid=grid))
+                found.append(BsdfSlice(light_from(theta, phi), table, transmitted, grid=grid))
             else:
                 found.append(_beside(float(theta), float(phi), offset, grid, table, transmitted=transmitted))
     if not found:
@@ -258,7 +258,10 @@ def _polar(path: Path, block: Block, values: Array) -> list[BsdfSlice]:
 
 def _beside(theta: float, phi: float, offset: float, grid: PolarGrid, table: Array, *, transmitted: bool) -> BsdfSlice:
     """A table about a direction in the plane of incidence that lies beside the specular one."""
-    lobe = BsdfSlice(direction(theta + offset, phi), table, transmitted, grid=grid)
+    # Across the normal light comes from the opposite azimuth, from which azimuths of the grid would count.
+    turn = 180.0 if theta + offset < 0.0 else 0.0
+    around = PolarGrid("specular", grid.radial, grid.azimuth + turn)
+    lobe = BsdfSlice(light_from(abs(theta + offset), phi + turn), table, transmitted, grid=around)
     (one,) = sampled(lambda _, s: lobe.at(s), [(theta, phi)], transmitted=transmitted)
     return one
 
@@ -346,7 +349,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
         for turn in ((0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))) if is_there else ():
             for theta in bsdf.incidences:
-                incident = direction(theta, turn)
+                incident = light_from(theta, turn)
                 scattered = grid.directions(incident, transmitted=transmitted)
                 beyond = np.isnan(scattered[..., 0])
                 scattered[beyond] = [0.0, 0.0, -1.0 if transmitted else 1.0]

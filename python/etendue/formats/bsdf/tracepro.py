@@ -27,7 +27,7 @@ from etendue.formats.bsdf.tracepro_lines import (
 )
 from etendue.formats.bsdf.tracepro_models import Numbers, Way, forwards, made
 from etendue.formats.bsdf.tracepro_readings import readings
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -241,7 +241,7 @@ def fits(data: BsdfData) -> bool:
     first = data.slices[0].grid if data.slices else None
     if first is None or data.components or first.frame != "cosines":
         return False
-    azimuth = first.azimuth + forwards(data.slices[0].incident, turning=data.isotropic)
+    azimuth = first.azimuth + forwards(data.slices[0].phi, turning=data.isotropic)
     return all(_complete([one for one in data.slices if one.front is front]) for front in (True, False)) and all(
         one.grid is not None
         and one.grid.frame == "cosines"
@@ -249,7 +249,7 @@ def fits(data: BsdfData) -> bool:
         and one.wavelength is None
         and np.array_equal(one.grid.radial, first.radial)
         and one.grid.azimuth.size == first.azimuth.size
-        and np.allclose(one.grid.azimuth + forwards(one.incident, turning=data.isotropic), azimuth, atol=1e-6)
+        and np.allclose(one.grid.azimuth + forwards(one.phi, turning=data.isotropic), azimuth, atol=1e-6)
         and not np.isnan(one.values).any()
         for one in data.slices
     )
@@ -270,8 +270,9 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
             for turn, theta in itertools.product(turns if is_there else (), bsdf.incidences):
                 if theta < NORMAL and turn:
                     continue  # light along the normal comes from no azimuth
-                incident = direction(theta, (180.0 + turn) % 360.0, behind=not front)
-                start = forwards(incident, turning=bsdf.isotropic)
+                light = (180.0 + turn) % 360.0
+                incident = light_from(theta, light, behind=not front)
+                start = forwards(light, turning=bsdf.isotropic)
                 grid = PolarGrid("cosines", BETA, np.arange(0.0, 360.0, AZIMUTH_STEP) - start)
                 scattered = grid.directions(incident, transmitted=transmitted)
                 beyond = np.isnan(scattered[..., 0])
@@ -302,7 +303,7 @@ def _section(data: BsdfData, *, front: bool) -> Iterator[str]:
     """Shares and tables of light that meets one side; of a side without slices all is absorbed."""
     grid = data.slices[0].grid
     assert grid is not None  # noqa: S101 - `fits` says so
-    azimuth = np.round(grid.azimuth + forwards(data.slices[0].incident, turning=data.isotropic), 9)
+    azimuth = np.round(grid.azimuth + forwards(data.slices[0].phi, turning=data.isotropic), 9)
     own = [one for one in data.slices if one.front is front]
     tables: dict[tuple[float, float], dict[bool, BsdfSlice]] = {}
     turns = sorted({_turn(one, data) for one in data.slices if one.theta >= NORMAL}) or [0.0]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from etendue.errors import UnsupportedFormatError
 from etendue.formats.bsdf.tracepro_lines import NORMAL, Lines, Rows
 from etendue.formats.bsdf.tracepro_readings import Reading
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -283,21 +283,18 @@ def _slices(
         for angle, around in itertools.product(theta, phi if turned else phi[:1]):
             if angle < NORMAL and around != phi[0]:
                 continue
-            incident = direction(angle, (180.0 + (around if turned else 0.0)) % 360.0, behind=not way.front)
-            start = forwards(incident, turning=not turned)
+            azimuth = (180.0 + (around if turned else 0.0)) % 360.0
+            incident = light_from(angle, azimuth, behind=not way.front)
+            start = forwards(azimuth, turning=not turned)
             values = _sampled(reading, numbers.at(colour, float(angle), float(around)), nodes, start)
             grid = PolarGrid("cosines", nodes.radial, nodes.azimuth)
             nanometres = float(wavelength) if coloured else None
             yield BsdfSlice(incident, values, way.transmitted, grid=grid, wavelength=nanometres)
 
 
-def forwards(incident: Array, *, turning: bool) -> float:
-    """The azimuth [°] of the forward direction as the file counts it, from the local x axis."""
-    if turning:
-        return FLOATING
-    # Of light along the normal a grid counts from −x.
-    oblique = np.hypot(incident[0], incident[1]) > 0.0
-    return float(np.degrees(np.arctan2(incident[1], incident[0])) - 180.0) % 360.0 if oblique else 180.0
+def forwards(phi: float, *, turning: bool) -> float:
+    """The azimuth [°] of the forward direction, from the local x axis as the file counts; light comes from azimuth `phi`."""
+    return FLOATING if turning else (phi - 180.0) % 360.0
 
 
 def _sampled(reading: Reading, numbers: Array, nodes: _Nodes, start: float) -> Array:

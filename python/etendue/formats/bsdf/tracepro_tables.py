@@ -9,7 +9,7 @@ from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.tokens import ADVICE
 from etendue.formats.bsdf.tracepro_lines import NORMAL, TABLE_COLUMNS, Lines, Rows, once_at_the_normal
 from etendue.formats.bsdf.tracepro_models import forwards
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, light_from
 
 Array = npt.NDArray[np.float64]
 
@@ -74,8 +74,9 @@ def slices_of(lines: Lines, blocks: dict[Key, Rows], *, front: bool, turning: bo
             raise lines.refuse(at, f"azimuths at {theta:g}° span more than a turn")
         if np.ptp(azimuth) == 360.0:
             azimuth, values = azimuth[:-1], values[:, :-1]
-        incident = direction(theta, (180.0 + (0.0 if turning else phi)) % 360.0, behind=not front)
-        grid = PolarGrid("cosines", beta, azimuth - forwards(incident, turning=turning))
+        light = (180.0 + (0.0 if turning else phi)) % 360.0
+        incident = light_from(theta, light, behind=not front)
+        grid = PolarGrid("cosines", beta, azimuth - forwards(light, turning=turning))
         for transmitted in (False, True):
             f = np.maximum(values[int(transmitted)], 0.0)
             colour = 1e3 * wavelength if several else None

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.shares import disagreements
 from etendue.formats.bsdf.tokens import Tokens
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -83,7 +83,7 @@ def read(path: Path) -> BsdfData:
                 slices.append(
                     BsdfSlice(
                         # A sample turned counter-clockwise sees the light come from where it is turned away from.
-                        direction(theta, (180.0 - rotation) % 360.0),
+                        light_from(theta, (180.0 - rotation) % 360.0),
                         np.maximum(values, 0.0)[order],
                         transmitted,
                         grid=grid,
@@ -142,7 +142,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     slices = []
     for phi in phis:
         for theta in bsdf.incidences:
-            incident = direction(theta, phi)
+            incident = light_from(theta, phi)
             scattered = grid.directions(incident, transmitted=transmitted)
             beyond = np.isnan(scattered[..., 0])
             scattered[beyond] = [0.0, 0.0, -1.0 if transmitted else 1.0]

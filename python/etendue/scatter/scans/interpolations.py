@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.scatter.scans import harvey_shack
-from etendue.scatter.scans.scans import Scans
+from etendue.scatter.scans.scans import SAME, Scans
 
 Array = npt.NDArray[np.float64]
 Interpolation = Callable[[Array, Array, Array, Array], tuple[Array, Array | None]]
@@ -169,12 +169,13 @@ def _apart(a: Array, b: float) -> Array:
 
 
 def _arms(r: Array, a: Array) -> Array:
-    """Azimuths of the scans, with their mirror images."""
+    """Azimuths of the scans, with their mirror images if they lie on one side of the plane of incidence."""
     if r.size < 2:
         raise ArgumentError("fewer than two values beside the specular direction: nothing to interpolate")
+    one_side = any((_apart(a, middle) < 90.0 + ON_ARM).all() for middle in (90.0, 270.0))
     found: list[float] = []
     for azimuth in a[np.argsort(-r)].tolist():
-        for each in (azimuth % 360.0, -azimuth % 360.0):
+        for each in (azimuth % 360.0, -azimuth % 360.0)[: 2 if one_side else 1]:
             if all(_apart(np.array(each), other) >= ON_ARM for other in found):
                 found.append(each)
     if len(found) < 2 or len(found) > 72:
@@ -298,7 +299,11 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
         raise UnknownNameError("method of interpolation", method, METHODS)
     radial = radial_coordinates(smallest)
     slices = []
-    for incident, own in scans.by_incidence():
+    groups = scans.by_incidence()
+    turns = {round(phi % 360.0, 4) % 360.0 for incident, _ in groups if (phi := _azimuth(incident)) is not None}
+    for measured, own in groups:
+        # If the sample was not turned, the plane of incidence is the same along the normal.
+        incident = light_from(0.0, *turns) if len(turns) == 1 and _azimuth(measured) is None else measured
         # The azimuth of PolarGrid counts from the forward direction, that of Harvey and Shack from 90° before it.
         grid = PolarGrid("cosines", radial, np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False, dtype=np.float64))
         at = grid.directions(incident, transmitted=False)
@@ -318,5 +323,10 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
             factor = scans.reflectance / share
         scaled = None if errors is None else errors * factor
         slices.append(BsdfSlice(incident, values * factor, grid=grid, stated=share, standard_error=scaled))
-    azimuths = {round(one.phi, 4) % 360.0 for one in slices if one.theta > 1e-4}
-    return BsdfData(tuple(slices), isotropic=len(azimuths) <= 1, mirrored=False, name="scans")
+    return BsdfData(tuple(slices), isotropic=len(turns) <= 1, mirrored=False, name="scans")
+
+
+def _azimuth(incident: Array) -> float | None:
+    """Of where light comes from [°]; None along the normal."""
+    across = float(np.hypot(incident[0], incident[1]))
+    return float(np.degrees(np.arctan2(incident[1], incident[0]))) if across > SAME else None
