@@ -3,7 +3,8 @@
 1. A known BRDF, 0.3/π + a Gaussian of σ = 0.15 in direction cosines with a share of 0.4, is tabled at 0, 15 … 75° in 3 136
    points each; its directional-hemispherical reflectance is held against the quadrature of the function.
 2. Samples and values per second of each model and of the table, and the chamber of thesis chapter 4 traced forwards with
-   each, all beside a Lambertian surface of the same reflectance.
+   each, all beside a Lambertian surface of the same reflectance at normal incidence: a ray, and a bounce, which is what a
+   ray takes beyond one in a black chamber, over the further surfaces that it meets.
 
 3. With `--peers` (needs `pyradiance` and `mitsuba`): the same BRDF through `pabopto2bsdf` and `bsdf2klems`; and the map of
    the chamber from 55°, 126 × 63 pixels, with a satin paint beside Mitsuba's `roughplastic` of the same reflectance at 20°
@@ -28,7 +29,10 @@ from typing import Any
 import etendue as et
 import numpy as np
 import numpy.typing as npt
+from etendue import _core
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.scatter.building import core_scene
+from etendue.scene import compile_scene
 from timing import best
 
 Array = npt.NDArray[np.float64]
@@ -75,6 +79,14 @@ def chamber(finish: Mapping[str, Any]) -> et.Scene:
         {"shape": {"kind": "disk", "radius": 21.5}, "finish": finish},
     ]
     return et.Scene(sources=lamps, surfaces=walls)
+
+
+def ways(scene: et.Scene) -> float:
+    """Ways between surfaces that a ray of the chamber goes, the last one included."""
+    rays = 2 * _core.batch_size()
+    core = core_scene({**compile_scene(scene).record, "detectors": []})
+    traced = _core.work_unit(core, rays, 1, 1 << 20, 0, 2)
+    return float(traced["ledger"]["segments"] / rays)
 
 
 def as_mountain(folder: Path) -> list[Path]:
@@ -244,6 +256,9 @@ def main() -> None:
         et.bsdf.Lambertian(reflectance=1.0).sample(direction(40.0, 0.0), SAMPLES, seed=1),
     )
     units: dict[str, tuple[float, ...]] = {}
+    black = chamber({"kind": "bsdf", "bsdf": et.bsdf.Lambertian(reflectance=0.0)})
+    et.trace(black, rays=1000, seed=1)
+    started = best(lambda: et.trace(black, rays=rays, seed=1), 3)
     for name, bsdf in bsdfs.items():
         bsdf.sample(incident, 10, seed=1)
         drawn = best(lambda bsdf=bsdf: bsdf.sample(incident, SAMPLES, seed=2), 3)
@@ -252,11 +267,13 @@ def main() -> None:
         scene = chamber(finish)
         ledger = et.trace(scene, rays=1000, seed=1).ledger
         traced = best(lambda scene=scene: et.trace(scene, rays=rays, seed=1), 3)
-        units[name] = (drawn, asked, traced)
+        bounce = (traced - started) / (ways(scene) - 1.0)
+        units[name] = (drawn, asked, traced, bounce)
         ratios = [ours / base for ours, base in zip(units[name], units["lambertian"], strict=True)]
         row(f"{name}: a sample", f"{1e9 * drawn / SAMPLES:.0f} ns", f"{ratios[0]:.1f} × lambertian")
         row(f"{name}: a value", f"{1e9 * asked / SAMPLES:.0f} ns", f"{ratios[1]:.1f} × lambertian")
         row(f"{name}: a ray of the chamber", f"{1e9 * traced / rays:.0f} ns", f"{ratios[2]:.1f} × lambertian")
+        row(f"{name}: a bounce there", f"{1e9 * bounce / rays:.0f} ns", f"{ratios[3]:.1f} × lambertian")
         assert ledger.closes  # noqa: S101 - what does not close is no benchmark
     if given.peers:
         radiance_row()
