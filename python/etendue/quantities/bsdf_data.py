@@ -27,6 +27,9 @@ GRID_FRAMES: tuple[str, ...] = get_args(GridFrame)
 GRAZING = 1e-9
 """Heights below which a direction lies in the surface."""
 
+NORMAL = 1e-4
+"""Angles of incidence [°] below which light comes along the normal, and from no azimuth."""
+
 LEAN = 1e-100
 """Sine of the angle of light that comes along the normal and keeps an azimuth: its square is still a number that is not 0
 (they begin at 1e-308), and the cosine beside it is 1 exactly."""

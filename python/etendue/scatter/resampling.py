@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfSlice
+from etendue.quantities.bsdf_data import NORMAL, BsdfSlice
 
 Array = npt.NDArray[np.float64]
 
@@ -124,9 +124,6 @@ def lobes_of(
         found[row] = lobes
     return found
 
-
-NORMAL = 1e-4
-"""Angles of incidence [°] below which light comes along the normal, and from no azimuth."""
 
 TURN = 10.0
 """Between rows [°] where light was measured along the normal alone."""

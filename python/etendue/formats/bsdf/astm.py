@@ -12,8 +12,7 @@ import numpy.typing as npt
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.points import slices_of
-from etendue.formats.bsdf.tokens import ADVICE, LARGEST
-from etendue.formats.encodings import decoded
+from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number, whole
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
@@ -40,15 +39,7 @@ def read(path: Path) -> BsdfData:
     is behind it. So the mirrored direction has φs = φi + π. Directions that make a grid in θ and φ become one; others stand
     for what is nearest to them.
     """
-    with path.open("rb") as file:
-        data = file.read(LARGEST + 1)
-    if len(data) > LARGEST:
-        raise FormatError(path, "length", "more than 256 MiB", "No measurement of a BSDF is so large.")
-    text = decoded(path, data)
-    lines = text.splitlines()
-    if not text.endswith(("\n", "\r")):
-        advice = "If it is whole, end it; if not, ask for the file again."
-        raise FormatError(path, f"line {len(lines)}", "the last line has no end", advice)
+    lines = ended_lines(path)
     facts, names, begin = _header(path, lines)
     rows = _rows(path, lines, begin, len(names), facts)
     channels, complaints = _channels(path, names, begin)

@@ -12,8 +12,7 @@ import numpy.typing as npt
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.points import on_grid
-from etendue.formats.bsdf.tokens import ADVICE, LARGEST
-from etendue.formats.encodings import decoded
+from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
 from etendue.quantities.report import Complaint
@@ -43,15 +42,7 @@ def read(path: Path) -> BsdfData:
     The light of an incidence at azimuth φ goes on towards φ: the mirrored and the straight direction have the azimuth of the
     incidence. Azimuths from 0 to 180° alone are those of a surface that is its own mirror image.
     """
-    with path.open("rb") as file:
-        data = file.read(LARGEST + 1)
-    if len(data) > LARGEST:
-        raise FormatError(path, "length", "more than 256 MiB", "No table of a BSDF is so large.")
-    text = decoded(path, data)
-    lines = text.splitlines()
-    if not text.endswith(("\n", "\r")):
-        advice = "If it is whole, end it; if not, ask for the file again."
-        raise FormatError(path, f"line {len(lines)}", "the last line has no end", advice)
+    lines = ended_lines(path)
     scale = _scale(path, lines)
     blocks, gaps = _blocks(path, lines)
     sizes = [len(points) for _, _, points in blocks]

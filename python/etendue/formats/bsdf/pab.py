@@ -10,8 +10,7 @@ import numpy as np
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
 from etendue.formats.bsdf.points import slices_of
-from etendue.formats.bsdf.tokens import ADVICE, LARGEST
-from etendue.formats.encodings import decoded
+from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number, whole
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.report import Complaint
@@ -31,15 +30,7 @@ def read(path: Path) -> BsdfData:
     Directions are away from the sample, θ from the normal of its front, beyond 90° behind it, so that the mirrored direction
     has the azimuth φ + 180°. DSF is f cosθ. Of three tristimulus values the second is read.
     """
-    with path.open("rb") as file:
-        data = file.read(LARGEST + 1)
-    if len(data) > LARGEST:
-        raise FormatError(path, "length", "more than 256 MiB", "No measurement of one incidence is so large.")
-    text = decoded(path, data)
-    lines = text.splitlines()
-    if not text.endswith(("\n", "\r")):
-        advice = "If it is whole, end it; if not, ask for the file again."
-        raise FormatError(path, f"line {len(lines)}", "the last line has no end", advice)
+    lines = ended_lines(path)
     keys: dict[str, str] = {}
     rows: list[list[float]] = []
     for at, line in enumerate(lines, 1):

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.formats.bsdf.bsdf_format import ShareTables
-from etendue.formats.bsdf.tokens import Tokens
+from etendue.formats.bsdf.tokens import UNENDED, Tokens
 from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
 
 Array = npt.NDArray[np.float64]
@@ -46,7 +46,7 @@ def require_end(path: Path, tokens: Tokens) -> None:
         file.seek(-1, 2)
         ended = file.read(1) in b"\r\n\t "
     if not ended:
-        tokens.refuse("the last line has no end", "If it is whole, end it; if not, ask for the file again.")
+        tokens.refuse("the last line has no end", UNENDED)
 
 
 def sizes(tokens: Tokens, words: int) -> tuple[int, Array]:

@@ -22,6 +22,39 @@ ODD = re.compile(r"[^0-9eE+. -]")
 
 ADVICE = "The file is damaged or cut short; ask for it again."
 
+UNENDED = "If it is whole, end it; if not, ask for the file again."
+"""What to do about a last line without an end."""
+
+
+def text_of(path: Path) -> str:
+    """The text of a file.
+
+    Raises
+    ------
+    FormatError
+        If it is larger than 256 MiB or in no known encoding.
+    """
+    with path.open("rb") as file:
+        data = file.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise FormatError(path, "length", "more than 256 MiB", "No table of a BSDF is so large.")
+    return decoded(path, data)
+
+
+def ended_lines(path: Path) -> list[str]:
+    """The lines of a file that would not show otherwise that it was cut.
+
+    Raises
+    ------
+    FormatError
+        As `text_of`, and if the last line has no end.
+    """
+    text = text_of(path)
+    lines = text.splitlines()
+    if not text.endswith(("\n", "\r")):
+        raise FormatError(path, f"line {len(lines)}", "the last line has no end", UNENDED)
+    return lines
+
 
 class Tokens:
     """The words of a file; what follows ``#`` is left out.
@@ -39,13 +72,9 @@ class Tokens:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
-        if len(data) > LARGEST:
-            raise FormatError(path, "length", "more than 256 MiB", "No table of a BSDF is so large.")
         self.words: list[str] = []
         self.lines: list[int] = []
-        for at, line in enumerate(decoded(path, data).splitlines(), 1):
+        for at, line in enumerate(text_of(path).splitlines(), 1):
             found = line.partition("#")[0].split()
             self.words += found
             self.lines += [at] * len(found)

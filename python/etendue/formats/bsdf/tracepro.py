@@ -17,7 +17,6 @@ from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.tracepro_balance import Lit, chosen, only
 from etendue.formats.bsdf.tracepro_lines import (
     COLUMNS,
-    NORMAL,
     SIDES,
     TABLE_COLUMNS,
     Lines,
@@ -27,7 +26,7 @@ from etendue.formats.bsdf.tracepro_lines import (
 )
 from etendue.formats.bsdf.tracepro_models import Numbers, Way, forwards, made
 from etendue.formats.bsdf.tracepro_readings import readings
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import NORMAL, BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError
-from etendue.formats.bsdf.tokens import ADVICE, LARGEST
-from etendue.formats.encodings import decoded
+from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number
+from etendue.quantities.bsdf_data import NORMAL
 
 Array = npt.NDArray[np.float64]
 
@@ -19,9 +19,6 @@ COLUMNS = ("Temperature", "Wavelength", "IncAngle", "AziAngle", "Abso_S", "Abso_
            "Tran_P", "PhaseRefl", "PhaseTran", "BRDF_A", "BRDF_B", "BRDF_By", "BRDF_g", "BRDF_gy", "BTDF_A", "BTDF_B",
            "BTDF_By", "BTDF_g", "BTDF_gy")  # fmt: skip
 TABLE_COLUMNS = ("Temperature", "Wavelength", "IncAngle", "AziAngle", "ScatterBeta", "ScatterAzimuth", "BRDF", "BTDF")
-
-NORMAL = 1e-4
-"""Angles of incidence [°] below which light comes along the normal, and from no azimuth."""
 
 SIDES = ("Side1_Data", "Side2_Data")
 SECTIONS = (*SIDES, "Table_BSDF_Data", "GratingData", "SAVE-DATA")
@@ -75,17 +72,7 @@ class Lines:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
-        if len(data) > LARGEST:
-            raise FormatError(path, "length", "more than 256 MiB", "No table of a BSDF is so large.")
-        text = decoded(path, data)
-        self.lines = text.splitlines()
-        if not text.endswith(("\n", "\r")):
-            place = f"line {len(self.lines)}"
-            raise FormatError(
-                path, place, "the last line has no end", "If it is whole, end it; if not, ask for the file again."
-            )
+        self.lines = ended_lines(path)
 
     def refuse(self, line: int, found: str, advice: str = ADVICE) -> FormatError:
         """What is wrong in a line, which counts from 0."""

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import UnsupportedFormatError
-from etendue.formats.bsdf.tracepro_lines import NORMAL, Lines, Rows
+from etendue.formats.bsdf.tracepro_lines import Lines, Rows
 from etendue.formats.bsdf.tracepro_readings import Reading
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import NORMAL, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]

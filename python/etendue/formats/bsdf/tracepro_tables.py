@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.tokens import ADVICE
-from etendue.formats.bsdf.tracepro_lines import NORMAL, TABLE_COLUMNS, Lines, Rows, once_at_the_normal
+from etendue.formats.bsdf.tracepro_lines import TABLE_COLUMNS, Lines, Rows, once_at_the_normal
 from etendue.formats.bsdf.tracepro_models import forwards
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import NORMAL, BsdfSlice, PolarGrid, light_from
 
 Array = npt.NDArray[np.float64]
 
