@@ -252,6 +252,9 @@ class Scene:
     def may_focus(self) -> bool:
         """Whether light can reach a diffuse surface in a way that lines of sight find by chance, or not at all."""
 
+    def window(self, view: _View) -> tuple[slice, slice]:
+        """Rows and columns of a view outside of which its lines of sight meet nothing."""
+
 @final
 class FarField:
     """Nodes of a far field [rad]: rows of γ, and the nodes C of each row."""

@@ -35,6 +35,27 @@ def seen(
     return et.luminance_map(et.Scene(**scene), observer, screen, rays_per_pixel=rays_per_pixel, seed=seed)
 
 
+def test_what_lies_beside_a_lamp_changes_no_bit_of_its_image() -> None:
+    """Only pixels whose lines may meet something are followed: a black body elsewhere widens that window, one without
+    an end makes it the whole map."""
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 7, "exponent": 2, "at": [1, 2, 0.5]}
+    near = {"kind": "surface", "shape": {"kind": "sphere", "radius": 0.02}, "flux": 1, "at": [-1, 2, 1]}
+    wall = {"shape": {"kind": "rectangle", "width": 2, "height": 1}, "finish": {"kind": "lambertian", "reflectance": 0.6},
+            "at": [0.5, 3.5, 1], "rotation": [80, 0, 10]}  # fmt: skip
+    black = {"finish": {"kind": "lambertian", "reflectance": 0}}
+    small = {"shape": {"kind": "disk", "radius": 0.1}, "at": [-6, -5, -30], **black}
+    whole = {"shape": {"kind": "plane"}, "at": [0, 0, -60], **black}
+    observer, screen = et.Observer(35, 40, 80, target=(0, 1, 0)), et.Screen(20, 16, 64, 48)
+    bare = seen(observer, screen, sources=[lamp, near], surfaces=[wall])
+    lit = np.argwhere(bare.values > 0)
+    assert lit.min() > 3
+    assert (lit.max(axis=0) < (44, 60)).all()
+    for other in (small, whole):
+        beside = seen(observer, screen, sources=[lamp, near], surfaces=[wall, other])
+        assert np.array_equal(bare.values, beside.values)
+        assert np.array_equal(bare.standard_error, beside.standard_error)
+
+
 # --- without noise ---------------------------------------------------------------------------------------------------
 
 

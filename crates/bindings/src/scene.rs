@@ -1,5 +1,6 @@
 //! A scene as Python hands it over: plain dictionaries, one for each thing, with a `kind` where there are several.
 
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use etendue_math::Vec3;
@@ -9,10 +10,10 @@ use etendue_optics::medium::{Index, Medium};
 use etendue_optics::source::{Emitter, IntensityTable, Pattern, Source, SpectralLines, SurfaceSource};
 use etendue_optics::table::Curve;
 use etendue_trace::detector::{Detector, Intensity};
-use etendue_trace::lit_scene::light_samplers;
+use etendue_trace::lit_scene::{LitScene, light_samplers};
 use etendue_trace::scene::{Scene as CoreScene, SceneFace};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PySlice};
 
 use crate::bsdf::Bsdf as BuiltBsdf;
 use crate::detector::detector;
@@ -21,6 +22,7 @@ use crate::field::LightField;
 use crate::finish::finish;
 use crate::patches::patches;
 use crate::scene_values::{Dict, face, frame, get, inner, list, optional, refuse, shape};
+use crate::view::View;
 
 fn part(dict: &Bound<'_, PyDict>) -> PyResult<SceneFace> {
     Ok(SceneFace {
@@ -182,6 +184,14 @@ impl Scene {
     /// Whether light can reach a diffuse surface in a way that lines of sight find by chance, or not at all.
     fn may_focus(&self) -> bool {
         self.core.may_focus()
+    }
+
+    /// Rows and columns of a view outside of which its lines of sight meet nothing, as slices.
+    fn window<'py>(&self, py: Python<'py>, view: View) -> (Bound<'py, PySlice>, Bound<'py, PySlice>) {
+        let view = view.core();
+        let [columns, rows] = LitScene::new(&self.core, self.light_samplers()).window(&view);
+        let slice = |range: Range<u32>| PySlice::new(py, range.start as isize, range.end as isize, 1);
+        (slice(rows), slice(columns))
     }
 
     #[new]

@@ -233,7 +233,7 @@ pub fn look_at_scene<'py>(
         guide: guide.map(Guide::core),
         glints: glints.map(Glints::core),
     };
-    let pixels = stoppable(py, |stop| {
+    let image = stoppable(py, |stop| {
         let lit = LitScene::new(scene.core(), scene.light_samplers()).until(stop);
         let survey = survey.map(Survey::core);
         inside(threads.unwrap_or(0), || {
@@ -241,14 +241,23 @@ pub fn look_at_scene<'py>(
         })
     })?;
     let shape = [view.rows as usize, view.columns as usize];
-    let array = |pick: fn(&Pixel) -> f64| PyArray1::from_iter(py, pixels.iter().map(pick)).reshape(shape);
-    Ok([
-        array(|p| p.sum)?,
-        array(|p| p.chance)?,
-        array(|p| p.deviation)?,
-        array(|p| p.met[0])?,
-        array(|p| p.met[1])?,
-    ])
+    let [columns, rows] = [&image.columns, &image.rows].map(|range| range.start as usize..range.end as usize);
+    let array = |pick: fn(&Pixel) -> f64| {
+        // Memory of zeros that nothing is written to costs nothing.
+        let array = PyArray2::zeros(py, shape, false);
+        let mut all = array.readwrite();
+        let all = all.as_slice_mut()?;
+        for (row, pixels) in rows.clone().zip(image.pixels.chunks(columns.len().max(1))) {
+            let start = row * shape[1] + columns.start;
+            for (value, pixel) in all[start..start + columns.len()].iter_mut().zip(pixels) {
+                *value = pick(pixel);
+            }
+        }
+        Ok(array)
+    };
+    let picks: [fn(&Pixel) -> f64; 5] = [|p| p.sum, |p| p.chance, |p| p.deviation, |p| p.met[0], |p| p.met[1]];
+    let arrays: Vec<_> = picks.into_iter().map(array).collect::<PyResult<_>>()?;
+    arrays.try_into().map_err(|_| PyValueError::new_err("five arrays"))
 }
 
 /// Where the first `rays` rays of a run of as many start, turn and end: one (k, 3) array each \[mm\]; a ray that escapes ends

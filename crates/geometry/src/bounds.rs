@@ -65,6 +65,18 @@ impl Bounds {
         }
     }
 
+    /// Its eight corners.
+    pub fn corners(self) -> impl Iterator<Item = Vec3> {
+        (0..8).map(move |k| {
+            let side = |bit: usize, lo: f64, hi: f64| if k >> bit & 1 == 0 { lo } else { hi };
+            Vec3::new(
+                side(0, self.lo.x, self.hi.x),
+                side(1, self.lo.y, self.hi.y),
+                side(2, self.lo.z, self.hi.z),
+            )
+        })
+    }
+
     /// Whether a point lies in the box or on its faces.
     #[must_use]
     pub fn contains(self, p: Vec3) -> bool {

@@ -48,15 +48,7 @@ impl Face {
                 hi: Vec3::new(inf, inf, inf),
             };
         }
-        let corner = |i: u32| {
-            let pick = |bit: u32, lo: f64, hi: f64| if i >> bit & 1 == 0 { lo } else { hi };
-            self.frame.point_to_world(Vec3::new(
-                pick(0, local.lo.x, local.hi.x),
-                pick(1, local.lo.y, local.hi.y),
-                pick(2, local.lo.z, local.hi.z),
-            ))
-        };
-        let bounds = Bounds::of((0..8).map(corner));
+        let bounds = Bounds::of(local.corners().map(|corner| self.frame.point_to_world(corner)));
         bounds.widened(2.0 * ROUNDING * (size(self.frame.origin) + size(local.lo) + size(local.hi)))
     }
 
@@ -156,11 +148,7 @@ impl Face {
             }
             Shape::Mesh(mesh) => {
                 // A box around the box, in the coordinates of the mesh.
-                let corner = |i: u32| {
-                    let pick = |bit: u32, lo: f64, hi: f64| if i >> bit & 1 == 0 { lo } else { hi };
-                    frame.point_to_local(Vec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z)))
-                };
-                let local = Bounds::of((0..8).map(corner));
+                let local = Bounds::of(around.corners().map(|corner| frame.point_to_local(corner)));
                 mesh.touches(local.widened(2.0 * ROUNDING * (size(frame.origin) + size(lo) + size(hi))))
             }
             Shape::Asphere(_) | Shape::Torus(_) => true,

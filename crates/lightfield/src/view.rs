@@ -1,5 +1,8 @@
 //! An observer and the pixel grid through which he looks.
 
+use std::ops::Range;
+
+use etendue_geometry::bounds::Bounds;
 use etendue_math::Vec3;
 
 /// A pixel grid in space, seen from a point. Lengths in mm.
@@ -60,6 +63,49 @@ impl View {
         let u = (place[0] / f64::from(self.columns) - 0.5) * self.width;
         let v = (0.5 - place[1] / f64::from(self.rows)) * self.height;
         (self.target + self.right * u + self.up * v - self.observer).normalized()
+    }
+
+    /// Where on the grid, in pixels as for [`View::through`], the observer sees a point; None if it is not before him.
+    #[must_use]
+    pub fn place(&self, point: Vec3) -> Option<[f64; 2]> {
+        let to = point - self.observer;
+        let t = (self.target - self.observer).dot(self.normal) / to.dot(self.normal);
+        let at = self.observer + to * t - self.target;
+        let u = at.dot(self.right) / self.width + 0.5;
+        let v = 0.5 - at.dot(self.up) / self.height;
+        let place = [u * f64::from(self.columns), v * f64::from(self.rows)];
+        (t > 0.0 && place.iter().all(|p| p.is_finite())).then_some(place)
+    }
+
+    /// The columns and the rows of all pixels through which lines from the observer may meet a box; all of them if it has no
+    /// end, or is not as a whole before the observer.
+    #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the grid"
+    )]
+    pub fn window(&self, bounds: Bounds) -> [Range<u32>; 2] {
+        let size = [self.columns, self.rows];
+        if bounds.is_empty() {
+            return [0..0, 0..0];
+        }
+        // Central projection keeps what is convex: the corners hold all that is between them.
+        let mut place = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for corner in bounds.corners() {
+            let Some(at) = self.place(corner) else {
+                return size.map(|n| 0..n);
+            };
+            for (range, at) in place.iter_mut().zip(at) {
+                *range = [range[0].min(at), range[1].max(at)];
+            }
+        }
+        // A pixel more on each side, for rounding.
+        std::array::from_fn(|k| {
+            let [low, high] =
+                [place[k][0].floor() - 1.0, place[k][1].floor() + 2.0].map(|v| v.clamp(0.0, f64::from(size[k])));
+            low as u32..high as u32
+        })
     }
 
     /// The unit vector from the centre of a pixel to the observer.
@@ -131,6 +177,41 @@ mod tests {
     fn a_parallel_line_meets_no_pixel() {
         assert_eq!(view().pixel(Vec3::new(0.0, 0.0, 3.0), Vec3::new(1.0, 0.0, 0.0)), None);
         assert_eq!(view().pixel(Vec3::new(0.0, 0.0, 9.0), Vec3::new(1.0, 0.0, 0.0)), None);
+    }
+
+    #[test]
+    fn lines_that_meet_a_box_lie_in_its_window() {
+        let v = View {
+            columns: 70,
+            rows: 60,
+            ..view()
+        };
+        let around = Bounds::of([Vec3::new(-1.0, 2.3, -4.0), Vec3::new(0.3, 3.1, 2.0)]);
+        let [columns, rows] = v.window(around);
+        assert!(columns.len() < 40 && rows.len() < 50);
+        for k in 0..20_u32.pow(3) {
+            let at = |k: u32, lo: f64, hi: f64| lo + (hi - lo) * f64::from(k % 20) / 19.0;
+            let point = Vec3::new(at(k, -1.0, 0.3), at(k / 20, 2.3, 3.1), at(k / 400, -4.0, 2.0));
+            let pixel = v.pixel(point, (v.observer - point).normalized()).expect("on the grid");
+            assert!(
+                columns.contains(&(pixel % 70)) && rows.contains(&(pixel / 70)),
+                "{point:?}"
+            );
+            let place = v.place(point).expect("before the observer");
+            assert!((v.through(place) - (point - v.observer).normalized()).length() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_window_is_whole_where_projection_does_not_tell() {
+        let v = view();
+        let all = [0..7, 0..6];
+        assert_eq!(v.window(Bounds::of([v.observer, v.target])), all);
+        assert_eq!(v.window(Bounds::EMPTY.grow(Vec3::new(f64::INFINITY, 0.0, 0.0))), all);
+        assert_eq!(v.window(Bounds::EMPTY), [0..0, 0..0]);
+        assert_eq!(v.place(v.observer + v.observer - v.target), None);
+        let beside = Bounds::of([Vec3::new(90.0, 0.0, 0.0), Vec3::new(91.0, 1.0, 0.0)]);
+        assert!(v.window(beside)[0].is_empty());
     }
 
     #[test]

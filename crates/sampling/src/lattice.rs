@@ -1,5 +1,7 @@
 //! Points that fill a cube more evenly than random ones: a rank-1 lattice, as a sequence, randomly shifted.
 
+use crate::philox::Stream;
+
 /// Generating vector of the lattice sequence, an embedded rule as in Cools, Kuo, Nuyens, "Constructing embedded lattice rules
 /// for multivariate integration", SIAM J. Sci. Comput. 28 (2006), `[Cools2006]`, found by `benchmarks/lattice_search.py`: any
 /// 2^m of its points, m from 4 to 20, are a lattice of good quality, above all dimensions 0 and 1, 2 and 3, and so on.
@@ -16,13 +18,49 @@ pub const DIMENSIONS: usize = GENERATOR.len();
 pub fn lattice_point(index: u32, shift: &[f64; DIMENSIONS]) -> [f64; DIMENSIONS] {
     // The radical inverse in base 2 orders the points so that every beginning is spread out.
     let phase = index.reverse_bits();
-    std::array::from_fn(|k| {
-        let turn = f64::from(phase.wrapping_mul(GENERATOR[k])) * (1.0 / 4_294_967_296.0) + shift[k];
-        // Both are below 1.
-        let inside = if turn >= 1.0 { turn - 1.0 } else { turn };
-        // A number that rounds to 1 or is 0 is none that others draw.
-        inside.clamp(f64::EPSILON / 2.0, 1.0 - f64::EPSILON / 2.0)
-    })
+    std::array::from_fn(|k| coordinate(phase, GENERATOR[k], shift[k]))
+}
+
+#[inline(always)]
+fn coordinate(phase: u32, generator: u32, shift: f64) -> f64 {
+    let turn = f64::from(phase.wrapping_mul(generator)) * (1.0 / 4_294_967_296.0) + shift;
+    // Both are below 1.
+    let inside = if turn >= 1.0 { turn - 1.0 } else { turn };
+    // A number that rounds to 1 or is 0 is none that others draw.
+    inside.clamp(f64::EPSILON / 2.0, 1.0 - f64::EPSILON / 2.0)
+}
+
+/// A point of the sequence, moved at random; four of its coordinates at a time are worked out when they are asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct ShiftedPoint {
+    phase: u32,
+    shifts: Stream,
+    address: [u64; 2],
+}
+
+impl ShiftedPoint {
+    /// How many times four coordinates it has.
+    pub const FOURS: u64 = DIMENSIONS as u64 / 4;
+
+    /// Point `index`, moved by the numbers of a stream at an address, the second part of which leaves its last 8 bits free.
+    #[inline]
+    #[must_use]
+    pub const fn new(index: u32, shifts: Stream, address: [u64; 2]) -> Self {
+        Self {
+            phase: index.reverse_bits(),
+            shifts,
+            address,
+        }
+    }
+
+    /// Coordinates 4 `number` to 4 `number` + 3.
+    #[inline]
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "below FOURS")]
+    pub fn four(&self, number: u64) -> [f64; 4] {
+        let shift = self.shifts.uniforms(self.address[0], self.address[1] | number);
+        std::array::from_fn(|k| coordinate(self.phase, GENERATOR[4 * number as usize + k], shift[k]))
+    }
 }
 
 #[cfg(test)]
@@ -70,5 +108,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn four_coordinates_at_a_time_are_those_of_the_point() {
+        let shifts = Stream::new(7, 1);
+        let mut shift = [0.0; DIMENSIONS];
+        for (number, four) in (0_u64..).zip(shift.chunks_mut(4)) {
+            four.copy_from_slice(&shifts.uniforms(12, 5 << 8 | number));
+        }
+        let (point, whole) = (ShiftedPoint::new(3, shifts, [12, 5 << 8]), lattice_point(3, &shift));
+        let fours: Vec<f64> = (0..ShiftedPoint::FOURS).flat_map(|number| point.four(number)).collect();
+        assert_eq!(fours, whole);
     }
 }

@@ -1,7 +1,9 @@
 //! A scene with what its sources need to be seen from other points.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use etendue_lightfield::View;
 use etendue_optics::light_sampler::LightSampler;
 
 use crate::scene::Scene;
@@ -84,6 +86,26 @@ impl<'a> LitScene<'a> {
             stop: Some(stop),
             ..self
         }
+    }
+
+    /// The columns and the rows of the pixels of a view, outside of which its lines of sight meet neither surface nor source.
+    #[must_use]
+    pub fn window(&self, view: &View) -> [Range<u32>; 2] {
+        let sources = self.scene.sources.iter().zip(self.light_samplers);
+        let lamps = sources
+            .filter(|(_, sampler)| sampler.is_some())
+            .map(|(source, _)| source.bounds());
+        let faces = self.scene.face_set.bounds().iter().copied();
+        let windows = faces.chain(lamps).map(|bounds| view.window(bounds));
+        windows
+            .filter(|[columns, rows]| !columns.is_empty() && !rows.is_empty())
+            .fold([0..0, 0..0], |all, one| {
+                let [columns, rows] = [0, 1].map(|k| match (&all[k], &one[k]) {
+                    (none, some) if none.is_empty() => some.clone(),
+                    (a, b) => a.start.min(b.start)..a.end.max(b.end),
+                });
+                [columns, rows]
+            })
     }
 
     /// Whether that was set.

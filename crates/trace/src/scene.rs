@@ -165,13 +165,21 @@ impl Scene {
     /// surfaces, or from a source that cannot be seen.
     #[must_use]
     pub fn may_focus(&self) -> bool {
-        let any = |test: fn(&Facts) -> bool| {
-            let is = |finish: u32| test(self.finishes[finish as usize].facts());
-            self.roles
-                .iter()
-                .any(|role| matches!(role.act, Act::Optical(finish) if is(finish)))
-        };
-        any(Facts::is_diffuse) && (any(Facts::is_specular) || !self.sources.iter().all(Source::is_visible))
+        let may_redirect = || self.may_reflect() || !self.sources.iter().all(Source::is_visible);
+        self.any_finish(Facts::is_diffuse) && may_redirect()
+    }
+
+    /// Whether there are surfaces that mirror or refract light.
+    #[must_use]
+    pub fn may_reflect(&self) -> bool {
+        self.any_finish(Facts::is_specular)
+    }
+
+    fn any_finish(&self, test: fn(&Facts) -> bool) -> bool {
+        let is = |finish: u32| test(self.finishes[finish as usize].facts());
+        self.roles
+            .iter()
+            .any(|role| matches!(role.act, Act::Optical(finish) if is(finish)))
     }
 
     /// Of each face whether it is a smooth interface of a solid, which light meets at the normal of the surface itself.

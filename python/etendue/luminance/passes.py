@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,8 @@ class Passes:
         Rows and columns of the map.
     area : ndarray
         Apparent area of its pixels, up to a factor.
+    window : pair of slices
+        Rows and columns outside of which no line of sight meets anything.
 
     Examples
     --------
@@ -39,17 +42,20 @@ class Passes:
     (2.0, 6)
     """
 
-    def __init__(self, shape: tuple[int, int], area: Array) -> None:
+    def __init__(
+        self, shape: tuple[int, int], area: Array, window: tuple[slice, slice] = (slice(None), slice(None))
+    ) -> None:
         self.done = 0
         self.blocks: list[Array] = []
         """The light of each pass by blocks of the map (`etendue.luminance.gathering.blocks`)."""
-        self._area = area
-        self._all = _Spread(shape)
-        self._chance = _Spread(shape)
-        self._lucky = np.zeros(shape, dtype=np.int64)
-        self._smooth = np.zeros(shape, dtype=bool)
-        self._diffuse = np.zeros(shape, dtype=bool)
-        self._deviation = np.zeros(shape)
+        self._area, self._shape, self._window = area, shape, window
+        part = area[window].shape
+        self._all = _Spread(part)
+        self._chance = _Spread(part)
+        self._lucky = np.zeros(part, dtype=np.int64)
+        self._smooth = np.zeros(part, dtype=bool)
+        self._diffuse = np.zeros(part, dtype=bool)
+        self._deviation = np.zeros(part)
 
     def add(self, values: Array, chance: Array, deviation: Array, smooth: Array, diffuse: Array) -> None:
         """One pass more.
@@ -59,12 +65,18 @@ class Passes:
         """
         self.done += 1
         self.blocks.append(blocks(values))
+        values, chance, deviation, smooth, diffuse = (
+            sums[self._window] for sums in (values, chance, deviation, smooth, diffuse)
+        )
         self._all.add(values, self.done)
-        self._chance.add(chance, self.done)
-        self._lucky += chance > 0.0
+        # Of nothing so far, nothing more changes neither mean nor spread.
+        if chance.any() or self._lucky.any():
+            self._chance.add(chance, self.done)
+            self._lucky += chance > 0.0
         self._smooth |= smooth > 0.0
         self._diffuse |= diffuse > 0.0
-        self._deviation = self._deviation + (deviation - self._deviation) / self.done
+        if deviation.any() or self._deviation.any():
+            self._deviation += (deviation - self._deviation) / self.done
 
     def total(self, image: Forward | None, *, known: bool = True) -> tuple[Array, Array]:
         """The luminance of both routes and its standard error; with what the sources know of their own, if `known`.
@@ -73,11 +85,19 @@ class Passes:
         """
         chance = self._chance.variance(self.done)
         variance = self._all.variance(self.done) + (at_least_nearby(chance, self._lucky, self._smooth) - chance)
-        values = self._all.mean
-        if image is not None:
-            values = values + image.values
-            variance = variance + image.with_neighbours(self._diffuse).error ** 2
-        return values, np.sqrt(variance + (self._deviation**2 if known else 0.0))
+        if known:
+            variance = variance + self._deviation**2
+        values = self._whole(self._all.mean)
+        if image is None:
+            return values, self._whole(np.sqrt(variance))
+        forwards = image.with_neighbours(self._whole(self._diffuse)).error ** 2
+        return values + image.values, np.sqrt(self._whole(variance) + forwards)
+
+    def _whole(self, part: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """What is known of the window, on the map."""
+        whole = np.zeros(self._shape, dtype=part.dtype)
+        whole[self._window] = part
+        return whole
 
     def relative_error(self, image: Forward | None) -> float:
         """Sampling error over the luminance, weighted by flux (`RelativeError`); 0 if there is no light."""
@@ -107,7 +127,7 @@ class Passes:
         rare = (self._lucky > 0) & (self._lucky < self.done / 2)
         if rare.any():
             part = float(self._chance.mean.sum() / values.sum())
-            largest = np.unravel_index(np.argmax(np.where(rare, self._chance.mean, 0.0)), values.shape)
+            largest = np.unravel_index(np.argmax(self._whole(np.where(rare, self._chance.mean, 0.0))), values.shape)
             row, column = (int(i) for i in largest)
             notes.append(
                 f"{part:.2%} of the light was found by chance, behind lenses or in mirrors; pixels where fewer than half "
@@ -123,12 +143,17 @@ class _Spread:
     def __init__(self, shape: tuple[int, int]) -> None:
         self.mean = np.zeros(shape)
         self._squares = np.zeros(shape)
+        # Room for what comes in between: memory that is asked for again for each pass takes longer than the sums.
+        self._off, self._step = np.zeros(shape), np.zeros(shape)
 
     def add(self, values: Array, number: int) -> None:
         """One pass more, the so many-th."""
-        off = values - self.mean
-        self.mean = self.mean + off / number
-        self._squares = self._squares + off * (values - self.mean)
+        np.subtract(values, self.mean, out=self._off)
+        np.divide(self._off, number, out=self._step)
+        self.mean += self._step
+        np.subtract(values, self.mean, out=self._step)
+        self._off *= self._step
+        self._squares += self._off
 
     def variance(self, passes: int) -> Array:
         """Of the mean."""

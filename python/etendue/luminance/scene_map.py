@@ -53,8 +53,35 @@ MOST_EVENTS = 10_000
 """Surfaces that a line of sight may meet."""
 
 
+class SeenScene:
+    """A scene that is ready to be looked at, from one observer or from many, one after the other.
+
+    Parameters
+    ----------
+    scene : Scene
+    cache : bool
+        Whether light fields of its rays may be taken from those fitted before.
+    threads : int, optional
+
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes.
+    ArgumentError
+        If it has no sources.
+    """
+
+    def __init__(self, scene: Scene, *, cache: bool = True, threads: int | None = None) -> None:
+        seeable, self.notes = with_fields(scene, checked_threads(threads), cache=cache)
+        self.compiled = compile_scene(seeable)
+        if not self.compiled.record["sources"]:
+            raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
+        self.core = core_scene({**self.compiled.record, "detectors": []})
+        self.origin = Provenance(scene.name or "scene", "traced scene", fingerprint(self.compiled.record))
+
+
 def look_at_scene(
-    scene: Scene,
+    scene: Scene | SeenScene,
     pairs: Sequence[tuple[Observer, Screen]],
     how: PathTracing,
     progress: Progress | None = None,
@@ -77,17 +104,13 @@ def look_at_scene(
     """
     threads = checked_threads(threads)
     views = [screen.core_view(observer) for observer, screen in pairs]
-    seeable, notes = with_fields(scene, threads, cache=cache)
-    compiled = compile_scene(seeable)
-    if not compiled.record["sources"]:
-        raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
-    core = core_scene({**compiled.record, "detectors": []})
+    seen = scene if isinstance(scene, SeenScene) else SeenScene(scene, cache=cache, threads=threads)
+    compiled, core = seen.compiled, seen.core
     forward = _forward(core, compiled, views, how, threads, wanted=scattered is None)
     images = forward.images
-    notes = [*compiled.notes, *notes, *_unseen(compiled, forwards=scattered is not None or images is not None)]
+    notes = [*compiled.notes, *seen.notes, *_unseen(compiled, forwards=scattered is not None or images is not None)]
     notes += [] if scattered is not None else forward.notes(how)
     left: Left = "scattered" if scattered is not None else "caustics" if images is not None else "nothing"
-    origin = Provenance(scene.name or "scene", "traced scene", fingerprint(compiled.record))
     surveys = _Surveys(core, compiled.record, how.seed, threads)
     maps, done = [], 0
     for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, forward.plan.glints, strict=True)):
@@ -110,7 +133,8 @@ def look_at_scene(
                 progress(done)
 
         image = None if scattered is None else scattered[number]
-        eye = _Eye(look, advance, how, screen, screen.cosine(observer), images, number, image)
+        window = core.window(view)
+        eye = _Eye(look, advance, how, screen, screen.cosine(observer), window, images, number, image)
         passes, common, about = eye.best(surveys)
         image = eye.image
         paths = how.paths * passes.done
@@ -140,7 +164,7 @@ def look_at_scene(
                 observer,
                 screen,
                 compiled.flux_unit,
-                origin.then(f"luminance by {paths:,} lines of sight per pixel, seed {how.seed}"),
+                seen.origin.then(f"luminance by {paths:,} lines of sight per pixel, seed {how.seed}"),
                 (*told, *notes),
             )
         )
@@ -186,6 +210,8 @@ class _Eye:
         Its pixels.
     area : ndarray
         Their apparent area, up to a factor.
+    window : pair of slices
+        Rows and columns outside of which there is nothing to see.
     images : LightImages, optional
         Rays forwards, which keep their number for each line of sight.
     number : int
@@ -199,6 +225,7 @@ class _Eye:
     how: PathTracing
     screen: Screen
     area: Array
+    window: tuple[slice, slice]
     images: LightImages | None
     number: int
     image: Forward | None
@@ -241,7 +268,7 @@ class _Eye:
 
     def _followed(self, known: _core.Survey | None, made: Sequence[list[Array]] = (), first: int = 0) -> Passes:
         """As many passes as the map needs, from number `first` on; those that are made already come before others."""
-        how, passes = self.how, Passes(self.screen.shape, self.area)
+        how, passes = self.how, Passes(self.screen.shape, self.area, self.window)
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
         while passes.done < wanted:
             passes.add(*(made[passes.done] if passes.done < len(made) else self.look(first + passes.done, known)))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib
 from typing import Any
 
 
+@functools.cache
 def version() -> str:
     """Version of the installed package."""
     # Its module takes a quarter of the time that the whole package does, and is seldom needed.

@@ -1,6 +1,6 @@
 //! The random numbers of one ray, taken as they are needed.
 
-use etendue_sampling::lattice::DIMENSIONS;
+use etendue_sampling::lattice::ShiftedPoint;
 use etendue_sampling::philox::Stream;
 
 /// Numbers between 0 and 1 at the address of a ray: the coordinates of a point of low discrepancy first, if there is one.
@@ -10,9 +10,10 @@ pub struct Numbers {
     index: u64,
     block: u64,
     held: [f64; 4],
-    used: usize,
-    point: [f64; DIMENSIONS],
-    next: usize,
+    used: u32,
+    /// How many times four coordinates of the point were drawn.
+    fours: u32,
+    point: Option<ShiftedPoint>,
 }
 
 impl Numbers {
@@ -25,8 +26,8 @@ impl Numbers {
             block,
             held: [0.0; 4],
             used: 4,
-            point: [0.0; DIMENSIONS],
-            next: DIMENSIONS,
+            fours: 0,
+            point: None,
         }
     }
 
@@ -42,26 +43,34 @@ impl Numbers {
 
     /// The coordinates of a point, then those of ray `index`.
     #[must_use]
-    pub const fn after(point: [f64; DIMENSIONS], stream: Stream, index: u64) -> Self {
+    pub const fn after(point: ShiftedPoint, stream: Stream, index: u64) -> Self {
         let mut numbers = Self::new(stream, index, 0);
-        numbers.point = point;
-        numbers.next = 0;
+        numbers.point = Some(point);
         numbers
     }
 
     /// The next one.
     #[inline]
     pub fn draw(&mut self) -> f64 {
-        if self.next < DIMENSIONS {
-            self.next += 1;
-            return self.point[self.next - 1];
-        }
         if self.used == 4 {
-            self.held = self.stream.uniforms(self.index, self.block);
-            self.block += 1;
-            self.used = 0;
+            self.refill();
         }
         self.used += 1;
-        self.held[self.used - 1]
+        self.held[self.used as usize - 1]
+    }
+
+    #[inline]
+    fn refill(&mut self) {
+        self.used = 0;
+        if let Some(point) = &self.point {
+            self.held = point.four(u64::from(self.fours));
+            self.fours += 1;
+            if u64::from(self.fours) == ShiftedPoint::FOURS {
+                self.point = None;
+            }
+        } else {
+            self.held = self.stream.uniforms(self.index, self.block);
+            self.block += 1;
+        }
     }
 }

@@ -1,10 +1,12 @@
 //! The small images of sources in the pixels of a view.
 
+use std::ops::Range;
+
 use etendue_lightfield::View;
 use rayon::prelude::*;
 
 use super::image::{Found, Glint};
-use super::search::{Search, Sight};
+use super::search::{Search, Sight, targets};
 use crate::lit_scene::LitScene;
 
 /// Starts of the search over all pixels: more per pixel where these are few.
@@ -16,6 +18,9 @@ const MOST_STARTS: usize = 16;
 /// One pixel of so many is looked at first: where light wanders among thousands of surfaces, a search finds nothing and has
 /// no end.
 const FIRST_LOOK: usize = 32;
+
+/// From so many pixels beside those that see anything, an image in these may be found.
+const BESIDE: u32 = 5;
 
 /// Images in one pixel, at most.
 const MOST: usize = 32;
@@ -47,51 +52,66 @@ impl Glints {
             begins: vec![0; view.pixels() + 1],
             of: vec![false; sources],
         };
-        let Some(mut search) = Search::new(lit, view, most_events) else {
+        let targets = targets(lit, view);
+        let Some(mut search) = Search::new(lit, view, most_events, &targets) else {
             return result;
         };
         let pixels = view.pixels();
+        let [columns, rows] = lit.window(view);
+        let beside = |range: Range<u32>, n: u32| range.start.saturating_sub(BESIDE)..(range.end + BESIDE).min(n);
+        let (columns, rows) = (beside(columns, view.columns), beside(rows, view.rows));
+        let window: Vec<usize> = rows
+            .flat_map(|row| {
+                columns
+                    .clone()
+                    .map(move |column| (row * view.columns + column) as usize)
+            })
+            .collect();
         let starts = (STARTS / pixels.max(1)).clamp(1, MOST_STARTS);
-        let [first, caught] = (0..pixels)
-            .into_par_iter()
-            .step_by(FIRST_LOOK)
+        let [first, caught] = window
+            .par_iter()
+            .filter(|pixel| *pixel % FIRST_LOOK == 0)
             .map_init(
                 || search.clone(),
                 |search, pixel| {
                     if lit.is_stopped() {
                         return [0, 0];
                     }
-                    search.first_look(pixel, starts)
+                    search.first_look(*pixel, starts)
                 },
             )
             .reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]]);
         if first == 0 && 2 * caught > starts * pixels.div_ceil(FIRST_LOOK) {
             search.spend_little();
         }
-        let found: Vec<(Vec<Found>, Vec<Sight>)> = (0..pixels)
-            .into_par_iter()
+        let found: Vec<(Vec<Found>, Vec<Sight>)> = window
+            .par_iter()
             .map_init(
                 || search.clone(),
                 |search, pixel| {
                     if lit.is_stopped() {
                         return Default::default();
                     }
-                    search.search_from(pixel, starts)
+                    search.search_from(*pixel, starts)
                 },
             )
             .collect();
+        if found.iter().all(|(images, _)| images.is_empty()) {
+            return result;
+        }
         let mut images: Vec<Vec<Found>> = vec![Vec::new(); pixels];
         for image in found.iter().flat_map(|(images, _)| images) {
             for pixel in touched(view, &image.glint) {
                 // In the midst of a large image lines that are spread evenly have no noise, and need no others.
                 let large = |sight: &Sight| sight.0 == image.source && sight.1 == image.ways;
+                let seen = window.binary_search(&pixel).map_or(&[][..], |at| &found[at].1[..]);
                 let here = &mut images[pixel];
                 let known = |other: &Found| {
                     other.source == image.source
                         && other.ways == image.ways
                         && other.glint.distance2(image.glint.centre) < SAME * SAME
                 };
-                if here.len() < MOST && !here.iter().any(known) && !found[pixel].1.iter().any(large) {
+                if here.len() < MOST && !here.iter().any(known) && !seen.iter().any(large) {
                     here.push(image.clone());
                 }
             }

@@ -58,6 +58,9 @@ const WIDTH: f64 = 1.5;
 const NARROWEST: f64 = 1e-9;
 const WIDEST: f64 = 0.5;
 
+/// The lesser width of a whole source from which on no image of it is looked for, in pixels.
+const LARGE: f64 = 4.0 * WIDEST;
+
 /// The seed of the points of sources: any does.
 const SEED: u64 = 0x474C_494E_5453;
 
@@ -71,7 +74,7 @@ type Spread = [[f64; 3]; 3];
 
 /// Points of a source and how they are spread.
 #[derive(Debug)]
-struct Target {
+pub struct Target {
     source: usize,
     points: Vec<Vec3>,
     middle: Vec3,
@@ -116,7 +119,7 @@ pub struct Search<'a> {
     scene: &'a Scene,
     view: &'a View,
     most_events: u32,
-    targets: std::sync::Arc<Vec<Target>>,
+    targets: &'a [Target],
     wavelengths: Vec<f64>,
     /// What the observer is in and on.
     observer: (SolidStack, OriginFaces),
@@ -128,13 +131,8 @@ pub struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// None if there is nothing to look for.
-    pub fn new(lit: &'a LitScene<'a>, view: &'a View, most_events: u32) -> Option<Self> {
+    pub fn new(lit: &'a LitScene<'a>, view: &'a View, most_events: u32, targets: &'a [Target]) -> Option<Self> {
         let observer = place(lit.scene, view.observer, (view.target - view.observer).normalized()).ok()?;
-        let targets: Vec<Target> = (0..lit.scene.sources.len())
-            // A source that stands around the observer is a surround, not a lamp: glass shows all of it in little.
-            .filter(|number| !lit.scene.sources[*number].bounds().contains(view.observer))
-            .filter_map(|number| target(lit, number))
-            .collect();
         let n = lit.lines.len();
         let colours = n.min(COLOURS);
         // In the middle of each of as many parts of the light.
@@ -142,18 +140,31 @@ impl<'a> Search<'a> {
             let share = (k as f64 + 0.5) / colours as f64;
             lit.lines[lit.lines.partition_point(|line| line.0 < share).min(n - 1)].1
         });
-        (!targets.is_empty()).then(|| Self {
+        let search = Self {
             lit,
             scene: lit.scene,
             view,
             most_events,
-            targets: std::sync::Arc::new(targets),
+            targets,
             wavelengths: wavelengths.collect(),
             observer,
             media: MediumCache::new(lit.scene),
             work: WORK,
             left: 0,
-        })
+        };
+        // Without smooth surfaces the only images are direct ones.
+        let hopeless = !lit.scene.may_reflect() && targets.iter().all(|target| search.is_large(target));
+        (!hopeless).then_some(search)
+    }
+
+    /// Whether a source is seen directly as something far larger than a pixel, with a margin for places beside its middle.
+    fn is_large(&self, target: &Target) -> bool {
+        let width = self.view.place(target.middle).and_then(|at| {
+            let passing = passing(&self.lines(at), target.middle);
+            let inverse = passing.inverse()?;
+            Some(widths(&spread_on_screen(&inverse, &passing.axes, &target.spread)).1)
+        });
+        width.is_some_and(|width| width > 2.0 * LARGE)
     }
 
     /// Spends little on each start from now on.
@@ -212,8 +223,7 @@ impl<'a> Search<'a> {
                 }
                 let met = self.interactions(&chain.lines);
                 let reach = met.as_ref().map_or(f64::INFINITY, |met| met[0].t);
-                let targets = self.targets.clone();
-                for target in targets.iter() {
+                for target in self.targets {
                     if self.shows(target, &chain.lines[0], reach) {
                         seen.push((target.source, chain.ways.clone()));
                     } else {
@@ -369,7 +379,7 @@ impl<'a> Search<'a> {
             return;
         }
         // Whatever is far larger than a pixel is no small image.
-        if widths(&spread_on_screen(&inverse, &middle.axes, &target.spread)).1 > 4.0 * WIDEST {
+        if widths(&spread_on_screen(&inverse, &middle.axes, &target.spread)).1 > LARGE {
             return;
         }
         let distance = |point: &Vec3| {
@@ -551,6 +561,15 @@ fn image(place: Pair, spread: &Square) -> Option<Glint> {
     };
     let [s, t] = [larger, lesser].map(|width| width.clamp(NARROWEST, WIDEST));
     Glint::new(place, [[x * s, y * s], [-y * t, x * t]])
+}
+
+/// What a view may show small images of.
+pub fn targets(lit: &LitScene<'_>, view: &View) -> Vec<Target> {
+    (0..lit.scene.sources.len())
+        // A source that stands around the observer is a surround, not a lamp: glass shows all of it in little.
+        .filter(|number| !lit.scene.sources[*number].bounds().contains(view.observer))
+        .filter_map(|number| target(lit, number))
+        .collect()
 }
 
 /// Points of a source that can be seen; None if it cannot.

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use etendue_lightfield::View;
 use etendue_optics::source::Numbers;
-use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
+use etendue_sampling::lattice::ShiftedPoint;
 use etendue_sampling::philox::Stream;
 use rayon::prelude::*;
 
@@ -29,6 +29,17 @@ const PURPOSE_PATH: u64 = 0x5041_5448;
 /// What is added to a purpose for the paths that look for small images of sources.
 const AIMED: u64 = 1 << 32;
 
+/// What a map holds: the columns and rows in which lines of sight may meet anything, and the sums of their pixels, row by row.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// Columns.
+    pub columns: Range<u32>,
+    /// Rows.
+    pub rows: Range<u32>,
+    /// Sums of the pixels in both.
+    pub pixels: Vec<Pixel>,
+}
+
 /// The map of `view`: for each pixel the sums over passes `passes`. Passes are independent of each other. With a survey,
 /// paths end at diffuse surfaces whose light is known.
 ///
@@ -40,20 +51,28 @@ pub fn render(
     method: &Method<'_>,
     survey: Option<&ExitanceSurvey>,
     passes: Range<u32>,
-) -> Vec<Pixel> {
+) -> Image {
     let lines = view.pixels() as u64 * u64::from(method.paths);
     let known: Vec<ExitanceCache<'_>> = survey
         .iter()
         .filter(|survey| survey.patches() > 0)
         .flat_map(|survey| passes.clone().map(|pass| survey.exitance(lit, pass, lines)))
         .collect();
-    let mut pixels = vec![Pixel::default(); view.pixels()];
+    let [columns, rows] = lit.window(view);
+    let which: Vec<usize> = rows
+        .clone()
+        .flat_map(|row| {
+            columns
+                .clone()
+                .map(move |column| (row * view.columns + column) as usize)
+        })
+        .collect();
+    let mut pixels = vec![Pixel::default(); which.len()];
     let each = (passes.len() * method.paths as usize).max(1);
     let chunk = (4 * BLOCK / each).clamp(1, 1 << 12);
-    pixels.par_chunks_mut(chunk).enumerate().for_each(|(number, pixels)| {
-        Renderer::new(lit, view, method, &known).paint(number * chunk, passes.clone(), pixels);
-    });
-    pixels
+    let chunks = pixels.par_chunks_mut(chunk).zip(which.par_chunks(chunk));
+    chunks.for_each(|(pixels, which)| Renderer::new(lit, view, method, &known).paint(which, passes.clone(), pixels));
+    Image { columns, rows, pixels }
 }
 
 /// A block of paths, and room for what its steps need.
@@ -70,19 +89,18 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Adds the passes to pixels from number `first` on.
-    fn paint(&mut self, first: usize, passes: Range<u32>, pixels: &mut [Pixel]) {
+    /// Adds the passes to pixels of some numbers.
+    fn paint(&mut self, which: &[usize], passes: Range<u32>, pixels: &mut [Pixel]) {
         let paths = self.block.method.paths as usize;
         let share = 1.0 / f64::from(self.block.method.paths);
-        let mut cells = vec![[0.0; 5]; pixels.len() * passes.len()];
+        let mut cells = vec![[0.0; 5]; which.len() * passes.len()];
         // All cells, then once more those with small images of sources.
         let mut tasks: Vec<(usize, bool)> = (0..cells.len()).map(|cell| (cell, false)).collect();
         if let Some(glints) = self.block.method.glints {
-            let has = |cell: &usize| !glints.of_pixel(first + cell / passes.len()).is_empty();
+            let has = |cell: &usize| !glints.of_pixel(which[cell / passes.len()]).is_empty();
             tasks.extend((0..cells.len()).filter(has).map(|cell| (cell, true)));
         }
         let total = tasks.len() * paths;
-        let mut shift = (usize::MAX, [0.0; DIMENSIONS]);
         let mut begin = 0;
         while begin < total && !self.block.lit.is_stopped() {
             let end = (begin + BLOCK).min(total);
@@ -90,15 +108,12 @@ impl<'a> Renderer<'a> {
             for flat in begin..end {
                 let (task, index) = (flat / paths, flat % paths);
                 let (cell, aimed) = tasks[task];
-                let pixel = (first + cell / passes.len()) as u64;
+                let pixel = which[cell / passes.len()] as u64;
                 #[allow(clippy::cast_possible_truncation, reason = "a number of passes")]
                 let pass = (cell % passes.len()) as u32;
                 let pass = [passes.start + pass, pass];
-                if shift.0 != task {
-                    shift = (task, self.shift(pixel, pass[0], aimed));
-                }
                 #[allow(clippy::cast_possible_truncation, reason = "a number of paths")]
-                self.aim(pixel, pass, index as u32, aimed, &shift.1);
+                self.aim(pixel, pass, index as u32, aimed);
             }
             self.follow();
             for (flat, path) in (begin..end).zip(&self.block.paths) {
@@ -123,26 +138,18 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// How the lattice of a pixel is moved in a pass.
-    fn shift(&self, pixel: u64, pass: u32, aimed: bool) -> [f64; DIMENSIONS] {
-        let shifts = Stream::new(self.block.method.seed, PURPOSE_SHIFT + if aimed { AIMED } else { 0 });
-        let mut shift = [0.0; DIMENSIONS];
-        for (block, four) in (0_u64..).zip(shift.chunks_mut(4)) {
-            four.copy_from_slice(&shifts.uniforms(pixel, u64::from(pass) << 8 | block));
-        }
-        shift
-    }
-
     /// A path from the observer through a point of a pixel.
-    fn aim(&mut self, pixel: u64, [pass, made]: [u32; 2], index: u32, aimed: bool, shift: &[f64; DIMENSIONS]) {
+    fn aim(&mut self, pixel: u64, [pass, made]: [u32; 2], index: u32, aimed: bool) {
         let view = self.block.view;
-        let stream = Stream::new(self.block.method.seed, PURPOSE_PATH + if aimed { AIMED } else { 0 });
+        let [shifts, stream] = [PURPOSE_SHIFT, PURPOSE_PATH]
+            .map(|purpose| Stream::new(self.block.method.seed, purpose + if aimed { AIMED } else { 0 }));
+        let point = ShiftedPoint::new(index, shifts, [pixel, u64::from(pass) << 8]);
         let address = ((pixel << 24 | u64::from(pass)) << 20).wrapping_add(u64::from(index));
         #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
         let path = self.block.paths.len() as u32;
         // Made where it stays: it is large.
         self.block.paths.push(Path {
-            numbers: Numbers::after(lattice_point(index, shift), stream, address),
+            numbers: Numbers::after(point, stream, address),
             line: 0,
             pass: made as usize,
             sum: [0.0; 2],

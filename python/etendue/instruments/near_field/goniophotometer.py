@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
 
+from etendue.concurrency import in_order
 from etendue.errors import ArgumentError
 from etendue.instruments.near_field.camera import Camera
 from etendue.instruments.near_field.far_field import FAR
@@ -182,6 +184,7 @@ class NearFieldGoniophotometer:
             raise ArgumentError(f"a seed of {seed}; give 0 or more.")
         source = lamp_of(lamp, samples, size, seed, threads)
         setting, around = self._setting(source)
+        workers = threads or os.cpu_count() or 1
         stops, seen, light, light_error, brightest = self._look(source, setting, around, seed, progress)
         if not brightest > 0.0:
             raise ArgumentError(f"{source.name}: no light was seen from any position.")
@@ -189,7 +192,7 @@ class NearFieldGoniophotometer:
             rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 1))))
             light_error = np.hypot(light_error, self.photometer_error * light)
             light = light * (1.0 + self.photometer_error * rng.standard_normal(light.size))
-        start, counts = self._exposed(seen, stops, brightest, seed)
+        start, counts = self._exposed(seen, stops, brightest, seed, workers)
         return NearFieldRun(
             setting,
             light,
@@ -232,12 +235,13 @@ class NearFieldGoniophotometer:
         stops, seen = np.zeros(count + 1, dtype=np.intp), Spool(SEEN)
         light, variance, brightest = np.zeros(count), np.zeros(count), 0.0
         same = setting.distance == setting.photometer_distance
+        share = setting.illuminance_of(screen, setting.distance)
         others = _outside(around, setting, inner=same)
         beyond = []
         if others is not None:
             beyond.append((lamp.images(at_photometer, others), _weight(others, setting, screen if same else None)))
         for k, (image, error) in enumerate(lamp.images(true, screen)):
-            seen_here = [(image, error, setting.illuminance_of(screen, setting.distance))] if same else []
+            seen_here = [(image, error, share)] if same else []
             seen_here += [(*next(images), weight) for images, weight in beyond]
             for values, off, weight in seen_here:
                 light[k] += float((values * weight).sum())
@@ -271,22 +275,27 @@ class NearFieldGoniophotometer:
         return camera, photometer
 
     def _exposed(
-        self, seen: Spool, stops: npt.NDArray[np.intp], brightest: float, seed: int
+        self, seen: Spool, stops: npt.NDArray[np.intp], brightest: float, seed: int, workers: int
     ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.void]]:
         """Counts of the pixels that are not dark in all exposures."""
         camera, luminance = self.camera, seen.array()
         times = camera.true_times(seed)
         per = camera.level * camera.highest / brightest
         counts, kept = Spool(counts_dtype(camera.exposures)), np.zeros(len(stops), dtype=np.intp)
-        for number, some in enumerate(stretches(len(luminance))):
+
+        def exposed(numbered: tuple[int, slice]) -> tuple[npt.NDArray[np.void], npt.NDArray[np.intp]]:
+            number, some = numbered
             rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 5, number))))
             read = camera.expose(luminance["luminance"][some].astype(np.float64), per, times, rng)
             bright = (read > camera.dark_level + camera.least_count).any(axis=1)
             record = np.zeros(int(bright.sum()), dtype=counts_dtype(camera.exposures))
             record["pixel"], record["counts"] = luminance["pixel"][some][bright], read[bright]
-            counts.append(record)
             summed = np.concatenate([[0], np.cumsum(bright)])
-            kept += summed[np.clip(stops - some.start, 0, bright.size)]
+            return record, summed[np.clip(stops - some.start, 0, bright.size)]
+
+        for record, summed in in_order(exposed, enumerate(stretches(len(luminance))), workers):
+            counts.append(record)
+            kept += summed
         return kept, counts.array()
 
 

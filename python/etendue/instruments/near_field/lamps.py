@@ -10,19 +10,20 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from etendue.concurrency import in_order
 from etendue.errors import ArgumentError
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import pilot_sample
-from etendue.luminance.estimate import luminance_map
 from etendue.luminance.framing import centre_of_light, probe
 from etendue.luminance.looking import look_at_field
 from etendue.luminance.methods import PathTracing
 from etendue.luminance.opening import open_source
+from etendue.luminance.scene_map import SeenScene, look_at_scene
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import RayStream
-from etendue.scene import Scene, compile_scene
+from etendue.scene import Scene
 from etendue.scene.framing import finite_boxes
 from etendue.scene.sources.from_files import Field, Rays
 from etendue.units import FluxUnit
@@ -146,11 +147,16 @@ class SceneLamp(Lamp):
     """
 
     def __init__(self, scene: Scene, samples: int | None, seed: int, threads: int | None) -> None:
-        self._scene, self._samples, self._seed, self._threads = scene, samples, seed, threads
-        compiled = compile_scene(scene)
+        self._scene, self._samples, self._seed, self._threads = (
+            SeenScene(scene, threads=threads),
+            samples,
+            seed,
+            threads,
+        )
+        compiled = self._scene.compiled
         self.name, self.flux_unit = scene.name or "the scene", compiled.flux_unit
         self.provenance = Provenance(scene.name or "scene", "scene")
-        self.notes = tuple(compiled.notes)
+        self.notes = (*compiled.notes, *self._scene.notes)
         boxes = finite_boxes(compiled.record["faces"]) + finite_boxes(compiled.record["sources"]) + _starts(scene)
         if not boxes:
             raise ArgumentError(f"{self.name}: nothing in the scene has an end; an instrument cannot go around it.")
@@ -170,12 +176,16 @@ class SceneLamp(Lamp):
     def images(self, observers: Sequence[Observer], screen: Screen) -> Iterator[tuple[Array, Array | None]]:
         """By lines of sight."""
         lines = self._samples or lines_per_pixel(screen)
-        for number, observer in enumerate(observers):
+
+        def image(numbered: tuple[int, Observer]) -> tuple[Array, Array | None]:
+            number, observer = numbered
             # Lines of its own for each view: what they miss of a small lamp averages out.
             seed = int(np.random.SeedSequence((self._seed, 8, number)).generate_state(1)[0])
             how = PathTracing(rays_per_pixel=lines, seed=seed)
-            lmap = luminance_map(self._scene, observer, screen, method=how, threads=self._threads)
-            yield lmap.values, lmap.standard_error
+            (lmap,) = look_at_scene(self._scene, [(observer, screen)], how, threads=self._threads)
+            return lmap.values, lmap.standard_error
+
+        yield from in_order(image, enumerate(observers), self._threads or os.cpu_count() or 1)
 
 
 def _starts(scene: Scene) -> list[Array]:

@@ -113,12 +113,8 @@ impl PatchSource {
     #[must_use]
     pub fn bounds(&self, frame: &Frame) -> Bounds {
         let corners = self.parts.iter().flat_map(|part| {
-            let Bounds { lo, hi } = part.cells.bounds();
-            (0..8).map(move |i| {
-                let pick = |bit: usize, a: f64, b: f64| if i & bit == 0 { a } else { b };
-                let corner = Vec3::new(pick(1, lo.x, hi.x), pick(2, lo.y, hi.y), pick(4, lo.z, hi.z));
-                frame.point_to_world(part.frame.point_to_world(corner))
-            })
+            let corners = part.cells.bounds().corners();
+            corners.map(|corner| frame.point_to_world(part.frame.point_to_world(corner)))
         });
         let found = Bounds::of(corners);
         found.widened(1e-9 * (found.hi - found.lo).length())
