@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use etendue_math::Vec3;
-use etendue_optics::bsdf::{Bsdf as CoreBsdf, Drawn, Media};
+use etendue_optics::bsdf::{Bsdf as CoreBsdf, Media, Outcome};
 use etendue_sampling::philox::Stream;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
@@ -61,25 +61,33 @@ impl Bsdf {
     fn drawn(&self, n: usize, seed: u64, media: &Media, incident: impl Fn(usize) -> Vec3) -> Vec<f64> {
         let stream = Stream::new(seed, 0);
         let mut found = Vec::with_capacity(3 * n);
-        let mut drawn = Vec::new();
         for first in (0..n).step_by(TOGETHER) {
             let rays = first..n.min(first + TOGETHER);
             let pairs: Vec<_> = rays.clone().map(|k| stream.uniforms(k as u64, 0)).collect();
             let numbers = [0, 1].map(|i| pairs.iter().map(|pair| pair[i]).collect::<Vec<f64>>());
             let incident: Vec<Vec3> = rays.map(&incident).collect();
-            let media = vec![*media; incident.len()];
-            drawn.clear();
+            let of = |component: fn(&Vec3) -> f64| incident.iter().map(component).collect::<Vec<f64>>();
+            let mut directions = [of(|d| d.x), of(|d| d.y), of(|d| d.z)];
+            let all = vec![*media; incident.len()];
+            let mut outcomes = vec![Outcome::Absorbed; incident.len()];
             self.core
-                .sample_many(&incident, &media, [&numbers[0], &numbers[1]], &mut drawn);
-            found.extend(incident.iter().zip(&media).zip(&drawn).flat_map(|((i, media), drawn)| {
-                let d = match *drawn {
-                    Drawn::Absorbed => Vec3::new(f64::NAN, f64::NAN, f64::NAN),
-                    Drawn::Mirrored => specular(*i, media, None),
-                    Drawn::Refracted(cosine) => specular(*i, media, Some(cosine)),
-                    Drawn::Scattered(d) => d,
-                };
-                [d.x, d.y, d.z]
-            }));
+                .sample_many(&mut directions, &all, [&numbers[0], &numbers[1]], &mut outcomes);
+            found.extend(
+                incident
+                    .iter()
+                    .zip(&outcomes)
+                    .enumerate()
+                    .flat_map(|(k, (i, outcome))| {
+                        let [x, y, z] = directions.each_ref().map(|list| list[k]);
+                        let d = match outcome {
+                            Outcome::Absorbed => Vec3::new(f64::NAN, f64::NAN, f64::NAN),
+                            Outcome::Mirrored => specular(*i, media, None),
+                            Outcome::Refracted => specular(*i, media, Some(z)),
+                            Outcome::Scattered => Vec3::new(x, y, z),
+                        };
+                        [d.x, d.y, d.z]
+                    }),
+            );
         }
         found
     }

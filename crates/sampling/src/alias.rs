@@ -59,11 +59,14 @@ impl Alias {
         let slot = (scaled as usize).min(self.slots.len() - 1);
         let (chance, alias) = self.slots[slot];
         let within = scaled - slot as f64;
-        if within < chance {
-            (slot, part_of(within, chance))
+        // Without a branch: which of the two it is, nobody can foresee.
+        let own = within < chance;
+        let (part, share) = if own {
+            (within, chance)
         } else {
-            (alias as usize, part_of(within - chance, 1.0 - chance))
-        }
+            (within - chance, 1.0 - chance)
+        };
+        (if own { slot } else { alias as usize }, part_of(part, share))
     }
 }
 

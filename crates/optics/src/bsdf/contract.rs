@@ -26,6 +26,7 @@ use std::f64::consts::FRAC_1_PI;
 use std::fmt::Debug;
 use std::sync::Arc;
 
+use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::warp::part_of;
@@ -180,6 +181,39 @@ pub enum Drawn {
     Scattered(Vec3),
 }
 
+/// What becomes of one of many rays whose directions are kept together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// It is absorbed.
+    Absorbed,
+    /// It is mirrored.
+    Mirrored,
+    /// It is refracted; the third component of its direction is the cosine of the angle of refraction instead.
+    Refracted,
+    /// It is scattered; its direction is the new one.
+    Scattered,
+}
+
+impl Drawn {
+    /// Its direction in the place of that from which the ray came, and what becomes of the ray.
+    pub fn keep(self, directions: &mut Vectors, k: usize) -> Outcome {
+        match self {
+            Self::Absorbed => Outcome::Absorbed,
+            Self::Mirrored => Outcome::Mirrored,
+            Self::Refracted(cosine) => {
+                directions[2][k] = cosine;
+                Outcome::Refracted
+            }
+            Self::Scattered(d) => {
+                for (list, component) in directions.iter_mut().zip([d.x, d.y, d.z]) {
+                    list[k] = component;
+                }
+                Outcome::Scattered
+            }
+        }
+    }
+}
+
 /// Optical properties of a surface: the bidirectional scattering distribution function and the specular components beside it.
 pub trait Bsdf: Debug + Send + Sync {
     /// What holds at all angles and wavelengths.
@@ -237,11 +271,14 @@ pub trait Bsdf: Debug + Send + Sync {
         }
     }
 
-    /// What becomes of many rays, each as [`sample`](Bsdf::sample) says: added to `drawn` in their order.
-    fn sample_many(&self, incident: &[Vec3], media: &[Media], numbers: [&[f64]; 2], drawn: &mut Vec<Drawn>) {
-        let numbers = numbers[0].iter().zip(numbers[1]);
-        let rays = incident.iter().zip(media).zip(numbers);
-        drawn.extend(rays.map(|((incident, media), (a, b))| self.sample(*incident, media, [*a, *b])));
+    /// What becomes of many rays, each as [`sample`](Bsdf::sample) says, one outcome for each. Directions are those from which the
+    /// rays come; those of rays that are scattered are changed to where they go.
+    fn sample_many(&self, directions: &mut Vectors, media: &[Media], numbers: [&[f64]; 2], outcomes: &mut [Outcome]) {
+        for (k, outcome) in outcomes.iter_mut().enumerate() {
+            let [x, y, z] = directions.each_ref().map(|list| list[k]);
+            let drawn = self.sample(Vec3::new(x, y, z), &media[k], numbers.map(|list| list[k]));
+            *outcome = drawn.keep(directions, k);
+        }
     }
 
     /// Shares of the radiance along the mirrored and the refracted line that is seen by who looks along −`towards`; and the

@@ -20,6 +20,7 @@ mod monotone_cubic;
 mod rough_coat;
 mod rough_interface;
 mod rough_metal;
+mod table_draw;
 mod table_grid;
 mod table_lobes;
 mod tabulated;
@@ -27,7 +28,7 @@ mod tabulated;
 mod tests;
 
 pub use coated::Coated;
-pub use contract::{Bsdf, Component, Drawn, Facts, Media, Parameters, Parts, Product, Shares};
+pub use contract::{Bsdf, Component, Drawn, Facts, Media, Outcome, Parameters, Parts, Product, Shares};
 pub use cosine_power::CosinePower;
 pub use interface::Interface;
 pub use lambertian::Lambertian;

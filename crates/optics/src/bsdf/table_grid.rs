@@ -32,6 +32,8 @@ pub(super) struct Grid {
     /// From 0 to the end of the plane.
     radial: Vec<f64>,
     azimuths: usize,
+    /// The reciprocal of how many radial coordinates there are.
+    part: f64,
     /// f, azimuth by azimuth, at each radial coordinate.
     f: Vec<f64>,
     /// Of `f`, by what each value contributes to the integral over the plane; None if that is 0.
@@ -54,22 +56,23 @@ pub(super) struct Integrals<'a> {
 /// The function of r that is 1 at a radial coordinate, 0 at those next to it, and linear in between, times r: the density of
 /// what belongs to that coordinate.
 #[derive(Clone, Copy, Debug)]
-struct Hat {
-    node: f64,
-    /// Its integral.
-    whole: f64,
+pub(super) struct Hat {
+    pub node: f64,
     /// The part of it that lies nearer to 0.
-    inner: f64,
+    pub inner: f64,
     /// Towards 0, and away from it.
-    slopes: [Slope; 2],
+    pub slopes: [Slope; 2],
 }
 
 /// One side of a hat. With s from 0 at the far end to 1 at its top the density is s (far + s (node − far)).
 #[derive(Clone, Copy, Debug)]
-struct Slope {
-    far: f64,
+pub(super) struct Slope {
+    pub far: f64,
     /// The part of it that goes with s; the rest goes with s² towards 0, and with s (1 − s) away from it.
-    linear: f64,
+    pub linear: f64,
+    /// The part of the hat that comes before it, and its own.
+    pub begin: f64,
+    pub share: f64,
 }
 
 /// Farthest |β − β₀|.
@@ -183,17 +186,18 @@ impl Slice {
         // Constant beyond the last of its coordinates.
         let on_all = |row: &[f64]| (0..all.len()).map(|i| row[i.min(row.len() - 1)]).collect::<Vec<f64>>();
         let f: Vec<f64> = f.chunks(radial.len()).flat_map(on_all).collect();
-        let hats: Vec<Hat> = (0..all.len()).map(|i| Hat::of(&all, i)).collect();
+        let (hats, wholes): (Vec<Hat>, Vec<f64>) = (0..all.len()).map(|i| Hat::of(&all, i)).unzip();
         let weights: Vec<f64> = f
             .iter()
-            .zip(hats.iter().cycle())
-            .map(|(f, hat)| f * hat.whole)
+            .zip(wholes.iter().cycle())
+            .map(|(f, whole)| f * whole)
             .collect();
         let lowest = all.get(1).map_or(0, |r| leading(*r));
         let first_above = |bits: u64| all.partition_point(|r| *r < f64::from_bits(bits << SHIFT));
         Ok(Grid {
             sine: self.sine,
             azimuths: *azimuths,
+            part: 1.0 / all.len() as f64,
             f,
             nodes: Alias::new(&weights),
             hats,
@@ -207,7 +211,8 @@ impl Slice {
 }
 
 impl Hat {
-    fn of(radial: &[f64], i: usize) -> Self {
+    /// The hat of a radial coordinate, and its integral.
+    fn of(radial: &[f64], i: usize) -> (Self, f64) {
         let node = radial[i];
         let side = |other: Option<&f64>| {
             // Nothing beyond the first and the last coordinate.
@@ -216,41 +221,49 @@ impl Hat {
             let straight = 0.5 * far.min(node);
             let bent = if far < node { step / 3.0 } else { step / 6.0 };
             let linear = if bent > 0.0 { straight / (straight + bent) } else { 1.0 };
-            (step * (straight + bent), Slope { far, linear })
+            (step * (straight + bent), far, linear)
         };
-        let (inner, towards) = side(i.checked_sub(1).map(|below| &radial[below]));
-        let (outer, away) = side(radial.get(i + 1));
-        let whole = inner + outer;
-        Self {
-            node,
-            whole,
-            inner: if whole > 0.0 { inner / whole } else { 0.0 },
-            slopes: [towards, away],
-        }
+        let below = i.checked_sub(1).map(|below| &radial[below]);
+        let [towards, away] = [below, radial.get(i + 1)].map(side);
+        let whole = towards.0 + away.0;
+        let inner = if whole > 0.0 { towards.0 / whole } else { 0.0 };
+        let slope = |(_, far, linear): (f64, f64, f64), begin: f64, share: f64| Slope {
+            far,
+            linear,
+            begin,
+            share,
+        };
+        let slopes = [slope(towards, 0.0, inner), slope(away, inner, 1.0 - inner)];
+        (Self { node, inner, slopes }, whole)
     }
 
     /// A radial coordinate with its density, from two numbers of which the second is not used up.
     #[inline]
     fn draw(&self, number: f64, other: f64) -> f64 {
-        let (slope, rest, inwards) = if number < self.inner {
-            (&self.slopes[0], part_of(number, self.inner), true)
-        } else {
-            (&self.slopes[1], part_of(number - self.inner, 1.0 - self.inner), false)
-        };
+        let inwards = number < self.inner;
+        let slope = &self.slopes[usize::from(!inwards)];
+        let rest = part_of(number - slope.begin, slope.share);
         let s = if rest < slope.linear {
             part_of(rest, slope.linear).sqrt()
         } else {
-            // The largest of three numbers has the density 3 s², the middle one 6 s (1 − s).
-            let first = part_of(rest - slope.linear, 1.0 - slope.linear);
-            let [second, third] = MoreNumbers::new([rest, other]).pair();
-            let [low, high] = [first.min(second), first.max(second)];
-            if inwards {
-                high.max(third)
-            } else {
-                third.clamp(low, high)
-            }
+            bent([rest, slope.linear], other, inwards)
         };
         slope.far + s * (self.node - slope.far)
+    }
+}
+
+/// A place along a slope in the part that does not go with s, from what is left of a number and where that part begins, and from
+/// another number.
+#[inline]
+pub(super) fn bent([rest, linear]: [f64; 2], other: f64, inwards: bool) -> f64 {
+    // The largest of three numbers has the density 3 s², the middle one 6 s (1 − s).
+    let first = part_of(rest - linear, 1.0 - linear);
+    let [second, third] = MoreNumbers::new([rest, other]).pair();
+    let [low, high] = [first.min(second), first.max(second)];
+    if inwards {
+        high.max(third)
+    } else {
+        third.clamp(low, high)
     }
 }
 
@@ -334,19 +347,37 @@ impl Grid {
         })
     }
 
+    /// Of a node its azimuth and the hat of its radial coordinate; and what is left of the number.
+    #[inline]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "fewer than 2^16 radial coordinates"
+    )]
+    pub(super) fn hat_of(&self, (node, rest): (u32, f64)) -> (f64, &Hat, f64) {
+        // A division of whole numbers: half a step from the next one, rounding does not matter.
+        let azimuth = ((f64::from(node) + 0.5) * self.part) as u32;
+        let i = node - azimuth * self.radial.len() as u32;
+        (f64::from(azimuth), &self.hats[i as usize], rest)
+    }
+
+    /// How many azimuths there are.
+    #[inline]
+    pub(super) const fn azimuths(&self) -> f64 {
+        self.azimuths as f64
+    }
+
     /// The second part: a point from the hats of a node.
     #[inline]
-    #[allow(clippy::cast_possible_truncation, reason = "fewer than 2^16 radial coordinates")]
-    pub(super) fn about(&self, (node, rest): (u32, f64), number: f64) -> (f64, f64) {
-        let n = self.radial.len() as u32;
-        let (azimuth, i) = (node / n, node % n);
+    pub(super) fn about(&self, node: (u32, f64), number: f64) -> (f64, f64) {
+        let (azimuth, hat, rest) = self.hat_of(node);
         let aside = if number < 0.5 {
             (2.0 * number).sqrt() - 1.0
         } else {
             1.0 - (2.0 - 2.0 * number).sqrt()
         };
-        let turn = (f64::from(azimuth) + aside) / self.azimuths as f64;
-        let r = self.hats[i as usize].draw(rest, number);
+        let turn = (azimuth + aside) / self.azimuths();
+        let r = hat.draw(rest, number);
         (r, if turn < 0.0 { turn + 1.0 } else { turn })
     }
 

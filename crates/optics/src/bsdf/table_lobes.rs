@@ -41,6 +41,21 @@ pub(super) struct Lobe {
     sines: Vec<f64>,
     guide: Guide,
     blends: Vec<Blend>,
+    /// From each sine to the next.
+    steps: Vec<Step>,
+}
+
+/// Shares between two sines of incidence.
+#[derive(Clone, Debug)]
+pub(super) struct Step {
+    pub from: f64,
+    /// To the next sine; without end if there is none.
+    pub width: f64,
+    /// The first slice.
+    pub first: f64,
+    /// At the first sine, of two slices and the floor, and by how much they rise to the next.
+    pub shares: [f64; 3],
+    pub rises: [f64; 3],
 }
 
 /// How light from an angle of incidence is shared by slices.
@@ -96,6 +111,7 @@ impl Row {
             sines: Vec::new(),
             guide: Guide::default(),
             blends: Vec::new(),
+            steps: Vec::new(),
         };
         lobe.fill(&of(|slice| slice.share), &of(|slice| slice.floor));
         Ok(lobe)
@@ -162,6 +178,44 @@ impl Lobe {
             }
         }
         self.guide = Guide::new(&self.sines);
+        self.tabulate();
+    }
+
+    /// Shares from each sine to the next.
+    fn tabulate(&mut self) {
+        let pairs = self.sines.windows(2).zip(self.blends.windows(2));
+        let step = |(sines, blends): (&[f64], &[Blend])| Step {
+            from: sines[0],
+            width: if sines[1] > sines[0] {
+                sines[1] - sines[0]
+            } else {
+                f64::INFINITY
+            },
+            first: blends[0].first as f64,
+            shares: blends[0].shares,
+            rises: std::array::from_fn(|k| blends[1].shares[k] - blends[0].shares[k]),
+        };
+        self.steps = pairs.map(step).collect();
+    }
+
+    /// The step from the last sine that is not above this one.
+    #[inline]
+    pub(super) fn step(&self, sine: f64) -> &Step {
+        &self.steps[self.above(sine) - 1]
+    }
+
+    /// A slice, by its number.
+    #[inline]
+    pub(super) fn slice(&self, number: usize) -> &Grid {
+        &self.slices[number]
+    }
+
+    /// The first sine above this one, but for the very first and beyond the last.
+    #[inline]
+    fn above(&self, sine: f64) -> usize {
+        self.guide
+            .not_above(&self.sines, sine, |node| *node)
+            .clamp(1, self.sines.len() - 1)
     }
 
     fn push(&mut self, (sine, blend): (f64, Blend)) {
@@ -171,10 +225,7 @@ impl Lobe {
 
     #[inline]
     pub(super) fn blend(&self, sine: f64) -> Blend {
-        let above = self
-            .guide
-            .not_above(&self.sines, sine, |node| *node)
-            .clamp(1, self.sines.len() - 1);
+        let above = self.above(sine);
         let (a, b) = (&self.blends[above - 1], &self.blends[above]);
         let [from, to] = [self.sines[above - 1], self.sines[above]];
         let part = if to > from {
@@ -242,8 +293,9 @@ impl Lobes {
     /// Without the floor of any slice; None if there is nothing else.
     pub(super) fn without_floor(&self) -> Option<Self> {
         let mut rows = self.rows.clone();
-        for blend in rows.iter_mut().flat_map(|row| &mut row.blends) {
-            blend.shares[2] = 0.0;
+        for row in &mut rows {
+            row.blends.iter_mut().for_each(|blend| blend.shares[2] = 0.0);
+            row.tabulate();
         }
         let left = rows.iter().flat_map(|row| &row.blends).any(|blend| blend.share() > 0.0);
         left.then_some(Self { rows })

@@ -14,11 +14,13 @@
 
 use std::sync::Arc;
 
+use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
 use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
-use super::contract::{Bsdf, Drawn, Facts, Media, Parts, Product, Shares, by_cosine};
+use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares, by_cosine};
+use super::table_draw::{Group, TOGETHER};
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lit, Lobe, Lobes, Way};
 
@@ -187,24 +189,15 @@ struct Picked<'a> {
 }
 
 impl Picked<'_> {
-    /// The node of the grid, and what is left of the number.
-    #[inline]
-    fn node(&self) -> (u32, f64) {
-        self.grid.map_or((0, 0.0), |grid| grid.node(self.numbers[0]))
-    }
-
     /// The direction.
     #[inline]
-    fn direction(&self, incident: Vec3, node: (u32, f64)) -> Vec3 {
+    fn direction(&self, incident: Vec3) -> Vec3 {
         let Some(grid) = self.grid else {
             return by_cosine(self.up, self.numbers);
         };
-        let place = |point| self.incidence.direction(incident, point, self.up);
-        place(grid.about(node, self.numbers[1])).unwrap_or_else(|| {
-            let mut more = MoreNumbers::new(self.numbers);
-            let again = (1..TRIES).find_map(|_| place(grid.draw(more.pair())));
-            again.unwrap_or_else(|| by_cosine(self.up, self.numbers))
-        })
+        let place = grid.draw(self.numbers);
+        let found = self.incidence.direction(incident, place, self.up);
+        found.unwrap_or_else(|| again(&self.incidence, incident, grid, self.numbers, self.up))
     }
 }
 
@@ -227,9 +220,6 @@ impl Side {
 
 /// How often is tried again for a point within the unit circle.
 const TRIES: u32 = 10_000;
-
-/// How many rays are drawn for together.
-const TOGETHER: usize = 64;
 
 impl Bsdf for Tabulated {
     fn facts(&self) -> &Facts {
@@ -289,41 +279,103 @@ impl Bsdf for Tabulated {
             numbers: [number, numbers[1]],
             up: front != transmitted,
         };
-        picked.direction(incident, picked.node())
+        picked.direction(incident)
     }
 
     /// As any BSDF does, but what light is shared by is looked up once.
     fn sample(&self, incident: Vec3, media: &Media, numbers: [f64; 2]) -> Drawn {
         let picked = self.picked(incident, media, numbers);
-        picked.map_or(Drawn::Absorbed, |picked| {
-            Drawn::Scattered(picked.direction(incident, picked.node()))
-        })
+        picked.map_or(Drawn::Absorbed, |picked| Drawn::Scattered(picked.direction(incident)))
     }
 
-    /// As any BSDF does, but the nodes of many rays are looked up together: they are all over a memory that no cache holds, and
-    /// the processor waits for many of them at once.
-    fn sample_many(&self, incident: &[Vec3], media: &[Media], numbers: [&[f64]; 2], drawn: &mut Vec<Drawn>) {
-        let mut group = [None; TOGETHER];
-        let mut nodes = [(0, 0.0); TOGETHER];
-        for (first, incident) in (0..).step_by(TOGETHER).zip(incident.chunks(TOGETHER)) {
-            for (k, i) in (first..).enumerate().take(incident.len()) {
-                group[k] = self.picked(incident[k], &media[i], numbers.map(|list| list[i]));
+    /// As any BSDF does, but where a side has a single lobe, for many rays together.
+    fn sample_many(&self, directions: &mut Vectors, media: &[Media], numbers: [&[f64]; 2], outcomes: &mut [Outcome]) {
+        let mut sides = [Waiting::new(), Waiting::new()];
+        for k in 0..outcomes.len() {
+            let side = usize::from(directions[2][k] <= 0.0);
+            sides[side].which[sides[side].count] = k;
+            sides[side].count += 1;
+            if sides[side].count == TOGETHER {
+                self.sample_waiting(side == 0, &mut sides[side], directions, media, numbers, outcomes);
             }
-            for (node, picked) in nodes.iter_mut().zip(&group) {
-                *node = picked.as_ref().map_or((0, 0.0), Picked::node);
-            }
-            drawn.extend(
-                incident
-                    .iter()
-                    .zip(&group)
-                    .zip(nodes)
-                    .map(|((incident, picked), node)| {
-                        let direction = picked.map(|picked| picked.direction(*incident, node));
-                        direction.map_or(Drawn::Absorbed, Drawn::Scattered)
-                    }),
-            );
+        }
+        for (side, waiting) in sides.iter_mut().enumerate() {
+            self.sample_waiting(side == 0, waiting, directions, media, numbers, outcomes);
         }
     }
+}
+
+/// Rays that meet one side.
+#[derive(Clone)]
+struct Waiting {
+    which: [usize; TOGETHER],
+    count: usize,
+    group: Group,
+}
+
+impl Waiting {
+    const fn new() -> Self {
+        Self {
+            which: [0; TOGETHER],
+            count: 0,
+            group: Group::new(),
+        }
+    }
+}
+
+impl Tabulated {
+    /// What becomes of the rays that have come together.
+    fn sample_waiting(
+        &self,
+        front: bool,
+        waiting: &mut Waiting,
+        directions: &mut Vectors,
+        media: &[Media],
+        numbers: [&[f64]; 2],
+        outcomes: &mut [Outcome],
+    ) {
+        let Waiting { which, count, group } = waiting;
+        let which = &which[..std::mem::take(count)];
+        let Some((way, lobe)) = self.lone(front) else {
+            for k in which.iter().copied() {
+                let [x, y, z] = directions.each_ref().map(|list| list[k]);
+                let drawn = self.sample(Vec3::new(x, y, z), &media[k], numbers.map(|list| list[k]));
+                outcomes[k] = drawn.keep(directions, k);
+            }
+            return;
+        };
+        let up = front != way;
+        for (place, k) in which.iter().enumerate() {
+            for axis in 0..2 {
+                group.incident[axis][place] = directions[axis][*k];
+                group.numbers[axis][place] = numbers[axis][*k];
+            }
+        }
+        group.draw(lobe, which.len(), up);
+        for (place, k) in which.iter().enumerate() {
+            if group.absorbed[place] > 0.0 {
+                outcomes[*k] = Outcome::Absorbed;
+                continue;
+            }
+            outcomes[*k] = Outcome::Scattered;
+            let mut to = group.direction.each_ref().map(|list| list[place]);
+            if let Some((incidence, slice, numbers)) = group.missed(place) {
+                let [x, y] = [0, 1].map(|axis| directions[axis][*k]);
+                let found = again(&incidence, Vec3::new(x, y, 0.0), lobe.slice(slice), numbers, up);
+                to = [found.x, found.y, found.z];
+            }
+            for (list, component) in directions.iter_mut().zip(to) {
+                list[*k] = component;
+            }
+        }
+    }
+}
+
+/// A direction where a first place was outside the unit circle.
+fn again(incidence: &Incidence, incident: Vec3, grid: &Grid, numbers: [f64; 2], up: bool) -> Vec3 {
+    let mut more = MoreNumbers::new(numbers);
+    let found = (1..TRIES).find_map(|_| incidence.direction(incident, grid.draw(more.pair()), up));
+    found.unwrap_or_else(|| by_cosine(up, numbers))
 }
 
 /// The floors.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use etendue_math::Vec3;
 use etendue_sampling::philox::Stream;
 
-use super::contract::{Bsdf, Drawn, Example, Examples, Media, by_cosine};
+use super::contract::{Bsdf, Drawn, Example, Examples, Media, Outcome, by_cosine};
 use super::interface::Interface;
 use super::kinds;
 use super::lambertian::Lambertian;
@@ -191,13 +191,15 @@ fn many_rays_are_drawn_for_as_each_by_itself() {
             .map(|i| direction(HEIGHTS[i % HEIGHTS.len()], 0.137 * i as f64))
             .collect();
         let media: Vec<Media> = (0..150).map(|i| MEDIA[i % MEDIA.len()]).collect();
-        let mut drawn = vec![Drawn::Absorbed];
-        bsdf.sample_many(&incident, &media, numbers.each_ref().map(|list| &list[..]), &mut drawn);
-        assert_eq!(drawn.len(), 151, "{name}");
+        let numbers = numbers.each_ref().map(|list| &list[..]);
+        let mut found = [0, 1, 2].map(|axis| incident.iter().map(|d| [d.x, d.y, d.z][axis]).collect::<Vec<f64>>());
+        let (mut expected, mut outcomes) = (found.clone(), vec![Outcome::Absorbed; 150]);
+        bsdf.sample_many(&mut found, &media, numbers, &mut outcomes);
         for i in 0..150 {
-            let alone = bsdf.sample(incident[i], &media[i], [numbers[0][i], numbers[1][i]]);
-            assert_eq!(drawn[i + 1], alone, "{name}");
+            let alone = bsdf.sample(incident[i], &media[i], numbers.map(|list| list[i]));
+            assert_eq!(outcomes[i], alone.keep(&mut expected, i), "{name}");
         }
+        assert_eq!(found, expected, "{name}");
     }
 }
 

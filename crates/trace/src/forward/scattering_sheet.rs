@@ -5,7 +5,7 @@
 
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
-use etendue_optics::bsdf::{Bsdf, Drawn, Media};
+use etendue_optics::bsdf::{Bsdf, Media, Outcome};
 use etendue_optics::fresnel::reflect;
 use multiversion::multiversion;
 
@@ -46,8 +46,7 @@ pub struct ScatteredRays {
     pub media: Vec<Media>,
     /// To where each comes from, and where it goes, in the frame of the surface.
     towards: Vectors,
-    incident: Vec<Vec3>,
-    drawn: Vec<Drawn>,
+    outcomes: Vec<Outcome>,
 }
 
 impl ScatteredRays {
@@ -61,35 +60,26 @@ impl ScatteredRays {
             None => outward(rays.normals(), rays.directions(), &mut self.towards),
             Some(axis) => outward_along(axis, rays.normals(), rays.directions(), &mut self.towards),
         }
-        self.incident.clear();
-        self.incident.extend((0..n).map(|k| at(&self.towards, k)));
-        self.drawn.clear();
+        self.outcomes.resize(n, Outcome::Absorbed);
         sheet
             .bsdf
-            .sample_many(&self.incident, &self.media, numbers, &mut self.drawn);
+            .sample_many(&mut self.towards, &self.media, numbers, &mut self.outcomes);
     }
 
     /// Turns the lines to the sheet into those from there; rays that are absorbed are told, and left out.
     pub fn turn(&mut self, sheet: &ScatteringSheet<'_>, rays: &mut SheetRays, mut absorbed: impl FnMut(u32)) {
-        for (k, drawn) in self.drawn.iter().enumerate() {
-            if let Drawn::Scattered(v) = drawn {
-                for (list, component) in self.towards.iter_mut().zip([v.x, v.y, v.z]) {
-                    list[k] = component;
-                }
-            }
-        }
         match sheet.axis {
             None => in_space(rays.normals(), &mut self.towards),
             Some(axis) => in_space_along(axis, rays.normals(), &mut self.towards),
         }
-        rays.turn_each(|k, ray| match self.drawn[k] {
-            Drawn::Scattered(_) => Some(at(&self.towards, k)),
-            Drawn::Mirrored => {
-                let height = self.incident[k].z;
+        rays.turn_each(|k, ray| match self.outcomes[k] {
+            Outcome::Scattered => Some(at(&self.towards, k)),
+            Outcome::Mirrored => {
+                let height = (-ray.d.dot(ray.normal)).clamp(-1.0, 1.0);
                 let facing = if height > 0.0 { ray.normal } else { -ray.normal };
                 Some(reflect(ray.d, facing, height.abs()))
             }
-            Drawn::Absorbed | Drawn::Refracted(_) => {
+            Outcome::Absorbed | Outcome::Refracted => {
                 absorbed(ray.who);
                 None
             }

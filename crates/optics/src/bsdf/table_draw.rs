@@ -1,0 +1,263 @@
+//! Many rays at once off a table of one lobe: what [`Tabulated`](super::Tabulated) draws for each by itself, to the same bits.
+//!
+//! Step by step for all of them together. Sums, roots and angles are worked out several at a time; what is looked up in between
+//! is all over a memory that no cache holds, and without branches the processor waits for many of them at once.
+
+use etendue_math::Vec3;
+use etendue_math::trig::sin_cos_turns;
+use etendue_sampling::warp::part_of;
+use multiversion::multiversion;
+
+use super::table_lobes::{Incidence, Lobe, Step};
+
+/// How many rays are drawn for together.
+pub(super) const TOGETHER: usize = 64;
+
+type Lanes = [f64; TOGETHER];
+const ZERO: Lanes = [0.0; TOGETHER];
+
+#[derive(Clone)]
+/// What scatters each of some rays that meet the same side of a surface, and where to.
+pub(super) struct Group {
+    /// Direction cosines of where the light comes from, and two random numbers.
+    pub incident: [Lanes; 2],
+    pub numbers: [Lanes; 2],
+    /// See [`Incidence`].
+    sine: Lanes,
+    forward: [Lanes; 2],
+    /// See [`Step`].
+    from: Lanes,
+    width: Lanes,
+    first: Lanes,
+    shares: [Lanes; 3],
+    rises: [Lanes; 3],
+    /// Above 0 for rays that are absorbed, and for those that a floor scatters.
+    pub absorbed: Lanes,
+    floor: Lanes,
+    /// The number of the slice, and what is left of the first number.
+    slice: Lanes,
+    rest: Lanes,
+    /// The node of the slice: azimuth and how many azimuths there are; see `Hat`.
+    azimuth: Lanes,
+    azimuths: Lanes,
+    far: Lanes,
+    top: Lanes,
+    linear: Lanes,
+    /// What is left of the first number as a share of one side of the hat, and from 0 to 1.
+    part: Lanes,
+    whole: Lanes,
+    side: Lanes,
+    /// From the far end of the side to its top.
+    along: Lanes,
+    /// Where the light goes.
+    pub direction: [Lanes; 3],
+}
+
+impl Group {
+    pub const fn new() -> Self {
+        Self {
+            incident: [ZERO; 2],
+            numbers: [ZERO; 2],
+            sine: ZERO,
+            forward: [ZERO; 2],
+            from: ZERO,
+            width: ZERO,
+            first: ZERO,
+            shares: [ZERO; 3],
+            rises: [ZERO; 3],
+            absorbed: ZERO,
+            floor: ZERO,
+            slice: ZERO,
+            rest: ZERO,
+            azimuth: ZERO,
+            azimuths: ZERO,
+            far: ZERO,
+            top: ZERO,
+            linear: ZERO,
+            part: ZERO,
+            whole: ZERO,
+            side: ZERO,
+            along: ZERO,
+            direction: [ZERO; 3],
+        }
+    }
+
+    /// Draws for the first `n` rays.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "numbers of slices"
+    )]
+    pub fn draw(&mut self, lobe: &Lobe, n: usize, up: bool) {
+        incidences(self);
+        for k in 0..n {
+            let Step {
+                from,
+                width,
+                first,
+                shares,
+                rises,
+            } = lobe.step(self.sine[k]);
+            (self.from[k], self.width[k], self.first[k]) = (*from, *width, *first);
+            for j in 0..3 {
+                (self.shares[j][k], self.rises[j][k]) = (shares[j], rises[j]);
+            }
+        }
+        picks(self);
+        for k in 0..n {
+            let grid = lobe.slice(self.slice[k] as usize);
+            let (azimuth, hat, rest) = grid.hat_of(grid.node(self.rest[k]));
+            let side = usize::from(rest >= hat.inner);
+            let slope = &hat.slopes[side];
+            (self.azimuth[k], self.azimuths[k]) = (azimuth, grid.azimuths());
+            (self.far[k], self.top[k], self.linear[k]) = (slope.far, hat.node, slope.linear);
+            (self.part[k], self.whole[k]) = (rest - slope.begin, slope.share);
+            self.side[k] = side as f64;
+        }
+        radii(self);
+        for k in 0..n {
+            if self.part[k] >= self.linear[k] {
+                let slope = [self.part[k], self.linear[k]];
+                self.along[k] = super::table_grid::bent(slope, self.numbers[1][k], self.side[k] == 0.0);
+            }
+        }
+        directions(self, if up { 1.0 } else { -1.0 });
+    }
+
+    /// A ray, its numbers that have not been used, and its slice, where the place that was drawn lies outside the unit circle.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "numbers of slices"
+    )]
+    pub fn missed(&self, k: usize) -> Option<(Incidence, usize, [f64; 2])> {
+        let [x, y] = self.incident.each_ref().map(|list| list[k]);
+        let missed = self.direction[2][k] == 0.0 && self.floor[k] == 0.0;
+        missed.then(|| {
+            let numbers = [self.rest[k], self.numbers[1][k]];
+            (Incidence::new(Vec3::new(x, y, 0.0)), self.slice[k] as usize, numbers)
+        })
+    }
+}
+
+/// Sines and azimuths of incidence.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn incidences(group: &mut Group) {
+    let Group {
+        incident: [x, y],
+        sine,
+        forward: [c, s],
+        ..
+    } = group;
+    for k in 0..TOGETHER {
+        let length = (x[k] * x[k] + y[k] * y[k]).sqrt();
+        let scale = -1.0 / length;
+        let tilted = length > 0.0;
+        c[k] = if tilted { x[k] * scale } else { -1.0 };
+        s[k] = if tilted { y[k] * scale } else { 0.0 };
+        sine[k] = if length < 1.0 { length } else { 1.0 };
+    }
+}
+
+/// Slices or floors by their shares.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn picks(group: &mut Group) {
+    let Group {
+        numbers: [number, _],
+        sine,
+        from,
+        width,
+        first,
+        shares: [a, b, even],
+        rises: [da, db, deven],
+        absorbed,
+        floor,
+        slice,
+        rest,
+        ..
+    } = group;
+    for k in 0..TOGETHER {
+        let part = (sine[k] - from[k]) / width[k];
+        let part = if part > 0.0 { part } else { 0.0 };
+        let part = if part < 1.0 { part } else { 1.0 };
+        let [a, b, even] = [a[k] + part * da[k], b[k] + part * db[k], even[k] + part * deven[k]];
+        let all = a + b + even;
+        // Shares that should add up to 1 may fall short of it by rounding.
+        absorbed[k] = if (number[k] < all) | (all >= 1.0 - 1e-12) {
+            0.0
+        } else {
+            1.0
+        };
+        let left = [number[k], number[k] - a, number[k] - a - b];
+        let is_first = left[0] < a;
+        let is_even = !is_first & (left[1] >= b) & (even > 0.0);
+        let is_second = !is_first & !is_even & (b > 0.0);
+        let (part, share) = if is_even {
+            (left[2], even)
+        } else if is_second {
+            (left[1], b)
+        } else {
+            (left[0], a)
+        };
+        floor[k] = if is_even { 1.0 } else { 0.0 };
+        slice[k] = first[k] + if is_second { 1.0 } else { 0.0 };
+        rest[k] = part_of(part, share);
+    }
+}
+
+/// Radial coordinates, but for those that have to be drawn in another way.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn radii(group: &mut Group) {
+    let Group {
+        linear,
+        part,
+        whole,
+        along,
+        ..
+    } = group;
+    for k in 0..TOGETHER {
+        part[k] = part_of(part[k], whole[k]);
+        along[k] = part_of(part[k], linear[k]).sqrt();
+    }
+}
+
+/// Directions at the places that were drawn; the height of those outside the unit circle is 0.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn directions(group: &mut Group, sign: f64) {
+    let Group {
+        incident: [x, y],
+        numbers: [_, number],
+        forward: [c, s],
+        floor,
+        rest,
+        azimuth,
+        azimuths,
+        far,
+        top,
+        along,
+        direction: [to_x, to_y, to_z],
+        ..
+    } = group;
+    for k in 0..TOGETHER {
+        let is_even = floor[k] > 0.0;
+        // Of a floor, as `by_cosine` says.
+        let cosine = (1.0 - rest[k]).sqrt();
+        let even = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
+        // Of a node: azimuths with a density that falls linearly towards the next ones.
+        let low = number[k] < 0.5;
+        let root = (if low { 2.0 * number[k] } else { 2.0 - 2.0 * number[k] }).sqrt();
+        let aside = if low { root - 1.0 } else { 1.0 - root };
+        let turn = (azimuth[k] + aside) / azimuths[k];
+        let turn = if turn < 0.0 { turn + 1.0 } else { turn };
+        let r = far[k] + along[k] * (top[k] - far[k]);
+        let (sin, cos) = sin_cos_turns(if is_even { number[k] } else { turn });
+        let (ahead, across) = (r * cos, r * sin);
+        let px = c[k] * ahead - s[k] * across - x[k];
+        let py = s[k] * ahead + c[k] * across - y[k];
+        let square = 1.0 - px * px - py * py;
+        let height = if square > 0.0 { square.sqrt() } else { 0.0 };
+        to_x[k] = if is_even { even * cos } else { px };
+        to_y[k] = if is_even { even * sin } else { py };
+        to_z[k] = sign * if is_even { cosine } else { height };
+    }
+}
