@@ -46,7 +46,8 @@ impl Alias {
         self.pick_and_rest(u).0
     }
 
-    /// The entry for a uniform number in (0, 1), and what is left of the number: uniform again, less than 1.
+    /// The slot that a uniform number in (0, 1) falls into: its number, the chance of the entry of that number, and the entry
+    /// that has the rest.
     #[inline]
     #[must_use]
     #[allow(
@@ -54,11 +55,18 @@ impl Alias {
         clippy::cast_sign_loss,
         reason = "below the number of slots"
     )]
-    pub fn pick_and_rest(&self, u: f64) -> (usize, f64) {
-        let scaled = u * self.slots.len() as f64;
-        let slot = (scaled as usize).min(self.slots.len() - 1);
+    pub fn slot(&self, u: f64) -> (usize, f64, u32) {
+        let slot = ((u * self.slots.len() as f64) as usize).min(self.slots.len() - 1);
         let (chance, alias) = self.slots[slot];
-        let within = scaled - slot as f64;
+        (slot, chance, alias)
+    }
+
+    /// The entry for a uniform number in (0, 1), and what is left of the number: uniform again, less than 1.
+    #[inline]
+    #[must_use]
+    pub fn pick_and_rest(&self, u: f64) -> (usize, f64) {
+        let (slot, chance, alias) = self.slot(u);
+        let within = u * self.slots.len() as f64 - slot as f64;
         // Without a branch: which of the two it is, nobody can foresee.
         let own = within < chance;
         let (part, share) = if own {

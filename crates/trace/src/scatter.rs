@@ -90,15 +90,21 @@ pub fn axes(normal: Vec3) -> [Vec3; 3] {
 }
 
 /// Axes of which the first is a direction laid on the surface; any, where it stands upright on it.
+#[inline(always)]
 #[must_use]
 pub fn axes_along(normal: Vec3, axis: Vec3) -> [Vec3; 3] {
     let laid = axis - normal * axis.dot(normal);
     let length = laid.length();
-    if length <= 1e-9 * axis.length() {
-        return axes(normal);
-    }
+    let upright = length <= 1e-9 * axis.length();
     let x = laid * (1.0 / length);
-    [x, normal.cross(x), normal]
+    let y = normal.cross(x);
+    // By components: several at a time where many are asked for.
+    let [any_x, any_y] = across(normal);
+    let either = |any: Vec3, own: Vec3| {
+        let pick = |any: f64, own: f64| if upright { any } else { own };
+        Vec3::new(pick(any.x, own.x), pick(any.y, own.y), pick(any.z, own.z))
+    };
+    [either(any_x, x), either(any_y, y), normal]
 }
 
 /// Components of a unit vector along axes.

@@ -37,16 +37,28 @@ pub(super) struct Group {
     /// The number of the slice, and what is left of the first number.
     slice: Lanes,
     rest: Lanes,
-    /// The node of the slice: azimuth and how many azimuths there are; see `Hat`.
-    azimuth: Lanes,
+    /// Of the slice how many radial coordinates, azimuths and values there are.
+    radii: Lanes,
     azimuths: Lanes,
-    far: Lanes,
+    values: Lanes,
+    /// Of its alias table: a place, what it holds, and the node that is found.
+    slot: Lanes,
+    chance: Lanes,
+    alias: Lanes,
+    /// Azimuth and radial coordinate of the node.
+    azimuth: Lanes,
+    radius: Lanes,
+    /// See `Hat`; of both sides.
+    inner: Lanes,
     top: Lanes,
+    fars: [Lanes; 2],
+    linears: [Lanes; 2],
+    /// Of the side that is drawn from; 1 if it is the outer one.
+    far: Lanes,
     linear: Lanes,
-    /// What is left of the first number as a share of one side of the hat, and from 0 to 1.
-    part: Lanes,
-    whole: Lanes,
     side: Lanes,
+    /// What is left of the first number, on that side.
+    part: Lanes,
     /// From the far end of the side to its top.
     along: Lanes,
     /// Where the light goes.
@@ -69,14 +81,22 @@ impl Group {
             floor: ZERO,
             slice: ZERO,
             rest: ZERO,
-            azimuth: ZERO,
+            radii: ZERO,
             azimuths: ZERO,
-            far: ZERO,
+            values: ZERO,
+            slot: ZERO,
+            chance: ZERO,
+            alias: ZERO,
+            azimuth: ZERO,
+            radius: ZERO,
+            inner: ZERO,
             top: ZERO,
+            fars: [ZERO; 2],
+            linears: [ZERO; 2],
+            far: ZERO,
             linear: ZERO,
-            part: ZERO,
-            whole: ZERO,
             side: ZERO,
+            part: ZERO,
             along: ZERO,
             direction: [ZERO; 3],
         }
@@ -106,13 +126,16 @@ impl Group {
         picks(self);
         for k in 0..n {
             let grid = lobe.slice(self.slice[k] as usize);
-            let (azimuth, hat, rest) = grid.hat_of(grid.node(self.rest[k]));
-            let side = usize::from(rest >= hat.inner);
-            let slope = &hat.slopes[side];
-            (self.azimuth[k], self.azimuths[k]) = (azimuth, grid.azimuths());
-            (self.far[k], self.top[k], self.linear[k]) = (slope.far, hat.node, slope.linear);
-            (self.part[k], self.whole[k]) = (rest - slope.begin, slope.share);
-            self.side[k] = side as f64;
+            [self.radii[k], self.azimuths[k], self.values[k]] = grid.size();
+            (self.slot[k], self.chance[k], self.alias[k]) = grid.slot(self.rest[k]);
+        }
+        nodes(self);
+        for k in 0..n {
+            let hat = lobe.slice(self.slice[k] as usize).hat(self.radius[k] as usize);
+            (self.inner[k], self.top[k]) = (hat.inner, hat.node);
+            for side in 0..2 {
+                (self.fars[side][k], self.linears[side][k]) = (hat.slopes[side].far, hat.slopes[side].linear);
+            }
         }
         radii(self);
         for k in 0..n {
@@ -205,18 +228,70 @@ fn picks(group: &mut Group) {
     }
 }
 
+/// Nodes of the slices.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn nodes(group: &mut Group) {
+    let Group {
+        rest,
+        radii,
+        values,
+        slot,
+        chance,
+        alias,
+        azimuth,
+        radius,
+        part,
+        ..
+    } = group;
+    for k in 0..TOGETHER {
+        let within = rest[k] * values[k] - slot[k];
+        let own = within < chance[k];
+        let (left, share) = if own {
+            (within, chance[k])
+        } else {
+            (within - chance[k], 1.0 - chance[k])
+        };
+        part[k] = part_of(left, share);
+        let node = if own { slot[k] } else { alias[k] };
+        // A division of whole numbers: the nearest one to what lies half a step from its next.
+        azimuth[k] = whole((node + 0.5) / radii[k] - 0.5);
+        radius[k] = node - azimuth[k] * radii[k];
+    }
+}
+
+/// The nearest whole number, of a small one.
+#[inline(always)]
+fn whole(x: f64) -> f64 {
+    // As an addition rounds; `round` is a call where the instruction set has no such thing.
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    (x + WHOLE) - WHOLE
+}
+
 /// Radial coordinates, but for those that have to be drawn in another way.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn radii(group: &mut Group) {
     let Group {
+        inner,
+        fars,
+        linears,
+        far,
         linear,
+        side,
         part,
-        whole,
         along,
         ..
     } = group;
     for k in 0..TOGETHER {
-        part[k] = part_of(part[k], whole[k]);
+        let inwards = part[k] < inner[k];
+        far[k] = if inwards { fars[0][k] } else { fars[1][k] };
+        linear[k] = if inwards { linears[0][k] } else { linears[1][k] };
+        side[k] = if inwards { 0.0 } else { 1.0 };
+        let (left, share) = if inwards {
+            (part[k], inner[k])
+        } else {
+            (part[k] - inner[k], 1.0 - inner[k])
+        };
+        part[k] = part_of(left, share);
         along[k] = part_of(part[k], linear[k]).sqrt();
     }
 }

@@ -32,8 +32,6 @@ pub(super) struct Grid {
     /// From 0 to the end of the plane.
     radial: Vec<f64>,
     azimuths: usize,
-    /// The reciprocal of how many radial coordinates there are.
-    part: f64,
     /// f, azimuth by azimuth, at each radial coordinate.
     f: Vec<f64>,
     /// Of `f`, by what each value contributes to the integral over the plane; None if that is 0.
@@ -70,9 +68,6 @@ pub(super) struct Slope {
     pub far: f64,
     /// The part of it that goes with s; the rest goes with s² towards 0, and with s (1 − s) away from it.
     pub linear: f64,
-    /// The part of the hat that comes before it, and its own.
-    pub begin: f64,
-    pub share: f64,
 }
 
 /// Farthest |β − β₀|.
@@ -197,7 +192,6 @@ impl Slice {
         Ok(Grid {
             sine: self.sine,
             azimuths: *azimuths,
-            part: 1.0 / all.len() as f64,
             f,
             nodes: Alias::new(&weights),
             hats,
@@ -221,19 +215,13 @@ impl Hat {
             let straight = 0.5 * far.min(node);
             let bent = if far < node { step / 3.0 } else { step / 6.0 };
             let linear = if bent > 0.0 { straight / (straight + bent) } else { 1.0 };
-            (step * (straight + bent), far, linear)
+            (step * (straight + bent), Slope { far, linear })
         };
         let below = i.checked_sub(1).map(|below| &radial[below]);
-        let [towards, away] = [below, radial.get(i + 1)].map(side);
-        let whole = towards.0 + away.0;
-        let inner = if whole > 0.0 { towards.0 / whole } else { 0.0 };
-        let slope = |(_, far, linear): (f64, f64, f64), begin: f64, share: f64| Slope {
-            far,
-            linear,
-            begin,
-            share,
-        };
-        let slopes = [slope(towards, 0.0, inner), slope(away, inner, 1.0 - inner)];
+        let [(towards, inside), (away, outside)] = [below, radial.get(i + 1)].map(side);
+        let whole = towards + away;
+        let inner = if whole > 0.0 { towards / whole } else { 0.0 };
+        let slopes = [inside, outside];
         (Self { node, inner, slopes }, whole)
     }
 
@@ -242,7 +230,11 @@ impl Hat {
     fn draw(&self, number: f64, other: f64) -> f64 {
         let inwards = number < self.inner;
         let slope = &self.slopes[usize::from(!inwards)];
-        let rest = part_of(number - slope.begin, slope.share);
+        let rest = if inwards {
+            part_of(number, self.inner)
+        } else {
+            part_of(number - self.inner, 1.0 - self.inner)
+        };
         let s = if rest < slope.linear {
             part_of(rest, slope.linear).sqrt()
         } else {
@@ -347,37 +339,42 @@ impl Grid {
         })
     }
 
-    /// Of a node its azimuth and the hat of its radial coordinate; and what is left of the number.
+    /// The place in the table of nodes that a number falls into, and what it holds.
     #[inline]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "fewer than 2^16 radial coordinates"
-    )]
-    pub(super) fn hat_of(&self, (node, rest): (u32, f64)) -> (f64, &Hat, f64) {
-        // A division of whole numbers: half a step from the next one, rounding does not matter.
-        let azimuth = ((f64::from(node) + 0.5) * self.part) as u32;
-        let i = node - azimuth * self.radial.len() as u32;
-        (f64::from(azimuth), &self.hats[i as usize], rest)
+    pub(super) fn slot(&self, number: f64) -> (f64, f64, f64) {
+        // Without nodes, the first one takes all.
+        self.nodes.as_ref().map_or((0.0, 1.0, 0.0), |nodes| {
+            let (slot, chance, alias) = nodes.slot(number);
+            (slot as f64, chance, f64::from(alias))
+        })
     }
 
-    /// How many azimuths there are.
+    /// How many radial coordinates, azimuths and values there are.
     #[inline]
-    pub(super) const fn azimuths(&self) -> f64 {
-        self.azimuths as f64
+    pub(super) const fn size(&self) -> [f64; 3] {
+        let [radii, azimuths] = [self.radial.len() as f64, self.azimuths as f64];
+        [radii, azimuths, self.f.len() as f64]
+    }
+
+    /// The hat of a radial coordinate.
+    #[inline]
+    pub(super) fn hat(&self, i: usize) -> &Hat {
+        &self.hats[i]
     }
 
     /// The second part: a point from the hats of a node.
     #[inline]
-    pub(super) fn about(&self, node: (u32, f64), number: f64) -> (f64, f64) {
-        let (azimuth, hat, rest) = self.hat_of(node);
+    #[allow(clippy::cast_possible_truncation, reason = "fewer than 2^16 radial coordinates")]
+    pub(super) fn about(&self, (node, rest): (u32, f64), number: f64) -> (f64, f64) {
+        let n = self.radial.len() as u32;
+        let (azimuth, i) = (node / n, node % n);
         let aside = if number < 0.5 {
             (2.0 * number).sqrt() - 1.0
         } else {
             1.0 - (2.0 - 2.0 * number).sqrt()
         };
-        let turn = (azimuth + aside) / self.azimuths();
-        let r = hat.draw(rest, number);
+        let turn = (f64::from(azimuth) + aside) / self.azimuths as f64;
+        let r = self.hats[i as usize].draw(rest, number);
         (r, if turn < 0.0 { turn + 1.0 } else { turn })
     }
 

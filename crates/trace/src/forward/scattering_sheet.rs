@@ -117,9 +117,12 @@ fn outward(normals: &Vectors, directions: &Vectors, towards: &mut Vectors) {
 }
 
 /// The same where the first axis follows a direction.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn outward_along(axis: Vec3, normals: &Vectors, directions: &Vectors, towards: &mut Vectors) {
+    let n = towards[0].len();
+    let [dx, dy, dz] = directions.each_ref().map(|list| &list[..n]);
     each(normals, towards, |k, normal, _| {
-        local(&axes_along(normal, axis), -at(directions, k))
+        local(&axes_along(normal, axis), -Vec3::new(dx[k], dy[k], dz[k]))
     });
 }
 
@@ -130,6 +133,7 @@ fn in_space(normals: &Vectors, vectors: &mut Vectors) {
 }
 
 /// The same where the first axis follows a direction.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn in_space_along(axis: Vec3, normals: &Vectors, vectors: &mut Vectors) {
     each(normals, vectors, |_, normal, v| along(&axes_along(normal, axis), v));
 }
