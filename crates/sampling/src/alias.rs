@@ -5,9 +5,11 @@ use crate::warp::part_of;
 /// Alias table (Walker 1977; construction of Vose 1991, `[Vose1991]`) over weights that need not add up to one.
 #[derive(Clone, Debug)]
 pub struct Alias {
-    /// For each entry the chance of itself, else of its alias.
-    slots: Vec<(f64, u32)>,
+    slots: Vec<Slot>,
 }
+
+/// The chance of the entry of the same number, and the entry that has the rest.
+pub type Slot = (f64, u32);
 
 impl Alias {
     /// A table over weights ≥ 0; None if there are none, their sum is not above 0 and finite, or there are 2³² or more.
@@ -19,7 +21,7 @@ impl Alias {
             return None;
         }
         let scale = f64::from(count) / total;
-        let mut slots: Vec<(f64, u32)> = weights.iter().zip(0..count).map(|(w, i)| (w * scale, i)).collect();
+        let mut slots: Vec<Slot> = weights.iter().zip(0..count).map(|(w, i)| (w * scale, i)).collect();
         let (mut poor, mut rich): (Vec<u32>, Vec<u32>) = (0..count).partition(|i| slots[*i as usize].0 < 1.0);
         while let (Some(small), Some(large)) = (poor.pop(), rich.last().copied()) {
             let missing = 1.0 - slots[small as usize].0;
@@ -46,8 +48,14 @@ impl Alias {
         self.pick_and_rest(u).0
     }
 
-    /// The slot that a uniform number in (0, 1) falls into: its number, the chance of the entry of that number, and the entry
-    /// that has the rest.
+    /// Its slots: a uniform number falls into one of them, and what is left of it decides.
+    #[inline]
+    #[must_use]
+    pub fn slots(&self) -> &[Slot] {
+        &self.slots
+    }
+
+    /// The entry for a uniform number in (0, 1), and what is left of the number: uniform again, less than 1.
     #[inline]
     #[must_use]
     #[allow(
@@ -55,18 +63,11 @@ impl Alias {
         clippy::cast_sign_loss,
         reason = "below the number of slots"
     )]
-    pub fn slot(&self, u: f64) -> (usize, f64, u32) {
-        let slot = ((u * self.slots.len() as f64) as usize).min(self.slots.len() - 1);
-        let (chance, alias) = self.slots[slot];
-        (slot, chance, alias)
-    }
-
-    /// The entry for a uniform number in (0, 1), and what is left of the number: uniform again, less than 1.
-    #[inline]
-    #[must_use]
     pub fn pick_and_rest(&self, u: f64) -> (usize, f64) {
-        let (slot, chance, alias) = self.slot(u);
-        let within = u * self.slots.len() as f64 - slot as f64;
+        let scaled = u * self.slots.len() as f64;
+        let slot = (scaled as usize).min(self.slots.len() - 1);
+        let (chance, alias) = self.slots[slot];
+        let within = scaled - slot as f64;
         // Without a branch: which of the two it is, nobody can foresee.
         let own = within < chance;
         let (part, share) = if own {

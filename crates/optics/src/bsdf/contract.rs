@@ -272,7 +272,7 @@ pub trait Bsdf: Debug + Send + Sync {
     }
 
     /// What becomes of many rays, each as [`sample`](Bsdf::sample) says, one outcome for each. Directions are those from which the
-    /// rays come; those of rays that are scattered are changed to where they go.
+    /// rays come; those of rays that are scattered are changed to where they go, and those of rays that are absorbed mean nothing.
     fn sample_many(&self, directions: &mut Vectors, media: &[Media], numbers: [&[f64]; 2], outcomes: &mut [Outcome]) {
         for (k, outcome) in outcomes.iter_mut().enumerate() {
             let [x, y, z] = directions.each_ref().map(|list| list[k]);

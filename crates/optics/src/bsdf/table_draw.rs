@@ -3,60 +3,61 @@
 //! Step by step for all of them together. Sums, roots and angles are worked out several at a time; what is looked up in between
 //! is all over a memory that no cache holds, and without branches the processor waits for many of them at once.
 
-use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
+use etendue_sampling::alias::Slot;
 use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
-use super::table_lobes::{Incidence, Lobe, Step};
+use super::table_grid::bent;
+use super::table_lobes::Lobe;
 
 /// How many rays are drawn for together.
 pub(super) const TOGETHER: usize = 64;
 
 type Lanes = [f64; TOGETHER];
+type Numbers = [u32; TOGETHER];
 const ZERO: Lanes = [0.0; TOGETHER];
 
-#[derive(Clone)]
 /// What scatters each of some rays that meet the same side of a surface, and where to.
 pub(super) struct Group {
     /// Direction cosines of where the light comes from, and two random numbers.
     pub incident: [Lanes; 2],
     pub numbers: [Lanes; 2],
-    /// See [`Incidence`].
+    /// See `Incidence`.
     sine: Lanes,
     forward: [Lanes; 2],
-    /// See [`Step`].
+    /// See `Step`.
     from: Lanes,
     width: Lanes,
-    first: Lanes,
+    first: Numbers,
     shares: [Lanes; 3],
     rises: [Lanes; 3],
     /// Above 0 for rays that are absorbed, and for those that a floor scatters.
     pub absorbed: Lanes,
     floor: Lanes,
     /// The number of the slice, and what is left of the first number.
-    slice: Lanes,
+    slice: Numbers,
     rest: Lanes,
     /// Of the slice how many radial coordinates, azimuths and values there are.
     radii: Lanes,
     azimuths: Lanes,
     values: Lanes,
     /// Of its alias table: a place, what it holds, and the node that is found.
-    slot: Lanes,
+    slot: Numbers,
     chance: Lanes,
-    alias: Lanes,
+    alias: Numbers,
     /// Azimuth and radial coordinate of the node.
     azimuth: Lanes,
-    radius: Lanes,
+    radius: Numbers,
     /// See `Hat`; of both sides.
     inner: Lanes,
     top: Lanes,
     fars: [Lanes; 2],
     linears: [Lanes; 2],
-    /// Of the side that is drawn from; 1 if it is the outer one.
+    /// Of the side that is drawn from; above 0 if it is the inner one.
     far: Lanes,
     linear: Lanes,
-    side: Lanes,
+    inwards: Lanes,
     /// What is left of the first number, on that side.
     part: Lanes,
     /// From the far end of the side to its top.
@@ -74,28 +75,28 @@ impl Group {
             forward: [ZERO; 2],
             from: ZERO,
             width: ZERO,
-            first: ZERO,
+            first: [0; TOGETHER],
             shares: [ZERO; 3],
             rises: [ZERO; 3],
             absorbed: ZERO,
             floor: ZERO,
-            slice: ZERO,
+            slice: [0; TOGETHER],
             rest: ZERO,
             radii: ZERO,
             azimuths: ZERO,
             values: ZERO,
-            slot: ZERO,
+            slot: [0; TOGETHER],
             chance: ZERO,
-            alias: ZERO,
+            alias: [0; TOGETHER],
             azimuth: ZERO,
-            radius: ZERO,
+            radius: [0; TOGETHER],
             inner: ZERO,
             top: ZERO,
             fars: [ZERO; 2],
             linears: [ZERO; 2],
             far: ZERO,
             linear: ZERO,
-            side: ZERO,
+            inwards: ZERO,
             part: ZERO,
             along: ZERO,
             direction: [ZERO; 3],
@@ -103,31 +104,25 @@ impl Group {
     }
 
     /// Draws for the first `n` rays.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "numbers of slices"
-    )]
     pub fn draw(&mut self, lobe: &Lobe, n: usize, up: bool) {
         incidences(self);
         for k in 0..n {
-            let Step {
-                from,
-                width,
-                first,
-                shares,
-                rises,
-            } = lobe.step(self.sine[k]);
-            (self.from[k], self.width[k], self.first[k]) = (*from, *width, *first);
+            let step = lobe.step(self.sine[k]);
+            (self.from[k], self.width[k], self.first[k]) = (step.from, step.width, step.first);
             for j in 0..3 {
-                (self.shares[j][k], self.rises[j][k]) = (shares[j], rises[j]);
+                (self.shares[j][k], self.rises[j][k]) = (step.shares[j], step.rises[j]);
             }
         }
         picks(self);
+        let mut tables: [&[Slot]; TOGETHER] = [&[]; TOGETHER];
         for k in 0..n {
             let grid = lobe.slice(self.slice[k] as usize);
             [self.radii[k], self.azimuths[k], self.values[k]] = grid.size();
-            (self.slot[k], self.chance[k], self.alias[k]) = grid.slot(self.rest[k]);
+            tables[k] = grid.slots();
+        }
+        slots(self);
+        for k in 0..n {
+            (self.chance[k], self.alias[k]) = tables[k][self.slot[k] as usize];
         }
         nodes(self);
         for k in 0..n {
@@ -141,25 +136,16 @@ impl Group {
         for k in 0..n {
             if self.part[k] >= self.linear[k] {
                 let slope = [self.part[k], self.linear[k]];
-                self.along[k] = super::table_grid::bent(slope, self.numbers[1][k], self.side[k] == 0.0);
+                self.along[k] = bent(slope, self.numbers[1][k], self.inwards[k] > 0.0);
             }
         }
         directions(self, if up { 1.0 } else { -1.0 });
     }
 
-    /// A ray, its numbers that have not been used, and its slice, where the place that was drawn lies outside the unit circle.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "numbers of slices"
-    )]
-    pub fn missed(&self, k: usize) -> Option<(Incidence, usize, [f64; 2])> {
-        let [x, y] = self.incident.each_ref().map(|list| list[k]);
+    /// Of a ray whose place lies outside the unit circle the number of its slice, and its numbers that have not been used.
+    pub fn missed(&self, k: usize) -> Option<(usize, [f64; 2])> {
         let missed = self.direction[2][k] == 0.0 && self.floor[k] == 0.0;
-        missed.then(|| {
-            let numbers = [self.rest[k], self.numbers[1][k]];
-            (Incidence::new(Vec3::new(x, y, 0.0)), self.slice[k] as usize, numbers)
-        })
+        missed.then(|| (self.slice[k] as usize, [self.rest[k], self.numbers[1][k]]))
     }
 }
 
@@ -223,13 +209,34 @@ fn picks(group: &mut Group) {
             (left[0], a)
         };
         floor[k] = if is_even { 1.0 } else { 0.0 };
-        slice[k] = first[k] + if is_second { 1.0 } else { 0.0 };
+        slice[k] = first[k] + u32::from(is_second);
         rest[k] = part_of(part, share);
+    }
+}
+
+/// Places in the tables of nodes.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a slice has fewer than 2^31 values"
+)]
+fn slots(group: &mut Group) {
+    let Group { rest, values, slot, .. } = group;
+    for k in 0..TOGETHER {
+        let place = rest[k] * values[k];
+        let last = values[k] - 1.0;
+        slot[k] = (if place < last { place } else { last }) as i32 as u32;
     }
 }
 
 /// Nodes of the slices.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "fewer than 2^16 radial coordinates"
+)]
 fn nodes(group: &mut Group) {
     let Group {
         rest,
@@ -244,7 +251,7 @@ fn nodes(group: &mut Group) {
         ..
     } = group;
     for k in 0..TOGETHER {
-        let within = rest[k] * values[k] - slot[k];
+        let within = rest[k] * values[k] - f64::from(slot[k]);
         let own = within < chance[k];
         let (left, share) = if own {
             (within, chance[k])
@@ -252,10 +259,10 @@ fn nodes(group: &mut Group) {
             (within - chance[k], 1.0 - chance[k])
         };
         part[k] = part_of(left, share);
-        let node = if own { slot[k] } else { alias[k] };
+        let node = f64::from(if own { slot[k] } else { alias[k] });
         // A division of whole numbers: the nearest one to what lies half a step from its next.
         azimuth[k] = whole((node + 0.5) / radii[k] - 0.5);
-        radius[k] = node - azimuth[k] * radii[k];
+        radius[k] = (node - azimuth[k] * radii[k]) as i32 as u32;
     }
 }
 
@@ -276,7 +283,7 @@ fn radii(group: &mut Group) {
         linears,
         far,
         linear,
-        side,
+        inwards: sides,
         part,
         along,
         ..
@@ -285,7 +292,7 @@ fn radii(group: &mut Group) {
         let inwards = part[k] < inner[k];
         far[k] = if inwards { fars[0][k] } else { fars[1][k] };
         linear[k] = if inwards { linears[0][k] } else { linears[1][k] };
-        side[k] = if inwards { 0.0 } else { 1.0 };
+        sides[k] = if inwards { 1.0 } else { 0.0 };
         let (left, share) = if inwards {
             (part[k], inner[k])
         } else {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use etendue_math::special::{exp, ln};
 use etendue_math::trig::sin_cos_turns;
-use etendue_sampling::alias::Alias;
+use etendue_sampling::alias::{Alias, Slot};
 use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
@@ -339,21 +339,16 @@ impl Grid {
         })
     }
 
-    /// The place in the table of nodes that a number falls into, and what it holds.
+    /// The table of nodes; without any, the first one takes all.
     #[inline]
-    pub(super) fn slot(&self, number: f64) -> (f64, f64, f64) {
-        // Without nodes, the first one takes all.
-        self.nodes.as_ref().map_or((0.0, 1.0, 0.0), |nodes| {
-            let (slot, chance, alias) = nodes.slot(number);
-            (slot as f64, chance, f64::from(alias))
-        })
+    pub(super) fn slots(&self) -> &[Slot] {
+        self.nodes.as_ref().map_or(&[(1.0, 0)], Alias::slots)
     }
 
-    /// How many radial coordinates, azimuths and values there are.
+    /// How many radial coordinates, azimuths and places in the table of nodes there are.
     #[inline]
-    pub(super) const fn size(&self) -> [f64; 3] {
-        let [radii, azimuths] = [self.radial.len() as f64, self.azimuths as f64];
-        [radii, azimuths, self.f.len() as f64]
+    pub(super) fn size(&self) -> [f64; 3] {
+        [self.radial.len(), self.azimuths, self.slots().len()].map(|n| n as f64)
     }
 
     /// The hat of a radial coordinate.

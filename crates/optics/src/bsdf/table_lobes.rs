@@ -52,7 +52,7 @@ pub(super) struct Step {
     /// To the next sine; without end if there is none.
     pub width: f64,
     /// The first slice.
-    pub first: f64,
+    pub first: u32,
     /// At the first sine, of two slices and the floor, and by how much they rise to the next.
     pub shares: [f64; 3],
     pub rises: [f64; 3],
@@ -191,7 +191,7 @@ impl Lobe {
             } else {
                 f64::INFINITY
             },
-            first: blends[0].first as f64,
+            first: u32::try_from(blends[0].first).unwrap_or(u32::MAX),
             shares: blends[0].shares,
             rises: std::array::from_fn(|k| blends[1].shares[k] - blends[0].shares[k]),
         };

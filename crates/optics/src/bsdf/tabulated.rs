@@ -12,6 +12,7 @@
 //! **Drawing** is exact: a slice by its share, a node of its grid by what it contributes, a point by the hats about that node in
 //! the plane of direction cosines, where area is projected solid angle; and again if the point lies outside the unit circle.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use etendue_geometry::surface_points::Vectors;
@@ -290,83 +291,58 @@ impl Bsdf for Tabulated {
 
     /// As any BSDF does, but where a side has a single lobe, for many rays together.
     fn sample_many(&self, directions: &mut Vectors, media: &[Media], numbers: [&[f64]; 2], outcomes: &mut [Outcome]) {
-        let mut sides = [Waiting::new(), Waiting::new()];
-        for k in 0..outcomes.len() {
-            let side = usize::from(directions[2][k] <= 0.0);
-            sides[side].which[sides[side].count] = k;
-            sides[side].count += 1;
-            if sides[side].count == TOGETHER {
-                self.sample_waiting(side == 0, &mut sides[side], directions, media, numbers, outcomes);
+        let mut group = Group::new();
+        for first in (0..outcomes.len()).step_by(TOGETHER) {
+            let rays = first..outcomes.len().min(first + TOGETHER);
+            let heights = &directions[2][rays.clone()];
+            let above = heights.iter().filter(|z| **z > 0.0).count();
+            let lone = (above == 0 || above == rays.len())
+                .then(|| self.lone(above > 0))
+                .flatten();
+            if let Some((way, lobe)) = lone {
+                let up = (above > 0) != way;
+                sample_group(&mut group, lobe, up, rays, directions, numbers, outcomes);
+                continue;
             }
-        }
-        for (side, waiting) in sides.iter_mut().enumerate() {
-            self.sample_waiting(side == 0, waiting, directions, media, numbers, outcomes);
-        }
-    }
-}
-
-/// Rays that meet one side.
-#[derive(Clone)]
-struct Waiting {
-    which: [usize; TOGETHER],
-    count: usize,
-    group: Group,
-}
-
-impl Waiting {
-    const fn new() -> Self {
-        Self {
-            which: [0; TOGETHER],
-            count: 0,
-            group: Group::new(),
-        }
-    }
-}
-
-impl Tabulated {
-    /// What becomes of the rays that have come together.
-    fn sample_waiting(
-        &self,
-        front: bool,
-        waiting: &mut Waiting,
-        directions: &mut Vectors,
-        media: &[Media],
-        numbers: [&[f64]; 2],
-        outcomes: &mut [Outcome],
-    ) {
-        let Waiting { which, count, group } = waiting;
-        let which = &which[..std::mem::take(count)];
-        let Some((way, lobe)) = self.lone(front) else {
-            for k in which.iter().copied() {
+            for k in rays {
                 let [x, y, z] = directions.each_ref().map(|list| list[k]);
                 let drawn = self.sample(Vec3::new(x, y, z), &media[k], numbers.map(|list| list[k]));
                 outcomes[k] = drawn.keep(directions, k);
             }
-            return;
-        };
-        let up = front != way;
-        for (place, k) in which.iter().enumerate() {
-            for axis in 0..2 {
-                group.incident[axis][place] = directions[axis][*k];
-                group.numbers[axis][place] = numbers[axis][*k];
-            }
         }
-        group.draw(lobe, which.len(), up);
-        for (place, k) in which.iter().enumerate() {
-            if group.absorbed[place] > 0.0 {
-                outcomes[*k] = Outcome::Absorbed;
-                continue;
-            }
-            outcomes[*k] = Outcome::Scattered;
-            let mut to = group.direction.each_ref().map(|list| list[place]);
-            if let Some((incidence, slice, numbers)) = group.missed(place) {
-                let [x, y] = [0, 1].map(|axis| directions[axis][*k]);
-                let found = again(&incidence, Vec3::new(x, y, 0.0), lobe.slice(slice), numbers, up);
-                to = [found.x, found.y, found.z];
-            }
-            for (list, component) in directions.iter_mut().zip(to) {
-                list[*k] = component;
-            }
+    }
+}
+
+/// What becomes of rays that meet one lobe.
+fn sample_group(
+    group: &mut Group,
+    lobe: &Lobe,
+    up: bool,
+    rays: Range<usize>,
+    directions: &mut Vectors,
+    numbers: [&[f64]; 2],
+    outcomes: &mut [Outcome],
+) {
+    let n = rays.len();
+    for axis in 0..2 {
+        group.incident[axis][..n].copy_from_slice(&directions[axis][rays.clone()]);
+        group.numbers[axis][..n].copy_from_slice(&numbers[axis][rays.clone()]);
+    }
+    group.draw(lobe, n, up);
+    for (list, found) in directions.iter_mut().zip(&group.direction) {
+        list[rays.clone()].copy_from_slice(&found[..n]);
+    }
+    for (place, k) in rays.enumerate() {
+        if group.absorbed[place] > 0.0 {
+            outcomes[k] = Outcome::Absorbed;
+            continue;
+        }
+        outcomes[k] = Outcome::Scattered;
+        if let Some((slice, numbers)) = group.missed(place) {
+            let [x, y] = group.incident.each_ref().map(|list| list[place]);
+            let incident = Vec3::new(x, y, 0.0);
+            let found = again(&Incidence::new(incident), incident, lobe.slice(slice), numbers, up);
+            Drawn::Scattered(found).keep(directions, k);
         }
     }
 }

@@ -198,8 +198,9 @@ fn many_rays_are_drawn_for_as_each_by_itself() {
         for i in 0..150 {
             let alone = bsdf.sample(incident[i], &media[i], numbers.map(|list| list[i]));
             assert_eq!(outcomes[i], alone.keep(&mut expected, i), "{name}");
+            let [found, expected] = [&found, &expected].map(|lists| lists.each_ref().map(|list| list[i]));
+            assert!(found == expected || outcomes[i] == Outcome::Absorbed, "{name}");
         }
-        assert_eq!(found, expected, "{name}");
     }
 }
 
