@@ -133,19 +133,31 @@ impl Group {
             }
         }
         radii(self);
+        // Without branches, which nobody can foresee: those that are bent first.
+        let (mut list, mut count) = ([0; TOGETHER], 0);
         for k in 0..n {
-            if self.part[k] >= self.linear[k] {
-                let slope = [self.part[k], self.linear[k]];
-                self.along[k] = bent(slope, self.numbers[1][k], self.inwards[k] > 0.0);
-            }
+            list[count] = k;
+            count += usize::from(self.part[k] >= self.linear[k]);
+        }
+        for k in list.into_iter().take(count) {
+            let slope = [self.part[k], self.linear[k]];
+            self.along[k] = bent(slope, self.numbers[1][k], self.inwards[k] > 0.0);
         }
         directions(self, if up { 1.0 } else { -1.0 });
     }
 
-    /// Of a ray whose place lies outside the unit circle the number of its slice, and its numbers that have not been used.
-    pub fn missed(&self, k: usize) -> Option<(usize, [f64; 2])> {
-        let missed = self.direction[2][k] == 0.0 && self.floor[k] == 0.0;
-        missed.then(|| (self.slice[k] as usize, [self.rest[k], self.numbers[1][k]]))
+    /// Those of the first `n` rays whose places lie outside the unit circle, each with the number of its slice and its numbers
+    /// that have not been used.
+    pub fn missed(&self, n: usize) -> impl Iterator<Item = (usize, usize, [f64; 2])> {
+        let (mut list, mut count) = ([0; TOGETHER], 0);
+        for k in 0..n {
+            list[count] = k;
+            count += usize::from((self.direction[2][k] == 0.0) & (self.floor[k] == 0.0) & (self.absorbed[k] == 0.0));
+        }
+        let numbers = |k: usize| [self.rest[k], self.numbers[1][k]];
+        list.into_iter()
+            .take(count)
+            .map(move |k| (k, self.slice[k] as usize, numbers(k)))
     }
 }
 

@@ -12,6 +12,7 @@
 //! **Drawing** is exact: a slice by its share, a node of its grid by what it contributes, a point by the hats about that node in
 //! the plane of direction cosines, where area is projected solid angle; and again if the point lies outside the unit circle.
 
+use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -291,26 +292,32 @@ impl Bsdf for Tabulated {
 
     /// As any BSDF does, but where a side has a single lobe, for many rays together.
     fn sample_many(&self, directions: &mut Vectors, media: &[Media], numbers: [&[f64]; 2], outcomes: &mut [Outcome]) {
-        let mut group = Group::new();
-        for first in (0..outcomes.len()).step_by(TOGETHER) {
-            let rays = first..outcomes.len().min(first + TOGETHER);
-            let heights = &directions[2][rays.clone()];
-            let above = heights.iter().filter(|z| **z > 0.0).count();
-            let lone = (above == 0 || above == rays.len())
-                .then(|| self.lone(above > 0))
-                .flatten();
-            if let Some((way, lobe)) = lone {
-                let up = (above > 0) != way;
-                sample_group(&mut group, lobe, up, rays, directions, numbers, outcomes);
-                continue;
+        GROUP.with_borrow_mut(|group| {
+            for first in (0..outcomes.len()).step_by(TOGETHER) {
+                let rays = first..outcomes.len().min(first + TOGETHER);
+                let heights = &directions[2][rays.clone()];
+                let above = heights.iter().filter(|z| **z > 0.0).count();
+                let lone = (above == 0 || above == rays.len())
+                    .then(|| self.lone(above > 0))
+                    .flatten();
+                if let Some((way, lobe)) = lone {
+                    let up = (above > 0) != way;
+                    sample_group(group, lobe, up, rays, directions, numbers, outcomes);
+                    continue;
+                }
+                for k in rays {
+                    let [x, y, z] = directions.each_ref().map(|list| list[k]);
+                    let drawn = self.sample(Vec3::new(x, y, z), &media[k], numbers.map(|list| list[k]));
+                    outcomes[k] = drawn.keep(directions, k);
+                }
             }
-            for k in rays {
-                let [x, y, z] = directions.each_ref().map(|list| list[k]);
-                let drawn = self.sample(Vec3::new(x, y, z), &media[k], numbers.map(|list| list[k]));
-                outcomes[k] = drawn.keep(directions, k);
-            }
-        }
+        });
     }
+}
+
+thread_local! {
+    /// Room to work in: it would take a while to make it anew.
+    static GROUP: RefCell<Box<Group>> = RefCell::new(Box::new(Group::new()));
 }
 
 /// What becomes of rays that meet one lobe.
@@ -332,18 +339,18 @@ fn sample_group(
     for (list, found) in directions.iter_mut().zip(&group.direction) {
         list[rays.clone()].copy_from_slice(&found[..n]);
     }
-    for (place, k) in rays.enumerate() {
-        if group.absorbed[place] > 0.0 {
-            outcomes[k] = Outcome::Absorbed;
-            continue;
-        }
-        outcomes[k] = Outcome::Scattered;
-        if let Some((slice, numbers)) = group.missed(place) {
-            let [x, y] = group.incident.each_ref().map(|list| list[place]);
-            let incident = Vec3::new(x, y, 0.0);
-            let found = again(&Incidence::new(incident), incident, lobe.slice(slice), numbers, up);
-            Drawn::Scattered(found).keep(directions, k);
-        }
+    for (outcome, absorbed) in outcomes[rays.clone()].iter_mut().zip(&group.absorbed) {
+        *outcome = if *absorbed > 0.0 {
+            Outcome::Absorbed
+        } else {
+            Outcome::Scattered
+        };
+    }
+    for (place, slice, numbers) in group.missed(n) {
+        let [x, y] = group.incident.each_ref().map(|list| list[place]);
+        let incident = Vec3::new(x, y, 0.0);
+        let found = again(&Incidence::new(incident), incident, lobe.slice(slice), numbers, up);
+        Drawn::Scattered(found).keep(directions, rays.start + place);
     }
 }
 

@@ -119,22 +119,26 @@ impl SheetRays {
         }
     }
 
-    /// Turns the lines that have reached the face into those from there, as `bounced` says for each; those for which there is
-    /// none are left out.
-    pub fn turn_each(&mut self, mut bounced: impl FnMut(usize, &SheetRay) -> Option<Vec3>) {
+    /// The number of the state of one of them.
+    #[inline]
+    pub fn who(&self, k: usize) -> u32 {
+        self.who[k]
+    }
+
+    /// Turns the lines that have reached the face into those from there in some directions; some of them go on.
+    pub fn turn_to(&mut self, directions: &Vectors, goes_on: impl Fn(usize) -> bool) {
+        let n = self.len();
+        let [to_x, to_y, to_z] = directions.each_ref().map(|list| &list[..n]);
+        let [x, y, z] = self.d.each_mut().map(|list| &mut list[..n]);
+        let [ox, oy, oz] = self.o.each_mut().map(|list| &mut list[..n]);
+        let (who, part) = (&mut self.who[..n], &mut self.part[..n]);
         let mut place = 0;
-        for k in 0..self.len() {
-            let ray = self.get(k);
-            let Some(d) = bounced(k, &ray) else {
-                continue;
-            };
+        for k in 0..n {
             // No later than where it is: the rays move up.
-            (self.who[place], self.part[place]) = (self.who[k], self.part[k]);
-            for (axis, component) in [d.x, d.y, d.z].into_iter().enumerate() {
-                self.o[axis][place] = self.o[axis][k];
-                self.d[axis][place] = component;
-            }
-            place += 1;
+            (who[place], part[place]) = (who[k], part[k]);
+            (ox[place], oy[place], oz[place]) = (ox[k], oy[k], oz[k]);
+            (x[place], y[place], z[place]) = (to_x[k], to_y[k], to_z[k]);
+            place += usize::from(goes_on(k));
         }
         self.who.truncate(place);
         self.part.truncate(place);

@@ -47,6 +47,8 @@ pub struct ScatteredRays {
     /// To where each comes from, and where it goes, in the frame of the surface.
     towards: Vectors,
     outcomes: Vec<Outcome>,
+    /// Those that are absorbed.
+    gone: Vec<usize>,
 }
 
 impl ScatteredRays {
@@ -72,25 +74,40 @@ impl ScatteredRays {
             None => in_space(rays.normals(), &mut self.towards),
             Some(axis) => in_space_along(axis, rays.normals(), &mut self.towards),
         }
-        rays.turn_each(|k, ray| match self.outcomes[k] {
-            Outcome::Scattered => Some(at(&self.towards, k)),
-            Outcome::Mirrored => {
-                let height = (-ray.d.dot(ray.normal)).clamp(-1.0, 1.0);
-                let facing = if height > 0.0 { ray.normal } else { -ray.normal };
-                Some(reflect(ray.d, facing, height.abs()))
+        let Self {
+            towards,
+            outcomes,
+            gone: list,
+            ..
+        } = self;
+        let mut gone = 0;
+        list.resize(outcomes.len(), 0);
+        for (k, outcome) in outcomes.iter().enumerate() {
+            if *outcome == Outcome::Mirrored {
+                mirror(rays, k, towards);
             }
-            Outcome::Absorbed | Outcome::Refracted => {
-                absorbed(ray.who);
-                None
-            }
-        });
+            list[gone] = k;
+            gone += usize::from(!goes_on(*outcome));
+        }
+        list[..gone].iter().for_each(|k| absorbed(rays.who(*k)));
+        rays.turn_to(towards, |k| goes_on(outcomes[k]));
     }
 }
 
-/// One of many vectors.
-#[inline(always)]
-fn at(vectors: &Vectors, k: usize) -> Vec3 {
-    Vec3::new(vectors[0][k], vectors[1][k], vectors[2][k])
+/// The direction in which a ray is mirrored.
+fn mirror(rays: &SheetRays, k: usize, towards: &mut Vectors) {
+    let ray = rays.get(k);
+    let height = (-ray.d.dot(ray.normal)).clamp(-1.0, 1.0);
+    let facing = if height > 0.0 { ray.normal } else { -ray.normal };
+    let d = reflect(ray.d, facing, height.abs());
+    for (list, component) in towards.iter_mut().zip([d.x, d.y, d.z]) {
+        list[k] = component;
+    }
+}
+
+/// Whether a ray leaves a sheet that lets nothing through.
+fn goes_on(outcome: Outcome) -> bool {
+    matches!(outcome, Outcome::Mirrored | Outcome::Scattered)
 }
 
 /// Changes each of many vectors, told the normal there.
