@@ -3,8 +3,9 @@
 1. A known BRDF, 0.3/π + a Gaussian of σ = 0.15 in direction cosines with a share of 0.4, is tabled at 0, 15 … 75° in 3 136
    points each; its directional-hemispherical reflectance is held against the quadrature of the function.
 2. Samples and values per second of each model and of the table, and the chamber of thesis chapter 4 traced forwards with
-   each, all beside a Lambertian surface of the same reflectance at normal incidence: a ray, and a bounce, which is what a
-   ray takes beyond one in a black chamber, over the further surfaces that it meets.
+   each, all beside a Lambertian surface of the same reflectance at normal incidence: a ray; a segment, which is a ray over
+   the ways that it goes; and a bounce, which is what a ray takes beyond one in a black chamber, over the further surfaces
+   that it meets.
 
 3. With `--peers` (needs `pyradiance` and `mitsuba`): the same BRDF through `pabopto2bsdf` and `bsdf2klems`; and the map of
    the chamber from 55°, 126 × 63 pixels, with a satin paint beside Mitsuba's `roughplastic` of the same reflectance at 20°
@@ -267,12 +268,14 @@ def main() -> None:
         scene = chamber(finish)
         ledger = et.trace(scene, rays=1000, seed=1).ledger
         traced = best(lambda scene=scene: et.trace(scene, rays=rays, seed=1), 3)
-        bounce = (traced - started) / (ways(scene) - 1.0)
-        units[name] = (drawn, asked, traced, bounce)
+        gone = ways(scene)
+        segment, bounce = traced / gone, (traced - started) / (gone - 1.0)
+        units[name] = (drawn, asked, traced, bounce, segment)
         ratios = [ours / base for ours, base in zip(units[name], units["lambertian"], strict=True)]
         row(f"{name}: a sample", f"{1e9 * drawn / SAMPLES:.0f} ns", f"{ratios[0]:.1f} × lambertian")
         row(f"{name}: a value", f"{1e9 * asked / SAMPLES:.0f} ns", f"{ratios[1]:.1f} × lambertian")
         row(f"{name}: a ray of the chamber", f"{1e9 * traced / rays:.0f} ns", f"{ratios[2]:.1f} × lambertian")
+        row(f"{name}: a segment there", f"{1e9 * segment / rays:.0f} ns", f"{ratios[4]:.1f} × lambertian")
         row(f"{name}: a bounce there", f"{1e9 * bounce / rays:.0f} ns", f"{ratios[3]:.1f} × lambertian")
         assert ledger.closes  # noqa: S101 - what does not close is no benchmark
     if given.peers:

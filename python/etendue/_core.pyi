@@ -252,8 +252,8 @@ class Scene:
     def may_focus(self) -> bool:
         """Whether light can reach a diffuse surface in a way that lines of sight find by chance, or not at all."""
 
-    def window(self, view: _View) -> tuple[slice, slice]:
-        """Rows and columns of a view outside of which its lines of sight meet nothing."""
+    def window(self, view: _View) -> list[tuple[int, int]]:
+        """Rows and columns of a view outside of which its lines of sight meet nothing: first, and after the last."""
 
 @final
 class FarField:

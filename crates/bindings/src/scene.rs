@@ -1,6 +1,5 @@
 //! A scene as Python hands it over: plain dictionaries, one for each thing, with a `kind` where there are several.
 
-use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use etendue_math::Vec3;
@@ -13,7 +12,7 @@ use etendue_trace::detector::{Detector, Intensity};
 use etendue_trace::lit_scene::{LitScene, light_samplers};
 use etendue_trace::scene::{Scene as CoreScene, SceneFace};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PySlice};
+use pyo3::types::PyDict;
 
 use crate::bsdf::Bsdf as BuiltBsdf;
 use crate::detector::detector;
@@ -186,12 +185,11 @@ impl Scene {
         self.core.may_focus()
     }
 
-    /// Rows and columns of a view outside of which its lines of sight meet nothing, as slices.
-    fn window<'py>(&self, py: Python<'py>, view: View) -> (Bound<'py, PySlice>, Bound<'py, PySlice>) {
+    /// Rows and columns of a view outside of which its lines of sight meet nothing: the first of each, and that after the last.
+    fn window(&self, view: View) -> [(u32, u32); 2] {
         let view = view.core();
         let [columns, rows] = LitScene::new(&self.core, self.light_samplers()).window(&view);
-        let slice = |range: Range<u32>| PySlice::new(py, range.start as isize, range.end as isize, 1);
-        (slice(rows), slice(columns))
+        [rows, columns].map(|range| (range.start, range.end))
     }
 
     #[new]

@@ -133,7 +133,8 @@ def look_at_scene(
                 progress(done)
 
         image = None if scattered is None else scattered[number]
-        window = core.window(view)
+        rows, columns = (slice(*ends) for ends in core.window(view))
+        window = rows, columns
         eye = _Eye(look, advance, how, screen, screen.cosine(observer), window, images, number, image)
         passes, common, about = eye.best(surveys)
         image = eye.image

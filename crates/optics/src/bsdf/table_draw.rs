@@ -27,11 +27,10 @@ pub(super) struct Group {
     sine: Lanes,
     forward: [Lanes; 2],
     /// See `Step`.
-    from: Lanes,
-    width: Lanes,
+    beyond: Lanes,
     first: Numbers,
     shares: [Lanes; 3],
-    rises: [Lanes; 3],
+    slopes: [Lanes; 3],
     /// Above 0 for rays that are absorbed, and for those that a floor scatters.
     pub absorbed: Lanes,
     floor: Lanes,
@@ -73,11 +72,10 @@ impl Group {
             numbers: [ZERO; 2],
             sine: ZERO,
             forward: [ZERO; 2],
-            from: ZERO,
-            width: ZERO,
+            beyond: ZERO,
             first: [0; TOGETHER],
             shares: [ZERO; 3],
-            rises: [ZERO; 3],
+            slopes: [ZERO; 3],
             absorbed: ZERO,
             floor: ZERO,
             slice: [0; TOGETHER],
@@ -108,21 +106,21 @@ impl Group {
         incidences(self);
         for k in 0..n {
             let step = lobe.step(self.sine[k]);
-            (self.from[k], self.width[k], self.first[k]) = (step.from, step.width, step.first);
+            (self.beyond[k], self.first[k]) = (self.sine[k] - step.from, step.first);
             for j in 0..3 {
-                (self.shares[j][k], self.rises[j][k]) = (step.shares[j], step.rises[j]);
+                (self.shares[j][k], self.slopes[j][k]) = (step.shares[j], step.slopes[j]);
             }
         }
         picks(self);
         let mut tables: [&[Slot]; TOGETHER] = [&[]; TOGETHER];
-        for k in 0..n {
+        for (k, table) in tables.iter_mut().enumerate().take(n) {
             let grid = lobe.slice(self.slice[k] as usize);
             [self.radii[k], self.azimuths[k], self.values[k]] = grid.size();
-            tables[k] = grid.slots();
+            *table = grid.slots();
         }
         slots(self);
-        for k in 0..n {
-            (self.chance[k], self.alias[k]) = tables[k][self.slot[k] as usize];
+        for (k, table) in tables.iter().enumerate().take(n) {
+            (self.chance[k], self.alias[k]) = table[self.slot[k] as usize];
         }
         nodes(self);
         for k in 0..n {
@@ -185,12 +183,10 @@ fn incidences(group: &mut Group) {
 fn picks(group: &mut Group) {
     let Group {
         numbers: [number, _],
-        sine,
-        from,
-        width,
+        beyond,
         first,
         shares: [a, b, even],
-        rises: [da, db, deven],
+        slopes: [da, db, deven],
         absorbed,
         floor,
         slice,
@@ -198,10 +194,8 @@ fn picks(group: &mut Group) {
         ..
     } = group;
     for k in 0..TOGETHER {
-        let part = (sine[k] - from[k]) / width[k];
-        let part = if part > 0.0 { part } else { 0.0 };
-        let part = if part < 1.0 { part } else { 1.0 };
-        let [a, b, even] = [a[k] + part * da[k], b[k] + part * db[k], even[k] + part * deven[k]];
+        let on = beyond[k];
+        let [a, b, even] = [a[k] + on * da[k], b[k] + on * db[k], even[k] + on * deven[k]];
         let all = a + b + even;
         // Shares that should add up to 1 may fall short of it by rounding.
         absorbed[k] = if (number[k] < all) | (all >= 1.0 - 1e-12) {

@@ -34,6 +34,8 @@ pub(super) struct Grid {
     azimuths: usize,
     /// f, azimuth by azimuth, at each radial coordinate.
     f: Vec<f64>,
+    /// How many radial coordinates, azimuths and places in the table of nodes there are.
+    size: [f64; 3],
     /// Of `f`, by what each value contributes to the integral over the plane; None if that is 0.
     nodes: Option<Alias>,
     /// For each radial coordinate.
@@ -54,6 +56,7 @@ pub(super) struct Integrals<'a> {
 /// The function of r that is 1 at a radial coordinate, 0 at those next to it, and linear in between, times r: the density of
 /// what belongs to that coordinate.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Hat {
     pub node: f64,
     /// The part of it that lies nearer to 0.
@@ -187,13 +190,20 @@ impl Slice {
             .zip(wholes.iter().cycle())
             .map(|(f, whole)| f * whole)
             .collect();
+        let nodes = Alias::new(&weights);
+        let size = [
+            all.len(),
+            *azimuths,
+            nodes.as_ref().map_or(1, |nodes| nodes.slots().len()),
+        ];
         let lowest = all.get(1).map_or(0, |r| leading(*r));
         let first_above = |bits: u64| all.partition_point(|r| *r < f64::from_bits(bits << SHIFT));
         Ok(Grid {
             sine: self.sine,
             azimuths: *azimuths,
             f,
-            nodes: Alias::new(&weights),
+            size: size.map(|n| n as f64),
+            nodes,
             hats,
             first_below: (lowest..=leading(END))
                 .map(|bits| first_above(bits).max(1) as u16 - 1)
@@ -347,8 +357,8 @@ impl Grid {
 
     /// How many radial coordinates, azimuths and places in the table of nodes there are.
     #[inline]
-    pub(super) fn size(&self) -> [f64; 3] {
-        [self.radial.len(), self.azimuths, self.slots().len()].map(|n| n as f64)
+    pub(super) const fn size(&self) -> [f64; 3] {
+        self.size
     }
 
     /// The hat of a radial coordinate.

@@ -45,17 +45,24 @@ pub(super) struct Lobe {
     steps: Vec<Step>,
 }
 
-/// Shares between two sines of incidence.
+/// Shares between two sines of incidence, in one line of a cache.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub(super) struct Step {
     pub from: f64,
-    /// To the next sine; without end if there is none.
-    pub width: f64,
+    /// At the first sine, of two slices and the floor, and by how much they rise with the sine.
+    pub shares: [f64; 3],
+    pub slopes: [f64; 3],
     /// The first slice.
     pub first: u32,
-    /// At the first sine, of two slices and the floor, and by how much they rise to the next.
-    pub shares: [f64; 3],
-    pub rises: [f64; 3],
+}
+
+impl Step {
+    #[inline]
+    fn shares(&self, sine: f64) -> [f64; 3] {
+        let beyond = sine - self.from;
+        std::array::from_fn(|k| self.shares[k] + beyond * self.slopes[k])
+    }
 }
 
 /// How light from an angle of incidence is shared by slices.
@@ -177,45 +184,44 @@ impl Lobe {
                 }
             }
         }
-        self.guide = Guide::new(&self.sines);
         self.tabulate();
     }
 
     /// Shares from each sine to the next.
     fn tabulate(&mut self) {
         let pairs = self.sines.windows(2).zip(self.blends.windows(2));
-        let step = |(sines, blends): (&[f64], &[Blend])| Step {
-            from: sines[0],
-            width: if sines[1] > sines[0] {
-                sines[1] - sines[0]
-            } else {
-                f64::INFINITY
-            },
-            first: u32::try_from(blends[0].first).unwrap_or(u32::MAX),
-            shares: blends[0].shares,
-            rises: std::array::from_fn(|k| blends[1].shares[k] - blends[0].shares[k]),
+        let step = |(sines, blends): (&[f64], &[Blend])| {
+            let width = sines[1] - sines[0];
+            let slope = |k: usize| (blends[1].shares[k] - blends[0].shares[k]) / width;
+            Step {
+                from: sines[0],
+                shares: blends[0].shares,
+                slopes: std::array::from_fn(|k| if width > 0.0 { slope(k) } else { 0.0 }),
+                first: u32::try_from(blends[0].first).unwrap_or(u32::MAX),
+            }
         };
         self.steps = pairs.map(step).collect();
+        self.guide = Guide::new(&self.sines[..self.sines.len() - 1]);
     }
 
     /// The step from the last sine that is not above this one.
     #[inline]
     pub(super) fn step(&self, sine: f64) -> &Step {
-        &self.steps[self.above(sine) - 1]
+        let above = self.guide.not_above(&self.steps, sine, |step| step.from);
+        &self.steps[above.max(1) - 1]
+    }
+
+    /// The first of two slices, and the shares of both and of the floor.
+    #[inline]
+    pub(super) fn shares(&self, sine: f64) -> (usize, [f64; 3]) {
+        let step = self.step(sine);
+        (step.first as usize, step.shares(sine))
     }
 
     /// A slice, by its number.
     #[inline]
     pub(super) fn slice(&self, number: usize) -> &Grid {
         &self.slices[number]
-    }
-
-    /// The first sine above this one, but for the very first and beyond the last.
-    #[inline]
-    fn above(&self, sine: f64) -> usize {
-        self.guide
-            .not_above(&self.sines, sine, |node| *node)
-            .clamp(1, self.sines.len() - 1)
     }
 
     fn push(&mut self, (sine, blend): (f64, Blend)) {
@@ -225,7 +231,10 @@ impl Lobe {
 
     #[inline]
     pub(super) fn blend(&self, sine: f64) -> Blend {
-        let above = self.above(sine);
+        let above = self
+            .guide
+            .not_above(&self.sines[..self.sines.len() - 1], sine, |node| *node)
+            .max(1);
         let (a, b) = (&self.blends[above - 1], &self.blends[above]);
         let [from, to] = [self.sines[above - 1], self.sines[above]];
         let part = if to > from {
@@ -250,10 +259,10 @@ impl Lobe {
     /// A slice or a floor (None), picked by its share, with what is left of a number that is less than the share of all, as a
     /// number from 0 to 1.
     #[inline]
-    pub(super) fn pick(&self, blend: &Blend, mut left: f64) -> (Option<&Grid>, f64) {
+    pub(super) fn pick(&self, (first, shares): (usize, [f64; 3]), mut left: f64) -> (Option<&Grid>, f64) {
         let mut last = (None, left);
-        for (k, share) in blend.shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
-            last = (self.slices.get(blend.first + k).filter(|_| k < 2), part_of(left, share));
+        for (k, share) in shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
+            last = (self.slices.get(first + k).filter(|_| k < 2), part_of(left, share));
             if left < share {
                 break;
             }

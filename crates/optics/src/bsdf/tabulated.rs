@@ -117,11 +117,11 @@ impl Tabulated {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;
         let (way, (grid, number)) = if let Some((way, lobe)) = self.lone(front) {
-            let blend = lobe.blend(incidence.sine);
-            let share = blend.share();
+            let shares = lobe.shares(incidence.sine);
+            let share = shares.1.iter().sum::<f64>();
             // Shares that should add up to 1 may fall short of it by rounding.
             let scattered = numbers[0] < share || share >= 1.0 - 1e-12;
-            (way, scattered.then(|| lobe.pick(&blend, numbers[0]))?)
+            (way, scattered.then(|| lobe.pick(shares, numbers[0]))?)
         } else {
             let ways = [false, true].map(|way| self.lit(&incidence, front, way, media.wavelength));
             let shares = Shares {
@@ -232,7 +232,7 @@ impl Bsdf for Tabulated {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;
         let diffuse = match self.lone(front) {
-            Some((way, lobe)) => on_its_way(way, lobe.blend(incidence.sine).share()),
+            Some((way, lobe)) => on_its_way(way, lobe.shares(incidence.sine).1.iter().sum()),
             None => [false, true].map(|way| share(&self.lit(&incidence, front, way, media.wavelength))),
         };
         Shares {
@@ -270,8 +270,8 @@ impl Bsdf for Tabulated {
         let front = incident.z > 0.0;
         let (grid, number) = match self.lone(front) {
             Some((_, lobe)) => {
-                let blend = lobe.blend(incidence.sine);
-                lobe.pick(&blend, numbers[0] * blend.share())
+                let shares = lobe.shares(incidence.sine);
+                lobe.pick(shares, numbers[0] * shares.1.iter().sum::<f64>())
             }
             None => pick(&self.lit(&incidence, front, transmitted, media.wavelength), numbers[0]),
         };
