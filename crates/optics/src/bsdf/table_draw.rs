@@ -328,12 +328,11 @@ fn directions(group: &mut Group, sign: f64) {
     } = group;
     for k in 0..TOGETHER {
         let is_even = floor[k] > 0.0;
-        // Of a floor, as `by_cosine` says.
-        let cosine = (1.0 - rest[k]).sqrt();
-        let even = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
-        // Of a node: azimuths with a density that falls linearly towards the next ones.
+        // Of a node: azimuths with a density that falls linearly towards the next ones. Of a floor, as `by_cosine` says. One root
+        // for both, here and below.
         let low = number[k] < 0.5;
-        let root = (if low { 2.0 * number[k] } else { 2.0 - 2.0 * number[k] }).sqrt();
+        let square = if low { 2.0 * number[k] } else { 2.0 - 2.0 * number[k] };
+        let root = (if is_even { 1.0 - rest[k] } else { square }).sqrt();
         let aside = if low { root - 1.0 } else { 1.0 - root };
         let turn = (azimuth[k] + aside) / azimuths[k];
         let turn = if turn < 0.0 { turn + 1.0 } else { turn };
@@ -343,9 +342,10 @@ fn directions(group: &mut Group, sign: f64) {
         let px = c[k] * ahead - s[k] * across - x[k];
         let py = s[k] * ahead + c[k] * across - y[k];
         let square = 1.0 - px * px - py * py;
-        let height = if square > 0.0 { square.sqrt() } else { 0.0 };
-        to_x[k] = if is_even { even * cos } else { px };
-        to_y[k] = if is_even { even * sin } else { py };
-        to_z[k] = sign * if is_even { cosine } else { height };
+        let square = if square > 0.0 { square } else { 0.0 };
+        let height = (if is_even { (1.0 - root) * (1.0 + root) } else { square }).sqrt();
+        to_x[k] = if is_even { height * cos } else { px };
+        to_y[k] = if is_even { height * sin } else { py };
+        to_z[k] = sign * if is_even { root } else { height };
     }
 }
