@@ -34,13 +34,14 @@ from etendue import _core
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
 from etendue.scatter.building import core_scene
 from etendue.scene import compile_scene
-from timing import best
+from timing import timed
 
 Array = npt.NDArray[np.float64]
 
 FLOOR, LOBE, SIGMA = 0.3, 0.4, 0.15
 ANGLES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 82.5)
 SAMPLES = 1_000_000
+ROUNDS = 9
 
 
 def row(job: str, value: str, ratio: str = "") -> None:
@@ -228,6 +229,26 @@ def mitsuba_row() -> None:
     row("satin chamber, light image: etendue", f"{own:.2f} /s", f"{own / peer:.2f} × mitsuba, mean {own_mean:.3g}")
 
 
+def one_round(
+    bsdfs: Mapping[str, et.Bsdf],
+    scenes: Mapping[str, et.Scene],
+    gone: Mapping[str, float],
+    black: et.Scene,
+    directions: tuple[Array, Array],
+    rays: int,
+) -> dict[str, tuple[float, ...]]:
+    """Times of a sample, a value, and a ray of the chamber, a segment and a bounce there [s], of each surface in turn."""
+    incident, to = directions
+    started = timed(lambda: et.trace(black, rays=rays, seed=1))[0] / rays
+    found = {}
+    for name, bsdf in bsdfs.items():
+        drawn = timed(lambda bsdf=bsdf: bsdf.sample(incident, SAMPLES, seed=2))[0] / SAMPLES
+        asked = timed(lambda bsdf=bsdf: bsdf.evaluate(incident, to))[0] / SAMPLES
+        traced = timed(lambda name=name: et.trace(scenes[name], rays=rays, seed=1))[0] / rays
+        found[name] = drawn, asked, traced, traced / gone[name], (traced - started) / (gone[name] - 1.0)
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=float, default=1e6)
@@ -256,28 +277,25 @@ def main() -> None:
         direction(40.0, 180.0),
         et.bsdf.Lambertian(reflectance=1.0).sample(direction(40.0, 0.0), SAMPLES, seed=1),
     )
-    units: dict[str, tuple[float, ...]] = {}
     black = chamber({"kind": "bsdf", "bsdf": et.bsdf.Lambertian(reflectance=0.0)})
-    et.trace(black, rays=1000, seed=1)
-    started = best(lambda: et.trace(black, rays=rays, seed=1), 3)
-    for name, bsdf in bsdfs.items():
-        bsdf.sample(incident, 10, seed=1)
-        drawn = best(lambda bsdf=bsdf: bsdf.sample(incident, SAMPLES, seed=2), 3)
-        asked = best(lambda bsdf=bsdf: bsdf.evaluate(incident, to), 3)
-        finish = {"kind": "bsdf", "bsdf": bsdf}
-        scene = chamber(finish)
-        ledger = et.trace(scene, rays=1000, seed=1).ledger
-        traced = best(lambda scene=scene: et.trace(scene, rays=rays, seed=1), 3)
-        gone = ways(scene)
-        segment, bounce = traced / gone, (traced - started) / (gone - 1.0)
-        units[name] = (drawn, asked, traced, bounce, segment)
-        ratios = [ours / base for ours, base in zip(units[name], units["lambertian"], strict=True)]
-        row(f"{name}: a sample", f"{1e9 * drawn / SAMPLES:.0f} ns", f"{ratios[0]:.1f} × lambertian")
-        row(f"{name}: a value", f"{1e9 * asked / SAMPLES:.0f} ns", f"{ratios[1]:.1f} × lambertian")
-        row(f"{name}: a ray of the chamber", f"{1e9 * traced / rays:.0f} ns", f"{ratios[2]:.1f} × lambertian")
-        row(f"{name}: a segment there", f"{1e9 * segment / rays:.0f} ns", f"{ratios[4]:.1f} × lambertian")
-        row(f"{name}: a bounce there", f"{1e9 * bounce / rays:.0f} ns", f"{ratios[3]:.1f} × lambertian")
-        assert ledger.closes  # noqa: S101 - what does not close is no benchmark
+    scenes = {name: chamber({"kind": "bsdf", "bsdf": bsdf}) for name, bsdf in bsdfs.items()}
+    for name, scene in scenes.items():
+        bsdfs[name].sample(incident, 10, seed=1)
+        assert et.trace(scene, rays=1000, seed=1).ledger.closes  # noqa: S101 - what does not close is no benchmark
+    gone = {name: ways(scene) for name, scene in scenes.items()}
+    # The machine's speed swings within a run: each round takes its turn with all of them.
+    rounds = [one_round(bsdfs, scenes, gone, black, (incident, to), rays) for _ in range(ROUNDS)]
+    for name in bsdfs:
+        for k, what in enumerate(("a sample", "a value", "a ray of the chamber", "a segment there", "a bounce there")):
+            times = [found[name][k] for found in rounds]
+            low, ratio, high = np.quantile(
+                [found[name][k] / found["lambertian"][k] for found in rounds], [0.1, 0.5, 0.9]
+            )
+            row(
+                f"{name}: {what}",
+                f"{1e9 * np.median(times):.0f} ns",
+                f"{ratio:.2f} × lambertian, {low:.2f} to {high:.2f}",
+            )
     if given.peers:
         radiance_row()
         mitsuba_row()
