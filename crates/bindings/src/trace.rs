@@ -242,7 +242,7 @@ pub fn look_at_scene<'py>(
     })?;
     let shape = [view.rows as usize, view.columns as usize];
     let [columns, rows] = [&image.columns, &image.rows].map(|range| range.start as usize..range.end as usize);
-    let array = |pick: fn(&Pixel) -> f64| {
+    let array = |pick: fn(&Pixel) -> f64| -> PyResult<Bound<'py, PyArray2<f64>>> {
         // Memory of zeros that nothing is written to costs nothing.
         let array = PyArray2::zeros(py, shape, false);
         let mut all = array.readwrite();
@@ -255,9 +255,13 @@ pub fn look_at_scene<'py>(
         }
         Ok(array)
     };
-    let picks: [fn(&Pixel) -> f64; 5] = [|p| p.sum, |p| p.chance, |p| p.deviation, |p| p.met[0], |p| p.met[1]];
-    let arrays: Vec<_> = picks.into_iter().map(array).collect::<PyResult<_>>()?;
-    arrays.try_into().map_err(|_| PyValueError::new_err("five arrays"))
+    Ok([
+        array(|p| p.sum)?,
+        array(|p| p.chance)?,
+        array(|p| p.deviation)?,
+        array(|p| p.met[0])?,
+        array(|p| p.met[1])?,
+    ])
 }
 
 /// Where the first `rays` rays of a run of as many start, turn and end: one (k, 3) array each \[mm\]; a ray that escapes ends

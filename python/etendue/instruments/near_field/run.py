@@ -11,7 +11,6 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from etendue.concurrency import in_order
 from etendue.errors import ArgumentError
 from etendue.formats.input import as_path
 from etendue.instruments.near_field.far_field import far_field_notes
@@ -140,15 +139,10 @@ class NearFieldRun:
     def _merged(self) -> tuple[npt.NDArray[np.float32], int]:
         """Relative luminance of each record, and how many are saturated in all exposures."""
         values, saturated = np.zeros(len(self.records), dtype=np.float32), 0
-        merging = self.merging
-
-        def merged(some: slice) -> tuple[slice, Array, int]:
-            found, full = merging.merged(self.records["counts"][some])
-            return some, found, int(full.sum())
-
-        for some, found, full in in_order(merged, stretches(len(self.records)), os.cpu_count() or 1):
-            values[some] = found
-            saturated += full
+        for some in stretches(len(self.records)):
+            merged, full = self.merging.merged(self.records["counts"][some])
+            values[some] = merged
+            saturated += int(full.sum())
         return values, saturated
 
     @property
