@@ -78,6 +78,22 @@ impl RayBlock {
         self.deep |= origin_faces.face[1] != NONE;
     }
 
+    /// Rays more that all start at one point, and on the same faces.
+    pub fn extend_from(&mut self, o: Vec3, direction: &[Vec<f64>; 3], origin_faces: OriginFaces) {
+        let n = self.len() + direction[0].len();
+        for (mine, x) in self.origin.iter_mut().zip([o.x, o.y, o.z]) {
+            mine.resize(n, x);
+        }
+        for (mine, more) in self.direction.iter_mut().zip(direction) {
+            mine.extend_from_slice(more);
+        }
+        for (slot, face) in self.faces.iter_mut().zip(origin_faces.face) {
+            slot.resize(n, face);
+        }
+        self.parts.resize(n, origin_faces.part);
+        self.deep |= origin_faces.face[1] != NONE;
+    }
+
     /// Rays more that all start on one face, or on nothing if that is [`NONE`].
     pub fn extend(
         &mut self,

@@ -1,5 +1,7 @@
 //! How far away a line leaves a part of a carrier surface, without chart coordinates: for lines that mostly miss it.
 
+use etendue_geometry::RayBatch;
+use etendue_geometry::ray_batch::BLOCK;
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
@@ -99,6 +101,34 @@ pub struct Sights<'a> {
     pub reach: &'a [f64],
 }
 
+impl Sights<'_> {
+    /// Start point and direction of one of them.
+    #[inline(always)]
+    #[must_use]
+    pub fn line(&self, i: usize) -> (Vec3, Vec3) {
+        let [o, d] = [self.origin, self.direction].map(|lists| Vec3::new(lists[0][i], lists[1][i], lists[2][i]));
+        (o, d)
+    }
+}
+
+/// Where the lines of a block leave a part: what [`CarrierPart::leaves`] finds for each, NaN for those that do not.
+#[derive(Clone, Debug)]
+pub struct Departures {
+    /// How far along each line \[mm\].
+    pub distance: Vec<f64>,
+    /// Under which the area is seen from where the line begins.
+    pub cosine: Vec<f64>,
+}
+
+impl Default for Departures {
+    fn default() -> Self {
+        Self {
+            distance: vec![0.0; BLOCK],
+            cosine: vec![0.0; BLOCK],
+        }
+    }
+}
+
 impl CarrierPart {
     /// How far from `position` the line along `direction` leaves the part, and the cosine under which its area is seen from
     /// there: that of the angle with the normal, and where the depth changes with direction what makes
@@ -114,6 +144,18 @@ impl CarrierPart {
             Shape::Tube { radius, height } => Tube { radius, height }.leave(o, d),
         };
         (!t.is_nan()).then_some((t, cosine))
+    }
+
+    /// Where each line of a block leaves the part.
+    pub fn depart(&self, batch: &RayBatch, out: &mut Departures) {
+        match self.shape {
+            Shape::Rectangle { width, height, focus } => {
+                depart(&Rectangle { width, height, focus }, self, batch, out);
+            }
+            Shape::Disk { radius } => depart(&Disk { radius }, self, batch, out),
+            Shape::Hemisphere { radius } => depart(&Hemisphere { radius }, self, batch, out),
+            Shape::Tube { radius, height } => depart(&Tube { radius, height }, self, batch, out),
+        }
     }
 
     /// Marks the lines of sight that meet the part's emitting side at 0 < t ≤ `reach`, the part standing in `frame`; others
@@ -134,6 +176,18 @@ impl CarrierPart {
             Shape::Hemisphere { radius } => mark(&Hemisphere { radius }, &placed, sights, marks),
             Shape::Tube { radius, height } => mark(&Tube { radius, height }, &placed, sights, marks),
         }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn depart<L: Leave>(leave: &L, part: &CarrierPart, batch: &RayBatch, out: &mut Departures) {
+    let n = batch.len;
+    let [px, py, pz] = batch.position.each_ref().map(|v| &v[..n]);
+    let [kx, ky, kz] = batch.direction.each_ref().map(|v| &v[..n]);
+    let (distance, cosine) = (&mut out.distance[..n], &mut out.cosine[..n]);
+    for i in 0..n {
+        let (o, d) = part.localise(Vec3::new(px[i], py[i], pz[i]), Vec3::new(kx[i], ky[i], kz[i]));
+        (distance[i], cosine[i]) = leave.leave(o, d);
     }
 }
 

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use etendue_geometry::bounds::Bounds;
 use etendue_math::Vec3;
+use multiversion::multiversion;
 
 /// A pixel grid in space, seen from a point. Lengths in mm.
 #[derive(Clone, Copy, Debug)]
@@ -57,12 +58,20 @@ impl View {
 
     /// The unit vector from the observer through a place on the grid: in pixels, along the columns and the rows, from the top
     /// left corner.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn through(&self, place: [f64; 2]) -> Vec3 {
         let u = (place[0] / f64::from(self.columns) - 0.5) * self.width;
         let v = (0.5 - place[1] / f64::from(self.rows)) * self.height;
         (self.target + self.right * u + self.up * v - self.observer).normalized()
+    }
+
+    /// The same through each of some places, given by their columns and by their rows.
+    pub fn through_all(&self, places: &[Vec<f64>; 2], directions: &mut [Vec<f64>; 3]) {
+        for list in directions.iter_mut() {
+            list.resize(places[0].len(), 0.0);
+        }
+        through_all(self, places, directions);
     }
 
     /// Where on the grid, in pixels as for [`View::through`], the observer sees a point; None if it is not before him.
@@ -135,6 +144,16 @@ impl View {
         };
         let angle = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(a, b)| half(a, b));
         (axis, angle.into_iter().fold(0.0, f64::max))
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn through_all(view: &View, [across, down]: &[Vec<f64>; 2], directions: &mut [Vec<f64>; 3]) {
+    let n = across.len();
+    let (down, [x, y, z]) = (&down[..n], directions.each_mut().map(|list| &mut list[..n]));
+    for i in 0..n {
+        let d = view.through([across[i], down[i]]);
+        (x[i], y[i], z[i]) = (d.x, d.y, d.z);
     }
 }
 

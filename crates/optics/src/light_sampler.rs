@@ -1,6 +1,6 @@
 //! Sources as they are seen: their luminance along a line, and points on them to connect to.
 
-use etendue_lightfield::field::LightField;
+use etendue_lightfield::field::{LightField, PartField, Seen, SightReader};
 use etendue_lightfield::leave::Sights;
 use etendue_math::Vec3;
 use etendue_sampling::alias::Alias;
@@ -77,12 +77,8 @@ impl LightSampler {
             .collect();
         let total: f64 = fluxes.iter().sum();
         let parts = field.parts.iter().zip(&fluxes).map(|(part, flux)| {
-            let [n1, n2, n3, n4] = part.cells;
-            let means = part.cell_means(1);
-            let light: Vec<f64> = means
-                .chunks(n3 * n4)
-                .map(|cell| cell.iter().map(|r| r.value).sum())
-                .collect();
+            let [n1, n2, ..] = part.cells;
+            let light = part.flux_of_places();
             let sum: f64 = light.iter().sum();
             let even = 1.0 / light.len() as f64;
             let shares: Vec<f64> = light
@@ -151,14 +147,13 @@ impl LightSampler {
                     }
                     let crossing = part.part.cross(p, -k);
                     if crossing.met {
-                        let reading = part.at(crossing.place, crossing.direction);
-                        visit(SourceHit {
+                        let seen = Seen {
                             t: -back,
-                            luminance: reading.value * self.scale,
-                            deviation: reading.deviation * self.scale,
                             cosine,
-                            density: table.density(crossing.place) / part.part.area(),
-                        });
+                            place: crossing.place,
+                            reading: part.at(crossing.place, crossing.direction),
+                        };
+                        visit(self.hit(part, table, seen));
                     }
                 }
             }
@@ -174,6 +169,42 @@ impl LightSampler {
                 }
             }),
             Emitter::Rays { .. } | Emitter::Point(_) | Emitter::Beam(_) => {}
+        }
+    }
+
+    /// The same for those of many lines of sight that have these numbers, to the same bits; `visit` is told the number of each.
+    pub fn along_all(
+        &self,
+        source: &Source,
+        sights: Sights<'_>,
+        which: &[u32],
+        reader: &mut SightReader,
+        mut visit: impl FnMut(usize, SourceHit),
+    ) {
+        if let Emitter::Field(sampler) = &source.emitter {
+            for (part, table) in sampler.field().parts.iter().zip(&self.parts) {
+                reader.read(part, &source.frame, sights, which, |i, seen| {
+                    visit(i, self.hit(part, table, seen));
+                });
+            }
+            return;
+        }
+        for i in which {
+            let i = *i as usize;
+            let (o, d) = sights.line(i);
+            self.along(source, o, d, sights.reach[i], |hit| visit(i, hit));
+        }
+    }
+
+    /// What is seen of a part of a light field.
+    #[inline]
+    fn hit(&self, part: &PartField, table: &PlaceTable, seen: Seen) -> SourceHit {
+        SourceHit {
+            t: seen.t,
+            luminance: seen.reading.value * self.scale,
+            deviation: seen.reading.deviation * self.scale,
+            cosine: seen.cosine,
+            density: table.density(seen.place) / part.part.area(),
         }
     }
 

@@ -56,9 +56,22 @@ impl ShiftedPoint {
     /// Coordinates 4 `number` to 4 `number` + 3.
     #[inline]
     #[must_use]
-    #[allow(clippy::cast_possible_truncation, reason = "below FOURS")]
     pub fn four(&self, number: u64) -> [f64; 4] {
-        let shift = self.shifts.uniforms(self.address[0], self.address[1] | number);
+        self.moved(number, &self.shift(number))
+    }
+
+    /// By how much they are moved: the same for all points at one address.
+    #[inline]
+    #[must_use]
+    pub fn shift(&self, number: u64) -> [f64; 4] {
+        self.shifts.uniforms(self.address[0], self.address[1] | number)
+    }
+
+    /// These coordinates, where it is known by how much they are moved.
+    #[inline]
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "below FOURS")]
+    pub fn moved(&self, number: u64, shift: &[f64; 4]) -> [f64; 4] {
         std::array::from_fn(|k| coordinate(self.phase, GENERATOR[4 * number as usize + k], shift[k]))
     }
 }

@@ -60,9 +60,10 @@ def _feed(digest: Any, value: Any) -> None:
             digest.update(f"a{value.dtype.kind}{value.shape}".encode())
             digest.update(np.ascontiguousarray(value).data)
         case _core.LightField():
-            _feed(digest, value.flux())
+            flux = value.flux()
+            _feed(digest, flux)
             spread = np.random.default_rng(1).random((SAMPLE >> 4, 4))
-            for part in range(len(value.flux())):
+            for part in range(len(flux)):
                 _feed(digest, value.at(part, spread)[0])
         case _:
             n = len(value)

@@ -126,11 +126,29 @@ impl PartField {
     #[must_use]
     pub fn flux(&self) -> f64 {
         let [space, direction] = self.tent_masses();
-        let layers = self.ratio.chunks_exact(direction.len());
-        let of_layer =
-            |layer: &[[f32; 2]]| -> f64 { layer.iter().zip(&direction).map(|(r, m)| f64::from(r[0]) * m).sum() };
-        let sum: f64 = layers.zip(&space).map(|(layer, mass)| mass * of_layer(layer)).sum();
+        let layers = self.layers(&direction);
+        let sum: f64 = layers.zip(&space).map(|(layer, mass)| mass * layer).sum();
         sum * self.level * self.part.etendue()
+    }
+
+    /// ∫ L dU over each cell of the place, in all directions together.
+    #[must_use]
+    pub fn flux_of_places(&self) -> Vec<f64> {
+        let [space, direction] = self.overlaps();
+        let layers: Vec<f64> = self.layers(&direction.tent_masses()).collect();
+        let scale = self.level * self.part.etendue();
+        let of_place = |(place, weights): (usize, &[f64; 9])| -> f64 {
+            let near = space.neighbours(place).into_iter().zip(weights);
+            near.map(|(near, weight)| weight * layers[near]).sum::<f64>() * scale
+        };
+        space.weights.iter().enumerate().map(of_place).collect()
+    }
+
+    /// The ratio over each place, weighed by masses of the directions.
+    fn layers<'a>(&'a self, direction: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        let of_layer =
+            move |layer: &[[f32; 2]]| -> f64 { layer.iter().zip(direction).map(|(r, m)| f64::from(r[0]) * m).sum() };
+        self.ratio.chunks_exact(direction.len()).map(of_layer)
     }
 
     /// Mean luminance of each cell and mean of its standard deviation; the same bits for any number of threads.
@@ -226,6 +244,15 @@ mod tests {
                 "{kind}: {} {flux}",
                 field.flux()
             );
+            let directions = field.cells[2] * field.cells[3];
+            let share = field.part.etendue() / value.len() as f64;
+            for (of_place, cells) in field.flux_of_places().iter().zip(value.chunks(directions)) {
+                let flux = cells.iter().sum::<f64>() * share;
+                assert!(
+                    (of_place - flux).abs() < 1e-12 * (1.0 + flux),
+                    "{kind}: {of_place} {flux}"
+                );
+            }
         }
     }
 

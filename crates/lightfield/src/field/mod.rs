@@ -12,8 +12,10 @@ pub mod intensity;
 mod light_field;
 pub mod look;
 mod points;
+mod sights;
 pub mod tent;
 
 pub use errors::{Averaging, FineErrors};
 pub use factor::Factor;
 pub use light_field::{LightField, PartField, Reading};
+pub use sights::{Seen, SightReader};

@@ -8,7 +8,7 @@ use etendue_geometry::ray_batch::BLOCK;
 use multiversion::multiversion;
 
 use super::factor::groups;
-use super::light_field::{PartField, joined, weighed};
+use super::light_field::{PartField, Reading, joined, weighed};
 use super::tent::Tents;
 use crate::surface::Coordinates;
 
@@ -44,6 +44,17 @@ impl Default for Points {
 }
 
 impl Points {
+    /// What was found at a point, with all kinds of errors together.
+    #[inline(always)]
+    #[must_use]
+    pub fn reading(&self, i: usize) -> Reading {
+        let variance: f64 = self.deviations.iter().map(|d| d[i] * d[i]).sum();
+        Reading {
+            value: self.value[i],
+            deviation: variance.sqrt(),
+        }
+    }
+
     /// Reads the first `count` points of a part; what is found where a line does not leave the part means nothing.
     pub fn read(&mut self, part: &PartField, at: &Coordinates, count: usize) {
         if let Some((lower, upper)) = extent(at, count) {

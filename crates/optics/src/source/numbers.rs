@@ -41,10 +41,12 @@ impl Numbers {
         numbers
     }
 
-    /// The coordinates of a point, then those of ray `index`.
+    /// The coordinates of a point, by whose first shift (see [`ShiftedPoint::shift`]) it is moved, then those of ray `index`.
+    #[inline]
     #[must_use]
-    pub const fn after(point: ShiftedPoint, stream: Stream, index: u64) -> Self {
+    pub fn after(point: ShiftedPoint, shift: &[f64; 4], stream: Stream, index: u64) -> Self {
         let mut numbers = Self::new(stream, index, 0);
+        (numbers.held, numbers.used, numbers.fours) = (point.moved(0, shift), 0, 1);
         numbers.point = Some(point);
         numbers
     }

@@ -6,7 +6,8 @@ use etendue_lightfield::View;
 use rayon::prelude::*;
 
 use super::image::{Found, Glint};
-use super::search::{Search, Sight, targets};
+use super::search::{FromPixel, Search, Sight, tile_side};
+use super::targets::targets;
 use crate::lit_scene::LitScene;
 
 /// Starts of the search over all pixels: more per pixel where these are few.
@@ -60,13 +61,15 @@ impl Glints {
         let [columns, rows] = lit.window(view);
         let beside = |range: Range<u32>, n: u32| range.start.saturating_sub(BESIDE)..(range.end + BESIDE).min(n);
         let (columns, rows) = (beside(columns, view.columns), beside(rows, view.rows));
-        let window: Vec<usize> = rows
-            .flat_map(|row| {
+        let pixels_of = |rows: Range<u32>, columns: Range<u32>| -> Vec<usize> {
+            let of_row = |row: u32| {
                 columns
                     .clone()
                     .map(move |column| (row * view.columns + column) as usize)
-            })
-            .collect();
+            };
+            rows.flat_map(of_row).collect()
+        };
+        let window = pixels_of(rows.clone(), columns.clone());
         let starts = (STARTS / pixels.max(1)).clamp(1, MOST_STARTS);
         let [first, caught] = window
             .par_iter()
@@ -84,18 +87,35 @@ impl Glints {
         if first == 0 && 2 * caught > starts * pixels.div_ceil(FIRST_LOOK) {
             search.spend_little();
         }
-        let found: Vec<(Vec<Found>, Vec<Sight>)> = window
+        let side = tile_side(starts);
+        let cut = |range: &Range<u32>| {
+            let range = range.clone();
+            range
+                .clone()
+                .step_by(side as usize)
+                .map(move |from| from..(from + side).min(range.end))
+        };
+        let tiles: Vec<Vec<usize>> = cut(&rows)
+            .flat_map(|rows| cut(&columns).map(move |columns| (rows.clone(), columns)))
+            .map(|(rows, columns)| pixels_of(rows, columns))
+            .collect();
+        let mut found: Vec<(usize, FromPixel)> = tiles
             .par_iter()
             .map_init(
                 || search.clone(),
-                |search, pixel| {
-                    if lit.is_stopped() {
-                        return Default::default();
-                    }
-                    search.search_from(*pixel, starts)
+                |search, tile| {
+                    let found = if lit.is_stopped() {
+                        vec![Default::default(); tile.len()]
+                    } else {
+                        search.search_from(tile, starts)
+                    };
+                    tile.iter().copied().zip(found).collect::<Vec<_>>()
                 },
             )
+            .flatten()
             .collect();
+        found.sort_unstable_by_key(|(pixel, _)| *pixel);
+        let found: Vec<FromPixel> = found.into_iter().map(|(_, found)| found).collect();
         if found.iter().all(|(images, _)| images.is_empty()) {
             return result;
         }

@@ -4,15 +4,17 @@
 //! pixel; by Newton's method that place is found from which it meets a point of the source. As for manifolds of specular
 //! paths `[Jakob2012]`, but with differences in the place of derivatives, which asks nothing of the surfaces.
 
-use etendue_geometry::RayBatch;
 use etendue_geometry::hits::TIE;
-use etendue_geometry::origin_faces::OriginFaces;
+use etendue_geometry::origin_faces::{NONE, OriginFaces};
 use etendue_lightfield::View;
 use etendue_math::Vec3;
-use etendue_optics::source::surface::across;
 use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
 
-use super::image::{Found, Glint};
+use super::image::Found;
+use super::passing::{
+    BESIDE, Line, Pair, Square, WIDEST, determinant, image, passing, spread_on_screen, times, widths,
+};
+use super::targets::Target;
 use crate::interaction::{Interaction, first_interaction};
 use crate::lit_scene::LitScene;
 use crate::medium_cache::MediumCache;
@@ -20,9 +22,6 @@ use crate::ray_start::place;
 use crate::scatter::{SPLIT, SurfaceEvent};
 use crate::scene::Scene;
 use crate::solid_stack::SolidStack;
-
-/// How far beside a line its neighbours start, in pixels: far above rounding, far below what surfaces do.
-const BESIDE: f64 = 1e-4;
 
 /// From how far away an image is looked for, in pixels.
 const NEAR: f64 = 3.0;
@@ -36,65 +35,38 @@ const WORK: usize = 256;
 /// As many where a first look has found that starts run out of them and lead to no image.
 const LITTLE_WORK: usize = 16;
 
-/// Points of each source that are looked for.
-const POINTS: usize = 64;
-
-/// Those among them that tell how large the source is about one of them.
-const TOGETHER: usize = 8;
-
 /// Parts of a source are images by themselves if their area on the screen is so much smaller than its own.
 const APART: f64 = 1.0 / 400.0;
 
 /// How far behind a surface a point may lie that is on it, in units of the distance: far above rounding.
 const HIDDEN: f64 = 1e-3;
 
-/// Steps to an image.
-const STEPS: usize = 20;
+/// Steps to an image, each of a pixel at most.
+const STEPS: u32 = 20;
 
-/// Width of an image in units of the standard deviation of the places of its light.
-const WIDTH: f64 = 1.5;
-
-/// The least and the largest width, in pixels. Lines that are spread evenly find what is larger both ways.
-const NARROWEST: f64 = 1e-9;
-const WIDEST: f64 = 0.5;
+/// Steps beyond an edge that are taken back, at most: an image that lies there is none.
+const EDGES: u32 = 4;
 
 /// The lesser width of a whole source from which on no image of it is looked for, in pixels.
 const LARGE: f64 = 4.0 * WIDEST;
 
-/// The seed of the points of sources: any does.
-const SEED: u64 = 0x474C_494E_5453;
-
 /// Wavelengths that images are looked for at.
 const COLOURS: usize = 4;
 
-type Pair = [f64; 2];
-/// By rows.
-type Square = [Pair; 2];
-type Spread = [[f64; 3]; 3];
+/// Starts of a tile that look in vain for an image of a source through some surfaces, before no other does.
+const IN_VAIN: usize = 2;
 
-/// Points of a source and how they are spread.
-#[derive(Debug)]
-pub struct Target {
-    source: usize,
-    points: Vec<Vec3>,
-    middle: Vec3,
-    radius: f64,
-    /// Covariance of all points, and of those about each.
-    spread: Spread,
-    about: Vec<Spread>,
-}
+/// Starts that see nothing but the same surface first, and no image near to them, speak for those between them.
+const SPEAKING: [usize; 2] = [4, 3];
+
+/// Starts in a tile, at least.
+const TILE: usize = 8;
 
 /// A source, and at each smooth surface on the way to it whether light is transmitted.
 pub type Sight = (usize, Vec<bool>);
 
-/// A line of sight on its way.
-#[derive(Clone, Copy)]
-struct Line {
-    o: Vec3,
-    d: Vec3,
-    stack: SolidStack,
-    origin_faces: OriginFaces,
-}
+/// What comes of the starts in a pixel: images, wherever they are, and what most of the starts see without a search.
+pub type FromPixel = (Vec<Found>, Vec<Sight>);
 
 /// A chain of smooth surfaces from a start: the line there and those beside it.
 #[derive(Clone)]
@@ -102,14 +74,6 @@ struct Chain {
     lines: [Line; 3],
     weight: f64,
     ways: Vec<bool>,
-}
-
-/// How lines pass a point: offset of the line, and its change with the place in pixels, across it; distance along it.
-struct Passing {
-    off: Pair,
-    change: Square,
-    along: f64,
-    axes: [Vec3; 2],
 }
 
 /// What is needed to look for images.
@@ -127,6 +91,8 @@ pub struct Search<'a> {
     /// Surfaces that may be met from a start, and those that are left of them at the present one.
     work: usize,
     left: usize,
+    /// Images that were looked for in a tile: of which source, through which surfaces, and whether one was found.
+    tried: Vec<(Sight, bool)>,
 }
 
 impl<'a> Search<'a> {
@@ -151,6 +117,7 @@ impl<'a> Search<'a> {
             media: MediumCache::new(lit.scene),
             work: WORK,
             left: 0,
+            tried: Vec::new(),
         };
         // Without smooth surfaces the only images are direct ones.
         let hopeless = !lit.scene.may_reflect() && targets.iter().all(|target| search.is_large(target));
@@ -182,29 +149,71 @@ impl<'a> Search<'a> {
         looks.fold([0, 0], |sum, look| [sum[0] + look[0], sum[1] + look[1]])
     }
 
-    /// Images that are found from starts in a pixel, wherever they are, and what most of the starts see without a search.
-    pub fn search_from(&mut self, pixel: usize, starts: usize) -> (Vec<Found>, Vec<Sight>) {
-        let (mut found, mut seen) = (Vec::new(), Vec::new());
-        for start in 0..starts {
-            self.search_at(pixel, start, starts, &mut found, &mut seen);
+    /// Looks from the starts in the pixels of a tile, pixel by pixel.
+    ///
+    /// Some of the starts come first. If these all meet the same surface first and no image is near to any of them, others that
+    /// meet this surface are left out.
+    pub fn search_from(&mut self, tile: &[usize], starts: usize) -> Vec<FromPixel> {
+        let step = SPEAKING[usize::from(starts > 1)];
+        let all = tile.len() * starts;
+        let mut found = vec![Vec::new(); tile.len()];
+        let mut seen: Vec<(Vec<Sight>, usize)> = vec![(Vec::new(), 0); tile.len()];
+        let mut search = |search: &mut Self, number: usize| {
+            let (pixel, start) = (number / starts, number % starts);
+            let (seen, searched) = &mut seen[pixel];
+            search.search_at(tile[pixel], start, starts, &mut found[pixel], seen);
+            *searched += 1;
+        };
+        let mut faces: Vec<u32> = Vec::new();
+        let mut ended = true;
+        self.tried.clear();
+        for number in (0..all).step_by(step) {
+            search(self, number);
+            ended &= self.left > 0;
+            faces.push(self.first_face(tile[number / starts], number % starts));
         }
-        seen.sort_unstable();
-        let most = seen
-            .chunk_by(PartialEq::eq)
-            .filter(|same| 2 * same.len() > starts)
-            .map(|same| same[0].clone());
-        let most = most.collect();
-        (found, most)
+        let quiet = ended && self.tried.is_empty() && faces.iter().all(|face| *face == faces[0]);
+        for number in (0..all).filter(|number| number % step > 0) {
+            if !quiet || self.first_face(tile[number / starts], number % starts) != faces[0] {
+                search(self, number);
+            }
+        }
+        if quiet {
+            // What is seen all over the tile.
+            let everything: Vec<Sight> = seen.iter().flat_map(|(seen, _)| seen.iter().cloned()).collect();
+            let searched = seen.iter().map(|(_, searched)| searched).sum();
+            seen.fill((everything, searched));
+        }
+        let most = seen.into_iter().map(|(seen, searched)| common(seen, searched));
+        found.into_iter().zip(most).collect()
+    }
+
+    /// Where a start lies.
+    #[allow(clippy::cast_possible_truncation, reason = "a small number")]
+    fn place(&self, pixel: usize, start: usize) -> Pair {
+        let columns = self.view.columns as usize;
+        let point = lattice_point(start as u32, &[0.5; DIMENSIONS]);
+        [(pixel % columns) as f64 + point[0], (pixel / columns) as f64 + point[1]]
+    }
+
+    /// The face that a line of sight from a start meets first; [`NONE`] if there is none.
+    fn first_face(&self, pixel: usize, start: usize) -> u32 {
+        let d = self.view.through(self.place(pixel, start));
+        let (stack, origin_faces) = self.observer;
+        let met = first_interaction(self.scene, self.view.observer, d, &origin_faces, f64::INFINITY, stack);
+        met.ok().flatten().map_or(NONE, |met| met.face)
     }
 
     /// Looks from one of the starts in a pixel.
-    #[allow(clippy::cast_possible_truncation, reason = "a small number")]
     fn search_at(&mut self, pixel: usize, start: usize, starts: usize, found: &mut Vec<Found>, seen: &mut Vec<Sight>) {
-        let columns = self.view.columns as usize;
-        let point = lattice_point(start as u32, &[0.5; DIMENSIONS]);
-        let at = [(pixel % columns) as f64 + point[0], (pixel / columns) as f64 + point[1]];
         let wavelength = self.wavelengths[(pixel + start) % self.wavelengths.len()];
-        self.start(at, wavelength, pixel * starts + start, found, seen);
+        self.start(
+            self.place(pixel, start),
+            wavelength,
+            pixel * starts + start,
+            found,
+            seen,
+        );
     }
 
     fn start(&mut self, at: Pair, wavelength: f64, number: usize, found: &mut Vec<Found>, seen: &mut Vec<Sight>) {
@@ -395,6 +404,12 @@ impl<'a> Search<'a> {
         if nearest.0 > NEAR {
             return;
         }
+        let sight = (target.source, chain.ways.clone());
+        let mut before = self.tried.iter().filter(|(other, _)| *other == sight);
+        if before.clone().count() >= IN_VAIN && before.all(|(_, found)| !found) {
+            return;
+        }
+        let before = found.len();
         for k in [nearest.1, number % target.points.len()] {
             let Some((place, inverse, axes)) = self.approach(target.points[k], at, &chain.ways, target, wavelength)
             else {
@@ -413,6 +428,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
+        self.tried.push((sight, found.len() > before));
     }
 
     /// Whether a line meets the source itself: it is not small there, as glass shows the whole sky in little.
@@ -443,15 +459,20 @@ impl<'a> Search<'a> {
     ) -> Option<(Pair, Square, [Vec3; 2])> {
         let (mut at, mut last) = (start, start);
         let close = 1e-3 * (target.spread[0][0] + target.spread[1][1] + target.spread[2][2]).sqrt();
-        for _ in 0..STEPS {
+        let mut edges = 0;
+        for step in 0..STEPS {
             let Some(lines) = self.follow(at, ways, wavelength) else {
+                edges += 1;
+                if edges == EDGES || self.left == 0 {
+                    return None;
+                }
                 // Beyond an edge: half way back.
                 at = [f64::midpoint(at[0], last[0]), f64::midpoint(at[1], last[1])];
                 continue;
             };
             let passing = passing(&lines, point);
             let inverse = passing.inverse()?;
-            let mut step = times(&inverse, passing.off);
+            let mut way = times(&inverse, passing.off);
             if passing.off[0].hypot(passing.off[1]) < close {
                 if self.left == 0 {
                     return None;
@@ -459,14 +480,18 @@ impl<'a> Search<'a> {
                 // Another surface may stand before it.
                 let reach = self.interactions(&lines).map_or(f64::INFINITY, |met| met[0].t);
                 let there = passing.along > 0.0 && passing.along <= reach * (1.0 + HIDDEN);
-                return there.then_some(([at[0] - step[0], at[1] - step[1]], inverse, passing.axes));
+                return there.then_some(([at[0] - way[0], at[1] - way[1]], inverse, passing.axes));
             }
-            let length = step[0].hypot(step[1]);
+            let length = way[0].hypot(way[1]);
+            if length > f64::from(STEPS - step) {
+                // Farther away than the steps reach that are left.
+                return None;
+            }
             if length > 1.0 {
-                step = step.map(|x| x / length);
+                way = way.map(|x| x / length);
             }
             last = at;
-            at = [at[0] - step[0], at[1] - step[1]];
+            at = [at[0] - way[0], at[1] - way[1]];
             let grid = [self.view.columns, self.view.rows].map(f64::from);
             if (0..2).any(|k| !(-1.0..=grid[k] + 1.0).contains(&at[k])) {
                 return None;
@@ -476,146 +501,15 @@ impl<'a> Search<'a> {
     }
 }
 
-impl Passing {
-    /// Places by offsets; None where offsets do not follow places.
-    fn inverse(&self) -> Option<Square> {
-        let [[a, b], [c, d]] = self.change;
-        let determinant = a * d - b * c;
-        let inverse = [[d / determinant, -b / determinant], [-c / determinant, a / determinant]];
-        inverse.iter().flatten().all(|x| x.is_finite()).then_some(inverse)
-    }
+/// What was seen from more than half of so many starts.
+fn common(mut seen: Vec<Sight>, starts: usize) -> Vec<Sight> {
+    seen.sort_unstable();
+    let most = seen.chunk_by(PartialEq::eq).filter(|same| 2 * same.len() > starts);
+    most.map(|same| same[0].clone()).collect()
 }
 
-fn passing(lines: &[Line; 3], point: Vec3) -> Passing {
-    let d = lines[0].d;
-    let axes = across(d);
-    let off = lines.each_ref().map(|line| {
-        let to = point - line.o;
-        let beside = line.d * to.dot(line.d) - to;
-        axes.map(|axis| beside.dot(axis))
-    });
-    let change = |k: usize| [(off[1][k] - off[0][k]) / BESIDE, (off[2][k] - off[0][k]) / BESIDE];
-    Passing {
-        off: off[0],
-        change: [change(0), change(1)],
-        along: (point - lines[0].o).dot(d),
-        axes,
-    }
-}
-
-fn times(m: &Square, v: Pair) -> Pair {
-    [m[0][0] * v[0] + m[0][1] * v[1], m[1][0] * v[0] + m[1][1] * v[1]]
-}
-
-fn determinant(m: &Square) -> f64 {
-    m[0][0] * m[1][1] - m[0][1] * m[1][0]
-}
-
-/// The covariance in pixels that one in space comes to.
-fn spread_on_screen(inverse: &Square, axes: &[Vec3; 2], spread: &Spread) -> Square {
-    let row = |v: Vec3| spread.map(|r| r[0] * v.x + r[1] * v.y + r[2] * v.z);
-    let flat = axes.map(|a| {
-        let s = row(a);
-        axes.map(|b| s[0] * b.x + s[1] * b.y + s[2] * b.z)
-    });
-    let half = inverse.map(|r| {
-        [
-            r[0] * flat[0][0] + r[1] * flat[1][0],
-            r[0] * flat[0][1] + r[1] * flat[1][1],
-        ]
-    });
-    half.map(|r| inverse.map(|s| r[0] * s[0] + r[1] * s[1]))
-}
-
-/// The larger and the lesser width of an image of this covariance.
-fn widths(spread: &Square) -> (f64, f64) {
-    let [[a, b], [_, d]] = *spread;
-    let (mean, half) = (f64::midpoint(a, d), ((a - d) / 2.0).hypot(b));
-    let lesser = if mean + half > 0.0 {
-        determinant(spread).max(0.0) / (mean + half)
-    } else {
-        0.0
-    };
-    (WIDTH * (mean + half).max(0.0).sqrt(), WIDTH * lesser.sqrt())
-}
-
-/// An image at a place, of a covariance in pixels; None if it is large.
-fn image(place: Pair, spread: &Square) -> Option<Glint> {
-    let (larger, lesser) = widths(spread);
-    if lesser >= WIDEST {
-        return None;
-    }
-    let [[a, b], [_, d]] = *spread;
-    // Of the two forms of the axis, the one without cancellation.
-    let half = ((a - d) / 2.0).hypot(b);
-    let axis = if a >= d {
-        [half + (a - d) / 2.0, b]
-    } else {
-        [b, half + (d - a) / 2.0]
-    };
-    let length = axis[0].hypot(axis[1]);
-    let [x, y] = if length > 0.0 {
-        axis.map(|v| v / length)
-    } else {
-        [1.0, 0.0]
-    };
-    let [s, t] = [larger, lesser].map(|width| width.clamp(NARROWEST, WIDEST));
-    Glint::new(place, [[x * s, y * s], [-y * t, x * t]])
-}
-
-/// What a view may show small images of.
-pub fn targets(lit: &LitScene<'_>, view: &View) -> Vec<Target> {
-    (0..lit.scene.sources.len())
-        // A source that stands around the observer is a surround, not a lamp: glass shows all of it in little.
-        .filter(|number| !lit.scene.sources[*number].bounds().contains(view.observer))
-        .filter_map(|number| target(lit, number))
-        .collect()
-}
-
-/// Points of a source that can be seen; None if it cannot.
-fn target(lit: &LitScene<'_>, number: usize) -> Option<Target> {
-    let source = &lit.scene.sources[number];
-    lit.light_samplers[number].as_ref()?;
-    let mut batch = RayBatch::default();
-    source.emit(number as u64, 0..POINTS as u64, POINTS as u64, SEED, &[], &mut batch);
-    let points: Vec<Vec3> = (0..batch.len)
-        .filter(|i| batch.usable(*i))
-        .map(|i| batch.position(i))
-        .collect();
-    let (middle, spread) = moments(points.iter())?;
-    let radius = points.iter().map(|p| (*p - middle).length()).fold(0.0, f64::max);
-    if radius == 0.0 {
-        return None;
-    }
-    let about = points.iter().map(|point| {
-        let mut others: Vec<&Vec3> = points.iter().collect();
-        others.sort_by(|a, b| (**a - *point).length().total_cmp(&(**b - *point).length()));
-        Some(moments(others.into_iter().take(TOGETHER))?.1)
-    });
-    Some(Target {
-        source: number,
-        about: about.collect::<Option<_>>()?,
-        points,
-        middle,
-        radius,
-        spread,
-    })
-}
-
-/// Mean and covariance of points.
-fn moments<'p>(points: impl Iterator<Item = &'p Vec3> + Clone) -> Option<(Vec3, Spread)> {
-    let n = points.clone().count() as f64;
-    let zero = Vec3::new(0.0, 0.0, 0.0);
-    let mean = points.clone().fold(zero, |sum, p| sum + *p) * (1.0 / n);
-    let mut spread = [[0.0; 3]; 3];
-    for point in points {
-        let off = *point - mean;
-        let off = [off.x, off.y, off.z];
-        for (row, a) in spread.iter_mut().zip(off) {
-            for (cell, b) in row.iter_mut().zip(off) {
-                *cell += a * b / n;
-            }
-        }
-    }
-    (n > 0.0).then_some((mean, spread))
+/// The side of the tiles of pixels with so many starts each, at least one, that are searched together.
+pub fn tile_side(starts: usize) -> u32 {
+    let side = |side: &u32| (side * side) as usize * starts >= TILE;
+    (1..=3).find(side).unwrap_or(3)
 }

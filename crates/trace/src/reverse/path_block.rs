@@ -4,6 +4,7 @@ use etendue_geometry::hits::Hits;
 use etendue_geometry::origin_faces::OriginFaces;
 use etendue_geometry::ray_block::RayBlock;
 use etendue_lightfield::View;
+use etendue_lightfield::field::SightReader;
 use etendue_math::Vec3;
 use etendue_optics::source::Numbers;
 
@@ -92,6 +93,9 @@ pub struct PathBlock<'a> {
     /// How far each branch goes, and whether it may meet a source.
     pub(super) reach: Vec<f64>,
     pub(super) marks: Vec<bool>,
+    /// Those that may, and room to look along them.
+    pub(super) marked: Vec<u32>,
+    pub(super) reader: SightReader,
     /// Connections that have to be looked at.
     pub(super) shadows: RayBlock,
     pub(super) connections: Vec<Connection>,
@@ -116,6 +120,8 @@ impl<'a> PathBlock<'a> {
             next: Vec::new(),
             reach: Vec::new(),
             marks: Vec::new(),
+            marked: Vec::new(),
+            reader: SightReader::default(),
             shadows: RayBlock::default(),
             connections: Vec::new(),
             observer: place(lit.scene, view.observer, (view.target - view.observer).normalized()).ok(),

@@ -9,6 +9,7 @@
 
 use std::ops::Range;
 
+use etendue_geometry::surface_points::Vectors;
 use etendue_lightfield::View;
 use etendue_optics::source::Numbers;
 use etendue_sampling::lattice::ShiftedPoint;
@@ -71,7 +72,10 @@ pub fn render(
     let each = (passes.len() * method.paths as usize).max(1);
     let chunk = (4 * BLOCK / each).clamp(1, 1 << 12);
     let chunks = pixels.par_chunks_mut(chunk).zip(which.par_chunks(chunk));
-    chunks.for_each(|(pixels, which)| Renderer::new(lit, view, method, &known).paint(which, passes.clone(), pixels));
+    let renderer = || Renderer::new(lit, view, method, &known);
+    chunks.for_each_init(renderer, |renderer, (pixels, which)| {
+        renderer.paint(which, passes.clone(), pixels);
+    });
     Image { columns, rows, pixels }
 }
 
@@ -79,6 +83,17 @@ pub fn render(
 struct Renderer<'a> {
     block: PathBlock<'a>,
     splitter: Splitter,
+    starts: Starts,
+}
+
+/// Where lines of sight begin.
+#[derive(Default)]
+struct Starts {
+    /// Places on the grid, by columns and by rows, and the directions through them.
+    places: [Vec<f64>; 2],
+    directions: Vectors,
+    /// Numbers of their paths.
+    paths: Vec<u32>,
 }
 
 impl<'a> Renderer<'a> {
@@ -86,6 +101,7 @@ impl<'a> Renderer<'a> {
         Self {
             block: PathBlock::new(lit, view, method, known),
             splitter: Splitter::new(lit.scene),
+            starts: Starts::default(),
         }
     }
 
@@ -105,16 +121,16 @@ impl<'a> Renderer<'a> {
         while begin < total && !self.block.lit.is_stopped() {
             let end = (begin + BLOCK).min(total);
             self.block.paths.clear();
-            for flat in begin..end {
-                let (task, index) = (flat / paths, flat % paths);
-                let (cell, aimed) = tasks[task];
+            let these = tasks.iter().enumerate().take(end.div_ceil(paths)).skip(begin / paths);
+            for (task, (cell, aimed)) in these {
+                let first = task * paths;
+                let indices = begin.max(first) - first..end.min(first + paths) - first;
                 let pixel = which[cell / passes.len()] as u64;
                 #[allow(clippy::cast_possible_truncation, reason = "a number of passes")]
                 let pass = (cell % passes.len()) as u32;
-                let pass = [passes.start + pass, pass];
-                #[allow(clippy::cast_possible_truncation, reason = "a number of paths")]
-                self.aim(pixel, pass, index as u32, aimed);
+                self.aim(pixel, [passes.start + pass, pass], indices, *aimed);
             }
+            self.start();
             self.follow();
             for (flat, path) in (begin..end).zip(&self.block.paths) {
                 let cell = &mut cells[tasks[flat / paths].0];
@@ -138,58 +154,70 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// A path from the observer through a point of a pixel.
-    fn aim(&mut self, pixel: u64, [pass, made]: [u32; 2], index: u32, aimed: bool) {
-        let view = self.block.view;
+    /// Paths through points of a pixel.
+    fn aim(&mut self, pixel: u64, [pass, made]: [u32; 2], indices: Range<usize>, aimed: bool) {
+        let Self { block, starts, .. } = self;
         let [shifts, stream] = [PURPOSE_SHIFT, PURPOSE_PATH]
-            .map(|purpose| Stream::new(self.block.method.seed, purpose + if aimed { AIMED } else { 0 }));
-        let point = ShiftedPoint::new(index, shifts, [pixel, u64::from(pass) << 8]);
-        let address = ((pixel << 24 | u64::from(pass)) << 20).wrapping_add(u64::from(index));
-        #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
-        let path = self.block.paths.len() as u32;
-        // Made where it stays: it is large.
-        self.block.paths.push(Path {
-            numbers: Numbers::after(point, stream, address),
-            line: 0,
-            pass: made as usize,
-            sum: [0.0; 2],
-            chance: 0.0,
-            met: [false; 2],
-            aimed,
-            share: 1.0,
-        });
-        let Path {
-            numbers, line, share, ..
-        } = &mut self.block.paths[path as usize];
-        let columns = u64::from(view.columns);
+            .map(|purpose| Stream::new(block.method.seed, purpose + if aimed { AIMED } else { 0 }));
+        let point = |index| ShiftedPoint::new(index, shifts, [pixel, u64::from(pass) << 8]);
+        let shift = point(0).shift(0);
+        let columns = u64::from(block.view.columns);
         let corner = [(pixel % columns) as f64, (pixel / columns) as f64];
         #[allow(clippy::cast_possible_truncation, reason = "a number of a pixel")]
-        let images = self
-            .block
-            .method
-            .glints
-            .map_or(&[][..], |glints| glints.of_pixel(pixel as usize));
-        let (du, dv) = (numbers.draw(), numbers.draw());
-        let place = if aimed {
-            glints::draw(images, [numbers.draw(), du, dv])
-        } else {
-            [corner[0] + du, corner[1] + dv]
-        };
-        if !images.is_empty() {
-            *share = 1.0 / (1.0 + glints::density(images, place));
+        let glints = block.method.glints.map_or(&[][..], |all| all.of_pixel(pixel as usize));
+        for index in indices {
+            #[allow(clippy::cast_possible_truncation, reason = "a number of paths")]
+            let index = index as u32;
+            let address = ((pixel << 24 | u64::from(pass)) << 20).wrapping_add(u64::from(index));
+            let mut numbers = Numbers::after(point(index), &shift, stream, address);
+            let (du, dv) = (numbers.draw(), numbers.draw());
+            let place = if aimed {
+                glints::draw(glints, [numbers.draw(), du, dv])
+            } else {
+                [corner[0] + du, corner[1] + dv]
+            };
+            let share = if glints.is_empty() {
+                1.0
+            } else {
+                1.0 / (1.0 + glints::density(glints, place))
+            };
+            let lines = &block.lit.lines;
+            let line = if lines.len() > 1 {
+                let number = numbers.draw();
+                lines.partition_point(|l| l.0 < number).min(lines.len() - 1)
+            } else {
+                0
+            };
+            // What is drawn about an image may lie in another pixel.
+            if !aimed || (0..2).all(|k| (corner[k]..corner[k] + 1.0).contains(&place[k])) {
+                starts.places[0].push(place[0]);
+                starts.places[1].push(place[1]);
+                #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+                starts.paths.push(block.paths.len() as u32);
+            }
+            block.paths.push(Path {
+                numbers,
+                line,
+                pass: made as usize,
+                sum: [0.0; 2],
+                chance: 0.0,
+                met: [false; 2],
+                aimed,
+                share,
+            });
         }
-        let d = view.through(place);
-        let lines = &self.block.lit.lines;
-        if lines.len() > 1 {
-            let number = numbers.draw();
-            *line = lines.partition_point(|l| l.0 < number).min(lines.len() - 1);
-        }
-        // What is drawn about an image may lie in another pixel.
-        let here = !aimed || (0..2).all(|k| (corner[k]..corner[k] + 1.0).contains(&place[k]));
-        if let (Some((stack, origin_faces)), true) = (self.block.observer, here) {
-            self.block.lines.push(view.observer, d, origin_faces);
-            self.block.branches.push(Branch {
-                path,
+    }
+
+    /// The lines of sight of the paths, from the observer.
+    fn start(&mut self) {
+        let Self { block, starts, .. } = self;
+        if let Some((stack, origin_faces)) = block.observer {
+            block.view.through_all(&starts.places, &mut starts.directions);
+            block
+                .lines
+                .extend_from(block.view.observer, &starts.directions, origin_faces);
+            block.branches.extend(starts.paths.iter().map(|path| Branch {
+                path: *path,
                 stack,
                 weight: 1.0,
                 seen: Seen::Smooth,
@@ -199,8 +227,10 @@ impl<'a> Renderer<'a> {
                 drawn: false,
                 direct: true,
                 density: 0.0,
-            });
+            }));
         }
+        starts.places.iter_mut().for_each(Vec::clear);
+        starts.paths.clear();
     }
 
     /// Follows all branches of the block to their ends.

@@ -86,7 +86,9 @@ impl Sides {
 #[derive(Default)]
 struct SplitScratch {
     which: Vec<u32>,
-    sides: Vec<Sides>,
+    /// What lies on both sides, for each that is different; and which of them it is.
+    kinds: Vec<Sides>,
+    kind: Vec<u32>,
     sign: Vec<f64>,
     n: [Vec<f64>; 2],
     t: Vec<f64>,
@@ -138,9 +140,10 @@ impl PathBlock<'_> {
         let indices = || scratch.which.iter().map(|i| *i as usize);
         fill(&mut scratch.t, indices().map(|i| hits.t[i]));
         fill(&mut scratch.part, indices().map(|i| hits.part[i].0));
-        fill(&mut scratch.sign, scratch.sides.iter().map(|sides| sides.sign));
+        let sides = || scratch.kind.iter().map(|kind| &scratch.kinds[*kind as usize]);
+        fill(&mut scratch.sign, sides().map(|sides| sides.sign));
         for (side, list) in scratch.n.iter_mut().enumerate() {
-            fill(list, scratch.sides.iter().map(|sides| sides.n[side]));
+            fill(list, sides().map(|sides| sides.n[side]));
         }
         gather(&mut scratch.points, &self.lines.origin, &scratch.which);
         gather(&mut scratch.mirrored, &self.lines.direction, &scratch.which);
@@ -166,7 +169,7 @@ impl PathBlock<'_> {
             branch.events += 1;
             branch.travelled += scratch.t[k];
             branch.direct &= branch.scatters > 0;
-            let Sides { n, absorption, .. } = scratch.sides[k];
+            let Sides { n, absorption, .. } = scratch.kinds[scratch.kind[k] as usize];
             if absorption > 0.0 {
                 branch.weight *= (-absorption * scratch.t[k]).exp();
             }
@@ -189,11 +192,8 @@ impl PathBlock<'_> {
             for (k, i) in scratch.which.iter().enumerate() {
                 let mut branch = self.branches[*i as usize];
                 branch.weight *= shares[k];
-                branch.stack = if transmitted {
-                    scratch.sides[k].after
-                } else {
-                    scratch.sides[k].before
-                };
+                let sides = &scratch.kinds[scratch.kind[k] as usize];
+                branch.stack = if transmitted { sides.after } else { sides.before };
                 if branch.weight > 0.0 {
                     #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
                     scratch.going.push(k as u32);
@@ -216,23 +216,30 @@ impl PathBlock<'_> {
     fn look_around(&mut self, solid: u16, which: &[u32], hits: &Hits, scratch: &mut SplitScratch) {
         let scene = self.lit.scene;
         scratch.which.clear();
-        scratch.sides.clear();
+        scratch.kinds.clear();
+        scratch.kind.clear();
         // Nearly all come from one or two sides.
-        let mut seen: Vec<(SolidStack, f64, Option<Sides>)> = Vec::new();
+        let mut seen: Vec<(SolidStack, f64, Option<u32>)> = Vec::new();
         for i in which {
             let branch = &self.branches[*i as usize];
             let (stack, wavelength) = (branch.stack, self.wavelength(branch.path));
             let known = seen.iter().find(|known| known.0 == stack && known.1 == wavelength);
-            let sides = if let Some((.., sides)) = known {
-                *sides
+            let kind = if let Some((.., kind)) = known {
+                *kind
             } else {
-                let sides = Sides::new(scene, solid, stack, wavelength, &mut self.media);
-                seen.push((stack, wavelength, sides));
-                sides
+                let kind = Sides::new(scene, solid, stack, wavelength, &mut self.media).map(|sides| {
+                    scratch.kinds.push(sides);
+                    #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+                    {
+                        scratch.kinds.len() as u32 - 1
+                    }
+                });
+                seen.push((stack, wavelength, kind));
+                kind
             };
-            if let Some(sides) = sides {
+            if let Some(kind) = kind {
                 scratch.which.push(*i);
-                scratch.sides.push(sides);
+                scratch.kind.push(kind);
             } else {
                 self.step(hits, *i as usize);
             }

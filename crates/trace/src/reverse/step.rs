@@ -58,51 +58,62 @@ impl PathBlock<'_> {
             let Some(sampler) = &self.lit.light_samplers[number] else {
                 continue;
             };
-            self.marks.clear();
-            self.marks.resize(self.branches.len(), false);
+            let Self {
+                lines,
+                reach,
+                branches,
+                paths,
+                method,
+                marks,
+                marked,
+                reader,
+                media,
+                lit,
+                ..
+            } = self;
+            marks.clear();
+            marks.resize(branches.len(), false);
             let sights = Sights {
-                origin: self.lines.origin.each_ref().map(Vec::as_slice),
-                direction: self.lines.direction.each_ref().map(Vec::as_slice),
-                reach: &self.reach,
+                origin: lines.origin.each_ref().map(Vec::as_slice),
+                direction: lines.direction.each_ref().map(Vec::as_slice),
+                reach,
             };
-            sampler.mark(source, sights, &mut self.marks);
-            for (i, branch) in self.branches.iter().enumerate().filter(|(i, _)| self.marks[*i]) {
-                let caustic = branch.seen == Seen::Caustic && branch.direct;
-                if caustic && self.method.left == LeftOut::Caustics {
-                    continue;
+            sampler.mark(source, sights, marks);
+            let glints = method.glints.is_some_and(|glints| glints.has(number));
+            let is_small = |branch: &Branch| branch.seen == Seen::Smooth && glints;
+            let is_caustic = |branch: &Branch| branch.seen == Seen::Caustic && branch.direct;
+            let counts = |branch: &Branch| {
+                let elsewhere = is_caustic(branch) && method.left == LeftOut::Caustics;
+                !elsewhere && (is_small(branch) || !paths[branch.path as usize].aimed)
+            };
+            let numbers = (0_u32..).zip(branches.iter().zip(&*marks));
+            let those = numbers.filter(|(_, (branch, mark))| **mark && counts(branch));
+            fill(marked, those.map(|(i, _)| i));
+            sampler.along_all(source, sights, marked, reader, |i, hit| {
+                let branch = &branches[i];
+                let path = &mut paths[branch.path as usize];
+                let shared = if is_small(branch) { path.share } else { 1.0 };
+                let (_, wavelength, colour) = &lit.lines[path.line];
+                let mut weight = branch.weight * shared * colour[number];
+                let absorption = media.at(scene, branch.stack.top(), *wavelength).absorption;
+                if absorption > 0.0 {
+                    weight *= (-absorption * hit.t).exp();
                 }
-                let (o, d) = (self.lines.origin(i), self.lines.direction(i));
-                let path = &mut self.paths[branch.path as usize];
-                let small = branch.seen == Seen::Smooth && self.method.glints.is_some_and(|g| g.has(number));
-                if path.aimed && !small {
-                    continue;
+                if let (true, LeftOut::Shared(balance)) = (is_caustic(branch), method.left) {
+                    weight *= 1.0 - balance.forwards(branch.density, hit.luminance / lit.flux);
                 }
-                let shared = if small { path.share } else { 1.0 };
-                let (_, wavelength, colour) = &self.lit.lines[path.line];
-                let (sum, chance, media) = (&mut path.sum, &mut path.chance, &mut self.media);
-                let rare = branch.drawn && !branch.direct;
-                sampler.along(source, o, d, self.reach[i], |hit| {
-                    let mut weight = branch.weight * shared * colour[number];
-                    let absorption = media.at(scene, branch.stack.top(), *wavelength).absorption;
-                    if absorption > 0.0 {
-                        weight *= (-absorption * hit.t).exp();
-                    }
-                    if let (true, LeftOut::Shared(balance)) = (caustic, self.method.left) {
-                        weight *= 1.0 - balance.forwards(branch.density, hit.luminance / self.lit.flux);
-                    }
-                    if let Seen::Diffuse { density, all } = branch.seen {
-                        let distance = branch.travelled + hit.t;
-                        let picked = if all { 1.0 } else { share };
-                        let other = picked * hit.density * distance * distance / hit.cosine;
-                        weight *= density / (density + other);
-                    }
-                    sum[0] += weight * hit.luminance;
-                    sum[1] += weight * hit.deviation;
-                    if rare {
-                        *chance += weight * hit.luminance;
-                    }
-                });
-            }
+                if let Seen::Diffuse { density, all } = branch.seen {
+                    let distance = branch.travelled + hit.t;
+                    let picked = if all { 1.0 } else { share };
+                    let other = picked * hit.density * distance * distance / hit.cosine;
+                    weight *= density / (density + other);
+                }
+                path.sum[0] += weight * hit.luminance;
+                path.sum[1] += weight * hit.deviation;
+                if branch.drawn && !branch.direct {
+                    path.chance += weight * hit.luminance;
+                }
+            });
         }
     }
 

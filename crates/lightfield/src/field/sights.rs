@@ -1,0 +1,148 @@
+//! What many lines of sight see of a light field: its parts are read at all of them together.
+
+use etendue_geometry::RayBatch;
+use etendue_geometry::ray_batch::BLOCK;
+use etendue_math::{Frame, Vec3};
+
+use super::light_field::{PartField, Reading};
+use super::points::Points;
+use crate::leave::{Departures, Sights};
+use crate::surface::{Coordinates, carry};
+
+/// What a line of sight sees of a part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// Distance along the line \[mm\].
+    pub t: f64,
+    /// The cosine under which the area is seen (see [`CarrierPart::leaves`](crate::surface::CarrierPart::leaves)).
+    pub cosine: f64,
+    /// The place on the part's chart.
+    pub place: [f64; 2],
+    /// The luminance.
+    pub reading: Reading,
+}
+
+/// Room to read in: it would take a while to make it anew.
+#[derive(Default)]
+pub struct SightReader {
+    batch: RayBatch,
+    left: Departures,
+    at: Coordinates,
+    points: Points,
+}
+
+impl SightReader {
+    /// Calls `visit` with the number of each of some lines of sight that see a part, which stands in `frame`, no farther away
+    /// than they reach, and with what it sees: to the bit what each line finds by itself.
+    pub fn read(
+        &mut self,
+        part: &PartField,
+        frame: &Frame,
+        sights: Sights<'_>,
+        which: &[u32],
+        mut visit: impl FnMut(usize, Seen),
+    ) {
+        for which in which.chunks(BLOCK) {
+            let Self {
+                batch,
+                left,
+                at,
+                points,
+            } = self;
+            batch.len = which.len();
+            for (k, i) in which.iter().enumerate() {
+                let (o, d) = sights.line(*i as usize);
+                // Light goes the other way.
+                let (p, k_back) = (frame.point_to_local(o), -frame.direction_to_local(d));
+                put(&mut batch.position, k, p);
+                put(&mut batch.direction, k, k_back);
+            }
+            part.part.depart(batch, left);
+            carry(std::slice::from_ref(&part.part), batch, at);
+            points.read(part, at, which.len());
+            for (k, i) in which.iter().enumerate() {
+                let (back, i) = (left.distance[k], *i as usize);
+                if at.part[k] == Coordinates::NONE || !(-sights.reach[i]..0.0).contains(&back) {
+                    continue;
+                }
+                let seen = Seen {
+                    t: -back,
+                    cosine: left.cosine[k],
+                    place: [at.values[0][k], at.values[1][k]],
+                    reading: points.reading(k),
+                };
+                visit(i, seen);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn put(lists: &mut [Vec<f64>; 3], k: usize, v: Vec3) {
+    for (list, x) in lists.iter_mut().zip([v.x, v.y, v.z]) {
+        list[k] = x;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::light_field::tests::rough;
+    use crate::surface::tests::lattice;
+
+    #[test]
+    fn each_line_sees_what_it_sees_by_itself() {
+        let frame = Frame {
+            origin: Vec3::new(-3.0, 2.0, 1.0),
+            x: Vec3::new(0.0, 0.6, 0.8),
+            y: Vec3::new(1.0, 0.0, 0.0),
+            z: Vec3::new(0.0, 0.8, -0.6),
+        };
+        for kind in 0..4 {
+            let field = rough(kind);
+            let (mut origin, mut direction): ([Vec<f64>; 3], [Vec<f64>; 3]) = Default::default();
+            let mut reach = Vec::new();
+            for (i, [s1, s2, a, b]) in lattice(5000).enumerate() {
+                let (x, k) = field.part.ray([s1, s2], [a, b]);
+                // From before the part, from behind it, and past it, with a reach that is enough or not.
+                let (aside, away) = ([0.0, 0.0, 4.0][i % 3], [5.0, 5.0, -5.0][i % 3]);
+                let o = frame.point_to_world(x + k * away + Vec3::new(aside, 0.0, 0.0));
+                let d = -frame.direction_to_world(k);
+                for (lists, v) in [(&mut origin, o), (&mut direction, d)] {
+                    for (list, x) in lists.iter_mut().zip([v.x, v.y, v.z]) {
+                        list.push(x);
+                    }
+                }
+                reach.push(if i % 2 == 0 { 5.5 } else { 4.5 });
+            }
+            let sights = Sights {
+                origin: origin.each_ref().map(Vec::as_slice),
+                direction: direction.each_ref().map(Vec::as_slice),
+                reach: &reach,
+            };
+            // Some of the lines, more than a block of them.
+            let which: Vec<u32> = (0..5000).filter(|i| i % 7 != 2).collect();
+            let mut found = Vec::new();
+            SightReader::default().read(&field, &frame, sights, &which, |i, seen| found.push((i, seen)));
+            let alone = which.iter().filter_map(|i| {
+                let i = *i as usize;
+                let (o, d) = sights.line(i);
+                let (p, k) = (frame.point_to_local(o), -frame.direction_to_local(d));
+                let (back, cosine) = field.part.leaves(p, k)?;
+                let crossing = field.part.cross(p, k);
+                (crossing.met && (-reach[i]..0.0).contains(&back)).then(|| {
+                    let seen = Seen {
+                        t: -back,
+                        cosine,
+                        place: crossing.place,
+                        reading: field.at(crossing.place, crossing.direction),
+                    };
+                    (i, seen)
+                })
+            });
+            let alone: Vec<_> = alone.collect();
+            assert_eq!(found, alone);
+            assert!(alone.len() > 500 && alone.len() < 3000, "{kind}: {}", alone.len());
+        }
+    }
+}
