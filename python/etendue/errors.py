@@ -83,6 +83,10 @@ class UnitError(EtendueError, ValueError):
     """A conversion between units that the data does not support (watts to lumens without a spectrum)."""
 
 
+MOST_TOLD = 50
+"""Mistakes of a scene that a message tells one by one."""
+
+
 class SceneError(EtendueError, ValueError):
     """A scene that cannot be built: every mistake in it, each with its place and what to do.
 
@@ -91,14 +95,18 @@ class SceneError(EtendueError, ValueError):
     source : object
         The file, or what was being made.
     mistakes : iterable of (place, text)
-        ``('solids[2] "lens": shape.radius', "…")`` and so on, at least one.
+        ``('solids[2] "lens": shape.radius', "…")`` and so on, at least one. The message tells the first fifty.
     """
 
     def __init__(self, source: object, mistakes: Iterable[tuple[str, str]]) -> None:
         self.source = source
         self.mistakes = tuple(mistakes)
-        told = [f"{place}: {text}" if place else text for place, text in self.mistakes]
-        self.lines = (f"{source}: {told[0]}",) if len(told) == 1 else (f"{source}: {len(told)} mistakes", *told)
+        told = [f"{place}: {text}" if place else text for place, text in self.mistakes[:MOST_TOLD]]
+        more = len(self.mistakes) - len(told)
+        told += [f"and {more:,} more"] if more else []
+        self.lines = (
+            (f"{source}: {told[0]}",) if len(told) == 1 else (f"{source}: {len(self.mistakes):,} mistakes", *told)
+        )
         """The message, line by line."""
         super().__init__("\n  ".join(self.lines))
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import re
 import sys
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import etendue as et
@@ -15,7 +17,7 @@ import numpy as np
 import pytest
 from etendue.cli import app as program
 from etendue.errors import SceneWarning
-from etendue.scene import compile_scene
+from etendue.scene import compile_scene, overlaps
 from oracles.scenes import BODIES, OCTAHEDRON, OCTANTS
 
 POINT = re.compile(r"\((\S+), (\S+), (\S+)\) mm")
@@ -300,3 +302,25 @@ def test_the_command_line_tells_it(
         assert not leaving.value.code, err
         assert " ".join(err.split()).count('warning: "lens" and "pearl" overlap: both hold') == 1
     assert "pearl" in json.dumps(json.loads(out))
+
+
+@pytest.mark.parametrize("at_once", [1, 7, 1 << 18])
+def test_pairs_of_boxes_are_those_of_all_against_all(monkeypatch: pytest.MonkeyPatch, at_once: int) -> None:
+    generator = np.random.default_rng(3)
+    low = generator.uniform(0, 10, (60, 3))
+    high = low + generator.uniform(0, 4, (60, 3))
+    # Some begin where others end, one holds all, and one has no end that is known.
+    low[1], high[2], low[3], high[3] = high[0], low[4], -1, 20
+    low[5], high[5] = np.inf, -np.inf
+    sizes = (high - low).max(axis=1)
+    monkeypatch.setattr(overlaps, "PAIRS_AT_ONCE", at_once)
+    found = list(overlaps._near(SimpleNamespace(low=low, high=high, sizes=sizes)))  # type: ignore[arg-type]
+
+    def meet(a: int, b: int) -> bool:
+        thick = overlaps.BESIDE * min(sizes[a], sizes[b])
+        return all(min(high[a, k], high[b, k]) - max(low[a, k], low[b, k]) > thick for k in range(3))
+
+    expected = {(a, b) for a, b in itertools.combinations(range(60), 2) if meet(a, b)}
+    assert len(found) == len(set(found))
+    assert set(found) == expected
+    assert 100 < len(expected) < 1000

@@ -33,16 +33,21 @@ class Description(BaseModel):
     def __init__(self, **values: Any) -> None:
         cls = type(self)
         keys = cls.names_by_key()
-        known = [key for key, name in keys.items() if name not in cls.IN_MEMORY]
-        mistakes = [(key, f"unknown key.{cls._meant(key, values[key], known)}") for key in values if key not in keys]
-        wrong = {
-            name: f"is {shown(values[name])}.{_hint(values[name], choices)}"
-            for name, choices in _choices(cls).items()
-            if name in values and not (isinstance(values[name], str | None) and values[name] in choices)
-        }
+        mistakes: list[tuple[str, str]] = []
+        wrong: dict[str, str] = {}
+        for name, choices in _choices(cls).items():
+            if name in values and not (isinstance(values[name], str | None) and values[name] in choices):
+                wrong[name] = f"is {shown(values[name])}.{_hint(values[name], choices)}"
+        fitting = values
+        if not values.keys() <= keys.keys():
+            known = [key for key, name in keys.items() if name not in cls.IN_MEMORY]
+            mistakes = [
+                (key, f"unknown key.{cls._meant(key, values[key], known)}") for key in values if key not in keys
+            ]
+            fitting = {key: value for key, value in values.items() if key in keys}
         mistakes += wrong.items()
         try:
-            super().__init__(**{key: value for key, value in values.items() if key in keys})
+            super().__init__(**fitting)
         except ValidationError as error:
             mistakes += [mistake for mistake in mistakes_of(error, values) if mistake[0] not in wrong]
         if mistakes:
@@ -63,8 +68,10 @@ class Description(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _keys_are_texts(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        # Parts within parts are made by the constructor too, which gets their keys as keywords.
-        if isinstance(data, Mapping) and not all(isinstance(key, str) for key in data):
+        # Parts within parts are made by the constructor too, which gets their keys as keywords. Thousands of solids come by
+        # here: dictionaries are told by their type, which takes a fraction of the time.
+        is_table = type(data) is dict or isinstance(data, Mapping)
+        if is_table and {*map(type, data)} != {str}:
             data = {str(key): value for key, value in data.items()}
         return handler(data)
 

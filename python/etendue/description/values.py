@@ -12,6 +12,8 @@ from pydantic import AllowInfNan, BeforeValidator, FailFast
 
 def _number(value: Any) -> Any:
     """A float from any real number; text that looks like one is a mistake, and so is a truth value."""
+    if type(value) is float:
+        return value
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
         raise ValueError("not a number")  # noqa: TRY004 - a TypeError would not reach the list of mistakes
     try:

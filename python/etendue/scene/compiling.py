@@ -289,10 +289,15 @@ class _Compiler:
             for doubt in body.doubts:
                 self._doubt(f"{place}: {doubt}", 5)
             self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(body.faces)]
+            # By the key that states it: faces with one finish share it.
+            finishes: dict[str | None, tuple[int, bool, list[float] | None]] = {}
             for face, placed in zip(body.faces, body.placed(frame), strict=True):
                 key, given = solid.finish_of(face)
-                where, owner = ("finish", name) if key is None else (f"finishes.{key}", f"{name}.{key}")
-                finish, lets_in, axis = self._finish(join(place, where), owner, given)
+                if key not in finishes:
+                    where, owner = ("finish", name) if key is None else (f"finishes.{key}", f"{name}.{key}")
+                    finish, lets_in, axis = self._finish(join(place, where), owner, given)
+                    finishes[key] = finish, lets_in, _turned(axis, frame)
+                finish, lets_in, turned = finishes[key]
                 entered |= lets_in
                 self.notes += [f"{name}: {note}" for note in (*face.notes, *(face.facet_notes if lets_in else ()))]
                 self.rows["faces"].append(
@@ -303,7 +308,7 @@ class _Compiler:
                         "solid": number,
                         "flip": face.flip,
                         "finish": finish,
-                        "axis": _turned(axis, frame),
+                        "axis": turned,
                     }
                 )
                 self.names["faces"].append(f"{name}.{face.name}")

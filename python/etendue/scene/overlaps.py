@@ -36,6 +36,9 @@ of coordinates in single precision, and less than anything that is made."""
 MOST_PAIRS = 512
 """Pairs of solids with boxes that meet; a scene with more is looked at in part."""
 
+PAIRS_AT_ONCE = 1 << 18
+"""Pairs of boxes that are compared together."""
+
 DEEPEST = 4
 """Solids that a ray may be in at once."""
 
@@ -237,13 +240,22 @@ def _near(solids: _Solids) -> Iterator[tuple[int, int]]:
     """Pairs of solids whose boxes have a space in common, the first listed first."""
     order = np.argsort(solids.low[:, 0], kind="stable")
     low, high, sizes = solids.low[order], solids.high[order], solids.sizes[order]
-    ends = np.searchsorted(low[:, 0], high[:, 0])
-    for i, end in enumerate(ends):
-        common = np.minimum(high[i], high[i + 1 : end]) - np.maximum(low[i], low[i + 1 : end])
-        thick = BESIDE * np.minimum(sizes[i], sizes[i + 1 : end])
-        for j in np.flatnonzero((common > thick[:, None]).all(axis=1)):
-            a, b = int(order[i]), int(order[i + 1 + j])
-            yield min(a, b), max(a, b)
+    # How many of those that begin later along x begin before each has ended.
+    counts = np.maximum(np.searchsorted(low[:, 0], high[:, 0]) - np.arange(1, len(order) + 1), 0)
+    start = 0
+    while start < len(order):
+        # So many solids at a time that their pairs take little memory; one at least.
+        stop = start + max(int(np.searchsorted(np.cumsum(counts[start:]), PAIRS_AT_ONCE)), 1)
+        first = np.repeat(np.arange(start, stop), counts[start:stop])
+        begun = np.repeat(np.cumsum(counts[start:stop]) - counts[start:stop], counts[start:stop])
+        second = first + 1 + np.arange(len(first)) - begun
+        for axis in (1, 2, 0):
+            common = np.minimum(high[first, axis], high[second, axis]) - np.maximum(low[first, axis], low[second, axis])
+            near = common > BESIDE * np.minimum(sizes[first], sizes[second])
+            first, second = first[near], second[near]
+        pairs = np.sort(order[np.stack([first, second], axis=1)], axis=1)
+        yield from ((int(a), int(b)) for a, b in pairs)
+        start = stop
 
 
 def _compare(solids: _Solids, a: int, b: int, lines: int) -> tuple[Array | None, bool, bool]:

@@ -103,6 +103,8 @@ class Placement(Description):
 
     @model_validator(mode="after")
     def _one_way_of_turning(self) -> Self:
+        if self.toward is None and self.axis is None and self.rotation is None and self.angle is None:
+            return self
         ways = [name for name in ("toward", "axis", "rotation") if getattr(self, name) is not None]
         if len(ways) > 1:
             raise ValueError(f"is turned by {' and '.join(repr(w) for w in ways)}; use one of them")
