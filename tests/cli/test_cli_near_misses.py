@@ -8,6 +8,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import pytest
+from etendue.formats.head import WORKBOOK_SIGNATURE
 
 from cli.outcome import Run
 
@@ -137,6 +138,8 @@ def test_messages_name_options(run: Run, lamp: Path, words: str, told: str) -> N
         ("fit map.npz -o a.h5", "this is a luminance or illuminance map, no ray file. etendue plot, filter, compare"),
         ("info scene.toml", "this is a scene, no ray file. etendue trace, luminance, draw"),
         ("bsdf info scene.toml", "this is a scene, no BSDF"),
+        ("bsdf info scan.xls", "this is a workbook of Excel, no BSDF. etendue bsdf fit takes scans"),
+        ("info scan.xls", "this is a workbook of Excel, no ray file. etendue bsdf fit takes scans"),
         (
             "fit result.h5 -o a.h5",
             "this is the result of a trace, no ray file. etendue info, luminance and view take it",
@@ -150,6 +153,7 @@ def test_a_file_of_another_kind_is_told_by_name(run: Run, lamp: Path, words: str
     et.write_intensity("lamp.ies", et.Intensity(c=[0], gamma=[0, 10, 90], values=[[9, 5, 0]]))
     scene = et.Scene(sources=[{"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 1}])
     scene.save("scene.toml")
+    Path("scan.xls").write_bytes(WORKBOOK_SIGNATURE + bytes(504))
     et.trace(scene, 10).save("result.h5")
     outcome = run(*words.split())
     assert outcome.status == 1

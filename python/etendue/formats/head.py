@@ -17,6 +17,9 @@ HEAD_BYTES = 1 << 16
 STEP_SIGNATURE = b"ISO-10303-21"
 """How STEP files begin, after white space."""
 
+WORKBOOK_SIGNATURE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+"""How the container of Excel's older workbooks (.xls) begins."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Head:

@@ -7,7 +7,7 @@ import dataclasses
 from pathlib import Path
 
 from etendue.formats.hdf5 import SIGNATURE
-from etendue.formats.head import Head
+from etendue.formats.head import WORKBOOK_SIGNATURE, Head
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,6 +33,9 @@ MAP_TITLE, ILLUMINANCE_TITLE = "# etendue luminance map", "# etendue illuminance
 """First lines of maps as CSV."""
 
 MAP = Kind("a luminance or illuminance map", "etendue plot, filter, compare and view take it.")
+WORKBOOK = Kind(
+    "a workbook of Excel", "etendue bsdf fit takes scans of the goniometer RT-300S; export other tables as text."
+)
 SCENE = Kind("a scene", "etendue trace, luminance, draw, sweep and view take it.")
 BSDF = Kind(
     "scatter data (étendue BSDF)", "etendue bsdf info says what it holds; in a scene it is the file of a finish."
@@ -46,7 +49,7 @@ OF_HDF5 = {
 
 
 def own_kind(head: Head) -> Kind | None:
-    """What a file is that étendue wrote or reads as a scene: told without a reader of rays, intensity or scatter.
+    """What a file is that étendue wrote, or reads as a scene or as scans: told without a reader of rays or of intensity.
 
     Examples
     --------
@@ -56,6 +59,8 @@ def own_kind(head: Head) -> Kind | None:
     data = head.data
     if data.startswith(SIGNATURE):
         return _of_hdf5(head.path)
+    if data.startswith(WORKBOOK_SIGNATURE):
+        return WORKBOOK
     titles = (MAP_TITLE.encode("ascii"), ILLUMINANCE_TITLE.encode("ascii"))
     if (data.startswith(b"PK\x03\x04") and b"header.npy" in data[:128]) or data.startswith(titles):
         return MAP

@@ -9,12 +9,10 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.extras import require
+from etendue.formats.head import WORKBOOK_SIGNATURE
 from etendue.formats.input import as_path
 
 Array = npt.NDArray[np.float64]
-
-MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-"""With which the container of such workbooks begins."""
 
 ROWS = ("Azimuth", "Incidence", "Receive", "RT")
 """Of each sheet: three angles [°], and the signal, π f |cos θ| of the laser diode."""
@@ -25,7 +23,7 @@ LARGEST = 1 << 26
 def is_rt300s(path: Path) -> bool:
     """Whether a file is a workbook of that kind, by its first bytes."""
     with as_path(path).open("rb") as file:
-        return file.read(len(MAGIC)) == MAGIC
+        return file.read(len(WORKBOOK_SIGNATURE)) == WORKBOOK_SIGNATURE
 
 
 def read_rt300s(path: Path) -> dict[str, Array]:
