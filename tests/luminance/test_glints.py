@@ -99,3 +99,22 @@ def test_glints_in_glass(kind: str) -> None:
     z = (values[:, row, column] - expected) / np.hypot(error[:, row, column], known)
     assert (error[:, row, column] < 0.25 * expected).all()
     assert chi2.sf((z**2).sum(), len(z)) > SIGNIFICANCE
+
+
+@pytest.mark.slow
+def test_the_number_of_threads_does_not_matter() -> None:
+    scene, eye, screen = (
+        et.Scene(**glass("torus")),
+        et.Observer(55, 20, 300, target=(1, 0.5, 9)),
+        et.Screen(18, 14, 36, 28),
+    )
+
+    def looked(threads: int) -> et.LuminanceMap:
+        return et.luminance_map(scene, eye, screen, rays_per_pixel=4, threads=threads)
+
+    one = looked(1)
+    assert any("lamps are small" in note for note in one.notes)
+    for threads in (2, 7):
+        found = looked(threads)
+        assert found.notes == one.notes
+        np.testing.assert_array_equal(found.values, one.values)

@@ -207,44 +207,69 @@ fn mark<L: Leave>(part: &L, frame: &Frame, sights: Sights<'_>, marks: &mut [bool
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::surface::tests::{lattice, zoo};
 
+    /// Lines of sight about a part.
+    pub(crate) struct SomeSights {
+        pub(crate) frame: Frame,
+        origin: [Vec<f64>; 3],
+        direction: [Vec<f64>; 3],
+        reach: Vec<f64>,
+    }
+
+    impl SomeSights {
+        /// From before the part, from behind it, and past it, with a reach that is enough or not.
+        pub(crate) fn about(part: &CarrierPart, n: u32) -> Self {
+            let mut sights = Self {
+                frame: Frame {
+                    origin: Vec3::new(-3.0, 2.0, 1.0),
+                    x: Vec3::new(0.0, 0.6, 0.8),
+                    y: Vec3::new(1.0, 0.0, 0.0),
+                    z: Vec3::new(0.0, 0.8, -0.6),
+                },
+                origin: Default::default(),
+                direction: Default::default(),
+                reach: Vec::new(),
+            };
+            for (i, [s1, s2, a, b]) in lattice(n).enumerate() {
+                let (x, k) = part.ray([s1, s2], [a, b]);
+                let (aside, away) = ([0.0, 0.0, 4.0][i % 3], [5.0, 5.0, -5.0][i % 3]);
+                let o = sights.frame.point_to_world(x + k * away + Vec3::new(aside, 0.0, 0.0));
+                let d = -sights.frame.direction_to_world(k);
+                for (lists, v) in [(&mut sights.origin, o), (&mut sights.direction, d)] {
+                    for (list, x) in lists.iter_mut().zip([v.x, v.y, v.z]) {
+                        list.push(x);
+                    }
+                }
+                sights.reach.push(if i % 2 == 0 { 5.5 } else { 4.5 });
+            }
+            sights
+        }
+
+        pub(crate) fn sights(&self) -> Sights<'_> {
+            Sights {
+                origin: self.origin.each_ref().map(Vec::as_slice),
+                direction: self.direction.each_ref().map(Vec::as_slice),
+                reach: &self.reach,
+            }
+        }
+    }
+
     #[test]
     fn lines_of_sight_are_marked_where_they_are_left() {
-        let frame = Frame {
-            origin: Vec3::new(-3.0, 2.0, 1.0),
-            x: Vec3::new(0.0, 0.6, 0.8),
-            y: Vec3::new(1.0, 0.0, 0.0),
-            z: Vec3::new(0.0, 0.8, -0.6),
-        };
         for part in zoo() {
-            let (mut origin, mut direction): ([Vec<f64>; 3], [Vec<f64>; 3]) = Default::default();
-            let (mut reach, mut expected) = (Vec::new(), Vec::new());
-            for (i, [s1, s2, a, b]) in lattice(4000).enumerate() {
-                let (x, k) = part.ray([s1, s2], [a, b]);
-                // From before the part, from behind it, and past it, with a reach that is enough or not.
-                let (aside, away) = ([0.0, 0.0, 4.0][i % 3], [5.0, 5.0, -5.0][i % 3]);
-                let o = x + k * away + Vec3::new(aside, 0.0, 0.0);
-                let most = if i % 2 == 0 { 5.5 } else { 4.5 };
-                let found = part.leaves(o, k).is_some_and(|(back, _)| back < 0.0 && -back <= most);
-                expected.push(found);
-                let (o, d) = (frame.point_to_world(o), -frame.direction_to_world(k));
-                for (axis, (o, d)) in [(o.x, d.x), (o.y, d.y), (o.z, d.z)].into_iter().enumerate() {
-                    origin[axis].push(o);
-                    direction[axis].push(d);
-                }
-                reach.push(most);
-            }
-            let sights = Sights {
-                origin: origin.each_ref().map(Vec::as_slice),
-                direction: direction.each_ref().map(Vec::as_slice),
-                reach: &reach,
-            };
-            let mut marks = vec![false; reach.len()];
+            let some = SomeSights::about(&part, 4000);
+            let (sights, frame) = (some.sights(), some.frame);
+            let expected = (0..4000).map(|i| {
+                let (o, d) = sights.line(i);
+                let left = part.leaves(frame.point_to_local(o), -frame.direction_to_local(d));
+                left.is_some_and(|(back, _)| back < 0.0 && -back <= sights.reach[i])
+            });
+            let mut marks = vec![false; sights.reach.len()];
             part.mark(&frame, sights, &mut marks);
-            assert_eq!(marks, expected);
+            assert_eq!(marks, expected.collect::<Vec<bool>>());
             let met = marks.iter().filter(|m| **m).count();
             assert!(met > 500 && met < 2500, "{part:?}: {met}");
         }

@@ -1,6 +1,6 @@
 //! Sources as they are seen: their luminance along a line, and points on them to connect to.
 
-use etendue_lightfield::field::{LightField, PartField, Seen, SightReader};
+use etendue_lightfield::field::{LightField, PartField, SightReader, SightReading};
 use etendue_lightfield::leave::Sights;
 use etendue_math::Vec3;
 use etendue_sampling::alias::Alias;
@@ -147,7 +147,7 @@ impl LightSampler {
                     }
                     let crossing = part.part.cross(p, -k);
                     if crossing.met {
-                        let seen = Seen {
+                        let seen = SightReading {
                             t: -back,
                             cosine,
                             place: crossing.place,
@@ -198,7 +198,7 @@ impl LightSampler {
 
     /// What is seen of a part of a light field.
     #[inline]
-    fn hit(&self, part: &PartField, table: &PlaceTable, seen: Seen) -> SourceHit {
+    fn hit(&self, part: &PartField, table: &PlaceTable, seen: SightReading) -> SourceHit {
         SourceHit {
             t: seen.t,
             luminance: seen.reading.value * self.scale,

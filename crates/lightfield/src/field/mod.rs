@@ -18,4 +18,4 @@ pub mod tent;
 pub use errors::{Averaging, FineErrors};
 pub use factor::Factor;
 pub use light_field::{LightField, PartField, Reading};
-pub use sights::{Seen, SightReader};
+pub use sights::{SightReader, SightReading};

@@ -11,7 +11,7 @@ use crate::surface::{Coordinates, carry};
 
 /// What a line of sight sees of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct SightReading {
     /// Distance along the line \[mm\].
     pub t: f64,
     /// The cosine under which the area is seen (see [`CarrierPart::leaves`](crate::surface::CarrierPart::leaves)).
@@ -40,7 +40,7 @@ impl SightReader {
         frame: &Frame,
         sights: Sights<'_>,
         which: &[u32],
-        mut visit: impl FnMut(usize, Seen),
+        mut visit: impl FnMut(usize, SightReading),
     ) {
         for which in which.chunks(BLOCK) {
             let Self {
@@ -65,7 +65,7 @@ impl SightReader {
                 if at.part[k] == Coordinates::NONE || !(-sights.reach[i]..0.0).contains(&back) {
                     continue;
                 }
-                let seen = Seen {
+                let seen = SightReading {
                     t: -back,
                     cosine: left.cosine[k],
                     place: [at.values[0][k], at.values[1][k]],
@@ -88,38 +88,14 @@ fn put(lists: &mut [Vec<f64>; 3], k: usize, v: Vec3) {
 mod tests {
     use super::*;
     use crate::field::light_field::tests::rough;
-    use crate::surface::tests::lattice;
+    use crate::leave::tests::SomeSights;
 
     #[test]
     fn each_line_sees_what_it_sees_by_itself() {
-        let frame = Frame {
-            origin: Vec3::new(-3.0, 2.0, 1.0),
-            x: Vec3::new(0.0, 0.6, 0.8),
-            y: Vec3::new(1.0, 0.0, 0.0),
-            z: Vec3::new(0.0, 0.8, -0.6),
-        };
         for kind in 0..4 {
             let field = rough(kind);
-            let (mut origin, mut direction): ([Vec<f64>; 3], [Vec<f64>; 3]) = Default::default();
-            let mut reach = Vec::new();
-            for (i, [s1, s2, a, b]) in lattice(5000).enumerate() {
-                let (x, k) = field.part.ray([s1, s2], [a, b]);
-                // From before the part, from behind it, and past it, with a reach that is enough or not.
-                let (aside, away) = ([0.0, 0.0, 4.0][i % 3], [5.0, 5.0, -5.0][i % 3]);
-                let o = frame.point_to_world(x + k * away + Vec3::new(aside, 0.0, 0.0));
-                let d = -frame.direction_to_world(k);
-                for (lists, v) in [(&mut origin, o), (&mut direction, d)] {
-                    for (list, x) in lists.iter_mut().zip([v.x, v.y, v.z]) {
-                        list.push(x);
-                    }
-                }
-                reach.push(if i % 2 == 0 { 5.5 } else { 4.5 });
-            }
-            let sights = Sights {
-                origin: origin.each_ref().map(Vec::as_slice),
-                direction: direction.each_ref().map(Vec::as_slice),
-                reach: &reach,
-            };
+            let some = SomeSights::about(&field.part, 5000);
+            let (sights, frame) = (some.sights(), some.frame);
             // Some of the lines, more than a block of them.
             let which: Vec<u32> = (0..5000).filter(|i| i % 7 != 2).collect();
             let mut found = Vec::new();
@@ -130,8 +106,8 @@ mod tests {
                 let (p, k) = (frame.point_to_local(o), -frame.direction_to_local(d));
                 let (back, cosine) = field.part.leaves(p, k)?;
                 let crossing = field.part.cross(p, k);
-                (crossing.met && (-reach[i]..0.0).contains(&back)).then(|| {
-                    let seen = Seen {
+                (crossing.met && (-sights.reach[i]..0.0).contains(&back)).then(|| {
+                    let seen = SightReading {
                         t: -back,
                         cosine,
                         place: crossing.place,

@@ -56,7 +56,7 @@ const COLOURS: usize = 4;
 /// Starts of a tile that look in vain for an image of a source through some surfaces, before no other does.
 const IN_VAIN: usize = 2;
 
-/// Starts that see nothing but the same surface first, and no image near to them, speak for those between them.
+/// Of the starts in a tile every so many come first and may speak for the others: where each pixel has one start, and several.
 const SPEAKING: [usize; 2] = [4, 3];
 
 /// Starts in a tile, at least.
@@ -141,6 +141,8 @@ impl<'a> Search<'a> {
 
     /// How many images are found from starts in a pixel, and how many of the starts end for want of work.
     pub fn first_look(&mut self, pixel: usize, starts: usize) -> [usize; 2] {
+        // What other pixels have looked for in vain depends on which of them this thread has had.
+        self.tried.clear();
         let looks = (0..starts).map(|start| {
             let mut found = Vec::new();
             self.search_at(pixel, start, starts, &mut found, &mut Vec::new());
