@@ -1,6 +1,8 @@
 //! The optional Pólya tree.
 
-use etendue_lightfield::polya::{Base, Data, Grid, average, log_evidence, posterior};
+use std::sync::atomic::AtomicBool;
+
+use etendue_lightfield::polya::{self, Data, Grid, average, log_evidence, posterior};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -18,46 +20,59 @@ pub enum Masses<'py> {
     Factors(Vec<(usize, Floats<'py>)>),
 }
 
-impl Masses<'_> {
-    /// The factors of a product; none of a table of cells.
-    fn factors(&self) -> PyResult<Vec<(usize, &[f64])>> {
-        match self {
-            Self::Cells(_) => Ok(Vec::new()),
-            Self::Factors(factors) => factors
-                .iter()
-                .map(|(axes, mass)| Ok((*axes, mass.as_slice()?)))
-                .collect(),
-        }
-    }
-}
-
-struct Problem {
+/// What is to be fitted, as Python hands it over.
+struct Problem<'a> {
     grid: Grid,
-    base: Base,
+    weight: &'a [f64],
+    squared: Option<&'a [f64]>,
+    factors: Vec<polya::Masses<'a>>,
 }
 
-impl Problem {
-    fn new(depths: Vec<u32>, weight: &[f64], squared: Option<&[f64]>, masses: Option<&Masses<'_>>) -> PyResult<Self> {
+impl<'a> Problem<'a> {
+    fn new(
+        depths: Vec<u32>,
+        weight: &'a Floats<'_>,
+        squared: Option<&'a Floats<'_>>,
+        masses: Option<&'a Masses<'_>>,
+    ) -> PyResult<Self> {
         let refuse = |message: String| Err(PyValueError::new_err(message));
         let factors = match masses {
             None => Vec::new(),
             Some(Masses::Cells(mass)) => vec![(depths.len(), mass.as_slice()?)],
-            Some(product) => product.factors()?,
-        };
-        let base = if factors.is_empty() {
-            Base::uniform()
-        } else if let Some(base) = Base::product(&depths, &factors) {
-            base
-        } else {
-            return refuse(format!("the masses of the base do not fit the depths {depths:?}"));
+            Some(Masses::Factors(factors)) => factors
+                .iter()
+                .map(|(axes, mass)| Ok((*axes, mass.as_slice()?)))
+                .collect::<PyResult<_>>()?,
         };
         let Some(grid) = Grid::new(depths) else {
             return refuse("no axis, or more than 2^34 boxes".into());
         };
+        let (weight, squared) = (weight.as_slice()?, squared.map(PyReadonlyArray1::as_slice).transpose()?);
         if weight.len() != grid.cells() || squared.is_some_and(|s| s.len() != grid.cells()) {
             return refuse(format!("{} cells need as many weights", grid.cells()));
         }
-        Ok(Self { grid, base })
+        let problem = Self {
+            grid,
+            weight,
+            squared,
+            factors,
+        };
+        if !problem.data(None).fits(&problem.grid) {
+            return refuse(format!(
+                "the masses of the base do not fit the depths {:?}",
+                problem.grid.depths()
+            ));
+        }
+        Ok(problem)
+    }
+
+    fn data<'b>(&'b self, stop: Option<&'b AtomicBool>) -> Data<'b> {
+        Data {
+            weight: self.weight,
+            squared: self.squared,
+            factors: &self.factors,
+            stop,
+        }
     }
 }
 
@@ -74,17 +89,10 @@ pub fn polya_posterior<'py>(
     concentration: f64,
     threads: Option<usize>,
 ) -> PyResult<Moments<'py>> {
-    let weight = weight.as_slice()?;
-    let squared = weight_squared.as_ref().map(PyReadonlyArray1::as_slice).transpose()?;
-    let Problem { grid, base } = Problem::new(depths, weight, squared, base.as_ref())?;
+    let problem = Problem::new(depths, &weight, weight_squared.as_ref(), base.as_ref())?;
     let result = stoppable(py, |stop| {
-        let data = Data {
-            weight,
-            squared,
-            base: &base,
-            stop: Some(stop),
-        };
-        posterior(&grid, &data, concentration, threads.unwrap_or(0))
+        let data = problem.data(Some(stop));
+        posterior(&problem.grid, &data, concentration, threads.unwrap_or(0))
     })?;
     Ok((
         PyArray1::from_vec(py, result.ratio),
@@ -108,24 +116,16 @@ pub fn polya_average<'py>(
     positions: Vec<Vec<usize>>,
     threads: Option<usize>,
 ) -> PyResult<Averages<'py>> {
-    let weight = weight.as_slice()?;
-    let squared = weight_squared.as_ref().map(PyReadonlyArray1::as_slice).transpose()?;
     let base = base.map(Masses::Factors);
-    let Problem { grid, base: own } = Problem::new(depths, weight, squared, base.as_ref())?;
-    if positions.is_empty() || positions.iter().any(|p| p.len() != grid.depths().len()) {
+    let problem = Problem::new(depths, &weight, weight_squared.as_ref(), base.as_ref())?;
+    if positions.is_empty() || positions.iter().any(|p| p.len() != problem.grid.depths().len()) {
         return Err(PyValueError::new_err(
             "give positions with one number of steps per axis",
         ));
     }
-    let factors = base.as_ref().map(Masses::factors).transpose()?.unwrap_or_default();
     let result = stoppable(py, |stop| {
-        let data = Data {
-            weight,
-            squared,
-            base: &own,
-            stop: Some(stop),
-        };
-        average(&grid, &data, &factors, concentration, &positions, threads.unwrap_or(0))
+        let data = problem.data(Some(stop));
+        average(&problem.grid, &data, concentration, &positions, threads.unwrap_or(0))
     })?;
     Ok((
         PyArray1::from_vec(py, result.ratio),
@@ -146,16 +146,9 @@ pub fn polya_evidence<'py>(
     concentration: f64,
     threads: Option<usize>,
 ) -> PyResult<f64> {
-    let weight = weight.as_slice()?;
-    let squared = weight_squared.as_ref().map(PyReadonlyArray1::as_slice).transpose()?;
-    let Problem { grid, base } = Problem::new(depths, weight, squared, base.as_ref())?;
+    let problem = Problem::new(depths, &weight, weight_squared.as_ref(), base.as_ref())?;
     stoppable(py, |stop| {
-        let data = Data {
-            weight,
-            squared,
-            base: &base,
-            stop: Some(stop),
-        };
-        log_evidence(&grid, &data, concentration, threads.unwrap_or(0))
+        let data = problem.data(Some(stop));
+        log_evidence(&problem.grid, &data, concentration, threads.unwrap_or(0))
     })
 }

@@ -3,13 +3,17 @@
 use etendue_math::special::{ln, ln_gamma};
 
 use super::grid::{Grid, Level};
+use super::kernel::{Busy, GROUP};
 
 /// A base measure over the cells of a grid: a product of factors, each over some neighbouring axes.
 #[derive(Clone, Debug)]
-pub struct Base {
+pub(super) struct Base {
     /// None of them: equal mass in all cells.
     factors: Vec<Factor>,
 }
+
+/// Factors of a base measure: the mass of each cell of a grid over the next axes, and how many axes these are.
+pub type Masses<'a> = (usize, &'a [f64]);
 
 /// For each level of a grid, for each of its splits: one number per box.
 type Table = Vec<Vec<Vec<f64>>>;
@@ -48,33 +52,29 @@ fn terms_of(c: f64, share: f64) -> [f64; 3] {
 }
 
 impl Base {
-    /// Equal mass in all cells.
-    #[must_use]
-    pub const fn uniform() -> Self {
-        Self { factors: Vec::new() }
-    }
-
-    /// The product of the factors' masses; each factor takes the next axes of the grid, as many as its own depths.
+    /// The product of the factors' masses, whose cells are moved cyclically by so many steps along each axis.
     ///
-    /// A box without mass has the share ½. Factors of equal masses are left out. None if the factors do not fit the depths.
-    #[must_use]
-    pub fn product(depths: &[u32], factors: &[(usize, &[f64])]) -> Option<Self> {
+    /// A box without mass has the share ½. Factors of equal masses are left out.
+    pub fn product(grid: &Grid, factors: &[Masses<'_>], steps: &[usize]) -> Self {
         let mut first = 0;
         let mut built = Vec::new();
         for (axes, mass) in factors {
             let axes = first..first + axes;
-            let grid = Grid::new(depths.get(axes.clone())?.to_vec())?;
-            if mass.len() != grid.cells() {
-                return None;
-            }
             first = axes.end;
             if mass.iter().all(|m| *m == mass[0]) {
                 continue;
             }
-            let shares = shares(&grid, mass);
-            built.push(Factor { axes, grid, shares });
+            let own = grid.of_axes(axes.clone());
+            let mut placed = vec![0.0; mass.len()];
+            own.arrange(mass, &steps[axes.clone()], &mut placed);
+            let shares = shares(&own, placed);
+            built.push(Factor {
+                axes,
+                grid: own,
+                shares,
+            });
         }
-        (first == depths.len()).then_some(Self { factors: built })
+        Self { factors: built }
     }
 
     pub(super) const fn is_uniform(&self) -> bool {
@@ -98,26 +98,47 @@ impl Base {
         }
     }
 
-    /// For boxes `first..first + n` of a level, split along `axis`: the base share of the lower half.
+    /// For boxes `first..first + n` of a level, n a power of two, split along `axis`: the base share of the lower half.
     pub(super) fn lower_shares(&self, level: &Level, axis: usize, first: usize, out: &mut [f64]) {
         match self.factors.iter().find(|f| f.axes.contains(&axis)) {
             None => out.fill(0.5),
-            Some(factor) => factor.spread(&factor.shares, level, axis, first, out),
+            Some(factor) => {
+                let (id, split) = factor.split_of(level, axis);
+                let all = 0..out.len().div_ceil(GROUP);
+                factor
+                    .entries(level, id, first)
+                    .deal([&factor.shares[id][split]], all, [out]);
+            }
         }
     }
 
-    /// The same with the terms of the splits.
-    pub(super) fn splits(&self, terms: &SplitTerms, level: &Level, axis: usize, first: usize, out: &mut Splits<'_>) {
-        self.lower_shares(level, axis, first, out.share);
+    /// The same with the terms of the splits, of those groups of boxes that are busy.
+    pub(super) fn splits(
+        &self,
+        terms: &SplitTerms,
+        (level, axis, first): (&Level, usize, usize),
+        busy: &Busy,
+        out: &mut Splits<'_>,
+    ) {
+        let [prior, log_lower, log_upper] = &mut out.terms;
         match self.factors.iter().position(|f| f.axes.contains(&axis)) {
             None => {
-                for (row, value) in out.terms.iter_mut().zip(terms.even) {
+                out.share.fill(0.5);
+                for (row, value) in [prior, log_lower, log_upper].into_iter().zip(terms.even) {
                     row.fill(value);
                 }
             }
             Some(index) => {
-                for (row, table) in out.terms.iter_mut().zip(&terms.tables[index]) {
-                    self.factors[index].spread(table, level, axis, first, row);
+                let factor = &self.factors[index];
+                let (id, split) = factor.split_of(level, axis);
+                let [a, b, c] = &terms.tables[index];
+                let tables = [&factor.shares, a, b, c].map(|table| &table[id][split][..]);
+                let rows = [&mut *out.share, prior, log_lower, log_upper];
+                let entries = factor.entries(level, id, first);
+                if rows[0].len() < GROUP {
+                    entries.deal(tables, 0..1, rows);
+                } else {
+                    entries.deal(tables, busy.groups(), rows);
                 }
             }
         }
@@ -125,40 +146,92 @@ impl Base {
 }
 
 impl Factor {
-    /// Deals the numbers of a table out to boxes `first..first + n` of a level of the whole grid, split along `axis`.
-    fn spread(&self, table: &Table, level: &Level, axis: usize, first: usize, out: &mut [f64]) {
+    /// The factor's own level of a level of the whole grid, and which of its splits is that along an axis of the whole grid.
+    fn split_of(&self, level: &Level, axis: usize) -> (usize, usize) {
         let halvings = &level.halvings[self.axes.clone()];
         let id = halvings
             .iter()
             .zip(self.grid.depths())
             .fold(0, |id, (h, d)| id * (*d as usize + 1) + *h as usize);
+        let splits = &self.grid.levels()[id].splits;
+        let split = splits.iter().position(|s| s.axis == axis - self.axes.start);
+        (id, split.expect("the axis can be split"))
+    }
+
+    /// Where boxes `first..` of a level of the whole grid have their entries in the tables of the factor's level `id`.
+    fn entries(&self, level: &Level, id: usize, first: usize) -> Entries {
         let own = &self.grid.levels()[id];
-        let split = own.splits.iter().position(|s| s.axis == axis - self.axes.start);
-        let table = &table[id][split.expect("the axis can be split")];
-        let low_bits: u32 = level.halvings[self.axes.end..].iter().sum();
-        let mask = own.boxes - 1;
-        let n = out.len();
-        if low_bits == 0 && own.boxes >= n {
-            let start = first & mask;
-            out.copy_from_slice(&table[start..start + n]);
-        } else if n >> low_bits == 0 {
-            out.fill(table[(first >> low_bits) & mask]);
-        } else if low_bits == 0 {
-            out.chunks_exact_mut(own.boxes).for_each(|o| o.copy_from_slice(table));
-        } else {
-            for (i, run) in out.chunks_exact_mut(1 << low_bits).enumerate() {
-                run.fill(table[((first >> low_bits) + i) & mask]);
+        let bits = own.shift_in_tile(0);
+        Entries {
+            first,
+            behind: level.shift_in_tile(self.axes.end),
+            behind_tile: level.shift_of_tile(self.axes.end),
+            within: (1 << bits) - 1,
+            tile: (own.boxes >> bits) - 1,
+            bits,
+            in_tile: level.shift_in_tile(0),
+        }
+    }
+}
+
+/// Where boxes have their entries in a table of a factor. Of a box's number, some bits are those for the place within the tile
+/// along the factor's axes, and some those for the tile.
+struct Entries {
+    first: usize,
+    /// Bits behind the former and the latter.
+    behind: u32,
+    behind_tile: u32,
+    /// Their largest values.
+    within: usize,
+    tile: usize,
+    /// Bits for the place within the tile along the factor's axes, and along all axes.
+    bits: u32,
+    in_tile: u32,
+}
+
+impl Entries {
+    #[inline(always)]
+    const fn of(&self, number: usize) -> usize {
+        (((number >> self.behind_tile) & self.tile) << self.bits) | ((number >> self.behind) & self.within)
+    }
+
+    /// Deals the entries of some tables out to groups of boxes, one row for each table.
+    #[inline(always)]
+    fn deal<const N: usize>(&self, tables: [&[f64]; N], groups: impl Iterator<Item = usize>, rows: [&mut [f64]; N]) {
+        const BITS: u32 = GROUP.ilog2();
+        let n = rows[0].len();
+        if n < GROUP {
+            for (table, row) in tables.into_iter().zip(rows) {
+                (0..n).for_each(|i| row[i] = table[self.of(self.first + i)]);
+            }
+            return;
+        }
+        let mut rows = rows.map(|row| row.as_chunks_mut::<GROUP>().0);
+        for group in groups {
+            let number = self.first + group * GROUP;
+            let start = self.of(number);
+            for (table, row) in tables.iter().zip(&mut rows) {
+                row[group] = if self.behind >= BITS {
+                    [table[start]; GROUP]
+                } else if self.behind == 0 && self.bits >= BITS {
+                    *table[start..].first_chunk().expect("a whole group")
+                } else if self.in_tile >= BITS {
+                    let tile = start & !self.within;
+                    std::array::from_fn(|i| table[tile | (((number + i) >> self.behind) & self.within)])
+                } else {
+                    std::array::from_fn(|i| table[self.of(number + i)])
+                };
             }
         }
     }
 }
 
-/// The shares of all lower halves, from the masses of the cells.
-fn shares(grid: &Grid, mass: &[f64]) -> Table {
+/// The shares of all lower halves, from the masses of the cells, each at its place.
+fn shares(grid: &Grid, mass: Vec<f64>) -> Table {
     let levels = grid.levels();
     let mut masses: Vec<Vec<f64>> = vec![Vec::new(); levels.len()];
     let mut shares = vec![Vec::new(); levels.len()];
-    masses[grid.finest()] = mass.to_vec();
+    masses[grid.finest()] = mass;
     for id in (0..grid.finest()).rev() {
         let level = &levels[id];
         let mut total = Vec::new();
@@ -187,25 +260,72 @@ mod tests {
             .iter()
             .flat_map(|s| direction.iter().map(move |d| s * d))
             .collect();
-        let product = Base::product(&depths, &[(2, &space), (2, &direction)]).expect("fits");
-        let dense = Base::product(&depths, &[(4, &full)]).expect("fits");
-        let grid = Grid::new(depths.to_vec()).expect("small");
-        for level in grid.levels() {
-            for step in &level.splits {
-                for n in (0..).map(|k| 1 << k).take_while(|n| *n <= level.boxes) {
-                    for first in (0..level.boxes).step_by(n) {
-                        let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
-                        product.lower_shares(level, step.axis, first, &mut a);
-                        dense.lower_shares(level, step.axis, first, &mut b);
-                        for (a, b) in a.iter().zip(&b) {
-                            // A box of a factor may hold mass where the product holds none.
-                            assert!((a - b).abs() < 1e-14 || *b == 0.5, "{a} {b}");
+        // One tile, and more and more of them until each is a cell.
+        for most in [1 << 15, 400, 100, 30, 8, 1] {
+            let grid = Grid::with_tiles(depths.to_vec(), most).expect("small");
+            for steps in [[0; 4], [3, 1, 2, 5]] {
+                let product = Base::product(&grid, &[(2, &space), (2, &direction)], &steps);
+                let dense = Base::product(&grid, &[(4, &full)], &steps);
+                for level in grid.levels() {
+                    for step in &level.splits {
+                        for n in (0..).map(|k| 1 << k).take_while(|n| *n <= level.boxes) {
+                            for first in (0..level.boxes).step_by(n) {
+                                let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
+                                product.lower_shares(level, step.axis, first, &mut a);
+                                dense.lower_shares(level, step.axis, first, &mut b);
+                                for (a, b) in a.iter().zip(&b) {
+                                    // A box of a factor may hold mass where the product holds none.
+                                    assert!((a - b).abs() < 1e-14 || *b == 0.5, "{a} {b}");
+                                }
+                            }
                         }
                     }
                 }
             }
         }
-        assert!(Base::product(&depths, &[(2, &space)]).is_none());
-        assert!(Base::product(&depths, &[(2, &direction), (2, &space)]).is_none());
+    }
+
+    #[test]
+    fn shares_are_ratios_of_masses() {
+        // Against sums over the cells of every box, whichever way boxes are numbered.
+        let grid = Grid::with_tiles(vec![2, 3], 9).expect("small");
+        let mass: Vec<f64> = (0..32).map(|i| f64::from((i * 5 + 2) % 7)).collect();
+        let base = Base::product(&grid, &[(2, &mass)], &[0, 0]);
+        let sum = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| -> f64 {
+            rows.flat_map(|r| columns.clone().map(move |c| r * 8 + c))
+                .map(|i| mass[i])
+                .sum()
+        };
+        for level in grid.levels() {
+            let [h, k] = [level.halvings[0], level.halvings[1]];
+            let (height, width) = (4 >> h, 8 >> k);
+            for step in &level.splits {
+                let mut found = vec![0.0; level.boxes];
+                base.lower_shares(level, step.axis, 0, &mut found);
+                let mut expected = Vec::new();
+                for i in 0..1 << h {
+                    for j in 0..1 << k {
+                        let (rows, columns) = (i * height..(i + 1) * height, j * width..(j + 1) * width);
+                        let whole = sum(rows.clone(), columns.clone());
+                        let half = if step.axis == 0 {
+                            sum(rows.start..rows.start + height / 2, columns)
+                        } else {
+                            sum(rows, columns.start..columns.start + width / 2)
+                        };
+                        expected.push(if whole > 0.0 { half / whole } else { 0.5 });
+                    }
+                }
+                let number = |i: usize, j: usize| {
+                    let [a, b] = [level.within[0], level.within[1]];
+                    let tile = ((i >> a) << (k - b)) | (j >> b);
+                    (tile << (a + b)) | ((i & ((1 << a) - 1)) << b) | (j & ((1 << b) - 1))
+                };
+                for i in 0..1_usize << h {
+                    for j in 0..1_usize << k {
+                        assert!((found[number(i, j)] - expected[(i << k) + j]).abs() < 1e-15);
+                    }
+                }
+            }
+        }
     }
 }

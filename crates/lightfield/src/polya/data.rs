@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::base::Base;
+use super::base::Masses;
 use super::grid::Grid;
 
 /// Boxes in one unit of work: a power of two whose scratch arrays fit the first caches.
@@ -15,8 +15,9 @@ pub struct Data<'a> {
     pub weight: &'a [f64],
     /// Σ w² of each cell: it turns unequal weights into effective counts, box by box. None: all weights are one.
     pub squared: Option<&'a [f64]>,
-    /// The base measure. Cells without base mass hold no mass and must hold no points.
-    pub base: &'a Base,
+    /// The factors of the base measure, which together take all axes; none of them: equal mass in all cells. Cells without base
+    /// mass hold no mass and must hold no points.
+    pub factors: &'a [Masses<'a>],
     /// Set by somebody else: then the rest is left out, and the result means nothing.
     pub stop: Option<&'a AtomicBool>,
 }
@@ -31,13 +32,18 @@ impl Data<'_> {
         }
     }
 
-    /// Whether halves of any box are equal under the base measure and points are counted: then ln Γ is needed per box and
-    /// not per split.
-    pub(super) fn has_equal_halves(&self) -> bool {
-        self.squared.is_none() && self.base.is_uniform()
-    }
-
-    pub(super) fn fits(&self, grid: &Grid) -> bool {
-        self.weight.len() == grid.cells() && self.squared.is_none_or(|s| s.len() == grid.cells())
+    /// Whether there is one weight per cell, and one mass per cell of each factor.
+    #[must_use]
+    pub fn fits(&self, grid: &Grid) -> bool {
+        let mut rest = grid.depths();
+        let fits = |(axes, mass): &Masses<'_>| {
+            rest.split_at_checked(*axes).is_some_and(|(own, others)| {
+                rest = others;
+                mass.len() == 1 << own.iter().sum::<u32>()
+            })
+        };
+        self.weight.len() == grid.cells()
+            && self.squared.is_none_or(|s| s.len() == grid.cells())
+            && (self.factors.is_empty() || (self.factors.iter().all(fits) && rest.is_empty()))
     }
 }

@@ -5,20 +5,23 @@
 //! the share of the base measure. Every axis-parallel dyadic partition has its prior probability, every one is averaged
 //! with its posterior probability, and no bin width is ever chosen. `[WongMa2010]`, `[Hutter2005]`; theory eqs. 29 to 32.
 //!
-//! `grid`: the lattice of boxes. `base`: what the tree falls back on. `kernel`: the arithmetic. `data`: what it is fitted to. `tree`: the sweeps. `posterior`: what comes out.
+//! `grid`: the lattice of boxes. `base`: what the tree falls back on. `kernel`: the arithmetic. `data`: what it is fitted to.
+//! `ascend`, `descend`: the sweeps from the cells to the root and back, `sweep`: what they share. `posterior`: what comes out.
 //! `average`: of trees on a grid that is moved. `array`: their memory.
 
 mod array;
+mod ascend;
 mod average;
 mod base;
 mod data;
+mod descend;
 mod grid;
 mod kernel;
 mod posterior;
-mod tree;
+mod sweep;
 
 pub use average::{Average, average};
-pub use base::Base;
+pub use base::Masses;
 pub use data::Data;
 pub use grid::Grid;
 pub use posterior::{Posterior, log_evidence, posterior};

@@ -4,9 +4,11 @@ use etendue_sampling::ordered;
 use rayon::ThreadPool;
 
 use super::array::{Array, Workspace};
+use super::ascend::ascend;
 use super::data::Data;
+use super::descend::descend;
 use super::grid::Grid;
-use super::tree::{ascend, descend};
+use super::sweep::Problem;
 
 /// What the tree knows after the data; one entry per cell.
 #[derive(Clone, Debug)]
@@ -29,26 +31,38 @@ pub struct Posterior {
 pub fn posterior(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> Posterior {
     assert!(data.fits(grid), "one entry per cell");
     ordered::beside(threads, |pool| {
-        let ([ratio, ratio_squared], log_evidence) = grown(grid, data, c, pool, &mut Workspace::default());
+        let none = vec![0; grid.depths().len()];
+        let (moments, log_evidence) = grown(grid, data, &none, c, pool, &mut Workspace::default());
+        let [ratio, ratio_squared] = moments.map(|moment| {
+            let mut values = vec![0.0; grid.cells()];
+            grid.each_row(&none, |first, begin, row| {
+                for (v, place) in values[first..].iter_mut().zip(row) {
+                    *v = moment[begin + place];
+                }
+            });
+            values
+        });
         Posterior {
-            ratio: ratio.to_vec(),
-            ratio_squared: ratio_squared.to_vec(),
+            ratio,
+            ratio_squared,
             log_evidence,
         }
     })
 }
 
-/// Both moments of the ratio, and the evidence.
+/// Both moments of the ratio, tile by tile, and the evidence; of cells that are moved by so many steps along each axis.
 pub(super) fn grown(
     grid: &Grid,
     data: &Data<'_>,
+    steps: &[usize],
     c: f64,
     pool: Option<&ThreadPool>,
     workspace: &mut Workspace,
 ) -> ([Array<f64>; 2], f64) {
     let data = &data.simplified();
-    let evidence = ascend(grid, data, c, true, pool, workspace);
-    let moments = descend(grid, data, c, &evidence, pool, workspace);
+    let problem = Problem::new(grid, data, steps, c);
+    let evidence = ascend(&problem, data, steps, true, pool, workspace);
+    let moments = descend(&problem, &evidence, pool, workspace);
     let log_root = evidence.log_root;
     evidence.give(workspace);
     (moments, log_root)
@@ -62,24 +76,22 @@ pub(super) fn grown(
 pub fn log_evidence(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> f64 {
     assert!(data.fits(grid), "one entry per cell");
     let data = &data.simplified();
+    let none = vec![0; grid.depths().len()];
     ordered::beside(threads, |pool| {
-        ascend(grid, data, c, false, pool, &mut Workspace::default()).log_root
+        let problem = Problem::new(grid, data, &none, c);
+        ascend(&problem, data, &none, false, pool, &mut Workspace::default()).log_root
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::polya::base::Base;
+    use crate::polya::base::Masses;
 
     fn integers(cells: usize, seed: u64) -> Vec<f64> {
         (0..cells as u64)
             .map(|i| ((i * i * 7 + seed * 13 + i) % 11) as f64)
             .collect()
-    }
-
-    fn dense(depths: &[u32], mass: &[f64]) -> Base {
-        Base::product(depths, &[(depths.len(), mass)]).expect("fits")
     }
 
     #[test]
@@ -89,7 +101,7 @@ mod tests {
         let data = Data {
             weight: &[3.0, 1.0],
             squared: None,
-            base: &Base::uniform(),
+            factors: &[],
             stop: None,
         };
         let post = posterior(&grid, &data, 2.0, 1);
@@ -129,12 +141,12 @@ mod tests {
                 .map(|(v, b)| if *b > 0.0 { *v } else { 0.0 })
                 .collect();
             let squared: Vec<f64> = weight.iter().map(|w| w * 1.7).collect();
-            let measure = dense(&depths, &base);
+            let measure = [(depths.len(), &base[..])];
             for squared in [None, Some(squared.as_slice())] {
                 let data = Data {
                     weight: &weight,
                     squared,
-                    base: &measure,
+                    factors: &measure,
                     stop: None,
                 };
                 let post = posterior(&grid, &data, 3.0, 2);
@@ -155,14 +167,14 @@ mod tests {
         let depths = vec![3, 2, 3, 2];
         let grid = Grid::new(depths.clone()).expect("small");
         let counts = integers(1024, 4);
-        let even = dense(&depths, &vec![1.0; 1024]);
-        let uniform = Base::uniform();
+        let ones = vec![1.0; 1024];
+        let (even, uniform): ([Masses<'_>; 1], [Masses<'_>; 0]) = ([(4, &ones)], []);
         let quick = posterior(
             &grid,
             &Data {
                 weight: &counts,
                 squared: None,
-                base: &uniform,
+                factors: &uniform,
                 stop: None,
             },
             3.0,
@@ -171,13 +183,13 @@ mod tests {
         for squared in [None, Some(counts.as_slice())] {
             let nearly: Vec<f64> = counts.iter().map(|w| w * (1.0 + 1e-13)).collect();
             let squared = squared.map(|_| nearly.as_slice());
-            for base in [&even, &uniform] {
+            for factors in [&even[..], &uniform] {
                 let slow = posterior(
                     &grid,
                     &Data {
                         weight: &counts,
                         squared,
-                        base,
+                        factors,
                         stop: None,
                     },
                     3.0,
@@ -203,14 +215,57 @@ mod tests {
     }
 
     #[test]
+    fn the_size_of_tiles_does_not_matter() {
+        // Weighted and not, on even and on other halves; moved as well.
+        let depths = vec![3, 2, 3, 2];
+        let weight: Vec<f64> = integers(1024, 4).iter().map(|v| (v - 7.0).max(0.0)).collect();
+        let squared: Vec<f64> = weight.iter().map(|w| 0.6 * w * w).collect();
+        let (space, direction): (Vec<f64>, Vec<f64>) = (
+            integers(32, 1).iter().map(|v| v + 1.0).collect(),
+            integers(32, 2).iter().map(|v| v + 0.5).collect(),
+        );
+        let product: [Masses<'_>; 2] = [(2, &space), (2, &direction)];
+        for squared in [None, Some(&squared[..])] {
+            for factors in [&[][..], &product] {
+                let data = Data {
+                    weight: &weight,
+                    squared,
+                    factors,
+                    stop: None,
+                };
+                let run = |most: usize, steps: &[usize]| {
+                    let grid = Grid::with_tiles(depths.clone(), most).expect("small");
+                    let ([mean, square], log_root) = grown(&grid, &data, steps, 3.0, None, &mut Workspace::default());
+                    let mut cells = Vec::new();
+                    grid.each_row(steps, |_, begin, row| {
+                        cells.extend(row.iter().map(|place| [mean[begin + place], square[begin + place]]));
+                    });
+                    (cells, log_root)
+                };
+                for steps in [[0; 4], [5, 1, 6, 3]] {
+                    let (expected, log_root) = run(1 << 16, &steps);
+                    for most in [3000, 500, 100, 20, 1] {
+                        let (found, log) = run(most, &steps);
+                        assert!((log - log_root).abs() < 1e-10 * log_root.abs());
+                        for (a, b) in found.iter().zip(&expected) {
+                            assert!((a[0] / b[0] - 1.0).abs() < 1e-6 && (a[1] / b[1] - 1.0).abs() < 1e-6);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
     fn gives_the_same_bits_for_one_two_and_seven_threads() {
-        let grid = Grid::new(vec![4, 4, 4, 4]).expect("small");
+        // Of many tiles and levels beside them.
+        let grid = Grid::with_tiles(vec![4, 4, 4, 4], 3000).expect("small");
         let weight = integers(1 << 16, 2);
         let squared: Vec<f64> = weight.iter().map(|w| w * 1.3).collect();
         let data = Data {
             weight: &weight,
             squared: Some(&squared),
-            base: &Base::uniform(),
+            factors: &[],
             stop: None,
         };
         let bits = |threads| {
@@ -237,7 +292,7 @@ mod tests {
                 &Data {
                     weight,
                     squared: None,
-                    base: &Base::uniform(),
+                    factors: &[],
                     stop: None,
                 },
                 3.0,
