@@ -166,7 +166,7 @@ def test_errors_of_a_table_are_what_its_cells_bring_one_by_one() -> None:
     That of twelve drawn tables squared, over it, times 11, is χ² with 11 degrees of freedom; bounds at 10⁻⁴ on both sides.
     """
     radial = np.concatenate([np.linspace(0.0, 12.0, 7), np.linspace(20.0, 180.0, 9)])
-    grid = PolarGrid("specular", radial, np.arange(0.0, 360.0, 60.0))
+    grid = PolarGrid("specular", radial, np.arange(0.0, 360.0, 120.0))
     values = np.full(grid.shape, 0.2) + 0.3 * np.exp(-0.5 * (radial / 4.0) ** 2)
     errors = 0.1 * values
 

@@ -33,7 +33,10 @@ STEP = 8
 
 MOST_STEPS = 4
 """Steps of a pilot at most; it stops earlier when enough has been found, or rays go to and fro for long, or nothing is found
-by more rays than the map has lines of sight."""
+by more rays than the map has lines of sight, or something by `MOST_BEFOREHAND` times as many."""
+
+MOST_BEFOREHAND = 8
+"""Rays of a pilot for each line of sight, from which on it has cost a small map more than it can save."""
 
 ENOUGH = 1 << 13
 """Arrivals at diffuse surfaces, and as many contributions to an image, that are enough for a pilot."""
@@ -197,7 +200,8 @@ def plan(
         segments += traced["ledger"]["segments"]
         batches += STEP
         least = min(total[2].sum() for total in sums)
-        if min(sum(map(len, arrivals)), least) >= ENOUGH or (least == 0 and batches * BATCH >= lines * pixels):
+        most = lines * pixels * (MOST_BEFOREHAND if least else 1)
+        if min(sum(map(len, arrivals)), least) >= ENOUGH or batches * BATCH >= most:
             break
     done = batches * BATCH
     found = np.concatenate(arrivals)

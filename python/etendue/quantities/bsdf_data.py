@@ -413,11 +413,36 @@ def _integral(one: BsdfSlice) -> float:
 
     a, wa = points(azimuth)
     r, wr = points(radial)
-    d = grid.direction(r[None, :], a[:, None], one.incident, transmitted=one.transmitted)
-    f = _bilinear(grid, one.held, np.broadcast_to(r, d.shape[:-1]), np.broadcast_to((a % 360.0)[:, None], d.shape[:-1]))
-    measure = r if grid.frame == "cosines" else np.sin(np.radians(r)) * math.radians(1.0) * np.abs(d[..., 2])
-    inside = np.where(np.isnan(d[..., 2]), 0.0, measure * f)
-    return float(np.einsum("i,ij,j->", np.radians(wa), inside, wr))
+    # Nodes lie on lines of either coordinate: f is interpolated along one, then along the other.
+    j, k, v = _around(grid.azimuth, a % 360.0)
+    i, u = _between(grid.radial, r)
+    held = (1.0 - v)[:, None] * one.held[j] + v[:, None] * one.held[k]
+    f = held[:, i]
+    f *= 1.0 - u
+    f += u * held[:, np.minimum(i + 1, grid.radial.size - 1)]
+    f *= _projected(grid, r, a, one)
+    return float(np.radians(wa) @ f @ wr)
+
+
+def _projected(grid: PolarGrid, r: Array, a: Array, one: BsdfSlice) -> Array:
+    """Projected solid angle over the product of steps of both coordinates, azimuths in radians, shape (m, n).
+
+    0 where there is no direction on the side where light leaves.
+    """
+    if grid.frame == "cosines":
+        sine = math.hypot(one.incident[0], one.incident[1])
+        # |β|² of β₀ and what is added to it.
+        squares = np.cos(np.radians(a))[:, None] * (2.0 * sine * r) + (sine * sine + r * r)
+        return np.where(squares <= 1.0, r, 0.0)
+    turn, t = np.radians(a)[:, None], np.radians(r)
+    if grid.frame == "normal":
+        height = np.broadcast_to(np.cos(t), (a.size, r.size))
+    else:
+        # Along the specular direction and along the direction at right angles to it, towards the normal.
+        s, e, _ = _axes(one.incident, transmitted=one.transmitted)
+        side = math.copysign(1.0, s[2])
+        height = np.cos(turn) * (side * e[2] * np.sin(t)) + side * s[2] * np.cos(t)
+    return np.where(height >= 0.0, height, 0.0) * (np.sin(t) * math.radians(1.0))
 
 
 def _extended(grid: PolarGrid, one: BsdfSlice) -> Array:
