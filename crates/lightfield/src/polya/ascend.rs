@@ -8,7 +8,7 @@ use super::base::Splits;
 use super::data::{CHUNK, Data};
 use super::grid::Level;
 use super::kernel::{Busy, SPLIT, Trial, add_log_bayes, add_log_gamma, join, log_gamma, whole_term, write_split};
-use super::sweep::{Place, Problem, Scratch, add, each, effective_counts, sum_chunk, sum_tile};
+use super::sweep::{Place, Problem, Scratch, add, cut, each, effective_counts, sum_chunk, sum_tile};
 
 /// What the sweep leaves behind.
 pub(super) struct Evidence {
@@ -344,7 +344,7 @@ struct UpTask<'a> {
 fn ascend_chunk(problem: &Problem<'_>, finer: &Finer<'_>, scratch: &mut Scratch, task: UpTask<'_>) {
     let (c, level) = (problem.c, task.level);
     let (first, n) = (task.first, task.weight.len());
-    let rows = scratch.rows.each_mut().map(|row| &mut row[..n]);
+    let rows = cut(&mut scratch.rows, n);
     let [
         b0,
         b1,

@@ -1,8 +1,9 @@
 //! Base measures: what the tree falls back on where the data say nothing.
 
 use etendue_math::special::{ln, ln_gamma};
+use multiversion::multiversion;
 
-use super::grid::{Grid, Level};
+use super::grid::{Grid, Level, Step};
 use super::kernel::{Busy, GROUP};
 
 /// A base measure over the cells of a grid: a product of factors, each over some neighbouring axes.
@@ -15,7 +16,7 @@ pub(super) struct Base {
 /// Factors of a base measure: the mass of each cell of a grid over the next axes, and how many axes these are.
 pub type Masses<'a> = (usize, &'a [f64]);
 
-/// For each level of a grid, for each of its splits: one number per box.
+/// For each level of a grid, for each of its splits or origins: one number per box.
 type Table = Vec<Vec<Vec<f64>>>;
 
 /// The share of its lower half in every dyadic box of a few axes.
@@ -24,6 +25,8 @@ struct Factor {
     axes: std::ops::Range<usize>,
     grid: Grid,
     shares: Table,
+    /// The share of each box in each of those that it is half of.
+    halves: Table,
 }
 
 /// What the evidence of a split owes to the base measure alone, for one concentration: worked out once per box of a factor
@@ -70,6 +73,7 @@ impl Base {
             let shares = shares(&own, placed);
             built.push(Factor {
                 axes,
+                halves: halves(&own, &shares),
                 grid: own,
                 shares,
             });
@@ -98,21 +102,23 @@ impl Base {
         }
     }
 
-    /// For boxes `first..first + n` of a level, n a power of two, split along `axis`: the base share of the lower half.
-    pub(super) fn lower_shares(&self, level: &Level, axis: usize, first: usize, out: &mut [f64]) {
+    /// For boxes `first..first + n` of a level, n a power of two: the base share of each in the box that it is half of along
+    /// `axis`.
+    pub(super) fn half_shares(&self, level: &Level, axis: usize, first: usize, out: &mut [f64]) {
         match self.factors.iter().find(|f| f.axes.contains(&axis)) {
             None => out.fill(0.5),
             Some(factor) => {
-                let (id, split) = factor.split_of(level, axis);
-                let all = 0..out.len().div_ceil(GROUP);
-                factor
-                    .entries(level, id, first)
-                    .deal([&factor.shares[id][split]], all, [out]);
+                let id = factor.level_of(level);
+                let origins = &factor.grid.levels()[id].origins;
+                let origin = origins.iter().position(|s| s.axis == axis - factor.axes.start);
+                let table = &factor.halves[id][origin.expect("it is half of something")];
+                deal_one(&factor.entries(level, id, first), table, out);
             }
         }
     }
 
-    /// The same with the terms of the splits, of those groups of boxes that are busy.
+    /// For as many boxes, split along an axis, the base share of the lower half and the terms of the splits: of those groups of
+    /// boxes that are busy.
     pub(super) fn splits(
         &self,
         terms: &SplitTerms,
@@ -130,32 +136,27 @@ impl Base {
             }
             Some(index) => {
                 let factor = &self.factors[index];
-                let (id, split) = factor.split_of(level, axis);
+                let id = factor.level_of(level);
+                let splits = &factor.grid.levels()[id].splits;
+                let split = splits.iter().position(|s| s.axis == axis - factor.axes.start);
+                let split = split.expect("the axis can be split");
                 let [a, b, c] = &terms.tables[index];
                 let tables = [&factor.shares, a, b, c].map(|table| &table[id][split][..]);
                 let rows = [&mut *out.share, prior, log_lower, log_upper];
-                let entries = factor.entries(level, id, first);
-                if rows[0].len() < GROUP {
-                    entries.deal(tables, 0..1, rows);
-                } else {
-                    entries.deal(tables, busy.groups(), rows);
-                }
+                deal_four(&factor.entries(level, id, first), tables, busy, rows);
             }
         }
     }
 }
 
 impl Factor {
-    /// The factor's own level of a level of the whole grid, and which of its splits is that along an axis of the whole grid.
-    fn split_of(&self, level: &Level, axis: usize) -> (usize, usize) {
+    /// The number of the factor's own level that a level of the whole grid belongs to.
+    fn level_of(&self, level: &Level) -> usize {
         let halvings = &level.halvings[self.axes.clone()];
-        let id = halvings
+        halvings
             .iter()
             .zip(self.grid.depths())
-            .fold(0, |id, (h, d)| id * (*d as usize + 1) + *h as usize);
-        let splits = &self.grid.levels()[id].splits;
-        let split = splits.iter().position(|s| s.axis == axis - self.axes.start);
-        (id, split.expect("the axis can be split"))
+            .fold(0, |id, (h, d)| id * (*d as usize + 1) + *h as usize)
     }
 
     /// Where boxes `first..` of a level of the whole grid have their entries in the tables of the factor's level `id`.
@@ -226,6 +227,19 @@ impl Entries {
     }
 }
 
+/// The entries of one table, dealt out to all boxes of a chunk.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn deal_one(entries: &Entries, table: &[f64], row: &mut [f64]) {
+    let all = 0..row.len().div_ceil(GROUP);
+    entries.deal([table], all, [row]);
+}
+
+/// Those of four tables, to the groups of boxes that are busy.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn deal_four(entries: &Entries, tables: [&[f64]; 4], busy: &Busy, rows: [&mut [f64]; 4]) {
+    entries.deal(tables, busy.groups(), rows);
+}
+
 /// The shares of all lower halves, from the masses of the cells, each at its place.
 fn shares(grid: &Grid, mass: Vec<f64>) -> Table {
     let levels = grid.levels();
@@ -247,9 +261,39 @@ fn shares(grid: &Grid, mass: Vec<f64>) -> Table {
     shares
 }
 
+/// The shares of all boxes in those that they are halves of.
+fn halves(grid: &Grid, shares: &Table) -> Table {
+    let levels = grid.levels();
+    let of_origin = |level: &Level, step: &Step| {
+        let above = &levels[step.level];
+        let way = above.splits.iter().position(|s| s.axis == step.axis);
+        let of_whole = &shares[step.level][way.expect("each origin has its split")];
+        let mut halves = vec![0.0; level.boxes];
+        halves.copy_from_slice(step.wholes(of_whole, 0, &mut vec![0.0; level.boxes]));
+        for (number, share) in halves.iter_mut().enumerate() {
+            *share = if step.is_upper(number) { 1.0 - *share } else { *share };
+        }
+        halves
+    };
+    let of_level = |level: &Level| level.origins.iter().map(|step| of_origin(level, step)).collect();
+    levels.iter().map(of_level).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn lower_shares((base, terms): (&Base, &SplitTerms), level: &Level, axis: usize, first: usize, out: &mut [f64]) {
+        let mut busy = Busy::none();
+        busy.find(&vec![2.0; out.len()]);
+        let mut rows = vec![vec![0.0; out.len()]; 3];
+        let [a, b, c] = &mut rows[..] else { unreachable!() };
+        let mut splits = Splits {
+            share: out,
+            terms: [a, b, c],
+        };
+        base.splits(terms, (level, axis, first), &busy, &mut splits);
+    }
 
     #[test]
     fn a_product_has_the_shares_of_its_full_table() {
@@ -266,13 +310,14 @@ mod tests {
             for steps in [[0; 4], [3, 1, 2, 5]] {
                 let product = Base::product(&grid, &[(2, &space), (2, &direction)], &steps);
                 let dense = Base::product(&grid, &[(4, &full)], &steps);
+                let terms = [&product, &dense].map(|base| base.split_terms(3.0));
                 for level in grid.levels() {
                     for step in &level.splits {
                         for n in (0..).map(|k| 1 << k).take_while(|n| *n <= level.boxes) {
                             for first in (0..level.boxes).step_by(n) {
                                 let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
-                                product.lower_shares(level, step.axis, first, &mut a);
-                                dense.lower_shares(level, step.axis, first, &mut b);
+                                lower_shares((&product, &terms[0]), level, step.axis, first, &mut a);
+                                lower_shares((&dense, &terms[1]), level, step.axis, first, &mut b);
                                 for (a, b) in a.iter().zip(&b) {
                                     // A box of a factor may hold mass where the product holds none.
                                     assert!((a - b).abs() < 1e-14 || *b == 0.5, "{a} {b}");
@@ -301,7 +346,7 @@ mod tests {
             let (height, width) = (4 >> h, 8 >> k);
             for step in &level.splits {
                 let mut found = vec![0.0; level.boxes];
-                base.lower_shares(level, step.axis, 0, &mut found);
+                lower_shares((&base, &base.split_terms(3.0)), level, step.axis, 0, &mut found);
                 let mut expected = Vec::new();
                 for i in 0..1 << h {
                     for j in 0..1 << k {
@@ -323,6 +368,19 @@ mod tests {
                 for i in 0..1_usize << h {
                     for j in 0..1_usize << k {
                         assert!((found[number(i, j)] - expected[(i << k) + j]).abs() < 1e-15);
+                    }
+                }
+                let finer = &grid.levels()[step.level];
+                let back = finer.origins.iter().find(|o| o.axis == step.axis).expect("there");
+                for n in (0..).map(|k| 1 << k).take_while(|n| *n <= finer.boxes) {
+                    for first in (0..finer.boxes).step_by(n) {
+                        let mut halves = vec![0.0; n];
+                        base.half_shares(finer, step.axis, first, &mut halves);
+                        for (i, half) in halves.iter().enumerate() {
+                            let whole = found[back.range_of_wholes(first + i, 1).start];
+                            let expected = if back.is_upper(first + i) { 1.0 - whole } else { whole };
+                            assert!(half.to_bits() == expected.to_bits());
+                        }
                     }
                 }
             }

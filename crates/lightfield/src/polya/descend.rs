@@ -6,9 +6,9 @@ use rayon::ThreadPool;
 use super::array::{Array, Workspace};
 use super::ascend::Evidence;
 use super::data::CHUNK;
-use super::grid::{Level, Step};
+use super::grid::Level;
 use super::kernel::{Flow, add_flow};
-use super::sweep::{Place, Problem, Scratch, each, effective_counts, sum_tile};
+use super::sweep::{Place, Problem, Scratch, cut, each, effective_counts, sum_tile};
 
 /// Mean and mean square of what reaches a box, and of what has stopped at the box or above it and is handed on to its first
 /// half-able axis; over boxes that lie in one place.
@@ -208,7 +208,7 @@ fn descend_chunk(problem: &Problem<'_>, above: &Above<'_>, scratch: &mut Scratch
     }
     let [flow_mean, flow_square, total_mean, total_square] = moments;
     let (first, n) = (task.first, flow_mean.len());
-    let [share, half, gathered, whole, mean, square, ..] = scratch.rows.each_mut().map(|row| &mut row[..n]);
+    let [share, half, gathered, whole, mean, square, ..] = cut(&mut scratch.rows, n);
     let split = &mut scratch.split[..n];
     for step in &level.origins {
         let from = &levels[step.level];
@@ -231,11 +231,7 @@ fn descend_chunk(problem: &Problem<'_>, above: &Above<'_>, scratch: &mut Scratch
         } else {
             (task.weight, whole)
         };
-        if problem.base.is_uniform() {
-            share.fill(0.5);
-        } else {
-            half_shares(problem, from, *step, task.number, share);
-        }
+        problem.base.half_shares(level, step.axis, task.number, share);
         let way = from
             .splits
             .iter()
@@ -275,22 +271,4 @@ fn descend_chunk(problem: &Problem<'_>, above: &Above<'_>, scratch: &mut Scratch
             }
         }
     }
-}
-
-/// The base share of each of the boxes `first..` in the box it is half of along the step's axis.
-fn half_shares(problem: &Problem<'_>, above: &Level, step: Step, first: usize, share: &mut [f64]) {
-    let wholes = step.range_of_wholes(first, share.len());
-    if wholes.len() == share.len() {
-        problem.base.lower_shares(above, step.axis, wholes.start, share);
-    } else {
-        let mut lower = [0.0; CHUNK];
-        let lower = &mut lower[..wholes.len()];
-        problem.base.lower_shares(above, step.axis, wholes.start, lower);
-        step.dealt(lower, share);
-    }
-    step.sides(first, share.len(), |run, is_upper| {
-        if is_upper {
-            share[run].iter_mut().for_each(|p| *p = 1.0 - *p);
-        }
-    });
 }

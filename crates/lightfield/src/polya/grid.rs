@@ -394,13 +394,9 @@ impl Step {
         }
     }
 
-    /// Whether boxes are upper halves: calls `visit(range, is_upper)` for runs within `0..n`.
-    #[inline(always)]
-    pub fn sides(self, first: usize, n: usize, mut visit: impl FnMut(std::ops::Range<usize>, bool)) {
-        let run = self.block.min(n);
-        for start in (0..n).step_by(run) {
-            visit(start..start + run, (first + start) & self.block != 0);
-        }
+    /// Whether a box is an upper half.
+    pub const fn is_upper(self, number: usize) -> bool {
+        number & self.block != 0
     }
 }
 
@@ -529,12 +525,10 @@ mod tests {
                     for first in (0..2 * level.boxes).step_by(n) {
                         let mut wholes = vec![0; n];
                         let wholes = back.wholes(&coarser, first, &mut wholes);
-                        let mut upper = vec![false; n];
-                        back.sides(first, n, |run, side| upper[run].fill(side));
-                        for i in 0..n {
-                            let (high, low) = ((first + i) / (2 * back.block), (first + i) % back.block);
-                            assert_eq!(wholes[i], high * back.block + low);
-                            assert_eq!(upper[i], (first + i) & back.block != 0);
+                        for (number, whole) in (first..).zip(wholes) {
+                            let (high, low) = (number / (2 * back.block), number % back.block);
+                            assert_eq!(*whole, high * back.block + low);
+                            assert_eq!(back.is_upper(number), number / back.block % 2 == 1);
                         }
                     }
                 }

@@ -68,6 +68,13 @@ const ROWS: usize = 12;
 /// Room for the numbers of a chunk.
 type Row = [f64; CHUNK];
 
+/// Room for so many numbers in each of the rows.
+#[inline(always)]
+pub(super) fn cut(rows: &mut [Row; ROWS], n: usize) -> [&mut [f64]; ROWS] {
+    let mut rows = rows.iter_mut();
+    std::array::from_fn(|_| rows.next().map(|row| &mut row[..n]).unwrap_or_default())
+}
+
 /// What the work on a chunk needs room for.
 pub(super) struct Scratch {
     pub rows: Box<[Row; ROWS]>,
@@ -139,7 +146,7 @@ pub(super) fn sum_tile(grid: &Grid, cells: &[f64], rows: &mut [Row; ROWS], sums:
 /// Sums of boxes `first..` from those of the halves of their first split.
 #[multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub(super) fn sum_chunk(level: &Level, finer: &[f64], first: usize, rows: &mut [Row; ROWS], own: &mut [f64]) {
-    let [b0, b1, ..] = rows.each_mut().map(|row| &mut row[..own.len()]);
+    let [b0, b1, ..] = cut(rows, own.len());
     let (lower, upper) = level.splits[0].halves(finer, first, b0, b1);
     add(own, lower, upper);
 }
