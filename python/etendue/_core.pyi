@@ -35,6 +35,7 @@ __all__ = [
     "look_at_events",
     "look_at_scene",
     "losses",
+    "node_values",
     "polya_average",
     "polya_evidence",
     "polya_posterior",
@@ -384,6 +385,9 @@ def cross_parts(parts: Sequence[_Part], position: _Floats, direction: _Floats) -
 
 def rays_of_part(part: _Part, coordinates: _Floats) -> tuple[_Floats, _Floats]:
     """Points (n, 3) and directions (n, 3) at coordinates (n, 4) of a part."""
+
+def node_values(means: _Floats, shape: Sequence[int]) -> _Floats:
+    """Values at the centres of cells whose linear interpolation has these means over the cells."""
 
 _Masses: TypeAlias = _Floats | Sequence[tuple[int, _Floats]]
 

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use etendue_lightfield::field::draw::{FieldRays as CoreRays, Sampler};
 use etendue_lightfield::field::intensity::intensity;
 use etendue_lightfield::field::look::{along, look};
+use etendue_lightfield::field::nodes;
 use etendue_lightfield::field::{Averaging, Factor, FineErrors, LightField as CoreField, PartField, Reading};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -13,6 +14,21 @@ use pyo3::prelude::*;
 use crate::run::stoppable;
 use crate::surface::{Part, vectors};
 use crate::view::View;
+
+/// Values at the centres of cells of a grid whose linear interpolation has the means given over the cells.
+#[pyfunction]
+pub fn node_values<'py>(
+    py: Python<'py>,
+    means: PyReadonlyArray1<'py, f64>,
+    shape: Vec<usize>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let means = means.as_slice()?;
+    let cells = shape.iter().try_fold(1_usize, |cells, n| cells.checked_mul(*n));
+    if cells != Some(means.len()) {
+        return Err(PyValueError::new_err("one mean per cell of the shape is needed"));
+    }
+    Ok(PyArray1::from_vec(py, py.detach(|| nodes::node_values(means, &shape))))
+}
 
 /// The light that leaves one part, as Python hands it over.
 #[derive(FromPyObject)]

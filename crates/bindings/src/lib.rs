@@ -59,6 +59,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(counts::count_rays, module)?)?;
     module.add_function(wrap_pyfunction!(surface::cross_parts, module)?)?;
     module.add_function(wrap_pyfunction!(surface::rays_of_part, module)?)?;
+    module.add_function(wrap_pyfunction!(field::node_values, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_posterior, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_average, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_evidence, module)?)?;

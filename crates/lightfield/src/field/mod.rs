@@ -11,6 +11,7 @@ pub mod factor;
 pub mod intensity;
 mod light_field;
 pub mod look;
+pub mod nodes;
 mod points;
 mod sights;
 pub mod tent;
