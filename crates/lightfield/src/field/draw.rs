@@ -7,9 +7,9 @@ use etendue_geometry::{RayBatch, RaySource};
 use etendue_sampling::alias::Alias;
 use etendue_sampling::philox::Stream;
 
-use super::factor::UnderTents;
 use super::light_field::LightField;
 use super::tent::under_tent;
+use super::under_tents::UnderTents;
 
 /// The purpose under which rays are drawn from a field (see [`Stream::new`]).
 pub const PURPOSE_FIELD: u64 = 0x4649_454C;
@@ -38,7 +38,7 @@ impl Sampler {
             starts.push(weights.len());
             let [n1, n2, n3, n4] = part.cells;
             let tables = [(&part.space, [n1, n2]), (&part.direction, [n3, n4])];
-            let tables = tables.map(|(factor, cells)| (!factor.is_one()).then(|| factor.under_tents(cells)));
+            let tables = tables.map(|(factor, cells)| (!factor.is_one()).then(|| UnderTents::new(factor, cells)));
             let [space, direction] = part.tent_masses();
             let scale = part.level * part.part.etendue();
             let products = space.iter().flat_map(|s| direction.iter().map(move |d| s * d));
@@ -90,15 +90,15 @@ impl Sampler {
             local / n4 % n3,
             local % n4,
         ];
-        let mut pair = |table: &Option<UnderTents>, factor, axis: usize| {
+        let mut pair = |table: &Option<UnderTents>, axis: usize| {
             let cell = [index[axis], index[axis + 1]];
             match table {
-                Some(table) => table.draw(factor, cell, &mut next),
+                Some(table) => table.draw(cell, &mut next),
                 None => [0, 1].map(|k| under_tent(cell[k], next(), field.cells[axis + k], wraps && axis + k == 0)),
             }
         };
-        let place = pair(&self.under[part][0], &field.space, 0);
-        let direction = pair(&self.under[part][1], &field.direction, 2);
+        let place = pair(&self.under[part][0], 0);
+        let direction = pair(&self.under[part][1], 2);
         (part, place, direction)
     }
 }

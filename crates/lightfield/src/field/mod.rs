@@ -15,6 +15,7 @@ pub mod nodes;
 mod points;
 mod sights;
 pub mod tent;
+mod under_tents;
 
 pub use errors::{Averaging, FineErrors};
 pub use factor::Factor;

@@ -130,12 +130,16 @@ impl Tents {
 #[inline]
 #[must_use]
 pub fn under_tent(cell: usize, u: f64, n: usize, wraps: bool) -> f64 {
-    let offset = if u < 0.5 {
-        (2.0 * u).sqrt() - 1.0
-    } else {
-        1.0 - (2.0 - 2.0 * u).sqrt()
-    };
-    inside((cell as f64 + 0.5 + offset) / n as f64, wraps)
+    inside((cell as f64 + 0.5 + tent_offset(u)) / n as f64, wraps)
+}
+
+/// A number from −1 to 1 whose density is a tent, from a uniform one in (0, 1).
+#[inline(always)]
+pub(super) fn tent_offset(u: f64) -> f64 {
+    // One root for either side, without a branch.
+    let low = u < 0.5;
+    let aside = 1.0 - (2.0 * if low { u } else { 1.0 - u }).sqrt();
+    if low { -aside } else { aside }
 }
 
 /// Brings a coordinate back that has left \[0, 1\] by less than one: on the other side, or reflected.
