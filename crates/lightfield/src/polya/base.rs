@@ -3,8 +3,9 @@
 use etendue_math::special::{ln, ln_gamma};
 use multiversion::multiversion;
 
+use super::chunk::{Busy, GROUP};
+use super::data::Masses;
 use super::grid::{Grid, Level, Step};
-use super::kernel::{Busy, GROUP};
 
 /// A base measure over the cells of a grid: a product of factors, each over some neighbouring axes.
 #[derive(Clone, Debug)]
@@ -12,9 +13,6 @@ pub(super) struct Base {
     /// None of them: equal mass in all cells.
     factors: Vec<Factor>,
 }
-
-/// Factors of a base measure: the mass of each cell of a grid over the next axes, and how many axes these are.
-pub type Masses<'a> = (usize, &'a [f64]);
 
 /// For each level of a grid, for each of its splits or origins: one number per box.
 type Table = Vec<Vec<Vec<f64>>>;

@@ -2,11 +2,10 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::base::Masses;
 use super::grid::Grid;
 
-/// Boxes in one unit of work: a power of two whose scratch arrays fit the first caches.
-pub(super) const CHUNK: usize = 256;
+/// Factors of a base measure: the mass of each cell of a grid over the next axes, and how many axes these are.
+pub type Masses<'a> = (usize, &'a [f64]);
 
 /// Weighted points on the cells of a grid, and the measure they are compared with.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@ use rayon::ThreadPool;
 
 use super::array::{Array, Workspace};
 use super::ascend::Evidence;
-use super::data::CHUNK;
+use super::chunk::CHUNK;
 use super::grid::Level;
 use super::kernel::{Flow, add_flow};
 use super::sweep::{Place, Problem, Scratch, cut, each, effective_counts, sum_tile};

@@ -3,7 +3,7 @@
 //! Boxes are numbered so that those of a tile, a dyadic box of the grid, come one after the other: first by the halvings that
 //! cut out the tile, axis by axis, then by those within it.
 
-use super::data::CHUNK;
+use super::chunk::CHUNK;
 
 /// A grid of 2^`depths[k]` cells along axis k, last axis fastest.
 #[derive(Clone, Debug)]

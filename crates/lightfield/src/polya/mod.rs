@@ -5,14 +5,15 @@
 //! the share of the base measure. Every axis-parallel dyadic partition has its prior probability, every one is averaged
 //! with its posterior probability, and no bin width is ever chosen. `[WongMa2010]`, `[Hutter2005]`; theory eqs. 29 to 32.
 //!
-//! `grid`: the lattice of boxes. `base`: what the tree falls back on. `kernel`: the arithmetic. `data`: what it is fitted to.
-//! `ascend`, `descend`: the sweeps from the cells to the root and back, `sweep`: what they share. `posterior`: what comes out.
-//! `average`: of trees on a grid that is moved. `array`: their memory.
+//! `grid`: the lattice of boxes. `base`: what the tree falls back on. `chunk`: boxes that are worked on together. `kernel`: the
+//! arithmetic. `data`: what it is fitted to. `ascend`, `descend`: the sweeps from the cells to the root and back, `sweep`: what they
+//! share. `posterior`: what comes out. `average`: of trees on a grid that is moved. `array`: their memory.
 
 mod array;
 mod ascend;
 mod average;
 mod base;
+mod chunk;
 mod data;
 mod descend;
 mod grid;
@@ -21,7 +22,6 @@ mod posterior;
 mod sweep;
 
 pub use average::{Average, average};
-pub use base::Masses;
-pub use data::Data;
+pub use data::{Data, Masses};
 pub use grid::Grid;
 pub use posterior::{Posterior, log_evidence, posterior};

@@ -86,7 +86,7 @@ pub fn log_evidence(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::polya::base::Masses;
+    use crate::polya::data::Masses;
 
     fn integers(cells: usize, seed: u64) -> Vec<f64> {
         (0..cells as u64)

@@ -9,9 +9,9 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::base::{Base, SplitTerms};
-use super::data::{CHUNK, Data};
+use super::chunk::{Busy, CHUNK};
+use super::data::Data;
 use super::grid::{Grid, Level, Span};
-use super::kernel::Busy;
 
 /// A tree to be grown.
 pub(super) struct Problem<'a> {
