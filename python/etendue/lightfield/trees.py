@@ -13,7 +13,7 @@ from etendue import _core
 from etendue.lightfield.counting import FloatArray, Sums
 
 TILE_BITS = 22
-"""Halvings of a grid that one tree takes: 4 million cells, whose boxes fill 1.5 GB. Larger grids are cut into tiles."""
+"""Halvings of a grid that one tree takes: 4 million cells, whose boxes fill some 2 GB. Larger grids are cut into tiles."""
 
 
 POSITIONS = ((0.0, 0.0, 0.0, 0.0), (0.38, 0.62, 0.29, 0.71), (0.13, 0.29, 0.62, 0.38), (0.71, 0.83, 0.13, 0.54))

@@ -23,7 +23,7 @@ pub struct Posterior {
 
 /// The posterior of the tree with concentration `c`, on `threads` threads (0: one per core); the same bits for any number.
 ///
-/// Time is that of Π(2^(d+1) − 1) boxes; memory some 20 bytes for each, 28 with weights.
+/// Time is that of Π(2^(d+1) − 1) boxes; memory some 24 to 30 bytes for each.
 ///
 /// # Panics
 /// If an array has not one entry per cell.
