@@ -1,7 +1,5 @@
 //! From the means of cells to the values at their centres, between which a field is linear.
 
-use rayon::prelude::*;
-
 /// Factor by which the value at a cell's centre may differ from the cell's mean.
 const LARGEST_STEP: f64 = 8.0;
 
@@ -35,22 +33,18 @@ pub fn node_values(means: &[f64], shape: &[usize]) -> Vec<f64> {
 
 /// T along one axis of `n` cells, on which one step is that many numbers.
 fn blur(values: &[f64], n: usize, step: usize, out: &mut [f64]) {
-    /// Numbers that are worth a task.
-    const TASK: usize = 1 << 12;
     let mean = |below: f64, own: f64, above: f64| 0.75 * own + 0.125 * (below + above);
-    // Tasks of whole steps, wherever lines along the axis begin.
-    let steps = (TASK / step).max(1);
-    out.par_chunks_mut(steps * step).enumerate().for_each(|(task, out)| {
-        for (k, out) in out.chunks_exact_mut(step).enumerate() {
-            let at = task * steps + k;
-            let of = |at: usize| &values[at * step..][..step];
-            let below = of(if at.is_multiple_of(n) { at } else { at - 1 });
-            let above = of(if at % n == n - 1 { at } else { at + 1 });
-            for (((o, b), v), a) in out.iter_mut().zip(below).zip(of(at)).zip(above) {
-                *o = mean(*b, *v, *a);
-            }
+    let last = (n - 1) * step;
+    for (v, out) in values.chunks_exact(n * step).zip(out.chunks_exact_mut(n * step)) {
+        for k in 0..step {
+            out[k] = mean(v[k], v[k], v[k + step]);
+            out[last + k] = mean(v[last + k - step], v[last + k], v[last + k]);
         }
-    });
+        let beside = v[..last - step].iter().zip(&v[2 * step..]);
+        for ((o, v), (below, above)) in out[step..last].iter_mut().zip(&v[step..last]).zip(beside) {
+            *o = mean(*below, *v, *above);
+        }
+    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use etendue_math::Vec3;
 use etendue_math::trig::{atan_eighths, sin_cos_turns};
 use etendue_sampling::guide::Guide;
+use etendue_sampling::ordered::inside;
 use etendue_sampling::warp::part_of;
 use rayon::prelude::*;
 
@@ -92,7 +93,11 @@ impl Way {
             return Err("an azimuth of incidence lies outside a turn".into());
         }
         // Side by side: a table by azimuth holds dozens. Of several mistakes the first is told.
-        let rows: Vec<_> = self.rows.par_iter().map(Row::lobe).collect();
+        let rows: Vec<_> = if self.rows.len() == 1 {
+            self.rows.iter().map(Row::lobe).collect()
+        } else {
+            inside(0, || self.rows.par_iter().map(Row::lobe).collect())
+        };
         let rows: Result<_, _> = rows.into_iter().collect();
         Ok(Lobes { rows: rows? })
     }
