@@ -51,7 +51,5 @@ def test_a_process_may_fork_after_anything() -> None:
     """The child would wait for ever for threads that it does not have."""
     threads = {"RAYON_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-W", "ignore", "-c", WORK]
-    done = subprocess.run(  # noqa: S603 - our own program
-        command, env=os.environ | threads, timeout=240, capture_output=True, text=True
-    )
+    done = subprocess.run(command, check=False, env=os.environ | threads, timeout=240, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
