@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -88,6 +89,22 @@ def blurred(values: Array, width: float) -> Array:
     transform = np.fft.rfft2(values, (rows, columns)) * np.exp(-2 * (np.pi * width) ** 2 * (fx**2 + fy**2))
     smooth: Array = np.fft.irfft2(transform, (rows, columns))[: values.shape[0], : values.shape[1]]
     return smooth
+
+
+@functools.cache
+def blur_matrix(n: int, width: float) -> Array:
+    """The matrix that `blurred` applies to rows and columns of n cells: as fast as transforms where images are small.
+
+    Examples
+    --------
+    >>> image, matrix = np.eye(40)[:24], {n: blur_matrix(n, 1.5) for n in (24, 40)}
+    >>> bool(np.allclose(matrix[24] @ image @ matrix[40], blurred(image, 1.5), atol=1e-12))
+    True
+    """
+    size = _round_number(n + math.ceil(6 * width))
+    kernel = np.fft.irfft(np.exp(-2 * (np.pi * width * np.fft.rfftfreq(size)) ** 2), size)
+    matrix: Array = kernel[np.subtract.outer(np.arange(n), np.arange(n)) % size]
+    return matrix
 
 
 def _reflected(at: npt.NDArray[np.int64], n: int) -> npt.NDArray[np.int64]:

@@ -7,13 +7,14 @@ each ray's place is taken at the depth of its own inclination. Theory section 14
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.denoising.fourier_plane import blurred
+from etendue.denoising.fourier_plane import blur_matrix
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.pilot_sample import even_density, pilot_sample, selected_rays
 from etendue.lightfield.selection.scorer import WITH_IMAGES, SurfaceScorer
@@ -72,18 +73,43 @@ ENOUGH = 0.9995
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Rays:
-    """Rays that head upwards: where they cross the plane [mm], their slopes, what they lean, and ring and half of each."""
+    """Rays that head upwards: where they cross the plane [mm], their slopes, what they lean, and which of the set they are.
+
+    They lie by groups, one half of a ring after the other. Either half of a ring is looked up in the image of the other.
+    """
 
     place: FloatArray
     slope: FloatArray
     lean: FloatArray
-    ring: npt.NDArray[np.intp]
-    half: Bools
+    number: npt.NDArray[np.intp]
+    group: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, position: FloatArray, direction: FloatArray, z: float) -> _Rays:
+        """Those of some positions and directions, where they cross a height [mm]."""
+        lean = 1.0 - direction[:, 2]
+        # By rank, so that rays of one inclination are dealt to rings as well.
+        ring = np.zeros(len(lean), dtype=np.intp)
+        ring[np.argsort(lean, kind="stable")] = np.arange(len(lean)) * RINGS // len(lean)
+        group = 2 * ring + (np.random.default_rng(1).random(len(lean)) < 0.5)
+        order = np.argsort(group, kind="stable")
+        x, k = position[order], direction[order]
+        slope = k[:, :2] / k[:, 2:]
+        return cls(x[:, :2] + (z - x[:, 2:]) * slope, slope, lean[order], order, group[order])
 
     def at(self, depth: FloatArray | float) -> FloatArray:
         """Their places at heights above the plane [mm]."""
         moved: FloatArray = self.place + np.multiply(depth, self.slope.T).T
         return moved
+
+    def by_ring(self, values: FloatArray) -> FloatArray:
+        """Sums over the rays of each ring."""
+        return np.bincount(self.group >> 1, values, RINGS).astype(np.float64)
+
+    @functools.cached_property
+    def mean_lean(self) -> FloatArray:
+        """What the rays of each ring lean on average."""
+        return self.by_ring(self.lean) / self.by_ring(np.ones_like(self.lean))
 
 
 def focused(plane: Plane, rays: RayStream, seed: int = 1, threads: int | None = None) -> Plane:
@@ -131,7 +157,7 @@ def focused(plane: Plane, rays: RayStream, seed: int = 1, threads: int | None = 
 
     if plane.focus is not None or not enough:
         return sized(plane.focus)
-    focus = _focus(_rays(some.position[up], some.direction[up], plane.z))
+    focus = _focus(_Rays.of(some.position[up], some.direction[up], plane.z))
     flat = sized(None)
     if focus is None:
         return flat
@@ -169,15 +195,6 @@ def focused_about(z: float, rays: RaySet, seed: int = 1, threads: int | None = N
     return dataclasses.replace(plane, rest=around.radius)
 
 
-def _rays(position: FloatArray, direction: FloatArray, z: float) -> _Rays:
-    slope = direction[:, :2] / direction[:, 2:]
-    lean = 1.0 - direction[:, 2]
-    # By rank, so that rays of one inclination are dealt to rings as well.
-    ring = np.argsort(np.argsort(lean, kind="stable"), kind="stable") * RINGS // len(lean)
-    half = np.random.default_rng(1).random(len(lean)) < 0.5
-    return _Rays(position[:, :2] + (z - position[:, 2:]) * slope, slope, lean, ring, half)
-
-
 @dataclasses.dataclass(frozen=True)
 class _View:
     """The square in which images are compared."""
@@ -185,29 +202,28 @@ class _View:
     centre: FloatArray
     side: float
 
-    def cells(self, place: FloatArray) -> tuple[npt.NDArray[np.intp], Bools]:
-        """The cell of each place, and whether it lies in the square."""
-        index = np.floor(((place - self.centre) / self.side + 0.5) * SIDE).astype(np.intp)
-        inside: Bools = np.all((index >= 0) & (index < SIDE), axis=1)
-        index = np.clip(index, 0, SIDE - 1)
-        return index[:, 0] * SIDE + index[:, 1], inside
+    def cells(self, place: FloatArray) -> npt.NDArray[np.intp]:
+        """The cell of each place; what lies beside the square has one that comes after all others."""
+        x, y = (np.floor(((place - self.centre) / self.side + 0.5) * SIDE).astype(np.intp)).T
+        # A bit that a number from 0 to SIDE - 1 does not have is set if either lies beyond.
+        return np.where((x | y) & -SIDE, SIDE**2, x * SIDE + y)
 
-    def densities(self, place: FloatArray, half: Bools) -> tuple[FloatArray, FloatArray]:
-        """Smooth images of the rays in either half, each for those of the other, the first half's first; mean 1."""
-        cell, inside = self.cells(place)
+    def densities(self, cell: npt.NDArray[np.intp], group: npt.NDArray[np.intp], groups: int) -> FloatArray:
+        """A smooth image of each group of rays, of mean 1 and 0 beside the square, shape (groups, cells and one)."""
+        size = SIDE**2 + 1
+        counts = np.bincount(group * size + cell, minlength=groups * size).reshape(groups, size)
+        rays = np.maximum(counts.sum(axis=1), 1)
+        blur = blur_matrix(SIDE, BLUR)
+        images = np.zeros(counts.shape)
+        smooth = blur @ counts[:, :-1].reshape(groups, SIDE, SIDE).astype(np.float64) @ blur
+        images[:, :-1] = np.maximum(smooth, 0.0).reshape(groups, -1) * (SIDE**2 / rays)[:, None]
+        return images
 
-        def image(which: Bools) -> FloatArray:
-            counts = np.bincount(cell[which & inside], minlength=SIDE**2).reshape(SIDE, SIDE)
-            rays = max(int(np.count_nonzero(which)), 1)
-            smooth: FloatArray = np.maximum(blurred(counts.astype(np.float64), BLUR), 0.0).ravel() * (SIDE**2 / rays)
-            return smooth
-
-        return image(~half), image(half)
-
-    def log_likelihoods(self, place: FloatArray, half: Bools, images: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Ln of the density of each ray in the image of the other half."""
-        cell, inside = self.cells(place)
-        seen = np.where(half, images[0][cell], images[1][cell]) * inside
+    def log_likelihoods(
+        self, cell: npt.NDArray[np.intp], group: npt.NDArray[np.intp], images: FloatArray
+    ) -> FloatArray:
+        """Ln of the density of each ray in the image of the other half of its ring or of all rings."""
+        seen = images[group ^ 1, cell]
         values: FloatArray = np.log((1.0 - FLOOR) * seen + FLOOR)
         return values
 
@@ -218,13 +234,11 @@ def _focus(rays: _Rays) -> Focus | None:
     step = view.side / 80.0
     depths = about + step * np.arange(-COARSE, COARSE + 1.0)
     whole, own = np.zeros(len(depths)), np.zeros((len(depths), RINGS))
-    members = [np.flatnonzero(rays.ring == ring) for ring in range(RINGS)]
     for i, depth in enumerate(depths):
-        place = rays.at(depth)
-        whole[i] = view.log_likelihoods(place, rays.half, view.densities(place, rays.half)).sum()
-        for ring, mine in enumerate(members):
-            images = view.densities(place[mine], rays.half[mine])
-            own[i, ring] = view.log_likelihoods(place[mine], rays.half[mine], images).sum()
+        cell = view.cells(rays.at(depth))
+        half, group = rays.group & 1, rays.group
+        whole[i] = view.log_likelihoods(cell, half, view.densities(cell, half, 2)).sum()
+        own[i] = rays.by_ring(view.log_likelihoods(cell, group, view.densities(cell, group, 2 * RINGS)))
     one = float(_peaks(depths, whole[:, None])[0][0])
     constant: Focus = (one, 0.0, 0.0, 0.0)
     curved = _fitted(rays, *_peaks(depths, own))
@@ -243,6 +257,7 @@ def _focus(rays: _Rays) -> Focus | None:
 def _waist(rays: _Rays) -> tuple[_View, float]:
     """Where the bundle is narrowest: the square about it, and its height above the plane [mm]."""
     narrow = np.flatnonzero(rays.lean < 0.5)
+    narrow = narrow[np.argsort(rays.number[narrow])]
     narrow = narrow[:: max(len(narrow) // WAIST_RAYS, 1)]
     own_place, own_slope = rays.place[narrow], rays.slope[narrow]
 
@@ -277,9 +292,8 @@ def _peaks(depths: FloatArray, scores: FloatArray) -> tuple[FloatArray, FloatArr
 
 def _fitted(rays: _Rays, depth: FloatArray, weight: FloatArray) -> Focus:
     """The cubic in the lean through the depths of the rings, each believed as much as its maximum is sharp."""
-    lean = np.array([rays.lean[rays.ring == ring].mean() for ring in range(RINGS)])
     scale = np.sqrt(weight / weight.max())
-    matrix = np.polynomial.polynomial.polyvander(lean, 3) * scale[:, None]
+    matrix = np.polynomial.polynomial.polyvander(rays.mean_lean, 3) * scale[:, None]
     # Held to the straight line by a little, where few rings say anything.
     mean = float(np.average(depth, weights=weight))
     ridge = 1e-3 * np.diag([0.0, 0.0, 1.0, 1.0])
@@ -295,22 +309,19 @@ def _heights(rays: _Rays, focus: Focus) -> FloatArray:
 def _registered(rays: _Rays, view: _View, focus: Focus, step: float) -> Focus:
     """Each ring moved to where the image of all rays predicts it best."""
     heights = _heights(rays, focus)
-    images = view.densities(rays.at(heights), rays.half)
+    half = rays.group & 1
+    images = view.densities(view.cells(rays.at(heights)), half, 2)
     steps = step * np.arange(-FINE, FINE + 1.0)
-    scores = np.array(
-        [
-            np.bincount(rays.ring, view.log_likelihoods(rays.at(heights + dz), rays.half, images), minlength=RINGS)
-            for dz in steps
-        ]
-    )
+    cells = (view.cells(rays.at(heights + dz)) for dz in steps)
+    scores = np.array([rays.by_ring(view.log_likelihoods(cell, half, images)) for cell in cells])
     moved, weight = _peaks(steps, scores)
-    lean = np.array([rays.lean[rays.ring == ring].mean() for ring in range(RINGS)])
-    return _fitted(rays, np.polynomial.polynomial.polyval(lean, focus) + moved, weight)
+    return _fitted(rays, np.polynomial.polynomial.polyval(rays.mean_lean, focus) + moved, weight)
 
 
 def _score(rays: _Rays, view: _View, focus: Focus) -> float:
-    place = rays.at(_heights(rays, focus))
-    return float(view.log_likelihoods(place, rays.half, view.densities(place, rays.half)).sum())
+    """Sum of the logarithms of the likelihood."""
+    cell, half = view.cells(rays.at(_heights(rays, focus))), rays.group & 1
+    return float(view.log_likelihoods(cell, half, view.densities(cell, half, 2)).sum())
 
 
 def _windowed(plane: Plane, rays: RayStream) -> Plane:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 import numpy.typing as npt
 
@@ -30,6 +32,10 @@ ALMOST_ALL = 0.999
 """Share of the lines that must pass the point; the others are strays."""
 
 
+_SAMPLES: weakref.WeakSet[RaySet] = weakref.WeakSet()
+"""Pilot samples that exist, and selections from them: all of their rays carry flux, and none need be read again."""
+
+
 def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
     """Up to `at_most` rays that carry flux, from stretches spread evenly over the set, in its own scale of flux.
 
@@ -46,6 +52,8 @@ def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
     """
     if not rays.has_position:
         raise ArgumentError("these rays have no positions (a far-field set), so no surface can carry them.")
+    if isinstance(rays, RaySet) and len(rays) <= at_most and rays in _SAMPLES:
+        return rays
     source, n = rays.core_source(), len(rays)
     pieces = max(at_most // STRETCH, 2)
     starts = range(0, n, STRETCH)
@@ -56,7 +64,9 @@ def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
         position, direction, flux = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         carry = flux > 0
         if carry.any():
-            return RaySet(position[carry], direction[carry], flux[carry], flux_unit=rays.flux_unit)
+            sample = RaySet(position[carry], direction[carry], flux[carry], flux_unit=rays.flux_unit)
+            _SAMPLES.add(sample)
+            return sample
     raise ArgumentError("these rays carry no flux, so no light field can be fitted to them.")
 
 
@@ -69,7 +79,11 @@ def selected_rays(rays: RaySet, which: npt.NDArray[np.bool_]) -> RaySet:
     >>> selected_rays(rays, np.array([False, True])).flux.tolist()
     [2.0]
     """
-    return RaySet(rays.position[which], rays.direction[which], rays.flux[which], flux_unit=rays.flux_unit)
+    at = np.flatnonzero(which)
+    selected = RaySet(rays.position[at], rays.direction[at], rays.flux[at], flux_unit=rays.flux_unit)
+    if rays in _SAMPLES and len(at):
+        _SAMPLES.add(selected)
+    return selected
 
 
 def check_near_field(rays: RayStream) -> None:

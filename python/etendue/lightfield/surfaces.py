@@ -671,13 +671,13 @@ def hits_upwards(rays: RayStream, z: float, name: str, focus: Focus = FLAT) -> F
     [[3.0, 0.0]]
     """
     position, direction = _places_and_directions(rays)
-    up = direction[:, 2] > 0
-    if not up.any():
+    up = np.flatnonzero(direction[:, 2] > 0)
+    if not len(up):
         raise ArgumentError(f"{name}: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
     x, k = position[up], direction[up]
     sharp = z + np.polynomial.polynomial.polyval(1.0 - k[:, 2], focus)
-    hits: FloatArray = x + ((sharp - x[:, 2]) / k[:, 2])[:, None] * k
-    return hits[:, :2]
+    hits: FloatArray = x[:, :2] + ((sharp - x[:, 2]) / k[:, 2])[:, None] * k[:, :2]
+    return hits
 
 
 def _span(values: FloatArray, centre: float | None) -> tuple[float, float]:

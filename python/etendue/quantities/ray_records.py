@@ -228,7 +228,8 @@ class RayRecords(RayStream):
         stored = self._stored("direction")
         with np.errstate(over="ignore", invalid="ignore"):
             norm = np.sqrt(np.einsum("ij,ij->i", stored, stored))[:, None]
-        unit: FloatArray = np.divide(stored, norm, out=stored, where=(norm >= 1e-6) & np.isfinite(norm))
+        usable = (norm >= 1e-6) & np.isfinite(norm)
+        unit: FloatArray = np.divide(stored, norm, out=stored, where=True if usable.all() else usable)
         return unit
 
     @property

@@ -67,8 +67,8 @@ def ball_centre(position: FloatArray, direction: FloatArray, start: FloatArray, 
     """
 
     def feet(some: npt.NDArray[np.intp]) -> FloatArray:
-        x, k = position[some], direction[some]
-        foot: FloatArray = x + np.sum((centre - x) * k, axis=1)[:, None] * k - centre
+        x, k = position[some] - centre, direction[some]
+        foot: FloatArray = x - np.einsum("ij,ij->i", x, k)[:, None] * k
         return foot
 
     centre = start
@@ -77,7 +77,7 @@ def ball_centre(position: FloatArray, direction: FloatArray, start: FloatArray, 
     for _ in range(2):
         for step in range(2, STEPS + 2):
             foot = feet(few)
-            centre = centre + foot[np.argmax(np.sum(foot**2, axis=1))] / step
+            centre = centre + foot[np.argmax(np.einsum("ij,ij->i", foot, foot))] / step
         few = np.argsort(np.linalg.norm(feet(everyone), axis=1))[-LINES:]
     return centre
 

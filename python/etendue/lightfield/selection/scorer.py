@@ -49,8 +49,10 @@ def _tree_shape(grid: Grid, *, few: bool) -> tuple[int, ...]:
 
 def _numbered(coordinates: FloatArray, axes: slice, shape: tuple[int, ...]) -> Cells:
     """The cell of each ray along some of its coordinates."""
-    index = np.minimum((coordinates[:, axes] * shape).astype(np.intp), np.array(shape) - 1)
-    numbers: Cells = np.ravel_multi_index(tuple(index.T), shape)
+    numbers: Cells = np.zeros(len(coordinates), dtype=np.intp)
+    for values, n in zip(coordinates[:, axes].T, shape, strict=True):
+        numbers *= n
+        numbers += np.minimum((values * n).astype(np.intp), n - 1)
     return numbers
 
 
@@ -73,6 +75,25 @@ class HeldOutScore:
         """Whether the score lies above another with certainty, and by enough to matter."""
         lead, error = self.score.lead(other.score)
         return lead > max(settings.lead * error, settings.least_lead)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Met:
+    """The rays that meet a part of a surface: where, with how much flux, and in which fold each is held out."""
+
+    coordinates: FloatArray
+    flux: FloatArray
+    fold: npt.NDArray[np.int64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _HeldOut:
+    """The rays of one fold, and the flux of all others."""
+
+    position: FloatArray
+    direction: FloatArray
+    flux: FloatArray
+    others: float
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -129,6 +150,13 @@ class SurfaceScorer:
         """In which fold each ray is held out."""
         return np.random.default_rng(self.seed).permutation(len(self.flux)) % self.settings.folds
 
+    @functools.cached_property
+    def held_out(self) -> list[_HeldOut]:
+        """The folds that are held out in turn."""
+        folds = range(min(math.ceil(self.one_fold_from / len(self.flux)), self.settings.folds))
+        masks = (self.fold == fold for fold in folds)
+        return [_HeldOut(self.position[m], self.direction[m], self.flux[m], float(self.flux[~m].sum())) for m in masks]
+
     def score_all(
         self, surfaces: Sequence[tuple[Sequence[Part], Grid]], recipes: Sequence[str] = TREES_ALONE
     ) -> list[HeldOutScore]:
@@ -165,53 +193,44 @@ class SurfaceScorer:
     def _score(self, parts: Sequence[Part], grids: Sequence[Grid], recipes: Sequence[str]) -> list[HeldOutScore]:
         """The scores of a surface on several grids."""
         owner, coordinates = _core.cross_parts([part.core() for part in parts], self.position, self.direction)
-        met = np.bincount(owner[owner >= 0], minlength=len(parts))
-        folds = range(min(math.ceil(self.one_fold_from / len(owner)), self.settings.folds))
-        weights = np.concatenate([self.flux[self.fold == fold] for fold in folds])
+        rays = [
+            _Met(coordinates[mine], self.flux[mine], self.fold[mine])
+            for mine in (np.flatnonzero(owner == index) for index in range(len(parts)))
+        ]
+        weights = np.concatenate([held_out.flux for held_out in self.held_out])
         unmet = float(self.flux[owner < 0].sum() / self.flux.sum())
-        few = [bool(n < FEW * met.max()) for n in met]
-        images = self._images(parts, owner, coordinates, few, folds, recipes)
+        most = max(len(own.flux) for own in rays)
+        few = [len(own.flux) < FEW * most for own in rays]
+        images = self._images(parts, rays, few, recipes)
         found = []
         for grid in grids:
             shapes = [_tree_shape(grid, few=is_few) for is_few in few]
-            cells = [_numbered(coordinates[owner == index], slice(0, 4), shape) for index, shape in enumerate(shapes)]
-            values = [
-                self._held_out(parts, owner, cells, shapes, own, self.fold == fold, recipes)
-                for fold, own in zip(folds, images, strict=True)
-            ]
+            cells = [_numbered(own.coordinates, slice(0, 4), shape) for own, shape in zip(rays, shapes, strict=True)]
+            values = [self._held_out(fold, parts, rays, cells, shapes, own, recipes) for fold, own in enumerate(images)]
             scores = [Score(np.concatenate(of_recipe), weights) for of_recipe in zip(*values, strict=True)]
             found.append(HeldOutScore(max(scores, key=lambda score: score.mean), unmet))
         return found
 
     def _images(
-        self,
-        parts: Sequence[Part],
-        owner: npt.NDArray[np.int64],
-        coordinates: FloatArray,
-        few: Sequence[bool],
-        folds: Sequence[int],
-        recipes: Sequence[str],
+        self, parts: Sequence[Part], rays: Sequence[_Met], few: Sequence[bool], recipes: Sequence[str]
     ) -> list[list[Images]]:
         """For each fold the images of each part, by the rays that are not held out.
 
         Their concentrations are those of greatest evidence in the first fold.
         """
-        found: list[list[Images]] = [[Images() for _ in parts] for _ in folds]
-        for index, part in enumerate(parts):
+        found: list[list[Images]] = [[Images() for _ in parts] for _ in self.held_out]
+        for index, (part, own) in enumerate(zip(parts, rays, strict=True)):
             if part.hole == 0.0 and recipes == TREES_ALONE:
                 continue
-            mine = owner == index
             shape = tuple(n // (COARSER if few[index] else 1) for n in IMAGE_SHAPE)
-            own = coordinates[mine]
-            cells = [_numbered(own, axes, shape[axes]) for axes in (slice(0, 2), slice(2, 4))]
+            cells = [_numbered(own.coordinates, axes, shape[axes]) for axes in (slice(0, 2), slice(2, 4))]
             first: Images | None = None
-            for fold, images in zip(folds, found, strict=True):
-                fitted = self.fold[mine] != fold
+            for fold, images in enumerate(found):
+                fitted = own.fold != fold
                 if not fitted.any():
                     continue
-                flux = self.flux[mine][fitted]
                 space, direction = (
-                    _sums(c[fitted], flux, shape[axes])
+                    _sums(c[fitted], own.flux[fitted], shape[axes])
                     for c, axes in zip(cells, (slice(0, 2), slice(2, 4)), strict=True)
                 )
                 counts = PartCounts(space, space, direction)
@@ -221,36 +240,38 @@ class SurfaceScorer:
 
     def _held_out(
         self,
+        fold: int,
         parts: Sequence[Part],
-        owner: npt.NDArray[np.int64],
+        rays: Sequence[_Met],
         cells: Sequence[Cells],
         shapes: Sequence[tuple[int, ...]],
         images: Sequence[Images],
-        out: npt.NDArray[np.bool_],
         recipes: Sequence[str],
     ) -> list[FloatArray]:
-        """Ln of the density at the rays that are held out, by the fields of the others that each recipe makes."""
+        """Ln of the density at the rays of a fold, by the fields of the others that each recipe makes."""
         estimates = []
-        for index, part in enumerate(parts):
-            mine = (owner == index) & ~out
-            if mine.any():
-                own, flux = mine[owner == index], self.flux[mine]
-                counts = _sums(cells[index][own], flux, shapes[index])
+        met = 0.0
+        for index, (part, own) in enumerate(zip(parts, rays, strict=True)):
+            fitted = own.fold != fold
+            flux = own.flux[fitted]
+            if len(flux):
+                counts = _sums(cells[index][fitted], flux, shapes[index])
                 # A tree that does not know of the images.
                 c, alone = self.settings.concentration, PartCounts(counts, counts, counts)
                 estimate = grow_part(alone, part, "uniform", images[index], c, 1, "none", positions=POSITIONS[:1])
                 estimates.append((estimate, float(flux.sum())))
-        met = float(self.flux[(owner >= 0) & ~out].sum())
-        unmet = max(1.0 - met / float(self.flux[~out].sum()), MIXED_IN)
+                met += estimates[-1][1]
+        out = self.held_out[fold]
+        unmet = max(1.0 - met / out.others, MIXED_IN)
         values = []
         for recipe in recipes:
-            density = np.zeros(int(out.sum()))
+            density = np.zeros(len(out.flux))
             fields = [
                 core_part(e.chart.core(), dataclasses.replace(e, recipe=recipe).field(flux)) for e, flux in estimates
             ]
             if fields:
                 # Where a line leaves two parts, the light of both counts.
-                light = _core.LightField(fields).luminance(self.position[out], self.direction[out], 1)[0]
+                light = _core.LightField(fields).luminance(out.position, out.direction, 1)[0]
                 density = light / met
             values.append(np.log((1.0 - unmet) * density + unmet * self.even))
         return values

@@ -70,8 +70,10 @@ class TrialSurfaces:
 
     def nested(self, z: float) -> tuple[Part, ...]:
         """Rectangles at a depth, each within the next, the smallest first; by some of the rays."""
-        hit = crossings(self.few, z)
-        return tuple(_rectangle(z, hit, trim).parts()[0] for trim in self.settings.nested_trims)
+        trims = self.settings.nested_trims
+        # Of all rectangles at once: the crossings are put in order once.
+        bounds = np.quantile(crossings(self.few, z), [q for trim in trims for q in (trim, 1 - trim)], axis=0)
+        return tuple(_rectangle(z, low, high).parts()[0] for low, high in zip(bounds[::2], bounds[1::2], strict=True))
 
     def centres(self) -> list[FloatArray]:
         """Of the ball, and of the sphere on which the rays start, if they do."""
@@ -138,9 +140,10 @@ def crossings(rays: RaySet, z: float) -> FloatArray:
     >>> crossings(et.RaySet([[0, 0, 1], [0, 0, 1]], [[0.6, 0, 0.8], [0, 0, -1]], [1, 1]), 5.0).tolist()
     [[3.0, 0.0]]
     """
-    up = rays.direction[:, 2] > 0
-    x, k = rays.position[up], rays.direction[up]
-    hit: FloatArray = (x + ((z - x[:, 2]) / k[:, 2])[:, None] * k)[:, :2]
+    x, k = rays.position, rays.direction
+    up = np.flatnonzero(k[:, 2] > 0)
+    x, k = x[up], k[up]
+    hit: FloatArray = x[:, :2] + ((z - x[:, 2]) / k[:, 2])[:, None] * k[:, :2]
     return hit
 
 
@@ -158,9 +161,8 @@ def _window(reach: FloatArray, radius: float) -> float | None:
     return float(edges[np.argmax(likelihood)])
 
 
-def _rectangle(z: float, hit: FloatArray, trim: float) -> Plane:
-    """The rectangle at a depth that leaves out a share of the crossings beyond each of its sides."""
-    low, high = np.quantile(hit, [trim, 1 - trim], axis=0)
+def _rectangle(z: float, low: FloatArray, high: FloatArray) -> Plane:
+    """The rectangle at a depth between two corners, and a little more; of some size, wherever they lie."""
     room = np.where(high > low, (high - low) * (1 + SLACK), 1e-3)
     middle = (low + high) / 2
     return Plane(z, float(room[0]), float(room[1]), (float(middle[0]), float(middle[1])))
