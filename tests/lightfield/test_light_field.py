@@ -135,6 +135,30 @@ def test_maps_show_the_truth_from_everywhere(film: tuple[PrismaticFilm, et.RaySe
         assert lmap.dead_pixels == 0
 
 
+@pytest.mark.parametrize("theta", [0, 55])
+@pytest.mark.parametrize(("width", "height"), [(2.04, 1.3), (0.3, 0.3), (3, 0.002), (0.002, 0.001)])
+def test_pixels_of_any_size_show_all_the_light(width: float, height: float, theta: float) -> None:
+    """The light of a flat source seen from afar is what its luminance, read along lines from points all over it, adds up to:
+    in pixels that hold it, cut it, or are cut by it in slivers."""
+    rng = np.random.default_rng(2)
+    n = 4000
+    r, turn = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    direction = np.stack([r * np.cos(turn), r * np.sin(turn), np.sqrt(1 - r**2)], axis=1)
+    position = (rng.random((n, 3)) - 0.5) * [width, height, 0]
+    plane = et.Plane(z=0, width=width, height=height, centre=(0, 0), focus=(0, 0, 0, 0))
+    field = LightField.fit(et.RaySet(position, direction, np.full(n, 100 / n)), plane)
+    observer = et.Observer(theta, 20, 1e6)
+    share = (np.arange(200) + 0.5) / 200 - 0.5
+    u, v = (grid.ravel() for grid in np.meshgrid(share * width, share * height))
+    places = np.column_stack([u, v, 0 * u])
+    sight = observer.position - places
+    seen = field.luminance(places, sight / np.linalg.norm(sight, axis=1)[:, None])[0]
+    expected = seen.mean() * 1e-6 * width * height * math.cos(math.radians(theta))
+    for side, pixels in ((8.0, 1), (7.0, 5), (6.0, 16)):
+        lmap = et.luminance_map(field, observer, et.Screen(side, side, pixels, pixels))
+        assert lmap.intensity == pytest.approx(expected, rel=5e-3)
+
+
 @pytest.mark.slow
 def test_both_parts_of_a_dome_are_seen() -> None:
     source = DieUnderDome()

@@ -72,6 +72,22 @@ impl Focus {
         None
     }
 
+    /// The lowest and the highest of the heights, over all directions.
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
+        let [_, b, c, d] = self.0;
+        // Where the slope b + 2 c l + 3 d l² over the lean l is zero, without cancellation.
+        let root = (c * c - 3.0 * b * d).max(0.0).sqrt();
+        let sum = -(c + root.copysign(c));
+        [1.0, 0.0, 1.0 - sum / (3.0 * d), 1.0 - b / sum]
+            .into_iter()
+            .filter(|cosine| (0.0..=1.0).contains(cosine))
+            .map(|cosine| self.at(cosine))
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| {
+                [low.min(z), high.max(z)]
+            })
+    }
+
     /// The largest height of a place above or below the plane.
     #[must_use]
     pub fn reach(&self) -> f64 {
@@ -239,6 +255,23 @@ impl CarrierPart {
             Shape::Disk { radius } | Shape::Hemisphere { radius } => radius,
             Shape::Tube { radius, height } => radius.hypot(0.5 * height),
         }
+    }
+
+    /// The corners of a box along the axes of the part's frame that holds all its places: those of low x first, as
+    /// [`Bounds::corners`](etendue_geometry::bounds::Bounds::corners) has them.
+    #[must_use]
+    pub fn corners(&self) -> [Vec3; 8] {
+        let (x, y, [low, high]) = match self.shape {
+            Shape::Rectangle { width, height, focus } => (0.5 * width, 0.5 * height, focus.range()),
+            Shape::Disk { radius } => (radius, radius, [0.0; 2]),
+            Shape::Hemisphere { radius } => (radius, radius, [0.0, radius]),
+            Shape::Tube { radius, height } => (radius, radius, [-0.5 * height, 0.5 * height]),
+        };
+        std::array::from_fn(|i| {
+            let side = |bit: usize, length: f64| if i & bit == 0 { -length } else { length };
+            let z = if i & 1 == 0 { low } else { high };
+            self.frame.point_to_world(Vec3::new(side(4, x), side(2, y), z))
+        })
     }
 
     /// Étendue \[mm² sr\] of all light that can leave the part: π times its area.

@@ -11,14 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from etendue import _core
-from etendue.denoising.shifted_trees import LATTICE
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
 from etendue.lightfield.etendue_density import FineErrors, PartField, core_part
 from etendue.lightfield.marginals import scaled
 from etendue.lightfield.nodes import node_values
 from etendue.lightfield.surfaces import Part
 from etendue.lightfield.symmetry import order, sum_of_images
-from etendue.lightfield.trees import POSITIONS, Base, Tree, grow_averaged, log_evidence
+from etendue.lightfield.trees import POSITIONS, Base, Position, Tree, even_positions, grow_averaged, log_evidence
 
 CONCENTRATIONS = {"uniform": (1.0, 3.0, 10.0), "product": (10.0, 30.0, 100.0)}
 """Concentrations c among which the evidence chooses, by base measure: one that was taken from the data is believed more."""
@@ -32,8 +31,8 @@ FLOOR = 1e-3
 MIXED_IN = 1e-4
 """Least share of the even density in every score, so that one cell that is wrongly dark cannot decide it."""
 
-FINE_POSITIONS = tuple((k * LATTICE[0] % 1.0, k * LATTICE[1] % 1.0) for k in range(16))
-"""Positions of the fine grids over which images are averaged: evenly spread."""
+FINE_POSITIONS = even_positions((3, 5))
+"""Positions of the fine grids over which images are averaged."""
 
 
 class Recipe(NamedTuple):
@@ -78,7 +77,7 @@ def images_of(
     chart: Part,
     threads: int | None,
     symmetry: str = "none",
-    positions: Sequence[tuple[float, ...]] = FINE_POSITIONS,
+    positions: Sequence[Position] = FINE_POSITIONS,
     like: Images | None = None,
 ) -> Images:
     """Densities over the place and over the direction: what the fine counts tell, each by itself.
@@ -114,7 +113,7 @@ def grow_symmetric(
     base: Base,
     concentration: float,
     threads: int | None,
-    positions: Sequence[tuple[float, ...]],
+    positions: Sequence[Position],
     symmetry: str,
 ) -> Tree:
     """The average of trees of folded counts: as symmetric as they are, which grids that are moved are not."""
@@ -270,7 +269,7 @@ def all_images(
     counts: EtendueCounts,
     fold: Fold,
     threads: int | None,
-    positions: Sequence[tuple[float, ...]] = FINE_POSITIONS,
+    positions: Sequence[Position] = FINE_POSITIONS,
     like: Sequence[Images] | None = None,
 ) -> tuple[Images, ...]:
     """The images of each part, from the counts of a fold; see `images_of`."""
@@ -331,7 +330,7 @@ def grow_candidate(
     images: Sequence[Images],
     concentrations: Sequence[float],
     threads: int | None,
-    positions: Sequence[tuple[float, ...]] = POSITIONS,
+    positions: Sequence[Position] = POSITIONS,
 ) -> Candidate:
     """The candidate of a recipe on the counts of a fold, its trees averaged over positions of the grid."""
     parts = zip(counts[fold], counts.surface.parts(), images, concentrations, strict=True)
@@ -350,7 +349,7 @@ def grow_part(
     concentration: float,
     threads: int | None,
     symmetry: str,
-    positions: Sequence[tuple[float, ...]] = POSITIONS,
+    positions: Sequence[Position] = POSITIONS,
 ) -> PartEstimate:
     """The estimate of one part."""
     base = base_of(chart, recipe, images)

@@ -16,8 +16,29 @@ TILE_BITS = 22
 """Halvings of a grid that one tree takes: 4 million cells, whose boxes fill some 2 GB. Larger grids are cut into tiles."""
 
 
-POSITIONS = ((0.0, 0.0, 0.0, 0.0), (0.38, 0.62, 0.29, 0.71), (0.13, 0.29, 0.62, 0.38), (0.71, 0.83, 0.13, 0.54))
-"""Shares of each axis by which the grid is moved for the trees that are averaged: far from dyadic fractions."""
+Position = tuple[float, ...]
+"""Shares of each axis by which a grid is moved."""
+
+
+def even_positions(steps: Sequence[int]) -> tuple[Position, ...]:
+    """Sixteen positions of a grid along as many axes as there are steps, even beside the boxes of every size.
+
+    Trees err by where the edges of their boxes lie, so positions must spread evenly over a box of each of the sizes 1, ½, ¼
+    … of the axis: 17 j/256 does for j from 0 to 15, since it moves on by j/256 of the axis whenever j/16 comes round to the
+    same place in a box. A step that is odd takes all j, in another order; with 3, 5, 11 and 13 the first four are as even as
+    four can be.
+
+    Examples
+    --------
+    >>> position = np.array(even_positions((3,)))[:, 0]
+    >>> [round(float(np.diff(np.sort(position % box)).max()) * 16 / box, 2) for box in (1, 0.5, 0.25)]
+    [1.06, 1.12, 1.25]
+    """
+    return tuple(tuple(17 * (step * k % 16) / 256 for step in steps) for k in range(16))
+
+
+POSITIONS = even_positions((3, 5, 11, 13))[:4]
+"""Those of the trees over place and direction that are averaged."""
 
 ELSEWHERE = (0.27, 0.09, 0.41, 0.88)
 """A position that is none of these."""
@@ -121,7 +142,7 @@ def grow_averaged(
     base: Base,
     concentration: float,
     threads: int | None,
-    positions: Sequence[tuple[float, ...]] = POSITIONS,
+    positions: Sequence[Position] = POSITIONS,
 ) -> Tree:
     """The average of the trees on a grid that is moved cyclically to each of some positions; theory section 14.
 

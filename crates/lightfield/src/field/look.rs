@@ -10,10 +10,21 @@ use etendue_geometry::ray_batch::BLOCK;
 use etendue_math::Vec3;
 use etendue_sampling::ordered;
 
+use super::footprint::{Footprint, add_small};
 use super::light_field::{LightField, PartField, Reading, stopped};
+use super::pixel_sums::{PixelSums, lattice_error};
 use super::points::Points;
 use crate::surface::{Coordinates, carry};
 use crate::view::View;
+
+/// How many times as many points there are in pixels where they differ much.
+const FINER: u32 = 16;
+
+/// By how much the average over the points may be off before there are more: a share of the deviation, or of the value.
+const LEFT: [f64; 2] = [0.25, 0.005];
+
+/// Points of which each half is a lattice of its own.
+const HALVES: usize = 64;
 
 /// Lines in one unit of work outside of maps.
 const CHUNK: usize = 256;
@@ -22,40 +33,119 @@ const CHUNK: usize = 256;
 ///
 /// The average runs over `samples` points, at most [`BLOCK`], of a rank-1 lattice in the pixel: of all point sets that
 /// small its shadows on rows, columns and slanted edges are the most even. Points of a part err together as far as the
-/// place that they spread over is small, and parts apart from one another. Once `stop` is set, the rest is left out.
+/// place that they spread over is small, and parts apart from one another. Where they differ so much that their average may
+/// be off by more than [`LEFT`], as at edges, [`FINER`] times as many are taken, and what is left is in the deviation. Parts
+/// that are no larger than pixels are summed up over their own footprint. Once `stop` is set, the rest is left out.
 #[must_use]
 pub fn look(field: &LightField, view: &View, samples: u32, threads: usize, stop: Option<&AtomicBool>) -> Vec<Reading> {
-    let points = lattice(samples);
-    let tiles = Tile::all(view, (BLOCK / points.len()).max(1));
-    let work = |scratch: &mut Scratch, tile: &Tile| {
-        let mut pixels = vec![Reading::default(); tile.pixels()];
-        if !stopped(stop) {
-            see(field, view, *tile, &points, scratch, &mut pixels);
+    let (mut small, mut large) = (vec![], vec![]);
+    for part in &field.parts {
+        match Footprint::of(&part.part, view).filter(Footprint::is_small) {
+            Some(footprint) => small.push((part, footprint)),
+            None => large.push(part),
         }
-        pixels
-    };
-    let one_by_one = || {
-        let mut scratch = Scratch::default();
-        tiles.iter().map(|tile| work(&mut scratch, tile)).collect()
-    };
-    let seen: Vec<Vec<Reading>> = if threads == 1 || tiles.len() <= 4 {
-        one_by_one()
-    } else {
-        ordered::within(threads, |parallel| {
-            if parallel {
-                tiles.par_iter().map_init(Scratch::default, work).collect()
-            } else {
-                one_by_one()
-            }
-        })
-    };
-    let mut map = vec![Reading::default(); view.pixels()];
-    for (tile, seen) in tiles.iter().zip(&seen) {
-        for (row, seen) in (tile.row..).zip(seen.chunks_exact(tile.columns)) {
-            map[row * view.columns as usize + tile.column..][..tile.columns].copy_from_slice(seen);
+    }
+    let mut map = look_at_large(&large, view, samples, threads, stop);
+    for (part, footprint) in small {
+        if !stopped(stop) {
+            add_small(part, &footprint, view, &mut map);
         }
     }
     map
+}
+
+/// What is seen of parts that are large against the pixels.
+fn look_at_large(
+    parts: &[&PartField],
+    view: &View,
+    samples: u32,
+    threads: usize,
+    stop: Option<&AtomicBool>,
+) -> Vec<Reading> {
+    let mut map = vec![Reading::default(); view.pixels()];
+    if parts.is_empty() {
+        return map;
+    }
+    let points = lattice(samples);
+    let tiles = Tile::all(view, (BLOCK / points.len()).max(1));
+    let seen = each(&tiles, threads, stop, |scratch, tile| {
+        see(parts, view, *tile, &points, scratch)
+    });
+    let mut off = vec![0.0; map.len()];
+    for (tile, seen) in tiles.iter().zip(&seen) {
+        for (row, seen) in (tile.row..).zip(seen.chunks_exact(tile.columns)) {
+            let first = row * view.columns as usize + tile.column;
+            for (pixel, (reading, left)) in (first..).zip(seen) {
+                (map[pixel], off[pixel]) = (*reading, *left);
+            }
+        }
+    }
+    let wanted: Vec<usize> = (0..map.len())
+        .filter(|pixel| wants_more(view, &map, &off, points.len(), *pixel))
+        .collect();
+    let points = lattice((samples * FINER).min(BLOCK as u32));
+    let finer = each(&wanted, threads, stop, |scratch, pixel| {
+        see(parts, view, Tile::alone(view, *pixel), &points, scratch)
+    });
+    for (pixel, seen) in wanted.iter().zip(&finer) {
+        for (reading, left) in seen {
+            map[*pixel] = Reading {
+                value: reading.value,
+                deviation: reading.deviation.hypot(*left),
+            };
+        }
+    }
+    map
+}
+
+/// The results of work on each of some items, in their order; nothing for those that come after `stop` is set.
+fn each<T: Sync, R: Send>(
+    items: &[T],
+    threads: usize,
+    stop: Option<&AtomicBool>,
+    work: impl Fn(&mut Scratch, &T) -> Vec<R> + Sync,
+) -> Vec<Vec<R>> {
+    let work = |scratch: &mut Scratch, item: &T| if stopped(stop) { vec![] } else { work(scratch, item) };
+    let one_by_one = || {
+        let mut scratch = Scratch::default();
+        items.iter().map(|item| work(&mut scratch, item)).collect()
+    };
+    if threads == 1 || items.len() <= 4 {
+        return one_by_one();
+    }
+    ordered::within(threads, |parallel| {
+        if parallel {
+            items
+                .par_iter()
+                .with_min_len(4)
+                .map_init(Scratch::default, work)
+                .collect()
+        } else {
+            one_by_one()
+        }
+    })
+}
+
+/// Whether the average over `points` points of a pixel may be off by too much: by how much they differ, or because an edge
+/// beside the outermost of them would not show, of which the pixels next to it tell.
+fn wants_more(view: &View, map: &[Reading], off: &[f64], points: usize, pixel: usize) -> bool {
+    let [rows, columns] = [view.rows as usize, view.columns as usize];
+    let (row, column) = (pixel / columns, pixel % columns);
+    let beside = [
+        (row > 0).then(|| pixel - columns),
+        (row + 1 < rows).then(|| pixel + columns),
+        (column > 0).then(|| pixel - 1),
+        (column + 1 < columns).then(|| pixel + 1),
+    ];
+    let Reading { value, deviation } = map[pixel];
+    let step = beside
+        .into_iter()
+        .flatten()
+        .map(|other| (map[other].value - value).abs())
+        .fold(0.0, f64::max);
+    // The outermost points are half a step from the border; where an edge lies before them it is half of that on average.
+    let left = off[pixel].max(0.25 * step / points as f64);
+    points > 1 && left > (LEFT[0] * deviation).max(LEFT[1] * value)
 }
 
 /// Some pixels beside and above one another: they see parts of the tables that lie together, whichever way the rows of these
@@ -88,6 +178,17 @@ impl Tile {
         tiles
     }
 
+    /// One pixel.
+    const fn alone(view: &View, pixel: usize) -> Self {
+        let columns = view.columns as usize;
+        Self {
+            row: pixel / columns,
+            column: pixel % columns,
+            rows: 1,
+            columns: 1,
+        }
+    }
+
     const fn pixels(&self) -> usize {
         self.rows * self.columns
     }
@@ -99,28 +200,69 @@ struct Scratch {
     batch: RayBatch,
     at: Coordinates,
     points: Points,
+    /// What each point sees on all parts together.
+    total: Vec<f64>,
 }
 
-/// Fills the pixels of a tile: all their points are carried to each part as one block.
+/// What is seen in each pixel of a tile, and how far the average over its points may be off: all points of the tile are
+/// carried to each part as one block.
 fn see(
-    field: &LightField,
+    parts: &[&PartField],
     view: &View,
     tile: Tile,
     points: &[[f64; 2]],
     scratch: &mut Scratch,
-    pixels: &mut [Reading],
-) {
+) -> Vec<(Reading, f64)> {
+    let mut pixels = vec![Reading::default(); tile.pixels()];
     aim(view, tile, points, &mut scratch.batch);
-    for part in &field.parts {
+    scratch.total.clear();
+    scratch.total.resize(scratch.batch.len, 0.0);
+    for part in parts {
         carry(std::slice::from_ref(&part.part), &scratch.batch, &mut scratch.at);
         scratch.points.read(part, &scratch.at, scratch.batch.len);
-        average(part, &scratch.at, &scratch.points, points.len(), pixels);
+        average(
+            part,
+            &scratch.at,
+            &scratch.points,
+            points.len(),
+            &mut pixels,
+            &mut scratch.total,
+        );
+    }
+    let off = scratch.total.chunks_exact(points.len()).map(left);
+    pixels.into_iter().zip(off).collect()
+}
+
+/// How far the average over the points of a pixel may be off: by their variance, and by how every other of them differs from
+/// the rest.
+fn left(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let (mut halves, mut squares) = ([0.0; 2], 0.0);
+    for (i, value) in values.iter().enumerate() {
+        halves[i % 2] += value;
+        squares += value * value;
+    }
+    let mean = (halves[0] + halves[1]) / n;
+    let by_variance = lattice_error(n, squares / n - mean * mean);
+    // Of a few points either half alone says little.
+    if values.len() < HALVES {
+        by_variance
+    } else {
+        by_variance.max((halves[0] - halves[1]).abs() / n)
     }
 }
 
-/// Adds to each pixel what its points, so many one after the other, see on a part: compiled for each instruction set.
+/// Adds to each pixel, and to the total of each point, what its points, so many one after the other, see on a part: compiled
+/// for each instruction set.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn average(part: &PartField, at: &Coordinates, read: &Points, points: usize, pixels: &mut [Reading]) {
+fn average(
+    part: &PartField,
+    at: &Coordinates,
+    read: &Points,
+    points: usize,
+    pixels: &mut [Reading],
+    total: &mut [f64],
+) {
     let share = 1.0 / points as f64;
     let [of_cells, by_place, by_direction] = &read.deviations;
     let wraps = part.part.wraps();
@@ -131,63 +273,11 @@ fn average(part: &PartField, at: &Coordinates, read: &Points, points: usize, pix
             if at.part[i] != Coordinates::NONE {
                 let deviations = [of_cells[i], by_place[i], by_direction[i]];
                 sums.add(wraps, [s1[i], s2[i]], read.value[i], deviations);
+                total[i] += read.value[i];
             }
         }
         pixel.value += share * sums.value;
         pixel.deviation = pixel.deviation.hypot(share * sums.deviation(part));
-    }
-}
-
-/// What the points of a pixel amount to on one part.
-#[derive(Default)]
-struct PixelSums {
-    points: f64,
-    value: f64,
-    deviations: [f64; 3],
-    /// Where the first point is, and how far the others lie from it: sums and sums of squares.
-    first: [f64; 2],
-    away: [f64; 2],
-    squares: [f64; 2],
-}
-
-impl PixelSums {
-    #[inline(always)]
-    fn add(&mut self, wraps: bool, place: [f64; 2], value: f64, deviations: [f64; 3]) {
-        if self.points == 0.0 {
-            self.first = place;
-        }
-        self.points += 1.0;
-        self.value += value;
-        for (axis, at) in place.iter().enumerate() {
-            let mut away = at - self.first[axis];
-            if wraps && axis == 0 {
-                away -= away.round();
-            }
-            self.away[axis] += away;
-            self.squares[axis] += away * away;
-        }
-        for (sum, d) in self.deviations.iter_mut().zip(deviations) {
-            *sum += d;
-        }
-    }
-
-    /// Standard deviation of the sum of values: what is left of each kind of error on the area of places that the points
-    /// spread over. A pixel sees a part along nearly one direction, in which all its points err together.
-    fn deviation(&self, part: &PartField) -> f64 {
-        if self.points == 0.0 {
-            return 0.0;
-        }
-        // Even points on a side of length l have the variance l²/12.
-        let side = |axis: usize| {
-            let mean = self.away[axis] / self.points;
-            (12.0 * (self.squares[axis] / self.points - mean * mean).max(0.0)).sqrt()
-        };
-        let area = side(0) * side(1);
-        let of_cells = part.errors.cells.left(area * (part.cells[0] * part.cells[1]) as f64);
-        let fine = part.errors.space.side() as f64;
-        let within = part.errors.within.left(area * fine * fine);
-        let [cells, place, direction] = self.deviations;
-        (cells * of_cells).hypot(place * within).hypot(direction)
     }
 }
 
@@ -273,7 +363,10 @@ const fn gcd(a: u32, b: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::field::errors::Averaging;
+    use crate::field::factor::Factor;
     use crate::field::light_field::tests::rough;
+    use crate::surface::{Focus, Shape};
+    use etendue_math::Frame;
 
     fn view() -> View {
         View {
@@ -313,17 +406,67 @@ mod tests {
         let total: f64 = fine.iter().map(|r| r.value).sum();
         let difference: f64 = coarse.iter().zip(&fine).map(|(a, b)| (a.value - b.value).abs()).sum();
         assert!(total > 0.0 && difference < 0.05 * total, "{difference} {total}");
-        // A pixel's own average, point by point, through the public reading.
+        // Each pixel's own average, point by point, through the public reading: of the points or of the finer ones.
         let v = view();
-        let pixel = 15 * 40 + 17;
-        let mut sum = 0.0;
-        for [du, dv] in lattice(16) {
-            let u = ((17.0 + du) / 40.0 - 0.5) * 4.0;
-            let w = (0.5 - (15.0 + dv) / 30.0) * 3.0;
-            let point = v.target + v.right * u + v.up * w;
-            sum += field.luminance(point, (v.observer - point).normalized()).value / 16.0;
+        let average = |pixel: usize, points: u32| {
+            let read = |[du, dv]: [f64; 2]| {
+                let u = (((pixel % 40) as f64 + du) / 40.0 - 0.5) * 4.0;
+                let w = (0.5 - ((pixel / 40) as f64 + dv) / 30.0) * 3.0;
+                let point = v.target + v.right * u + v.up * w;
+                field.luminance(point, (v.observer - point).normalized()).value
+            };
+            lattice(points).into_iter().map(read).sum::<f64>() / f64::from(points)
+        };
+        let mut finer = 0;
+        for (pixel, reading) in coarse.iter().enumerate() {
+            let near = |value: f64| (reading.value - value).abs() <= 1e-12 * value;
+            let more = !near(average(pixel, 16));
+            assert!(!more || near(average(pixel, 256)));
+            finer += usize::from(more);
         }
-        assert!((coarse[pixel].value / sum - 1.0).abs() < 1e-12 && sum > 0.0);
+        assert!((50..1000).contains(&finer), "{finer}");
+    }
+
+    #[test]
+    fn edges_between_the_points_of_pixels_are_seen() {
+        // An even square that reaches a fiftieth of a pixel beyond the edges of others, seen from far above.
+        let mut part = rough(0);
+        part.part.shape = Shape::Rectangle {
+            width: 2.04,
+            height: 1.04,
+            focus: Focus::default(),
+        };
+        part.part.frame = Frame {
+            origin: Vec3::default(),
+            x: Vec3::new(1.0, 0.0, 0.0),
+            y: Vec3::new(0.0, 1.0, 0.0),
+            z: Vec3::new(0.0, 0.0, 1.0),
+        };
+        part.ratio.fill([1.0, 0.0]);
+        (part.space, part.direction) = (Factor::one(), Factor::one());
+        let field = LightField { parts: vec![part] };
+        for off in [0.0, 0.3, 0.77] {
+            let view = View {
+                observer: Vec3::new(0.0, 0.0, 1e7),
+                target: Vec3::new(off, 0.5 * off, 0.0),
+                width: 6.0,
+                height: 6.0,
+                columns: 6,
+                rows: 6,
+                ..view()
+            };
+            let map = look(&field, &view, 16, 1, None);
+            let total: f64 = map.iter().map(|r| r.value).sum();
+            assert!((total / (2.0 * 2.04 * 1.04) - 1.0).abs() < 5e-3, "{total}");
+            for (i, reading) in map.iter().enumerate() {
+                let overlap = |at: f64, low: f64, high: f64| (high.min(at + 1.0) - low.max(at)).max(0.0);
+                let (row, column) = ((i / 6) as f64, (i % 6) as f64);
+                let x = overlap(column - 3.0 + off, -1.02, 1.02);
+                let y = overlap(2.0 - row + 0.5 * off, -0.52, 0.52);
+                let error = (reading.value - 2.0 * x * y).abs();
+                assert!(error < 3.0 * reading.deviation + 0.01, "{error} {reading:?}");
+            }
+        }
     }
 
     #[test]
