@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
+from etendue.scatter.resampling import ACCURACY, lobes_of
 from oracles.both_ways import forwards_and_backwards_agree, two_walls
 from scipy.stats import chi2
 
@@ -113,6 +114,49 @@ def test_a_table_without_symmetry_keeps_its_handedness() -> None:
         slanted(incident=incident * mirror, scattered=scattered * mirror)[:, ::-1],
     ):
         assert np.abs(found - wrong).max() > 0.06 * right.max()
+
+
+def holed(*, f: float | None = None, beyond: float = 2.0) -> et.BsdfTable:
+    """R = 0.6 and a narrow lobe that does not change with the incidence; of the slice at 40° one value is `f`, and there is
+    nothing farther than `beyond` from the specular direction in direction cosines."""
+    grid = PolarGrid("normal", np.arange(0.0, 90.0, 2.0), np.arange(0.0, 360.0, 5.0))
+    slices = []
+    for theta in (0.0, 20.0, 40.0, 60.0):
+        incident = light_from(theta, 180.0)
+        scattered = grid.directions(incident, transmitted=False)
+        off = np.linalg.norm(incident[:2] + scattered[..., :2], axis=-1)
+        values = 0.6 / math.pi + 5.0 * np.exp(-0.5 * (off / 0.06) ** 2)
+        if theta == 40.0:
+            values[off > beyond] = 0.0
+            values[50, 30] = values[50, 30] if f is None else f
+        slices.append(BsdfSlice(incident, values, grid=grid))
+    return et.BsdfTable(BsdfData(slices, mirrored=False))
+
+
+@pytest.mark.parametrize("part", [0.0, 0.5])
+def test_one_low_value_changes_f_there_alone(part: float) -> None:
+    """Elsewhere f is what it is of the same table without it: to what f is linear within at the peak and where f is known,
+    and to a quarter of what the skirts of the lobe are off by themselves between incidences, 8 %.
+    """
+    whole, table = holed(), holed(f=part * 0.6 / math.pi)
+    one = table.data.slices[2]
+    hole = one.incident[:2] + one.directions[50, 30, :2]
+    around = direction(np.arange(0.0, 90.0, 4.0)[:, None], np.arange(-80.0, 180.0, 20.0)).reshape(-1, 3)
+    for theta in (20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 60.0):
+        incident = direction(theta, 180.0)
+        peak = incident * [-1.0, -1.0, 1.0]
+        at = np.append(around[np.linalg.norm(incident[:2] + around[:, :2] - hole, axis=1) > 0.1], [peak], axis=0)
+        off = np.abs(table.evaluate(incident, at) / whole.evaluate(incident, at) - 1.0)
+        assert off[-1] < ACCURACY, theta
+        assert off.max() < (ACCURACY if theta in (20.0, 40.0, 60.0) else 0.02), theta
+    assert float(table.reflectance(40.0)) == pytest.approx(one.integral(), rel=1e-6)
+
+
+def test_a_slice_without_a_diffuse_part_leaves_that_of_the_others() -> None:
+    """0.6 is Lambertian at 0°, 20° and 60°; at 40° all lies within a cone."""
+    slices = holed(beyond=0.3).data.slices
+    lobes = lobes_of(slices, [one.integral() for one in slices], isotropic=True, mirrored=False)[0.0]
+    assert [lobe.floor for lobe in lobes] == pytest.approx([0.6, 0.6, 0.0, 0.6], abs=1e-12)
 
 
 def test_samples_have_the_share_and_the_density(table: et.BsdfTable) -> None:

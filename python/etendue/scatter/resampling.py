@@ -30,6 +30,10 @@ FEW = 80
 """The same for slices of single points, none of which is closer to another than some hundredths."""
 
 
+LOW = 0.05
+"""Part of the projected solid angle whose values do not decide what is diffuse: more than a hole in a measurement."""
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Lobe:
     """What the core takes of a slice.
@@ -103,10 +107,12 @@ def lobes_of(
     kept: dict[tuple[float, float], Array] = {}
     for row in rows:
         before: Array | None = None
-        lobes = []
+        members: list[tuple[float, Array, float]] = []
+        lows: list[tuple[float, float]] = []
         if normal is not None:
             before = _swung(normal[0], row)
-            lobes.append(_lobe(0.0, radial, before, normal[1], floor=float(before.min())))
+            members.append((0.0, before, normal[1]))
+            lows.append(_low(radial, np.where(radial <= 1.0, before, np.nan)))
         for theta in sorted(by_theta):
             known = by_theta[theta]
             f, share, sine = np.zeros((azimuths, radial.size)), 0.0, 0.0
@@ -120,8 +126,12 @@ def lobes_of(
             if mirrored:
                 f = 0.5 * (f + f[(-np.arange(azimuths)) % azimuths])
             before = _continued(f, before)
-            lobes.append(_lobe(sine, radial, before, share, floor=float(np.nanmin(f))))
-        found[row] = lobes
+            members.append((sine, before, share))
+            lows.append(_low(radial, f))
+        found[row] = [
+            _lobe(sine, radial, whole, share, floor=floor)
+            for (sine, whole, share), floor in zip(members, _floors(lows), strict=True)
+        ]
     return found
 
 
@@ -187,6 +197,25 @@ def _directions(one: BsdfSlice, radial: Array, azimuths: int, phi: float) -> Arr
     found = np.concatenate([beta, height[..., None]], axis=-1)
     found[np.isnan(height)] = np.nan
     return np.asarray(found)
+
+
+def _low(radial: Array, f: Array) -> tuple[float, float]:
+    """The smallest value, and that which f stays under in `LOW` of the projected solid angle; NaN: beyond the hemisphere."""
+    weights = np.broadcast_to(radial * np.gradient(radial), f.shape)[~np.isnan(f)]
+    values = f[~np.isnan(f)]
+    order = np.argsort(values)
+    reached = np.cumsum(weights[order])
+    return float(values[order[0]]), float(values[order[np.searchsorted(reached, LOW * reached[-1])]])
+
+
+def _floors(lows: Sequence[tuple[float, float]]) -> list[float]:
+    """What is Lambertian of slices that are interpolated together, from the smallest and the low value of each.
+
+    A single value below the rest would leave the diffuse part of its slice in the lobe, and a mean of the logarithms of
+    lobes with and without it is neither. So the same is left in all lobes: the most by which any smallest value lies below.
+    """
+    left = max(low - least for least, low in lows)
+    return [max(low - left, 0.0) for _, low in lows]
 
 
 def _lobe(sine: float, radial: Array, f: Array, share: float, *, floor: float) -> Lobe:
