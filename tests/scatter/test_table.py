@@ -194,6 +194,39 @@ def test_what_radiates_more_than_it_receives_is_refused_with_the_angle() -> None
     assert float(told.reflectance(35.0)) == pytest.approx(1.0, abs=1e-6)
 
 
+def even(share: float, *, way: bool, wavelength: float | None = None, theta: float = 30.0) -> BsdfSlice:
+    """A Lambertian slice, transmitted if `way`."""
+    grid = PolarGrid("normal", np.array([0.0, 90.0]), np.array([0.0]))
+    return BsdfSlice(direction(theta, 0.0), np.full((1, 2), share / math.pi), way, grid=grid, wavelength=wavelength)
+
+
+def test_each_way_is_linear_between_its_own_wavelengths() -> None:
+    """np.interp of the shares that were put in, constant beyond them; a way without a wavelength is the same at all."""
+    back, through = {450.0: 0.2, 550.0: 0.3, 650.0: 0.1}, {500.0: 0.1, 600.0: 0.5}
+    coloured = [even(share, way=False, wavelength=at) for at, share in back.items()]
+    asked = (400.0, 450.0, 500.0, 525.0, 550.0, 600.0, 650.0, 700.0)
+    other = [even(share, way=True, wavelength=at) for at, share in through.items()]
+    table, plain = (et.BsdfTable(BsdfData(coloured + more)) for more in (other, [even(0.25, way=True)]))
+    for at in asked:
+        r, t = (np.interp(at, [*way], [*way.values()]) for way in (back, through))
+        assert table.reflectance(30.0, wavelength=at) == pytest.approx(r, abs=1e-9)
+        assert table.transmittance(30.0, wavelength=at) == pytest.approx(t, abs=1e-9)
+        assert plain.reflectance(30.0, wavelength=at) == pytest.approx(r, abs=1e-9)
+        assert plain.transmittance(30.0, wavelength=at) == pytest.approx(0.25, abs=1e-9)
+        assert plain.evaluate(direction(30.0, 0.0), [0, 0, -1], wavelength=at) == pytest.approx(
+            0.25 / math.pi, abs=1e-9
+        )
+
+
+def test_a_slice_without_a_wavelength_holds_where_no_other_is_stated() -> None:
+    """0.4 at 10° for all; at 60° 0.2 at 450 nm and 0.6 at 650 nm."""
+    slices = [even(0.4, way=False, theta=10.0)]
+    slices += [even(share, way=False, wavelength=at, theta=60.0) for at, share in ((450.0, 0.2), (650.0, 0.6))]
+    table = et.BsdfTable(BsdfData(slices))
+    for at, share in ((450.0, 0.2), (550.0, 0.4), (650.0, 0.6)):
+        assert table.reflectance([10.0, 60.0], wavelength=at) == pytest.approx([0.4, share], abs=1e-9)
+
+
 def test_tables_pickle(table: et.BsdfTable) -> None:
     again = pickle.loads(pickle.dumps(table))  # noqa: S301 - our own
     assert again.reflectance(33.0) == table.reflectance(33.0)

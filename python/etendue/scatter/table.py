@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Iterable
 from typing import Any
 
@@ -11,9 +10,8 @@ from etendue.description.files import Files
 from etendue.errors import ArgumentError
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
 from etendue.quantities.report import Complaint
-from etendue.scatter.bsdf import WAVELENGTH, Bsdf
-from etendue.scatter.models import MODELS
-from etendue.scatter.resampling import lobes_of
+from etendue.scatter.bsdf import Bsdf
+from etendue.scatter.members import members_of
 from etendue.scatter.scans.interpolations import tabulated
 from etendue.scatter.scans.scans import Scans
 
@@ -99,14 +97,7 @@ class BsdfTable(Bsdf):
 
     @functools.cached_property
     def _record(self) -> dict[str, Any]:
-        members = [(1.0, MODELS[part["kind"]](**part).record(Files())) for part in map(dict, self.data.components)]
-        if self.data.slices:
-            sides = [[one for one in self.data.slices if one.front is front] for front in (True, False)]
-            if self.data.both_sides:
-                front = back = _sheets(sides[0] or sides[1], self.data)
-            else:
-                front, back = (_sheets(side, self.data) for side in sides)
-            members.append((1.0, {"kind": "table", "front": front, "back": back}))
+        members = [(1.0, part) for part in members_of(self.data, [share_of(one) for one in self.data.slices])]
         return members[0][1] if len(members) == 1 else {"kind": "sum", "members": members}
 
 
@@ -136,26 +127,3 @@ def _excesses(data: BsdfData) -> Iterable[Complaint]:
             )
         if share > 1.0:
             yield Complaint("warning", f"{one.theta:g}° of incidence", f"{way} {share:.6g} of the light; scaled to 1")
-
-
-def _sheets(slices: list[BsdfSlice], data: BsdfData) -> list[dict[str, Any]]:
-    def colour(one: BsdfSlice) -> float:
-        return WAVELENGTH if one.wavelength is None else one.wavelength
-
-    sheets = []
-    for wavelength, members in itertools.groupby(sorted(slices, key=colour), colour):
-        ways: list[list[BsdfSlice]] = [[], []]
-        for one in members:
-            ways[one.transmitted].append(one)
-        reflected, transmitted = (_rows(way, data) if way else None for way in ways)
-        sheets.append({"wavelength": wavelength, "reflected": reflected, "transmitted": transmitted})
-    return sheets
-
-
-def _rows(slices: list[BsdfSlice], data: BsdfData) -> list[dict[str, Any]]:
-    shares = [share_of(one) for one in slices]
-    mirrored = data.isotropic and data.mirrored
-    rows = lobes_of(slices, shares, isotropic=data.isotropic, mirrored=mirrored)
-    return [
-        {"azimuth": phi / 360.0, "slices": [lobe.record() for lobe in lobes]} for phi, lobes in sorted(rows.items())
-    ]

@@ -1,0 +1,80 @@
+"""What a table of scatter hands to the core: its components, and its slices by side, way and wavelength."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from etendue.description.files import Files
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
+from etendue.scatter.bsdf import WAVELENGTH
+from etendue.scatter.models import MODELS
+from etendue.scatter.resampling import lobes_of
+
+Record = dict[str, Any]
+Rows = list[Record]
+
+Known = list[tuple[BsdfSlice, float]]
+"""Slices, with what each scatters of the flux."""
+
+
+def members_of(data: BsdfData, shares: Sequence[float]) -> list[Record]:
+    """Records of what adds up to a BSDF: one for each component; and one for the slices, or one for each way.
+
+    The core interpolates between wavelengths with both ways together. Where they are not known at the same, each way has a
+    table of its own, so that either is interpolated between its own wavelengths.
+
+    Parameters
+    ----------
+    data : BsdfData
+        Of any kind.
+    shares : sequence of float
+        Of the flux that each slice scatters.
+
+    Examples
+    --------
+    >>> [record["kind"] for record in members_of(BsdfData(components=({"kind": "lambertian", "reflectance": 0.5},)), [])]
+    ['scatter']
+    """
+    found = [MODELS[part["kind"]](**part).record(Files()) for part in map(dict, data.components)]
+    known = list(zip(data.slices, shares, strict=True))
+    sides = [[pair for pair in known if pair[0].front is front] for front in (True, False)]
+    if data.both_sides:
+        sides = [sides[0] or sides[1]]
+    ways = [[_by_wavelength(side, data, transmitted=way) for side in sides] for way in (False, True)]
+    there = [way for way in ways if any(way)]
+    if len(there) == 2 and not any(a and b and a.keys() != b.keys() for a, b in zip(*ways, strict=True)):
+        return [*found, _table(*ways)]
+    empty: list[dict[float, Rows]] = [{} for _ in sides]
+    return found + [_table(way, empty) if way is ways[0] else _table(empty, way) for way in there]
+
+
+def _by_wavelength(known: Known, data: BsdfData, *, transmitted: bool) -> dict[float, Rows]:
+    """The rows of one way of light that meets a side; slices of no wavelength hold at all, where no other says more."""
+    way = [pair for pair in known if pair[0].transmitted is transmitted]
+    of_all = [pair for pair in way if pair[0].wavelength is None]
+    stated = sorted({one.wavelength for one, _ in way if one.wavelength is not None})
+    if not stated:
+        return {WAVELENGTH: _rows(of_all, data)} if of_all else {}
+    return {at: _rows([pair for pair in way if pair[0].wavelength == at] + of_all, data) for at in stated}
+
+
+def _rows(known: Known, data: BsdfData) -> Rows:
+    slices, shares = zip(*known, strict=True)
+    mirrored = data.isotropic and data.mirrored
+    rows = lobes_of(slices, shares, isotropic=data.isotropic, mirrored=mirrored)
+    return [
+        {"azimuth": phi / 360.0, "slices": [lobe.record() for lobe in lobes]} for phi, lobes in sorted(rows.items())
+    ]
+
+
+def _table(reflected: Sequence[dict[float, Rows]], transmitted: Sequence[dict[float, Rows]]) -> Record:
+    """Of light that meets the front and the back, or either."""
+    sides = [
+        [
+            {"wavelength": at, "reflected": back.get(at), "transmitted": through.get(at)}
+            for at in sorted({*back, *through})
+        ]
+        for back, through in zip(reflected, transmitted, strict=True)
+    ]
+    return {"kind": "table", "front": sides[0], "back": sides[-1]}
