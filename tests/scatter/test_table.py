@@ -200,6 +200,61 @@ def even(share: float, *, way: bool, wavelength: float | None = None, theta: flo
     return BsdfSlice(direction(theta, 0.0), np.full((1, 2), share / math.pi), way, grid=grid, wavelength=wavelength)
 
 
+MIRROR = {"kind": "mirror", "reflectance": {"angle": [0.0, 30.0, 90.0], "values": [0.2, 0.6, 0.2]}}
+
+
+def test_both_ways_and_components_together_leave_no_more_than_arrives() -> None:
+    """The sums are 0.7 + 0.7, 0.7 at 450 nm + 0.5, 0.7 + 0.6 of a mirror, and 0.98 + 0.103 of two components."""
+    both = [even(0.7, way=False), even(0.7, way=True)]
+    coloured = [even(0.7, way=False, wavelength=450.0), even(0.4, way=False, wavelength=650.0), even(0.5, way=True)]
+    lambertian = {"kind": "lambertian", "reflectance": 0.98}
+    for data, told in (
+        (BsdfData(both), "at 30° of incidence 1.4 "),
+        (BsdfData(coloured), "at 30° of incidence, 450 nm 1.2 "),
+        (BsdfData(both[:1], (MIRROR,)), "at 30° of incidence 1.3 "),
+        (BsdfData((), (lambertian, {"kind": "mirror", "reflectance": 0.103})), "at 0° of incidence 1.083 "),
+    ):
+        with pytest.raises(ArgumentError, match=told):
+            et.BsdfTable(data)
+    # Each side for itself: light that meets the front is reflected, light that meets the back goes through.
+    grid = both[1].grid
+    behind = BsdfSlice(direction(30.0, 0.0, behind=True), both[1].values, True, grid=grid)
+    table = et.BsdfTable(BsdfData([both[0], behind], both_sides=False))
+    assert table.complaints == ()
+    assert table.reflectance(30.0) == pytest.approx(0.7)
+    assert table.transmittance(30.0, side="back") == pytest.approx(0.7)
+
+
+def test_what_leaves_beyond_all_of_the_light_by_little_is_scaled_and_told() -> None:
+    """0.606 + 0.4 is scaled by 1/1.006 at 30° alone; beside 0.6 of a mirror there is room for 0.4 of 0.405."""
+    slices = [even(0.6, way=False, theta=60.0), even(0.606, way=False), even(0.4, way=True)]
+    table = et.BsdfTable(BsdfData(slices))
+    assert [str(one) for one in table.complaints] == [
+        "warning: 30° of incidence: 1.006 of the light leaves in all; scaled to 1"
+    ]
+    assert table.reflectance([30.0, 60.0]) == pytest.approx([0.606 / 1.006, 0.6], abs=1e-9)
+    assert table.transmittance(30.0) == pytest.approx(0.4 / 1.006, abs=1e-9)
+    # Backwards as forwards.
+    assert table.evaluate(direction(30.0, 0.0), [0, 0, -1]) == pytest.approx(0.4 / 1.006 / math.pi, abs=1e-9)
+    mirrored = et.BsdfTable(BsdfData([even(0.405, way=False)], (MIRROR,)))
+    assert "1.005" in str(mirrored.complaints[0])
+    assert mirrored.regular_reflectance(30.0) == pytest.approx(0.6, abs=1e-9)
+    assert mirrored.reflectance(30.0) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_components_and_what_lies_between_incidences_are_scaled_as_a_whole() -> None:
+    """A mirror and a Lambertian, together 1.008 at 33.3°; slices at 0° and 60° with a mirror that is 0.005 more at 30°."""
+    bent = {"kind": "lambertian", "reflectance": {"angle": [0.0, 33.3, 90.0], "values": [0.1, 0.408, 0.1]}}
+    components = et.BsdfTable(BsdfData((), ({"kind": "mirror", "reflectance": 0.6}, bent)))
+    assert "1.008" in str(components.complaints[0])
+    assert components.reflectance([0.0, 33.3]) == pytest.approx([0.7 / 1.008, 1.0], abs=1e-9)
+    hump = {"kind": "mirror", "reflectance": {"angle": [0.0, 30.0, 60.0], "values": [0.5, 0.505, 0.5]}}
+    table = et.BsdfTable(BsdfData([even(0.5, way=False, theta=theta) for theta in (0.0, 60.0)], (hump,)))
+    assert "30° of incidence: 1.005 of the light leaves in all; everything is scaled" in str(table.complaints[0])
+    assert table.reflectance([0.0, 30.0]) == pytest.approx([1.0 / 1.005, 1.0], abs=1e-6)
+    assert pickle.loads(pickle.dumps(table)).reflectance(30.0) == table.reflectance(30.0)  # noqa: S301 - our own
+
+
 def test_each_way_is_linear_between_its_own_wavelengths() -> None:
     """np.interp of the shares that were put in, constant beyond them; a way without a wavelength is the same at all."""
     back, through = {450.0: 0.2, 550.0: 0.3, 650.0: 0.1}, {500.0: 0.1, 600.0: 0.5}

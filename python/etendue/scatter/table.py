@@ -10,13 +10,12 @@ from etendue.description.files import Files
 from etendue.errors import ArgumentError
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
 from etendue.quantities.report import Complaint
+from etendue.scatter.balance import MOST, balanced
 from etendue.scatter.bsdf import Bsdf
+from etendue.scatter.building import built
 from etendue.scatter.members import members_of
 from etendue.scatter.scans.interpolations import tabulated
 from etendue.scatter.scans.scans import Scans
-
-MOST = 1.01
-"""Share that a slice may scatter: more is refused, and what is above 1 is scaled to 1, with a complaint."""
 
 
 class BsdfTable(Bsdf):
@@ -33,7 +32,7 @@ class BsdfTable(Bsdf):
     Raises
     ------
     ArgumentError
-        If there is nothing in it, or a slice scatters more than 101 % of the light.
+        If there is nothing in it, or more than 101 % of the light leaves, in both ways and by components together.
 
     Examples
     --------
@@ -49,7 +48,9 @@ class BsdfTable(Bsdf):
         if not data.slices and not data.components:
             raise ArgumentError("a BSDF has slices or components; these data hold neither")
         self.data = data
-        self.complaints: tuple[Complaint, ...] = data.complaints + tuple(_excesses(data))
+        excesses = tuple(_excesses(data))
+        self._shares_of_slices, self._weight, more = balanced(data, [share_of(one) for one in data.slices])
+        self.complaints: tuple[Complaint, ...] = (*data.complaints, *excesses, *more)
 
     @classmethod
     def from_scans(cls, scans: Scans, method: str = "specular-centred") -> BsdfTable:
@@ -97,8 +98,15 @@ class BsdfTable(Bsdf):
 
     @functools.cached_property
     def _record(self) -> dict[str, Any]:
-        members = [(1.0, part) for part in members_of(self.data, [share_of(one) for one in self.data.slices])]
-        return members[0][1] if len(members) == 1 else {"kind": "sum", "members": members}
+        members = [(self._weight, part) for part in members_of(self.data, self._shares_of_slices)]
+        if len(members) == 1 and self._weight == 1.0:
+            return members[0][1]
+        record = {"kind": "sum", "members": members}
+        try:
+            built(record)
+        except ValueError as error:
+            raise ArgumentError(f"the table {self.name!r}: {error}") from None
+        return record
 
 
 Bsdf.table = BsdfTable
