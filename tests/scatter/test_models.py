@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import etendue as et
@@ -116,3 +117,36 @@ def test_lobes_of_a_round_and_an_elliptical_gaussian() -> None:
     off = np.array([[0.02, 0.0], [0.0, 0.06]])
     scattered = np.column_stack([off, np.sqrt(1.0 - np.sum(off * off, axis=1))])
     assert np.allclose(lobe.evaluate([0, 0, 1], scattered), 10.0 * math.exp(-0.5), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (lambda b: b.reflectance(30, phi=math.nan), "phi is nan; give finite"),
+        (lambda b: b.transmittance(30, phi=[0, math.inf]), "phi is"),
+        (lambda b: b.reflectance(30, media=(1, -1.5)), "media is .* above 0"),
+        (lambda b: b.regular_reflectance(30, media=(1, math.nan)), "media is"),
+        (lambda b: b.regular_transmittance(30, media=(0, 1.5)), "media is"),
+        (lambda b: b.evaluate([0, 0, 1], [0, 0, 1], media=(1, math.inf)), "media is"),
+        (lambda b: b.pdf([0, 0, 1], [0, 0, 1], media=(1,)), "media is .* two"),
+        (lambda b: b.evaluate([0, 0, 1], [0, 0, 1], wavelength=math.nan), "wavelength is nan"),
+        (lambda b: b.sample([0, 0, 1], 2, wavelength=-555.0), "wavelength is -555"),
+        (lambda b: b.sample([0, 0, 1], 2, seed=-1), "seed is -1; give a whole number"),
+        (lambda b: b.sample([0, 0, 1], 2, seed=2**64), "seed is"),
+        (lambda b: b.sample([0, 0, 1], 1.5), "n is 1.5; give a whole number"),
+        (lambda b: b.sample([0, 0, 1], -1), "n is -1"),
+        (lambda b: et.plot_bsdf(b, incidence=95), "incidence is 95"),
+        (lambda b: et.plot_bsdf(b, incidence=90.0), "incidence is 90"),
+        (lambda b: et.plot_bsdf(b, incidence=math.nan), "incidence is nan"),
+    ],
+)
+def test_numbers_that_mean_nothing_are_refused_by_name(asked: Callable[[et.Bsdf], Any], told: str) -> None:
+    for bsdf in (et.bsdf.Interface(), et.bsdf.Gaussian(peak=2.0, sigma=0.15)):
+        with pytest.raises(ArgumentError, match=told):
+            asked(bsdf)
+
+
+def test_whole_numbers_of_any_kind_draw_rays() -> None:
+    lobe = et.bsdf.Gaussian(peak=2.0, sigma=0.15)
+    drawn = [lobe.sample([0, 0, 1], n, seed=seed) for n, seed in ((5, 3), (np.int32(5), np.uint64(3)))]
+    assert np.array_equal(*drawn, equal_nan=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
+from etendue.errors import ArgumentError
 from etendue.plot import style
 from etendue.plot.map_picture import draw_slim_bar
 from etendue.quantities.bsdf_data import direction
@@ -82,7 +83,7 @@ def plot_bsdf(
     side : {"front", "back"}
         The side that the light meets.
     incidence : number
-        Angle of incidence [°] of the diagram in the middle.
+        Angle of incidence [°] of the diagram in the middle, from 0 to below 90°.
     title : str, optional
         Above everything.
     ax : three Axes, optional
@@ -98,7 +99,7 @@ def plot_bsdf(
     MissingLibraryError
         If matplotlib is not installed.
     ArgumentError
-        If there are not three axes, or a path beside them.
+        If there are not three axes, or a path beside them; or `incidence` is no angle from 0 to below 90°.
     UnknownNameError
         If the extension is none of .png, .svg and .pdf.
 
@@ -108,6 +109,8 @@ def plot_bsdf(
     >>> len(plot_bsdf(Gaussian(peak=5, sigma=0.15)).axes)
     4
     """
+    if not 0.0 <= incidence < 90.0:
+        raise ArgumentError(f"incidence is {incidence!r}; give an angle from 0 to below 90°.")
     if ax is not None:
         panels = style.given_axes(ax, 3, path)
         _draw(panels, bsdf, side, incidence)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import abc
 import functools
+import math
+import numbers
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -29,6 +31,9 @@ UNIT = 1e-6
 
 WAVELENGTH = 555.0
 """[nm], where nothing else is said."""
+
+MOST_SEED = 2**64 - 1
+"""Of the numbers that rays are drawn with."""
 
 
 def unit_vectors(name: str, values: npt.ArrayLike) -> Array:
@@ -142,10 +147,10 @@ class Bsdf(abc.ABC):
         Raises
         ------
         ArgumentError
-            If a vector is not of length 1.
+            If a vector is not of length 1, or the wavelength or an index is not finite and above 0.
         """
         shape, pairs = _pairs(incident, scattered)
-        return self._compiled.evaluate(*pairs, (wavelength, *media)).reshape(shape)
+        return self._compiled.evaluate(*pairs, _surroundings(wavelength, media)).reshape(shape)
 
     def pdf(
         self,
@@ -160,7 +165,7 @@ class Bsdf(abc.ABC):
         Parameters, result and errors are those of `evaluate`.
         """
         shape, pairs = _pairs(incident, scattered)
-        return self._compiled.pdf(*pairs, (wavelength, *media)).reshape(shape)
+        return self._compiled.pdf(*pairs, _surroundings(wavelength, media)).reshape(shape)
 
     def sample(
         self,
@@ -193,16 +198,20 @@ class Bsdf(abc.ABC):
         Raises
         ------
         ArgumentError
-            If `incident` is neither one unit vector nor one for each ray, or `n` is negative.
+            If `incident` is neither one unit vector nor one for each ray, `n` or `seed` is no whole number from 0 to
+            2⁶⁴ − 1, or the wavelength or an index is not finite and above 0.
         """
         direction = unit_vectors("incident", incident)
-        if n < 0:
-            raise ArgumentError(f"{n} rays cannot be drawn")
+        counts: dict[str, Any] = {"n": n, "seed": seed}
+        for name, value in counts.items():
+            if not (isinstance(value, numbers.Integral) and 0 <= int(value) <= MOST_SEED):
+                raise ArgumentError(f"{name} is {value!r}; give a whole number from 0 to 2⁶⁴ − 1.")
+        surroundings = _surroundings(wavelength, media)
         if direction.shape == (n, 3):
-            return self._compiled.sample_each(direction, seed, (wavelength, *media))
+            return self._compiled.sample_each(direction, seed, surroundings)
         if direction.shape != (3,):
             raise ArgumentError(f"{n} rays come from one direction, or from {n}; incident has shape {direction.shape}")
-        return self._compiled.sample(tuple(direction.tolist()), n, seed, (wavelength, *media))
+        return self._compiled.sample(tuple(direction.tolist()), n, seed, surroundings)
 
     def reflectance(
         self,
@@ -232,11 +241,12 @@ class Bsdf(abc.ABC):
         Raises
         ------
         ArgumentError
-            If an angle is not from 0 to 90°.
+            If an angle of incidence is not from 0 to 90°, an azimuth is not finite, or the wavelength or an index is not
+            finite and above 0.
         UnknownNameError
             If there is no such side.
         """
-        mirrored, _, back, _ = self._shares(theta, phi, side, (wavelength, *media))
+        mirrored, _, back, _ = self._shares(theta, phi, side, _surroundings(wavelength, media))
         return mirrored + back
 
     def transmittance(
@@ -252,7 +262,7 @@ class Bsdf(abc.ABC):
 
         Parameters, result and errors are those of `reflectance`.
         """
-        _, refracted, _, through = self._shares(theta, phi, side, (wavelength, *media))
+        _, refracted, _, through = self._shares(theta, phi, side, _surroundings(wavelength, media))
         return refracted + through
 
     def regular_reflectance(
@@ -268,7 +278,7 @@ class Bsdf(abc.ABC):
 
         Parameters, result and errors are those of `reflectance`.
         """
-        return self._shares(theta, phi, side, (wavelength, *media))[0]
+        return self._shares(theta, phi, side, _surroundings(wavelength, media))[0]
 
     def regular_transmittance(
         self,
@@ -283,7 +293,7 @@ class Bsdf(abc.ABC):
 
         Parameters, result and errors are those of `reflectance`.
         """
-        return self._shares(theta, phi, side, (wavelength, *media))[1]
+        return self._shares(theta, phi, side, _surroundings(wavelength, media))[1]
 
     def _shares(
         self, theta: npt.ArrayLike, phi: npt.ArrayLike, side: Side, media: tuple[float, float, float]
@@ -293,6 +303,8 @@ class Bsdf(abc.ABC):
         angles = np.asarray(theta, np.float64)
         if not ((angles >= 0.0) & (angles <= 90.0)).all():
             raise ArgumentError("angles of incidence are from 0 to 90°")
+        if not np.isfinite(np.asarray(phi, np.float64)).all():
+            raise ArgumentError(f"phi is {phi!r}; give finite azimuths [°].")
         incident = direction(angles, phi, behind=side == "back")
         found = self._compiled.shares(incident.reshape(-1, 3), media)
         a, b, c, d = (column.reshape(incident.shape[:-1]) for column in found.T)
@@ -330,6 +342,17 @@ class Bsdf(abc.ABC):
     def transmits(self) -> bool:
         """Whether light is scattered to the other side."""
         return self.ways[3]
+
+
+def _surroundings(wavelength: float, media: tuple[float, float]) -> tuple[float, float, float]:
+    """As the core takes them."""
+    if not (math.isfinite(wavelength) and wavelength > 0.0):
+        raise ArgumentError(f"wavelength is {wavelength!r}; give a finite number of nm above 0.")
+    if len(media) != 2 or not all(math.isfinite(index) and index > 0.0 for index in media):
+        raise ArgumentError(
+            f"media is {media!r}; give two refractive indices, finite and above 0: in front and behind."
+        )
+    return wavelength, *media
 
 
 def _pairs(incident: npt.ArrayLike, scattered: npt.ArrayLike) -> tuple[tuple[int, ...], tuple[Array, Array]]:
