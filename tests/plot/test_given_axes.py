@@ -10,6 +10,7 @@ import etendue as et
 import matplotlib as mpl
 import numpy as np
 import pytest
+from etendue.errors import ArgumentError
 from etendue.quantities.threshold_sweep import COLUMNS, ThresholdSweep
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -169,3 +170,9 @@ def test_names_are_no_formulas() -> None:
     et.plot_cross_sections([et.cross_section(make_map(), y=0)], labels=["$a^$"], ax=axes)
     axes.figure.canvas.draw()
     assert axes.get_legend().get_texts()[0].get_text() == "$a^$"
+
+
+@pytest.mark.parametrize("incidence", [-5.0, 90.0, 95.0, float("nan")])
+def test_light_from_behind_has_no_lobe_to_draw(incidence: float) -> None:
+    with pytest.raises(ArgumentError, match=f"incidence is {incidence}; give an angle"):
+        et.plot_bsdf(et.bsdf.Lambertian(reflectance=0.5), incidence=incidence)

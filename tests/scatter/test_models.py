@@ -135,9 +135,6 @@ def test_lobes_of_a_round_and_an_elliptical_gaussian() -> None:
         (lambda b: b.sample([0, 0, 1], 2, seed=2**64), "seed is"),
         (lambda b: b.sample([0, 0, 1], 1.5), "n is 1.5; give a whole number"),
         (lambda b: b.sample([0, 0, 1], -1), "n is -1"),
-        (lambda b: et.plot_bsdf(b, incidence=95), "incidence is 95"),
-        (lambda b: et.plot_bsdf(b, incidence=90.0), "incidence is 90"),
-        (lambda b: et.plot_bsdf(b, incidence=math.nan), "incidence is nan"),
     ],
 )
 def test_numbers_that_mean_nothing_are_refused_by_name(asked: Callable[[et.Bsdf], Any], told: str) -> None:
