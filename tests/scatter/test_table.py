@@ -194,6 +194,29 @@ def test_what_radiates_more_than_it_receives_is_refused_with_the_angle() -> None
     assert float(told.reflectance(35.0)) == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("share", [0.5, 0.95])
+def test_below_the_first_incidence_the_lobe_keeps_shape_and_share(share: float) -> None:
+    """A round Gaussian of σ = 0.15 at 60° alone, a fifth of which is cut by the horizon: at 0° it is share / (2π σ²) at its
+    peak, and round; it is cut at 75° as the function is, whose share is a quadrature."""
+
+    def lobe(*, incident: Array, scattered: Array) -> Array:
+        off = incident[..., :2] + scattered[..., :2]
+        return np.exp(-0.5 * np.sum(off * off, axis=-1) / SIGMA**2)
+
+    grid = PolarGrid("cosines", np.append(0.0, np.geomspace(0.005, 2.0, 120)), np.array([0.0]))
+    values = share / quadrature(lobe, 60.0) * np.exp(-0.5 * (grid.radial / SIGMA) ** 2)
+    table = et.BsdfTable(BsdfData([BsdfSlice(direction(60.0, 180.0), values[None], grid=grid)]))
+    assert table.reflectance([0.0, 10.0, 40.0, 60.0]) == pytest.approx(share, rel=2e-3)
+    assert float(table.reflectance(75.0)) == pytest.approx(
+        share * quadrature(lobe, 75.0) / quadrature(lobe, 60.0), rel=0.01
+    )
+    off = np.array([0.0, 0.1, 0.2, 0.3])
+    peak = share / (2.0 * math.pi * SIGMA**2)
+    for azimuth in (0.0, 70.0, 180.0):
+        f = table.evaluate([0, 0, 1], direction(np.degrees(np.arcsin(off)), azimuth))
+        assert f == pytest.approx(peak * np.exp(-0.5 * (off / SIGMA) ** 2), rel=0.02)
+
+
 def even(share: float, *, way: bool, wavelength: float | None = None, theta: float = 30.0) -> BsdfSlice:
     """A Lambertian slice, transmitted if `way`."""
     grid = PolarGrid("normal", np.array([0.0, 90.0]), np.array([0.0]))
@@ -257,20 +280,18 @@ def test_components_and_what_lies_between_incidences_are_scaled_as_a_whole() -> 
 
 def test_each_way_is_linear_between_its_own_wavelengths() -> None:
     """np.interp of the shares that were put in, constant beyond them; a way without a wavelength is the same at all."""
-    back, through = {450.0: 0.2, 550.0: 0.3, 650.0: 0.1}, {500.0: 0.1, 600.0: 0.5}
-    coloured = [even(share, way=False, wavelength=at) for at, share in back.items()]
+    back, through = {450.0: 0.2, 650.0: 0.1}, {500.0: 0.1, 600.0: 0.5}
+    coloured = [even(share, way=False, wavelength=at, theta=0.0) for at, share in back.items()]
     asked = (400.0, 450.0, 500.0, 525.0, 550.0, 600.0, 650.0, 700.0)
-    other = [even(share, way=True, wavelength=at) for at, share in through.items()]
-    table, plain = (et.BsdfTable(BsdfData(coloured + more)) for more in (other, [even(0.25, way=True)]))
+    other = [even(share, way=True, wavelength=at, theta=0.0) for at, share in through.items()]
+    table, plain = (et.BsdfTable(BsdfData(coloured + more)) for more in (other, [even(0.25, way=True, theta=0.0)]))
     for at in asked:
         r, t = (np.interp(at, [*way], [*way.values()]) for way in (back, through))
         assert table.reflectance(30.0, wavelength=at) == pytest.approx(r, abs=1e-9)
         assert table.transmittance(30.0, wavelength=at) == pytest.approx(t, abs=1e-9)
         assert plain.reflectance(30.0, wavelength=at) == pytest.approx(r, abs=1e-9)
         assert plain.transmittance(30.0, wavelength=at) == pytest.approx(0.25, abs=1e-9)
-        assert plain.evaluate(direction(30.0, 0.0), [0, 0, -1], wavelength=at) == pytest.approx(
-            0.25 / math.pi, abs=1e-9
-        )
+        assert plain.evaluate([0, 0, 1], [0, 0, -1], wavelength=at) == pytest.approx(0.25 / math.pi, abs=1e-9)
 
 
 def test_a_slice_without_a_wavelength_holds_where_no_other_is_stated() -> None:

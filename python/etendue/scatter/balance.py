@@ -37,8 +37,7 @@ def balanced(data: BsdfData, shares: Sequence[float]) -> tuple[list[float], floa
     """Shares of slices with which no more light leaves than arrives, and a weight of everything for what is left.
 
     At the incidences of the slices both ways are scaled so that they make 1 with the components. What exceeds 1 after that
-    is due to components alone, or lies between incidences; everything is multiplied by the weight for it. Of slices without
-    components nothing is looked at below the first incidence, where nothing is known.
+    is due to components alone, or lies between incidences; everything is multiplied by the weight for it.
 
     Parameters
     ----------
@@ -114,8 +113,6 @@ def _everywhere(data: BsdfData, members: Sequence[_core.Bsdf]) -> Iterator[tuple
     angles = np.concatenate(
         [np.arange(0.0, 90.0 + STEP, STEP), [one.theta for one in data.slices], _nodes(data, "angle")]
     )
-    if len(members) == 1:
-        angles = angles[angles >= min(one.theta for one in data.slices)]
     azimuths = np.unique(np.append(AROUND, [] if data.isotropic else [one.phi for one in data.slices]))
     theta = np.repeat(np.unique(angles), len(azimuths))
     phi = np.tile(azimuths, len(theta) // len(azimuths))

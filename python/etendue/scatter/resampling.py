@@ -67,8 +67,9 @@ def lobes_of(
     """Slices of one way and one wavelength on the grid of the core: by azimuth of incidence [°], of rising incidence.
 
     Beyond the rim of the hemisphere, where a slice holds nothing and the lobe of a neighbouring incidence may reach, f goes
-    on in proportion to that of the slice before; that of the first is held constant. Single points stand for what is nearest
-    to them. If incidences are not known at the same azimuths, f is interpolated between azimuths, turned with them.
+    on in proportion to that of the slice before; that of the first to its mean over azimuths. Below the first incidence its
+    lobe keeps its share. Single points stand for what is nearest to them. If incidences are not known at the same azimuths,
+    f is interpolated between azimuths, turned with them.
 
     Light along the normal comes from no azimuth. Unless the sample is isotropic, f stays where it is in the frame of the
     sample: there is a row at azimuth 0, from which the core takes such light to come, and if no slice is known there, the
@@ -128,10 +129,12 @@ def lobes_of(
             before = _continued(f, before)
             members.append((sine, before, share))
             lows.append(_low(radial, f))
-        found[row] = [
+        lobes = [
             _lobe(sine, radial, whole, share, floor=floor)
             for (sine, whole, share), floor in zip(members, _floors(lows), strict=True)
         ]
+        # Below the first incidence no more is scattered than there, though less of the lobe is cut by the horizon.
+        found[row] = lobes if lobes[0].sine == 0.0 else [dataclasses.replace(lobes[0], sine=0.0), *lobes]
     return found
 
 
@@ -265,7 +268,10 @@ def _nearest(one: BsdfSlice, directions: Array) -> Array:
 
 
 def _continued(f: Array, before: Array | None) -> Array:
-    """Missing values along each azimuth in proportion to those of the slice before, or the last one there is."""
+    """Missing values along each azimuth in proportion to those of the slice before, or to the mean of all azimuths.
+
+    The mean falls away from the specular direction, or is held: what rises there is another lobe, as of light sent back.
+    """
     # At grazing incidence the hemisphere may end before the first step: the specular direction itself is common to all.
     centre = f[:, 0][~np.isnan(f[:, 0])]
     f = f.copy()
@@ -274,7 +280,9 @@ def _continued(f: Array, before: Array | None) -> Array:
     last = np.maximum.accumulate(np.where(missing, 0, np.arange(f.shape[1])), axis=1)
     held = np.take_along_axis(f, last, axis=1)
     if before is None:
-        return np.asarray(held)
+        known = ~missing
+        mean = np.where(known, f, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        before = np.broadcast_to(np.minimum.accumulate(np.where(known.any(axis=0), mean, np.inf)), f.shape)
     there = np.take_along_axis(before, last, axis=1)
     ratio = np.divide(before, there, out=np.ones_like(before), where=missing & (there > 0.0))
     return np.asarray(held * ratio)

@@ -21,8 +21,8 @@ from etendue.scatter.scans.scans import Scans
 class BsdfTable(Bsdf):
     """A BSDF as a table of slices, with the components that a file describes by models.
 
-    Between incidences the lobe moves with the specular direction and keeps its energy; beyond the last it moves unchanged,
-    and what leaves the hemisphere is absorbed: docs/scatter.md. Samples are exact.
+    Between incidences the lobe moves with the specular direction and keeps its energy, below the first as well; beyond the
+    last it moves unchanged, and what leaves the hemisphere is absorbed: docs/scatter.md. Samples are exact.
 
     Parameters
     ----------
