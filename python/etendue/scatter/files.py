@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from etendue.quantities.bsdf_data import LEAN, BsdfData
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf
 from etendue.scatter.models import MODELS
-from etendue.scatter.models.finish import Finish
+from etendue.scatter.models.finish import Finish, Record
 from etendue.scatter.models.shares import PARTS, Scattering
 from etendue.scatter.table import BsdfTable
 
@@ -94,6 +94,20 @@ def _joined(parts: Sequence[BsdfData], names: Sequence[str]) -> BsdfData:
     )
 
 
+def _parts(record: Record) -> Iterator[Record]:
+    """What the core takes as one, without the sums that it is part of."""
+    if record["kind"] != "sum":
+        yield record
+        return
+    for _, member in record["members"]:
+        yield from _parts(member)
+
+
+def _isotropic(record: Record) -> bool:
+    """Whether no lobe of a model is wider across the axis than along it, and no surface rougher."""
+    return all(part.get("aspect", 1.0) == 1.0 and part.get("alpha_x") == part.get("alpha_y") for part in _parts(record))
+
+
 class _Asked:
     """A BSDF as writers ask for it."""
 
@@ -101,7 +115,7 @@ class _Asked:
         data = bsdf.data if isinstance(bsdf, BsdfTable) else None
         self._bsdf = bsdf
         self.name = data.name if data else type(bsdf).__name__
-        self.isotropic = data.isotropic if data else True
+        self.isotropic = _isotropic(bsdf.record(Files())) and (data.isotropic if data else True)
         self.both_sides = data.both_sides if data else True
         self.wavelengths: tuple[float, ...] = data.wavelengths if data else ()
         self.incidences: tuple[float, ...] = bsdf.incidences if isinstance(bsdf, BsdfTable) else INCIDENCES
@@ -186,7 +200,8 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
     if form.fits is None or form.tabulate is None:
         raise ArgumentError(f"{form.title} is read only")
     if isinstance(bsdf, Finish) and form.name == "etendue":
-        return BsdfData(components=(bsdf.to_dict(),), name=type(bsdf).__name__), ()
+        isotropic = _isotropic(bsdf.record(Files()))
+        return BsdfData(components=(bsdf.to_dict(),), isotropic=isotropic, name=type(bsdf).__name__), ()
     if isinstance(bsdf, BsdfTable) and form.fits(bsdf.data):
         return bsdf.data, ()
     mirrored, refracted, back, through = bsdf.ways
@@ -195,7 +210,10 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
     lost = []
     if mirrored or refracted:
         lost.append("light that is mirrored or goes on in a single direction is not in the file")
-    data = form.tabulate(_Asked(bsdf))
+    asked = _Asked(bsdf)
+    data = form.tabulate(asked)
+    if data.isotropic and not asked.isotropic:
+        lost.append(f"only light from azimuth {data.slices[0].phi:g}° of an anisotropic sample is in the file")
     kept = {one.transmitted for one in data.slices}
     if back and through and len(kept) == 1:
         lost.append(f"the file holds {'transmitted' if True in kept else 'reflected'} light only")
