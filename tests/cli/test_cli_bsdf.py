@@ -10,6 +10,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.quantities.bsdf_data import PolarGrid, direction
+from oracles.tracepro_files import abg_side, surface_property
 
 from cli.outcome import Run
 
@@ -54,6 +55,20 @@ def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) ->
     assert Path("pet.txt").read_text().startswith("TracePro Surface Property Data")
     gloss = json.loads(run("bsdf", "gloss", "pet.h5", "--json").out)
     assert set(gloss["gloss"]) == {"20", "60", "85"}
+
+
+@pytest.mark.slow
+def test_a_formula_of_another_program_becomes_a_table(run: Run) -> None:
+    """ABg of TracePro in Zemax' layout: the same f along the specular direction, which is a node of the table."""
+    Path("abg.txt").write_text(surface_property(scatter=1, sections=[abg_side(a=0.01)]))
+    assert not et.read_bsdf("abg.txt").data.slices
+    told = run("bsdf", "convert", "abg.txt", "abg.bsdf")
+    assert told.status == 0, told.err
+    f = [
+        float(et.read_bsdf(path).evaluate(direction(40.0, 0.0), direction(40.0, 180.0)))
+        for path in ("abg.txt", "abg.bsdf")
+    ]
+    assert f[1] == pytest.approx(f[0], rel=1e-3)
 
 
 def test_mistakes_are_told_and_nothing_is_written(run: Run, scans: list[Path]) -> None:

@@ -195,6 +195,25 @@ def test_a_model_in_a_file_is_as_isotropic_as_it_is(tmp_path: Path, bsdf: et.Bsd
     assert et.read_bsdf(tmp_path / "model.h5").isotropic is isotropic
 
 
+@pytest.mark.parametrize(
+    "form", [form for form in WRITTEN if form.name not in ("klems", "tensor-tree")], ids=lambda form: form.name
+)
+def test_a_file_of_models_alone_is_tabled_as_the_models_are(
+    form: BsdfFormat, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its bytes are those of the same formula that never was in a file; but for the name."""
+    monkeypatch.setattr("etendue.scatter.files.INCIDENCES", (0.0, 40.0))
+    model = et.bsdf.ABg(a=0.02, b=0.05, g=2)
+    et.write_bsdf(tmp_path / "model.h5", model)
+    paths = [tmp_path / f"{name}{form.extensions[0]}" for name in ("model", "again")]
+    lost = [
+        et.write_bsdf(path, bsdf)
+        for path, bsdf in zip(paths, (model, et.read_bsdf(tmp_path / "model.h5")), strict=True)
+    ]
+    assert lost[0] == lost[1]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "form", [form for form in WRITTEN if form.name not in ("klems", "tensor-tree")], ids=lambda form: form.name

@@ -23,7 +23,7 @@ from etendue.scatter.models.shares import PARTS, Scattering
 from etendue.scatter.table import BsdfTable
 
 INCIDENCES = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 85.0)
-"""Angles [°] at which a model is tabled."""
+"""Angles [°] at which a model is tabled, and a file that holds models alone."""
 
 
 def read_bsdf(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> BsdfTable:
@@ -118,7 +118,7 @@ class _Asked:
         self.isotropic = _isotropic(bsdf.record(Files())) and (data.isotropic if data else True)
         self.both_sides = data.both_sides if data else True
         self.wavelengths: tuple[float, ...] = data.wavelengths if data else ()
-        self.incidences: tuple[float, ...] = bsdf.incidences if isinstance(bsdf, BsdfTable) else INCIDENCES
+        self.incidences: tuple[float, ...] = (bsdf.incidences if isinstance(bsdf, BsdfTable) else ()) or INCIDENCES
         _, _, self.reflects, self.transmits = bsdf.ways
 
     def evaluate(
