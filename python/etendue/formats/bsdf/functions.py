@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import numpy.typing as npt
 
+from etendue.formats.bsdf.bsdf_format import Tabulated
 from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, light_from
 
 Array = npt.NDArray[np.float64]
@@ -23,6 +24,42 @@ RADIAL = np.concatenate(
 """Angles from the specular direction [°]."""
 
 AZIMUTH_STEP = 5.0
+
+RIM = 1e-7
+"""Height at which f along the surface is taken: rounding leaves such directions on either side of it, up to `GRAZING`."""
+
+
+def values_on(
+    grid: PolarGrid, bsdf: Tabulated, incident: Array, *, transmitted: bool, wavelength: float | None = None
+) -> Array:
+    """F [1/sr] on a grid about the specular direction: along the surface as just above it, 0 beyond the hemisphere.
+
+    Parameters
+    ----------
+    grid : PolarGrid
+        In angles or direction cosines.
+    bsdf : Tabulated
+        What is asked.
+    incident : array, shape (3,)
+        Unit vector to where the light comes from.
+    transmitted : bool
+        Whether the light passes to the other side.
+    wavelength : float, optional
+        In nm.
+
+    Returns
+    -------
+    array, of the shape of the grid
+    """
+    scattered = grid.directions(incident, transmitted=transmitted)
+    there = ~np.isnan(scattered[..., 0])
+    to = scattered[there]
+    side = 1.0 if (incident[2] > 0.0) != transmitted else -1.0
+    to[:, 2] = side * np.maximum(side * to[:, 2], RIM)
+    to /= np.linalg.norm(to, axis=-1, keepdims=True)
+    values = np.zeros(grid.shape)
+    values[there] = bsdf.evaluate(incident, to, wavelength=wavelength)
+    return values
 
 
 def sampled(

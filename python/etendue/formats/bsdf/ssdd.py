@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
-from etendue.formats.bsdf.functions import AZIMUTH_STEP, RADIAL, sampled
+from etendue.formats.bsdf.functions import AZIMUTH_STEP, RADIAL, sampled, values_on
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number
@@ -350,10 +350,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
         for turn in ((0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))) if is_there else ():
             for theta in bsdf.incidences:
                 incident = light_from(theta, turn)
-                scattered = grid.directions(incident, transmitted=transmitted)
-                beyond = np.isnan(scattered[..., 0])
-                scattered[beyond] = [0.0, 0.0, -1.0 if transmitted else 1.0]
-                values = np.where(beyond, 0.0, bsdf.evaluate(incident, scattered))
+                values = values_on(grid, bsdf, incident, transmitted=transmitted)
                 slices.append(BsdfSlice(incident, values, transmitted, grid=grid))
     return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, name=bsdf.name)
 

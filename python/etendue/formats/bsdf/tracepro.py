@@ -14,6 +14,7 @@ import numpy.typing as npt
 from etendue.errors import UnsupportedFormatError
 from etendue.formats.bsdf import tracepro_tables
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.functions import values_on
 from etendue.formats.bsdf.tracepro_balance import Lit, chosen, only
 from etendue.formats.bsdf.tracepro_lines import (
     COLUMNS,
@@ -273,10 +274,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
                 incident = light_from(theta, light, behind=not front)
                 start = forwards(light, turning=bsdf.isotropic)
                 grid = PolarGrid("cosines", BETA, np.arange(0.0, 360.0, AZIMUTH_STEP) - start)
-                scattered = grid.directions(incident, transmitted=transmitted)
-                beyond = np.isnan(scattered[..., 0])
-                scattered[beyond] = [0.0, 0.0, 1.0 if front != transmitted else -1.0]
-                values = np.where(beyond, 0.0, bsdf.evaluate(incident, scattered))
+                values = values_on(grid, bsdf, incident, transmitted=transmitted)
                 slices.append(BsdfSlice(incident, values, transmitted, grid=grid))
     return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, both_sides=bsdf.both_sides, name=bsdf.name)
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.functions import values_on
 from etendue.formats.bsdf.shares import disagreements
 from etendue.formats.bsdf.tokens import Tokens
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
@@ -143,10 +144,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     for phi in phis:
         for theta in bsdf.incidences:
             incident = light_from(theta, phi)
-            scattered = grid.directions(incident, transmitted=transmitted)
-            beyond = np.isnan(scattered[..., 0])
-            scattered[beyond] = [0.0, 0.0, -1.0 if transmitted else 1.0]
-            values = np.where(beyond, 0.0, bsdf.evaluate(incident, scattered))
+            values = values_on(grid, bsdf, incident, transmitted=transmitted)
             one = BsdfSlice(incident, values, transmitted, grid=grid)
             slices.append(BsdfSlice(incident, values, transmitted, grid=grid, stated=one.integral()))
     return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, name=bsdf.name)
