@@ -9,7 +9,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import pytest
-from etendue.quantities.bsdf_data import PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
 from oracles.tracepro_files import abg_side, surface_property
 
 from cli.outcome import Run
@@ -69,6 +69,25 @@ def test_a_formula_of_another_program_becomes_a_table(run: Run) -> None:
         for path in ("abg.txt", "abg.bsdf")
     ]
     assert f[1] == pytest.approx(f[0], rel=1e-3)
+
+
+@pytest.mark.slow
+def test_each_wavelength_is_told(run: Run) -> None:
+    grid = PolarGrid("normal", np.array([0.0, 90.0]), np.array([0.0]))
+    slices = [
+        BsdfSlice(direction(theta, 0.0), [[share / math.pi] * 2], grid=grid, wavelength=wavelength)
+        for wavelength, share in ((650.0, 0.8), (450.0, 0.2))
+        for theta in (50.0, 10.0)
+    ]
+    et.write_bsdf("rising.h5", et.BsdfTable(BsdfData(slices)))
+    told = run("bsdf", "info", "rising.h5").out.splitlines()
+    assert [line.strip() for line in told[1:5]] == [
+        "front, 10°, 450 nm: 0.2000 reflected",
+        "front, 10°, 650 nm: 0.8000 reflected",
+        "front, 50°, 450 nm: 0.2000 reflected",
+        "front, 50°, 650 nm: 0.8000 reflected",
+    ]
+    assert told[5].startswith("reflectance at 555 nm: 0.5150 at 0°")
 
 
 def test_mistakes_are_told_and_nothing_is_written(run: Run, scans: list[Path]) -> None:

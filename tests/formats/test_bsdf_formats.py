@@ -195,6 +195,82 @@ def test_tables_in_scenes_are_those_that_were_written(form: BsdfFormat, tmp_path
         assert float(again.reflectance(theta)) == pytest.approx(float(bsdf.reflectance(theta)), rel=0.015), theta
 
 
+COLOURED = ("astm", "bird", "etendue", "lighttools", "speos-brdf")
+"""Formats that hold wavelengths."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", WRITTEN, ids=lambda form: form.name)
+def test_wavelengths_are_in_the_file_or_it_is_told_which_one_is(
+    form: BsdfFormat, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a surface whose reflectance is 0.2 at 450 nm, 0.8 at 650 nm and linear in between; as a model, and as a table."""
+    monkeypatch.setattr("etendue.scatter.files.INCIDENCES", (0.0, 40.0))
+    rising = et.bsdf.Lambertian(reflectance={"wavelength": [450, 650], "values": [0.2, 0.8]})
+    grid = PolarGrid("cosines", np.array([0.0, 2.0]), np.array([0.0]))
+    slices = [
+        BsdfSlice(direction(theta, 0.0), [[share / math.pi] * 2], grid=grid, wavelength=wavelength)
+        for theta in (10.0, 50.0)
+        for wavelength, share in ((450.0, 0.2), (650.0, 0.8))
+    ]
+    # Large files: the model will do.
+    asked = [rising] if form.name in ("klems", "tensor-tree") else [rising, et.BsdfTable(BsdfData(slices))]
+    for k, bsdf in enumerate(asked):
+        path = tmp_path / f"rising{k}{form.extensions[0]}"
+        lost = et.write_bsdf(path, bsdf)
+        again = et.read_bsdf(path)
+        told = "no wavelength is in the file: its values are those at 555 nm"
+        assert (told in lost) is (form.name not in COLOURED)
+        waves = np.array([450.0, 500.0, 650.0])
+        expected = 0.2 + 0.6 * (waves - 450.0) / 200.0 if form.name in COLOURED else np.full(3, 0.515)
+        # 5e-4: shares are integrals over grids, whose cells the rim of the hemisphere cuts.
+        assert [float(again.reflectance(20, wavelength=wave)) for wave in waves] == pytest.approx(expected, rel=5e-4)
+
+
+def test_a_single_wavelength_is_in_the_file_or_told(tmp_path: Path) -> None:
+    grid = PolarGrid("specular", np.array([0.0, 90.0]), np.array([0.0, 180.0]))
+    one = BsdfSlice(direction(10, 180), np.full((2, 2), 0.1), grid=grid, wavelength=633.0)
+    red = et.BsdfTable(BsdfData([one], name="red"))
+    told = "no wavelength is in the file: its values are those at 633 nm"
+    assert told in et.write_bsdf(tmp_path / "as_it_is.bsdf", red)
+    assert told in et.write_bsdf(tmp_path / "tabled.ssdd", red)
+    assert told not in et.write_bsdf(tmp_path / "red.astm", red)
+    again = et.read_bsdf(tmp_path / "red.astm")
+    assert again.wavelengths == (633.0,)
+    # What is in that layout already is written as it is.
+    assert et.write_bsdf(tmp_path / "again.astm", again) == ()
+    assert (tmp_path / "again.astm").read_bytes() == (tmp_path / "red.astm").read_bytes()
+
+
+def test_spectra_at_each_nanometre_are_thinned_and_that_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("etendue.scatter.files.INCIDENCES", (40.0,))
+    waves = np.arange(400.0, 701.0)
+    rising = et.bsdf.Lambertian(reflectance={"wavelength": waves.tolist(), "values": (waves / 1000.0).tolist()})
+    lost = et.write_bsdf(tmp_path / "rising.json", rising)
+    assert "260 wavelengths between those of the file are left out" in lost
+    kept = read_bsdf_data(tmp_path / "rising.json").wavelengths
+    assert (len(kept), kept[0], kept[-1]) == (41, 400.0, 700.0)
+
+
+def test_ways_of_different_wavelengths_in_one_file(tmp_path: Path) -> None:
+    """Reflected light in two colours, and transmitted light in none: tabled, for a `.brdf` has both at the same ones."""
+    grid = PolarGrid("normal", np.array([0.0, 90.0]), np.arange(0.0, 360.0, 90.0))
+    slices = [
+        BsdfSlice(direction(10, 180), np.full((4, 2), f), transmitted, grid=grid, wavelength=wavelength)
+        for f, transmitted, wavelength in ((0.1, False, 450.0), (0.2, False, 650.0), (0.05, True, None))
+    ]
+    bsdf = et.BsdfTable(BsdfData(slices))
+    et.write_bsdf(tmp_path / "x.brdf", bsdf)
+    again = et.read_bsdf(tmp_path / "x.brdf")
+    assert again.wavelengths == (450.0, 650.0)
+    for wave in again.wavelengths:
+        for share in ("reflectance", "transmittance"):
+            found, expected = (float(getattr(one, share)(10, wavelength=wave)) for one in (again, bsdf))
+            assert found == pytest.approx(expected, rel=1e-6)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("form", WRITTEN, ids=lambda form: form.name)
 def test_a_lambertian_surface_is_the_same_everywhere_in_its_file(form: BsdfFormat, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from etendue.formats.bsdf import BSDF_FORMATS
 from etendue.plot import plot_bsdf
 from etendue.quantities.measured import measured
 from etendue.scatter.appearance import GLASS, appearance
+from etendue.scatter.bsdf import WAVELENGTH
 from etendue.scatter.files import read_bsdf, write_bsdf
 from etendue.scatter.scans.files import read_scans
 from etendue.scatter.scans.interpolations import METHODS
@@ -47,13 +48,15 @@ def info(files: Files, json: Json = False) -> None:
         stated = "" if one["stated"] is None else f", stated {one['stated']:.4f}"
         way = "transmitted" if one["transmitted"] else "reflected"
         place = f"{one['side']}, {one['theta']:g}°" + (f", azimuth {one['phi']:g}°" if not bsdf.isotropic else "")
+        place += "" if one["wavelength"] is None else f", {one['wavelength']:g} nm"
         say(f"  {place}: {one['share']:.4f} {way}{stated}")
     for part in facts["components"]:
         say(f"  component {part}")
+    colour = f" at {WAVELENGTH:g} nm" if bsdf.wavelengths else ""
     for key in ("reflectance", "transmittance"):
         if max(facts[key]) > 0.0:
             told = ", ".join(f"{share:.4f} at {angle:g}°" for angle, share in zip(ANGLES, facts[key], strict=True))
-            say(f"{key}: {told}")
+            say(f"{key}{colour}: {told}")
     say(f"reciprocity: f there and back differ by {facts['reciprocity']:.1%} on average")
 
 
@@ -63,7 +66,9 @@ def _named(files: list[Path]) -> str:
 
 def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
     # A file of many slices is told by the first azimuth.
-    first = {(one.front, one.transmitted, round(one.theta, 6)): one for one in reversed(bsdf.data.slices)}
+    first = {
+        (one.front, one.transmitted, round(one.theta, 6), one.wavelength): one for one in reversed(bsdf.data.slices)
+    }
     tables = [
         {
             "side": "front" if one.front else "back",
@@ -74,7 +79,9 @@ def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
             "share": one.integral(),
             "stated": one.stated,
         }
-        for one in sorted(first.values(), key=lambda one: (not one.front, one.transmitted, one.theta))
+        for one in sorted(
+            first.values(), key=lambda one: (not one.front, one.transmitted, one.theta, one.wavelength or 0.0)
+        )
     ]
     angles = np.array(ANGLES)
     return {

@@ -25,6 +25,9 @@ from etendue.scatter.table import BsdfTable
 INCIDENCES = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 85.0)
 """Angles [°] at which a model is tabled, and a file that holds models alone."""
 
+MOST_WAVELENGTHS = 41
+"""At which a model is tabled: spectra measured at each nanometre would make files of gigabytes."""
+
 
 def read_bsdf(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> BsdfTable:
     """Read a BSDF; the format is found from the content.
@@ -108,6 +111,13 @@ def _isotropic(record: Record) -> bool:
     return all(part.get("aspect", 1.0) == 1.0 and part.get("alpha_x") == part.get("alpha_y") for part in _parts(record))
 
 
+def _wavelengths(record: Record) -> set[float]:
+    """Between which shares of a model are linear [nm]; none where they are the same at all."""
+    grids = [value for part in _parts(record) for value in part.values() if isinstance(value, dict)]
+    nodes = [np.asarray(grid["wavelength"]) for grid in grids if "wavelength" in grid]
+    return {float(node) for one in nodes if one.size > 1 for node in one}
+
+
 class _Asked:
     """A BSDF as writers ask for it."""
 
@@ -115,9 +125,13 @@ class _Asked:
         data = bsdf.data if isinstance(bsdf, BsdfTable) else None
         self._bsdf = bsdf
         self.name = data.name if data else type(bsdf).__name__
-        self.isotropic = _isotropic(bsdf.record(Files())) and (data.isotropic if data else True)
+        record = bsdf.record(Files())
+        self.isotropic = _isotropic(record) and (data.isotropic if data else True)
         self.both_sides = data.both_sides if data else True
-        self.wavelengths: tuple[float, ...] = data.wavelengths if data else ()
+        nodes = sorted(_wavelengths(record))
+        kept = np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), MOST_WAVELENGTHS)).round().astype(int))
+        self.left_out = len(nodes) - kept.size
+        self.wavelengths = tuple(sorted({nodes[k] for k in kept}.union(data.wavelengths if data else ())))
         self.incidences: tuple[float, ...] = (bsdf.incidences if isinstance(bsdf, BsdfTable) else ()) or INCIDENCES
         _, _, self.reflects, self.transmits = bsdf.ways
 
@@ -214,6 +228,12 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
     data = form.tabulate(asked)
     if data.isotropic and not asked.isotropic:
         lost.append(f"only light from azimuth {data.slices[0].phi:g}° of an anisotropic sample is in the file")
+    if asked.wavelengths and not data.wavelengths:
+        # What a table does not know is that of the nearest wavelength.
+        at = min(max(WAVELENGTH, asked.wavelengths[0]), asked.wavelengths[-1])
+        lost.append(f"no wavelength is in the file: its values are those at {at:g} nm")
+    elif asked.left_out:
+        lost.append(f"{asked.left_out} wavelengths between those of the file are left out")
     kept = {one.transmitted for one in data.slices}
     if back and through and len(kept) == 1:
         lost.append(f"the file holds {'transmitted' if True in kept else 'reflected'} light only")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from pathlib import Path
 from typing import BinaryIO
@@ -130,40 +131,61 @@ def _channels(path: Path, names: list[str], begin: int) -> tuple[list[tuple[int,
 
 
 def fits(data: BsdfData) -> bool:
-    """Whether the slices are tables about the normal below 90°, of one colour."""
+    """Whether the slices are tables about the normal below 90°, at the same wavelengths for each incidence and way."""
     return (
         bool(data.slices)
         and not data.components
         and all(
             one.grid is not None
             and one.grid.frame == "normal"
-            and one.wavelength is None
             and one.grid.radial[-1] < 90.0
             and not np.isnan(one.values).any()
             for one in data.slices
         )
+        and len({tuple(one.wavelength for one in colours) for colours in _colours(data)}) == 1
+        and all(_alike(colours) for colours in _colours(data))
     )
 
 
+def _colours(data: BsdfData) -> list[list[BsdfSlice]]:
+    """The slices of each incidence and way, of rising wavelength."""
+    found: dict[tuple[float, float, bool, bool], list[BsdfSlice]] = {}
+    for one in sorted(data.slices, key=lambda one: one.wavelength or 0.0):
+        found.setdefault((round(one.theta, 9), round(one.phi, 9), one.front, one.transmitted), []).append(one)
+    return list(found.values())
+
+
+def _alike(colours: list[BsdfSlice]) -> bool:
+    """Whether slices are on one grid, each of another wavelength."""
+    grids = [one.grid for one in colours if one.grid is not None]
+    same = all(
+        np.array_equal(one.radial, grids[0].radial) and np.array_equal(one.azimuth, grids[0].azimuth) for one in grids
+    )
+    return same and len({one.wavelength for one in colours}) == len(colours)
+
+
 def tabulate(bsdf: Tabulated) -> BsdfData:
-    """Light from both sides, or from the front if the back is alike; reflected and transmitted."""
+    """Light from both sides, or from the front if the back is alike; reflected and transmitted, at each known wavelength."""
     turns = (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))
     slices = []
     for front in (True,) if bsdf.both_sides else (True, False):
         for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
             for turn in turns if is_there else ():
-                for theta in bsdf.incidences:
+                for theta, wave in itertools.product(bsdf.incidences, bsdf.wavelengths or (None,)):
                     incident = light_from(theta, (180.0 + turn) % 360.0, behind=not front)
                     grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP))
                     scattered = grid.directions(incident, transmitted=transmitted)
-                    slices.append(BsdfSlice(incident, bsdf.evaluate(incident, scattered), transmitted, grid=grid))
+                    values = bsdf.evaluate(incident, scattered, wavelength=wave)
+                    slices.append(BsdfSlice(incident, values, transmitted, grid=grid, wavelength=wave))
     return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, both_sides=bsdf.both_sides, name=bsdf.name)
 
 
 def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
-    """Write all points, twelve digits of the angles and nine of the values."""
+    """Write all points, twelve digits of the angles and nine of the values; a column for each wavelength."""
     rows = []
-    for one in data.slices:
+    places = _colours(data)
+    for colours in places:
+        one, values = colours[0], np.stack([colour.values for colour in colours])
         grid = one.grid
         assert grid is not None  # noqa: S101 - `fits` says so
         theta_i = np.radians(one.theta if one.front else 180.0 - one.theta)
@@ -173,10 +195,12 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
             for i, t in enumerate(polar):
                 if i == 0 and k > 0 and grid.radial[0] == 0.0:
                     continue
-                rows.append(f"{theta_i:.12g},{np.radians(one.phi):.12g},{t:.12g},{a:.12g},{one.values[k, i]:.9g}")
+                f = ",".join(f"{value:.9g}" for value in values[:, k, i])
+                rows.append(f"{theta_i:.12g},{np.radians(one.phi):.12g},{t:.12g},{a:.12g},{f}")
     name = " ".join(data.name.encode("ascii", "replace").decode("ascii").split())
     head = ["LAB_NAME -", "SYSTEM_NAME etendue", f"SAMPLE_NAME {name}", f"NUM_POINTS {len(rows)}"]
-    head.append(f"VARS {','.join(ANGLES)},BSDF")
+    names = ["BSDF" if one.wavelength is None else f"{one.wavelength:.9g}nm" for one in places[0]]
+    head.append(f"VARS {','.join([*ANGLES, *names])}")
     stream.write(("\n".join([*head, *rows]) + "\n").encode("ascii"))
     lost = []
     if any(one.standard_error is not None for one in data.slices):

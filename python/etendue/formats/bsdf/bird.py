@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 from pathlib import Path
@@ -175,14 +176,14 @@ def fits(data: BsdfData) -> bool:
 
 
 def tabulate(bsdf: Tabulated) -> BsdfData:
-    """Reflected light that meets the front."""
+    """Reflected light that meets the front, at each wavelength that is known."""
     slices = []
     for turn in (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN)):
-        for theta in bsdf.incidences:
+        for theta, wave in itertools.product(bsdf.incidences, bsdf.wavelengths or (None,)):
             incident = light_from(theta, (180.0 + turn) % 360.0)
             grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP))
-            f = bsdf.evaluate(incident, grid.directions(incident, transmitted=False))
-            slices.append(BsdfSlice(incident, f, grid=grid))
+            f = bsdf.evaluate(incident, grid.directions(incident, transmitted=False), wavelength=wave)
+            slices.append(BsdfSlice(incident, f, grid=grid, wavelength=wave))
     return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, name=bsdf.name)
 
 

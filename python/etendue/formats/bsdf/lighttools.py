@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import re
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -175,21 +177,22 @@ def fits(data: BsdfData) -> bool:
 
 
 def tabulate(bsdf: Tabulated) -> BsdfData:
-    """Light from both sides, or from the front if the back is alike; reflected and transmitted."""
+    """Light from both sides, or from the front if the back is alike; reflected and transmitted, at each known wavelength."""
     turns = (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))
     grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP))
     slices = []
     for front in (True,) if bsdf.both_sides else (True, False):
         for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
             for turn in turns if is_there else ():
-                for theta in bsdf.incidences:
+                for theta, wave in itertools.product(bsdf.incidences, bsdf.wavelengths or (None,)):
                     incident = light_from(theta, (INCIDENT + turn) % 360.0, behind=not front)
                     # Along the surface, where a BSDF may have no value: just above it.
                     behind = front == transmitted
                     polar = np.minimum(THETA, RIGHT_ANGLE - 1e-7)
                     scattered = direction(polar[None, :], grid.azimuth[:, None], behind=behind)
-                    one = BsdfSlice(incident, bsdf.evaluate(incident, scattered), transmitted, grid=grid)
-                    slices.append(BsdfSlice(incident, one.values, transmitted, grid=grid, stated=one.integral()))
+                    values = bsdf.evaluate(incident, scattered, wavelength=wave)
+                    one = BsdfSlice(incident, values, transmitted, grid=grid, wavelength=wave)
+                    slices.append(dataclasses.replace(one, stated=one.integral()))
     return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, both_sides=bsdf.both_sides, name=bsdf.name)
 
 

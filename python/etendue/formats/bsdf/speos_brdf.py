@@ -99,7 +99,10 @@ def fits(data: BsdfData) -> bool:
             return False
         by_way.setdefault((one.transmitted, one.wavelength), []).append(round(one.theta, 9))
     angles = next(iter(by_way.values()))
-    return all(sorted(thetas) == sorted(set(angles)) for thetas in by_way.values())
+    waves = [{wave for other, wave in by_way if other == way} for way, _ in by_way]
+    return waves.count(waves[0]) == len(waves) and all(
+        sorted(thetas) == sorted(set(angles)) for thetas in by_way.values()
+    )
 
 
 def tabulate(bsdf: Tabulated) -> BsdfData:

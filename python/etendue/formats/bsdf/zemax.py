@@ -177,7 +177,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
     stream.write(("\n".join([*lines, "DataEnd"]) + "\n").encode("ascii"))
     lost = []
     if first.wavelength is not None:
-        lost.append("the format has no wavelength")
+        lost.append(f"no wavelength is in the file: its values are those at {first.wavelength:g} nm")
     if any(one.standard_error is not None for one in data.slices):
         lost.append("the format has no standard errors")
     if not first.front:
