@@ -180,6 +180,8 @@ def test_binary_values(tmp_path: Path) -> None:
     ("old", "new", "said"),
     [
         ("COLOR_MODEL rgb", "COLOR_MODEL cmyk", "COLOR_MODEL 'cmyk'"),
+        ("PARAM_TYPE", "PARAM_KIND", "PARAM_TYPE None"),
+        ("_coordinate_system", "_coordinates", "PARAM_TYPE 'half.*It is one of spherical_coordinate_system, specular"),
         ("PARAM0_LIST 0 90\nPARAM2_LIST 0 180", "PARAM0_LIST 90 0\nPARAM2_LIST 0 180", "no list of rising"),
         ("PARAM2_LIST 0 180", "PARAM2_LIST 0 999", "beyond their range"),
         ("0.05\n0.05\n", "0.05\n", "not 2 finite values"),

@@ -116,6 +116,9 @@ def _blocks(path: Path, data: bytes) -> tuple[list[Block], list[Complaint]]:
         if keys.get("DATA_TYPE") not in TYPES or keys.get("COLOR_MODEL") not in MODELS:
             found_text = f"DATA_TYPE {keys.get('DATA_TYPE')!r}, COLOR_MODEL {keys.get('COLOR_MODEL')!r}"
             raise FormatError(path, f"line {line}", found_text[:100], ADVICE)
+        if not keys["DATA_TYPE"].startswith("specular") and keys.get("PARAM_TYPE") not in SYSTEMS:
+            found_text = f"PARAM_TYPE {keys.get('PARAM_TYPE')!r}"
+            raise FormatError(path, f"line {line}", found_text[:100], f"It is one of {', '.join(SYSTEMS)}.")
         lists = [_list(path, line, keys, f"PARAM{k}_LIST") for k in range(5)]
         waves = _list(path, line, keys, "WAVELENGTH_LIST")
         colours = MODELS[keys["COLOR_MODEL"]] or waves.size
