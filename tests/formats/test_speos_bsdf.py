@@ -96,3 +96,12 @@ def test_the_same_vinyl_as_zemax_has_it(samples: Path, way: str) -> None:
     ratio = speos.at(at) / zemax.at(at)
     assert np.std(ratio) / np.mean(ratio) < 0.01
     assert np.mean(ratio) == pytest.approx(1.03, abs=0.02)
+
+
+def test_a_byte_order_mark_changes_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "x.anisotropicbsdf"
+    found = []
+    for encoding in ("utf-8", "utf-8-sig"):
+        path.write_text(hand(), encoding=encoding)
+        found.append([one.values.tolist() for one in read_bsdf_data(path).slices])
+    assert found[0] == found[1]

@@ -245,3 +245,14 @@ def test_what_shares_cannot_hold_is_refused_and_nothing_is_left(
     with pytest.raises(ArgumentError, match=said):
         et.write_bsdf(tmp_path / name, bsdf)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("text", [BRDF, COATED, SCATTERING, SIMPLE], ids=["brdf", "coated", "scattering", "simple"])
+def test_a_byte_order_mark_changes_nothing(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "x.speos"
+    found = []
+    for encoding in ("utf-8", "utf-8-sig"):
+        path.write_text(text, encoding=encoding)
+        data = read_bsdf_data(path)
+        found.append((data.name, data.components, [(one.wavelength, one.values.tolist()) for one in data.slices]))
+    assert found[0] == found[1]

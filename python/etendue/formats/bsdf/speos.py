@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import BinaryIO
 
@@ -31,7 +32,7 @@ WAYS = ("reflection", "transmission")
 
 def recognise(head: bytes) -> bool:
     """By the first line, of text or binary files."""
-    return head.startswith(START.encode("ascii"))
+    return head.removeprefix(BOM_UTF8).startswith(START.encode("ascii"))
 
 
 def read(path: Path) -> BsdfData:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import BinaryIO
 
@@ -26,7 +27,7 @@ ANY_COLOUR = (360.0, 830.0)
 
 def recognise(head: bytes) -> bool:
     """By the first line, of text or binary files."""
-    return head[: len(START)].lower() == START.lower().encode("ascii")
+    return head.removeprefix(BOM_UTF8).lower().startswith(START.lower().encode("ascii"))
 
 
 def read(path: Path) -> BsdfData:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import BinaryIO
 
@@ -31,7 +32,7 @@ WAYS = ("reflectance", "transmittance")
 
 def recognise(head: bytes) -> bool:
     """By the first line."""
-    return head.startswith(START)
+    return head.removeprefix(BOM_UTF8).startswith(START)
 
 
 def read(path: Path) -> BsdfData:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import BinaryIO
 
@@ -30,7 +31,7 @@ INCIDENCES = (0.0, 20.0, 40.0, 55.0, 70.0, 80.0, 85.0)
 
 def recognise(head: bytes) -> bool:
     """By the first line."""
-    return head.startswith(START)
+    return head.removeprefix(BOM_UTF8).startswith(START)
 
 
 def read(path: Path) -> BsdfData:
