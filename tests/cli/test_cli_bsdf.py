@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import etendue as et
@@ -42,7 +43,8 @@ def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) ->
     fitted = run("bsdf", "fit", *scans, "-o", "pet.h5", "--reflectance", "0.7", "--json")
     assert fitted.status == 0, fitted.err
     shares = json.loads(fitted.out)["shares"]
-    assert shares["10.0"] == pytest.approx(0.72, abs=0.04)
+    assert [(one["theta"], one["phi"], one["transmitted"]) for one in shares] == [(10, 180, False), (50, 180, False)]
+    assert shares[0]["share"] == pytest.approx(0.72, abs=0.04)
     told = run("bsdf", "info", "pet.h5", "--json")
     facts = json.loads(told.out)
     assert [one["share"] for one in facts["tables"]] == pytest.approx([0.7, 0.7], abs=1e-3)
@@ -71,7 +73,22 @@ def test_a_formula_of_another_program_becomes_a_table(run: Run) -> None:
     assert f[1] == pytest.approx(f[0], rel=1e-3)
 
 
-@pytest.mark.slow
+def test_each_azimuth_of_a_scan_is_told(run: Run) -> None:
+    """Flat scans from two azimuths, the second of 0.6 times the values of the first: their shares have that ratio."""
+    rows = [
+        f"40,{180 + turn},{theta},{phi},{f}"
+        for turn, f in ((0, 0.2), (90, 0.12))
+        for theta in range(0, 85, 10)
+        for phi in (0, 90, 180, 270)
+    ]
+    Path("scan.csv").write_text("\n".join(["theta_i,phi_i,theta_s,phi_s,bsdf", *rows]) + "\n")
+    told = run("bsdf", "fit", "scan.csv", "-o", "sheet.h5", "--method", "smooth").out
+    found = re.findall(r"40°, azimuth (180|270)°: the scans add up to ([0-9.]+)", told)
+    assert [azimuth for azimuth, _ in found] == ["180", "270"]
+    first, second = (float(share) for _, share in found)
+    assert second == pytest.approx(0.6 * first, abs=1e-4)
+
+
 def test_each_wavelength_is_told(run: Run) -> None:
     grid = PolarGrid("normal", np.array([0.0, 90.0]), np.array([0.0]))
     slices = [

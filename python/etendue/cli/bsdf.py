@@ -201,7 +201,15 @@ def fit(
     )
     table = BsdfTable.from_scans(scans, method)
     notes = list(write_bsdf(output, table))
-    shares = {round(one.theta, 6): one.stated for one in table.data.slices}
+    shares = [
+        {
+            "theta": round(one.theta, 6),
+            "phi": round(one.phi, 6),
+            "transmitted": one.transmitted,
+            "share": one.stated,
+        }
+        for one in table.data.slices
+    ]
     turning = scans.anisotropy()
     complaints = [str(complaint) for complaint in table.complaints]
     if json:
@@ -213,9 +221,11 @@ def fit(
         complain(line)
     if math.isfinite(turning):
         say(f"  turning the sample changes values by {turning:.1%} (root mean square)")
-    for theta, share in shares.items():
-        scaled = "" if reflectance is None else f", scaled to {reflectance:g}"
-        say(f"  {theta:g}°: the scans add up to {share:.4f}{scaled}")
+    scaled = "" if reflectance is None else f", scaled to {reflectance:g}"
+    for one in shares:
+        place = f"{one['theta']:g}°" + ("" if table.isotropic else f", azimuth {one['phi']:g}°")
+        way = " of transmitted light" if one["transmitted"] else ""
+        say(f"  {place}: the scans{way} add up to {one['share']:.4f}{scaled}")
     say(f"{output}: {len(table.data.slices)} incidences of {scans.values.size} values, {method}")
 
 
