@@ -107,6 +107,15 @@ def test_each_wavelength_is_told(run: Run) -> None:
     assert told[5].startswith("reflectance at 555 nm: 0.5150 at 0°")
 
 
+@pytest.mark.parametrize("angle", ["95", "90", "-1", "nan"])
+def test_no_lobe_of_light_that_does_not_arrive(run: Run, angle: str) -> None:
+    et.write_bsdf("film.h5", et.bsdf.Gaussian(peak=2, sigma=0.1))
+    wrong = run("bsdf", "plot", "film.h5", "-o", "film.png", "--incidence", angle)
+    assert wrong.status == 2
+    assert f"--incidence: {angle}° is not from 0 to below 90°" in wrong.err
+    assert not Path("film.png").exists()
+
+
 def test_mistakes_are_told_and_nothing_is_written(run: Run, scans: list[Path]) -> None:
     wrong = run("bsdf", "fit", *scans, "-o", "pet.h5", "--method", "smoth")
     assert wrong.status == 2

@@ -27,6 +27,9 @@ app = typer.Typer(help="Files of scatter data: what they hold, pictures of it, o
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0)
 """Angles of incidence at which shares are told [°]."""
 
+RIGHT_ANGLE = 90.0
+"""[°]"""
+
 File = Annotated[Path, typer.Argument(help="A file with a BSDF, of any format that étendue reads.")]
 Files = Annotated[
     list[Path], typer.Argument(help="A file with a BSDF; or several that hold a part each, as one incidence.")
@@ -110,6 +113,8 @@ def plot(
 ) -> None:
     """Draw f in the plane of incidence, the lobe in direction cosines, and the shares over the angle of incidence."""
     one_of(side, ("front", "back"), "--side")
+    if not 0.0 <= incidence < RIGHT_ANGLE:
+        raise typer.BadParameter(f"{incidence:g}° is not from 0 to below 90°", param_hint="--incidence")
     check_folder(output)
     bsdf = read_bsdf(file)
     complaints = [str(complaint) for complaint in bsdf.complaints]
