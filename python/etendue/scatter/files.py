@@ -16,7 +16,7 @@ from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data, w
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, ShareTables
 from etendue.quantities.bsdf_data import LEAN, BsdfData
 from etendue.quantities.report import Complaint
-from etendue.scatter.bsdf import WAVELENGTH, Bsdf
+from etendue.scatter.bsdf import WAVELENGTH, Bsdf, Side
 from etendue.scatter.models import MODELS
 from etendue.scatter.models.finish import Finish, Record
 from etendue.scatter.models.shares import PARTS, Scattering
@@ -27,6 +27,9 @@ INCIDENCES = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 85
 
 MOST_WAVELENGTHS = 41
 """At which a model is tabled: spectra measured at each nanometre would make files of gigabytes."""
+
+COARSE = 0.01
+"""Share of the light by which a table may be off without a word: what readers let pass, see `BsdfTable`."""
 
 
 def read_bsdf(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> BsdfTable:
@@ -238,4 +241,24 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
     if back and through and len(kept) == 1:
         lost.append(f"the file holds {'transmitted' if True in kept else 'reflected'} light only")
     lost.append("the values are a table made for this format")
+    lost += _too_coarse(bsdf, data)
     return data, tuple(lost)
+
+
+def _too_coarse(bsdf: Bsdf, data: BsdfData) -> list[str]:
+    """What is to be said of a table whose directions are too far apart for the lobe: where it is farthest off."""
+    worst, said = COARSE, []
+    for one in data.slices:
+        side: Side = "front" if one.front else "back"
+        wavelength = WAVELENGTH if one.wavelength is None else one.wavelength
+        ways = (bsdf.reflectance, bsdf.regular_reflectance)
+        if one.transmitted:
+            ways = (bsdf.transmittance, bsdf.regular_transmittance)
+        total, regular = (float(way(one.theta, one.phi, side, wavelength=wavelength)) for way in ways)
+        share = total - regular
+        found = one.integral()
+        if abs(found - share) > worst:
+            worst = abs(found - share)
+            told = f"at {one.theta:g}° of incidence they add up to {found:.3g} of the light, in truth {share:.3g}"
+            said = [f"the directions of the table are too far apart for the lobe: {told}"]
+    return said
