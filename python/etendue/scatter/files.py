@@ -51,7 +51,7 @@ def read_bsdf(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -
     FormatError
         If it is none of the formats, or damaged; UnsupportedFormatError for formats that are known and refused.
     ArgumentError
-        If a slice scatters more than 101 % of the light, two files hold the same one, or there is no file.
+        If more than 101 % of the light leaves, two files hold the same slice, or there is no file.
     OSError
         If a file cannot be opened.
 
@@ -67,8 +67,12 @@ def read_bsdf(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -
     paths = [path] if isinstance(path, str | os.PathLike) else list(path)
     if not paths:
         raise ArgumentError("there is no file to read")
-    parts = [read_bsdf_data(one) for one in paths]
-    return BsdfTable(parts[0] if len(parts) == 1 else _joined(parts, [Path(one).name for one in paths]))
+    parts, names = [read_bsdf_data(one) for one in paths], [Path(one).name for one in paths]
+    data = parts[0] if len(parts) == 1 else _joined(parts, names)
+    try:
+        return BsdfTable(data)
+    except ArgumentError as error:
+        raise ArgumentError(f"{', '.join(names)}: {error}") from error
 
 
 def _joined(parts: Sequence[BsdfData], names: Sequence[str]) -> BsdfData:
