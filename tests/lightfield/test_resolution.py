@@ -82,6 +82,25 @@ def test_the_same_on_any_threads_and_in_words(stated: Resolution) -> None:
     assert "more rays would resolve more" in stated.summary()
 
 
+@pytest.mark.parametrize("number", [1, 100])
+def test_what_rests_on_one_ray_is_told_all_the_same(number: int) -> None:
+    """With probability 1/e one ray drawn with Poisson's law is none: there is no contrast then, whatever the pitch."""
+    rays = spotted(pitch=None, seed=1, rays=number)
+    flux = np.ones(number)
+    flux[0] = 1e9
+    field = et.LightField.fit(et.RaySet(rays.position, rays.direction, flux), PLANE, depths=(2, 2, 4, 4))
+    assert field.report.effective_rays == pytest.approx(1.0, rel=1e-6)
+    found = [field.resolution(seed=seed) for seed in range(5)]
+    assert all(0.0 < r.place <= 12.0 and r.place_limit == "rays" for r in found), found
+
+
+@pytest.mark.parametrize("flux", [1e-170, 1e300])
+def test_fluxes_without_squares_are_refused(flux: float) -> None:
+    rays = spotted(pitch=None, seed=1, rays=100)
+    with pytest.raises(ArgumentError, match="whose squares, on which errors rest"):
+        et.LightField.fit(et.RaySet(rays.position, rays.direction, np.full(100, flux)), PLANE)
+
+
 def test_the_finest_cells_are_as_asked() -> None:
     """2^k cells along a side of 12 mm; what is finer than the finest grid is told."""
     for side, halvings in ((12 / 4096, 12), (12 / 1000, 10), (12 / 1024, 10), (7.0, 1), (40.0, 1)):

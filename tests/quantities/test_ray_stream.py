@@ -164,13 +164,20 @@ def test_no_rays_sum_to_nothing() -> None:
 
 
 @fixed
-@given(st.lists(st.floats(0.0, 1e6), min_size=1, max_size=50))
+@given(st.lists(st.floats(1e-100, 1e6) | st.just(0.0), min_size=1, max_size=50))
 def test_effective_rays_count_equal_rays_in_full(weights: list[float]) -> None:
     w = np.array(weights)
     tally = Tally(len(w), 0, 0, 0, float(w.sum()), float((w * w).sum()), 0.0)
     assert 0 <= tally.effective_rays <= len(w) * (1 + 1e-12)
     equal = Tally(4, 0, 0, 0, 4 * 2.5, 4 * 2.5**2, 0.0)
-    assert equal.effective_rays == 4.0
+    assert equal.effective_rays == pytest.approx(4.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(("flux", "rays"), [(1e-170, None), (1e-150, 7), (1e153, 7), (1e300, None)])
+def test_effective_rays_are_known_as_far_as_squares_are(flux: float, rays: int | None) -> None:
+    """Seven equal rays are seven, also where the square of their sum is no number; where those of each are none, NaN."""
+    found = RaySet(np.zeros((7, 3)), np.ones((7, 3)), np.full(7, flux)).tally.effective_rays
+    assert math.isnan(found) if rays is None else found == pytest.approx(rays, rel=1e-12)
 
 
 # --- progress --------------------------------------------------------------------------------------------------------

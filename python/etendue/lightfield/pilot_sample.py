@@ -10,7 +10,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.ray_stream import RayStream
+from etendue.quantities.ray_stream import RayStream, squares_hold
 
 STRETCH = 4096
 """Rays that are read in one piece."""
@@ -42,7 +42,7 @@ def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
     Raises
     ------
     ArgumentError
-        If the rays have no position or carry no flux.
+        If the rays have no position or carry no flux, or so little or so much that its squares are no numbers.
 
     Examples
     --------
@@ -64,10 +64,22 @@ def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
         position, direction, flux = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         carry = flux > 0
         if carry.any():
+            _check_squares(flux[carry], rays)
             sample = RaySet(position[carry], direction[carry], flux[carry], flux_unit=rays.flux_unit)
             _SAMPLES.add(sample)
             return sample
     raise ArgumentError("these rays carry no flux, so no light field can be fitted to them.")
+
+
+def _check_squares(flux: npt.NDArray[np.float64], rays: RayStream) -> None:
+    """Refuse fluxes whose squares, on which every error rests, are no numbers."""
+    with np.errstate(over="ignore", under="ignore"):
+        if squares_hold(float(np.square(flux).sum())):
+            return
+    raise ArgumentError(
+        f"{rays.provenance.source}: its rays carry {flux.min():.4g} to {flux.max():.4g} {rays.flux_unit}, whose squares, on "
+        "which errors rest, are no numbers; state another total flux: --flux, in Python rays.with_total_flux."
+    )
 
 
 def selected_rays(rays: RaySet, which: npt.NDArray[np.bool_]) -> RaySet:

@@ -119,6 +119,8 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
         generator = np.random.Generator(np.random.Philox(key=stream))
         true = [image * _spots(len(image), pitch) for image in images]
         space, direction = (Sums(generator.poisson(own * t / t.sum()).astype(np.float64), None) for t in true)
+        if not (space.rays and direction.rays):
+            return 0.0, 0.0
         counts = PartCounts(space, space, direction)
         found = images_of(counts, dataclasses.replace(chart, hole=0.0), threads, positions=POSITIONS).densities()
         over_place, over_direction = (_contrast(f, t, pitch) for f, t in zip(found, true, strict=True))

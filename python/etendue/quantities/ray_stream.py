@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import copy
 import dataclasses
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Self
 
@@ -31,6 +32,19 @@ def checked_threads(threads: int | None) -> int | None:
     if threads is not None and not (isinstance(threads, int) and 1 <= threads <= 4096):
         raise ArgumentError(f"threads is {threads!r}; give a whole number from 1 to 4096, or None for one per core.")
     return threads
+
+
+def squares_hold(flux_squared: float) -> bool:
+    """Whether a sum of squared fluxes is one: none of it is lost to underflow, nor is it infinite.
+
+    A square below the normal numbers is off by 2⁻¹⁰⁷⁵ at most, and so 10¹⁰ of them by 10⁻⁶ of the smallest normal number.
+
+    Examples
+    --------
+    >>> squares_hold(1.0), squares_hold(0.0), squares_hold(math.inf)
+    (True, False, False)
+    """
+    return float(np.finfo(np.float64).tiny) <= flux_squared < math.inf
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,8 +85,13 @@ class Tally:
 
     @property
     def effective_rays(self) -> float:
-        """(Σ w)²/Σ w²: the number of equal rays with the same relative error of the total."""
-        return self.flux**2 / self.flux_squared if self.flux_squared > 0 else 0.0
+        """(Σ w)²/Σ w²: the number of equal rays with the same relative error of the total; 0 without flux.
+
+        NaN if the fluxes are so small or so large that their squares are no numbers.
+        """
+        if self.flux == 0.0:
+            return 0.0
+        return (self.flux / math.sqrt(self.flux_squared)) ** 2 if squares_hold(self.flux_squared) else math.nan
 
 
 @dataclasses.dataclass(frozen=True)

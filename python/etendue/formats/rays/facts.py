@@ -78,7 +78,7 @@ def fact_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
         ("rays", f"{facts['rays']:,}" + _unusable(facts)),
         ("flux", f"{facts['total_flux']:.7g} {unit}"),
         ("", f"{stated}; sum over the rays {facts['sum_flux']:.7g} {unit}"),
-        ("per ray", _range(facts["flux_per_ray"], unit) + f"; as good as {facts['effective_rays']:,.0f} equal rays"),
+        ("per ray", _range(facts["flux_per_ray"], unit) + _equal_rays(facts["effective_rays"])),
         ("bounding box", _box(facts["bounding_box"])),
         ("virtual focus", _point(facts["virtual_focus"], "mm") or "not determined (collimated rays, or far-field data)"),
         ("mean direction", _point(facts["mean_direction"], "") or "none"),
@@ -133,6 +133,10 @@ def _range(pair: list[float] | None, unit: str) -> str:
         return "none"
     low, high = pair
     return f"{counted(low, unit)} each" if low == high else f"{counted(low, unit)} to {counted(high, unit)}"
+
+
+def _equal_rays(effective: float) -> str:
+    return "" if math.isnan(effective) else f"; as good as {effective:,.0f} equal rays"
 
 
 def _box(bounds: list[list[float]] | None) -> str:
