@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError
-from etendue.lightfield.fitting import finest_for
+from etendue.lightfield.fitting import finest_for, not_so_fine
 from etendue.lightfield.resolution import Resolution
 
 Array = npt.NDArray[np.float64]
@@ -22,32 +22,41 @@ RAYS = 30_000
 PLANE = et.Plane(z=0, width=12.0, height=12.0, centre=(0.5, -0.3), focus=(0, 0, 0, 0))
 
 
-def spotted(*, pitch: float | None, seed: int, rays: int = RAYS) -> et.RaySet:
-    """A square that sends light upwards by the cosine law, with spots (1 + cos)(1 + cos) of this pitch, or even."""
+STRIP = (16.0, 0.4)
+"""Sides of a long source [mm]."""
+
+
+def spotted(
+    *, pitch: float | None, seed: int, rays: int = RAYS, sides: tuple[float, float] = (SIDE, SIDE)
+) -> et.RaySet:
+    """A rectangle that sends light upwards by the cosine law, with spots (1 + cos)(1 + cos) of this pitch, or even."""
     rng = np.random.default_rng(seed)
 
-    def along() -> Array:
-        x = rng.uniform(-SIDE / 2, SIDE / 2, 6 * rays)
-        if pitch is not None:
+    def along(side: float) -> Array:
+        x = rng.uniform(-side / 2, side / 2, 6 * rays)
+        if pitch is not None and pitch < side / 2:
             x = x[rng.uniform(0, 2, len(x)) < 1 + np.cos(2 * np.pi * x / pitch)]
         return x[:rays]
 
-    position = np.column_stack([along() + MIDDLE[0], along() + MIDDLE[1], np.zeros(rays)])
+    position = np.column_stack([along(sides[0]) + MIDDLE[0], along(sides[1]) + MIDDLE[1], np.zeros(rays)])
     sine, phi = np.sqrt(rng.random(rays)), rng.uniform(0, 2 * np.pi, rays)
     direction = np.column_stack([sine * np.cos(phi), sine * np.sin(phi), np.sqrt(1 - sine**2)])
     return et.RaySet(position, direction, np.full(rays, 100.0 / rays))
 
 
-def contrast(field: et.LightField, *, pitch: float) -> float:
-    """What the field shows of the spots, seen along the normal: the worse of the cosines along x and y."""
+def contrast(field: et.LightField, *, pitch: float, sides: tuple[float, float] = (SIDE, SIDE)) -> float:
+    """What the field shows of the spots, seen along the normal: the worse of the cosines along the sides that have some."""
     n = 600
-    offset = ((np.arange(n) + 0.5) / n - 0.5) * SIDE
-    x, y = np.meshgrid(offset, offset)
+    offset = [((np.arange(n) + 0.5) / n - 0.5) * side for side in sides]
+    x, y = np.meshgrid(*offset)
     points = np.column_stack([x.ravel() + MIDDLE[0], y.ravel() + MIDDLE[1], np.zeros(n * n)])
     seen = field.luminance(points, np.tile([0.0, 0.0, 1.0], (n * n, 1)))[0].reshape(n, n)
-    wave = np.cos(2 * np.pi * offset / pitch)
     # A cosine on a flat ground has the projection ½.
-    return 2.0 * min(float((seen @ wave).sum()), float((seen.T @ wave).sum())) / float(seen.sum())
+    return 2.0 * min(
+        float((image @ np.cos(2 * np.pi * at / pitch)).sum() / seen.sum())
+        for image, at, side in zip((seen, seen.T), offset, sides, strict=True)
+        if pitch < side / 2
+    )
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +72,33 @@ def test_spots_come_back_as_stated(stated: Resolution, factor: float) -> None:
     field = et.LightField.fit(spotted(pitch=pitch, seed=2), PLANE)
     shown = contrast(field, pitch=pitch)
     assert shown > 0.5 if factor > 1 else shown < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1.6, 1 / 1.6])
+def test_spots_of_a_strip_come_back_as_stated(factor: float) -> None:
+    """Its images have as many cells along either side, and those along the longer one are forty times as long."""
+    plane = et.Plane(z=0, width=1.02 * STRIP[0], height=1.02 * STRIP[1], centre=MIDDLE, focus=(0, 0, 0, 0))
+    pitch = factor * et.LightField.fit(spotted(pitch=None, seed=1, sides=STRIP), plane).resolution().place
+    field = et.LightField.fit(spotted(pitch=pitch, seed=2, sides=STRIP), plane)
+    shown = contrast(field, pitch=pitch, sides=STRIP)
+    assert shown > 0.5 if factor > 1 else shown < 0.5
+
+
+@pytest.mark.parametrize(
+    ("surface", "side"),
+    [
+        (et.Plane(z=0, width=12.0, height=0.3, centre=(0.7, -0.4)), 12.0 / 4),
+        (et.Plane(z=0, width=12.0, height=12.0, centre=(0.7, -0.4)), 12.0 / 4),
+        (et.Disk(radius=6.0), np.sqrt(np.pi) * 6.0 / 4),
+        (et.Cylinder(radius=6.0, bottom=-1.0, top=20.0), np.pi * 12.0 / 4),
+    ],
+)
+def test_cells_are_as_long_as_their_longer_side(surface: et.Plane, side: float) -> None:
+    """Four cells along the first side and eight along the second, four along either side of the square of directions."""
+    field = et.LightField.fit(spotted(pitch=None, seed=1, rays=200, sides=(12.0, 0.3)), surface, depths=(2, 3, 2, 2))
+    found = field.resolution()
+    assert (found.cell_place, found.cell_direction) == pytest.approx((side, np.degrees(np.sqrt(np.pi)) / 4), rel=1e-12)
 
 
 @pytest.mark.slow
@@ -102,16 +138,24 @@ def test_fluxes_without_squares_are_refused(flux: float) -> None:
 
 
 def test_the_finest_cells_are_as_asked() -> None:
-    """2^k cells along a side of 12 mm; what is finer than the finest grid is told."""
-    for side, halvings in ((12 / 4096, 12), (12 / 1000, 10), (12 / 1024, 10), (7.0, 1), (40.0, 1)):
-        assert finest_for(PLANE, side) == (halvings, ())
-    finest, (told,) = finest_for(PLANE, 1e-3)
-    assert finest == 12
-    assert "0.00293 mm" in told
-    assert finest_for(PLANE, None) == (9, ())
+    """2^k cells along a side of 12 mm, or the longer one of a strip; what is finer than the finest grid is told."""
+    for plane in (PLANE, et.Plane(z=0, width=0.3, height=12.0, centre=(0, 0))):
+        for side, halvings in ((12 / 4096, 12), (12 / 1000, 10), (12 / 1024, 10), (7.0, 1), (40.0, 1)):
+            assert finest_for(plane, side) == halvings
+            assert list(not_so_fine(plane, side, halvings)) == []
+        assert finest_for(plane, 1e-3) == 12
+        (told,) = not_so_fine(plane, 1e-3, 12)
+        assert "0.00293 mm" in told
+        assert finest_for(plane, None) == 9
     for wrong in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ArgumentError, match="max_resolution"):
             et.LightField.fit(spotted(pitch=None, seed=1, rays=100), PLANE, max_resolution=wrong)
+
+
+def test_cells_finer_than_the_rays_are_told() -> None:
+    """A thousand rays have a grid of 32 × 32 cells, however fine ones are asked for."""
+    field = et.LightField.fit(spotted(pitch=None, seed=1, rays=1000), PLANE, depths=(2, 2, 2, 2), max_resolution=0.1)
+    assert "cells of 0.1 mm would be more than there are rays: they have 0.375 mm" in field.notes
 
 
 @pytest.mark.slow

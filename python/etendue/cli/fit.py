@@ -45,7 +45,7 @@ def fit(
         float | None,
         typer.Option(
             "--max-resolution",
-            help="Side of the finest cells over place in mm, for sets of very many rays; 1/512 of the surface if not given.",
+            help="Longer side of the finest cells over place in mm, for sets of very many rays; 1/512 of it if not given.",
             metavar="MM",
         ),
     ] = None,

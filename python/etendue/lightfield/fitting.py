@@ -117,8 +117,8 @@ def fit_light_field(
         told.begin("focus")
         surface = focused(surface, rays, seed, threads) if isinstance(surface, Plane) else surface.sized_for(rays)
     told.begin("grid")
-    finest, not_so_fine = finest_for(surface, max_resolution)
-    plan = make_plan(rays, surface, depths, seed, threads, finest, told.step)
+    plan = make_plan(rays, surface, depths, seed, threads, finest_for(surface, max_resolution), told.step)
+    notes = (*notes, *not_so_fine(surface, max_resolution, plan.grids[0].fine[0]))
     counts = count_rays(rays, surface, plan.grids, seed=seed, threads=threads, progress=told.counted)
     if symmetry == "auto":
         symmetry = proven_symmetry(counts)
@@ -129,25 +129,31 @@ def fit_light_field(
     field = fit_counts(rays, counts, plan, seed, threads, told)
     spectrum = rays.total_spectrum(threads=threads)
     told.end()
-    return field.replace(notes=(*notes, *not_so_fine, *field.notes, *notes_of_rays(rays)), spectrum=spectrum)
+    return field.replace(notes=(*notes, *field.notes, *notes_of_rays(rays)), spectrum=spectrum)
 
 
-def finest_for(surface: Surface, max_resolution: float | None) -> tuple[int, tuple[str, ...]]:
-    """Halvings of the fine grid over place such that cells of the first part have this side [mm], or the finest there are.
+def finest_for(surface: Surface, max_resolution: float | None) -> int:
+    """Halvings of the fine grid over place so that no side of the first part's cells is longer [mm], or the most."""
+    return FINEST if max_resolution is None else min(_wanted_halvings(surface, max_resolution), MOST_FINEST)
 
-    And what is to be said of it, where a coarser one has to do.
-    """
-    if max_resolution is None:
-        return FINEST, ()
-    side = math.sqrt(surface.parts()[0].area)
-    wanted = max(math.ceil(math.log2(side / max_resolution) - 1e-9), 1)
-    if wanted <= MOST_FINEST:
-        return wanted, ()
-    told = (
-        f"cells of {max_resolution:g} mm would be more than {2**MOST_FINEST:,} × {2**MOST_FINEST:,} on "
-        f"{surface.told}: they have {side / 2**MOST_FINEST:.3g} mm; state a smaller surface for finer ones"
-    )
-    return MOST_FINEST, (told,)
+
+def _wanted_halvings(surface: Surface, max_resolution: float) -> int:
+    side = max(surface.parts()[0].sides)
+    return max(math.ceil(math.log2(side / max_resolution) - 1e-9), 1)
+
+
+def not_so_fine(surface: Surface, max_resolution: float | None, halvings: int) -> Iterator[str]:
+    """What is to be said where a fine grid of so many halvings has to do, and finer cells were asked for."""
+    if max_resolution is None or halvings >= _wanted_halvings(surface, max_resolution):
+        return
+    side = max(surface.parts()[0].sides) / 2**halvings
+    if halvings >= MOST_FINEST:
+        yield (
+            f"cells of {max_resolution:g} mm would be more than {2**MOST_FINEST:,} × {2**MOST_FINEST:,} on "
+            f"{surface.told}: they have {side:.3g} mm; state a smaller surface for finer ones"
+        )
+    else:
+        yield f"cells of {max_resolution:g} mm would be more than there are rays: they have {side:.3g} mm"
 
 
 def notes_of_rays(rays: RayStream) -> tuple[str, ...]:

@@ -168,8 +168,8 @@ class LightField(EtendueDensity, InNotebook):
         depths : tuple of int, optional
             2^depth cells along s₁, s₂, a and b, but on frames with few rays; None: chosen.
         max_resolution : float, optional
-            Side of the finest cells over place [mm]: at most 4096 × 4096 on the surface or, of a plane with frames, on its
-            window, and no more than there are rays. None: 512 × 512. What the field then resolves, `resolution` tells.
+            Longer side of the finest cells over place [mm]: at most 4096 × 4096 on the surface or, of a plane with frames,
+            on its window, and no more than there are rays. None: 512 × 512. `resolution` tells what the field resolves.
         seed : int
             Decides which rays are held out.
         threads : int, optional

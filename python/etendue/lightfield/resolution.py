@@ -17,7 +17,7 @@ from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.ray_stream import checked_threads
 
 PITCHES = tuple(2.13 * 2.0 ** (k / 2.0) for k in range(13))
-"""Pitches of the arrays that are tried, in cells of the images: none that dyadic boxes favour."""
+"""Pitches of the arrays that are tried, in cells of the images along the longer side: none that dyadic boxes favour."""
 
 HALF = 0.5
 PHASE = 1.0
@@ -25,6 +25,9 @@ PHASE = 1.0
 
 POSITIONS = FINE_POSITIONS[:4]
 """Positions over which the images are averaged here: a quarter of those of a fit, in a quarter of the time."""
+
+Pitches = tuple[float | None, float | None]
+"""In cells along either side of an image; None along one that has no room for two spots."""
 
 PURPOSE = 0x5350_4F54
 """Keeps the random numbers of the trial apart from all others."""
@@ -39,12 +42,13 @@ class Resolution:
     part : str
         Its name.
     place : float
-        Pitch of spots on the surface that directions share, which the field shows with half their contrast [mm].
+        Pitch of spots on the surface that directions share, which the field shows with half their contrast along either
+        side [mm]; along the longer one alone where the shorter has no room for two.
     direction : float
         Pitch of beams that places share, likewise, near the normal [°].
     cell_place, cell_direction : float
-        Side of the cells of places [mm] and of directions near the normal [°]: structure that changes with place and
-        direction together is no finer than these.
+        Longer side of the cells of places [mm] and of directions near the normal [°]: structure that changes with place
+        and direction together is no finer than these.
     place_limit, direction_limit : {"rays", "cells"}
         What would resolve more: more rays, or finer cells of the images.
 
@@ -77,8 +81,8 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
 
     The images of the field over place and over direction are multiplied with (1 + cos 2πx/p)(1 + cos 2πy/p), as many rays as
     the field rests on are drawn from them, and images are made of these as in a fit. The contrast is what is left of the
-    cosines. Where structure changes with the direction, as that of a die below a dome on the dome's surface does, only the
-    tree in four dimensions sees it, with its coarser cells.
+    cosines, the worse of both: cells of a long surface are long. Where structure changes with the direction, as that of a
+    die below a dome on the dome's surface does, only the tree in four dimensions sees it, with its coarser cells.
 
     Parameters
     ----------
@@ -108,22 +112,25 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
     rays = report.effective_rays if math.isfinite(report.effective_rays) else float(report.rays - report.unmet_rays)
     own = max(rays * fluxes[index] / field.total_flux, 1.0)
     fine = [len(f) for f in (part.space, part.direction) if f is not None]
-    sides = (fine[0], fine[1]) if len(fine) == 2 else (part.ratio.shape[0], part.ratio.shape[2])
-    images = marginals(part, sides, chart.shape == "tube")
-    # One cell of n × n holds the share 1/n² of the area, and of the π of all direction cosines.
-    units = math.sqrt(chart.area) / sides[0], math.degrees(math.sqrt(math.pi) / sides[1])
+    n1, n2, n3, n4 = part.ratio.shape
+    cells = (fine[0], fine[1]) if len(fine) == 2 else (min(n1, n2), min(n3, n4))
+    images = marginals(part, cells, chart.shape == "tube")
+    # The square of all directions holds the π of all direction cosines.
+    square = math.degrees(math.sqrt(math.pi))
+    sides = chart.sides, (square, square)
 
     def contrasts(pitch: float) -> tuple[float, float]:
         """Over place and over direction; both are tried at once."""
         stream = np.array([seed, PURPOSE + PITCHES.index(pitch)], dtype=np.uint64)
         generator = np.random.Generator(np.random.Philox(key=stream))
-        true = [image * _spots(len(image), pitch) for image in images]
+        pitches = [_along_sides(pitch, len(image), lengths) for image, lengths in zip(images, sides, strict=True)]
+        true = [image * _spots(len(image), both) for image, both in zip(images, pitches, strict=True)]
         space, direction = (Sums(generator.poisson(own * t / t.sum()).astype(np.float64), None) for t in true)
         if not (space.rays and direction.rays):
             return 0.0, 0.0
         counts = PartCounts(space, space, direction)
         found = images_of(counts, dataclasses.replace(chart, hole=0.0), threads, positions=POSITIONS).densities()
-        over_place, over_direction = (_contrast(f, t, pitch) for f, t in zip(found, true, strict=True))
+        over_place, over_direction = (_contrast(f, t, both) for f, t, both in zip(found, true, pitches, strict=True))
         return over_place, over_direction
 
     known: dict[float, tuple[float, float]] = {}
@@ -136,22 +143,29 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
 
         return contrast
 
-    place, direction = (_half_contrast(of(which), sides[which]) for which in (0, 1))
+    place, direction = (_half_contrast(of(which), cells[which]) for which in (0, 1))
     return Resolution(
         part=chart.name,
-        place=place * units[0],
-        direction=direction * units[1],
-        cell_place=math.sqrt(chart.area / (part.ratio.shape[0] * part.ratio.shape[1])),
-        cell_direction=math.degrees(math.sqrt(math.pi / (part.ratio.shape[2] * part.ratio.shape[3]))),
+        place=place * max(chart.sides) / cells[0],
+        direction=direction * square / cells[1],
+        cell_place=max(chart.sides[0] / n1, chart.sides[1] / n2),
+        cell_direction=square / min(n3, n4),
         place_limit="cells" if place <= PITCHES[1] else "rays",
         direction_limit="cells" if direction <= PITCHES[1] else "rays",
     )
 
 
-def _spots(n: int, pitch: float) -> FloatArray:
-    """An array of spots with this pitch on n × n cells: mean 1, darkest 0."""
-    wave = 1.0 + _wave(n, pitch)
-    return wave[:, None] * wave[None, :]
+def _along_sides(pitch: float, n: int, lengths: tuple[float, float]) -> Pitches:
+    """The pitch in cells along either side of n × n: as many millimetres are more cells along the shorter one."""
+    one, other = (pitch * (max(lengths) / length) for length in lengths)
+    most = max(pitch, n // 2)
+    return one if one <= most else None, other if other <= most else None
+
+
+def _spots(n: int, pitches: Pitches) -> FloatArray:
+    """An array of spots with these pitches on n × n cells: mean 1, darkest 0."""
+    along, across = (np.ones(n) if pitch is None else 1.0 + _wave(n, pitch) for pitch in pitches)
+    return along[:, None] * across[None, :]
 
 
 def _wave(n: int, pitch: float) -> FloatArray:
@@ -160,16 +174,18 @@ def _wave(n: int, pitch: float) -> FloatArray:
     return wave
 
 
-def _contrast(found: FloatArray, true: FloatArray, pitch: float) -> float:
+def _contrast(found: FloatArray, true: FloatArray, pitches: Pitches) -> float:
     """What is left of the cosines along both axes where the image is shown, linear between centres; the worse counts."""
     shown = node_values(found)
-    wave = _wave(len(true), pitch)
     left = []
-    for axes in ((0, 1), (1, 0)):
-        signal = float((true.transpose(axes) @ wave).sum() / true.sum())
-        left.append(float((shown.transpose(axes) @ wave).sum() / shown.sum()) / signal)
-    # Cells hold sinc(1/p) of the amplitude, and a linear interpolation takes sinc²(1/p) of what its nodes have.
-    return min(left) * float(np.sinc(1.0 / pitch)) ** 3
+    for axes, pitch in zip(((1, 0), (0, 1)), pitches, strict=True):
+        if pitch is not None:
+            wave = _wave(len(true), pitch)
+            signal = float((true.transpose(axes) @ wave).sum() / true.sum())
+            kept = float((shown.transpose(axes) @ wave).sum() / shown.sum()) / signal
+            # Cells hold sinc(1/p) of the amplitude, and a linear interpolation takes sinc²(1/p) of what its nodes have.
+            left.append(kept * float(np.sinc(1.0 / pitch)) ** 3)
+    return min(left)
 
 
 def _half_contrast(contrast: Callable[[float], float], n: int) -> float:

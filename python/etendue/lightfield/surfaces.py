@@ -88,6 +88,14 @@ class Part:
                 return 2 * math.pi * a * b
 
     @property
+    def sides(self) -> tuple[float, float]:
+        """Lengths of the sides of the chart [mm]; of disks and hemispheres those of the square of their area."""
+        a, b = self.size
+        if self.shape == "rectangle":
+            return a, b
+        return (2 * math.pi * a, b) if self.shape == "tube" else (math.sqrt(self.area),) * 2
+
+    @property
     def etendue(self) -> float:
         """π · area [mm² sr]: that of all light that can leave the part on one side."""
         return math.pi * self.area
