@@ -22,6 +22,7 @@ RAYS = 30_000
 PLANE = et.Plane(z=0, width=12.0, height=12.0, centre=(0.5, -0.3), focus=(0, 0, 0, 0))
 
 
+GRID = (3, 3, 3, 3)
 STRIP = (16.0, 0.4)
 """Sides of a long source [mm]."""
 
@@ -79,9 +80,22 @@ def test_spots_come_back_as_stated(stated: Resolution, factor: float) -> None:
 def test_spots_of_a_strip_come_back_as_stated(factor: float) -> None:
     """Its images have as many cells along either side, and those along the longer one are forty times as long."""
     plane = et.Plane(z=0, width=1.02 * STRIP[0], height=1.02 * STRIP[1], centre=MIDDLE, focus=(0, 0, 0, 0))
-    pitch = factor * et.LightField.fit(spotted(pitch=None, seed=1, sides=STRIP), plane).resolution().place
-    field = et.LightField.fit(spotted(pitch=pitch, seed=2, sides=STRIP), plane)
+    even = et.LightField.fit(spotted(pitch=None, seed=1, sides=STRIP), plane, depths=GRID)
+    pitch = factor * even.resolution().place
+    field = et.LightField.fit(spotted(pitch=pitch, seed=2, sides=STRIP), plane, depths=GRID)
     shown = contrast(field, pitch=pitch, sides=STRIP)
+    assert shown > 0.5 if factor > 1 else shown < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1.25, 1 / 1.25])
+def test_spots_of_a_symmetric_source_come_back_as_stated(factor: float) -> None:
+    """They are even about both middles, as cosines are, so that each ray of them stands for four, as in the statement."""
+    plane = et.Plane(z=0, width=12.0, height=12.0, centre=MIDDLE, focus=(0, 0, 0, 0))
+    even = et.LightField.fit(spotted(pitch=None, seed=1), plane, depths=GRID, symmetry="mirror-xy")
+    pitch = factor * even.resolution().place
+    field = et.LightField.fit(spotted(pitch=pitch, seed=2), plane, depths=GRID, symmetry="mirror-xy")
+    shown = contrast(field, pitch=pitch)
     assert shown > 0.5 if factor > 1 else shown < 0.5
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.lightfield.marginals import marginals
 from etendue.lightfield.nodes import node_values
+from etendue.lightfield.symmetry import sum_of_images
 from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.ray_stream import checked_threads
 
@@ -21,16 +23,32 @@ PITCHES = tuple(2.13 * 2.0 ** (k / 2.0) for k in range(13))
 
 HALF = 0.5
 PHASE = 1.0
-"""Of the cosines at the first cell [rad]: off the edges of dyadic boxes."""
+"""Of the cosines at the first cell [rad]: off the edges of dyadic boxes; those of symmetric fields are even."""
 
 POSITIONS = FINE_POSITIONS[:4]
 """Positions over which the images are averaged here: a quarter of those of a fit, in a quarter of the time."""
 
-Pitches = tuple[float | None, float | None]
-"""In cells along either side of an image; None along one that has no room for two spots."""
-
 PURPOSE = 0x5350_4F54
 """Keeps the random numbers of the trial apart from all others."""
+
+
+class Wave(NamedTuple):
+    """A cosine along one side of an image: its pitch in cells, and its mean over each of them.
+
+    Examples
+    --------
+    >>> Wave(2.0, np.array([1.0, -1.0])).pitch
+    2.0
+    """
+
+    pitch: float
+    cells: FloatArray
+
+
+Pitches = tuple[float | None, float | None]
+"""Along either side of an image; None along one that has no room for two spots."""
+
+Waves = tuple[Wave | None, Wave | None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +100,8 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
     The images of the field over place and over direction are multiplied with (1 + cos 2πx/p)(1 + cos 2πy/p), as many rays as
     the field rests on are drawn from them, and images are made of these as in a fit. The contrast is what is left of the
     cosines, the worse of both: cells of a long surface are long. Where structure changes with the direction, as that of a
-    die below a dome on the dome's surface does, only the tree in four dimensions sees it, with its coarser cells.
+    die below a dome on the dome's surface does, only the tree in four dimensions sees it, with its coarser cells. Of a field
+    that was folded by a symmetry the spots have it too, and the rays that are drawn are folded as those of the fit were.
 
     Parameters
     ----------
@@ -109,6 +128,7 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
     charts, fluxes = field.surface.parts(), field.part_flux
     index = int(np.argmax(fluxes))
     chart, part, report = charts[index], field.parts[index], field.report
+    symmetry = report.symmetry
     rays = report.effective_rays if math.isfinite(report.effective_rays) else float(report.rays - report.unmet_rays)
     own = max(rays * fluxes[index] / field.total_flux, 1.0)
     fine = [len(f) for f in (part.space, part.direction) if f is not None]
@@ -124,13 +144,15 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
         stream = np.array([seed, PURPOSE + PITCHES.index(pitch)], dtype=np.uint64)
         generator = np.random.Generator(np.random.Philox(key=stream))
         pitches = [_along_sides(pitch, len(image), lengths) for image, lengths in zip(images, sides, strict=True)]
-        true = [image * _spots(len(image), both) for image, both in zip(images, pitches, strict=True)]
-        space, direction = (Sums(generator.poisson(own * t / t.sum()).astype(np.float64), None) for t in true)
+        waves = [_waves(len(image), both, symmetry != "none") for image, both in zip(images, pitches, strict=True)]
+        true = [image * _spots(len(image), both) for image, both in zip(images, waves, strict=True)]
+        drawn = (generator.poisson(own * t / t.sum()).astype(np.float64) for t in true)
+        space, direction = (Sums(sum_of_images(cells, symmetry), None) for cells in drawn)
         if not (space.rays and direction.rays):
             return 0.0, 0.0
-        counts = PartCounts(space, space, direction)
-        found = images_of(counts, dataclasses.replace(chart, hole=0.0), threads, positions=POSITIONS).densities()
-        over_place, over_direction = (_contrast(f, t, both) for f, t, both in zip(found, true, pitches, strict=True))
+        counts, whole = PartCounts(space, space, direction), dataclasses.replace(chart, hole=0.0)
+        found = images_of(counts, whole, threads, symmetry, POSITIONS).densities()
+        over_place, over_direction = (_contrast(f, t, both) for f, t, both in zip(found, true, waves, strict=True))
         return over_place, over_direction
 
     known: dict[float, tuple[float, float]] = {}
@@ -162,29 +184,34 @@ def _along_sides(pitch: float, n: int, lengths: tuple[float, float]) -> Pitches:
     return one if one <= most else None, other if other <= most else None
 
 
-def _spots(n: int, pitches: Pitches) -> FloatArray:
-    """An array of spots with these pitches on n × n cells: mean 1, darkest 0."""
-    along, across = (np.ones(n) if pitch is None else 1.0 + _wave(n, pitch) for pitch in pitches)
+def _waves(n: int, pitches: Pitches, even: bool) -> Waves:
+    """The mean of a cosine over each of n cells along either side: 1 in the middle if it is even about that."""
+
+    def wave(pitch: float) -> FloatArray:
+        first = np.pi * (1 - n) / pitch if even else PHASE
+        cells: FloatArray = np.sinc(1.0 / pitch) * np.cos(2.0 * np.pi * np.arange(n) / pitch + first)
+        return cells
+
+    along, across = (None if pitch is None else Wave(pitch, wave(pitch)) for pitch in pitches)
+    return along, across
+
+
+def _spots(n: int, waves: Waves) -> FloatArray:
+    """An array of spots on n × n cells: mean 1, darkest 0."""
+    along, across = (np.ones(n) if wave is None else 1.0 + wave.cells for wave in waves)
     return along[:, None] * across[None, :]
 
 
-def _wave(n: int, pitch: float) -> FloatArray:
-    """The mean of a cosine over each of n cells."""
-    wave: FloatArray = np.sinc(1.0 / pitch) * np.cos(2.0 * np.pi * np.arange(n) / pitch + PHASE)
-    return wave
-
-
-def _contrast(found: FloatArray, true: FloatArray, pitches: Pitches) -> float:
+def _contrast(found: FloatArray, true: FloatArray, waves: Waves) -> float:
     """What is left of the cosines along both axes where the image is shown, linear between centres; the worse counts."""
     shown = node_values(found)
     left = []
-    for axes, pitch in zip(((1, 0), (0, 1)), pitches, strict=True):
-        if pitch is not None:
-            wave = _wave(len(true), pitch)
-            signal = float((true.transpose(axes) @ wave).sum() / true.sum())
-            kept = float((shown.transpose(axes) @ wave).sum() / shown.sum()) / signal
+    for axes, wave in zip(((1, 0), (0, 1)), waves, strict=True):
+        if wave is not None:
+            signal = float((true.transpose(axes) @ wave.cells).sum() / true.sum())
+            kept = float((shown.transpose(axes) @ wave.cells).sum() / shown.sum()) / signal
             # Cells hold sinc(1/p) of the amplitude, and a linear interpolation takes sinc²(1/p) of what its nodes have.
-            left.append(kept * float(np.sinc(1.0 / pitch)) ** 3)
+            left.append(kept * float(np.sinc(1.0 / wave.pitch)) ** 3)
     return min(left)
 
 
