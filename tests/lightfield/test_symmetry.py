@@ -13,7 +13,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield import fitting
 from etendue.lightfield.counting import PartGrids, count_rays
 from etendue.lightfield.etendue_density import FineErrors
-from etendue.lightfield.symmetry import SYMMETRIES, fold, proven_symmetry
+from etendue.lightfield.symmetry import SYMMETRIES, fold, proven_symmetry, refutation
 from oracles.sources import LimbDarkenedDisk
 from oracles.verdicts import assert_covers
 
@@ -153,6 +153,31 @@ def test_without_any_symmetry_none_is_found() -> None:
     assert (
         proven_symmetry(count_rays(rays, et.Plane(z=0, width=4, height=4, centre=(0, 0)), PartGrids(DEPTHS))) == "none"
     )
+
+
+def test_a_stated_symmetry_that_the_rays_refute_is_told() -> None:
+    """A luminance that rises along x by the law 1 + 0.8 x is even in y alone; χ² of 2⁴ cells is that of their pairs."""
+    x, k = rays_of(4000, 7, slope=0.8)
+    rays, plane = et.RaySet(x, k, np.ones(len(x))), et.Plane(z=0, width=2, height=2, centre=(0, 0), focus=(0, 0, 0, 0))
+    fitted = {
+        name: et.LightField.fit(rays, plane, depths=(1, 1, 1, 1), symmetry=name) for name in ("mirror-x", "mirror-y")
+    }
+    assert {name: field.report.symmetry for name, field in fitted.items()} == {name: name for name in fitted}
+    assert fitted["mirror-y"].notes == ()
+    (told,) = fitted["mirror-x"].notes
+    cells = np.zeros((2, 2, 2, 2))
+    np.add.at(cells, tuple((v > 0).astype(int) for v in (x[:, 0], x[:, 1], k[:, 0], k[:, 1])), 1.0)
+    mirrored = cells[::-1, :, ::-1]
+    chi2 = ((cells - mirrored) ** 2 / (cells + mirrored)).sum() / 2
+    assert f"refute the symmetry mirror-x that was stated: χ² of counts and images is {chi2:,.0f} over 8 pairs" in told
+
+
+def test_true_symmetries_are_hardly_ever_refuted() -> None:
+    """Of 60 sets of rays that are even in y one in a thousand: more than two with a probability of 3e-5."""
+    plane, grids = et.Plane(z=0, width=2, height=2, centre=(0, 0)), PartGrids((2, 2, 1, 1), (2, 2))
+    sets = (et.RaySet(*rays_of(2000, 100 + seed), np.ones(2000)) for seed in range(60))
+    told = [refutation(count_rays(rays, plane, grids), "mirror-y") for rays in sets]
+    assert sum(one is not None for one in told) <= 2
 
 
 def test_symmetries_that_cannot_be_are_refused() -> None:

@@ -32,7 +32,7 @@ from etendue.lightfield.focusing import focused
 from etendue.lightfield.pilot_sample import check_near_field, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Plane, Surface
-from etendue.lightfield.symmetry import fold, order, proven_symmetry
+from etendue.lightfield.symmetry import fold, order, proven_symmetry, refutation
 from etendue.lightfield.trees import POSITIONS
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
@@ -124,6 +124,8 @@ def fit_light_field(
         symmetry = proven_symmetry(counts)
         found = "no symmetry is borne out" if symmetry == "none" else f"the rays bear out the symmetry {symmetry}"
         notes = (*notes, f"{found} (χ² of counts and images, 1e-3)")
+    elif symmetry != "none" and (refuted := refutation(counts, symmetry)) is not None:
+        notes = (*notes, refuted)
     if symmetry != "none":
         counts = fold(counts, symmetry)
     field = fit_counts(rays, counts, plan, seed, threads, told)

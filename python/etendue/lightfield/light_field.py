@@ -164,7 +164,8 @@ class LightField(EtendueDensity, InNotebook):
             plane the focus is found where it is left out, and, if all its dimensions are, a window with frames about it.
         symmetry : str
             A symmetry of the source about the surface's axis, which multiplies its rays: ``"none"``, ``"mirror-x"``,
-            ``"mirror-y"``, ``"mirror-xy"``, ``"c2"``, ``"c4"``, or ``"auto"``: one of them if the rays bear it out.
+            ``"mirror-y"``, ``"mirror-xy"``, ``"c2"``, ``"c4"``, or ``"auto"``: one of them if the rays bear it out. A note
+            tells if they refute the one that is stated.
         depths : tuple of int, optional
             2^depth cells along s₁, s₂, a and b, but on frames with few rays; None: chosen.
         max_resolution : float, optional

@@ -126,12 +126,68 @@ def proven_symmetry(counts: EtendueCounts) -> str:
             images = _images(counts, name)
         except ArgumentError:
             continue
-        tests = [_disagreement(part.grid, image) for part in counts["all"] for image in images]
-        informative = [z for z in tests if z is not None]
-        # Each of the comparisons gets its share of the significance (Bonferroni, for a few of them).
-        if informative and max(informative) < SIGNIFICANCE_Z + 0.25 * math.log(len(informative)):
+        found = _disagreements(counts, images)
+        if found and not _refuted(found):
             return name
     return "none"
+
+
+def refutation(counts: EtendueCounts, symmetry: str) -> str | None:
+    """What is to be said of a symmetry that was stated, if the counts speak against it; None if they do not.
+
+    Parameters
+    ----------
+    counts : EtendueCounts
+        Not folded.
+    symmetry : str
+        A name in `SYMMETRIES`.
+
+    Raises
+    ------
+    UnknownNameError, ArgumentError
+        As `fold`.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> from etendue.lightfield.counting import PartGrids, count_rays
+    >>> counts = count_rays(et.RingSource(rays=10_000), et.Disk(radius=30), PartGrids((3, 3, 2, 2)))
+    >>> refutation(counts, "mirror-x") is None
+    True
+    """
+    found = _disagreements(counts, _images(counts, symmetry))
+    if not _refuted(found):
+        return None
+    worst = max(found, key=lambda one: one.z)
+    return (
+        f"the rays refute the symmetry {symmetry} that was stated: χ² of counts and images is {worst.chi2:,.0f} over "
+        f"{worst.pairs:,.0f} pairs of cells (significance 1e-3); the field has the symmetry all the same"
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class _Disagreement:
+    """χ² of cells of a part against their images under one map, and how many pairs there are."""
+
+    chi2: float
+    pairs: float
+
+    @property
+    def z(self) -> float:
+        """By how many standard deviations χ² lies above its mean (Wilson and Hilferty's approximation)."""
+        spread = 2.0 / (9.0 * self.pairs)
+        return (math.cbrt(self.chi2 / self.pairs) - (1.0 - spread)) / math.sqrt(spread)
+
+
+def _disagreements(counts: EtendueCounts, images: tuple[Image, ...]) -> list[_Disagreement]:
+    """Of each part and image that has data."""
+    tests = (_disagreement(part.grid, image) for part in counts["all"] for image in images)
+    return [test for test in tests if test is not None]
+
+
+def _refuted(found: list[_Disagreement]) -> bool:
+    """Whether one of them is too large; each gets its share of the significance (Bonferroni, for a few of them)."""
+    return any(one.z >= SIGNIFICANCE_Z + 0.25 * math.log(len(found)) for one in found)
 
 
 def _images(counts: EtendueCounts, symmetry: str) -> tuple[Image, ...]:
@@ -154,8 +210,8 @@ def _images(counts: EtendueCounts, symmetry: str) -> tuple[Image, ...]:
     return SYMMETRIES[symmetry]
 
 
-def _disagreement(sums: Sums, image: Image) -> float | None:
-    """How many standard deviations the χ² of cells against their images lies above its mean; None without data."""
+def _disagreement(sums: Sums, image: Image) -> _Disagreement | None:
+    """The χ² of cells against their images; None without data."""
     weight, squared = _coarse(sums.weight), _coarse(sums.weight if sums.squared is None else sums.squared)
     difference, variance = weight - image(weight), squared + image(squared)
     # Every pair appears twice, once from either side; a cell that is its own image says nothing.
@@ -164,9 +220,7 @@ def _disagreement(sums: Sums, image: Image) -> float | None:
     pairs = told.sum() / 2
     if pairs < 1:
         return None
-    chi2 = float((difference[told] ** 2 / variance[told]).sum() / 2)
-    spread = 2.0 / (9.0 * pairs)
-    return float(((chi2 / pairs) ** (1.0 / 3.0) - (1.0 - spread)) / math.sqrt(spread))
+    return _Disagreement(float((difference[told] ** 2 / variance[told]).sum() / 2), float(pairs))
 
 
 def _coarse(cells: FloatArray) -> FloatArray:
