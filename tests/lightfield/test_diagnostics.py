@@ -470,6 +470,27 @@ def test_diagnostics_are_plain_data_and_a_few_lines() -> None:
     assert diagnose(field).to_dict()["forecast"] is None
 
 
+def test_where_fits_to_more_rays_gain_nothing_the_error_bars_are_a_bound() -> None:
+    """Gains of -4 ± 2 and 1 ± 2 in 10⁵: no law, no factor, and nothing at 0 on a logarithmic axis."""
+    law = law_of_gains(RUNGS, np.array([-4e-5, 1.2e-5]), np.eye(2) * 2.2e-5**2, 10_000)
+    found = diagnose(field_of(PLANE, part(ramp(16).reshape(2, 2, 2, 2), 1e-3, 0.02)))
+    found = dataclasses.replace(found, forecast=law)
+    assert not law.measurable
+    assert law_of_gains(RUNGS, gains_of(0.02, 0.5), np.eye(2) * 1e-10, 10_000).measurable
+    assert found.to_dict()["forecast"]["rays_factor_to_halve_error"] is None
+    lines = found.summary()
+    assert f"no gain from more rays is measurable: the {found.expected_error:.1%} of the error bars" in lines
+    assert "1.2e-05 ± 2.2e-05 nat per ray" in lines
+    assert "times the rays" not in lines
+    axes = plot_characteristic(found).axes[2]
+    (legend,) = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "no gain from more rays is measurable" in legend
+    shown = [(line.get_xdata()[0], line.get_ydata()[0]) for line in axes.lines if len(line.get_xdata())]
+    assert shown[0] == (10_000, 100.0 * found.expected_error)
+    low, high = axes.get_ylim()
+    assert all(0.0 < low < y < high for _, y in shown)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["plane", "dome with a window", "cylinder"])
 def test_the_picture_shows_what_was_found_and_repeats_its_bytes(name: str, tmp_path: Path) -> None:

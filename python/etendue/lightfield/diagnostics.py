@@ -118,7 +118,7 @@ class Diagnostics:
             f"resolves {self.resolution.summary()}",
         ]
         if self.forecast is not None:
-            lines += _forecast_lines(self.forecast)
+            lines += _forecast_lines(self.forecast, self.expected_error)
         lines += [
             f"least certain: ({', '.join(f'{c:.4g}' for c in s.point)}) mm towards θ = {s.theta:.0f}°, φ = {s.phi:.0f}° "
             f"on the {s.part}: {measured(s.luminance, s.standard_error, unit)}, {s.share:.1%} of the expected loss"
@@ -285,8 +285,14 @@ def _spot(field: LightField, index: int, coordinates: FloatArray, share: float) 
     )
 
 
-def _forecast_lines(forecast: Forecast) -> list[str]:
+def _forecast_lines(forecast: Forecast, expected_error: float) -> list[str]:
     """What the forecast says, for people."""
+    if not forecast.measurable:
+        gain, spread = forecast.gains[-1], forecast.gain_errors[-1]
+        return [
+            f"no gain from more rays is measurable: the {expected_error:.1%} of the error bars is an upper bound",
+            f"in fits to parts of the rays, twice as many changed the score by {gain:.1e} ± {spread:.1e} nat per ray",
+        ]
     error, factor, gain = forecast.error(), forecast.factor(0.5), forecast.gain(4.0)
     return [
         f"relative error at a ray by fits to parts of the rays {_between(error, '{:.1%}')}, and what the grid blurs",
@@ -301,11 +307,13 @@ def _between(predicted: Predicted, form: str) -> str:
 
 
 def _forecast_facts(forecast: Forecast) -> dict[str, Any]:
+    """As plain data; without a measurable gain no number of rays is known to halve the error."""
     return {
+        "measurable": forecast.measurable,
         "rays": forecast.rays.tolist(),
         "gains": forecast.gains.tolist(),
         "gain_errors": forecast.gain_errors.tolist(),
         "exponent": forecast.exponent._asdict(),
         "error": forecast.error()._asdict(),
-        "rays_factor_to_halve_error": forecast.factor(0.5)._asdict(),
+        "rays_factor_to_halve_error": forecast.factor(0.5)._asdict() if forecast.measurable else None,
     }

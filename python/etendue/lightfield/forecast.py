@@ -100,6 +100,18 @@ class Forecast:
     weights: FloatArray
 
     @property
+    def measurable(self) -> bool:
+        """Whether more rays are likelier to gain anything than not; if not, an error of 0 means no more than that.
+
+        Examples
+        --------
+        >>> rays = np.array([1e4, 2e4, 4e4])
+        >>> [law_of_gains(rays, np.array(g), np.eye(2) * 1e-8, 80_000).measurable for g in ([8e-3, 4e-3], [-1e-4, 5e-5])]
+        [True, False]
+        """
+        return self.loss().value > 0.0
+
+    @property
     def exponent(self) -> Predicted:
         """β of loss ∝ rays^-β."""
         return self._forecast(self.exponents)

@@ -105,7 +105,7 @@ def plot_characteristic(
         _draw_luminance(given[0], diagnostics.curve, diagnostics.flux_unit)
         _draw_flux(given[1], diagnostics.curve, diagnostics.flux_unit)
         if forecast is not None:
-            _draw_forecast(given[2], forecast)
+            _draw_forecast(given[2], forecast, diagnostics.expected_error)
         style.put_title(given[0], heading)
         return given
     table = diagnostics.spots[:MOST_SPOTS]
@@ -120,7 +120,8 @@ def plot_characteristic(
     _draw_luminance(first, diagnostics.curve, diagnostics.flux_unit)
     _draw_flux(second, diagnostics.curve, diagnostics.flux_unit)
     if forecast is not None:
-        _draw_forecast(style.add_axes(figure, LEFT, under_panels, WIDTH - LEFT - RIGHT, PANEL), forecast)
+        below = style.add_axes(figure, LEFT, under_panels, WIDTH - LEFT - RIGHT, PANEL)
+        _draw_forecast(below, forecast, diagnostics.expected_error)
     style.add_text(figure, 0.3, height - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     on = re.sub(r"\d+\.\d+", lambda number: f"{float(number[0]):.4g}", f"on {diagnostics.surface}")
     style.add_text(figure, 0.3, height - 0.54, on, size=style.LABEL_SIZE, color=style.FAINT)
@@ -175,12 +176,37 @@ def _draw_flux(axes: Axes, curve: CharacteristicCurve, unit: FluxUnit) -> None:
     )  # fmt: skip
 
 
-def _draw_forecast(axes: Axes, forecast: Forecast) -> None:
+def _draw_forecast(axes: Axes, forecast: Forecast, expected_error: float) -> None:
+    """The error over the number of rays; the error bars as an upper bound where no gain from more is measurable."""
     _open(axes)
     n = np.geomspace(forecast.rays[0], AHEAD * forecast.field_rays, 97)
+    if forecast.measurable:
+        _draw_law(axes, forecast, n)
+    else:
+        _draw_bound(axes, forecast.field_rays, 100.0 * expected_error)
+    axes.set_xscale("log")
+    axes.set_xlim(n[0] / 1.15, n[-1])
+    axes.xaxis.set_major_formatter(style.log_formatter())
+    axes.set_xlabel("rays")
+    axes.set_ylabel("relative error at a ray [%]")
+    axes.legend(loc="lower left", frameon=False, fontsize=style.TICK_SIZE, labelcolor=style.INK, handlelength=1.6)
+
+
+def _draw_bound(axes: Axes, rays: int, percent: float) -> None:
+    """The error bars of the field, with an arrow downwards."""
+    axes.errorbar(
+        [rays], [percent], yerr=[percent / 2], uplims=True, fmt="o", color=style.INK, markersize=4.5, capsize=3,
+        label="the error bars of this field, an upper bound: no gain from more rays is measurable",
+    )  # fmt: skip
+    if percent > 0.0:
+        axes.set_yscale("log")
+        axes.set_ylim(percent / 10.0, percent * 3.0)
+        style.put_log_numbers(axes.yaxis)
+
+
+def _draw_law(axes: Axes, forecast: Forecast, n: npt.NDArray[np.float64]) -> None:
     value, low, high = (100.0 * np.array(column) for column in zip(*map(forecast.error, n), strict=True))
     colour = style.LINES[0]
-    axes.set_xscale("log")
     axes.set_yscale("log")
     axes.fill_between(n, low, high, color=colour, alpha=0.22, linewidth=0.0)
     axes.plot(n, value, color=colour, linewidth=1.2, label="error and its 68 % interval")
@@ -198,12 +224,7 @@ def _draw_forecast(axes: Axes, forecast: Forecast) -> None:
         [forecast.field_rays * then.value], [wanted], "D", color=style.LINES[2], markersize=4.5,
         label=f"half the error: {then.value:.2g} times the rays ({then.low:.2g} to {then.high:.2g})",
     )  # fmt: skip
-    axes.set_xlim(n[0] / 1.15, n[-1])
     style.put_log_numbers(axes.yaxis)
-    axes.xaxis.set_major_formatter(style.log_formatter())
-    axes.set_xlabel("rays")
-    axes.set_ylabel("relative error at a ray [%]")
-    axes.legend(loc="lower left", frameon=False, fontsize=style.TICK_SIZE, labelcolor=style.INK, handlelength=1.6)
 
 
 def _write_table(figure: Figure, bottom: float, spots: tuple[UncertainSpot, ...], unit: FluxUnit) -> None:
