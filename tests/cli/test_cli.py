@@ -333,6 +333,14 @@ def test_info_counts_and_names_defects(run: Run, folder: Path) -> None:
     assert "1 of 50 rays have negative flux" in outcome.out
 
 
+def test_info_of_rays_that_cannot_be_used_does_not_call_them_far_field_data(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "nan.csv").write_text("x_mm,y_mm,z_mm,l,m,n,flux_lm\n" + "0,0,0,0,0,1,nan\n" * 5, encoding="utf-8")
+    told = run("info", tmp_path / "nan.csv").out
+    assert "none (no ray can be used)" in told
+    assert "not determined (no ray can be used)" in told
+    assert "far-field" not in told
+
+
 def test_info_tells_the_wavelengths_that_are_known(run: Run, tmp_path: Path, folder: Path) -> None:
     data = bytearray((folder / "watts.tm25ray").read_bytes())
     rays = np.asarray(et.read_rays(folder / "watts.tm25ray").records)

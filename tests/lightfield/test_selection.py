@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError
 from etendue.lightfield.selection.scorer import SurfaceScorer
-from etendue.lightfield.selection.search import SurfaceChoice, choose_surface
+from etendue.lightfield.selection.search import SurfaceChoice, choose_surface, told_apart
 from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere
 from etendue.quantities.report import RayFileWarning
 from oracles.bodies import Block, Globe, Rod
@@ -341,6 +341,14 @@ def test_notes_name_all_that_was_compared(led_choice: SurfaceChoice) -> None:
     for row in choice.table:
         assert row.surface.NAME in choice.notes[0]
     assert json.dumps(choice.notes)
+
+
+@pytest.mark.parametrize("z", [0.0, 1.0, -10_000.0, 3e6])
+@pytest.mark.parametrize("apart", [2.0, 0.01, 3e-4])
+def test_depths_that_differ_are_told_apart(z: float, apart: float) -> None:
+    """The texts, read again, are as far apart as the depths, to one per cent."""
+    low, high = map(float, told_apart(z - apart / 3, z + 2 * apart / 3))
+    assert high - low == pytest.approx(apart, rel=0.01)
 
 
 @pytest.mark.slow

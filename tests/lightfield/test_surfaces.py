@@ -36,6 +36,18 @@ def test_the_text_of_a_surface_gives_the_surface(surface: et.Plane) -> None:
     assert et.parse_surface(surface.spec) == surface
 
 
+@pytest.mark.parametrize("off", [0.0, 12.3, -10_000.03, 2.5e6])
+def test_messages_tell_where_a_small_surface_is(off: float) -> None:
+    """The text, read again: lengths to four digits, and places to less than a hundredth of the size, however far off."""
+    for surface in (
+        et.Plane(z=off, width=1.2344, height=0.7, centre=(-off, 2 * off)),
+        et.Cylinder(radius=1.2344, bottom=off, top=off + 1, centre=(off, 0)),
+    ):
+        told = et.parse_surface(surface.told)
+        assert told.parts()[0].size[0] == pytest.approx(1.234, abs=1e-12)
+        np.testing.assert_allclose(told.parts()[0].centre, surface.parts()[0].centre, atol=0.01, rtol=0)
+
+
 @pytest.mark.parametrize("surface", SPECIMENS, ids=lambda s: s.NAME)
 def test_axes_are_right_handed_and_coordinates_lead_back_to_the_ray(surface: et.Plane) -> None:
     position, direction = bundle(4000, 1)

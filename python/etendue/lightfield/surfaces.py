@@ -188,22 +188,23 @@ class Surface(abc.ABC):
         >>> Dome(radius=1.264).spec
         'dome:radius=1.264,z=0,centre=0/0'
         """
-        return self._written(".12g")
+        return self._written(12)
 
     @property
     def told(self) -> str:
-        """The surface as messages tell it: as `spec`, to four digits.
+        """The surface as messages tell it: as `spec`, to four digits, and to more where it lies far off for its size.
 
         Examples
         --------
-        >>> Dome(radius=1.26412).told
-        'dome:radius=1.264,z=0,centre=0/0'
+        >>> Dome(radius=1.26412).told, Disk(radius=1.26412, z=-10_000.03).told
+        ('dome:radius=1.264,z=0,centre=0/0', 'disk:radius=1.264,z=-10000.03,centre=0/0')
         """
-        return self._written(".4g")
+        lengths = (getattr(self, f.name) for f in dataclasses.fields(self) if f.name in LENGTHS)
+        return self._written(4, max((length for length in lengths if length is not None), default=math.inf))
 
-    def _written(self, style: str) -> str:
+    def _written(self, digits: int, size: float = math.inf) -> str:
         return f"{self.NAME}:" + ",".join(
-            f"{f.name}={_text(getattr(self, f.name), style)}"
+            f"{f.name}={_text(getattr(self, f.name), digits, size)}"
             for f in dataclasses.fields(self)
             if getattr(self, f.name) is not None and not (f.name == "frames" and self.closed("frames") == 0)
         )
@@ -214,10 +215,13 @@ LENGTHS = {"width", "height", "depth", "radius", "window", "rest"}
 MOST_FRAMES = 16
 
 
-def _text(value: object, style: str) -> str:
+def _text(value: Any, digits: int, size: float) -> str:
     if isinstance(value, tuple):
-        return "/".join(_text(v, style) for v in value)
-    return str(value).lower() if isinstance(value, bool) else format(value, style)
+        return "/".join(_text(v, digits, size) for v in value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    more = max(math.floor(math.log10(abs(value) / size)), 0) if abs(value) > size else 0
+    return format(value, f".{digits + more}g")
 
 
 @dataclasses.dataclass(frozen=True)

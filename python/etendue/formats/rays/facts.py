@@ -13,6 +13,9 @@ from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress
 
+NO_RAY = "no ray can be used"
+"""Why nothing is known of where rays are."""
+
 
 def ray_facts(rays: RaySet, path: str | Path, progress: Progress | None = None) -> dict[str, Any]:
     """The facts of a file of rays: lengths in mm, wavelengths in nm, flux in the unit that stands beside.
@@ -71,7 +74,7 @@ def fact_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
     ('rays', '1,000')
     """
     unit = facts["flux_unit"]
-    header = facts["header_flux"]
+    header, usable = facts["header_flux"], facts["usable_rays"]
     stated = f"header {header:.7g} {unit}" if isinstance(header, float) else "no total in the header"
     rows = [
         ("format", facts["title"]),
@@ -79,8 +82,12 @@ def fact_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
         ("flux", f"{facts['total_flux']:.7g} {unit}"),
         ("", f"{stated}; sum over the rays {facts['sum_flux']:.7g} {unit}"),
         ("per ray", _range(facts["flux_per_ray"], unit) + _equal_rays(facts["effective_rays"])),
-        ("bounding box", _box(facts["bounding_box"])),
-        ("virtual focus", _point(facts["virtual_focus"], "mm") or "not determined (collimated rays, or far-field data)"),
+        ("bounding box", _box(facts["bounding_box"]) or f"none ({'far-field data' if usable else NO_RAY})"),
+        (
+            "virtual focus",
+            _point(facts["virtual_focus"], "mm")
+            or f"not determined ({'collimated rays, or far-field data' if usable else NO_RAY})",
+        ),
         ("mean direction", _point(facts["mean_direction"], "") or "none"),
         ("spectrum", facts["spectrum"]),
     ]  # fmt: skip
@@ -139,9 +146,9 @@ def _equal_rays(effective: float) -> str:
     return "" if math.isnan(effective) else f"; as good as {effective:,.0f} equal rays"
 
 
-def _box(bounds: list[list[float]] | None) -> str:
+def _box(bounds: list[list[float]] | None) -> str | None:
     if bounds is None:
-        return "none (far-field data)"
+        return None
     sides = [f"{low:.5g}" if low == high else f"{low:.5g} to {high:.5g}" for low, high in bounds]
     return ", ".join(f"{axis} {side}" for axis, side in zip("xyz", sides, strict=True)) + " mm"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -285,7 +286,8 @@ class _Search:
             f"likelihood per ray against it: {others})"
         )
         if depths is not None and isinstance(winner.surface, Plane | Disk | Dome):
-            yield f"depths between {depths[0]:.4g} and {depths[1]:.4g} mm cannot be told from that of {winner.surface.told}"
+            low, high = told_apart(*depths)
+            yield f"depths between {low} and {high} mm cannot be told from that of {winner.surface.told}"
         mean = np.average(self.trials.direction, weights=self.trials.rays.flux, axis=0)
         aslant = self.settings.aslant
         if np.linalg.norm(mean) > aslant and mean[2] < aslant * np.linalg.norm(mean):
@@ -294,6 +296,19 @@ class _Search:
                 f"the light heads towards ({x:.2f}, {y:.2f}, {z:.2f}) on average; planes, disks, hemispheres and domes "
                 "shine towards +Z: if one of these would suit the source, turn the rays (in Python, rays.rotated)"
             )
+
+
+def told_apart(low: float, high: float) -> tuple[str, str]:
+    """Two numbers to four digits, or to as many as give their difference three.
+
+    Examples
+    --------
+    >>> told_apart(-0.0026812, 0.0071653), told_apart(-10_000.0026812, -9999.9928347)
+    (('-0.002681', '0.007165'), ('-10000.00268', '-9999.992835'))
+    """
+    apart, largest = high - low, max(abs(low), abs(high))
+    digits = max(4, math.ceil(math.log10(largest / apart)) + 3) if 0.0 < apart < largest else 4
+    return f"{low:.{digits}g}", f"{high:.{digits}g}"
 
 
 def _table(finalists: list[_Scored], winner: _Scored) -> tuple[SurfaceScore, ...]:
