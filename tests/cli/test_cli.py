@@ -341,6 +341,16 @@ def test_info_of_rays_that_cannot_be_used_does_not_call_them_far_field_data(run:
     assert "far-field" not in told
 
 
+def test_info_tells_of_rays_that_a_file_holds_twice(run: Run, folder: Path) -> None:
+    """A set merged with itself: half of its rays repeat another one. Each way of asking says so, and of no other file."""
+    merged = run("convert", folder / "led.dat", folder / "led.dat", "twice.csv")
+    assert "shares 100.00% of its rays with" in merged.err
+    assert "50.00% of the rays repeat another one" in run("info", "twice.csv").out
+    (facts,) = run("info", "twice.csv", "--json").json
+    assert [c["severity"] for c in facts["complaints"] if "repeat" in c["found"]] == ["warning"]
+    assert "repeat" not in run("info", folder / "led.dat").out
+
+
 def test_info_tells_the_wavelengths_that_are_known(run: Run, tmp_path: Path, folder: Path) -> None:
     data = bytearray((folder / "watts.tm25ray").read_bytes())
     rays = np.asarray(et.read_rays(folder / "watts.tm25ray").records)

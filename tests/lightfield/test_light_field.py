@@ -229,6 +229,26 @@ def test_weights_count_as_flux_and_not_as_rays() -> None:
 
 
 @pytest.mark.slow
+def test_a_ray_that_a_set_holds_again_and_again_is_one_ray() -> None:
+    """Rays repeated 20 times with a twentieth of the flux, in another order, are the same light: the field is the same."""
+    source, n, times = LimbDarkenedDisk(), 2000, 20
+    once = rays_of(source, n, seed=4)
+    order = np.random.default_rng(1).permutation(n * times) % n
+    again = et.RaySet(once.position[order], once.direction[order], once.flux[order] / times)
+    seen = np.sort(np.unique(order, return_index=True)[1])
+    same = et.RaySet(*(column[order[seen]] for column in (once.position, once.direction, once.flux)))
+    expected, found = (LightField.fit(rays, et.Disk(radius=source.radius)) for rays in (same, again))
+    x, k = source.rays(500, seed=77)
+    assert found.luminance(points=x, directions=k)[0] == pytest.approx(
+        expected.luminance(points=x, directions=k)[0], rel=1e-9
+    )
+    assert found.report.effective_rays == pytest.approx(n, rel=1e-9)
+    assert found.resolution().summary() == expected.resolution().summary()
+    assert any("38,000 of 40,000 rays repeat another one" in note for note in found.notes)
+    assert not any("repeat" in note for note in expected.notes)
+
+
+@pytest.mark.slow
 def test_bits_do_not_depend_on_threads() -> None:
     rays = rays_of(DieUnderDome(), 10_000)
     one, seven = (LightField.fit(rays, et.Dome(radius=1.3), depths=(3, 3, 3, 3), threads=t) for t in (1, 7))

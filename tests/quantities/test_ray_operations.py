@@ -713,3 +713,19 @@ def test_rays_without_a_wavelength_have_no_lumens() -> None:
     rays = RaySet([[0, 0, 0]] * 3, [[0, 0, 1]] * 3, [1.0] * 3, flux_unit="W", wavelength=[555.0, 0.0, 610.0])
     with pytest.raises(UnitError, match="ray 2 has the wavelength 0 nm"):
         rays.in_unit("lm")
+
+
+def test_sets_that_hold_the_same_rays_say_so_when_they_are_merged() -> None:
+    """Of 400 rays, 300 are among those of the first set, in another order; a third set has rays of its own."""
+    one, other = (
+        RaySet(*np.split(np.random.default_rng(s).normal(size=(500, 6)), 2, axis=1), np.ones(500)) for s in (1, 2)
+    )
+    order = np.random.default_rng(3).permutation(500)[:300]
+    mixed = [
+        np.concatenate([getattr(one, name)[order], getattr(other, name)[:100]]) for name in ("position", "direction")
+    ]
+    both = RaySet.merge([one, RaySet(*mixed, np.ones(400))])
+    told = [complaint.found for complaint in both.complaints if "shares" in complaint.found]
+    assert len(told) == 1
+    assert "shares 75.00% of its rays with" in told[0]
+    assert not any("shares" in complaint.found for complaint in RaySet.merge([one, other]).complaints)

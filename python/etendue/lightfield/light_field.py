@@ -158,7 +158,8 @@ class LightField(EtendueDensity, InNotebook):
         Parameters
         ----------
         rays : RayStream
-            Any number of rays, of equal or unequal flux.
+            Any number of rays, of equal or unequal flux. Rays that a set holds several times count as one, up to some 8
+            million rays; the notes say so.
         surface : Surface or "auto"
             Where the light is carried to, along the rays; ``"auto"``: the surface that predicts held-out rays best. Of a
             plane the focus is found where it is left out, and, if all its dimensions are, a window with frames about it.

@@ -16,6 +16,7 @@ from etendue.quantities.ray_records import RayRecords
 from etendue.quantities.ray_rewriting import Rays
 from etendue.quantities.ray_stream import BATCH, RayBatch
 from etendue.quantities.ray_units import in_unit
+from etendue.quantities.repeated_rays import SharedRays
 from etendue.quantities.report import Complaint
 from etendue.quantities.spool import spool
 from etendue.units import FluxUnit
@@ -54,10 +55,13 @@ def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | 
     fields += [("spectrum_index", "<i4")] if indexed else []
     dtype = np.dtype(fields)
 
+    same = SharedRays([len(rays) for rays in sets])
+
     def parts() -> Iterator[npt.NDArray[Any]]:
         before = 0
-        for rays in sets:
+        for number, rays in enumerate(sets):
             for batch in rays.batches():
+                same.add(number, batch.position, batch.direction)
                 part = np.zeros(len(batch.flux), dtype)
                 part["position"], part["direction"], part["flux"] = batch.position, batch.direction, batch.flux
                 for name in shared:
@@ -71,6 +75,7 @@ def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | 
                 yield part
             before += len(rays.spectra)
 
+    records = spool(parts(), dtype)
     meaning = dataclasses.replace(
         sets[0].meaning,
         declared_flux=None,
@@ -81,12 +86,13 @@ def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | 
         single_wavelength=single,
         header={},
         copies=max(rays.meaning.copies for rays in sets),
-        complaints=tuple(
-            _placed(complaint, rays) for rays in sets for complaint in (*rays.complaints, *_losses(rays, dtype, single))
+        complaints=(
+            *(_placed(told, rays) for rays in sets for told in (*rays.complaints, *_losses(rays, dtype, single))),
+            *same.complaints([rays.provenance.source for rays in sets]),
         ),
         provenance=_provenance([rays.provenance for rays in sets]),
     )
-    return type(sets[0]).from_records(spool(parts(), dtype), meaning)
+    return type(sets[0]).from_records(records, meaning)
 
 
 def _wavelengths(sets: Sequence[RayRecords]) -> tuple[float | None, bool]:

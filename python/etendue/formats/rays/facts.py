@@ -12,6 +12,7 @@ from etendue.formats.rays import RAY_FORMATS
 from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress
+from etendue.quantities.repeated_rays import repeat_complaints
 
 NO_RAY = "no ray can be used"
 """Why nothing is known of where rays are."""
@@ -40,6 +41,7 @@ def ray_facts(rays: RaySet, path: str | Path, progress: Progress | None = None) 
     focus = rays.virtual_focus
     low, high = moments.flux_range
     known = len(rays) > rays.tally.unusable
+    complaints = (*rays.complaints, *repeat_complaints(rays, rays.meaning.copies))
     return {
         "file": str(path),
         "format": rays.provenance.format,
@@ -59,8 +61,8 @@ def ray_facts(rays: RaySet, path: str | Path, progress: Progress | None = None) 
         "luminous_efficacy": _efficacy(rays),
         "columns": list(rays.columns),
         "header": dict(rays.header),
-        "complaints": [complaint.to_dict() for complaint in rays.complaints],
-        "complaint_lines": [str(complaint) for complaint in rays.complaints],
+        "complaints": [complaint.to_dict() for complaint in complaints],
+        "complaint_lines": [str(complaint) for complaint in complaints],
     }
 
 

@@ -1,0 +1,155 @@
+"""Rays that a set holds more than once: whatever is made of them takes each for a ray of its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from etendue import _core
+from etendue.quantities.ray_stream import BATCH, RayStream
+from etendue.quantities.report import Complaint
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FloatArray = npt.NDArray[np.float64]
+Keys = npt.NDArray[np.uint64]
+
+KEPT = 1 << 20
+"""Rays that are compared: those whose key is a multiple of a number, so that copies are kept together or not at all."""
+
+STRETCHES = 64
+"""Of larger sets than so many batches, as many are read, evenly spread; of a set merged with itself each with its copy."""
+
+FEWEST, SHARE = 100, 0.01
+"""Repeated rays, and their share, that are worth a word: text of few digits makes some by chance."""
+
+ODD = np.uint64(0x9E3779B97F4A7C15)
+SHIFT = np.uint64(29)
+
+
+def keys_of(position: FloatArray, direction: FloatArray) -> Keys:
+    """A key of each ray's place and direction, to single precision: that of copies is the same, that of others is not.
+
+    Of 10^8 rays with different places, two have the same key by chance once in 4000 sets.
+
+    Examples
+    --------
+    >>> place = np.array([[0.0, 1, 2], [0, 1, 2], [0, 1, 3]])
+    >>> key = keys_of(place, np.tile([0.0, -0.0, 1], (3, 1)))
+    >>> bool(key[0] == key[1]), bool(key[0] == key[2])
+    (True, False)
+    """
+    key = np.zeros(len(position), dtype=np.uint64)
+    for column in (*position.T, *direction.T):
+        # Single precision, since a direction that is normalised again may change in its last bit; adding 0 makes 0 of -0.
+        key = (key ^ (column.astype(np.float32) + np.float32(0.0)).view(np.uint32).astype(np.uint64)) * ODD
+        key ^= key >> SHIFT
+    return key
+
+
+class Repeats(NamedTuple):
+    """Of rays that were compared: how many, and how many of them repeat another one."""
+
+    rays: int
+    repeated: int
+
+    @classmethod
+    def of(cls, rays: RayStream) -> Repeats:
+        """Of a set with positions, in one pass over its rays.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> once = et.RingSource(rays=300).ray_set()
+        >>> Repeats.of(once), Repeats.of(et.RaySet.merge([once, once]))
+        (Repeats(rays=300, repeated=0), Repeats(rays=600, repeated=300))
+        """
+        n, every = len(rays), np.uint64(max(1, len(rays) // KEPT))
+        starts = list(range(0, n, BATCH)) if n <= STRETCHES * BATCH else [i * n // STRETCHES for i in range(STRETCHES)]
+        kept = [np.zeros(0, dtype=np.uint64)]
+        source = rays.core_source()
+        for start in starts:
+            position, direction, flux = _core.read_rays(source, start, min(start + BATCH, n))
+            key = keys_of(position, direction)
+            kept.append(key[(key % every == 0) & (flux > 0.0)])
+        keys = np.concatenate(kept)
+        return cls(keys.size, keys.size - np.unique(keys).size)
+
+    @property
+    def told(self) -> str | None:
+        """What is to be said of them; None if they are few."""
+        if self.repeated < FEWEST or self.repeated < SHARE * self.rays:
+            return None
+        return (
+            f"{self.repeated / self.rays:.2%} of the rays repeat another one, with its place and direction: standard errors "
+            "and resolution take each for a ray of its own, and are too good; give each ray once, with the sum of the flux"
+        )
+
+
+def repeat_complaints(rays: RayStream, copies: float = 1.0) -> list[Complaint]:
+    """What is to be said of a set that holds rays more than once, in one pass over it.
+
+    Parameters
+    ----------
+    rays : RayStream
+        Without positions, nothing is said: different rays of a far-field set may share a direction.
+    copies : float
+        Of which the set itself tells (`RaySetMeaning.copies`): above 1, nothing is added.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> repeat_complaints(et.RingSource(rays=1000).ray_set())
+    []
+    """
+    told = Repeats.of(rays).told if rays.has_position and copies <= 1.0 else None
+    return [Complaint("warning", "rays", told)] if told else []
+
+
+class SharedRays:
+    """Whether sets that are joined hold the same rays.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Rays of each set.
+
+    Examples
+    --------
+    >>> place, up = np.arange(600.0).reshape(200, 3), np.tile([0.0, 0, 1], (200, 1))
+    >>> shared = SharedRays([200, 200])
+    >>> for number in (0, 1):
+    ...     shared.add(number, place, up)
+    >>> shared.complaints(["first", "second"])[0].found
+    'shares 100.00% of its rays with first: standard errors take each for a ray of its own, and are too small'
+    """
+
+    def __init__(self, sizes: Sequence[int]) -> None:
+        self._every = np.uint64(max(1, sum(sizes) // KEPT))
+        self._keys: list[list[Keys]] = [[] for _ in sizes]
+
+    def add(self, number: int, position: FloatArray, direction: FloatArray) -> None:
+        """Take note of some rays of a set."""
+        key = keys_of(position, direction)
+        self._keys[number].append(key[key % self._every == 0])
+
+    def complaints(self, names: Sequence[str]) -> list[Complaint]:
+        """Of each set that shares many rays with one before it; `names` are those of the sets."""
+        found: list[Complaint] = []
+        before: list[Keys] = []
+        for number, parts in enumerate(self._keys):
+            keys = np.concatenate([np.zeros(0, dtype=np.uint64), *parts])
+            for name, others in zip(names, before, strict=False):
+                shared = int(np.isin(keys, others).sum())
+                if shared >= FEWEST and shared >= SHARE * keys.size:
+                    told = (
+                        f"shares {shared / keys.size:.2%} of its rays with {name}: standard errors take each for a ray"
+                    )
+                    found.append(
+                        Complaint("warning", f"{names[number]}, rays", f"{told} of its own, and are too small")
+                    )
+            before.append(keys)
+        return found
