@@ -8,6 +8,7 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
+from etendue.quantities.smooth_light import NUMBERS, Harmonics, nodes_around
 from oracles.beams import beam, direction, lobe, rays_of
 from oracles.verdicts import LARGEST_Z, assert_covers, assert_drawn_with
 
@@ -105,6 +106,76 @@ def test_nodes_and_peaks_lie_within_their_errors(name: str) -> None:
     assert_drawn_with(share=(0.9, 0.9999), hits=float((np.abs(largest) < 2.0).sum()), rays=len(largest))
     # The mean over sets is no worse than a third of an error off: chance does not lift the peak that is stated.
     assert abs(np.mean(peaks)) < 1.0 / 3.0 + LARGEST_Z * np.std(peaks) / np.sqrt(len(peaks))
+
+
+def uneven(n: int, seed: int) -> Array:
+    """Directions of I ∝ cos γ (1 + 0.6 p + 0.3 q), no mirror image of itself: cosine light, of which some rays are kept."""
+    rng = np.random.default_rng(seed)
+    d = beam(3 * n, exponent=1.0, c=0.0, gamma=0.0, seed=seed + 10**6)
+    return np.asarray(d[1.9 * rng.random(3 * n) < 1.0 + 0.6 * d[:, 0] + 0.3 * d[:, 1]][:n])
+
+
+def uneven_light(c: Array, gamma: Array) -> Array:
+    p, q = np.sin(np.radians(gamma)) * np.cos(np.radians(c)), np.sin(np.radians(gamma)) * np.sin(np.radians(c))
+    return np.asarray(np.maximum(np.cos(np.radians(gamma)), 0.0) / np.pi * (1.0 + 0.6 * p + 0.3 * q))
+
+
+def uneven_wings(n: int, seed: int) -> Array:
+    """Directions of a batwing times 1 + 0.5 cos 2C + 0.3 cos(C − 40°)."""
+    rng = np.random.default_rng(seed)
+    c, gamma = rng.uniform(0, 360, 3 * n), np.degrees(np.arcsin(rng.random(3 * n) ** 0.25))
+    kept = 1.8 * rng.random(3 * n) < around(c)
+    return np.asarray(direction(c=c[kept], gamma=gamma[kept])[:n])
+
+
+def around(c: Array) -> Array:
+    return np.asarray(1.0 + 0.5 * np.cos(2.0 * np.radians(c)) + 0.3 * np.cos(np.radians(c - 40.0)))
+
+
+SMOOTH = {
+    "uneven": (uneven, uneven_light),
+    "uneven wings": (uneven_wings, lambda c, gamma: batwing(c, gamma) * around(c)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("band", [(30.0, 60.0), (60.0, 80.0)])
+@pytest.mark.parametrize(("n", "seeds"), [(2_000, 40), (20_000, 12)])
+@pytest.mark.parametrize("name", SMOOTH)
+def test_few_rays_of_smooth_light_without_symmetry(name: str, n: int, seeds: int, band: tuple[float, float]) -> None:
+    """What steps around the axis blur is below the noise for few rays as well: errors cover the truth in each band of γ."""
+    drawn, truth = SMOOTH[name]
+    found = []
+    for seed in range(seeds):
+        far = et.intensity_distribution(rays_of((drawn(n, 990_000 + seed), 1.0)))
+        rows = (far.gamma >= band[0]) & (far.gamma < band[1])
+        z = ((far.values - truth(far.c[:, None], far.gamma)) / far.standard_error)[:, rows]
+        found.append(z[np.isfinite(z)])
+    assert_covers(deviations=np.concatenate(found), effective=effective(found), one=(0.62, 0.74), two=(0.92, 0.98))
+
+
+@pytest.mark.parametrize(
+    ("order", "strength", "rays"), [(1, 0.5, 300), (1, 0.5, 30_000), (2, 0.3, 1000), (3, 0.8, 300)]
+)
+def test_nodes_around_the_axis_leave_little_bias(order: int, strength: float, rays: int) -> None:
+    """By quadrature: hat means of 1 + a cos(kC + 23°) joined by lines differ from it by less than 0.15 of the noise."""
+    c = (np.arange(100_000) + 0.5) * 360.0 / 100_000
+    light = 1.0 + strength * np.cos(np.radians(order * c + 23.0))
+    row = np.zeros(c.size, dtype=np.intp)
+    sums = Harmonics.of(c, light, row, 1)
+    chosen = int(nodes_around(sums, sums, np.array([float(rays)]))[0])
+
+    def ratio(number: int) -> float:
+        """Mean square of bias over that of noise: both of the table, over all C."""
+        at, step = np.arange(number) * 360.0 / number, 360.0 / number
+        hats = np.maximum(1.0 - np.abs((c[None, :] - at[:, None] + 180.0) % 360.0 - 180.0) / step, 0.0)
+        values = hats @ light / hats.sum(axis=1)
+        table = np.interp(c, np.append(at, 360.0), np.append(values, values[0]))
+        noise = (hats**2).sum(axis=1).mean() / hats.sum(axis=1).mean() ** 2 * c.size / rays * 0.75
+        return float(((table - light) ** 2).mean() / noise)
+
+    assert ratio(chosen) < 0.15
+    assert ratio(max(number for number in NUMBERS if number < chosen)) > 0.15
 
 
 @pytest.mark.slow
