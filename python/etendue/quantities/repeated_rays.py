@@ -51,7 +51,13 @@ def keys_of(position: FloatArray, direction: FloatArray) -> Keys:
 
 
 class Repeats(NamedTuple):
-    """Of rays that were compared: how many, and how many of them repeat another one."""
+    """Of rays that were compared: how many, and how many of them repeat another one.
+
+    Examples
+    --------
+    >>> Repeats(rays=10_000, repeated=50).told, str(Repeats(rays=10_000, repeated=5000).told)[:41]
+    (None, '50.00% of the rays repeat another one, wi')
+    """
 
     rays: int
     repeated: int

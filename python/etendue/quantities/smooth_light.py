@@ -30,7 +30,14 @@ NUMBERS = (2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
 class Harmonics(NamedTuple):
-    """Sums Σ w exp(ikC) of rays, shape (`ORDERS` + 1, rows), and Σ w², shape (rows,)."""
+    """Sums Σ w exp(ikC) of rays, shape (`ORDERS` + 1, rows), and Σ w², shape (rows,).
+
+    Examples
+    --------
+    >>> pair = Harmonics.of(np.array([0.0, 180.0]), np.ones(2), np.zeros(2, dtype=np.intp), 1)
+    >>> np.abs(pair.sums[:3, 0]).round(12).tolist(), pair.squares.tolist()
+    ([2.0, 0.0, 2.0], [2.0])
+    """
 
     sums: npt.NDArray[np.complex128]
     squares: Array
