@@ -10,9 +10,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue import _core
-from etendue.luminance.caustics import at_least_nearby
+from etendue.luminance import scene_map
+from etendue.luminance.caustics import MOST_SEGMENTS, at_least_nearby
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.scene import compile_scene
+from etendue.units import MM2_PER_M2
 from oracles.luminaires import corner, lens_and_mirror
 from oracles.verdicts import LARGEST_Z, REVERSE, SIGNIFICANCE, assert_agree
 from scipy.stats import binom, chi2, norm, t
@@ -131,6 +133,44 @@ def test_none_is_told_and_none_is_needed() -> None:
     assert not _core.Scene({**compile_scene(plain).record, "detectors": []}).may_focus()
     (lmap,) = et.luminance_map(plain, rays_per_pixel=16)
     assert not any("forwards" in note for note in lmap.notes)
+
+
+@pytest.mark.slow
+def test_trapped_light_costs_a_small_map_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quarter of the light goes to and fro in a clear block for ever. The rays forwards of a map of 16 lines of sight end
+    within the effort that is stated for a pilot; and they are no less right: I = Σ L A⊥ of a wall beside, seen from afar, is
+    ρ Φ cos θ/π of the flux that reaches it, by traces that give trapped rays up early."""
+    scene = et.Scene(
+        sources=[{"kind": "point", "flux": 100, "at": [0.3, 0.2, 1.2]}],
+        solids=[{"shape": {"kind": "block", "width": 4, "height": 4, "depth": 2}, "medium": "PMMA"}],
+        surfaces=[{"name": "wall", "shape": {"kind": "rectangle", "width": 10, "height": 10}, "at": [-8, 0, 0],
+                   "toward": [1, 0, 0], "finish": {"kind": "lambertian", "reflectance": 0.5}}],
+    )  # fmt: skip
+    segments, work_unit = [], _core.work_unit
+
+    def counted(*how: Any) -> _core._WorkSums:
+        segments.append((unit := work_unit(*how))["ledger"]["segments"])
+        return unit
+
+    eye, screen = et.Observer(45, 0, 1e6, target=(-8, 0, 0)), et.Screen(14, 14, 2, 2)
+    with monkeypatch.context() as counting:
+        counting.setattr(_core, "work_unit", counted)
+        lmap = et.luminance_map(scene, eye, screen, rays_per_pixel=4)
+    assert len(segments) == 3  # scouts, pilot, light image
+    assert sum(segments) < MOST_SEGMENTS
+    assert any("rays forwards, and 4,096 beforehand" in note for note in lmap.notes)
+    # Where rays are given up sooner, more of them are the same effort; they still outlast those of a pilot.
+    monkeypatch.setattr(scene_map, "MOST_EVENTS", 600)
+    lmap = et.luminance_map(scene, eye, screen, rays_per_pixel=4)
+    trace = et.trace(scene, rays=30_000, seed=5, most_events=100)
+    absorbed = trace.ledger.by_surface["wall"]
+    assert trace.ledger.terminated.flux > 20.0
+    expected = absorbed.flux / math.pi * math.cos(math.pi / 4)
+    area = 14**2 / 4 * screen.cosine(eye) / MM2_PER_M2
+    error = math.sqrt(((lmap.standard_error * area) ** 2).sum())
+    assert error < 0.1 * expected
+    z = ((lmap.values * area).sum() - expected) / math.hypot(error, expected / math.sqrt(absorbed.rays))
+    assert abs(z) < LARGEST_Z
 
 
 def test_a_pixel_that_found_nothing_errs_as_its_neighbours() -> None:

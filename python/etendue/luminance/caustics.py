@@ -31,8 +31,8 @@ BATCH = 1 << 13
 STEP = 8
 """Batches of a pilot at a time."""
 
-MOST_STEPS = 4
-"""Steps of a pilot at most; it stops earlier when enough has been found, or rays go to and fro for long, or nothing is found
+MOST_RAYS = 1 << 18
+"""Rays of a pilot at most; it stops earlier when enough has been found, or rays go to and fro for long, or nothing is found
 by more rays than the map has lines of sight, or something by `MOST_BEFOREHAND` times as many."""
 
 MOST_BEFOREHAND = 8
@@ -44,6 +44,16 @@ ENOUGH = 1 << 13
 MOST_SEGMENTS = 1 << 22
 """Ways between surfaces that the rays of a pilot go."""
 
+SCOUTS = 1 << 7
+"""Rays that tell a pilot how long rays go to and fro."""
+
+LONG = MOST_SEGMENTS // (STEP * BATCH)
+"""Ways of a ray, by the scouts, beyond which a step would take more than `MOST_SEGMENTS`, as where glass traps light: steps
+are then smaller, and rays are given up early. A pilot only advises; no light of the map rests on what its rays bring."""
+
+SMALL_BATCH, FEW_EVENTS = BATCH >> 4, 1 << 9
+"""Rays of a batch, and surfaces that a ray may meet, in a pilot whose rays are long."""
+
 LINE = 4.0
 """What a line of sight costs, in ways between surfaces of rays forwards."""
 
@@ -51,6 +61,7 @@ MOST_SHARE = 8.0
 """Rays forwards cost as much as this many times the lines of sight at most, unless they are asked for."""
 
 FEWEST_RAYS = 1 << 14
+"""Rays forwards that a map has at least where they find anything; of rays longer than `LONG`, as many as are that effort."""
 
 ROUND = 16
 """Batches of rays traced forwards at a time."""
@@ -190,10 +201,15 @@ def plan(
     images = [{"kind": "image", "view": view, "complement": True, "shared": float(pixels)} for view in views]
     core = core_scene({**record, "detectors": [*images, {"kind": "arrivals"}]})
     dealing = Dealing.of(record["sources"], RUN)
+    scouts = _core.work_unit(core, RUN, seed, most_events, 0, 1, threads, SCOUTS)
+    ways = scouts["ledger"]["segments"] / SCOUTS
+    long = ways > LONG
+    each, events = (SMALL_BATCH, min(FEW_EVENTS, most_events)) if long else (BATCH, most_events)
+    bound = min(MOST_SEGMENTS, MOST_SHARE * LINE * lines * pixels) if long else MOST_SEGMENTS
     batches, segments, arrivals = 0, 0, []
     sums = [np.zeros((3, view["columns"] * view["rows"])) for view in views]
-    while batches < MOST_STEPS * STEP and segments < MOST_SEGMENTS:
-        traced = _core.work_unit(core, RUN, seed, most_events, batches, batches + STEP, threads, BATCH)
+    while batches * each < MOST_RAYS and segments < bound:
+        traced = _core.work_unit(core, RUN, seed, events, batches, batches + STEP, threads, each)
         cells = (dealing.added(*dealing.nothing(tally), tally, RUN)[0] for tally in traced["tallies"])
         sums = [total + [part.sum(axis=0) for part in found] for total, found in zip(sums, cells, strict=False)]
         arrivals.append(traced["arrivals"])
@@ -201,14 +217,14 @@ def plan(
         batches += STEP
         least = min(total[2].sum() for total in sums)
         most = lines * pixels * (MOST_BEFOREHAND if least else 1)
-        if min(sum(map(len, arrivals)), least) >= ENOUGH or batches * BATCH >= most:
+        if min(sum(map(len, arrivals)), least) >= ENOUGH or batches * each >= most:
             break
-    done = batches * BATCH
+    done = batches * each
     found = np.concatenate(arrivals)
     guide = _core.Guide(core, found) if len(found) else None
     if rays is not None:
         return Plan(rays, guide, glints, done)
-    cost = max(segments / done / LINE, 0.25)
+    cost = max((ways if long else segments / done) / LINE, 0.25)
     wanted = [
         _rays(core, view, total, done, seed, most_events, lines, (guide, small), threads, cost)
         for view, total, small in zip(views, sums, glints, strict=True)
@@ -249,7 +265,7 @@ def _rays(
     of_ray, of_line = float((forward * weight).sum()), float((reverse * weight).sum())
     most = MOST_SHARE * lines * pixels / cost
     best = lines * math.sqrt(pixels * of_ray / (of_line * cost)) if of_line > 0.0 else most
-    return int(max(min(best, most), FEWEST_RAYS))
+    return int(max(min(best, most), FEWEST_RAYS * min(1.0, LONG / (cost * LINE))))
 
 
 class LightImages:
