@@ -16,7 +16,7 @@ from etendue.errors import ArgumentError, FormatError, SceneWarning, UnknownName
 from etendue.tracing import TraceWarning, running, work
 from etendue.tracing.result import TraceResult
 from oracles.results import bits
-from oracles.verdicts import LARGEST_Z
+from oracles.verdicts import LARGEST_Z, assert_drawn_with
 
 BATCHES = 8
 """Batches of a round here: with fewer than usual a trace of several rounds is short."""
@@ -277,7 +277,24 @@ def test_rays_that_never_end_are_given_up() -> None:
     )
     assert result.ledger.terminated.rays == 1000
     assert result.ledger.closes
-    assert any("most_events" in note for note in result.notes)
+    assert any("raise most_events" in note and "reflectance" in note for note in result.notes)
+
+
+def test_trapped_light_is_told_with_its_medium() -> None:
+    """In a block of n = 1.5 all light beyond the critical angle of all six faces stays: 1 − 3 (1 − √(1 − 1/n²)) of it. More
+    surfaces would not let it out, and the note does not advise them."""
+    block = {"name": "guide", "shape": {"kind": "block", "width": 4, "height": 4, "depth": 4}, "medium": {"index": 1.5}}
+    lamp = {"kind": "point", "flux": 1, "at": [0.1, 0.2, 2.3]}
+    result = et.trace(et.Scene(sources=[lamp], solids=[block]), 10_000, most_events=60)
+    assert_drawn_with(
+        share=1 - 3 * (1 - math.sqrt(1 - 1 / 1.5**2)), hits=result.ledger.terminated.rays, rays=result.rays_done
+    )
+    (note,) = result.notes
+    assert "trapped" in note
+    assert "'guide.medium' absorbed nothing" in note
+    assert "raise" not in note
+    dim = {**block, "medium": {"index": 1.5, "absorption": 0.5}}
+    assert not et.trace(et.Scene(sources=[lamp], solids=[dim]), 10_000).notes
 
 
 # --- files -----------------------------------------------------------------------------------------------------------

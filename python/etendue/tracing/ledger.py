@@ -126,10 +126,21 @@ class Ledger:
             notes.append(f"{self.lost_share:.2g} of the flux was lost: {reasons}")
         if total > 0.0 and self.terminated.flux > NOTEWORTHY * total:
             share = self.terminated.flux / total
-            notes.append(f"{share:.2g} of the flux met more surfaces than allowed and was given up: raise most_events")
+            notes.append(f"{share:.2g} of the flux met more surfaces than allowed and was given up: {self._endless()}")
         if not self.closes:
             notes.append("the ledger does not close; this is a defect of étendue, please report it")
         return tuple(notes)
+
+    def _endless(self) -> str:
+        """Why rays meet so many surfaces, and what to do."""
+        # The first medium is that of the surroundings, where no light goes to and fro by itself.
+        clear = [repr(name) for name, absorbed in list(self.by_medium.items())[1:] if not absorbed.rays]
+        if not clear:
+            return "raise most_events, or give surfaces that reflect all light a reflectance below 1"
+        return (
+            f"it is probably trapped by total reflection in a clear solid, as {' and '.join(clear)} absorbed nothing; give "
+            "the medium its absorption, or save time by a smaller most_events, which changes nothing for trapped light"
+        )
 
     def rows(self) -> Iterator[tuple[int, str, Entry]]:
         """Depth, name and entry of every line of the account that carries light."""
