@@ -195,7 +195,8 @@ def test_another_trace_is_not_continued(rounds: list[TraceResult]) -> None:
         et.trace(luminaire(), n, 7, resume=start, most_events=3)
     with pytest.raises(ArgumentError, match="the scene"):
         et.trace(luminaire(media={"tinted": {"index": 1.5, "absorption": 0.0500001}}), n, 7, resume=start)
-    # What a thing is called is not what it is.
+    # The number of rays need not be said again; what a thing is called is not what it is.
+    assert bits(et.trace(luminaire(), seed=7, resume=rounds[-1])) == bits(rounds[-1])
     assert et.trace(luminaire(name="renamed"), n, 7, resume=rounds[-1]).complete
 
 
@@ -245,11 +246,13 @@ def test_each_ray_of_a_set_once() -> None:
     n = 70_001
     rays = et.RaySet(rng.normal(size=(n, 3)), rng.normal(size=(n, 3)), rng.random(n))
     plane = {"name": "all", "kind": "rays", "shape": {"kind": "sphere", "radius": 50}}
-    result = et.trace(et.Scene(sources=[{"kind": "rays", "rays": rays}], detectors=[plane]), rays=None)
-    assert result.rays_done == n
+    scene = et.Scene(sources=[{"kind": "rays", "rays": rays}], detectors=[plane])
+    result = et.trace(scene)
+    assert result.rays_done == et.trace_work(scene).plan.rays == et.trace_rounds(scene).plan.rays == n
+    assert et.trace_work(et.Scene(sources=[{"kind": "point", "flux": 1}])).plan.rays == 10**7
     assert not any("share" in note for note in result.notes)
     np.testing.assert_allclose(np.sort(result.rays["all"].flux), np.sort(rays.flux), rtol=1e-12)
-    two = et.trace(et.Scene(sources=[{"kind": "rays", "rays": rays}, {"kind": "rays", "rays": rays, "flux": 1}]), None)
+    two = et.trace(et.Scene(sources=[{"kind": "rays", "rays": rays}, {"kind": "rays", "rays": rays, "flux": 1}]))
     assert two.rays_done == 2 * n
     assert any("share" in note for note in two.notes)
 

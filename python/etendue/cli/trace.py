@@ -109,8 +109,6 @@ def trace(
         check_folder(path)
     scene = Scene.load(file)
     started = None if resume is None else TraceResult.load(resume)
-    if rays is None and started is not None:
-        rays = started.rays_asked
     rounds = trace_rounds(scene, rays, seed, until=until, most_events=most_events, threads=threads, resume=started)
     writers = _writers(outputs, rounds.plan)
     require_apart([file, *scene.read_files()], [*outputs, *(path for path, _, _ in writers)])

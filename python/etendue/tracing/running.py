@@ -12,7 +12,6 @@ from etendue.errors import ArgumentError
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Scene
 from etendue.tracing.ledger import NOTEWORTHY, TraceWarning
-from etendue.tracing.plan import DEFAULT_RAYS
 from etendue.tracing.result import TraceResult
 from etendue.tracing.work import BATCHES, MOST_EVENTS, TraceWork, trace_work
 
@@ -21,7 +20,7 @@ Resume = TraceResult | str | os.PathLike[str] | None
 
 def trace(
     scene: Scene | str | os.PathLike[str],
-    rays: float | None = DEFAULT_RAYS,
+    rays: float | None = None,
     seed: int = 1,
     *,
     until: float | None = None,
@@ -40,8 +39,8 @@ def trace(
     scene : Scene or path
         With at least one source; of a path, the scene in that file.
     rays : int or None
-        Of all sources together, shared out by their flux. None: if all sources are ray sets, as many as these have, so
-        that one set alone gives every ray once; else 10⁷.
+        Of all sources together, shared out by their flux. None: as many as of the result that is gone on with; if there is
+        none and all sources are ray sets, as many as these have, so that one set alone gives every ray once; else 10⁷.
     seed : int
         0 to 2⁶⁴ − 1.
     until : float, optional
@@ -99,7 +98,7 @@ def trace(
 
 def trace_rounds(
     scene: Scene | str | os.PathLike[str],
-    rays: float | None = DEFAULT_RAYS,
+    rays: float | None = None,
     seed: int = 1,
     *,
     until: float | None = None,
@@ -140,6 +139,8 @@ def trace_rounds(
     if resume is not None:
         start = resume if isinstance(resume, TraceResult) else TraceResult.load(Path(resume))
     before = None if start is None else start.plan
+    if rays is None and start is not None:
+        rays = start.rays_asked
     work = trace_work(scene, rays, seed, most_events=most_events, threads=threads, before=before)
     if before is not None:
         work.plan.check_same(before)

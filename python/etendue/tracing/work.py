@@ -17,7 +17,7 @@ from etendue.quantities.ray_stream import checked_threads
 from etendue.scatter.building import core_scene
 from etendue.scene import Scene, compile_scene
 from etendue.tracing.far_fields import far_field_nodes
-from etendue.tracing.plan import DEFAULT_RAYS, Plan, make_plan
+from etendue.tracing.plan import Plan, make_plan
 from etendue.tracing.result import TraceResult
 from etendue.tracing.sums import Sums
 
@@ -142,7 +142,7 @@ class TraceWork:
 
 def trace_work(
     scene: Scene | str | os.PathLike[str],
-    rays: float | None = DEFAULT_RAYS,
+    rays: float | None = None,
     seed: int = 1,
     *,
     most_events: int = MOST_EVENTS,
