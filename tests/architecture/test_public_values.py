@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import inspect
+import os
 import pickle
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import etendue as et
 import numpy as np
 import pytest
 from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.file_records import FileRecords
 from etendue.quantities.spool import Spool
 from oracles.light_fields import SURFACES, make_field
 from oracles.map_files import make_map
@@ -167,6 +171,36 @@ def test_a_pickled_field_and_source_still_work() -> None:
     for stream in (field.rays(50, seed=3), source):
         again = pickle.loads(pickle.dumps(stream))  # noqa: S301 - our own
         assert again.ray_set().records.tobytes() == stream.ray_set().records.tobytes()
+
+
+def test_rays_of_a_file_are_found_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They stay in their file, by whatever name it was read: pickled is where it is, for processes that start elsewhere. The
+    oracle is the set that was written. Scenes that hold such rays, and traces of them, come along."""
+    monkeypatch.chdir(tmp_path)
+    written = rays()
+    et.write_rays("led.tm25ray", written)
+    held = et.read_rays("led.tm25ray")
+    assert isinstance(held.records, FileRecords)
+    lit = et.Scene(sources=[{"kind": "rays", "rays": held}])
+    work = et.trace_work(lit, seed=2)
+    stored = [pickle.dumps(value) for value in (held, lit, work)]
+    assert max(map(len, stored)) < written.records.nbytes / 4
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    again, scene_again, work_again = [pickle.loads(data) for data in stored]  # noqa: S301 - our own
+    copies = copy.copy(held), copy.deepcopy(held), copy.deepcopy(lit).sources[0].rays
+    for one in (again, scene_again.sources[0].rays, *copies):
+        assert same(one, held)
+        assert np.array_equal(one.records["direction"], np.asarray(written.records["direction"], "<f4"))
+    assert work.join([work_again(0)]).ledger == et.trace(lit, seed=2).ledger
+    path = tmp_path / "led.tm25ray"
+    os.utime(path, ns=(0, 0))
+    with pytest.raises(et.FormatError, match=r"led\.tm25ray: pickled rays: size or time of change"):
+        pickle.loads(stored[0])  # noqa: S301 - our own
+    path.unlink()
+    with pytest.raises(FileNotFoundError, match=r"led\.tm25ray"):
+        pickle.loads(stored[0])  # noqa: S301 - our own
+    assert copy.deepcopy(held).records is held.records
 
 
 @pytest.mark.parametrize("name", sorted(ERRORS))

@@ -4,22 +4,46 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
+from etendue.errors import FormatError
 
 STRETCH = 1 << 16
 """Records that are read at once where a column of all of them is asked for: some megabytes."""
+
+
+class Origin(NamedTuple):
+    """Where records come from, so that another process finds them.
+
+    Parameters
+    ----------
+    path : Path
+        The file, absolute.
+    offset, length : int
+        Of the records [bytes].
+    name : str
+        What messages call it.
+    stamp : (int, int)
+        Its size [bytes] and time of change [ns].
+    """
+
+    path: Path
+    offset: int
+    length: int
+    name: str
+    stamp: tuple[int, int]
 
 
 class FileRecords:
     """Structured records of a file, which behave like a read-only array of one axis that is not in memory.
 
     Not a memory map: if somebody shortens a mapped file, the system ends the program without a word. Here it is a
-    `FormatError`. The file is held open, so that it stays the same one if another takes its name.
+    `FormatError`. The file is held open, so that it stays the same one if another takes its name. Pickled are its path, size
+    and time of change, not its records.
 
     Parameters
     ----------
@@ -27,6 +51,8 @@ class FileRecords:
         The bytes of all records.
     dtype : structured dtype
         Of a record.
+    origin : Origin
+        Where they are.
 
     Examples
     --------
@@ -39,15 +65,28 @@ class FileRecords:
     (3, [1.0, 3.0, 5.0], [(2.0, 3.0), (4.0, 5.0)])
     """
 
-    def __init__(self, stored: _core.StoredBytes, dtype: np.dtype[Any]) -> None:
+    def __init__(self, stored: _core.StoredBytes, dtype: np.dtype[Any], origin: Origin) -> None:
         self.stored = stored
         self.dtype = dtype
+        self._origin = origin
         self.shape = (len(stored) // dtype.itemsize,)
 
     @classmethod
     def of(cls, path: Path, dtype: np.dtype[Any], offset: int, count: int) -> FileRecords:
         """`count` records from byte `offset` of a file; OSError if it cannot be opened."""
-        return cls(_core.StoredBytes(path, offset, count * dtype.itemsize).named(str(path)), dtype)
+        # Looked at before: a file that changes in between is not the one that is found again.
+        stamp = _stamp(path)
+        length = count * dtype.itemsize
+        stored = _core.StoredBytes(path, offset, length).named(str(path))
+        return cls(stored, dtype, Origin(path.absolute(), offset, length, str(path), stamp))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: where the records are."""
+        return _found_again, (self._origin, self.dtype)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> FileRecords:
+        """Itself: nobody can change it, and the file may be gone."""
+        return self
 
     def __len__(self) -> int:
         """Number of records."""
@@ -64,7 +103,7 @@ class FileRecords:
         if isinstance(key, str):
             return self._column(key)
         if isinstance(key, list) and key and all(isinstance(name, str) for name in key):
-            return FileRecords(self.stored, self.dtype[key])
+            return FileRecords(self.stored, self.dtype[key], self._origin)
         if isinstance(key, slice):
             return self._slice(key)
         if isinstance(key, int | np.integer):
@@ -120,6 +159,25 @@ class FileRecords:
         data = self.stored.read(start * width, stop * width)
         data.setflags(write=False)
         return data.view(self.dtype)
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Size [bytes] and time of change [ns] of a file."""
+    held = path.stat()
+    return held.st_size, held.st_mtime_ns
+
+
+def _found_again(origin: Origin, dtype: np.dtype[Any]) -> FileRecords:
+    """Pickled records; OSError if their file is gone, FormatError if it is another one."""
+    if _stamp(origin.path) != origin.stamp:
+        raise FormatError(
+            origin.path,
+            "pickled rays",
+            "size or time of change of the file is not what it was when they were pickled",
+            "Read the file again; to another machine, copy it with its time of change.",
+        )
+    stored = _core.StoredBytes(origin.path, origin.offset, origin.length).named(origin.name)
+    return FileRecords(stored, dtype, origin)
 
 
 AnyRecords = npt.NDArray[Any] | FileRecords
