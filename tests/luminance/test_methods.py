@@ -268,13 +268,15 @@ def test_misspelt_keywords_and_methods() -> None:
 @pytest.mark.parametrize(
     ("make", "wrong"),
     [
-        *((et.Cone, {"acceptance": bad}) for bad in (0.0, -1.0, 90.1, float("nan"), "wide")),
+        *((et.Cone, {"acceptance": bad}) for bad in (0.0, -1.0, 90.1, float("nan"), "wide", True)),
+        *((et.Cone, {"observer_radius": bad}) for bad in (0.0, float("inf"), "wide", True)),
         *((et.FromField, {"samples": bad}) for bad in (0, 1 << 20, 2.5, True)),
         *((et.FromField, {"surface": bad}) for bad in ("plane", None, 3)),
         *((et.PathTracing, {"rays_per_pixel": bad}) for bad in (0, 1 << 30, 2.5, True)),
-        *((et.PathTracing, {"until": bad}) for bad in (0.0, -1.0, float("nan"), "0.01")),
+        *((et.PathTracing, {"until": bad}) for bad in (0.0, -1.0, float("nan"), "0.01", True)),
         *((et.PathTracing, {"seed": bad}) for bad in (-1, 1 << 64, 0.5, True)),
-        *((et.PathTracing, {"forward_rays": bad}) for bad in (-1, 1 << 51, 2.5, "many", float("nan"))),
+        *((et.PathTracing, {"forward_rays": bad}) for bad in (-1, 1 << 51, 2.5, "many", float("nan"), True)),
+        *((et.PathTracing, {"gather": bad}) for bad in ("yes", 2, 0.0)),
     ],
 )
 def test_values_out_of_their_domain(make: Any, wrong: dict[str, Any]) -> None:
@@ -290,6 +292,44 @@ def test_methods_are_values(method: Any) -> None:
     assert repr(method).startswith(f"{type(method).__name__}(")
     with pytest.raises(dataclasses.FrozenInstanceError):
         setattr(method, option_names(type(method))[0], 1)
+
+
+def test_an_observer_of_the_scene_goes_by_his_name() -> None:
+    """Alone, among others, or on another screen: the bits of the observer that the name stands for."""
+    keys = {"theta": 20, "phi": 30, "distance": 400}
+    eyes = [
+        {"name": name, **keys, "roll": roll, "screen": {"width": 70, "height": 60, "columns": 7, "rows": 6}}
+        for name, roll in (("first", 10), ("eye", 0))
+    ]
+    scene = et.Scene(sources=[LAMP], surfaces=[PAPER, WALL], observers=eyes)
+    expected = et.luminance_map(scene, EYE, SCREEN, rays_per_pixel=4)
+    assert same(et.luminance_map(scene, "eye", rays_per_pixel=4), expected)
+    smaller = et.Screen(30, 30, 3, 3)
+    assert same(
+        et.luminance_map(scene, "eye", smaller, rays_per_pixel=4),
+        et.luminance_map(scene, EYE, smaller, rays_per_pixel=4),
+    )
+    named, other, framed = et.luminance_map(scene, ["eye", "first", EYE], rays_per_pixel=4)
+    assert same(named, expected)
+    assert other.observer.roll == 10
+    assert same(framed, et.luminance_map(scene, EYE, rays_per_pixel=4))
+    with pytest.raises(UnknownNameError, match="Did you mean 'eye'"):
+        et.luminance_map(scene, "eyes")
+
+
+def test_what_is_no_source_observer_or_screen() -> None:
+    rays: Any = et.RingSource(rays=100)
+    scene: Any = et.Scene(sources=[LAMP])
+    for source in (rays, scene):
+        for nobody in ((30, 0), 30, "eye", [EYE, None], None):
+            with pytest.raises(ArgumentError, match="observer"):
+                et.luminance_map(source, nobody, SCREEN)
+        for nowhere in ((30, 30), 30, "small"):
+            with pytest.raises(ArgumentError, match="give a Screen"):
+                et.luminance_map(source, EYE, nowhere)
+    for nothing, called in (({"sources": []}, "dict"), (3, "int"), (None, "NoneType")):
+        with pytest.raises(ArgumentError, match=f"a {called} is no source of light"):
+            et.luminance_map(nothing, EYE, SCREEN)  # type: ignore[call-overload]
 
 
 def test_without_options_each_source_has_its_method(folder: Path) -> None:

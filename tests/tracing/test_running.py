@@ -225,6 +225,8 @@ def test_progress_is_told_after_each_round() -> None:
     ("arguments", "match"),
     [
         ({"rays": 0}, "rays"), ({"rays": 2.5}, "rays"), ({"rays": 2**60}, "rays"), ({"rays": math.nan}, "rays"),
+        ({"rays": True}, "rays"), ({"rays": "many"}, "rays"), ({"seed": True}, "seed"), ({"most_events": True}, "most_e"),
+        ({"until": True}, "until"), ({"until": "0.1"}, "until"), ({"until": math.nan}, "until"),
         ({"seed": -1}, "seed"), ({"seed": 2**64}, "seed"), ({"most_events": 0}, "most_events"), ({"threads": 0}, "threads"),
     ],
 )  # fmt: skip
@@ -236,6 +238,15 @@ def test_nonsense_is_refused(arguments: dict[str, Any], match: str) -> None:
 def test_what_cannot_be_traced_is_refused() -> None:
     with pytest.raises(ArgumentError, match="no source"):
         et.trace(et.Scene())
+    rays: Any = et.RingSource(rays=100)
+    for nothing, match in (
+        (rays, "rays are put in a source"),
+        ({"sources": []}, "a dict is no scene"),
+        (None, "no scene"),
+    ):
+        for door in (et.trace, et.trace_rounds, et.trace_work):
+            with pytest.raises(ArgumentError, match=match):
+                door(nothing)
     many = {"kind": "illuminance", "width": 1, "height": 1, "columns": 65536, "rows": 65536}
     with pytest.raises(ArgumentError, match="cells"):
         et.trace(luminaire(detectors=[many]))

@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import numbers
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeGuard
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, MaxLen, MinLen
 from pydantic import AllowInfNan, BeforeValidator, FailFast
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether something is a real number; a truth value is none.
+
+    Examples
+    --------
+    >>> is_number(3), is_number(np.float32(0.5)), is_number(True), is_number("3")
+    (True, True, False, False)
+    """
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
 def _number(value: Any) -> Any:
     """A float from any real number; text that looks like one is a mistake, and so is a truth value."""
     if type(value) is float:
         return value
-    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
-        raise ValueError("not a number")  # noqa: TRY004 - a TypeError would not reach the list of mistakes
+    if not is_number(value):
+        raise ValueError("not a number")
     try:
         return float(value)
     except OverflowError:
@@ -24,7 +35,7 @@ def _number(value: Any) -> Any:
 
 def _count(value: Any) -> Any:
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral):
-        raise ValueError("not a whole number")  # noqa: TRY004 - likewise
+        raise ValueError("not a whole number")  # noqa: TRY004 - a TypeError would not reach the list of mistakes
     return int(value)
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from typing import Literal, TypedDict, Unpack, cast, overload
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal, TypedDict, Unpack, cast, overload
 
-from etendue.errors import ArgumentError
+from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import check_near_field
@@ -23,7 +23,11 @@ from etendue.quantities.memory import require_memory
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream
 from etendue.scene import Scene
+from etendue.scene.observers import ObserverKeys
 from etendue.scene.scatter_events import ScatterEvents
+
+_Observers = Sequence[Observer] | list[str] | list[Observer | str] | tuple[Observer | str, ...]
+"""Several, of a scene also by their names; a name alone is no sequence of them."""
 
 Acceptance = float | Literal["auto"] | None
 
@@ -85,20 +89,20 @@ def luminance_map(
 @overload
 def luminance_map(
     source: Scene | ScatterEvents | str | os.PathLike[str],
-    observer: Observer,
+    observer: Observer | str,
     screen: Screen | None = ...,
     **options: Unpack[_SceneOptions],
 ) -> LuminanceMap: ...
 @overload
 def luminance_map(
     source: Scene | ScatterEvents | str | os.PathLike[str],
-    observer: Sequence[Observer] | None = ...,
+    observer: _Observers | None = ...,
     screen: Screen | Sequence[Screen] | None = ...,
     **options: Unpack[_SceneOptions],
 ) -> list[LuminanceMap]: ...
 def luminance_map(
     source: RayStream | LightField | Scene | ScatterEvents | str | os.PathLike[str],
-    observer: Observer | Sequence[Observer] | None = None,
+    observer: Observer | str | _Observers | None = None,
     screen: Screen | Sequence[Screen] | None = None,
     *,
     method: AnyMethod | MethodName = "auto",
@@ -130,7 +134,8 @@ def luminance_map(
         scene, or the scatter events of a trace. Ray sets in a scene are fitted first, since rays have no luminance that a
         line of sight could meet. Of a path, what the file holds: a scene (``.toml``), a light field or rays.
     observer : Observer or sequence of Observer
-        Any number is served by one pass over the rays. Of a scene, None: its own observers with their screens.
+        Any number is served by one pass over the rays. Of a scene, a name stands for its observer of this name, who has a
+        screen of his own; None: all its observers.
     screen : Screen or sequence of Screen
         One for all observers, or one each. None: for each observer one of 128 × 128 pixels about his target, on which he
         sees the whole scene, or all light that heads for him but strays. A screen that shows less than nine tenths of the
@@ -166,14 +171,14 @@ def luminance_map(
     Raises
     ------
     ArgumentError
-        If the rays have no position, an option is out of its domain, the numbers of observers and screens differ, or
-        options, method and source do not go together.
+        If the rays have no position, an option is out of its domain, the numbers of observers and screens differ,
+        options, method and source do not go together, or something is given that is no source, observer or screen.
     SceneError
         If a scene has mistakes.
     MemoryLimitError
         If there is no room for the maps.
     UnknownNameError
-        If there is no such method or option.
+        If there is no such method or option, or the scene has no observer of that name.
 
     Examples
     --------
@@ -225,7 +230,7 @@ def luminance_map(
     else:
         check_near_field(source)
         maps = _with_missed(source, look_through_cone(source, pairs, cast("Cone", how), threads, progress))
-    return maps[0] if isinstance(observer, Observer) else maps
+    return maps[0] if isinstance(observer, Observer | str) else maps
 
 
 def _require_memory(source: RayStream | LightField | Scene | ScatterEvents, screens: list[Screen]) -> None:
@@ -244,7 +249,7 @@ def _require_memory(source: RayStream | LightField | Scene | ScatterEvents, scre
 
 def _pairs(
     source: RayStream | LightField | Scene | ScatterEvents,
-    observer: Observer | Sequence[Observer] | None,
+    observer: Observer | str | _Observers | None,
     screen: Screen | Sequence[Screen] | None,
 ) -> list[tuple[Observer, Screen]]:
     """Each observer with his screen."""
@@ -255,15 +260,41 @@ def _pairs(
         if not isinstance(scene, Scene) or not scene.observers:
             raise ArgumentError("the scene has no observers; give one.")
         return [(keys.observer(), keys.screen.screen()) for keys in scene.observers]
-    observers = [observer] if isinstance(observer, Observer) else list(observer)
+    own = {keys.name: keys for keys in scene.observers if keys.name} if isinstance(scene, Scene) else {}
+    known = [_observer(one, own) for one in _several(observer)]
+    observers = [one for one, _ in known]
     if screen is None:
-        if scene is None:
+        others = [one for one, seen in known if seen is None]
+        if others and scene is None:
             raise ArgumentError("the scene of these events is not known; give a screen.")
-        screen = framed_screens(scene, observers)
-    screens = [screen] * len(observers) if isinstance(screen, Screen) else list(screen)
+        framed = iter(framed_screens(scene, others) if others and scene is not None else ())
+        screens = [next(framed) if seen is None else seen for _, seen in known]
+    else:
+        screens = _several(screen)
+        if not all(isinstance(one, Screen) for one in screens):
+            raise ArgumentError(
+                f"screen is {screen!r}; give a Screen, e.g. et.Screen(30, 30, 64, 64), or one for each."
+            )
+        screens *= len(observers) if isinstance(screen, Screen) else 1
     if len(observers) != len(screens) or not observers:
         raise ArgumentError(f"{len(observers)} observers and {len(screens)} screens; give one screen, or one for each.")
     return list(zip(observers, screens, strict=True))
+
+
+def _several(given: Any) -> list[Any]:
+    """What is given, be it one or several."""
+    return list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+
+
+def _observer(given: Any, own: Mapping[str, ObserverKeys]) -> tuple[Observer, Screen | None]:
+    """An observer; with his screen if the scene has both, by name."""
+    if isinstance(given, Observer):
+        return given, None
+    if not isinstance(given, str) or not own:
+        raise ArgumentError(f"the observer is {given!r}; give an Observer, e.g. et.Observer(30, 0, 1000), or several.")
+    if given not in own:
+        raise UnknownNameError("observer of the scene", given, own)
+    return own[given].observer(), own[given].screen.screen()
 
 
 def _with_missed(source: RayStream | LightField, maps: list[LuminanceMap]) -> list[LuminanceMap]:

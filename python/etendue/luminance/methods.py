@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import numbers
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, Self, get_args
 
+from etendue.description.values import is_number
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.rays.ray_index import RayIndex
 from etendue.lightfield.light_field import LightField
@@ -100,14 +100,12 @@ class Cone(Method):
     def __post_init__(self) -> None:
         radius: Any = self.observer_radius
         angle: Any = self.acceptance
-        if angle is not None and not (
-            angle == "auto" or (isinstance(angle, numbers.Real) and 0.0 < float(angle) <= 90.0)
-        ):
-            shown = repr(angle) if isinstance(angle, str) else f"{angle}°"
+        if angle is not None and not (angle == "auto" or (is_number(angle) and 0.0 < float(angle) <= 90.0)):
+            shown = f"{angle}°" if is_number(angle) else repr(angle)
             raise ArgumentError(f"acceptance is {shown}; give a half-angle above 0° and at most 90°, or 'auto'.")
         if radius is None:
             return
-        if not (isinstance(radius, numbers.Real) and 0.0 < float(radius) < math.inf):
+        if not (is_number(radius) and 0.0 < float(radius) < math.inf):
             raise ArgumentError(
                 f"observer_radius is {radius!r}; give the radius of the observer's disk in mm, above 0."
             )
@@ -232,16 +230,18 @@ class PathTracing(Method):
         if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_RAYS_PER_PIXEL:
             raise ArgumentError(f"rays_per_pixel is {n!r}; give a whole number from 1 to {MOST_RAYS_PER_PIXEL:,}.")
         least: Any = self.until
-        if least is not None and not (isinstance(least, numbers.Real) and 0.0 < float(least) < math.inf):
+        if least is not None and not (is_number(least) and 0.0 < float(least) < math.inf):
             raise ArgumentError(f"until is {self.until!r}; give the relative error to be reached, e.g. 0.01.")
         if isinstance(self.seed, bool) or not (isinstance(self.seed, int) and 0 <= self.seed <= MOST_SEED):
             raise ArgumentError(f"seed is {self.seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
         rays: Any = self.forward_rays
-        whole = isinstance(rays, numbers.Real) and 0 <= float(rays) <= MOST_FORWARD_RAYS and float(rays).is_integer()
+        whole = is_number(rays) and 0 <= float(rays) <= MOST_FORWARD_RAYS and float(rays).is_integer()
         if rays is not None and not whole:
             raise ArgumentError(
                 f"forward_rays is {rays!r}; give a whole number up to {MOST_FORWARD_RAYS:,}, 0 for none, or leave it out."
             )
+        if self.gather is not None and not isinstance(self.gather, bool):
+            raise ArgumentError(f"gather is {self.gather!r}; give True or False, or leave it out.")
 
     @property
     def passes(self) -> int:
@@ -302,6 +302,11 @@ EVENTS = SourceKind(
 def kind_of_source(source: RayStream | LightField | Scene | ScatterEvents) -> SourceKind:
     """What a source can be looked at by.
 
+    Raises
+    ------
+    ArgumentError
+        If it is none.
+
     Examples
     --------
     >>> import etendue as et
@@ -314,6 +319,11 @@ def kind_of_source(source: RayStream | LightField | Scene | ScatterEvents) -> So
         return EVENTS
     if isinstance(source, LightField):
         return FIELD
+    if not isinstance(source, RayStream):
+        raise ArgumentError(
+            f"a {type(source).__name__} is no source of light that can be looked at; give rays, a light field, a scene, the "
+            "scatter events of a trace, or the path of a file."
+        )
     return INDEX if isinstance(source, RayIndex) else RAYS
 
 

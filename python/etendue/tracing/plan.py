@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from etendue import _core
+from etendue.description.values import is_number
 from etendue.errors import ArgumentError, SceneError
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.intensity_nodes import MOST_CELLS, Nodes
@@ -129,9 +130,9 @@ def make_plan(
     if not compiled.record["sources"]:
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to trace.")
     count, notes = _rays(compiled, rays)
-    if not (isinstance(seed, int) and 0 <= seed <= MOST_SEED):
+    if isinstance(seed, bool) or not (isinstance(seed, int) and 0 <= seed <= MOST_SEED):
         raise ArgumentError(f"seed is {seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
-    if not (isinstance(most_events, int) and 1 <= most_events <= MOST_EVENTS):
+    if isinstance(most_events, bool) or not (isinstance(most_events, int) and 1 <= most_events <= MOST_EVENTS):
         raise ArgumentError(f"most_events is {most_events!r}; give a whole number from 1 to {MOST_EVENTS:,}.")
     mark = fingerprint(compiled.record)
     choices: Iterable[Choice] = ()
@@ -177,7 +178,7 @@ def _rays(compiled: Compiled, rays: float | None) -> tuple[int, list[str]]:
                 f"{len(sets)} ray sets share {count:,} rays by their flux: each is gone through evenly, its rays used more "
                 "or less than once"
             )
-    elif isinstance(rays, bool) or not 1 <= rays <= MOST_RAYS or int(rays) != rays:
+    elif not (is_number(rays) and 1 <= rays <= MOST_RAYS and int(rays) == rays):
         raise ArgumentError(f"rays is {rays!r}; give a whole number from 1 to {MOST_RAYS:,}.")
     else:
         count = int(rays)

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
+from etendue.description.values import is_number
 from etendue.errors import ArgumentError
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Scene
@@ -65,7 +66,7 @@ def trace(
     SceneError
         If the scene has mistakes.
     ArgumentError
-        If a number is out of its range, the scene has no sources, or `resume` is the result of something else.
+        If a number is out of its range, the scene is none or has no sources, or `resume` is the result of something else.
     MemoryLimitError
         If there is no room for the cells of its detectors.
     KeyboardInterrupt
@@ -133,7 +134,7 @@ def trace_rounds(
     True
     """
     threads = checked_threads(threads)
-    if until is not None and not (math.isfinite(until) and until > 0.0):
+    if until is not None and not (is_number(until) and math.isfinite(until) and until > 0.0):
         raise ArgumentError(f"until is {until!r}; give the relative error to be reached, e.g. 0.01.")
     start = None
     if resume is not None:

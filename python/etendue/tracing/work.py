@@ -8,12 +8,13 @@ import os
 from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.memory import require_memory
-from etendue.quantities.ray_stream import checked_threads
+from etendue.quantities.ray_stream import RayStream, checked_threads
 from etendue.scatter.building import core_scene
 from etendue.scene import Scene, compile_scene
 from etendue.tracing.far_fields import far_field_nodes
@@ -182,6 +183,11 @@ def trace_work(
     """
     if isinstance(scene, str | os.PathLike):
         scene = Scene.load(Path(scene))
+    given: Any = scene
+    if not isinstance(given, Scene):
+        hint = "rays are put in a source: et.Scene(sources=[{'kind': 'rays', 'rays': rays}])"
+        advice = hint if isinstance(given, RayStream) else "give an et.Scene, or the path of one"
+        raise ArgumentError(f"a {type(given).__name__} is no scene; {advice}.")
     threads = checked_threads(threads)
     compiled = compile_scene(scene)
     core = core_scene(compiled.record)
