@@ -202,10 +202,8 @@ def test_a_gridded_source_is_the_rays_that_it_draws(tmp_path: Path) -> None:
 
 def test_surfaces_emit_on_the_side_that_is_asked_for() -> None:
     for side, flip in (("front", False), ("back", True)):
-        record = source(
-            sources.Surface(shape=DISK, flux=1, side=side, exponent=0, trim={"half_spaces": [{"normal": [1, 0, 0]}]})
-        )
-        assert (record["flip"], record["exponent"], record["trims"]) == (flip, 0.0, [(1.0, 0.0, 0.0, 0.0)])
+        record = source(sources.Surface(shape=DISK, flux=1, side=side, exponent=0, trim={"radius": [0, 0.5]}))
+        assert (record["flip"], record["exponent"], record["trims"]) == (flip, 0.0, [])
 
 
 @pytest.mark.parametrize(
@@ -232,6 +230,30 @@ def test_surfaces_without_an_end_cannot_emit(shape: dict[str, Any], trim: dict[s
     else:
         with pytest.raises(SceneError, match=r"sources\[0\]: shape: this surface has no end"):
             compiled(given)
+
+
+@pytest.mark.parametrize(
+    ("keys", "place"),
+    [
+        ({"shape": {"kind": "disk", "radius": 1e-300}}, r"shape\.radius: is 1e-300; it must be at least 1e-100"),
+        ({"shape": {"kind": "rectangle", "width": 1, "height": 1e-200}}, r"shape\.height: is 1e-200"),
+        ({"shape": {"kind": "sphere", "radius": 1}, "trim": {"z": [5, 6]}}, "trim: .* finite area"),
+        (
+            {"shape": {"kind": "torus", "major_radius": 2, "minor_radius": 1}, "trim": {"z": [0, 9]}},
+            "trim: .*half spaces",
+        ),
+    ],
+)
+def test_a_surface_that_cannot_emit_is_told_with_its_place(keys: dict[str, Any], place: str) -> None:
+    """The core takes whatever is compiled."""
+    with pytest.raises(SceneError, match=rf"sources\[0\]\.{place}"):
+        compile_scene(Scene.from_dict({"sources": [{"kind": "surface", "flux": 1, **keys}]}))
+
+
+def test_the_smallest_surface_emits() -> None:
+    shape = {"kind": "rectangle", "width": 1e-100, "height": 1e-100}
+    least = Scene(sources=[{"kind": "surface", "flux": 1, "shape": shape}])
+    assert et.trace(least, rays=100).ledger.escaped.rays == 100
 
 
 def test_rings_are_annuli_with_their_own_flux() -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, TypeGuard
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, MaxLen, MinLen
-from pydantic import AllowInfNan, BeforeValidator, FailFast
+from pydantic import AfterValidator, AllowInfNan, BeforeValidator, FailFast
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -66,12 +66,22 @@ Finite = AllowInfNan(False)
 LONGEST = 1e9
 """Largest length [mm] in a scene: a thousand kilometres. Squares and products of lengths then stay far from overflow."""
 
+SHORTEST = 1e-100
+"""Smallest length [mm] in a scene, so that squares and products of lengths do not vanish: no surface has an area of 0."""
+
+
+def _not_tiny(length: float) -> float:
+    if length < SHORTEST:
+        raise ValueError(f"is {length:g}; it must be at least {SHORTEST:g}")
+    return length
+
+
 Bound = Annotated[float, AsNumber]
 """A number or an infinity."""
 Number = Annotated[float, Finite, AsNumber]
 Positive = Annotated[float, Finite, Gt(0.0), AsNumber]
 NotNegative = Annotated[float, Finite, Ge(0.0), AsNumber]
-Length = Annotated[float, Finite, Gt(0.0), Le(LONGEST), AsNumber]
+Length = Annotated[float, Finite, Gt(0.0), Le(LONGEST), AfterValidator(_not_tiny), AsNumber]
 LengthOrZero = Annotated[float, Finite, Ge(0.0), Le(LONGEST), AsNumber]
 Coordinate = Annotated[float, Finite, Ge(-LONGEST), Le(LONGEST), AsNumber]
 Wavelength = Annotated[float, Finite, Gt(0.0), Le(1e9), AsNumber]

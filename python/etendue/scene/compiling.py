@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue import _core
 from etendue.description.mistakes import join
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
 from etendue.quantities.fingerprint import fingerprint
@@ -22,6 +23,7 @@ from etendue.scene.media_library import MEDIA
 from etendue.scene.overlaps import Kind, doubts_about
 from etendue.scene.placement import Frame
 from etendue.scene.scene import Scene
+from etendue.scene.shapes.shape import WHOLE
 from etendue.scene.things import Solid, Surface
 from etendue.units import FluxUnit
 
@@ -364,14 +366,15 @@ class _Compiler:
                     units.setdefault(emitter.flux_unit, name)
                     if "rays" in emitter.record:
                         emitter.record["rays"] = self._one_set(emitter.record["rays"])
-                    self.rows["sources"].append(
-                        {
-                            **emitter.record,
-                            "wavelengths": wavelengths,
-                            "shares": shares,
-                            "frame": source.frame().record(),
-                        }
-                    )
+                    row = {
+                        **emitter.record,
+                        "wavelengths": wavelengths,
+                        "shares": shares,
+                        "frame": source.frame().record(),
+                    }
+                    if getattr(source, "trim", WHOLE) != WHOLE:
+                        self._check_cut(join(place, "trim"), row)
+                    self.rows["sources"].append(row)
                     self.names["sources"].append(f"{name}.{emitter.name}" if emitter.name else name)
                     self.notes += [f"{name}: {note}" for note in (*emitter.flux_notes, *emitter.notes)]
                     if emitter.mean:
@@ -382,6 +385,14 @@ class _Compiler:
             text = " and ".join(f"{name!r} is in {unit}" for unit, name in units.items())
             self.mistakes.append(("sources", f"{text}; give all of them in one unit, by flux and flux_unit"))
         return next(iter(units), "lm")
+
+    def _check_cut(self, place: str, row: Record) -> None:
+        """A mistake if the tracer cannot draw from what is left of a surface: nothing, or not what it can cut."""
+        nothing: Record = {key: [] for key in self.rows}
+        try:
+            _core.Scene({**nothing, "media": [Medium(index=1.0).record(self.files)], "sources": [row]})
+        except ValueError as error:
+            self.mistakes.append((place, str(error)))
 
     def _one_set(self, rays: Any) -> Any:
         """The same set for the same rays, however often their file is read: light drawn from it is not independent."""
