@@ -136,7 +136,7 @@ def test_messages_name_options(run: Run, lamp: Path, words: str, told: str) -> N
         ("filter lamp.tm25ray --kind opt -o a.npz", "this is a ray file (IES TM-25 ray file), no map"),
         ("sample lamp.tm25ray -n 9 -o a.dat", "this is a ray file (IES TM-25 ray file), not a light field"),
         ("fit map.npz -o a.h5", "this is a luminance or illuminance map, no ray file. etendue plot, filter, compare"),
-        ("info scene.toml", "this is a scene, no ray file. etendue trace, luminance, draw"),
+        ("fit scene.toml -o a.h5", "this is a scene, no ray file. etendue info, trace, luminance, draw"),
         ("bsdf info scene.toml", "this is a scene, no BSDF"),
         ("bsdf info scan.xls", "this is a workbook of Excel, no BSDF. etendue bsdf fit takes scans"),
         ("info scan.xls", "this is a workbook of Excel, no ray file. etendue bsdf fit takes scans"),

@@ -23,6 +23,7 @@ from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.surfaces import parse_surface
 from etendue.plot.scene_layout import lay_out_scene
 from etendue.quantities.printable import printable
+from etendue.scene import compile_scene
 
 from cli.outcome import Run
 
@@ -286,6 +287,10 @@ def info(place: Path) -> Iterator[Case]:
     yield Case(("info", place / "led.tm25ray"), of_rays(et.read_rays(place / "led.tm25ray")))
     yield Case(("info", place / "led.h5"), et.LightField.load(place / "led.h5").notes)
     yield Case(("info", place / "led.ies"), et.read_intensity(place / "led.ies").notes)
+    with warnings.catch_warnings(action="ignore"):
+        compiled = compile_scene(et.Scene.load(place / "scene.toml"))
+    assert compiled.doubts
+    yield Case(("info", place / "scene.toml"), compiled.notes)
     yield Case(("info", place / "scene.result.h5"), tuple(detected(et.TraceResult.load(place / "scene.result.h5"))))
 
 

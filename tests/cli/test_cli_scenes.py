@@ -289,6 +289,50 @@ def test_a_result_without_anything_to_look_at(run: Run, tmp_path: Path) -> None:
     assert "add one of the kind scatter or rays" in err
 
 
+def test_info_on_a_scene(run: Run) -> None:
+    """All that stands in it, the flux of its sources and what is doubtful: what its keys say."""
+    keys = SCENE | {
+        "name": "two glasses",
+        "sources": [*SCENE["sources"],
+                    {"name": "target", "kind": "rings", "radii": [1, 2], "flux": [3, 7], "at": [0, 0, -9]}],
+        "solids": [{"name": name, "shape": {"kind": "ball", "radius": 2}, "at": [0, 0, z], "medium": "BK7"}
+                   for name, z in (("lower", 8), ("upper", 10))],
+    }  # fmt: skip
+    et.Scene(**keys).save("two.toml")
+    outcome = run("info", "two.toml", "--json")
+    assert outcome.status == 0
+    (facts,) = outcome.json
+    assert (facts["format"], facts["scene"], facts["bytes"]) == (
+        "scene",
+        "two glasses",
+        Path("two.toml").stat().st_size,
+    )
+    assert [(s["name"], s["kind"], s["flux"]) for s in facts["sources"]] == [
+        ("led", "surface", 90), ("target.ring 1", "rings", 3), ("target.ring 2", "rings", 7),
+    ]  # fmt: skip
+    assert (facts["flux"], facts["flux_unit"]) == (100, "lm")
+    assert facts["solids"] == [{"name": name, "kind": "ball", "medium": "BK7"} for name in ("lower", "upper")]
+    assert facts["surfaces"] == [{"name": "wall", "kind": "rectangle", "finish": "lambertian"}]
+    assert [(d["name"], d["kind"]) for d in facts["detectors"]] == [(d["name"], d["kind"]) for d in SCENE["detectors"]]
+    assert facts["observers"][0] == {"name": "left eye", "theta": 40, "phi": 10, "distance": 100, "pixels": [5, 4]}
+    assert any("overlap" in note for note in facts["notes"])
+    told = run("info", "two.toml")
+    for text in (
+        "scene 'two glasses'",
+        "flux       100 lm",
+        "led (surface, 90 lm)",
+        "upper (ball, BK7)",
+        "work top/2",
+        "5 × 4",
+    ):
+        assert text in told.out
+    assert "overlap" in told.err
+    Path("wrong.toml").write_text('[[sources]]\nkind = "pint"\n', encoding="utf-8")
+    wrong = run("info", "wrong.toml")
+    assert wrong.status == 1
+    assert "Did you mean 'point'" in wrong.err
+
+
 def test_info_on_a_result(run: Run, traced: et.TraceResult) -> None:
     status, out, _ = run("info", "r.h5")
     assert status == 0

@@ -1,4 +1,4 @@
-"""``etendue info``: what is in a ray, intensity, field, patch, trace or map file, and what is wrong with it."""
+"""``etendue info``: what is in a ray, intensity, field, patch, trace, map or scene file, and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def info(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Ray and intensity files of any format, light fields, patches, results of traces, maps, STEP files."
+            help="Ray and intensity files of any format, light fields, patches, results of traces, maps, scenes, STEP "
+            "files."
         ),
     ],
     photometry: Annotated[
@@ -80,10 +81,13 @@ def _looks(path: Path) -> Iterator[Callable[[Path], Found | None]]:
     """The looks that are worth it: by the first bytes, so that nobody waits for the parts of other files to be imported."""
     from etendue.formats.hdf5 import SIGNATURE
     from etendue.formats.head import STEP_SIGNATURE, Head
+    from etendue.formats.own_kind import SCENE, own_kind
 
     head = Head.of(path)
     if head.data.startswith(SIGNATURE):
         yield from (_light_field, _trace_result)
+    if own_kind(head) is SCENE:
+        yield _scene
     yield _map
     if head.data.lstrip().startswith(STEP_SIGNATURE):
         yield _bodies
@@ -167,6 +171,17 @@ def _map(path: Path) -> Found | None:
 
     found = read_any_map(path)
     return _found(path, "map", f"map of {found.quantity}", describe_map(found), lambda: print_map_file(found))
+
+
+def _scene(path: Path) -> Found:
+    from etendue.cli.scenes import describe_scene, print_scene
+    from etendue.scene import Scene, compile_scene
+
+    scene = Scene.load(path)
+    compiled = compile_scene(scene)
+    facts = describe_scene(scene, compiled)
+    what = f"scene {scene.name!r}" if scene.name else "scene"
+    return _found(path, "scene", what, facts, lambda: print_scene(facts, compiled.doubts))
 
 
 def _bodies(path: Path) -> Found | None:

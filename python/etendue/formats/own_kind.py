@@ -36,7 +36,7 @@ MAP = Kind("a luminance or illuminance map", "etendue plot, filter, compare and 
 WORKBOOK = Kind(
     "a workbook of Excel", "etendue bsdf fit takes scans of the goniometer RT-300S; export other tables as text."
 )
-SCENE = Kind("a scene", "etendue trace, luminance, draw, sweep and view take it.")
+SCENE = Kind("a scene", "etendue info, trace, luminance, draw, sweep and view take it.")
 BSDF = Kind(
     "scatter data (étendue BSDF)", "etendue bsdf info says what it holds; in a scene it is the file of a finish."
 )
