@@ -29,6 +29,11 @@ class Origin(NamedTuple):
         What messages call it.
     stamp : (int, int)
         Its size [bytes] and time of change [ns].
+
+    Examples
+    --------
+    >>> Origin(Path("/lamps/led.tm25ray"), 512, 2048, "led.tm25ray", (2560, 0)).length
+    2048
     """
 
     path: Path
