@@ -135,6 +135,7 @@ def test_maps_show_the_truth_from_everywhere(film: tuple[PrismaticFilm, et.RaySe
         assert lmap.dead_pixels == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("theta", [0, 55])
 @pytest.mark.parametrize(("width", "height"), [(2.04, 1.3), (0.3, 0.3), (3, 0.002), (0.002, 0.001)])
 def test_pixels_of_any_size_show_all_the_light(width: float, height: float, theta: float) -> None:

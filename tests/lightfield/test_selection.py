@@ -88,7 +88,9 @@ def test_a_flat_source_is_found_at_its_depth(name: str) -> None:
     assert row.unmet < 0.01
     # Once for each kind, and once more if the focused plane is not the plane itself.
     assert [type(row.surface) for row in choice.table].count(kind) <= (2 if kind is Plane else 1)
-    assert any(f"depths between {low:.4g} and {high:.4g} mm" in note for note in choice.notes)
+    told = next(note for note in choice.notes if note.startswith("depths between "))
+    bounds = [float(word) for word in told.removeprefix("depths between ").partition(" mm")[0].split(" and ")]
+    assert bounds == pytest.approx([low, high], abs=0.02 * (high - low))
 
 
 @pytest.mark.slow

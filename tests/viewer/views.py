@@ -16,13 +16,13 @@ class PageView(NamedTuple):
     screen: et.Screen
 
 
-def page_views(*, count: int, columns: int, rows: int, seed: int) -> list[PageView]:
-    """From above and below, near and far, of all and of a part."""
+def page_views(*, count: int, columns: int, rows: int, seed: int, closer: float = 1.0) -> list[PageView]:
+    """From above and below, near and far, of all and of a part; or of so much less of it."""
     rng = np.random.default_rng(seed)
     views = []
     for _ in range(count):
         theta, phi = float(rng.uniform(0, 120)), float(rng.uniform(-180, 180))
-        distance, width = float(rng.choice([12.0, 70.0, 1000.0])), float(rng.uniform(0.8, 4.0))
+        distance, width = float(rng.choice([12.0, 70.0, 1000.0])), float(rng.uniform(0.8, 4.0)) / closer
         target = tuple(float(x) for x in rng.uniform(-0.3, 0.6, 3))
         page = {"theta": theta, "phi": phi, "distance": distance, "target": list(target), "width": width}
         screen = et.Screen(width, width / columns * rows, columns, rows)

@@ -83,7 +83,7 @@ fn look_at_large(
     let wanted: Vec<usize> = (0..map.len())
         .filter(|pixel| wants_more(view, &map, &off, points.len(), *pixel))
         .collect();
-    let points = lattice((samples * FINER).min(BLOCK as u32));
+    let points = lattice((samples * FINER).min(u32::try_from(BLOCK).unwrap_or(u32::MAX)));
     let finer = each(&wanted, threads, stop, |scratch, pixel| {
         see(parts, view, Tile::alone(view, *pixel), &points, scratch)
     });
