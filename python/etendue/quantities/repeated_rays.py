@@ -42,10 +42,12 @@ def keys_of(position: FloatArray, direction: FloatArray) -> Keys:
     >>> bool(key[0] == key[1]), bool(key[0] == key[2])
     (True, False)
     """
-    key = np.zeros(len(position), dtype=np.uint64)
-    for column in (*position.T, *direction.T):
-        # Single precision, since a direction that is normalised again may change in its last bit; adding 0 makes 0 of -0.
-        key = (key ^ (column.astype(np.float32) + np.float32(0.0)).view(np.uint32).astype(np.uint64)) * ODD
+    # Single precision, since a direction that is normalised again may change in its last bit; adding 0 makes 0 of -0.
+    numbers = np.concatenate([position, direction], axis=1, dtype=np.float32, casting="same_kind")
+    numbers += np.float32(0.0)
+    key = np.zeros(len(numbers), dtype=np.uint64)
+    for pair in numbers.view(np.uint64).T:
+        key = (key ^ pair) * ODD
         key ^= key >> SHIFT
     return key
 
@@ -81,8 +83,8 @@ class Repeats(NamedTuple):
             position, direction, flux = _core.read_rays(source, start, min(start + BATCH, n))
             key = keys_of(position, direction)
             kept.append(key[(key % every == 0) & (flux > 0.0)])
-        keys = np.concatenate(kept)
-        return cls(keys.size, keys.size - np.unique(keys).size)
+        keys = np.sort(np.concatenate(kept))
+        return cls(keys.size, int(np.count_nonzero(keys[1:] == keys[:-1])))
 
     @property
     def told(self) -> str | None:
