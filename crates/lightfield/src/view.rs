@@ -61,9 +61,16 @@ impl View {
     #[inline(always)]
     #[must_use]
     pub fn through(&self, place: [f64; 2]) -> Vec3 {
+        (self.point(place) - self.observer).normalized()
+    }
+
+    /// The point of the grid at a place, as for [`View::through`].
+    #[inline(always)]
+    #[must_use]
+    pub fn point(&self, place: [f64; 2]) -> Vec3 {
         let u = (place[0] / f64::from(self.columns) - 0.5) * self.width;
         let v = (0.5 - place[1] / f64::from(self.rows)) * self.height;
-        (self.target + self.right * u + self.up * v - self.observer).normalized()
+        self.target + self.right * u + self.up * v
     }
 
     /// The same through each of some places, given by their columns and by their rows.

@@ -137,10 +137,7 @@ def fit_light_field(
     field = fit_counts(rays, counts, plan, seed, threads, told)
     spectrum = given.total_spectrum(threads=threads)
     told.end()
-    notes = (*notes, *field.notes, *repeated, *notes_of_rays(given))
-    return field.replace(
-        notes=notes, spectrum=spectrum, provenance=given.provenance.then(f"light field on {field.surface.spec}")
-    )
+    return field.replace(notes=(*notes, *field.notes, *repeated, *notes_of_rays(given)), spectrum=spectrum)
 
 
 def _each_once(rays: RayStream) -> tuple[RayStream, tuple[str, ...]]:
@@ -158,7 +155,7 @@ def _each_once(rays: RayStream) -> tuple[RayStream, tuple[str, ...]]:
     _, first, number = np.unique(keys_of(position, direction), return_index=True, return_inverse=True)
     order = np.argsort(first)
     flux, first = np.bincount(number, flux)[order], first[order]
-    joined = RaySet(position[first], direction[first], flux, flux_unit=rays.flux_unit)
+    joined = RaySet(position[first], direction[first], flux, flux_unit=rays.flux_unit, provenance=rays.provenance)
     told = f"{len(position) - len(first):,} of {len(rays):,} rays repeat another one, with its place and direction"
     return joined, (f"{told}: the field rests on {len(first):,} rays, each of them with the flux of all its copies",)
 

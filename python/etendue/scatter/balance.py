@@ -13,7 +13,7 @@ from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH
 from etendue.scatter.building import built
-from etendue.scatter.members import members_of
+from etendue.scatter.members import Record, members_of
 
 Array = npt.NDArray[np.float64]
 
@@ -33,8 +33,8 @@ VISIBLE = np.arange(380.0, 781.0, 20.0)
 """And for wavelengths [nm]."""
 
 
-def balanced(data: BsdfData, shares: Sequence[float]) -> tuple[list[float], float, list[Complaint]]:
-    """Shares of slices with which no more light leaves than arrives, and a weight of everything for what is left.
+def balanced(data: BsdfData, shares: Sequence[float]) -> tuple[list[Record] | None, float, list[Complaint]]:
+    """Members of a table of which no more light leaves than arrives, and a weight of everything for what is left.
 
     At the incidences of the slices both ways are scaled so that they make 1 with the components. What exceeds 1 after that
     is due to components alone, or lies between incidences; everything is multiplied by the weight for it.
@@ -48,8 +48,8 @@ def balanced(data: BsdfData, shares: Sequence[float]) -> tuple[list[float], floa
 
     Returns
     -------
-    shares, weight, complaints
-        Shares in the order of the slices.
+    members, weight, complaints
+        Members as `members_of` makes them; None if those of the shares will do, which have not been needed.
 
     Raises
     ------
@@ -64,8 +64,9 @@ def balanced(data: BsdfData, shares: Sequence[float]) -> tuple[list[float], floa
     0.996 warning: 0° of incidence: 1.004 of the light leaves in all; everything is scaled by 0.996016
     """
     if len(data.components) + len({one.transmitted for one in data.slices}) < 2:
-        return list(shares), 1.0, []
-    members = _built(data, shares)
+        return None, 1.0, []
+    records = members_of(data, shares)
+    members = [built(record) for record in records]
     complaints: dict[str, Complaint] = {}
     found = []
     for one, share in zip(data.slices, shares, strict=True):
@@ -79,17 +80,14 @@ def balanced(data: BsdfData, shares: Sequence[float]) -> tuple[list[float], floa
             )
         found.append(share if total <= 1.0 else share * max(1.0 - other, 0.0) / scattered)
     if found != list(shares):
-        members = _built(data, found)
+        records = members_of(data, found)
+        members = [built(record) for record in records]
     total, place = max(_everywhere(data, members))
     _refuse(total, place)
     if total > 1.0 + CLOSE:
         scaled = f"{total:.6g} of the light leaves in all; everything is scaled by {1.0 / total:.6g}"
         complaints.setdefault(f"{place}, left", Complaint("warning", place, scaled))
-    return found, 1.0 / max(total, 1.0), list(complaints.values())
-
-
-def _built(data: BsdfData, shares: Sequence[float]) -> list[_core.Bsdf]:
-    return [built(record) for record in members_of(data, shares)]
+    return records, 1.0 / max(total, 1.0), list(complaints.values())
 
 
 def _leaving(members: Sequence[_core.Bsdf], incident: Array, wavelength: float) -> Array:

@@ -49,7 +49,7 @@ class BsdfTable(Bsdf):
             raise ArgumentError("a BSDF has slices or components; these data hold neither")
         self.data = data
         excesses = tuple(_excesses(data))
-        self._shares_of_slices, self._weight, more = balanced(data, [share_of(one) for one in data.slices])
+        self._balanced, self._weight, more = balanced(data, [share_of(one) for one in data.slices])
         self.complaints: tuple[Complaint, ...] = (*data.complaints, *excesses, *more)
 
     @classmethod
@@ -98,7 +98,10 @@ class BsdfTable(Bsdf):
 
     @functools.cached_property
     def _record(self) -> dict[str, Any]:
-        members = [(self._weight, part) for part in members_of(self.data, self._shares_of_slices)]
+        found = self._balanced
+        if found is None:
+            found = members_of(self.data, [share_of(one) for one in self.data.slices])
+        members = [(self._weight, part) for part in found]
         if len(members) == 1 and self._weight == 1.0:
             return members[0][1]
         record = {"kind": "sum", "members": members}

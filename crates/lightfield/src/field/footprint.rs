@@ -162,9 +162,7 @@ fn pixel_at(view: &View, [column, row]: [f64; 2]) -> Option<usize> {
 
 /// The line from a place of the picture to the observer, as the ray `i` of a block.
 fn aim(view: &View, place: [f64; 2], i: usize, batch: &mut RayBatch) {
-    let u = (place[0] / f64::from(view.columns) - 0.5) * view.width;
-    let v = (0.5 - place[1] / f64::from(view.rows)) * view.height;
-    let point = view.target + view.right * u + view.up * v;
+    let point = view.point(place);
     let k: Vec3 = (view.observer - point).normalized();
     for (axis, (x, k)) in [(point.x, k.x), (point.y, k.y), (point.z, k.z)].into_iter().enumerate() {
         (batch.position[axis][i], batch.direction[axis][i]) = (x, k);

@@ -293,9 +293,7 @@ fn aim(view: &View, tile: Tile, points: &[[f64; 2]], batch: &mut RayBatch) {
         let places = x.iter_mut().zip(y).zip(z);
         let directions = kx.iter_mut().zip(ky).zip(kz);
         for ((((x, y), z), ((kx, ky), kz)), [du, dv]) in places.zip(directions).zip(points) {
-            let u = ((column + du) / f64::from(view.columns) - 0.5) * view.width;
-            let v = (0.5 - (row + dv) / f64::from(view.rows)) * view.height;
-            let point = view.target + view.right * u + view.up * v;
+            let point = view.point([column + du, row + dv]);
             let k = (view.observer - point).normalized();
             (*x, *y, *z) = (point.x, point.y, point.z);
             (*kx, *ky, *kz) = (k.x, k.y, k.z);

@@ -51,14 +51,23 @@ def values_on(
     -------
     array, of the shape of the grid
     """
+    side = 1.0 if (incident[2] > 0.0) != transmitted else -1.0
+
+    def above(to: Array) -> Array:
+        to[:, 2] = side * np.maximum(side * to[:, 2], RIM)
+        return bsdf.evaluate(incident, to / np.linalg.norm(to, axis=-1, keepdims=True), wavelength=wavelength)
+
+    return _filled(grid, incident, above, transmitted=transmitted, beyond=0.0)
+
+
+def _filled(
+    grid: PolarGrid, incident: Array, values_at: Callable[[Array], Array], *, transmitted: bool, beyond: float
+) -> Array:
+    """Values of a function of directions, shape (n, 3), on a grid; `beyond` where it reaches beyond the hemisphere."""
     scattered = grid.directions(incident, transmitted=transmitted)
     there = ~np.isnan(scattered[..., 0])
-    to = scattered[there]
-    side = 1.0 if (incident[2] > 0.0) != transmitted else -1.0
-    to[:, 2] = side * np.maximum(side * to[:, 2], RIM)
-    to /= np.linalg.norm(to, axis=-1, keepdims=True)
-    values = np.zeros(grid.shape)
-    values[there] = bsdf.evaluate(incident, to, wavelength=wavelength)
+    values = np.full(grid.shape, beyond)
+    values[there] = values_at(scattered[there])
     return values
 
 
@@ -91,10 +100,10 @@ def sampled(
     grid = PolarGrid("specular", RADIAL, np.arange(0.0, 360.0, AZIMUTH_STEP))
     for theta, phi in incidences:
         incident = light_from(theta, phi)
-        scattered = grid.directions(incident, transmitted=transmitted)
-        there = ~np.isnan(scattered[..., 0])
-        values = np.full(grid.shape, np.nan)
-        to = scattered[there]
-        values[there] = np.maximum(evaluate(np.broadcast_to(incident, to.shape), to), 0.0)
+
+        def known(to: Array, incident: Array = incident) -> Array:
+            return np.maximum(evaluate(np.broadcast_to(incident, to.shape), to), 0.0)
+
+        values = _filled(grid, incident, known, transmitted=transmitted, beyond=np.nan)
         found.append(BsdfSlice(incident, values, transmitted, grid=grid, wavelength=wavelength))
     return found
