@@ -61,6 +61,24 @@ def test_a_lamp_seen_directly_and_in_a_mirror() -> None:
     agree(et.Scene(sources=[lamp], surfaces=[mirror]), eye, wide, direct + mirrored)
 
 
+@pytest.mark.parametrize("lines", [4, 8])
+def test_few_lines_of_sight_find_them(lines: int) -> None:
+    """No map of 40 misses the lamp that the search has found, and their mean is the closed form."""
+    lamp = {**LAMP, "toward": [0, 0, 1]}
+    eye, screen = et.Observer(theta=0, phi=0, distance=200.0), et.Screen(40, 40, 9, 9)
+    maps = [
+        et.luminance_map(et.Scene(sources=[lamp]), eye, screen, rays_per_pixel=lines, seed=seed)
+        for seed in range(1, 41)
+    ]
+    light = (40.0 / 9.0) ** 2 * 1e-6 * np.array([lmap.values.sum() for lmap in maps])
+    assert (light > 0.0).all()
+    assert all(lmap.standard_error[lmap.values > 0.0].all() for lmap in maps)
+    expected = LUMINANCE * math.pi * RADIUS**2
+    error = light.std(ddof=1) / math.sqrt(len(light))
+    assert error < 0.06 * expected
+    assert abs(light.mean() - expected) < LARGEST_Z * error
+
+
 def glass(kind: str) -> dict[str, Any]:
     """A small lamp before a ball or a ring of glass, off all axes."""
     shapes = {

@@ -152,11 +152,41 @@ def test_one_low_value_changes_f_there_alone(part: float) -> None:
     assert float(table.reflectance(40.0)) == pytest.approx(one.integral(), rel=1e-6)
 
 
-def test_a_slice_without_a_diffuse_part_leaves_that_of_the_others() -> None:
-    """0.6 is Lambertian at 0°, 20° and 60°; at 40° all lies within a cone."""
+def test_a_slice_without_a_diffuse_part_has_neighbours_without() -> None:
+    """0.6 is Lambertian at 0°, 20° and 60°; at 40° all lies within a cone, and then no floor is taken out of any."""
     slices = holed(beyond=0.3).data.slices
     lobes = lobes_of(slices, [one.integral() for one in slices], isotropic=True, mirrored=False)[0.0]
-    assert [lobe.floor for lobe in lobes] == pytest.approx([0.6, 0.6, 0.0, 0.6], abs=1e-12)
+    assert [lobe.floor for lobe in lobes] == [0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("wide", [10.0, 30.0, 72.0, 150.0])
+def test_a_hole_in_a_slice_stays_a_hole(wide: float) -> None:
+    """R = 0.4 and a lobe that moves with the incidence; at 40° a sector about the light is dark. Between incidences f is the
+    known function outside the sector, and goes linearly to nothing within it."""
+    floor, peak = 0.4 / math.pi, 3.0
+
+    def known(*, incident: Array, scattered: Array) -> Array:
+        off = incident[..., :2] + scattered[..., :2]
+        return floor + peak * np.exp(-0.5 * np.sum(off * off, axis=-1) / SIGMA**2)
+
+    grid = PolarGrid("normal", np.linspace(0.0, 89.9, 91), np.arange(72) * 5.0)
+    slices = []
+    for theta in (20.0, 40.0, 60.0):
+        incident = direction(theta, 180.0)
+        scattered = grid.directions(incident, transmitted=False)
+        values = known(incident=incident, scattered=scattered)
+        back = np.degrees(np.arctan2(scattered[..., 1], -scattered[..., 0]))
+        values[(np.abs(back) < 0.5 * wide) & (theta == 40.0)] = 0.0
+        slices.append(BsdfSlice(incident, values, grid=grid))
+    table = et.BsdfTable(BsdfData(slices))
+    for theta, part in ((25.0, 0.25), (30.0, 0.5), (45.0, 0.75), (50.0, 0.5)):
+        incident = direction(theta, 180.0)
+        bright = np.stack([direction(theta, 0.0), direction(50.0, 30.0), direction(60.0, 90.0)])
+        right = known(incident=incident, scattered=bright)
+        # Energy is cubic in the squared sine between the incidences, and f linear: a few per cent of a hole's light.
+        assert table.evaluate(incident, bright) == pytest.approx(right, rel=0.06), theta
+        dark = table.evaluate(incident, direction(60.0, 180.0)[None])[0]
+        assert dark == pytest.approx((1.0 - part) * floor, rel=0.15), theta
 
 
 def test_samples_have_the_share_and_the_density(table: et.BsdfTable) -> None:

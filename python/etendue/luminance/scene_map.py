@@ -146,8 +146,8 @@ def look_at_scene(
         if small.pixels():
             told.append(
                 f"lamps are small against the pixel in {small.pixels():,} of them, directly, in mirrors or through lenses: "
-                "as many lines of sight again look there; what the search for them missed is left to chance, and a pixel "
-                "that no line of sight lit states no error"
+                "at least as many lines of sight again look there; what the search for them missed is left to chance, and a "
+                "pixel that no line of sight lit states no error"
             )
         told += about
         values, error = passes.total(image)

@@ -33,6 +33,9 @@ FEW = 80
 LOW = 0.05
 """Part of the projected solid angle whose values do not decide what is diffuse: more than a hole in a measurement."""
 
+STEPS = 4.0
+"""Floors of neighbouring incidences differ by this factor at most."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Lobe:
@@ -216,9 +219,14 @@ def _floors(lows: Sequence[tuple[float, float]]) -> list[float]:
 
     A single value below the rest would leave the diffuse part of its slice in the lobe, and a mean of the logarithms of
     lobes with and without it is neither. So the same is left in all lobes: the most by which any smallest value lies below.
+    For the same reason no floor is more than `STEPS` times that of its neighbour; beside a slice with a large hole is none.
     """
     left = max(low - least for least, low in lows)
-    return [max(low - left, 0.0) for _, low in lows]
+    floors = [max(low - left, 0.0) for _, low in lows]
+    for order in (range(1, len(floors)), range(len(floors) - 2, -1, -1)):
+        for k in order:
+            floors[k] = min(floors[k], STEPS * floors[k - order.step])
+    return floors
 
 
 def _lobe(sine: float, radial: Array, f: Array, share: float, *, floor: float) -> Lobe:

@@ -92,9 +92,12 @@ const STEP: f64 = 0.0875;
 /// What is added to f before its logarithm is taken, relative to the largest f.
 const LITTLE: f64 = 1e-6;
 
+/// f that is nothing beside the largest one.
+const NOTHING: f64 = 1e-9;
+
 impl Slice {
     /// Slices between this incidence and another one, close to each other: the logarithm of f is linear in the angle of incidence, so
-    /// that a lobe that grows and narrows stays one lobe.
+    /// that a lobe that grows and narrows stays one lobe. Where one of both has nothing, f is linear itself: a hole is no lobe.
     ///
     /// None where the grids differ in azimuths.
     #[allow(
@@ -113,12 +116,15 @@ impl Slice {
         radial.dedup();
         let [a, b] = [self, other].map(|slice| slice.on(&radial));
         let largest = a.iter().chain(&b).copied().fold(0.0, f64::max);
-        let little = (LITTLE * largest).max(f64::MIN_POSITIVE);
+        let [little, nothing] = [LITTLE, NOTHING].map(|part| (part * largest).max(f64::MIN_POSITIVE));
         (1..steps)
             .map(|k| {
                 let part = k as f64 / steps as f64;
                 let mean = |(a, b): (&f64, &f64)| {
-                    (exp((1.0 - part) * ln(a + little) + part * ln(b + little)) - little).max(0.0)
+                    let geometric = (exp((1.0 - part) * ln(a + little) + part * ln(b + little)) - little).max(0.0);
+                    let linear = (1.0 - part) * a + part * b;
+                    let least = a.min(*b);
+                    linear + (geometric - linear) * least / (least + nothing)
                 };
                 Self {
                     sine: (from + part * (to - from)).sin(),

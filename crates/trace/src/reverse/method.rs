@@ -30,7 +30,7 @@ pub struct Method<'a> {
     pub left: LeftOut,
     /// Where paths that do not see a diffuse surface directly go on from there, if that is known.
     pub guide: Option<&'a Guide>,
-    /// Small images of sources, where as many paths again look for them.
+    /// Small images of sources, where as many paths again look for them, and four in each pass at least.
     pub glints: Option<&'a Glints>,
 }
 

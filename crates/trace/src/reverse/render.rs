@@ -30,6 +30,10 @@ const PURPOSE_PATH: u64 = 0x5041_5448;
 /// What is added to a purpose for the paths that look for small images of sources.
 const AIMED: u64 = 1 << 32;
 
+/// Paths that look for the small images of sources in a pixel, per pass at least: of four passes with fewer all may miss them,
+/// and would not know it.
+const LEAST_AIMED: u32 = 4;
+
 /// What a map holds: the columns and rows in which lines of sight may meet anything, and the sums of their pixels, row by row.
 #[derive(Clone, Debug)]
 pub struct Image {
@@ -96,6 +100,15 @@ struct Starts {
     paths: Vec<u32>,
 }
 
+/// Paths of a pixel in each pass: those spread evenly over it, or those that look for small images of sources.
+fn paths_of(method: &Method<'_>, aimed: bool) -> u32 {
+    if aimed {
+        method.paths.max(LEAST_AIMED)
+    } else {
+        method.paths
+    }
+}
+
 impl<'a> Renderer<'a> {
     fn new(lit: &'a LitScene<'a>, view: &'a View, method: &'a Method<'a>, known: &'a [ExitanceCache<'a>]) -> Self {
         Self {
@@ -107,33 +120,47 @@ impl<'a> Renderer<'a> {
 
     /// Adds the passes to pixels of some numbers.
     fn paint(&mut self, which: &[usize], passes: Range<u32>, pixels: &mut [Pixel]) {
-        let paths = self.block.method.paths as usize;
-        let share = 1.0 / f64::from(self.block.method.paths);
         let mut cells = vec![[0.0; 5]; which.len() * passes.len()];
-        // All cells, then once more those with small images of sources.
-        let mut tasks: Vec<(usize, bool)> = (0..cells.len()).map(|cell| (cell, false)).collect();
+        let all: Vec<usize> = (0..cells.len()).collect();
+        self.look(&all, which, &passes, false, &mut cells);
+        // Once more those with small images of sources.
         if let Some(glints) = self.block.method.glints {
             let has = |cell: &usize| !glints.of_pixel(which[cell / passes.len()]).is_empty();
-            tasks.extend((0..cells.len()).filter(has).map(|cell| (cell, true)));
+            let those: Vec<usize> = all.into_iter().filter(has).collect();
+            self.look(&those, which, &passes, true, &mut cells);
         }
+        for (pixel, means) in pixels.iter_mut().zip(cells.chunks(passes.len().max(1))) {
+            for [mean, deviation, chance, smooth, diffuse] in means {
+                pixel.sum += mean;
+                pixel.chance += chance;
+                pixel.deviation += deviation;
+                pixel.met = [pixel.met[0] + smooth, pixel.met[1] + diffuse];
+            }
+        }
+    }
+
+    /// Adds the paths of some cells, each a pass of a pixel.
+    fn look(&mut self, tasks: &[usize], which: &[usize], passes: &Range<u32>, aimed: bool, cells: &mut [[f64; 5]]) {
+        let paths = paths_of(self.block.method, aimed) as usize;
+        let share = 1.0 / f64::from(self.block.method.paths);
         let total = tasks.len() * paths;
         let mut begin = 0;
         while begin < total && !self.block.lit.is_stopped() {
             let end = (begin + BLOCK).min(total);
             self.block.paths.clear();
             let these = tasks.iter().enumerate().take(end.div_ceil(paths)).skip(begin / paths);
-            for (task, (cell, aimed)) in these {
+            for (task, cell) in these {
                 let first = task * paths;
                 let indices = begin.max(first) - first..end.min(first + paths) - first;
                 let pixel = which[cell / passes.len()] as u64;
                 #[allow(clippy::cast_possible_truncation, reason = "a number of passes")]
                 let pass = (cell % passes.len()) as u32;
-                self.aim(pixel, [passes.start + pass, pass], indices, *aimed);
+                self.aim(pixel, [passes.start + pass, pass], indices, aimed);
             }
             self.start();
             self.follow();
             for (flat, path) in (begin..end).zip(&self.block.paths) {
-                let cell = &mut cells[tasks[flat / paths].0];
+                let cell = &mut cells[tasks[flat / paths]];
                 let [smooth, diffuse] = path.met.map(|met| if met { 1.0 } else { 0.0 });
                 for (sum, value) in cell
                     .iter_mut()
@@ -143,14 +170,6 @@ impl<'a> Renderer<'a> {
                 }
             }
             begin = end;
-        }
-        for (pixel, means) in pixels.iter_mut().zip(cells.chunks(passes.len().max(1))) {
-            for [mean, deviation, chance, smooth, diffuse] in means {
-                pixel.sum += mean;
-                pixel.chance += chance;
-                pixel.deviation += deviation;
-                pixel.met = [pixel.met[0] + smooth, pixel.met[1] + diffuse];
-            }
         }
     }
 
@@ -165,6 +184,8 @@ impl<'a> Renderer<'a> {
         let corner = [(pixel % columns) as f64, (pixel / columns) as f64];
         #[allow(clippy::cast_possible_truncation, reason = "a number of a pixel")]
         let glints = block.method.glints.map_or(&[][..], |all| all.of_pixel(pixel as usize));
+        let [evenly, about] = [false, true].map(|aimed| f64::from(paths_of(block.method, aimed)));
+        let more = about / evenly;
         for index in indices {
             #[allow(clippy::cast_possible_truncation, reason = "a number of paths")]
             let index = index as u32;
@@ -179,7 +200,7 @@ impl<'a> Renderer<'a> {
             let share = if glints.is_empty() {
                 1.0
             } else {
-                1.0 / (1.0 + glints::density(glints, place))
+                1.0 / (1.0 + more * glints::density(glints, place))
             };
             let lines = &block.lit.lines;
             let line = if lines.len() > 1 {
