@@ -1,4 +1,4 @@
-//! Exact sampling of a table: one uniform number, two look-ups.
+//! Sampling of a table: one uniform number, two look-ups.
 
 use crate::warp::part_of;
 
@@ -8,11 +8,42 @@ pub struct Alias {
     slots: Vec<Slot>,
 }
 
-/// The chance of the entry of the same number, and the entry that has the rest.
-pub type Slot = (f64, u32);
+/// One of the even parts of all uniform numbers. Eight bytes: large tables do not fit into caches, and each number takes one.
+#[derive(Clone, Copy, Debug)]
+pub struct Slot {
+    /// Chance of the entry of the same number, in units of 2⁻³².
+    pub own: u32,
+    /// The entry that has the rest.
+    pub alias: u32,
+}
+
+/// Unit of the chances.
+pub const UNIT: f64 = 1.0 / 4_294_967_296.0;
+
+impl Slot {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a chance is from 0 to 1; as a cast saturates, what is rounded to 1 falls short of it by a unit"
+    )]
+    fn new((chance, alias): (f64, u32)) -> Self {
+        Self {
+            own: (chance / UNIT).round() as u32,
+            alias,
+        }
+    }
+
+    /// Chance of the entry of the same number.
+    #[inline]
+    #[must_use]
+    pub fn chance(self) -> f64 {
+        f64::from(self.own) * UNIT
+    }
+}
 
 impl Alias {
-    /// A table over weights ≥ 0; None if there are none, their sum is not above 0 and finite, or there are 2³² or more.
+    /// A table over weights ≥ 0; None if there are none, their sum is not above 0 and finite, or there are 2³² or more. Shares are
+    /// right to 2⁻³² of that of an even weight.
     #[must_use]
     pub fn new(weights: &[f64]) -> Option<Self> {
         let count = u32::try_from(weights.len()).ok()?;
@@ -21,7 +52,7 @@ impl Alias {
             return None;
         }
         let scale = f64::from(count) / total;
-        let mut slots: Vec<Slot> = weights.iter().zip(0..count).map(|(w, i)| (w * scale, i)).collect();
+        let mut slots: Vec<(f64, u32)> = weights.iter().zip(0..count).map(|(w, i)| (w * scale, i)).collect();
         let (mut poor, mut rich): (Vec<u32>, Vec<u32>) = (0..count).partition(|i| slots[*i as usize].0 < 1.0);
         while let (Some(small), Some(large)) = (poor.pop(), rich.last().copied()) {
             let missing = 1.0 - slots[small as usize].0;
@@ -38,6 +69,7 @@ impl Alias {
                 slots[i as usize] = (1.0, i);
             }
         }
+        let slots = slots.into_iter().map(Slot::new).collect();
         Some(Self { slots })
     }
 
@@ -66,7 +98,7 @@ impl Alias {
     pub fn pick_and_rest(&self, u: f64) -> (usize, f64) {
         let scaled = u * self.slots.len() as f64;
         let slot = (scaled as usize).min(self.slots.len() - 1);
-        let (chance, alias) = self.slots[slot];
+        let (chance, alias) = (self.slots[slot].chance(), self.slots[slot].alias);
         let within = scaled - slot as f64;
         // Without a branch: which of the two it is, nobody can foresee.
         let own = within < chance;
@@ -84,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_entry_has_its_share_exactly() {
+    fn every_entry_has_its_share() {
         // The share of an entry, from the table itself: own chances and what aliases hand over.
         for weights in [
             vec![1.0],
@@ -94,13 +126,13 @@ mod tests {
             let table = Alias::new(&weights).expect("positive");
             let n = weights.len() as f64;
             let mut shares = vec![0.0; weights.len()];
-            for (i, (chance, alias)) in table.slots.iter().enumerate() {
-                shares[i] += chance / n;
-                shares[*alias as usize] += (1.0 - chance) / n;
+            for (i, slot) in table.slots.iter().enumerate() {
+                shares[i] += slot.chance() / n;
+                shares[slot.alias as usize] += (1.0 - slot.chance()) / n;
             }
             let total: f64 = weights.iter().sum();
             for (share, weight) in shares.iter().zip(&weights) {
-                assert!((share - weight / total).abs() < 1e-12);
+                assert!((share - weight / total).abs() < UNIT);
             }
             for k in 0..10_000 {
                 assert!(weights[table.pick((f64::from(k) + 0.5) / 10_000.0)] > 0.0);

@@ -10,8 +10,7 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// Of a list that rises, with so many more steps than it has numbers that few of them hold one: where the first place is
-    /// nearly always the right one, the processor foresees it.
+    /// Of a list that rises, with so many more steps than it has numbers that few of them hold two.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
@@ -19,7 +18,7 @@ impl Guide {
         reason = "lists of less than 2^32 numbers"
     )]
     pub fn new(rising: &[f64]) -> Self {
-        let steps = 16 * rising.len().next_power_of_two();
+        let steps = 8 * rising.len().next_power_of_two();
         let scale = match rising.last() {
             Some(end) if *end > 0.0 && (steps as f64 / end).is_finite() => steps as f64 / end,
             _ => 0.0,
@@ -45,6 +44,8 @@ impl Guide {
         while at > 0 && of(&rising[at - 1]) > x {
             at -= 1;
         }
+        // Whether one number lies below in the step nobody foresees, so it is counted; that there are more is rare.
+        at += rising.get(at).map_or(0, |next| usize::from(of(next) <= x));
         while at < rising.len() && of(&rising[at]) <= x {
             at += 1;
         }

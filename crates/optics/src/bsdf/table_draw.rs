@@ -4,7 +4,7 @@
 //! is all over a memory that no cache holds, and without branches the processor waits for many of them at once.
 
 use etendue_math::trig::sin_cos_turns;
-use etendue_sampling::alias::Slot;
+use etendue_sampling::alias::{Slot, UNIT};
 use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
@@ -43,7 +43,7 @@ pub(super) struct Group {
     values: Lanes,
     /// Of its alias table: a place, what it holds, and the node that is found.
     slot: Numbers,
-    chance: Lanes,
+    chance: Numbers,
     alias: Numbers,
     /// Azimuth and radial coordinate of the node.
     azimuth: Lanes,
@@ -84,7 +84,7 @@ impl Group {
             azimuths: ZERO,
             values: ZERO,
             slot: [0; TOGETHER],
-            chance: ZERO,
+            chance: [0; TOGETHER],
             alias: [0; TOGETHER],
             azimuth: ZERO,
             radius: [0; TOGETHER],
@@ -112,18 +112,26 @@ impl Group {
             }
         }
         picks(self);
+        // Those that a slice scatters; without branches, which nobody can foresee.
+        let (mut those, mut count) = ([0; TOGETHER], 0);
+        for k in 0..n {
+            those[count] = k;
+            count += usize::from((self.floor[k] == 0.0) & (self.absorbed[k] == 0.0));
+        }
+        let those = &those[..count];
         let mut tables: [&[Slot]; TOGETHER] = [&[]; TOGETHER];
-        for (k, table) in tables.iter_mut().enumerate().take(n) {
+        for &k in those {
             let grid = lobe.slice(self.slice[k] as usize);
             [self.radii[k], self.azimuths[k], self.values[k]] = grid.size();
-            *table = grid.slots();
+            tables[k] = grid.slots();
         }
         slots(self);
-        for (k, table) in tables.iter().enumerate().take(n) {
-            (self.chance[k], self.alias[k]) = table[self.slot[k] as usize];
+        for &k in those {
+            let slot = tables[k][self.slot[k] as usize];
+            (self.chance[k], self.alias[k]) = (slot.own, slot.alias);
         }
         nodes(self);
-        for k in 0..n {
+        for &k in those {
             let hat = lobe.slice(self.slice[k] as usize).hat(self.radius[k] as usize);
             (self.inner[k], self.top[k]) = (hat.inner, hat.node);
             for side in 0..2 {
@@ -131,9 +139,9 @@ impl Group {
             }
         }
         radii(self);
-        // Without branches, which nobody can foresee: those that are bent first.
+        // Those that are bent first.
         let (mut list, mut count) = ([0; TOGETHER], 0);
-        for k in 0..n {
+        for &k in those {
             list[count] = k;
             count += usize::from(self.part[k] >= self.linear[k]);
         }
@@ -258,11 +266,12 @@ fn nodes(group: &mut Group) {
     } = group;
     for k in 0..TOGETHER {
         let within = rest[k] * values[k] - f64::from(slot[k]);
-        let own = within < chance[k];
+        let chance = f64::from(chance[k]) * UNIT;
+        let own = within < chance;
         let (left, share) = if own {
-            (within, chance[k])
+            (within, chance)
         } else {
-            (within - chance[k], 1.0 - chance[k])
+            (within - chance, 1.0 - chance)
         };
         part[k] = part_of(left, share);
         let node = f64::from(if own { slot[k] } else { alias[k] });

@@ -358,7 +358,13 @@ impl Grid {
     /// The table of nodes; without any, the first one takes all.
     #[inline]
     pub(super) fn slots(&self) -> &[Slot] {
-        self.nodes.as_ref().map_or(&[(1.0, 0)], Alias::slots)
+        self.nodes.as_ref().map_or(
+            &[Slot {
+                own: u32::MAX,
+                alias: 0,
+            }],
+            Alias::slots,
+        )
     }
 
     /// How many radial coordinates, azimuths and places in the table of nodes there are.

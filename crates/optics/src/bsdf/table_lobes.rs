@@ -212,11 +212,17 @@ impl Lobe {
         self.guide = Guide::new(&self.sines[..self.sines.len() - 1]);
     }
 
+    /// The place in the list after the last sine, but for the very last, that is not above this one.
+    #[inline(always)]
+    fn above(&self, sine: f64) -> usize {
+        let from = &self.sines[..self.sines.len() - 1];
+        self.guide.not_above(from, sine, |from| *from).max(1)
+    }
+
     /// The step from the last sine that is not above this one.
     #[inline]
     pub(super) fn step(&self, sine: f64) -> &Step {
-        let above = self.guide.not_above(&self.steps, sine, |step| step.from);
-        &self.steps[above.max(1) - 1]
+        &self.steps[self.above(sine) - 1]
     }
 
     /// The first of two slices, and the shares of both and of the floor.
@@ -239,10 +245,7 @@ impl Lobe {
 
     #[inline]
     pub(super) fn blend(&self, sine: f64) -> Blend {
-        let above = self
-            .guide
-            .not_above(&self.sines[..self.sines.len() - 1], sine, |node| *node)
-            .max(1);
+        let above = self.above(sine);
         let (a, b) = (&self.blends[above - 1], &self.blends[above]);
         let [from, to] = [self.sines[above - 1], self.sines[above]];
         let part = if to > from {
