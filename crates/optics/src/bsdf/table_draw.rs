@@ -48,7 +48,7 @@ pub(super) struct Group {
     /// Azimuth and radial coordinate of the node.
     azimuth: Lanes,
     radius: Numbers,
-    /// See `Hat`; of both sides.
+    /// See `Hat`; of both sides. The first is the share of the side once that is known.
     inner: Lanes,
     top: Lanes,
     fars: [Lanes; 2],
@@ -57,7 +57,7 @@ pub(super) struct Group {
     far: Lanes,
     linear: Lanes,
     inwards: Lanes,
-    /// What is left of the first number, on that side.
+    /// What is left of the first number, on that side less than its share.
     part: Lanes,
     /// From the far end of the side to its top.
     along: Lanes,
@@ -143,10 +143,10 @@ impl Group {
         let (mut list, mut count) = ([0; TOGETHER], 0);
         for &k in those {
             list[count] = k;
-            count += usize::from(self.part[k] >= self.linear[k]);
+            count += usize::from(self.part[k] >= self.inner[k] * self.linear[k]);
         }
         for k in list.into_iter().take(count) {
-            let slope = [self.part[k], self.linear[k]];
+            let slope = [self.part[k] / self.inner[k], self.linear[k]];
             self.along[k] = bent(slope, self.numbers[1][k], self.inwards[k] > 0.0);
         }
         directions(self, if up { 1.0 } else { -1.0 });
@@ -313,8 +313,9 @@ fn radii(group: &mut Group) {
         } else {
             (part[k] - inner[k], 1.0 - inner[k])
         };
-        part[k] = part_of(left, share);
-        along[k] = part_of(part[k], linear[k]).sqrt();
+        part[k] = left;
+        inner[k] = share;
+        along[k] = part_of(left, share * linear[k]).sqrt();
     }
 }
 

@@ -155,12 +155,13 @@ impl Slice {
         self.f.chunks(n).flat_map(along).collect()
     }
 
-    /// Ready to be asked.
+    /// Ready to be asked; to be drawn from where sines of incidence lie between these, so that nodes beyond the unit circle are
+    /// left out. None: in all of the plane.
     ///
     /// # Errors
     /// What is wrong with the slice.
     #[allow(clippy::cast_possible_truncation, reason = "fewer than 2^16 radial coordinates")]
-    pub(super) fn grid(&self) -> Result<Grid, String> {
+    pub(super) fn grid(&self, sines: Option<[f64; 2]>) -> Result<Grid, String> {
         let Self {
             radial, azimuths, f, ..
         } = self;
@@ -191,11 +192,16 @@ impl Slice {
         let on_all = |row: &[f64]| (0..all.len()).map(|i| row[i.min(row.len() - 1)]).collect::<Vec<f64>>();
         let f: Vec<f64> = f.chunks(radial.len()).flat_map(on_all).collect();
         let (hats, wholes): (Vec<Hat>, Vec<f64>) = (0..all.len()).map(|i| Hat::of(&all, i)).unzip();
-        let weights: Vec<f64> = f
-            .iter()
-            .zip(wholes.iter().cycle())
-            .map(|(f, whole)| f * whole)
-            .collect();
+        let n = all.len();
+        let is_there = |node: usize| sines.is_none_or(|sines| reaches_in(&all, *azimuths, [node / n, node % n], sines));
+        let weight = |node: usize| {
+            if is_there(node) {
+                f[node] * wholes[node % n]
+            } else {
+                0.0
+            }
+        };
+        let weights: Vec<f64> = (0..f.len()).map(weight).collect();
         let nodes = Alias::new(&weights);
         let size = [
             all.len(),
@@ -218,6 +224,24 @@ impl Slice {
             radial: all,
         })
     }
+}
+
+/// Whether the hats of a node, an azimuth and a radial coordinate, reach into the unit circle about −β₀ for any |β₀| of a range.
+fn reaches_in(radial: &[f64], azimuths: usize, [j, i]: [usize; 2], [from, to]: [f64; 2]) -> bool {
+    let [near, far] = [radial[i.saturating_sub(1)], radial[(i + 1).min(radial.len() - 1)]];
+    // The azimuth of the hat that is farthest from the direction of β₀.
+    let step = 1.0 / azimuths as f64;
+    let turn = j as f64 * step;
+    let cosine = if (turn - 0.5).abs() < step {
+        -1.0
+    } else {
+        sin_cos_turns(turn - step).1.min(sin_cos_turns(turn + step).1)
+    };
+    // |β|² is convex in |β₀| and r: where it is least within a rectangle lies on its sides.
+    let square = |sine: f64, r: f64| sine * sine + r * (2.0 * sine * cosine + r);
+    let least = [from, to].map(|sine| square(sine, (-sine * cosine).clamp(near, far)));
+    let sides = [near, far].map(|r| square((-r * cosine).clamp(from, to), r));
+    least.into_iter().chain(sides).fold(f64::INFINITY, f64::min) < 1.0
 }
 
 impl Hat {
@@ -246,15 +270,15 @@ impl Hat {
     fn draw(&self, number: f64, other: f64) -> f64 {
         let inwards = number < self.inner;
         let slope = &self.slopes[usize::from(!inwards)];
-        let rest = if inwards {
-            part_of(number, self.inner)
+        let (left, share) = if inwards {
+            (number, self.inner)
         } else {
-            part_of(number - self.inner, 1.0 - self.inner)
+            (number - self.inner, 1.0 - self.inner)
         };
-        let s = if rest < slope.linear {
-            part_of(rest, slope.linear).sqrt()
+        let s = if left < share * slope.linear {
+            part_of(left, share * slope.linear).sqrt()
         } else {
-            bent([rest, slope.linear], other, inwards)
+            bent([left / share, slope.linear], other, inwards)
         };
         slope.far + s * (self.node - slope.far)
     }
@@ -468,6 +492,32 @@ mod tests {
     use crate::chi_squared::{CRITICAL, deviate};
 
     #[test]
+    fn nodes_that_are_left_out_reach_nowhere_into_the_circle() {
+        let radial = [0.0, 0.05, 0.3, 0.7, 1.1, 1.5, 2.0];
+        let mut seen = [0; 2];
+        for azimuths in [1, 4, 36] {
+            for sines in [[0.0, 0.1], [0.5, 0.6], [0.9, 1.0], [0.2, 0.2]] {
+                for (j, i) in (0..azimuths).flat_map(|j| (0..radial.len()).map(move |i| (j, i))) {
+                    let at = |k: u32, [a, b]: [f64; 2]| a + (b - a) * f64::from(k) / 40.0;
+                    let [near, far] = [radial[i.saturating_sub(1)], radial[(i + 1).min(6)]];
+                    let step = 1.0 / azimuths as f64;
+                    let around = [(j as f64 - 1.0) * step, (j as f64 + 1.0) * step];
+                    let inside = (0..41_u32.pow(3)).any(|k| {
+                        let (sine, r) = (at(k % 41, sines), at(k / 41 % 41, [near, far]));
+                        let (s, c) = sin_cos_turns(at(k / 1681, around));
+                        (sine + r * c).hypot(r * s) < 1.0
+                    });
+                    let kept = reaches_in(&radial, azimuths, [j, i], sines);
+                    assert!(kept || !inside, "{azimuths} {sines:?} {j} {i}");
+                    seen[usize::from(kept == inside)] += 1;
+                }
+            }
+        }
+        // Points in steps of a fortieth find nearly all that there are.
+        assert!(seen[1] > 40 * seen[0], "{seen:?}");
+    }
+
+    #[test]
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -483,7 +533,7 @@ mod tests {
             share: 0.5,
             floor: 0.0,
         };
-        let grid = slice.grid().expect("sound");
+        let grid = slice.grid(None).expect("sound");
         let (radii, turns) = (40, 24);
         let cell = |r: f64, turn: f64| (r / END * f64::from(radii), turn * f64::from(turns));
         let mut counts = vec![0_u64; 40 * 24];

@@ -109,15 +109,20 @@ impl Row {
         if sines.is_empty() || sines.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err("angles of incidence do not rise".into());
         }
-        let mut slices: Vec<Grid> = Vec::new();
+        let mut between: Vec<Slice> = Vec::new();
         for (k, slice) in self.slices.iter().enumerate() {
             if let Some(before) = k.checked_sub(1).map(|before| &self.slices[before]) {
-                for between in before.up_to(slice) {
-                    slices.push(between.grid()?);
-                }
+                between.extend(before.up_to(slice));
             }
-            slices.push(slice.grid()?);
+            between.push(slice.clone());
         }
+        let grid = |k: usize| {
+            // From the slice before to the one after.
+            let from = k.checked_sub(1).map_or(0.0, |before| between[before].sine);
+            let to = between.get(k + 1).map_or(1.0, |after| after.sine);
+            between[k].grid(Some([from, to]))
+        };
+        let slices: Vec<Grid> = (0..between.len()).map(grid).collect::<Result<_, String>>()?;
         let squares: Vec<f64> = sines.iter().map(|sine| sine * sine).collect();
         let of = |pick: fn(&Slice) -> f64| Cubic::new(&squares, &self.slices.iter().map(pick).collect::<Vec<_>>());
         let mut lobe = Lobe {
