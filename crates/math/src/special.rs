@@ -76,14 +76,49 @@ pub fn ln(x: f64) -> f64 {
 #[inline(always)]
 #[must_use]
 pub fn ln_gamma(x: f64) -> f64 {
-    const HALF_LN_TAU: f64 = 0.918_938_533_204_672_8;
-    let small = x < 8.0;
+    let (y, below) = raised(x);
+    stirling(y, 1.0 / y) - ln(below)
+}
+
+/// From here on Stirling's series does by itself.
+pub const LARGE: f64 = 8.0;
+
+/// [`ln_gamma`] of a number that is not below [`LARGE`], to the same bits in little more than half the time.
+#[inline(always)]
+#[must_use]
+pub fn ln_gamma_of_large(x: f64) -> f64 {
+    stirling(x, 1.0 / x)
+}
+
+/// ln Γ(a) + ln Γ(b) for positive numbers, not both of which are very small, in two thirds of the time. The errors are those of
+/// [`ln_gamma`]. If none is `SMALL`, both are at least [`LARGE`]: the same bits sooner.
+#[inline(always)]
+#[must_use]
+pub fn ln_gamma_of_both<const SMALL: bool>(a: f64, b: f64) -> f64 {
+    let [(ya, below_a), (yb, below_b)] = if SMALL {
+        [raised(a), raised(b)]
+    } else {
+        [(a, 1.0), (b, 1.0)]
+    };
+    let inverse = 1.0 / (ya * yb);
+    let both = stirling(ya, yb * inverse) + stirling(yb, ya * inverse);
+    if SMALL { both - ln(below_a * below_b) } else { both }
+}
+
+/// The number itself or eight more, and by how many times Γ grows to there.
+#[inline(always)]
+fn raised(x: f64) -> (f64, f64) {
+    let small = x < LARGE;
     // (x)₈ = x (x + 7) · (x + 1)(x + 6) · …, each pair from the same product.
     let pair = x * (x + 7.0);
     let rising = pair * (pair + 6.0) * ((pair + 10.0) * (pair + 12.0));
-    let y = if small { x + 8.0 } else { x };
-    let below = if small { rising } else { 1.0 };
-    let z = 1.0 / y;
+    (if small { x + 8.0 } else { x }, if small { rising } else { 1.0 })
+}
+
+/// Stirling's series for ln Γ(y), y ≥ 8, told 1/y.
+#[inline(always)]
+fn stirling(y: f64, z: f64) -> f64 {
+    const HALF_LN_TAU: f64 = 0.918_938_533_204_672_8;
     let z2 = z * z;
     let series = z * polynomial!(
         z2,
@@ -97,7 +132,7 @@ pub fn ln_gamma(x: f64) -> f64 {
             1.0 / 156.0
         ]
     );
-    (y - 0.5) * ln(y) - y + HALF_LN_TAU + series - ln(below)
+    (y - 0.5) * ln(y) - y + HALF_LN_TAU + series
 }
 
 /// The cube root of a positive number, to 2·10⁻¹⁴ of it, with the same bits on every platform: Halley's method from a third of
@@ -153,6 +188,23 @@ mod tests {
             let x = (f64::from(i) * 0.01 - 15.0).exp();
             let (a, b) = (ln_gamma(x + 1.0), ln_gamma(x) + x.ln());
             assert!((a - b).abs() < 1e-13 + 2e-15 * a.abs(), "{x}: {a} {b}");
+        }
+    }
+
+    #[test]
+    fn ln_gamma_of_large_numbers_and_of_two() {
+        for i in 0..4000 {
+            let x = LARGE + (f64::from(i) * 0.01 - 5.0).exp();
+            assert_eq!(ln_gamma_of_large(x).to_bits(), ln_gamma(x).to_bits());
+            let [large, less] = [LARGE + 3.0 * x, (f64::from(i) * -0.02).exp()];
+            let (both, again) = (ln_gamma_of_both::<true>(x, large), ln_gamma_of_both::<false>(x, large));
+            assert_eq!(both.to_bits(), again.to_bits());
+            for other in [large, less] {
+                let sum = ln_gamma(x) + ln_gamma(other);
+                for both in [ln_gamma_of_both::<true>(x, other), ln_gamma_of_both::<true>(other, x)] {
+                    assert!((both - sum).abs() < 2e-13 + 4e-15 * sum.abs(), "{x} {other}");
+                }
+            }
         }
     }
 

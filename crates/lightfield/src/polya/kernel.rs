@@ -1,6 +1,6 @@
 //! The arithmetic of a chunk of boxes, over plain arrays: compiled once per instruction set, the same bits on each.
 
-use etendue_math::special::{exp, ln, ln_gamma};
+use etendue_math::special::{LARGE, exp, ln, ln_gamma, ln_gamma_of_both, ln_gamma_of_large};
 use multiversion::multiversion;
 
 use super::chunk::{Busy, GROUP};
@@ -51,6 +51,9 @@ pub fn whole_term(c: f64, splits: f64, count: &[f64], busy: &Busy, out: &mut [f6
 /// ln Γ(c + n) of each number of points.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub fn log_gamma(c: f64, count: &[f64], busy: &Busy, out: &mut [f64]) {
+    if c >= LARGE && count.len() >= GROUP {
+        return each_of::<GROUP>(count, busy, out, |n| ln_gamma_of_large(c + n));
+    }
     let term = |n: f64| ln_gamma(c + n);
     if count.len() < GROUP {
         each_of::<1>(count, busy, out, term);
@@ -103,12 +106,30 @@ fn add_log_bayes_of<const B: usize>(c: f64, trial: &Trial<'_>, busy: &Busy, out:
         let (share, lower, upper, whole) = (&share[group], &lower[group], &upper[group], &whole[group]);
         let (prior, log_lower, log_upper) = (&prior[group], &log_lower[group], &log_upper[group]);
         let out = &mut out[group];
+        let (mut void, mut alpha, mut beta, mut least) = ([false; B], [0.0; B], [0.0; B], LARGE);
         for i in 0..B {
-            let void = (share[i] <= 0.0) | (share[i] >= 1.0);
-            let p = if void { 0.5 } else { share[i] };
-            let beta = ln_gamma(c * p + lower[i]) + ln_gamma(c * (1.0 - p) + upper[i]) - whole[i];
-            let bayes = beta + prior[i] - lower[i] * log_lower[i] - upper[i] * log_upper[i];
-            out[i] += if void { 0.0 } else { bayes };
+            void[i] = (share[i] <= 0.0) | (share[i] >= 1.0);
+            let p = if void[i] { 0.5 } else { share[i] };
+            alpha[i] = c * p + lower[i];
+            beta[i] = c * (1.0 - p) + upper[i];
+        }
+        for i in 0..B {
+            let less = if alpha[i] < beta[i] { alpha[i] } else { beta[i] };
+            least = if less < least { less } else { least };
+        }
+        let mut gammas = [0.0; B];
+        if least < LARGE {
+            for i in 0..B {
+                gammas[i] = ln_gamma_of_both::<true>(alpha[i], beta[i]);
+            }
+        } else {
+            for i in 0..B {
+                gammas[i] = ln_gamma_of_both::<false>(alpha[i], beta[i]);
+            }
+        }
+        for i in 0..B {
+            let bayes = gammas[i] - whole[i] + prior[i] - lower[i] * log_lower[i] - upper[i] * log_upper[i];
+            out[i] += if void[i] { 0.0 } else { bayes };
         }
     }
 }
