@@ -348,6 +348,8 @@ def test_info_tells_of_rays_that_a_file_holds_twice(run: Run, folder: Path) -> N
     assert "50.00% of the rays repeat another one" in run("info", "twice.csv").out
     (facts,) = run("info", "twice.csv", "--json").json
     assert [c["severity"] for c in facts["complaints"] if "repeat" in c["found"]] == ["warning"]
+    (alone,) = run("info", folder / "led.dat", "--json").json
+    assert facts["effective_rays"] == pytest.approx(alone["effective_rays"], rel=1e-6)
     assert "repeat" not in run("info", folder / "led.dat").out
 
 

@@ -188,6 +188,25 @@ def test_far_field_sets_and_unusable_rays() -> None:
     assert "15 of 20 nodes saw no ray" in led.notes[-1]
 
 
+def test_copies_of_a_ray_are_one_ray() -> None:
+    """A set merged with itself has twice the flux, the same nodes and relative errors; without places nothing is known."""
+    once = rays_of(
+        leaning_lobe(30_000, 6.0, direction(20.0, 35.0), 5), np.random.default_rng(1).gamma(2.0, 0.5, 30_000)
+    )
+    expected, found = intensity_distribution(once), intensity_distribution(et.RaySet.merge([once, once]))
+    assert np.array_equal(found.gamma, expected.gamma)
+    assert np.array_equal(found.c, expected.c)
+    assert np.allclose(found.values, 2.0 * expected.values, rtol=1e-9)
+    assert np.allclose(found.standard_error, 2.0 * expected.standard_error, rtol=1e-9, equal_nan=True)
+    assert found.flux_error == pytest.approx(2.0 * expected.flux_error)
+    assert any("30,000 of 60,000 rays repeat another one" in note for note in found.notes)
+    records = np.zeros(400, dtype=[("direction", "<f4", (3,)), ("flux", "<f4")])
+    records["direction"], records["flux"] = np.tile(np.random.default_rng(2).normal(size=(200, 3)), (2, 1)), 1.0
+    far = intensity_distribution(et.RaySet.from_records(records, RaySetMeaning()))
+    assert far.flux_error == pytest.approx(20.0)
+    assert not any("repeat" in note for note in far.notes)
+
+
 def test_no_flux_at_all() -> None:
     led = intensity_distribution(rays_of(direction([0.0, 5.0], [1.0, 90.0]), np.zeros(2)), 4, 45)
     assert (led.flux, led.maximum, led.symmetry()) == (0.0, 0.0, "rotational")

@@ -193,6 +193,24 @@ def test_rays_without_flux_are_no_evidence() -> None:
     assert lmap.dead_pixels == 1
 
 
+def test_copies_of_a_ray_are_one_ray() -> None:
+    """Rays that a set holds 0 to 9 times, in another order, are the same light as each of them once with all the flux."""
+    rng = np.random.default_rng(8)
+    once = et.RingSource(rays=20_000, seed=3).ray_set()
+    order = rng.permutation(np.repeat(np.arange(20_000), rng.poisson(3.0, 20_000)))
+    times = np.bincount(order, minlength=20_000)
+    same = et.RaySet(once.position, once.direction, once.flux * times)
+    again = et.RaySet(once.position[order], once.direction[order], once.flux[order])
+    place = et.Observer(20, 30, 200), et.Screen(60, 60, 5, 5)
+    for method in ("cone", et.Cone(acceptance=6), et.Cone(observer_radius=20)):
+        expected, found = (et.luminance_map(rays, *place, method=method) for rays in (same, again))
+        assert found.values == pytest.approx(expected.values, rel=1e-9, nan_ok=True)
+        assert found.standard_error == pytest.approx(expected.standard_error, rel=1e-9, nan_ok=True)
+        assert (found.rays == expected.rays).all()
+        assert sum("repeat another one" in note for note in found.notes) == 1
+    assert not any("repeat" in note for note in expected.notes)
+
+
 def test_rays_that_cannot_be_used_are_counted_in_the_notes() -> None:
     rays = et.RaySet([[0, 0, 0]] * 3, [[0, 0, 1], [0, 0, 0], [0, 0, 1]], [1.0, 1.0, np.nan])
     with pytest.warns(UserWarning, match="1 of 3 rays"):

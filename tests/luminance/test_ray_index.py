@@ -154,6 +154,17 @@ def test_rays_that_cannot_be_used_are_left_out_and_complained_about(cloud: et.Ra
     assert sorted(map(bytes, index.records)) == sorted(map(bytes, usable))
 
 
+def test_errors_of_an_index_of_copies_are_those_of_its_distinct_rays() -> None:
+    """A set with itself has twice the flux and half of the rays: errors are twice those of the set, not √2 times."""
+    once = et.RingSource(rays=100_000, seed=3).ray_set()
+    place = et.Observer(20, 30, 200), et.Screen(60, 60, 5, 5)
+    expected = et.luminance_map(once, *place, method=et.Cone(acceptance=6))
+    found = et.luminance_map(et.RayIndex.build(et.RaySet.merge([once, once])), *place, method=et.Cone(acceptance=6))
+    # Some copies are in another stretch than their ray.
+    assert found.standard_error == pytest.approx(2.0 * expected.standard_error, rel=1e-3, nan_ok=True)
+    assert any("all standard errors are 1.41 times as large for it" in note for note in found.notes)
+
+
 def test_no_ray_for_the_observer_is_a_dead_map() -> None:
     index = et.RayIndex.build(et.RaySet([[0, 0, 0]], [[0, 0, -1]], [1.0]))
     for acceptance in (1.5, "auto"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.node_choice import Choice, choose_nodes
 from etendue.quantities.ray_stream import Progress, RayStream
@@ -44,7 +45,8 @@ def intensity_distribution(
     Intensity
         [cd] for rays in lm, [W/sr] for rays in W. Its `standard_error` is √(Σ (w φ)²) over the solid angle, with the share
         φ of the node in a ray of flux w; NaN for a node that no ray reached, whose intensity is 0. `flux_error` is √(Σ w²).
-        The notes tell if the steps cannot hold a beam.
+        Copies of a ray, which have its place and direction, are one ray with the flux of all. The notes tell of them, and
+        if the steps cannot hold a beam.
 
     Raises
     ------
@@ -59,17 +61,19 @@ def intensity_distribution(
     >>> bool(abs(led.at(30, 60) * np.pi / rays.total_flux - 0.5) < 0.01), led.unit, round(led.flux / rays.total_flux, 9)
     (True, 'cd', 1.0)
     """
-    nodes, told = _nodes(rays, c_planes, gamma_step)
+    distinct = DistinctRays.of(rays)
+    nodes, told = _nodes(distinct.rays, c_planes, gamma_step)
     core = nodes.core()
     sums, squares, count = np.zeros(len(nodes)), np.zeros(len(nodes)), np.zeros(len(nodes), dtype=np.uint64)
-    for batch in rays.batches():
+    for batch in distinct.rays.batches():
         core.add(batch.direction, batch.flux, sums, squares, count)
         if progress is not None:
             progress(batch.start + batch.usable.size)
-    error = np.where(count > 0, np.sqrt(squares), np.nan)
+    error = np.where(count > 0, np.sqrt(squares * distinct.excess), np.nan)
     usable = int(count[-1])
-    left_out = f", {len(rays) - usable:,} others cannot be used" if usable < len(rays) else ""
-    notes = [*told, f"{nodes.describe()}; from the directions of {usable:,} rays{left_out}"]
+    unusable = distinct.unusable + len(distinct.rays) - usable
+    left_out = f", {unusable:,} others cannot be used" if unusable else ""
+    notes = [*told, f"{nodes.describe()}; from the directions of {usable:,} rays{left_out}", *distinct.notes]
     asked = c_planes is not None and gamma_step is not None
     step = "far-field intensity, " + ("steps as asked" if asked else "steps chosen from the rays")
     result = nodes.intensity(sums, error, rays.flux_unit, rays.provenance.then(step))

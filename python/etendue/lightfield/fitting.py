@@ -34,10 +34,9 @@ from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Plane, Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry, refutation
 from etendue.lightfield.trees import POSITIONS
-from etendue.quantities.ray_records import RayRecords
+from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
-from etendue.quantities.repeated_rays import Repeats, keys_of
 
 PILOT_RAYS = 1 << 20
 """Rays on which the shape of the grid and the concentrations are chosen."""
@@ -63,9 +62,6 @@ FEW = 1.0 / 16.0
 FEWEST_BITS, MOST_PILOT_BITS = 16, 20
 """Halvings in all of the grids that are compared, in steps of 4. Where images tell most, few cells do as well as many, in
 a sixteenth of the time; sets of very many rays may fill more than the pilot's."""
-
-MOST_JOINED = 1 << 23
-"""Rays of which copies are joined: 1 GB."""
 
 LEAST_LEAD = 1e-3
 """[nat per ray] A smaller lead of a finer grid shows in no map."""
@@ -110,7 +106,9 @@ def fit_light_field(
         raise ArgumentError(f"max_resolution is {max_resolution}; give the side of the finest cells, a length in mm.")
     check_near_field(rays)
     told = FitProgress(progress, len(rays), isinstance(surface, str))
-    given, (rays, repeated) = rays, _each_once(rays)
+    # Of copies some would be held out and others fitted, so that a field that remembers rays would seem to predict them.
+    given, distinct = rays, DistinctRays.of(rays)
+    rays, repeated = distinct.rays, _told_of_copies(distinct)
     notes: tuple[str, ...] = ()
     if isinstance(surface, str):
         if surface != "auto":
@@ -140,24 +138,12 @@ def fit_light_field(
     return field.replace(notes=(*notes, *field.notes, *repeated, *notes_of_rays(given)), spectrum=spectrum)
 
 
-def _each_once(rays: RayStream) -> tuple[RayStream, tuple[str, ...]]:
-    """The rays with copies of one as one ray that has their flux, and what is to be said of it.
-
-    Of copies some would be held out and others fitted, so that a field that remembers rays would seem to predict them.
-    """
-    told = Repeats.of(rays).told if isinstance(rays, RayRecords) else None
-    if told is None:
-        return rays, ()
-    if len(rays) > MOST_JOINED:
-        return rays, (told,)
-    parts = [(batch.position, batch.direction, batch.flux) for batch in rays.batches()]
-    position, direction, flux = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    _, first, number = np.unique(keys_of(position, direction), return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    flux, first = np.bincount(number, flux)[order], first[order]
-    joined = RaySet(position[first], direction[first], flux, flux_unit=rays.flux_unit, provenance=rays.provenance)
-    told = f"{len(position) - len(first):,} of {len(rays):,} rays repeat another one, with its place and direction"
-    return joined, (f"{told}: the field rests on {len(first):,} rays, each of them with the flux of all its copies",)
+def _told_of_copies(distinct: DistinctRays) -> tuple[str, ...]:
+    if distinct.told is None:
+        return ()
+    if distinct.excess > 1.0:
+        return (f"{distinct.told}: errors and resolution take each for a ray of its own, and are too good",)
+    return (f"{distinct.told}: the field rests on {len(distinct.rays):,} rays, each with the flux of all its copies",)
 
 
 def finest_for(surface: Surface, max_resolution: float | None) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -11,6 +13,7 @@ from etendue.luminance.acceptance import LADDER, AcceptanceChoice, choose_accept
 from etendue.luminance.cone import ConeEstimate, ConeView, cone_estimates
 from etendue.luminance.methods import Cone
 from etendue.luminance.observer_disk import check_disk, widest_angle
+from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally
@@ -24,38 +27,50 @@ def look_through_cone(
     progress: Progress | None = None,
 ) -> list[LuminanceMap]:
     """The maps of rays that head for the observers; see `luminance_map`."""
+    distinct = DistinctRays.of(rays, in_order=isinstance(rays, RayIndex))
+    look = partial(cone_estimates, distinct.rays, threads=threads, progress=progress, excess=distinct.excess)
     if how.observer_radius is not None:
         radius = float(how.observer_radius)
         for observer, screen in pairs:
             check_disk(observer, screen, radius)
         views = [ConeView(o, s, (widest_angle(o, s, radius),), radius) for o, s in pairs]
-        estimates, tally = cone_estimates(rays, views, threads, progress)
-        return [_map(rays, estimate, 0, tally, None) for estimate in estimates]
+        estimates, tally = look(views)
+        return [_map(rays, distinct, estimate, 0, tally, None) for estimate in estimates]
     if how.half_angle == "auto":
-        return _automatic(rays, pairs, threads, progress)
+        return _automatic(rays, distinct, pairs, look)
     angle = float(cast("float", how.half_angle))
-    estimates, tally = cone_estimates(rays, [ConeView(o, s, (angle,)) for o, s in pairs], threads, progress)
-    return [_map(rays, estimate, 0, tally, None) for estimate in estimates]
+    estimates, tally = look([ConeView(o, s, (angle,)) for o, s in pairs])
+    return [_map(rays, distinct, estimate, 0, tally, None) for estimate in estimates]
 
 
 def _automatic(
-    rays: RayStream, pairs: list[tuple[Observer, Screen]], threads: int | None, progress: Progress | None
+    rays: RayStream,
+    distinct: DistinctRays,
+    pairs: list[tuple[Observer, Screen]],
+    look: Callable[[list[ConeView]], tuple[list[ConeEstimate], Tally]],
 ) -> list[LuminanceMap]:
     """Compare the acceptances of the ladder; a second pass only for maps with more pixels than the comparison had."""
     ladder = [ConeView(o, comparison_screen(s), LADDER) for o, s in pairs]
-    compared, tally = cone_estimates(rays, ladder, threads, progress)
+    compared, tally = look(ladder)
     choices = [choose_acceptance(e, s) for e, (_, s) in zip(compared, pairs, strict=True)]
     fine = [i for i, (e, (_, s)) in enumerate(zip(compared, pairs, strict=True)) if e.view.screen != s]
     views = [ConeView(*pairs[i], (choices[i].acceptance,)) for i in fine]
-    refined = dict(zip(fine, cone_estimates(rays, views, threads, progress)[0] if fine else [], strict=True))
+    refined = dict(zip(fine, look(views)[0] if fine else [], strict=True))
     return [
-        _map(rays, refined[i], 0, tally, choice) if i in refined else _map(rays, estimate, choice.index, tally, choice)
+        _map(rays, distinct, refined[i], 0, tally, choice)
+        if i in refined
+        else _map(rays, distinct, estimate, choice.index, tally, choice)
         for i, (estimate, choice) in enumerate(zip(compared, choices, strict=True))
     ]
 
 
 def _map(
-    rays: RayStream, estimate: ConeEstimate, index: int, tally: Tally, choice: AcceptanceChoice | None
+    rays: RayStream,
+    distinct: DistinctRays,
+    estimate: ConeEstimate,
+    index: int,
+    tally: Tally,
+    choice: AcceptanceChoice | None,
 ) -> LuminanceMap:
     counts = estimate.rays[index]
     dead = counts == 0
@@ -75,11 +90,11 @@ def _map(
         "standard errors hold the noise of the rays alone; what the cone blurs, over the angle and by parallax at the edges "
         "of the source, is not in them"
     )
-    if tally.unusable:
-        notes.append(f"{tally.unusable:,} rays cannot be used and were left out; see the ray set's complaints")
+    if unusable := tally.unusable + distinct.unusable:
+        notes.append(f"{unusable:,} rays cannot be used and were left out; see the ray set's complaints")
     if choice is not None:
         notes.append(choice.reason)
-    notes += rays.notes
+    notes += [*distinct.notes, *rays.notes]
     method = "cone" if choice is None else "cone, automatic acceptance"
     limit = f"acceptance {angle:.6g}°" if disk is None else f"observer of radius {disk:.6g} mm"
     return LuminanceMap(

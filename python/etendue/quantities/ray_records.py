@@ -16,6 +16,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.file_records import AnyRecords, FileRecords
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally, checked_threads
+from etendue.quantities.repeated_rays import Repeats
 from etendue.quantities.report import Complaint, RayFileWarning, Severity
 from etendue.quantities.spectrum import Spectrum
 from etendue.units import FLUX_UNITS, FluxUnit
@@ -157,12 +158,14 @@ class RayRecords(RayStream):
         self._meaning = meaning
         self._tally: Tally | None = None
         self._moments: Moments | None = None
+        self._repeats: Repeats | None = None
 
     def replace(self, **changes: Any) -> Self:
         """A set over the same records with some fields of its meaning changed."""
         changed = type(self).from_records(self._records, dataclasses.replace(self._meaning, **changes))
         # The account of the flux as stored depends on the records alone: no second pass for it, and no second warning.
         changed._tally = self._tally  # noqa: SLF001 - its own kind
+        changed._repeats = self._repeats  # noqa: SLF001
         return changed
 
     def __len__(self) -> int:
@@ -320,6 +323,15 @@ class RayRecords(RayStream):
             low, high = moments["flux_range"]
             self._moments = Moments(moments["zero_flux"], (low, high), **arrays)
         return self._moments
+
+    def repeats(self) -> Repeats:
+        """Rays of a set with positions that repeat others; one pass over them, or over many of them, the first time."""
+        if self._repeats is None:
+            self._repeats = self._compared()
+        return self._repeats
+
+    def _compared(self) -> Repeats:
+        return Repeats.of(self)
 
     @property
     def flux_scale(self) -> float:

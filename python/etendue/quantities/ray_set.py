@@ -139,7 +139,7 @@ class RaySet(RayRecords, InNotebook):
         RaySet
             Columns that all sets have are kept. The merged set knows the wavelength of every ray if each set does, and
             the spectrum of every ray, by ``spectrum_index``, if each set does. The complaints name sets that hold the same
-            rays: errors take each of them for a ray of its own.
+            rays, which are not independent of each other.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Rays that a set holds more than once: whatever is made of them takes each for a ray of its own."""
+"""Rays that a set holds more than once, so that they are not independent of each other."""
 
 from __future__ import annotations
 
@@ -25,6 +25,12 @@ STRETCHES = 64
 
 FEWEST, SHARE = 100, 0.01
 """Repeated rays, and their share, that are worth a word: text of few digits makes some by chance."""
+
+TAKEN = (
+    "light fields, maps by the cone and tables of intensity take copies for one ray, all else takes each for a ray of its "
+    "own, with errors that are too small; give each ray once, with the sum of the flux"
+)
+"""What becomes of copies."""
 
 ODD = np.uint64(0x9E3779B97F4A7C15)
 SHIFT = np.uint64(29)
@@ -53,68 +59,71 @@ def keys_of(position: FloatArray, direction: FloatArray) -> Keys:
 
 
 class Repeats(NamedTuple):
-    """Of rays that were compared: how many, and how many of them repeat another one.
+    """Of rays that were compared: how many, how many of them repeat another one, and what that is worth.
+
+    Parameters
+    ----------
+    rays, repeated : int
+    excess : float
+        Σ w² with the copies of a ray taken together, over that of all rays apart: by which variances are too small that
+        take each for a ray of its own.
 
     Examples
     --------
-    >>> Repeats(rays=10_000, repeated=50).told, str(Repeats(rays=10_000, repeated=5000).told)[:41]
-    (None, '50.00% of the rays repeat another one, wi')
+    >>> Repeats(10_000, 50).told, Repeats(10_000, 5000).told
+    (None, '50.00% of the rays repeat another one, with its place and direction')
     """
 
     rays: int
     repeated: int
+    excess: float = 1.0
 
     @classmethod
-    def of(cls, rays: RayStream) -> Repeats:
+    def of(cls, rays: RayStream, stretch: int = BATCH) -> Repeats:
         """Of a set with positions, in one pass over its rays.
+
+        Parameters
+        ----------
+        rays : RayStream
+            The set.
+        stretch : int
+            Of sets with more than `STRETCHES` times so many rays, so many are read at a time.
 
         Examples
         --------
         >>> import etendue as et
-        >>> once = et.RingSource(rays=300).ray_set()
+        >>> once = et.RaySet(np.eye(300)[:, :3] + np.arange(300)[:, None], np.tile([0.0, 0, 1], (300, 1)), np.ones(300))
         >>> Repeats.of(once), Repeats.of(et.RaySet.merge([once, once]))
-        (Repeats(rays=300, repeated=0), Repeats(rays=600, repeated=300))
+        (Repeats(rays=300, repeated=0, excess=1.0), Repeats(rays=600, repeated=300, excess=2.0))
         """
-        n, every = len(rays), np.uint64(max(1, len(rays) // KEPT))
-        starts = list(range(0, n, BATCH)) if n <= STRETCHES * BATCH else [i * n // STRETCHES for i in range(STRETCHES)]
-        kept = [np.zeros(0, dtype=np.uint64)]
+        n, looked = len(rays), min(len(rays), STRETCHES * stretch)
+        every = np.uint64(max(1, looked // KEPT))
+        starts = range(0, n, stretch) if looked == n else [i * n // STRETCHES for i in range(STRETCHES)]
+        kept, carried = [np.zeros(0, dtype=np.uint64)], [np.zeros(0)]
         source = rays.core_source()
         for start in starts:
-            position, direction, flux = _core.read_rays(source, start, min(start + BATCH, n))
+            position, direction, flux = _core.read_rays(source, start, min(start + stretch, n))
             key = keys_of(position, direction)
-            kept.append(key[(key % every == 0) & (flux > 0.0)])
-        keys = np.sort(np.concatenate(kept))
-        return cls(keys.size, int(np.count_nonzero(keys[1:] == keys[:-1])))
+            lit = (key % every == 0) & (flux > 0.0)
+            kept.append(key[lit])
+            carried.append(flux[lit])
+        keys = np.concatenate(kept)
+        ordered = np.sort(keys)
+        found = cls(keys.size, int(np.count_nonzero(ordered[1:] == ordered[:-1])))
+        if not found.repeated:
+            return found
+        # Over the largest, so that no square is lost.
+        weight = np.concatenate(carried)
+        weight /= weight.max()
+        together = np.bincount(np.unique(keys, return_inverse=True)[1], weight)
+        return found._replace(excess=float((together**2).sum() / (weight**2).sum()))
 
     @property
     def told(self) -> str | None:
         """What is to be said of them; None if they are few."""
         if self.repeated < FEWEST or self.repeated < SHARE * self.rays:
             return None
-        return (
-            f"{self.repeated / self.rays:.2%} of the rays repeat another one, with its place and direction: standard errors "
-            "and resolution take each for a ray of its own, and are too good; give each ray once, with the sum of the flux"
-        )
-
-
-def repeat_complaints(rays: RayStream, copies: float = 1.0) -> list[Complaint]:
-    """What is to be said of a set that holds rays more than once, in one pass over it.
-
-    Parameters
-    ----------
-    rays : RayStream
-        Without positions, nothing is said: different rays of a far-field set may share a direction.
-    copies : float
-        Of which the set itself tells (`RaySetMeaning.copies`): above 1, nothing is added.
-
-    Examples
-    --------
-    >>> import etendue as et
-    >>> repeat_complaints(et.RingSource(rays=1000).ray_set())
-    []
-    """
-    told = Repeats.of(rays).told if rays.has_position and copies <= 1.0 else None
-    return [Complaint("warning", "rays", told)] if told else []
+        return f"{self.repeated / self.rays:.2%} of the rays repeat another one, with its place and direction"
 
 
 class SharedRays:
@@ -131,8 +140,8 @@ class SharedRays:
     >>> shared = SharedRays([200, 200])
     >>> for number in (0, 1):
     ...     shared.add(number, place, up)
-    >>> shared.complaints(["first", "second"])[0].found
-    'shares 100.00% of its rays with first: standard errors take each for a ray of its own, and are too small'
+    >>> shared.complaints(["first", "second"])[0].found[:57] + "…"
+    'shares 100.00% of its rays with first: light fields, maps…'
     """
 
     def __init__(self, sizes: Sequence[int]) -> None:
@@ -153,11 +162,7 @@ class SharedRays:
             for name, others in zip(names, before, strict=False):
                 shared = int(np.isin(keys, others).sum())
                 if shared >= FEWEST and shared >= SHARE * keys.size:
-                    told = (
-                        f"shares {shared / keys.size:.2%} of its rays with {name}: standard errors take each for a ray"
-                    )
-                    found.append(
-                        Complaint("warning", f"{names[number]}, rays", f"{told} of its own, and are too small")
-                    )
+                    told = f"shares {shared / keys.size:.2%} of its rays with {name}: {TAKEN}"
+                    found.append(Complaint("warning", f"{names[number]}, rays", told))
             before.append(keys)
         return found

@@ -12,7 +12,8 @@ from etendue.formats.rays import RAY_FORMATS
 from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress
-from etendue.quantities.repeated_rays import repeat_complaints
+from etendue.quantities.repeated_rays import TAKEN, Repeats
+from etendue.quantities.report import Complaint
 
 NO_RAY = "no ray can be used"
 """Why nothing is known of where rays are."""
@@ -41,7 +42,11 @@ def ray_facts(rays: RaySet, path: str | Path, progress: Progress | None = None) 
     focus = rays.virtual_focus
     low, high = moments.flux_range
     known = len(rays) > rays.tally.unusable
-    complaints = (*rays.complaints, *repeat_complaints(rays, rays.meaning.copies))
+    repeats = rays.repeats() if rays.has_position else Repeats(0, 0)
+    complaints = rays.complaints
+    # A set that tells of copies itself tells enough.
+    if repeats.told is not None and rays.meaning.copies <= 1.0:
+        complaints = (*complaints, Complaint("warning", "rays", f"{repeats.told}: {TAKEN}"))
     return {
         "file": str(path),
         "format": rays.provenance.format,
@@ -52,7 +57,7 @@ def ray_facts(rays: RaySet, path: str | Path, progress: Progress | None = None) 
         "total_flux": rays.total_flux,
         "header_flux": rays.header.get("total_flux"),
         "sum_flux": rays.tally.flux * rays.meaning.stored_flux_scale,
-        "effective_rays": rays.tally.effective_rays,
+        "effective_rays": rays.tally.effective_rays / repeats.excess,
         "flux_per_ray": [low * rays.flux_scale, high * rays.flux_scale] if known else None,
         "bounding_box": moments.bounds.tolist() if known and rays.has_position else None,
         "virtual_focus": list(focus.point) if focus.determined else None,

@@ -20,7 +20,11 @@ from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
+from etendue.quantities.repeated_rays import Repeats
 from etendue.quantities.report import Complaint
+
+STRETCH = 1 << 11
+"""Rays in a row that are compared with each other."""
 
 
 class RayIndex(RaySet):
@@ -142,6 +146,10 @@ class RayIndex(RaySet):
     def __repr__(self) -> str:
         """Say what a person wants to know, without a pass over the rays."""
         return f"<RayIndex of {len(self):,} rays in {self.flux_unit} from {self.provenance.source}>"
+
+    def _compared(self) -> Repeats:
+        # Copies of a ray stand together, so that a few short stretches tell of them.
+        return Repeats.of(self, STRETCH)
 
     @property
     def tables(self) -> IndexTables:
