@@ -96,6 +96,21 @@ def test_a_set_beside_another_source_keeps_its_errors() -> None:
     assert both.effective_rays == pytest.approx(1 / (0.7**2 / kish + 0.3**2 / 300_000))
 
 
+def test_a_set_that_repeats_its_rays_has_the_errors_of_its_distinct_rays() -> None:
+    """2000 rays that a set holds twice are 2000 rays. Where each has a colour they are told, not joined."""
+    lamp = lopsided(2000, 7)
+    twice = et.RaySet.merge([lamp, lamp])
+    result = et.trace(et.Scene(sources=[{"name": "led", "kind": "rays", "rays": twice}], detectors=[GRID]), 4000)
+    values, error = sum_and_error(lamp, twice.total_flux)
+    np.testing.assert_allclose(result.illuminance["grid"].values, values, rtol=1e-9)
+    np.testing.assert_allclose(result.illuminance["grid"].standard_error, error, rtol=1e-9)
+    told = "led: 2,000 of 4,000 rays repeat another one, with its place and direction: each counts once"
+    assert sum(note.startswith(told) for note in result.notes) == 1
+    coloured = et.RaySet(twice.position, twice.direction, twice.flux, wavelength=np.repeat([450.0, 600.0], 2000))
+    result = et.trace(et.Scene(sources=[{"name": "led", "kind": "rays", "rays": coloured}], detectors=[GRID]), 4000)
+    assert any("are up to 1.41 times too small; give each ray once" in note for note in result.notes)
+
+
 @pytest.mark.slow
 def test_until_is_not_reached_by_copies() -> None:
     scene = et.Scene(

@@ -27,7 +27,7 @@ def look_through_cone(
     progress: Progress | None = None,
 ) -> list[LuminanceMap]:
     """The maps of rays that head for the observers; see `luminance_map`."""
-    distinct = DistinctRays.of(rays, in_order=isinstance(rays, RayIndex))
+    distinct = DistinctRays.of(rays, join=not isinstance(rays, RayIndex))
     look = partial(cone_estimates, distinct.rays, threads=threads, progress=progress, excess=distinct.excess)
     if how.observer_radius is not None:
         radius = float(how.observer_radius)

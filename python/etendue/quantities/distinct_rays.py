@@ -44,15 +44,15 @@ class DistinctRays(NamedTuple):
     unusable: int = 0
 
     @classmethod
-    def of(cls, rays: RayStream, *, in_order: bool = False) -> DistinctRays:
+    def of(cls, rays: RayStream, *, join: bool = True) -> DistinctRays:
         """Copies of a ray as one ray that has their flux; up to `MOST_JOINED` rays, which are held in memory then.
 
         Parameters
         ----------
         rays : RayStream
             Without positions, nothing is joined: different rays of a far-field set may share a direction.
-        in_order : bool
-            Whether the rays stand in an order that is needed, as in an index: they are not joined, but told.
+        join : bool
+            False where their order or their further columns are needed, as in an index: they are told, and not joined.
 
         Examples
         --------
@@ -61,7 +61,7 @@ class DistinctRays(NamedTuple):
         >>> twice = DistinctRays.of(et.RaySet.merge([once, once]))
         >>> len(twice.rays), twice.excess, twice.told
         (300, 1.0, '300 of 600 rays repeat another one, with its place and direction')
-        >>> round(DistinctRays.of(et.RaySet.merge([once, once]), in_order=True).excess, 9)
+        >>> round(DistinctRays.of(et.RaySet.merge([once, once]), join=False).excess, 9)
         2.0
         """
         if not (isinstance(rays, RayRecords) and rays.has_position):
@@ -69,7 +69,7 @@ class DistinctRays(NamedTuple):
         found = rays.repeats()
         if found.told is None:
             return cls(rays)
-        if in_order or len(rays) > MOST_JOINED:
+        if not join or len(rays) > MOST_JOINED:
             return cls(rays, found.excess, found.told)
         parts = [(batch.position, batch.direction, batch.flux) for batch in rays.batches()]
         position, direction, flux = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))

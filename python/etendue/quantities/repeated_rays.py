@@ -27,8 +27,8 @@ FEWEST, SHARE = 100, 0.01
 """Repeated rays, and their share, that are worth a word: text of few digits makes some by chance."""
 
 TAKEN = (
-    "light fields, maps by the cone and tables of intensity take copies for one ray, all else takes each for a ray of its "
-    "own, with errors that are too small; give each ray once, with the sum of the flux"
+    "light fields, maps by the cone, tables of intensity and traces of rays without colours take copies for one ray, all "
+    "else takes each for a ray of its own, with errors that are too small; give each ray once, with the sum of the flux"
 )
 """What becomes of copies."""
 

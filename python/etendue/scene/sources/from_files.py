@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
@@ -14,6 +16,7 @@ from etendue.description.values import Positive
 from etendue.errors import ArgumentError
 from etendue.formats.rays import read_rays
 from etendue.lightfield.light_field import LightField
+from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
@@ -66,15 +69,18 @@ class Rays(Source):
         factor = 1.0 if self.flux is None else self.flux / total
         if not rays.has_position:
             raise ArgumentError("the rays have directions only; use their intensity as a point source")
+        # Copies of a ray are not independent; those that may differ in colour cannot be joined.
+        distinct = DistinctRays.of(rays, join=self.states_colours or not _have_colours(rays))
         record = {
             "kind": "rays",
-            "rays": rays.coloured_source(),
+            "rays": distinct.rays.coloured_source(),
             "coloured": not self.states_colours,
-            "scale": rays.flux_scale * factor,
+            "scale": distinct.rays.flux_scale * factor,
             "flux": total * factor,
         }
         unit = self.flux_unit if self.flux_unit is not None else rays.flux_unit
-        return (self._coloured(record, rays, unit),)
+        emitter = self._coloured(record, rays, unit)
+        return (dataclasses.replace(emitter, notes=(*emitter.notes, *_told_of_copies(distinct))),)
 
     def ray_stream(self, files: Files) -> RayStream:
         """The rays, in the unit that is asked for if their spectrum is known.
@@ -95,7 +101,7 @@ class Rays(Source):
 
     def _coloured(self, record: Record, rays: RayStream, unit: FluxUnit) -> Emitter:
         """With what the rays know of their colours, unless the user states these."""
-        by_ray = isinstance(rays, RaySet) and rays.colour_column is not None
+        by_ray = _have_colours(rays)
         if self.states_colours:
             stated = "wavelength" if self.wavelength is not None else "spectrum"
             told = f"the rays' own colours are not used, because {stated!r} is stated for all of them"
@@ -113,6 +119,18 @@ class Rays(Source):
                 f"file; they take {others}"
             )
         return Emitter(record, unit, colours.lines, notes=tuple(notes), range=colours.range)
+
+
+def _have_colours(rays: RayStream) -> bool:
+    """Whether each ray has a colour of its own."""
+    return isinstance(rays, RaySet) and rays.colour_column is not None
+
+
+def _told_of_copies(distinct: DistinctRays) -> tuple[str, ...]:
+    if distinct.excess > 1.0:
+        small = f"{math.sqrt(distinct.excess):.3g} times too small"
+        return (f"{distinct.told}: errors take each for a ray of its own, and are up to {small}; give each ray once",)
+    return distinct.notes
 
 
 class Field(Source):
