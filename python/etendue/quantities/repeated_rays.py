@@ -120,8 +120,8 @@ class Repeats(NamedTuple):
 
     @property
     def told(self) -> str | None:
-        """What is to be said of them; None if they are few."""
-        if self.repeated < FEWEST or self.repeated < SHARE * self.rays:
+        """What is to be said of them; None if they are few, or if few are distinct: pencils, light of no width."""
+        if self.repeated < FEWEST or self.repeated < SHARE * self.rays or self.rays - self.repeated < FEWEST:
             return None
         return f"{self.repeated / self.rays:.2%} of the rays repeat another one, with its place and direction"
 
