@@ -178,6 +178,41 @@ def test_nodes_around_the_axis_leave_little_bias(order: int, strength: float, ra
     assert ratio(max(number for number in NUMBERS if number < chosen)) > 0.15
 
 
+def test_nodes_at_the_end_of_the_light_may_be_dark() -> None:
+    """Lambertian light ends at 90°: the mean around that node holds light of one side alone, and its error reaches to 0.
+
+    Errors of steps that are asked for are those of the means.
+    """
+    far = et.intensity_distribution(rays_of((beam(5000, exponent=1.0, c=0.0, gamma=0.0, seed=5), np.pi)), 1)
+    (end,) = np.flatnonzero(np.isclose(far.gamma, 90.0))
+    assert far.values[0, end] > 0.0
+    assert far.standard_error[0, end] == pytest.approx(far.values[0, end], rel=1e-9)
+    asked = et.intensity_distribution(rays_of((beam(5000, exponent=1.0, c=0.0, gamma=0.0, seed=5), np.pi)), 1, 7.5)
+    assert (asked.standard_error[asked.values > 0.0] < asked.values[asked.values > 0.0]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [500, 5000])
+def test_errors_about_a_dark_pole_hold_what_its_steps_blur(n: int) -> None:
+    """I ∝ sin²γ cos γ: the pole and the rows beside it are means of brighter light around, over 16 seeds."""
+    poles, beside = [], []
+    for seed in range(16):
+        rng = np.random.default_rng(770_000 + seed)
+        c, gamma = rng.uniform(0, 360, n), np.degrees(np.arcsin(rng.random(n) ** 0.25))
+        far = et.intensity_distribution(rays_of((direction(c=c, gamma=gamma), 1.0)), 1)
+        z = (far.values - batwing(far.c[:, None], far.gamma))[0] / far.standard_error[0]
+        poles.append(z[0])
+        beside.append(z[1 : int(np.searchsorted(far.gamma, 15.0))])
+    lit = np.isfinite(poles)
+    assert_drawn_with(share=(0.9, 0.9999), hits=float((np.abs(poles)[lit] < 2.0).sum()), rays=float(lit.sum()))
+    found = [z[np.isfinite(z)] for z in beside]
+    assert_drawn_with(
+        share=(0.8, 0.999),
+        hits=effective(found) * float((np.abs(np.concatenate(found)) < 2.0).mean()),
+        rays=effective(found),
+    )
+
+
 @pytest.mark.slow
 def test_the_largest_of_values_that_are_alike_is_not_the_peak() -> None:
     """Even light in all directions: the largest of hundreds of nodes is too large, in every set; the peak is not."""
