@@ -207,6 +207,17 @@ def test_copies_of_a_ray_are_one_ray() -> None:
     assert not any("repeat" in note for note in far.notes)
 
 
+@pytest.mark.parametrize("power", [-700, -500, 500, 700])
+def test_flux_whose_squares_are_no_numbers_has_its_errors(power: int) -> None:
+    """Over a power of two every number is the same, bit by bit, also where squares vanish or are infinite."""
+    lamp = leaning_lobe(4000, 6.0, direction(20.0, 35.0), 5)
+    weights = np.random.default_rng(1).gamma(2.0, 0.5, 4000)
+    expected, found = (intensity_distribution(rays_of(lamp, weights * scale)) for scale in (1.0, 2.0**power))
+    assert np.array_equal(found.values, expected.values * 2.0**power)
+    assert np.array_equal(found.standard_error, expected.standard_error * 2.0**power, equal_nan=True)
+    assert found.flux_error == expected.flux_error * 2.0**power > 0.0
+
+
 def test_no_flux_at_all() -> None:
     led = intensity_distribution(rays_of(direction([0.0, 5.0], [1.0, 90.0]), np.zeros(2)), 4, 45)
     assert (led.flux, led.maximum, led.symmetry()) == (0.0, 0.0, "rotational")

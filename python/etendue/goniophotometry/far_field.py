@@ -7,7 +7,7 @@ import numpy as np
 from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.node_choice import Choice, choose_nodes
-from etendue.quantities.ray_stream import Progress, RayStream
+from etendue.quantities.ray_stream import Progress, RayStream, flux_power
 
 SAMPLE = 1 << 18
 """Rays that nodes are chosen from, at least if there are so many: every third of three times as many …"""
@@ -64,11 +64,11 @@ def intensity_distribution(
     (True, 'cd', 1.0)
     """
     distinct = DistinctRays.of(rays)
-    nodes, told = _nodes(distinct.rays, c_planes, gamma_step)
+    (nodes, told), power = _nodes(distinct.rays, c_planes, gamma_step)
     core = nodes.core()
     sums, squares, count = np.zeros(len(nodes)), np.zeros(len(nodes)), np.zeros(len(nodes), dtype=np.uint64)
     for batch in distinct.rays.batches():
-        core.add(batch.direction, batch.flux, sums, squares, count)
+        core.add(batch.direction, batch.flux / power, sums, squares, count)
         if progress is not None:
             progress(batch.start + batch.usable.size)
     error = np.where(count > 0, np.sqrt(squares * distinct.excess), np.nan)
@@ -79,11 +79,16 @@ def intensity_distribution(
     asked = c_planes is not None and gamma_step is not None
     step = "far-field intensity, " + ("steps as asked" if asked else "steps chosen from the rays")
     result = nodes.intensity(sums, error, rays.flux_unit, rays.provenance.then(step))
-    return result.replace(notes=(*notes, *_notes(result), *rays.notes))
+    return result.replace(
+        values=result.values * power,
+        standard_error=result.standard_error * power,
+        flux_error=result.flux_error * power,
+        notes=(*notes, *_notes(result), *rays.notes),
+    )
 
 
-def _nodes(rays: RayStream, c_planes: int | None, gamma_step: float | None) -> Choice:
-    """Nodes chosen from evenly spread rays."""
+def _nodes(rays: RayStream, c_planes: int | None, gamma_step: float | None) -> tuple[Choice, float]:
+    """Nodes chosen from evenly spread rays, and the power of two that their flux is summed over."""
     every = max(2 if len(rays) > FEW else 1, len(rays) // SAMPLE)
     parts = [
         (batch.direction[-batch.start % every :: every], batch.flux[-batch.start % every :: every])
@@ -91,7 +96,7 @@ def _nodes(rays: RayStream, c_planes: int | None, gamma_step: float | None) -> C
     ]
     direction = np.concatenate([np.zeros((0, 3)), *(part[0] for part in parts)])
     flux = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
-    return choose_nodes(direction, flux, len(rays), c_planes, gamma_step)
+    return choose_nodes(direction, flux, len(rays), c_planes, gamma_step), flux_power(flux)
 
 
 def _notes(result: Intensity) -> list[str]:

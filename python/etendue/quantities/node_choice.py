@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue.quantities.angle_table import gaps_of, hat_integrals
 from etendue.quantities.intensity_nodes import Nodes, check_steps, planes_of
+from etendue.quantities.ray_stream import flux_power
 from etendue.quantities.smooth_light import Harmonics, nodes_around, parts_of
 
 Array = npt.NDArray[np.float64]
@@ -155,6 +156,7 @@ class _Sample(NamedTuple):
     def of(cls, direction: Array, flux: Array) -> _Sample:
         lit = flux > 0.0
         direction, flux = np.ascontiguousarray(direction[lit], dtype=np.float64), np.array(flux[lit], dtype=np.float64)
+        flux /= flux_power(flux)
         x, y, z = direction.T
         gamma = np.degrees(np.arctan2(np.hypot(x, y), z))
         return cls(direction, flux, gamma, np.mod(np.degrees(np.arctan2(y, x)), TURN))

@@ -47,6 +47,18 @@ def squares_hold(flux_squared: float) -> bool:
     return float(np.finfo(np.float64).tiny) <= flux_squared < math.inf
 
 
+def flux_power(flux: FloatArray) -> float:
+    """The power of two at the largest flux; 1 without any: over it, squares are numbers, and no bit of theirs is another.
+
+    Examples
+    --------
+    >>> flux_power(np.array([0.3, 3.0])), flux_power(np.zeros(2)), flux_power(np.array([1e-200])) ** 2
+    (4.0, 1.0, 0.0)
+    """
+    largest = float(flux.max(initial=0.0))
+    return math.ldexp(1.0, min(math.frexp(largest)[1], 1023)) if largest > 0.0 else 1.0
+
+
 @dataclasses.dataclass(frozen=True)
 class Tally:
     """The flux account of a pass over rays, before any scaling.
