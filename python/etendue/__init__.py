@@ -94,11 +94,11 @@ PUBLIC = {
     "etendue.quantities.report": ("ChangedFileWarning", "RayFileWarning"),
     "etendue.quantities.spectrum": ("Spectrum",),
     "etendue.quantities.zonal_flux": ("zonal_flux",),
-    "etendue.scatter.bsdf": ("Bsdf",),
     "etendue.scatter.files": ("read_bsdf", "write_bsdf"),
     "etendue.scatter.scans.files": ("read_scans",),
     "etendue.scatter.scans.scans": ("Scans",),
-    "etendue.scatter.table": ("BsdfTable",),
+    # `Bsdf.from_scans` makes tables: where those are made, `Bsdf` knows of them.
+    "etendue.scatter.table": ("Bsdf", "BsdfTable"),
     "etendue.scene": ("Scene",),
     "etendue.scene.scatter_events": ("ScatterEvents",),
     "etendue.sources.ring_source": ("RingSource",),

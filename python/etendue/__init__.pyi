@@ -72,11 +72,10 @@ from etendue.quantities.report import ChangedFileWarning, RayFileWarning
 from etendue.quantities.spectrum import Spectrum
 from etendue.quantities.zonal_flux import zonal_flux
 from etendue.scatter import models as bsdf
-from etendue.scatter.bsdf import Bsdf
 from etendue.scatter.files import read_bsdf, write_bsdf
 from etendue.scatter.scans.files import read_scans
 from etendue.scatter.scans.scans import Scans
-from etendue.scatter.table import BsdfTable
+from etendue.scatter.table import Bsdf, BsdfTable
 from etendue.scene import Scene
 from etendue.scene.scatter_events import ScatterEvents
 from etendue.sources.ring_source import RingSource

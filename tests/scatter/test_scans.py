@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import etendue as et
@@ -241,6 +243,17 @@ def test_impossible_scans_are_refused() -> None:
         tabulated(Scans(np.array(i), np.array(s), np.ones(1)))
     with pytest.raises(UnknownNameError, match="smooth"):
         tabulated(Scans(np.array(i), np.array(s), np.ones(1)), "smoth")
+
+
+def test_a_table_is_the_first_thing_that_is_asked_for() -> None:
+    """In an interpreter that has made no other table."""
+    code = """
+import etendue as et
+scattered = [[0.5, 0, 0.75**0.5], [-0.5, 0, 0.75**0.5], [0, 0.5, 0.75**0.5]]
+print(et.Bsdf.from_scans(et.Scans([[0, 0, 1]] * 3, scattered, [0.2] * 3)).incidences)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "(0.0,)"
 
 
 # --- files -----------------------------------------------------------------------------------------------------------

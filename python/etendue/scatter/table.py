@@ -11,7 +11,7 @@ from etendue.errors import ArgumentError
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
 from etendue.quantities.report import Complaint
 from etendue.scatter.balance import MOST, balanced
-from etendue.scatter.bsdf import Bsdf
+from etendue.scatter.bsdf import Bsdf as Bsdf  # noqa: PLC0414 - handed on to `etendue`
 from etendue.scatter.building import built
 from etendue.scatter.members import members_of
 from etendue.scatter.scans.interpolations import tabulated
