@@ -178,6 +178,55 @@ def test_rgl_warp_against_a_quadrature(tmp_path: Path) -> None:
         assert float(one.at(s)) == pytest.approx(float(expected), rel=0.01)
 
 
+@pytest.mark.parametrize("phis", [(-180.0, -120.0, -60.0, 0.0), (-180.0, -150.0, -120.0, -90.0)])
+def test_rgl_samples_measured_over_a_part_of_the_turn(tmp_path: Path, phis: tuple[float, ...]) -> None:
+    """f by Mitsuba's rule: light from y > 0 is turned by half a turn; of a quarter x and y each become negative.
+
+    The density of visible normals is even, so that f cosθ is linear in the coordinates of the half vector.
+    """
+    single = np.float32
+    u, v = np.linspace(0, 1, 4), np.linspace(0, 1, 4)[:, None]
+    levels = 0.1 + 0.02 * np.cos(np.radians(2.0 * np.array(phis)))
+    values = levels[:, None, None, None, None] + np.broadcast_to(0.03 * u + 0.04 * v, (4, 2, 1, 4, 4))
+    path = tmp_path / "x.bsdf"
+    even = np.ones((4, 2, 2, 2), single)
+    path.write_bytes(
+        tensors(
+            {
+                "phi_i": np.radians(phis).astype(single),
+                "theta_i": np.radians([0.0, 40.0]).astype(single),
+                "ndf": even[0, 0],
+                "sigma": even[0, 0],
+                "vndf": even,
+                "spectra": values.astype(single),
+                "wavelengths": np.array([555.0], single),
+                "jacobian": np.zeros(1, np.uint8),
+            }
+        )
+    )
+    data = read_bsdf_data(path)
+    assert not data.isotropic
+    quarter = phis[-1] < 0.0
+    oblique = {round(one.phi) % 360: one for one in data.slices if one.theta > 1.0}
+    images = {round(-phi if quarter else phi + 180.0) % 360 for phi in phis} | {round(phi) % 360 for phi in phis}
+    images |= {round(180.0 + sign * phi) % 360 for phi in phis for sign in ((1.0, -1.0) if quarter else ())}
+    assert set(oblique) == images
+    for phi, one in oblique.items():
+        s = direction(25.0, phi + 100.0)
+        i = one.incident
+        if quarter:
+            signs = np.array([-np.sign(i[0]) or 1.0, -np.sign(i[1]) or 1.0, 1.0])
+            # On an axis either sign stands for the same: that of the measured azimuths is taken.
+            signs = np.where(np.abs(i) < 1e-5, 1.0, signs)
+        else:
+            signs = np.array([-1.0, -1.0, 1.0]) if i[1] > 1e-5 else np.ones(3)
+        i, s = signs * i, signs * s
+        half = (i + s) / np.linalg.norm(i + s)
+        x, y = math.sqrt(math.acos(half[2]) * 2.0 / math.pi), (math.atan2(half[1], half[0]) / math.pi + 1.0) / 2.0
+        level = 0.1 + 0.02 * math.cos(2.0 * math.atan2(i[1], i[0]))
+        assert float(one.at(signs * s)) == pytest.approx((level + 0.03 * x + 0.04 * y) / s[2], rel=5e-3)
+
+
 def test_rgl_mistakes(tmp_path: Path) -> None:
     path = tmp_path / "x.bsdf"
     whole = rgl(vndf=np.ones((4, 4)), values=np.full((4, 4), 0.1))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,9 @@ STEEPEST = 89.0
 ISOTROPIC = 2
 """Azimuths of incidence up to which a sample is isotropic, as its authors have it."""
 
+SAME = 1e-3
+"""Azimuths that differ by less are one [°]."""
+
 
 def recognise(head: bytes) -> bool:
     """By the first bytes."""
@@ -42,7 +46,8 @@ def read(path: Path) -> BsdfData:
     """Read the BRDF at the incidences that were measured, as the authors of the format interpolate it.
 
     f cosθ of the scattered direction is tabled; it is divided by the cosine. Of spectra the mean weighted by V(λ) is taken,
-    under light of equal energy, of RGB the luminance.
+    under light of equal energy, of RGB the luminance. A sample that was measured over a part of the turn is taken to be its
+    own image in the rest, as by its authors: see `_images`.
     """
     fields = _fields(path)
     theta_i, phi_i = (np.degrees(_array(path, fields, name, 1).astype(np.float64)) for name in ("theta_i", "phi_i"))
@@ -59,7 +64,8 @@ def read(path: Path) -> BsdfData:
         if theta > STEEPEST or (isotropic and j):
             continue
         table = _Table(values[j, i], _Warp(vndf[j, i]), ndf, sigma, jacobian=jacobian, isotropic=isotropic)
-        slices += sampled(table.f, [(float(theta), float(phi))])
+        for azimuth, signs in [(float(phi), (1.0, 1.0))] if isotropic else _images(phi_i, j):
+            slices += sampled(table.image(*signs), [(float(theta), azimuth)])
     if not slices:
         raise FormatError(path, "theta_i", "no incidence below 89°", ADVICE)
     text = bytes(fields["description"].ravel().astype("u1").tolist()) if "description" in fields else b""
@@ -72,6 +78,24 @@ def read(path: Path) -> BsdfData:
         name=name or path.stem,
         complaints=(Complaint("note", "values", said), Complaint("note", "grid", note)),
     )
+
+
+def _images(phi_i: Array, j: int) -> list[tuple[float, tuple[float, float]]]:
+    """Azimuths of incidence [°] that a measured one stands for, itself first, by the signs of x and y that lead there.
+
+    Over a quarter of a turn the sample is its own mirror image at x and at y, over a half its own after half a turn.
+    """
+    span = float(phi_i[-1] - phi_i[0])
+    parts = round(360.0 / span) if span > 0.0 else 1
+    signs = {1: [], 4: [(1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]}.get(parts, [(-1.0, -1.0)])
+    found, taken = [(float(phi_i[j]), (1.0, 1.0))], phi_i.tolist()
+    c, s = np.cos(np.radians(phi_i[j])), np.sin(np.radians(phi_i[j]))
+    for x, y in signs:
+        azimuth = float(np.degrees(np.arctan2(y * s, x * c)))
+        if all(abs((azimuth - other + 180.0) % 360.0 - 180.0) > SAME for other in taken):
+            found.append((azimuth, (x, y)))
+            taken.append(azimuth)
+    return found
 
 
 def _fields(path: Path) -> dict[str, npt.NDArray[np.generic]]:
@@ -193,6 +217,11 @@ class _Table:
     _: dataclasses.KW_ONLY
     jacobian: bool
     isotropic: bool
+
+    def image(self, x: float, y: float) -> Callable[[Array, Array], Array]:
+        """`f` of the sample mirrored by the signs of x and y."""
+        signs = np.array([x, y, 1.0])
+        return lambda incident, scattered: self.f(signs * incident, signs * scattered)
 
     def f(self, incident: Array, scattered: Array) -> Array:
         half = incident + scattered
