@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +41,22 @@ def test_a_table_made_by_hand(tmp_path: Path) -> None:
     assert through.transmitted
     assert through.at(direction(40.0, [0.0, 180.0], behind=True)).tolist() == pytest.approx([0.15, 0.05])
     assert any("1 directions were not measured" in complaint.found for complaint in data.complaints)
+
+
+def test_a_scan_in_the_plane_of_incidence(tmp_path: Path) -> None:
+    """exp(−30 |β − β₀|), measured in the plane: the same beside it, and no ring about the normal."""
+    beta0 = math.sin(math.radians(45.0))
+    lines = ["type bsdf_data", "format angles=deg bsdf=value scale=1", "45 0"]
+    for theta, phi in itertools.product(range(0, 90, 1), (0, 180)):
+        off = abs((1 if phi == 0 else -1) * math.sin(math.radians(theta)) - beta0)
+        lines.append(f"{theta} {phi} {math.exp(-30.0 * off):.9g}")
+    path = tmp_path / "plane.dat"
+    path.write_text("\n".join(lines) + "\n")
+    data = read_bsdf_data(path)
+    (one,) = data.slices
+    # ∫ exp(−30 r) 2πr dr, but for what little lies beyond the horizon.
+    assert one.integral() == pytest.approx(2.0 * math.pi / 900.0, rel=0.02)
+    assert any("in the plane of incidence alone" in complaint.found for complaint in data.complaints)
 
 
 def test_black_anodising_as_zemax_has_it(samples: Path) -> None:

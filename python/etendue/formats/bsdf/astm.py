@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
-from etendue.formats.bsdf.points import slices_of
+from etendue.formats.bsdf.points import RIM, slices_of
 from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number, whole
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
@@ -21,6 +21,9 @@ from etendue.quantities.report import Complaint
 Array = npt.NDArray[np.float64]
 
 ANGLES = ("theta_i", "phi_i", "theta_s", "phi_s")
+
+ROUNDED = 1e-3
+"""By which a whole turn, or half of one, may be more than that after rounding [rad]."""
 
 THETA = np.concatenate([np.arange(0.0, 80.0, 2.0), np.arange(80.0, 90.0, 1.0)])
 PHI_STEP, TURN = 5.0, 45.0
@@ -46,7 +49,9 @@ def read(path: Path) -> BsdfData:
     channels, complaints = _channels(path, names, begin)
     angles = np.degrees(rows[:, :4])
     slices = [
-        one for column, wavelength in channels for one in slices_of(angles, rows[:, column], wavelength=wavelength)
+        one
+        for column, wavelength in channels
+        for one in slices_of(angles, rows[:, column], complaints, wavelength=wavelength)
     ]
     if (rows[:, [column for column, _ in channels]] < 0.0).any():
         complaints.append(Complaint("warning", "values", "values below 0 became 0"))
@@ -101,16 +106,18 @@ def _rows(path: Path, lines: list[str], begin: int, columns: int, facts: dict[st
         raise FormatError(path, f"line {len(lines)}", found, ADVICE)
     angles = np.array(rows)
     # Angles below 0 are those a turn later; θ may run on either side of the normal.
-    if (np.abs(angles[:, :4]) > 2.0 * np.pi + 1e-9).any():
+    if (np.abs(angles[:, :4]) > 2.0 * np.pi + ROUNDED).any():
         raise FormatError(path, "angles", "angles beyond a turn", "They are in radians in this format.")
+    angles[:, :4] = np.clip(angles[:, :4], -2.0 * np.pi, 2.0 * np.pi)
     for theta, phi in ((0, 1), (2, 3)):
         over = angles[:, theta] < 0.0
         angles[over, theta] *= -1.0
         angles[over, phi] += np.pi
         angles[:, phi] %= 2.0 * np.pi
-    flat = np.abs(angles[:, 0] - 0.5 * np.pi) < 1e-6
-    if flat.any() or (angles[:, [0, 2]] > np.pi + 1e-9).any():
+    flat = np.abs(angles[:, 0] - 0.5 * np.pi) < np.radians(RIM)
+    if flat.any() or (angles[:, [0, 2]] > np.pi + ROUNDED).any():
         raise FormatError(path, "angles", "light along the surface, or θ beyond π", "Leave such points out.")
+    angles[:, [0, 2]] = np.minimum(angles[:, [0, 2]], np.pi)
     return angles
 
 

@@ -32,9 +32,6 @@ THETA = np.concatenate([np.arange(0.0, 80.0, 5.0), np.arange(80.0, 90.0, 3.0)])
 PHI_STEP, TURN = 10.0, 45.0
 """Directions of tables that are made to be written [°]."""
 
-DIRECTIONS = 4
-"""Digits after the point to which angles and wavelengths are the same."""
-
 
 def recognise(head: bytes) -> bool:
     """JSON whose metadata name the project's schema, or a type "BRDF" and its variables."""
@@ -72,11 +69,8 @@ def read(path: Path) -> BsdfData:
     slices: list[BsdfSlice] = []
     for wavelength in [None] if wavelengths is None else np.unique(wavelengths).tolist():
         own = np.ones(values.size, bool) if wavelengths is None else wavelengths == wavelength
-        at, f, own_errors, several = _merged(angles[own], values[own], None if errors is None else errors[own])
-        if several and not complaints:
-            text_of = "directions that stand there several times, as for two polarisations, became their mean"
-            complaints.append(Complaint("note", "data", text_of))
-        slices += slices_of(at, f, wavelength=wavelength, errors=own_errors)
+        known = None if errors is None else errors[own]
+        slices += slices_of(angles[own], values[own], complaints, wavelength=wavelength, errors=known)
     sample = metadata.get("sample")
     sample = sample if isinstance(sample, dict) else {}
     turns = {round(one.phi, 3) for one in slices if one.theta > 1e-3}
@@ -127,16 +121,6 @@ def _uncertainty(path: Path, data: dict[str, Any], values: Array) -> Array | Non
     if errors.min() < 0.0:
         raise FormatError(path, "data", "an uncertainty below 0", ADVICE)
     return errors * values if unit == "%" else errors
-
-
-def _merged(angles: Array, values: Array, errors: Array | None) -> tuple[Array, Array, Array | None, bool]:
-    """Each direction once, with the mean of its values."""
-    _, first, of = np.unique(np.round(angles, DIRECTIONS), axis=0, return_index=True, return_inverse=True)
-    count = np.bincount(of)
-    mean = np.bincount(of, values) / count
-    # Uncertainties of an instrument are mostly common to all values: they do not fall with the number of these.
-    error = None if errors is None else np.bincount(of, errors) / count
-    return angles[first], mean, error, bool(count.max() > 1)
 
 
 def _facts(metadata: dict[str, Any]) -> dict[str, str]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
-from etendue.formats.bsdf.points import on_grid
+from etendue.formats.bsdf.points import doubts, slice_of
 from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
@@ -50,8 +50,8 @@ def read(path: Path) -> BsdfData:
         found = f"{sizes[-1]} directions of the last incidence, {sizes[0]} of all others"
         raise FormatError(path, f"line {len(lines)}", found, ADVICE)
     mirrored = all(0.0 <= phi - turn <= 180.0 for _, turn, points in blocks for _, phi, _ in points)
-    slices = [one for block in blocks for one in _slices(path, block, scale, mirrored=mirrored)]
     complaints = [Complaint("note", "values", f"{gaps} directions were not measured")] if gaps else []
+    slices = [one for block in blocks for one in _slices(path, block, scale, complaints, mirrored=mirrored)]
     return BsdfData(
         tuple(slices),
         isotropic=len({round(turn, 6) for _, turn, _ in blocks}) == 1,
@@ -113,7 +113,7 @@ def _blocks(path: Path, lines: list[str]) -> tuple[list[Block], int]:
     return blocks, gaps
 
 
-def _slices(path: Path, block: Block, scale: float, *, mirrored: bool) -> list[BsdfSlice]:
+def _slices(path: Path, block: Block, scale: float, complaints: list[Complaint], *, mirrored: bool) -> list[BsdfSlice]:
     """Reflected and transmitted light of an incidence, on the grid that its directions make."""
     theta, turn, points = block
     rows = np.array(points)
@@ -123,18 +123,20 @@ def _slices(path: Path, block: Block, scale: float, *, mirrored: bool) -> list[B
         if not len(own):
             continue
         polar = np.where(transmitted, 180.0 - own[:, 0], own[:, 0])
-        made = on_grid(polar, own[:, 1], np.maximum(own[:, 2], 0.0) * scale)
-        if made is None:
+        incident = light_from(theta, (180.0 + turn) % 360.0)
+        one = slice_of(incident, polar, own[:, 1], np.maximum(own[:, 2], 0.0) * scale, transmitted)
+        if one is None or one.grid is None:
             raise FormatError(
                 path, f"{theta:g}° of incidence", "directions that make no grid", "Export a grid of θ and φ."
             )
-        radial, azimuth, values = made
-        if mirrored:
+        if mirrored and one.grid.frame == "normal":
+            azimuth = one.grid.azimuth
             inner = (azimuth - turn > 0.0) & (azimuth - turn < 180.0)
             azimuth = np.concatenate([azimuth, 2.0 * turn + 360.0 - azimuth[inner][::-1]])
-            values = np.concatenate([values, values[inner][::-1]])
-        grid = PolarGrid("normal", radial, azimuth)
-        found.append(BsdfSlice(light_from(theta, (180.0 + turn) % 360.0), values, transmitted, grid=grid))
+            values = np.concatenate([one.values, one.values[inner][::-1]])
+            one = BsdfSlice(incident, values, transmitted, grid=PolarGrid("normal", one.grid.radial, azimuth))
+        complaints += doubts(one)
+        found.append(one)
     return found
 
 

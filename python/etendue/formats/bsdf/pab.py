@@ -49,7 +49,7 @@ def read(path: Path) -> BsdfData:
     quantity = keys.get("format", "").split()[2].upper()
     theta, phi = _incidence(path, keys)
     table = np.array(rows)
-    complaints = []
+    complaints: list[Complaint] = []
     colours = table.shape[1] - 2
     if colours not in (1, 3):
         raise FormatError(path, "first row", f"{colours} values in a row", "étendue reads one value, or X, Y and Z.")
@@ -62,7 +62,7 @@ def read(path: Path) -> BsdfData:
         complaints.append(Complaint("warning", "values", f"{(f < 0.0).sum()} values below 0 became 0"))
     angles = np.column_stack([np.full((len(table), 2), (theta, phi)), table[:, :2]])
     return BsdfData(
-        tuple(slices_of(angles, f)),
+        tuple(slices_of(angles, f, complaints)),
         isotropic=True,
         mirrored=False,
         name=keys.get("sample_name", "") or path.stem,
