@@ -54,6 +54,7 @@ def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) ->
     assert Path("pet.png").stat().st_size > 5000
     converted = run("bsdf", "convert", "pet.h5", "pet.txt", "--format", "tracepro")
     assert converted.status == 0, converted.err
+    assert "pet.txt: 2 slices read from pet.h5" in converted.out
     assert Path("pet.txt").read_text().startswith("TracePro Surface Property Data")
     gloss = json.loads(run("bsdf", "gloss", "pet.h5", "--json").out)
     assert set(gloss["gloss"]) == {"20", "60", "85"}
@@ -66,6 +67,7 @@ def test_a_formula_of_another_program_becomes_a_table(run: Run) -> None:
     assert not et.read_bsdf("abg.txt").data.slices
     told = run("bsdf", "convert", "abg.txt", "abg.bsdf")
     assert told.status == 0, told.err
+    assert "abg.bsdf: 1 component read from abg.txt" in told.out
     f = [
         float(et.read_bsdf(path).evaluate(direction(40.0, 0.0), direction(40.0, 180.0)))
         for path in ("abg.txt", "abg.bsdf")

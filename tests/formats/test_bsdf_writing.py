@@ -13,6 +13,7 @@ import pytest
 from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data, write_bsdf_data
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.scatter.models.finish import Finish
 
 Array = npt.NDArray[np.float64]
 
@@ -153,6 +154,10 @@ def test_a_lambertian_surface_is_the_same_everywhere_in_its_file(form: BsdfForma
 def test_a_model_in_a_file_is_as_isotropic_as_it_is(tmp_path: Path, bsdf: et.Bsdf, isotropic: bool) -> None:
     et.write_bsdf(tmp_path / "model.h5", bsdf)
     assert et.read_bsdf(tmp_path / "model.h5").isotropic is isotropic
+    # Files that were written before say of all models that they are isotropic.
+    assert isinstance(bsdf, Finish)
+    et.write_bsdf(tmp_path / "old.h5", et.BsdfTable(BsdfData(components=(bsdf.to_dict(),), isotropic=True)))
+    assert et.read_bsdf(tmp_path / "old.h5").isotropic is isotropic
 
 
 @pytest.mark.parametrize(

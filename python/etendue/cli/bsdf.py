@@ -147,7 +147,9 @@ def convert(
         return
     for line in (*complaints, *(f"note: {note}" for note in notes)):
         complain(line)
-    say(f"{output}: {len(bsdf.data.slices)} slices read from {_named(files)}")
+    held = [(len(bsdf.data.slices), "slice"), (len(bsdf.data.components), "component")]
+    read = " and ".join(f"{n} {what}" + ("s" if n != 1 else "") for n, what in held if n)
+    say(f"{output}: {read} read from {_named(files)}")
 
 
 def gloss(

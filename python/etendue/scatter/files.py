@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from etendue.formats.bsdf.bsdf_format import BsdfFormat, ShareTables
 from etendue.quantities.bsdf_data import LEAN, BsdfData
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf, Side
+from etendue.scatter.members import parts_of, same_when_turned
 from etendue.scatter.models import MODELS
 from etendue.scatter.models.finish import Finish, Record
 from etendue.scatter.models.shares import PARTS, Scattering
@@ -104,23 +105,9 @@ def _joined(parts: Sequence[BsdfData], names: Sequence[str]) -> BsdfData:
     )
 
 
-def _parts(record: Record) -> Iterator[Record]:
-    """What the core takes as one, without the sums that it is part of."""
-    if record["kind"] != "sum":
-        yield record
-        return
-    for _, member in record["members"]:
-        yield from _parts(member)
-
-
-def _isotropic(record: Record) -> bool:
-    """Whether no lobe of a model is wider across the axis than along it, and no surface rougher."""
-    return all(part.get("aspect", 1.0) == 1.0 and part.get("alpha_x") == part.get("alpha_y") for part in _parts(record))
-
-
 def _wavelengths(record: Record) -> set[float]:
     """Between which shares of a model are linear [nm]; none where they are the same at all."""
-    grids = [value for part in _parts(record) for value in part.values() if isinstance(value, dict)]
+    grids = [value for part in parts_of(record) for value in part.values() if isinstance(value, dict)]
     nodes = [np.asarray(grid["wavelength"]) for grid in grids if "wavelength" in grid]
     return {float(node) for one in nodes if one.size > 1 for node in one}
 
@@ -133,7 +120,7 @@ class _Asked:
         self._bsdf = bsdf
         self.name = data.name if data else type(bsdf).__name__
         record = bsdf.record(Files())
-        self.isotropic = _isotropic(record) and (data.isotropic if data else True)
+        self.isotropic = bsdf.isotropic if isinstance(bsdf, BsdfTable) else same_when_turned(record)
         self.both_sides = data.both_sides if data else True
         nodes = sorted(_wavelengths(record))
         kept = np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), MOST_WAVELENGTHS)).round().astype(int))
@@ -221,7 +208,7 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
     if form.fits is None or form.tabulate is None:
         raise ArgumentError(f"{form.title} is read only")
     if isinstance(bsdf, Finish) and form.name == "etendue":
-        isotropic = _isotropic(bsdf.record(Files()))
+        isotropic = same_when_turned(bsdf.record(Files()))
         return BsdfData(components=(bsdf.to_dict(),), isotropic=isotropic, name=type(bsdf).__name__), ()
     if isinstance(bsdf, BsdfTable) and form.fits(bsdf.data):
         return bsdf.data, ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from etendue.description.files import Files
@@ -16,6 +16,27 @@ Rows = list[Record]
 
 Known = list[tuple[BsdfSlice, float]]
 """Slices, with what each scatters of the flux."""
+
+
+def parts_of(record: Record) -> Iterator[Record]:
+    """What the core takes as one, without the sums that it is part of."""
+    if record["kind"] != "sum":
+        yield record
+        return
+    for _, member in record["members"]:
+        yield from parts_of(member)
+
+
+def same_when_turned(record: Record) -> bool:
+    """Whether no lobe of a model is wider across the axis than along it, and no surface rougher."""
+    return all(
+        part.get("aspect", 1.0) == 1.0 and part.get("alpha_x") == part.get("alpha_y") for part in parts_of(record)
+    )
+
+
+def components_of(data: BsdfData) -> list[Record]:
+    """Records of what is described by models."""
+    return [MODELS[part["kind"]](**part).record(Files()) for part in map(dict, data.components)]
 
 
 def members_of(data: BsdfData, shares: Sequence[float]) -> list[Record]:
@@ -36,7 +57,7 @@ def members_of(data: BsdfData, shares: Sequence[float]) -> list[Record]:
     >>> [record["kind"] for record in members_of(BsdfData(components=({"kind": "lambertian", "reflectance": 0.5},)), [])]
     ['scatter']
     """
-    found = [MODELS[part["kind"]](**part).record(Files()) for part in map(dict, data.components)]
+    found = components_of(data)
     known = list(zip(data.slices, shares, strict=True))
     sides = [[pair for pair in known if pair[0].front is front] for front in (True, False)]
     if data.both_sides:

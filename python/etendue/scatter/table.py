@@ -13,7 +13,7 @@ from etendue.quantities.report import Complaint
 from etendue.scatter.balance import MOST, balanced
 from etendue.scatter.bsdf import Bsdf as Bsdf  # noqa: PLC0414 - handed on to `etendue`
 from etendue.scatter.building import built
-from etendue.scatter.members import members_of
+from etendue.scatter.members import components_of, members_of, same_when_turned
 from etendue.scatter.scans.interpolations import tabulated
 from etendue.scatter.scans.scans import Scans
 
@@ -75,7 +75,7 @@ class BsdfTable(Bsdf):
     @property
     def isotropic(self) -> bool:
         """Whether turning the sample about its normal changes nothing."""
-        return self.data.isotropic
+        return self.data.isotropic and all(map(same_when_turned, components_of(self.data)))
 
     @property
     def both_sides(self) -> bool:
