@@ -176,3 +176,8 @@ def test_names_are_no_formulas() -> None:
 def test_light_from_behind_has_no_lobe_to_draw(incidence: float) -> None:
     with pytest.raises(ArgumentError, match=f"incidence is {incidence}; give an angle"):
         et.plot_bsdf(et.bsdf.Lambertian(reflectance=0.5), incidence=incidence)
+
+
+def test_a_mirror_has_no_lobe_to_draw() -> None:
+    _, middle, _ = et.plot_bsdf(et.bsdf.Mirror(reflectance=0.9)).axes
+    assert "Nothing is scattered" in {middle.get_title(where) for where in ("left", "center", "right")}

@@ -17,6 +17,7 @@ from etendue.scatter.appearance import (
     specular_gloss,
     transmission_haze,
 )
+from etendue.scatter.materials import MATERIALS
 from etendue.scatter.models import Coated, Gaussian, Lambertian, Mirror, Mixture, Transmitter
 from etendue.scatter.table import BsdfTable
 
@@ -80,6 +81,8 @@ def test_haze() -> None:
     film = Gaussian(peak=0.8 / (2.0 * math.pi * sigma**2), sigma=sigma, way="transmitted")
     beyond = 100.0 * math.exp(-0.5 * (math.sin(math.radians(2.5)) / sigma) ** 2)
     assert transmission_haze(film) == pytest.approx(beyond, rel=1e-4)
+    # A lobe of half a degree has e^-72 of its light beyond, and no rounding error below 0.
+    assert transmission_haze(MATERIALS["holographic-diffuser-0.5"].finish) == 0.0
     clear = Mixture(parts=[Transmitter(transmittance=0.9), Lambertian(reflectance=0.0, transmittance=0.1)])
     assert transmission_haze(clear) == pytest.approx(10.0 * math.cos(math.radians(2.5)) ** 2, rel=1e-9)
     assert appearance(film).haze == transmission_haze(film)

@@ -185,7 +185,8 @@ def _lobe(axes: Axes, bsdf: Bsdf, theta: float, *, behind: bool) -> None:
         draw_slim_bar(image, "1/sr", axes)
     axes.set(xlabel="β along the plane of incidence", ylabel="β across")
     way = "transmitted" if transmitted else "reflected"
-    style.put_title(axes, f"f {way}, incidence {theta:g}°")
+    scattered_at_all = bsdf.reflects or bsdf.transmits
+    style.put_title(axes, f"f {way}, incidence {theta:g}°" if scattered_at_all else "Nothing is scattered")
 
 
 def _shares(axes: Axes, bsdf: Bsdf, side: Side) -> None:

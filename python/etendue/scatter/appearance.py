@@ -65,6 +65,9 @@ IMAGE_RECEPTORS = {
 }
 """Receptors by their angle from the mirrored direction [°]; of two the mean is taken."""
 
+ROUNDING = 1e-12
+"""Shares that differ by less are the same."""
+
 DRAWS = 12
 """Tables drawn from a table with standard errors, whose spread is the error of its appearance."""
 
@@ -295,7 +298,9 @@ def transmission_haze(bsdf: Bsdf) -> float:
         scattered = direction(theta[:, None], np.arange(0.0, 360.0, 10.0), behind=True)
         f = bsdf.evaluate([0.0, 0.0, 1.0], scattered).mean(axis=1)
         straight += float(np.sum(f * np.cos(np.radians(theta)) * np.sin(np.radians(theta)) * weight)) * 2.0 * np.pi
-    return float(100.0 * (1.0 - straight / total))
+    # Of a lobe within the limit nothing is left but rounding, on either side of 0.
+    beyond = 1.0 - straight / total
+    return 100.0 * beyond if abs(beyond) > ROUNDING else 0.0
 
 
 def appearance(bsdf: Bsdf, seed: int = 1) -> Appearance:
