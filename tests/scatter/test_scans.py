@@ -245,6 +245,25 @@ def test_impossible_scans_are_refused() -> None:
         tabulated(Scans(np.array(i), np.array(s), np.ones(1)), "smoth")
 
 
+def in_plane(*, f: float) -> Scans:
+    to = np.concatenate([direction(np.arange(0.0, 85.0, 5.0), a) for a in (0.0, 180.0)])
+    return Scans(np.tile(direction(30.0, 180.0), (len(to), 1)), to, np.full(len(to), f))
+
+
+def test_what_no_method_can_make_a_table_of_is_told() -> None:
+    """Directions on a line, and a sample that scatters nothing."""
+    with pytest.raises(ArgumentError, match="lie on a line"):
+        tabulated(in_plane(f=0.25), "direction-cosines")
+    for method in ("radial-basis", "smooth"):
+        with pytest.raises(ArgumentError, match="no value is above 0"):
+            tabulated(in_plane(f=0.0), method)
+    for error in (np.nan, -0.1, np.inf):
+        with pytest.raises(ArgumentError, match="standard errors are finite"):
+            Scans([[0, 0, 1]], [[0, 0, 1]], [0.2], standard_error=[error])  # type: ignore[arg-type,list-item] # made arrays
+    with pytest.raises(ArgumentError, match="must be finite"):
+        bsdf_of_flux(1.0, 1.0, solid_angle=math.inf, direction=[0.0, 0.0, 1.0])
+
+
 def test_a_table_is_the_first_thing_that_is_asked_for() -> None:
     """In an interpreter that has made no other table."""
     code = """

@@ -82,7 +82,7 @@ def bsdf_of_flux(
     Raises
     ------
     ArgumentError
-        If the solid angle or an incident flux is not positive, or the detector lies in the surface.
+        If the solid angle or an incident flux is not positive and finite, or the detector lies in the surface.
 
     Examples
     --------
@@ -91,8 +91,8 @@ def bsdf_of_flux(
     """
     cosine = np.abs(np.asarray(direction, np.float64)[..., 2])
     arriving = np.asarray(incident, np.float64)
-    if not solid_angle > 0.0 or not (arriving > 0.0).all():
-        raise ArgumentError("solid angle and incident flux must be more than 0")
+    if not 0.0 < solid_angle < np.inf or not ((arriving > 0.0) & np.isfinite(arriving)).all():
+        raise ArgumentError("solid angle and incident flux must be finite and more than 0")
     if (cosine < 1e-9).any():
         raise ArgumentError("a detector in the plane of the sample measures no BSDF")
     return np.asarray(np.asarray(scattered, np.float64) / (arriving * solid_angle * cosine))

@@ -48,10 +48,20 @@ def direction_cosines(incident: Array, measured: Array, values: Array, wanted: A
 
     Raises
     ------
+    ArgumentError
+        If the directions make no triangle.
     MissingLibraryError
         Without SciPy.
     """
-    inside = require("scipy.interpolate").LinearNDInterpolator(_planar(incident, measured), values, fill_value=0.0)
+    spatial = require("scipy.spatial")
+    try:
+        triangles = spatial.Delaunay(_planar(incident, measured))
+    except spatial.QhullError:
+        found = (
+            "the measured directions lie on a line in U, V, or are too few: there are no triangles to be linear over"
+        )
+        raise ArgumentError(found) from None
+    inside = require("scipy.interpolate").LinearNDInterpolator(triangles, values, fill_value=0.0)
     return np.asarray(inside(_planar(incident, wanted))), None
 
 
@@ -60,15 +70,23 @@ def radial_basis(incident: Array, measured: Array, values: Array, wanted: Array)
 
     Raises
     ------
+    ArgumentError
+        If no value is above 0.
     MissingLibraryError
         Without SciPy.
     """
+    _require_light(values)
     # A direction that was measured several times counts once.
     points, own = np.unique(np.round(_planar(incident, measured), 9), axis=0, return_inverse=True)
     mean = np.bincount(own.ravel(), values) / np.bincount(own.ravel())
     logs = np.log(np.maximum(mean, 1e-3 * values[values > 0.0].min()))
     plate = require("scipy.interpolate").RBFInterpolator(points, logs, kernel="linear")
     return np.asarray(np.exp(np.minimum(plate(_planar(incident, wanted)), np.log(values.max())))), None
+
+
+def _require_light(values: Array) -> None:
+    if not (values > 0.0).any():
+        raise ArgumentError("no value is above 0, and this method takes logarithms")
 
 
 def shepard(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, None]:
@@ -205,6 +223,7 @@ def smooth(incident: Array, measured: Array, values: Array, wanted: Array) -> tu
     largest gap between the scans. The standard error is that by which the others miss a value, averaged in the same way: of
     the shape between the scans, and of the noise of one value, which is more than that of their mean.
     """
+    _require_light(values)
     least = max(1e-3 * float(values[values > 0.0].min()), 1e-300)
     logs = np.log(np.maximum(values, least))
     planes = [harvey_shack.coordinates(incident, one) for one in (measured, wanted)]

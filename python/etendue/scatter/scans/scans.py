@@ -37,7 +37,8 @@ class Scans:
     Raises
     ------
     ArgumentError
-        If shapes do not fit, a direction is no unit vector in front of the sample, a value is not finite or below 0.
+        If shapes do not fit, a direction is no unit vector in front of the sample, a value or a
+        standard error is not finite or below 0.
 
     Examples
     --------
@@ -67,8 +68,11 @@ class Scans:
                 raise ArgumentError(f"{name}[{at}] is {vectors[at].tolist()}, no unit vector in front of the sample")
         if not (np.isfinite(self.values) & (self.values >= 0.0)).all():
             raise ArgumentError("measured values are finite and not below 0")
-        if self.standard_error is not None and self.standard_error.shape != n:
-            raise ArgumentError("standard errors have the shape of the values")
+        if self.standard_error is not None:
+            if self.standard_error.shape != n:
+                raise ArgumentError("standard errors have the shape of the values")
+            if not (np.isfinite(self.standard_error) & (self.standard_error >= 0.0)).all():
+                raise ArgumentError("standard errors are finite and not below 0")
         if self.reflectance is not None and not 0.0 < self.reflectance <= 1.0:
             raise ArgumentError(f"reflectance is {self.reflectance:g}; it must be more than 0 and at most 1")
 
