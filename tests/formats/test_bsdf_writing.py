@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import etendue as et
+import h5py
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -158,6 +159,18 @@ def test_a_model_in_a_file_is_as_isotropic_as_it_is(tmp_path: Path, bsdf: et.Bsd
     assert isinstance(bsdf, Finish)
     et.write_bsdf(tmp_path / "old.h5", et.BsdfTable(BsdfData(components=(bsdf.to_dict(),), isotropic=True)))
     assert et.read_bsdf(tmp_path / "old.h5").isotropic is isotropic
+
+
+@pytest.mark.parametrize("interpolated", [False, True])
+def test_whether_neighbours_err_together_is_kept(tmp_path: Path, interpolated: bool) -> None:
+    grid = PolarGrid("cosines", np.array([0.0, 2.0]), np.array([0.0]))
+    f = np.full(grid.shape, 0.1)
+    one = BsdfSlice(direction(30.0, 180.0), f, grid=grid, standard_error=0.1 * f, interpolated=interpolated)
+    et.write_bsdf(tmp_path / "scans.h5", et.BsdfTable(BsdfData([one])))
+    assert read_bsdf_data(tmp_path / "scans.h5").slices[0].interpolated is interpolated
+    with h5py.File(tmp_path / "scans.h5", "r+") as file:
+        del file["slice000000"].attrs["interpolated"]
+    assert read_bsdf_data(tmp_path / "scans.h5").slices[0].interpolated is False
 
 
 @pytest.mark.parametrize(

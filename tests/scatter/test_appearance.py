@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
 from etendue.scatter.appearance import (
     RECEPTORS,
+    Appearance,
     appearance,
     distinctness_of_image,
     haze_index,
@@ -20,6 +22,8 @@ from etendue.scatter.appearance import (
 from etendue.scatter.materials import MATERIALS
 from etendue.scatter.models import Coated, Gaussian, Lambertian, Mirror, Mixture, Transmitter
 from etendue.scatter.table import BsdfTable
+
+Array = npt.NDArray[np.float64]
 
 
 def glass(*, index: float, angle: float) -> float:
@@ -190,3 +194,53 @@ def test_errors_of_a_table_are_what_its_cells_bring_one_by_one() -> None:
     assert appearance(table(values, known=True)).errors == looks.errors
     assert appearance(table(values, known=True), seed=2).errors != looks.errors
     assert appearance(table(values, known=False)).errors == {}
+
+
+@pytest.mark.slow
+def test_errors_of_interpolated_values_do_not_shrink_in_the_mean() -> None:
+    """What each factor of 2 of the distance brings, its values all off together, against the spread of drawn tables.
+
+    By χ² of 11 degrees of freedom at a significance of 1e-3.
+    """
+    grid = PolarGrid("cosines", np.append(0.0, np.geomspace(1e-3, 2.0, 34)), np.arange(0.0, 360.0, 60.0))
+    incident = direction(20.0, 180.0)
+    values = np.full(grid.shape, 0.2)
+    errors = 0.1 * values
+
+    def table(f: Array, *, known: bool) -> BsdfTable:
+        error = errors if known else None
+        return BsdfTable(
+            BsdfData([BsdfSlice(incident, f, grid=grid, standard_error=error, interpolated=True)], isotropic=True)
+        )
+
+    octave = np.log2(np.maximum(grid.radial, 1e-4) / 1e-4)
+    plain = specular_gloss(table(values, known=False), 20)
+    square = 0.0
+    for k in range(16):
+        hats = np.maximum(1.0 - np.abs(octave - np.arange(17)[:, None]), 0.0)
+        moved = values + errors * hats[k] / np.sqrt((hats**2).sum(axis=0))
+        square += (specular_gloss(table(moved, known=False), 20) - plain) ** 2
+    looks = appearance(table(values, known=True))
+    assert 1.83 < 11.0 * looks.errors["gloss 20"] ** 2 / square < 31.26
+    # No less than a third of what it is if all values are off together.
+    assert looks.errors["gloss 20"] > 0.1 * plain / 3.0
+
+
+@pytest.mark.slow
+def test_errors_of_a_table_that_scatters_nearly_everything(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Errors that lead beyond all light are no obstacle; they are those of half the light, twice."""
+    monkeypatch.setattr("etendue.scatter.appearance.DRAWS", 2)
+    grid = PolarGrid("normal", np.array([0.0, 45.0, 89.0]), np.array([0.0, 120.0, 240.0]))
+
+    def looks(share: float, *components: dict[str, object]) -> Appearance:
+        f = np.full(grid.shape, share / math.pi)
+        one = BsdfSlice(direction(20.0, 180.0), f, grid=grid, standard_error=0.5 * f)
+        return appearance(BsdfTable(BsdfData([one], components, isotropic=True)))
+
+    whole, half = looks(0.99), looks(0.495)
+    for name in ("gloss 20", "reflection haze"):
+        assert whole.errors[name] == pytest.approx(2.0 * half.errors[name], rel=1e-9)
+    assert whole.errors["distinctness"] == pytest.approx(half.errors["distinctness"], rel=1e-6)
+    # What is mirrored is known.
+    glossy = looks(0.495, {"kind": "mirror", "reflectance": 0.04})
+    assert glossy.errors["gloss 20"] == pytest.approx(half.errors["gloss 20"], rel=1e-6)

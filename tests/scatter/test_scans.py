@@ -264,6 +264,19 @@ def test_what_no_method_can_make_a_table_of_is_told() -> None:
         bsdf_of_flux(1.0, 1.0, solid_angle=math.inf, direction=[0.0, 0.0, 1.0])
 
 
+@pytest.mark.parametrize("method", ["specular-centred", "shepard"])
+def test_errors_of_scans_are_those_of_the_table(method: str) -> None:
+    """A mean of values that are all off by 4 % is off by 4 %."""
+    scans = in_plane(f=0.25)
+    known = Scans(scans.incident, scans.scattered, scans.values, standard_error=0.04 * scans.values, reflectance=0.7)
+    (one,) = tabulated(known, method).slices
+    there = ~np.isnan(one.values)
+    assert one.interpolated
+    assert one.standard_error is not None
+    assert one.standard_error[there] == pytest.approx(0.04 * one.values[there])
+    assert tabulated(scans, method).slices[0].standard_error is None
+
+
 def test_a_table_is_the_first_thing_that_is_asked_for() -> None:
     """In an interpreter that has made no other table."""
     code = """

@@ -126,4 +126,5 @@ def polar_slice(
     values = np.where(there, filled, np.nan)
     if error is not None:
         errors = np.where(there, np.where(held, np.take_along_axis(errors, np.maximum(last, 0), axis=1), 0.0), np.nan)
-    return BsdfSlice(incident, values, behind, grid=grid, standard_error=None if error is None else errors)
+    known = None if error is None else errors
+    return BsdfSlice(incident, values, behind, grid=grid, standard_error=known, interpolated=True)

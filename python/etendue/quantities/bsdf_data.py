@@ -235,6 +235,8 @@ class BsdfSlice:
         What the file says that the integral of f cosθ is: total integrated scatter (TIS).
     standard_error : array, optional
         Of the values, same shape.
+    interpolated : bool
+        Whether the values lie between fewer that were measured, so that neighbours err together.
 
     Raises
     ------
@@ -258,6 +260,7 @@ class BsdfSlice:
     wavelength: float | None = None
     stated: float | None = None
     standard_error: Array | None = None
+    interpolated: bool = False
 
     def __post_init__(self) -> None:
         for name in ("incident", "values", "points", "projected", "standard_error"):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfData, direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
 from etendue.scatter.bsdf import Bsdf
 from etendue.scatter.table import BsdfTable
 
@@ -70,6 +72,15 @@ ROUNDING = 1e-12
 
 DRAWS = 12
 """Tables drawn from a table with standard errors, whose spread is the error of its appearance."""
+
+DIMMED = 0.5
+"""Part of their light that is left in these tables."""
+
+RATIOS = ("haze", "distinctness")
+"""Numbers that do not change with the light as a whole."""
+
+CLOSEST = 1e-4
+"""|β − β₀| within which all interpolated values err together."""
 
 NODES = 24
 """Of the rule of Gauss and Legendre along each side of the receptor, on both sides of the mirrored direction."""
@@ -306,8 +317,9 @@ def transmission_haze(bsdf: Bsdf) -> float:
 def appearance(bsdf: Bsdf, seed: int = 1) -> Appearance:
     """All numbers of a surface; of tables with standard errors these go through to the numbers.
 
-    Errors are the spread over tables drawn with independent normal errors of their values. What errors of an instrument have
-    in common, as that of its reference, is not in them.
+    Errors are the spread over tables drawn with normal errors of their values: independent ones where each was measured;
+    where values were interpolated between fewer, all that lie about as far from the specular direction err together, which
+    is an upper bound. What errors of an instrument have in common, as that of its reference, is not in them.
 
     Parameters
     ----------
@@ -329,7 +341,7 @@ def appearance(bsdf: Bsdf, seed: int = 1) -> Appearance:
     rng = np.random.default_rng(seed)
     drawn = [_appearance(BsdfTable(_drawn(data, rng))).values() for _ in range(DRAWS)]
     errors = {
-        name: float(np.std([one[name] for one in drawn if name in one], ddof=1))
+        name: float(np.std([one[name] for one in drawn if name in one], ddof=1)) / (1.0 if name in RATIOS else DIMMED)
         for name in found.values()
         if sum(name in one for one in drawn) > 1
     }
@@ -348,14 +360,43 @@ def _appearance(bsdf: Bsdf) -> Appearance:
 
 
 def _drawn(data: BsdfData, rng: np.random.Generator) -> BsdfData:
-    """With values off by errors of their size; the share that a slice scatters is off with them."""
+    """At half of its light, with values off by errors of their size; the share that a slice scatters is off with them.
+
+    Half of the light leaves room for errors: no table that scatters more than it receives is drawn.
+    """
     slices = []
     for one in data.slices:
+        values = one.values
         if one.standard_error is not None:
-            values = np.maximum(one.values + one.standard_error * rng.standard_normal(one.values.shape), 0.0)
-            one = dataclasses.replace(one, values=values, stated=None)  # noqa: PLW2901 - the same slice, drawn
-        slices.append(one)
-    return dataclasses.replace(data, slices=tuple(slices))
+            values = np.maximum(values + one.standard_error * _deviations(one, rng), 0.0)
+        slices.append(dataclasses.replace(one, values=DIMMED * values, stated=None))
+    return dataclasses.replace(data, slices=tuple(slices), components=tuple(map(_dimmed, data.components)))
+
+
+def _deviations(one: BsdfSlice, rng: np.random.Generator) -> Array:
+    """A number of unit variance for each value.
+
+    Interpolated values are those of neighbours, so that all at nearly the same distance from the specular direction, within
+    a factor of 2, err together: their errors do not shrink in the mean.
+    """
+    if not one.interpolated:
+        return rng.standard_normal(one.values.shape)
+    off = one.directions[..., :2] + one.incident[:2]
+    octave = np.log2(np.maximum(np.nan_to_num(np.hypot(off[..., 0], off[..., 1])), CLOSEST) / CLOSEST)
+    low = np.floor(octave).astype(np.intp)
+    part = octave - low
+    drawn = rng.standard_normal(int(low.max()) + 2)
+    both = (1.0 - part) * drawn[low] + part * drawn[low + 1]
+    return np.asarray(both / np.sqrt((1.0 - part) ** 2 + part**2))
+
+
+def _dimmed(component: Mapping[str, Any]) -> dict[str, Any]:
+    parts = [dict(part) for part in component["parts"]] if component["kind"] == "mixture" else [dict(component)]
+    weights = component.get("weights") or [1.0] * len(parts)
+    whole = {"kind": "mixture", "parts": parts, "weights": [DIMMED * weight for weight in weights]}
+    # The axis of one part is stated beside the parts.
+    stated = [own.pop("axis") for own in (*parts, dict(component)) if "axis" in own]
+    return {**whole, "axis": stated[0]} if stated else whole
 
 
 def _received(bsdf: Bsdf, angle: float, source: tuple[float, float], receptor: Receptor) -> float:

@@ -72,6 +72,8 @@ def _slice(node: Node) -> BsdfSlice:
         radial, azimuth = (node.values(node.dataset(name, np.dtype("<f8"), 1)) for name in ("radial", "azimuth"))
         grid = PolarGrid(frame, radial, azimuth)  # type: ignore[arg-type] # one of them, as was looked at
     optional: dict[str, Any] = {name: node.number(name) for name in ("wavelength", "stated") if name in node.node.attrs}
+    # Files of earlier versions do not say.
+    optional["interpolated"] = "interpolated" in node.node.attrs and node.truth("interpolated")
     incident = node.numbers("incident", (3,))
     return BsdfSlice(incident, arrays.pop("values"), node.truth("transmitted"), grid=grid, **arrays, **optional)
 
@@ -120,7 +122,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         )
         for i, one in enumerate(data.slices):
             node = file.create_group(f"slice{i:06}")
-            put(node, incident=one.incident, transmitted=one.transmitted)
+            put(node, incident=one.incident, transmitted=one.transmitted, interpolated=one.interpolated)
             for name in ("wavelength", "stated"):
                 if (value := getattr(one, name)) is not None:
                     put(node, **{name: value})

@@ -131,7 +131,15 @@ def slice_of(
     if plane is not None:
         at, row = plane
         known = None if errors is None else row(errors)
-        return BsdfSlice(incident, row(values), transmitted, grid=at, wavelength=wavelength, standard_error=known)
+        return BsdfSlice(
+            incident,
+            row(values),
+            transmitted,
+            grid=at,
+            wavelength=wavelength,
+            standard_error=known,
+            interpolated=True,
+        )
     grid = on_grid(polar, azimuth, values)
     if grid is None:
         return None

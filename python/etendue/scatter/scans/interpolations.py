@@ -277,6 +277,9 @@ METHODS: dict[str, Interpolation] = {
 }
 """Ways from scattered values to a grid, by name."""
 
+LINEAR = ("specular-centred", "direction-cosines", "natural-neighbours", "shepard")
+"""Those whose values are means of the measured ones: standard errors of these become some of the table."""
+
 
 def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = SMALLEST) -> BsdfData:
     """A table on 100 logarithmic |β − β₀| and 36 azimuths for each incidence.
@@ -294,7 +297,7 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
     -------
     BsdfData
         Isotropic if all light comes from one azimuth. Scaled to `scans.reflectance` where that is known; `stated` is the
-        share before.
+        share before. With standard errors where the scans have some and the method is linear, or finds its own (`smooth`).
 
     Raises
     ------
@@ -328,12 +331,15 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
         at = grid.directions(incident, transmitted=False)
         there = ~np.isnan(at[..., 0])
         f, error = METHODS[method](incident, scans.scattered[own], scans.values[own], at[there])
+        if error is None and scans.standard_error is not None and method in LINEAR:
+            # No less than that of a mean: as if all values that count for a place erred together.
+            error, _ = METHODS[method](incident, scans.scattered[own], scans.standard_error[own], at[there])
         values, errors = np.full(grid.shape, np.nan), None
         values[there] = np.maximum(f, 0.0)
         if error is not None:
             errors = np.full(grid.shape, np.nan)
             errors[there] = error
-        one = BsdfSlice(incident, values, grid=grid, standard_error=errors)
+        one = BsdfSlice(incident, values, grid=grid)
         share = one.integral()
         factor = 1.0
         if scans.reflectance is not None:
@@ -341,7 +347,9 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
                 raise ArgumentError("nothing is scattered: the values cannot be scaled to a reflectance")
             factor = scans.reflectance / share
         scaled = None if errors is None else errors * factor
-        slices.append(BsdfSlice(incident, values * factor, grid=grid, stated=share, standard_error=scaled))
+        slices.append(
+            BsdfSlice(incident, values * factor, grid=grid, stated=share, standard_error=scaled, interpolated=True)
+        )
     return BsdfData(tuple(slices), isotropic=len(turns) <= 1, mirrored=False, name="scans")
 
 
