@@ -381,3 +381,25 @@ def test_light_forwards_and_backwards_is_the_same(width: float) -> None:
             slices.append(BsdfSlice(incident, skewed(incident=incident, scattered=d), grid=grid))
     table = et.BsdfTable(BsdfData(slices, isotropic=False, mirrored=False))
     forwards_and_backwards_agree(surfaces=two_walls({"kind": "bsdf", "bsdf": table, "axis": [0.3, 1.0, 0.2]}))
+
+
+def test_noise_below_nothing_is_told() -> None:
+    """One half of the hemisphere at 3, the other at −1: the share is that of their mean, and f two thirds of what it was."""
+    grid = PolarGrid("normal", np.array([0.0, 90.0]), np.array([0.0, 179.999, 180.0, 359.999]))
+    values = 0.1 * np.array([[3.0, 3.0], [3.0, 3.0], [-1.0, -1.0], [-1.0, -1.0]])
+
+    def table(f: npt.NDArray[np.float64]) -> et.BsdfTable:
+        return et.BsdfTable(BsdfData([BsdfSlice(direction(0.0, 0.0), f, grid=grid)], isotropic=True, mirrored=False))
+
+    noisy = table(values)
+    assert float(noisy.reflectance(0.0)) == pytest.approx(0.1 * math.pi, rel=1e-3)
+    (told,) = map(str, noisy.complaints)
+    assert (
+        told
+        == "warning: 0° of incidence: values below 0 become 0, and the others are scaled by 0.667 to the same share"
+    )
+    # Less than nothing in all is nothing.
+    black = table(-values)
+    assert float(black.reflectance(0.0)) == 0.0
+    assert "values add up to -0.3142 of the light: nothing is scattered" in str(black.complaints[0])
+    assert not table(np.abs(values)).complaints

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Iterable
 from typing import Any
+
+import numpy as np
 
 from etendue.description.files import Files
 from etendue.errors import ArgumentError
@@ -48,9 +51,9 @@ class BsdfTable(Bsdf):
         if not data.slices and not data.components:
             raise ArgumentError("a BSDF has slices or components; these data hold neither")
         self.data = data
-        excesses = tuple(_excesses(data))
+        told = tuple(_told(data))
         self._balanced, self._weight, more = balanced(data, [share_of(one) for one in data.slices])
-        self.complaints: tuple[Complaint, ...] = (*data.complaints, *excesses, *more)
+        self.complaints: tuple[Complaint, ...] = (*data.complaints, *told, *more)
 
     @classmethod
     def from_scans(cls, scans: Scans, method: str = "specular-centred") -> BsdfTable:
@@ -116,7 +119,7 @@ Bsdf.table = BsdfTable
 
 
 def share_of(one: BsdfSlice) -> float:
-    """What a slice scatters of the flux: its integral, no more than 1.
+    """What a slice scatters of the flux: its integral, no less than 0 and no more than 1.
 
     Examples
     --------
@@ -125,10 +128,10 @@ def share_of(one: BsdfSlice) -> float:
     >>> round(share_of(BsdfSlice(direction(20.0, 0.0), [[0.1, 0.1]], grid=grid)), 6)
     0.314159
     """
-    return min(one.integral(), 1.0)
+    return min(max(one.integral(), 0.0), 1.0)
 
 
-def _excesses(data: BsdfData) -> Iterable[Complaint]:
+def _told(data: BsdfData) -> Iterable[Complaint]:
     for one in data.slices:
         share = one.integral()
         way = "transmits" if one.transmitted else "reflects"
@@ -136,5 +139,15 @@ def _excesses(data: BsdfData) -> Iterable[Complaint]:
             raise ArgumentError(
                 f"at {one.theta:g}° of incidence the table {way} {share:.4g} of the light, more than it receives"
             )
+        # Noise below 0 is no light that could be drawn.
+        lifted = share
+        if (one.values < 0.0).any():
+            lifted = dataclasses.replace(one, values=np.maximum(one.values, 0.0)).integral()
+        place = f"{one.theta:g}° of incidence"
+        if share < 0.0:
+            yield Complaint("warning", place, f"values add up to {share:.4g} of the light: nothing is scattered")
+        elif lifted > share * MOST:
+            found = f"values below 0 become 0, and the others are scaled by {share / lifted:.3g} to the same share"
+            yield Complaint("warning", place, found)
         if share > 1.0:
-            yield Complaint("warning", f"{one.theta:g}° of incidence", f"{way} {share:.6g} of the light; scaled to 1")
+            yield Complaint("warning", place, f"{way} {share:.6g} of the light; scaled to 1")
