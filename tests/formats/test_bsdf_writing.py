@@ -161,6 +161,19 @@ def test_a_model_in_a_file_is_as_isotropic_as_it_is(tmp_path: Path, bsdf: et.Bsd
     assert et.read_bsdf(tmp_path / "old.h5").isotropic is isotropic
 
 
+@pytest.mark.parametrize("form", ["astm", "bird", "fred", "ssdd", "zemax"])
+def test_another_back_is_in_the_file_or_told(tmp_path: Path, form: str) -> None:
+    grid = PolarGrid("cosines", np.array([0.0, 2.0]), np.array([0.0]))
+    slices = [
+        BsdfSlice(direction(30.0, 180.0, behind=behind), np.full(grid.shape, share / math.pi), grid=grid)
+        for behind, share in ((False, 0.2), (True, 0.6))
+    ]
+    lost = et.write_bsdf(tmp_path / "two", et.BsdfTable(BsdfData(slices, both_sides=False)), form)
+    back = float(et.read_bsdf(tmp_path / "two").reflectance(30.0, side="back"))
+    assert back == pytest.approx(0.6 if form == "astm" else 0.2, rel=0.01)
+    assert any("only light that meets the front" in one for one in lost) is (form != "astm")
+
+
 @pytest.mark.parametrize("interpolated", [False, True])
 def test_whether_neighbours_err_together_is_kept(tmp_path: Path, interpolated: bool) -> None:
     grid = PolarGrid("cosines", np.array([0.0, 2.0]), np.array([0.0]))

@@ -228,6 +228,8 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
         lost.append(f"no wavelength is in the file: its values are those at {at:g} nm")
     elif asked.left_out:
         lost.append(f"{asked.left_out} wavelengths between those of the file are left out")
+    if not asked.both_sides and len({one.front for one in data.slices}) == 1:
+        lost.append("only light that meets the front is in the file, and reads as that of both sides")
     kept = {one.transmitted for one in data.slices}
     if back and through and len(kept) == 1:
         lost.append(f"the file holds {'transmitted' if True in kept else 'reflected'} light only")
