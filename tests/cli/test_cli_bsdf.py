@@ -61,6 +61,22 @@ def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) ->
 
 
 @pytest.mark.slow
+def test_gloss_says_from_where_the_light_comes_and_of_which_colour(run: Run) -> None:
+    et.write_bsdf("brushed.h5", et.bsdf.RoughMetal(roughness=0.1, roughness_across=0.3, reflectance=0.8))
+    grid = PolarGrid("normal", np.array([0.0, 89.0]), np.array([0.0]))
+    slices = [
+        BsdfSlice(direction(30.0, 180.0), np.full(grid.shape, f), grid=grid, wavelength=wave)
+        for wave, f in ((450.0, 0.05), (650.0, 0.25))
+    ]
+    et.write_bsdf("red.h5", et.BsdfTable(BsdfData(slices)))
+    et.write_bsdf("white.h5", et.bsdf.Lambertian(reflectance=0.8))
+    told = {name: run("bsdf", "gloss", f"{name}.h5").err for name in ("brushed", "red", "white")}
+    assert "from azimuth 180°" in told["brushed"]
+    assert "555 nm" in told["red"]
+    assert not told["white"]
+
+
+@pytest.mark.slow
 def test_a_formula_of_another_program_becomes_a_table(run: Run) -> None:
     """ABg of TracePro in Zemax' layout: the same f along the specular direction, which is a node of the table."""
     Path("abg.txt").write_text(surface_property(scatter=1, sections=[abg_side(a=0.01)]))

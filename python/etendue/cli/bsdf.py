@@ -164,6 +164,10 @@ def gloss(
     bsdf = read_bsdf(files)
     found = appearance(bsdf, seed)
     complaints = [str(complaint) for complaint in bsdf.complaints]
+    if not bsdf.isotropic:
+        complaints.append("note: light comes from azimuth 180°; turned about its normal, the sample looks different")
+    if bsdf.wavelengths:
+        complaints.append(f"note: all numbers are those of light of {WAVELENGTH:g} nm, not weighted with V(λ)")
     if json:
         facts = {**dataclasses.asdict(found), "file": files[0] if len(files) == 1 else files}
         print_json({**facts, "complaints": complaints})

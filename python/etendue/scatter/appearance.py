@@ -1,4 +1,7 @@
-"""How glossy and how hazy a surface looks to the instruments of the standards, from its BSDF."""
+"""How glossy and how hazy a surface looks to the instruments of the standards, from its BSDF.
+
+Light of 555 nm meets the front from azimuth 180°, along the x axis of a sample that is not alike in all directions.
+"""
 
 from __future__ import annotations
 
