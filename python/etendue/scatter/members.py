@@ -19,7 +19,15 @@ Known = list[tuple[BsdfSlice, float]]
 
 
 def parts_of(record: Record) -> Iterator[Record]:
-    """What the core takes as one, without the sums that it is part of."""
+    """What the core takes as one, without the sums that it is part of.
+
+    Examples
+    --------
+    >>> from etendue.scatter.models import Mixture
+    >>> paint = Mixture(parts=[{"kind": "lambertian", "reflectance": 0.8}, {"kind": "abg", "a": 0.01, "b": 0.1, "g": 2}])
+    >>> [part["kind"] for part in parts_of(paint.record(Files()))]
+    ['scatter', 'abg']
+    """
     if record["kind"] != "sum":
         yield record
         return
@@ -28,14 +36,27 @@ def parts_of(record: Record) -> Iterator[Record]:
 
 
 def same_when_turned(record: Record) -> bool:
-    """Whether no lobe of a model is wider across the axis than along it, and no surface rougher."""
+    """Whether no lobe of a model is wider across the axis than along it, and no surface rougher.
+
+    Examples
+    --------
+    >>> from etendue.scatter.models import Gaussian
+    >>> [same_when_turned(Gaussian(peak=5, sigma=0.1, aspect=aspect).record(Files())) for aspect in (1.0, 2.0)]
+    [True, False]
+    """
     return all(
         part.get("aspect", 1.0) == 1.0 and part.get("alpha_x") == part.get("alpha_y") for part in parts_of(record)
     )
 
 
 def components_of(data: BsdfData) -> list[Record]:
-    """Records of what is described by models."""
+    """Records of what is described by models.
+
+    Examples
+    --------
+    >>> [record["kind"] for record in components_of(BsdfData(components=({"kind": "lambertian", "reflectance": 0.5},)))]
+    ['scatter']
+    """
     return [MODELS[part["kind"]](**part).record(Files()) for part in map(dict, data.components)]
 
 
