@@ -277,6 +277,30 @@ def test_errors_of_scans_are_those_of_the_table(method: str) -> None:
     assert tabulated(scans, method).slices[0].standard_error is None
 
 
+def test_stages_that_do_not_come_back_exactly() -> None:
+    """Angles as they are read, a few thousandths of a degree off: the same incidences, and the same share."""
+    rows = np.array(
+        [
+            (180.0 + 2.0 * gamma + a, b, gamma, 0.0)
+            for gamma in (0.0, 10.0, 40.0)
+            for a, b in [
+                *((a, 0.0) for a in np.arange(-45.0, 46.0, 3.0)),
+                *((0.0, b) for b in np.arange(-45.0, 46.0, 3.0)),
+            ]
+        ]
+    )
+    rng = np.random.default_rng(4)
+    tables = []
+    for stages in (rows, rows + rng.uniform(-0.004, 0.004, rows.shape)):
+        to = detector_direction(*stages.T)
+        scans = Scans.from_stages(stages, 0.1 / math.pi * 1e-3 * to[:, 2], 1.0, solid_angle=1e-3)
+        tables.append(et.Bsdf.from_scans(scans, "smooth"))
+    exact, read = tables
+    assert read.isotropic
+    assert read.incidences == pytest.approx(exact.incidences, abs=0.002)
+    assert read.reflectance([0.0, 10.0, 40.0]) == pytest.approx([0.1] * 3, rel=1e-3)
+
+
 def test_a_table_is_the_first_thing_that_is_asked_for() -> None:
     """In an interpreter that has made no other table."""
     code = """

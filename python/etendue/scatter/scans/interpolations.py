@@ -11,7 +11,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.scatter.scans import harvey_shack
-from etendue.scatter.scans.scans import SAME, Scans
+from etendue.scatter.scans.scans import NEAR, SAME, Scans
 
 Array = npt.NDArray[np.float64]
 Interpolation = Callable[[Array, Array, Array, Array], tuple[Array, Array | None]]
@@ -22,6 +22,9 @@ SMALLEST = 1e-3
 
 RADIAL, AZIMUTHS = 100, 36
 """Logarithmic steps of |β − β₀| to 2, and azimuths: those of the thesis."""
+
+TURNED = 0.1
+"""Azimuths of incidence that differ by less are one [°]."""
 
 ON_ARM = 2.5
 """Azimuths about the specular direction that differ by less belong to one scan [°]."""
@@ -322,10 +325,18 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
     radial = radial_coordinates(smallest)
     slices = []
     groups = scans.by_incidence()
-    turns = {round(phi % 360.0, 4) % 360.0 for incident, _ in groups if (phi := _azimuth(incident)) is not None}
+    turns: list[float] = []
+    for incident, _ in groups:
+        phi = _azimuth(incident)
+        if phi is not None and all(_apart(np.array(phi), other) > TURNED for other in turns):
+            turns.append(phi % 360.0)
     for measured, own in groups:
-        # If the sample was not turned, the plane of incidence is the same along the normal.
-        incident = light_from(0.0, *turns) if len(turns) == 1 and _azimuth(measured) is None else measured
+        incident = measured
+        if _azimuth(measured) is None and len(turns) == 1:
+            # The sample was not turned: the plane of incidence is the same along the normal.
+            incident = light_from(0.0, turns[0])
+        elif _azimuth(measured) is None and np.abs(measured[:2]).max() > SAME:
+            incident = np.array([0.0, 0.0, 1.0])
         # The azimuth of PolarGrid counts from the forward direction, that of Harvey and Shack from 90° before it.
         grid = PolarGrid("cosines", radial, np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False, dtype=np.float64))
         at = grid.directions(incident, transmitted=False)
@@ -356,4 +367,4 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
 def _azimuth(incident: Array) -> float | None:
     """Of where light comes from [°]; None along the normal."""
     across = float(np.hypot(incident[0], incident[1]))
-    return float(np.degrees(np.arctan2(incident[1], incident[0]))) if across > SAME else None
+    return float(np.degrees(np.arctan2(incident[1], incident[0]))) if across > NEAR else None

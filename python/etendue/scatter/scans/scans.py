@@ -13,7 +13,10 @@ from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, i
 Array = npt.NDArray[np.float64]
 
 SAME = 1e-6
-"""How far directions of incidence may differ that are one."""
+"""How far the length of a unit vector may be off."""
+
+NEAR = 5e-4
+"""Angles [rad] within which directions of incidence are one: stages do not come back to the same place exactly."""
 
 TURNED = 2e-3
 """Angles [rad] within which directions of a turned sample are the same, and cosines of incidence."""
@@ -118,12 +121,14 @@ class Scans:
         return cls(incident_direction(angles[:, 2], angles[:, 3]), to, f, reflectance=reflectance)
 
     def by_incidence(self) -> list[tuple[Array, npt.NDArray[np.intp]]]:
-        """Each direction of incidence, by angle, and which values belong to it."""
+        """Each direction of incidence, by angle, and which values belong to it: the mean of those that are `NEAR`."""
         left = np.arange(self.values.size)
         found = []
         while left.size:
             first = self.incident[left[0]]
-            same = np.abs(self.incident[left] - first).max(axis=1) < SAME
+            same = np.abs(self.incident[left] - first).max(axis=1) < NEAR
+            if np.ptp(self.incident[left[same]], axis=0).max() > 0.0:
+                first = self.incident[left[same]].mean(axis=0)
             found.append((first / np.linalg.norm(first), left[same]))
             left = left[~same]
         return sorted(found, key=lambda one: -one[0][2])
