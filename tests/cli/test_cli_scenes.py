@@ -157,6 +157,16 @@ def test_mistakes_are_found_before_any_ray_is_traced(
     assert set(tmp_path.iterdir()) == before
 
 
+def test_detectors_of_like_names_do_not_write_to_one_file(run: Run, tmp_path: Path) -> None:
+    """What a file name cannot hold becomes a dash, so that two names of a scene may become one."""
+    twin = {**SCENE["detectors"][2], "name": "work-top-2"}
+    et.Scene(**{**SCENE, "detectors": [*SCENE["detectors"], twin]}).save(tmp_path / "lamp.toml")
+    status, _, err = run("trace", "lamp.toml", "--rays", "1000", "-o", "{detector}.npz")
+    assert status == 1
+    assert "'work top/2' and 'work-top-2' would both be written here" in err
+    assert not (tmp_path / "work-top-2.npz").exists()
+
+
 def test_luminance_of_the_observers_of_a_scene(run: Run, tmp_path: Path) -> None:
     status, out, _ = run(
         "luminance", "lamp.toml", "--rays-per-pixel", "16", "--seed", "2", "-o", "{observer}.npz", "--json"

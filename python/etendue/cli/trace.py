@@ -192,7 +192,17 @@ def _writers(outputs: list[Path], plan: Plan) -> list[tuple[Path, str, Write]]:
             names = ", ".join(d.name for d in fitting)
             raise ArgumentError(f"{path}: {names} would all be written here; put {{detector}} into its name.")
         found += [(_named(path, d.name), d.name, OUTPUTS[d.KIND][1]) for d in fitting]
+    _require_apart(found)
     return found
+
+
+def _require_apart(found: list[tuple[Path, str, Write]]) -> None:
+    """Refuse two files of one name: names of detectors that differ only in what no file name holds make such."""
+    owners: dict[Path, str] = {}
+    for path, name, _ in found:
+        first = owners.setdefault(path, name)
+        if first != name:
+            raise ArgumentError(f"{path}: {first!r} and {name!r} would both be written here; rename one of them.")
 
 
 def _named(path: Path, detector: str) -> Path:
