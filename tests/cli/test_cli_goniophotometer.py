@@ -47,6 +47,13 @@ def test_a_scene_is_measured_and_becomes_rays_a_table_a_picture_and_a_file(run: 
     total = measured(facts["total_flux"], facts["total_flux_error"], facts["flux_unit"])
     assert f"total flux {total} by the photometer" in again.out
     assert len(et.read_rays("lamp.ray")) == 1000
+    # Settings of the instrument would change nothing of it.
+    late = run(
+        "goniophotometer", "lamp.h5", "--exposures", "4", "--positions", "10", "--samples", "9", "-o", "late.ies"
+    )
+    assert late.status == 2
+    assert "--positions, --exposures, --samples: lamp.h5 was measured before" in late.err
+    assert not Path("late.ies").exists()
 
 
 def test_mistakes_are_told_and_nothing_is_written(run: Run) -> None:
@@ -59,6 +66,7 @@ def test_mistakes_are_told_and_nothing_is_written(run: Run) -> None:
         (("--surface", "sphare"), "sphere"),
         (("--centre", "0,0"), "3 numbers"),
         (("--bits", "24"), "bits"),
+        (("--seed", "-1"), "--seed"),
         (("--exposure", "4"), "--exposures"),
     ):
         found = run("goniophotometer", "lamp.toml", *wrong)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -112,7 +113,7 @@ def goniophotometer(
         int | None,
         typer.Option("--samples", help="Lines of sight per pixel; if left out, 65 536 in each image, 4 at least."),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of noise, errors and rays.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of noise, errors and rays.", min=0)] = 1,
     threads: Threads = None,
     json: Json = False,
 ) -> None:
@@ -123,28 +124,30 @@ def goniophotometer(
     for path in outputs:
         _check(path, format)
     at = CLOSEST if surface == CLOSEST else parse_surface(surface)
+    gonio = NearFieldGoniophotometer(
+        _steps(positions),
+        distance,
+        camera_pixels=camera_pixels,
+        exposures=exposures,
+        field_of_view=field_of_view,
+        centre=None if centre is None else _triple(centre, "--centre"),
+        photometer_distance=photometer_distance,
+        photometer_error=photometer_error,
+        bits=bits,
+        full_well=full_well,
+        read_noise=read_noise,
+        blur=blur,
+        exposure_ratio=exposure_ratio,
+        level=level,
+        exposure_error=exposure_error,
+        threshold=threshold,
+        misalignment=_triple(misalignment, "--misalignment"),
+        arm_error=arm_error,
+    )
     run = _measured_before(lamp)
-    if run is None:
-        gonio = NearFieldGoniophotometer(
-            _steps(positions),
-            distance,
-            camera_pixels=camera_pixels,
-            exposures=exposures,
-            field_of_view=field_of_view,
-            centre=None if centre is None else _triple(centre, "--centre"),
-            photometer_distance=photometer_distance,
-            photometer_error=photometer_error,
-            bits=bits,
-            full_well=full_well,
-            read_noise=read_noise,
-            blur=blur,
-            exposure_ratio=exposure_ratio,
-            level=level,
-            exposure_error=exposure_error,
-            threshold=threshold,
-            misalignment=_triple(misalignment, "--misalignment"),
-            arm_error=arm_error,
-        )
+    if run is not None:
+        _refuse_settings(lamp, gonio, samples)
+    else:
         with progress_bar("positions", len(gonio.positions)) as progress:
             told = None if progress is None else lambda done, _: progress(done)
             run = gonio.measure(lamp, seed=seed, samples=samples, threads=threads, progress=told)
@@ -198,6 +201,19 @@ def _check(path: Path, format: str | None) -> None:
             "--format for rays in a file of another name."
         )
     check_folder(path)
+
+
+def _refuse_settings(lamp: Path, gonio: NearFieldGoniophotometer, samples: int | None) -> None:
+    """Settings of the instrument change nothing of what was measured before."""
+    standard = NearFieldGoniophotometer()
+    names = [field.name for field in dataclasses.fields(gonio)]
+    stated = [name for name in names if getattr(gonio, name) != getattr(standard, name)]
+    stated += [] if samples is None else ["samples"]
+    if stated:
+        options = ", ".join("--positions" if name == "step" else f"--{name.replace('_', '-')}" for name in stated)
+        raise typer.BadParameter(
+            f"{options}: {lamp} was measured before; such settings are for a lamp that is measured"
+        )
 
 
 def _measured_before(path: Path) -> NearFieldRun | None:
