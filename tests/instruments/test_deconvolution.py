@@ -340,6 +340,8 @@ def test_what_is_refused() -> None:
         et.deconvolve(GoniometerScan([0.0, 1.0], [1.0, 1.0]), SIGNATURE)
     with pytest.raises(ArgumentError, match="iterations"):
         et.deconvolve(scan, SIGNATURE, stop=0)
+    with pytest.raises(ArgumentError, match="seed is -1"):
+        et.deconvolve(scan, SIGNATURE, seed=-1)
     with pytest.raises(ArgumentError, match="does not iterate"):
         et.deconvolve(scan, SIGNATURE, method="penalised", stop="thesis")
     with pytest.raises(ArgumentError, match="needs the standard errors"):

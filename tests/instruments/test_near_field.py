@@ -353,6 +353,13 @@ def test_impossible_measurements_are_told(settings: dict[str, object], told: str
         et.NearFieldGoniophotometer(**{"step": 30, "camera_pixels": 16} | settings).measure(two_parts, size=3.4)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("seed", [-1, 1 << 64, 0.5])
+def test_seeds_that_are_none_are_told(run: et.NearFieldRun, seed: int) -> None:
+    for use in (run.ray_set, run.closest_surface, run.light_field):
+        with pytest.raises(ArgumentError, match="seed is"):
+            use(seed=seed)  # type: ignore[operator]
+
+
 @pytest.mark.slow
 def test_what_cannot_be_measured_is_told() -> None:
     gonio = et.NearFieldGoniophotometer(step=30, camera_pixels=16)

@@ -278,6 +278,9 @@ def test_what_makes_no_sense_is_refused(film: tuple[PrismaticFilm, et.RaySet, Li
         field.luminance(points=[[0, 0, 0]], directions=[[0, 0, 0]])
     with pytest.raises(ArgumentError, match="does not divide 180"):
         field.intensity(24, 7.0)
+    for seed in (-1, 1 << 64, 0.5):
+        with pytest.raises(ArgumentError, match="seed is"):
+            LightField.fit(rays, seed=seed)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow

@@ -89,7 +89,9 @@ def deconvolve(
         int,
         typer.Option("--replicates", help="Number of repeated scans, with new noise, that error bands are made of."),
     ] = REPLICATES,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the repeated scans, and of counts kept back.")] = 1,
+    seed: Annotated[
+        int, typer.Option("--seed", help="Seed of the repeated scans, and of counts kept back.", min=0)
+    ] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Take the instrument out of a scan, and say how the iteration stopped and what it is sure of."""

@@ -50,7 +50,7 @@ def fit(
         ),
     ] = None,
     seed: Annotated[
-        int, typer.Option("--seed", help="Seed: decides which rays are held out of the fit to judge it.")
+        int, typer.Option("--seed", help="Seed: decides which rays are held out of the fit to judge it.", min=0)
     ] = 1,
     threads: Threads = None,
     flux: Flux = None,

@@ -101,7 +101,7 @@ def goniometer(
     drift: Annotated[
         float, typer.Option("--drift", help="Share by which the beam changes during the scan, e.g. 0.01.")
     ] = 0.0,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of rays and noise.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of rays and noise.", min=0)] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Measure a sample, or the bare beam, with a virtual goniometer."""

@@ -58,7 +58,7 @@ def patches(
     sweep: Annotated[
         bool, typer.Option("--sweep", help="Also judge nine thresholds and this one: sweep.csv and sweep.png.")
     ] = False,
-    seed: Annotated[int, typer.Option("--seed", help="Seed: chooses the rays that --sweep keeps back.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed: chooses the rays that --sweep keeps back.", min=0)] = 1,
     flux: Flux = None,
     unit: Unit = None,
     json: Json = False,

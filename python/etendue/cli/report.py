@@ -48,7 +48,7 @@ def report(
         bool, typer.Option("--forecast/--no-forecast", help="Say what more rays would bring, for the time of a fit.")
     ] = True,
     seed: Annotated[
-        int, typer.Option("--seed", help="Seed: decides which rays are held out of the fit to judge it.")
+        int, typer.Option("--seed", help="Seed: decides which rays are held out of the fit to judge it.", min=0)
     ] = 1,
     threads: Threads = None,
     flux: Flux = None,

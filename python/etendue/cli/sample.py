@@ -27,7 +27,7 @@ def sample(
     format: Annotated[
         str | None, typer.Option("--format", help="Format to write; from the extension of the output if not given.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed: decides which rays are drawn.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed: decides which rays are drawn.", min=0)] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Draw rays of equal flux from a light field or from patches, exactly as these are read out; they stream to disk."""

@@ -16,6 +16,7 @@ from etendue.instruments.courses import after, course_of, rule_of
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
 from etendue.instruments.operators import Operator, OperatorName, middle_of, operator_of, sparse_if_large
 from etendue.instruments.penalised_lobe import PenalisedLobe, penalised_lobe
+from etendue.quantities.ray_stream import checked_seed
 
 Array = npt.NDArray[np.float64]
 Method = Literal["penalised", "richardson-lucy", "matrix"]
@@ -175,7 +176,7 @@ def deconvolve(
     ------
     ArgumentError
         If the scan has less than five positions or no light, the signature is wider than it, a rule or the method needs
-        standard errors that it does not have, or a stop is stated and nothing is iterated.
+        standard errors that it does not have, a stop is stated and nothing is iterated, or there is no such seed.
     UnknownNameError
         If there is no such operator, method or rule.
 
@@ -206,7 +207,7 @@ def deconvolve(
     gain = _gain(full)
     if method is None:
         method = "penalised" if operator == "rings" and gain is not None and stop is None else "richardson-lucy"
-    task = _Task(model, full, gain, rule_of(stop, counted=gain is not None), replicates, seed)
+    task = _Task(model, full, gain, rule_of(stop, counted=gain is not None), replicates, checked_seed(seed))
     found = _WAYS[method](task)
     notes += found.notes
     spread = found.spread

@@ -30,6 +30,7 @@ from etendue.instruments.round_blur import RoundBlur
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.total_variation import STRENGTHS, total_variation
 from etendue.quantities.bsdf_data import BsdfSlice
+from etendue.quantities.ray_stream import checked_seed
 
 Array = npt.NDArray[np.float64]
 DirectionalMethod = Literal["richardson-lucy", "total-variation", "parametric", "matrix"]
@@ -216,7 +217,7 @@ def deconvolve_directions(
     ------
     ArgumentError
         If the instrument is not known, the scan has less than nine positions or no light, the instrument function is wider
-        than it, or a way needs standard errors that it does not have.
+        than it, a way needs standard errors that it does not have, or there is no such seed.
     UnknownNameError
         If there is no such method, rule or model.
     MissingLibraryError
@@ -236,6 +237,7 @@ def deconvolve_directions(
         raise UnknownNameError("method", method, get_args(DirectionalMethod))
     if replicates and replicates < 2:
         raise ArgumentError("one replicate has no spread; draw two or more, or none")
+    seed = checked_seed(seed)
     of = _instrument(scan, instrument)
     notes = [*scan.notes, *_doubts(scan, of)]
     model = forward_model(of, scan, cell)

@@ -36,7 +36,7 @@ from etendue.lightfield.symmetry import fold, order, proven_symmetry, refutation
 from etendue.lightfield.trees import POSITIONS
 from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
+from etendue.quantities.ray_stream import Progress, RayStream, checked_seed, checked_threads
 
 PILOT_RAYS = 1 << 20
 """Rays on which the shape of the grid and the concentrations are chosen."""
@@ -101,7 +101,7 @@ def fit_light_field(
     progress: Progress | None = None,
 ) -> EtendueDensity:
     """See `LightField.fit`."""
-    threads = checked_threads(threads)
+    threads, seed = checked_threads(threads), checked_seed(seed)
     if max_resolution is not None and not 0.0 < max_resolution < math.inf:
         raise ArgumentError(f"max_resolution is {max_resolution}; give the side of the finest cells, a length in mm.")
     check_near_field(rays)

@@ -183,7 +183,7 @@ class LightField(EtendueDensity, InNotebook):
         Raises
         ------
         ArgumentError
-            If the rays have no position, carry no flux, or none meets the surface.
+            If the rays have no position, carry no flux, none meets the surface, or there is no such seed.
         UnknownNameError
             If there is no such symmetry.
         """

@@ -16,7 +16,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.rays.ray_index import RayIndex
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Surface
-from etendue.quantities.ray_stream import RayStream
+from etendue.quantities.ray_stream import RayStream, checked_seed
 from etendue.scene import Scene
 from etendue.scene.scatter_events import ScatterEvents
 
@@ -24,7 +24,6 @@ MOST_SAMPLES = 2048
 """Points per pixel: more resolve nothing that a light field holds."""
 
 MOST_RAYS_PER_PIXEL = 1 << 24
-MOST_SEED = (1 << 64) - 1
 MOST_FORWARD_RAYS = 1 << 50
 
 PASSES = 16
@@ -232,8 +231,7 @@ class PathTracing(Method):
         least: Any = self.until
         if least is not None and not (is_number(least) and 0.0 < float(least) < math.inf):
             raise ArgumentError(f"until is {self.until!r}; give the relative error to be reached, e.g. 0.01.")
-        if isinstance(self.seed, bool) or not (isinstance(self.seed, int) and 0 <= self.seed <= MOST_SEED):
-            raise ArgumentError(f"seed is {self.seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
+        checked_seed(self.seed)
         rays: Any = self.forward_rays
         whole = is_number(rays) and 0 <= float(rays) <= MOST_FORWARD_RAYS and float(rays).is_integer()
         if rays is not None and not whole:

@@ -34,6 +34,13 @@ def checked_threads(threads: int | None) -> int | None:
     return threads
 
 
+def checked_seed(seed: int) -> int:
+    """A seed of random numbers; `ArgumentError` if it is none."""
+    if isinstance(seed, bool) or not (isinstance(seed, int | np.integer) and 0 <= seed < 1 << 64):
+        raise ArgumentError(f"seed is {seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
+    return int(seed)
+
+
 def squares_hold(flux_squared: float) -> bool:
     """Whether a sum of squared fluxes is one: none of it is lost to underflow, nor is it infinite.
 

@@ -13,6 +13,7 @@ from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.intensity_nodes import MOST_CELLS, Nodes
 from etendue.quantities.node_choice import Choice
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.ray_stream import checked_seed
 from etendue.scene import Compiled, Scene
 from etendue.scene.dealing import Dealing
 from etendue.scene.detectors.detector import Detection, Setting
@@ -23,7 +24,6 @@ from etendue.units import FluxUnit
 DEFAULT_RAYS = 10**7
 MOST_RAYS = 1 << 50
 MOST_EVENTS = 10**9
-MOST_SEED = (1 << 64) - 1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,8 +130,7 @@ def make_plan(
     if not compiled.record["sources"]:
         raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to trace.")
     count, notes = _rays(compiled, rays)
-    if isinstance(seed, bool) or not (isinstance(seed, int) and 0 <= seed <= MOST_SEED):
-        raise ArgumentError(f"seed is {seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
+    seed = checked_seed(seed)
     if isinstance(most_events, bool) or not (isinstance(most_events, int) and 1 <= most_events <= MOST_EVENTS):
         raise ArgumentError(f"most_events is {most_events!r}; give a whole number from 1 to {MOST_EVENTS:,}.")
     mark = fingerprint(compiled.record)

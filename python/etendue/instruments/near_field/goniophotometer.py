@@ -20,6 +20,7 @@ from etendue.instruments.near_field.positions import ArmPositions
 from etendue.instruments.near_field.run import NearFieldRun
 from etendue.instruments.near_field.setting import Setting, counts_dtype
 from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.ray_stream import checked_seed
 from etendue.quantities.spool import Spool
 
 Array = npt.NDArray[np.float64]
@@ -176,13 +177,11 @@ class NearFieldGoniophotometer:
         Raises
         ------
         ArgumentError
-            If the lamp reaches as far as the camera or the photometer, or is dark from everywhere.
+            If the lamp reaches as far as the camera or the photometer, is dark from everywhere, or there is no such seed.
         FormatError, OSError, SceneError
             As the reading of a file.
         """
-        if seed < 0:
-            raise ArgumentError(f"a seed of {seed}; give 0 or more.")
-        source = lamp_of(lamp, samples, size, seed, threads)
+        source = lamp_of(lamp, samples, size, checked_seed(seed), threads)
         setting, around = self._setting(source)
         workers = threads or os.cpu_count() or 1
         stops, seen, light, light_error, brightest = self._look(source, setting, around, seed, progress)

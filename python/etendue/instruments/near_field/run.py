@@ -27,7 +27,7 @@ from etendue.quantities.observer import Observer
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.ray_stream import Progress
+from etendue.quantities.ray_stream import Progress, checked_seed
 from etendue.quantities.spool import Spool
 from etendue.units import MM2_PER_M2, FluxUnit
 
@@ -303,7 +303,7 @@ class NearFieldRun:
 
     def closest_surface(self, seed: int = 1) -> Surface:
         """The surface of least étendue that nearly all pixels look at: where rays start unless stated otherwise."""
-        return closest_surface(self._pilot(seed), seed)
+        return closest_surface(self._pilot(checked_seed(seed)), seed)
 
     def _pilot(self, seed: int) -> RaySet:
         """Some rays along the lines of pixels, where these pass the centre at their closest."""
@@ -348,12 +348,12 @@ class NearFieldRun:
         Raises
         ------
         ArgumentError
-            If the number of rays is impossible.
+            If the number of rays is impossible, or there is no such seed.
         """
         if rays is not None and not 1 <= rays <= 10**11:
             raise ArgumentError(f"{rays} rays; give at least one.")
         pixels = self._pixel_rays
-        at = self._surface(surface, seed)
+        at = self._surface(surface, checked_seed(seed))
         n = pixels.flux.size if rays is None else int(rays)
         summed = None if rays is None else np.cumsum(pixels.flux, dtype=np.float64)
         offset = float(np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 7)))).random())
