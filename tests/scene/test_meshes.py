@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import importlib.util
+import itertools
 import json
 import struct
 import sys
@@ -207,6 +208,33 @@ def test_a_mesh_inside_out_is_turned() -> None:
         mesh = {"kind": "mesh", "vertices": OCTAHEDRON, "triangles": triangles}
         (face,) = compile_scene(Scene(solids=[{"shape": mesh, "medium": "BK7"}])).record["faces"]
         assert face["flip"] is flip
+
+
+def test_each_shell_of_a_mesh_is_turned_outwards() -> None:
+    """Whatever the senses that a file has: the volume is that of two octahedra and a hollow one with a body in its cavity.
+
+    An octahedron of half-diagonals 2 s has 32 s³/3. Cavities run the other way than what is around them.
+    """
+    parts = ((1.0, (5.0, 0, 0)), (0.5, (-5.0, 0, 0)), (3.0, (0.0, 9, 0)), (2.0, (0.0, 9, 0)), (1.0, (0.1, 9, 0)))
+    true = np.array([1, 1, 1, -1, 1])
+    expected = 32 / 3 * sum(sense * size**3 for sense, (size, _) in zip(true, parts, strict=True))
+    for wrong in itertools.product((1, -1), repeat=3):
+        # The parts of the hollow one are turned together, as files have them.
+        senses = true * [wrong[0], wrong[1], *[wrong[2]] * 3]
+        corners = np.concatenate([CORNERS * size + at for size, at in parts])
+        rows = [np.array(OCTANTS)[:, ::sense] + len(CORNERS) * k for k, sense in enumerate(senses)]
+        mesh = {"kind": "mesh", "vertices": corners.tolist(), "triangles": np.concatenate(rows).tolist()}
+        (face,) = compile_scene(Scene(solids=[{"shape": mesh, "medium": "BK7"}])).record["faces"]
+        found = volume(face["shape"]["vertices"], face["shape"]["triangles"].astype(np.int64))
+        assert (-found if face["flip"] else found) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_shell_within_one_of_the_same_sense_is_doubted() -> None:
+    corners = np.concatenate([CORNERS * 2, CORNERS])
+    rows = np.concatenate([OCTANTS, np.array(OCTANTS) + len(CORNERS)])
+    mesh = {"kind": "mesh", "vertices": corners.tolist(), "triangles": rows.tolist()}
+    with pytest.warns(SceneWarning, match="lies within another part that runs the same way"):
+        compile_scene(Scene(solids=[{"shape": mesh, "medium": "BK7"}]))
 
 
 def test_welding_keeps_the_surface() -> None:
