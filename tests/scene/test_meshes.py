@@ -18,7 +18,7 @@ from etendue.description.files import Files
 from etendue.errors import FormatError, MissingLibraryError, SceneError, SceneWarning
 from etendue.scene import Scene, bodies, compile_scene
 from etendue.scene.mesh_files import MESH_FORMATS, read_mesh
-from etendue.scene.triangles import open_edges, smooth_normals, volume, welded
+from etendue.scene.triangles import directed_areas, open_edges, smooth_normals, volume, welded
 from oracles import step
 from oracles.meshes import divided_sphere
 from oracles.scenes import OCTAHEDRON, OCTANTS
@@ -190,6 +190,73 @@ def test_truncated_files_are_refused_or_smaller(name: str, tmp_path: Path) -> No
             continue
         assert len(mesh.triangles) <= 8
         assert np.abs(mesh.vertices).max() <= 2.0
+
+
+def obj_mesh(folder: Path, text: str) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    (folder / "body.obj").write_text(text, encoding="utf-8")
+    mesh = read_mesh(folder / "body.obj", None)
+    return mesh.vertices, mesh.triangles
+
+
+def test_vertices_of_obj_files_are_counted_from_either_end(tmp_path: Path) -> None:
+    """Bodies that name their own vertices by numbers below 0 lie apart: together they have twice the volume of one.
+
+    In between stand remarks, blanks, tabs, a line that goes on in the next one, and a file's mark of its encoding.
+    """
+    text = "\ufeff# " + "a remark " * 300 + "\n"
+    for k in range(2):
+        text += f"o body {k}\n" + "".join(f"v {c[0] + 9 * k:g} {c[1]:g} {c[2]:g} # a corner\n" for c in CORNERS)
+        text += "".join(f"  f\t{a - 6}/1 \\\n {b - 6}//2 {c - 6}\n" for a, b, c in OCTANTS)
+    vertices, triangles = obj_mesh(tmp_path, text)
+    assert volume(vertices, triangles) == pytest.approx(2 * volume(CORNERS, np.array(OCTANTS)), rel=1e-12)
+    assert not len(open_edges(triangles))
+
+
+def test_polygons_of_obj_files_may_have_reentrant_corners(tmp_path: Path) -> None:
+    """Triangles of a polygon do not overlap: their areas add up to its own, ½ |Σ p × p'|, whichever corner comes first.
+
+    A star without symmetry, tilted in space; and a square with a hole, joined to the rim by an edge that is there twice.
+    """
+    angle = np.arange(14) * 2 * np.pi / 14
+    star = np.stack([np.cos(angle), np.sin(angle)]) * np.where(np.arange(14) % 2, 0.3, 1 + 0.1 * np.arange(14))
+    frame = [(0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)]
+    for corners in (star.T, np.array(frame, dtype=np.float64)):
+        x, y = corners.T
+        area = 0.5 * abs((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+        tilted = corners @ np.array([[0.6, 0, 0.8], [0, 1, 0]])
+        for first in range(len(corners)):
+            order = np.roll(np.arange(len(corners)), first)
+            text = "".join("v {!r} {!r} {!r}\n".format(*p.tolist()) for p in tilted)
+            vertices, triangles = obj_mesh(tmp_path, text + "f " + " ".join(str(i + 1) for i in order) + "\n")
+            doubled, _ = directed_areas(vertices, triangles)
+            assert 0.5 * np.linalg.norm(doubled, axis=1).sum() == pytest.approx(area, rel=1e-12)
+            assert (doubled @ doubled[0] > 0.0).all()
+            assert len(triangles) == len(corners) - 2
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("v 0 0 1,5\n\n", "line 1: 'v 0 0 1,5' is no vertex"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", "line 4: 'f 1 2' is no face"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 0\n", "line 4: 'f 1 2 0' is no face"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 -4\n", "line 5: a face names a vertex that is not there"),
+        ("v 0 0 0\nv 4 3 0\nv 4 0 0\nv 0 2 0\nf 1 2 3 4\n", "line 5: a polygon crosses itself"),
+    ],
+)
+def test_obj_files_that_are_damaged(text: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=words):
+        obj_mesh(tmp_path, text)
+
+
+def test_text_stl_that_is_cut_off_is_refused(tmp_path: Path) -> None:
+    """Its first solid is whole: without the second one the body would be another."""
+    two = stl_ascii(1.0) + stl_ascii(2.0)
+    (tmp_path / "cut").write_bytes(two[: int(0.8 * len(two))])
+    with pytest.raises(FormatError, match=r"1\d facets begin, and 8 of them can be read"):
+        read_mesh(tmp_path / "cut", None)
+    (tmp_path / "loud").write_bytes(two.upper())
+    assert len(read_mesh(tmp_path / "loud", None).triangles) == 16
 
 
 def test_open_and_twisted_meshes_are_doubted() -> None:

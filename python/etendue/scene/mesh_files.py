@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from etendue.errors import FormatError
 from etendue.formats.head import STEP_SIGNATURE
 from etendue.quantities.memory import require_memory
 from etendue.scene.mesh_limits import LARGEST_FILE, check_mesh, require_mesh_memory
+from etendue.scene.obj_files import read_obj
 from etendue.scene.stated_normals import states_normals
 from etendue.scene.step_files import StepBody, read_step
 from etendue.units import MM_PER_LENGTH_UNIT
@@ -23,8 +25,11 @@ from etendue.units import MM_PER_LENGTH_UNIT
 Array = npt.NDArray[np.float64]
 Triangles = npt.NDArray[np.int64]
 
-HEAD = 512
-"""Bytes that tell a format."""
+HEAD = 1 << 14
+"""Bytes that tell a format: remarks may stand first."""
+
+
+_FACET = re.compile(rb"^\s*facet\b", re.MULTILINE | re.IGNORECASE)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,7 +64,7 @@ def _is_binary_stl(head: bytes, size: int) -> bool:
 
 
 def _is_obj(head: bytes, _size: int) -> bool:
-    lines = [line.split() for line in head.decode("utf-8", errors="replace").splitlines()[:-1]]
+    lines = [line.split() for line in head.decode("utf-8-sig", errors="replace").splitlines()[:-1]]
     first = next((line[0] for line in lines if line and not line[0].startswith("#")), "")
     return first in {"v", "vn", "vt", "o", "g", "s", "mtllib", "usemtl", "f"}
 
@@ -73,7 +78,7 @@ MESH_FORMATS: dict[str, MeshFormat] = {
         MeshFormat("gltf", "glTF", lambda head, _: head.lstrip().startswith(b"{"), 1000.0),
         # Binary STL before text: there are binary files that begin with "solid".
         MeshFormat("stl", "binary STL", _is_binary_stl),
-        MeshFormat("stl_ascii", "STL", lambda head, _: head.lstrip().startswith(b"solid")),
+        MeshFormat("stl_ascii", "STL", lambda head, _: head.lstrip()[:5].lower() == b"solid"),
         MeshFormat("obj", "OBJ", _is_obj),
     )
 }
@@ -156,7 +161,7 @@ def read_mesh(path: Path, unit: str | None, tolerance: float | None = None, body
     if form.name == "step":
         mesh = _step_body(path, read_step(path, raw, tolerance, body))
     else:
-        vertices, triangles = _load(path, form, raw)
+        vertices, triangles = read_obj(path, raw) if form.name == "obj" else _load(path, form, raw)
         mm = MM_PER_LENGTH_UNIT[unit] if unit is not None else form.mm or 1.0
         mesh = StoredMesh(vertices * mm, triangles, unread_normals=states_normals(form.name, raw))
     require_mesh_memory(path, len(mesh.triangles))
@@ -243,4 +248,9 @@ def _load(path: Path, form: MeshFormat, raw: bytes) -> tuple[Array, Triangles]:
         raise
     except Exception as error:  # noqa: BLE001 - whatever a damaged file makes the library raise
         raise FormatError(path, form.title, f"cannot be read ({error})", "The file is damaged, or no mesh.") from None
+    if form.name == "stl_ascii":
+        begun = len(_FACET.findall(raw))
+        if begun != len(triangles):
+            found = f"{begun:,} facets begin, and {len(triangles):,} of them can be read"
+            raise FormatError(path, "whole file", found, "The file is cut off, or damaged.")
     return vertices, triangles
