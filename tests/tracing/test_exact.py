@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
+from etendue.scene.detectors.illuminance import lowered_by_chance
 from etendue.tracing.result import TraceResult
 from numpy.polynomial.legendre import leggauss
 from oracles.intensity import hat_means
-from oracles.verdicts import SIGNIFICANCE, assert_agree, assert_drawn_with
+from oracles.verdicts import LARGEST_Z, SIGNIFICANCE, assert_agree, assert_drawn_with
 from scipy.stats import chi2
 
 Array = npt.NDArray[np.float64]
@@ -27,6 +29,31 @@ def traced(rays: float, seed: int = 1, **scene: Any) -> TraceResult:
 
 
 # --- free space ------------------------------------------------------------------------------------------------------
+
+
+def test_chance_lowers_the_least_of_equal_cells_as_is_told() -> None:
+    """100 cells of the same light, 10⁴ rays each: what is taken off again leaves least/mean 1 on average.
+
+    The standard error of the average over 400 draws is that of their spread.
+    """
+    counts = np.random.default_rng(5).poisson(1e4, (400, 100)).astype(np.float64)
+    uniformity = counts.min(axis=1) / counts.mean(axis=1)
+    found = uniformity / [1.0 - lowered_by_chance(row, np.sqrt(row)) for row in counts]
+    assert abs(found.mean() - 1.0) < LARGEST_Z * found.std(ddof=1) / 20.0
+    assert uniformity.mean() < 0.98
+
+
+def test_noise_of_the_darkest_cell_is_told() -> None:
+    """A beam makes the same light in all cells; of 100 and of 0.5 rays in each, there is something to be said."""
+    beam = {"kind": "beam", "shape": {"kind": "rectangle", "width": 10, "height": 10}, "flux": 1, "at": [0, 0, -5]}
+    grid = {"name": "grid", "kind": "illuminance", "width": 10, "height": 10, "columns": 10, "rows": 10}
+    below = {**grid, "name": "below", "columns": 1, "rows": 1, "toward": [0, 0, -1]}
+    (told,) = traced(10_000, sources=[beam], detectors=[{**grid, "toward": [0, 0, -1]}]).illuminance["grid"].notes
+    assert re.match(r"the darkest of 100 cells is known to \d+ %; chance may have lowered it, .* by up to \d+ %", told)
+    (told,) = traced(50, sources=[beam], detectors=[{**grid, "toward": [0, 0, -1]}]).illuminance["grid"].notes
+    assert re.match(r"no ray met \d\d of 100 cells", told)
+    assert not traced(1000, sources=[beam], detectors=[below]).illuminance["below"].notes
+    assert not traced(1000, sources=[beam], detectors=[grid]).illuminance["grid"].notes
 
 
 @pytest.mark.parametrize("exponent", [1.0, 3.5])

@@ -252,6 +252,8 @@ class Steps(Iterator[SweepTable]):
         if len(seen) < len(self._measures):
             *_, result = trace_rounds(scene, self._rays, self._how.seed, threads=self._threads)
             notes += result.notes
+            for name in dict.fromkeys(m.of for m in self._measures if m.reads == "map" and m not in seen):
+                notes += result.notes_of(name)
         maps = {}
         if seen:
             seeable, told = with_fields(scene, self._threads, cache=self._cache, fits=self._fits)
