@@ -12,7 +12,7 @@ import pytest
 from etendue.luminance import scene_map
 from etendue.sweeps.measures import NOUNS
 from oracles.verdicts import LARGEST_Z, REVERSE, SIGNIFICANCE, assert_agree
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
 DIE: dict[str, Any] = {"name": "die", "kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 100}
 SCREEN: dict[str, Any] = {
@@ -213,6 +213,28 @@ def test_the_error_of_a_flux_does_not_hang_on_the_cells() -> None:
         assert fine.standard_error[name] == pytest.approx(coarse.standard_error[name], rel=1e-9)
     alone = et.trace(whole.replace(detectors=[DESK | {"columns": 1, "rows": 1, "at": [0.5, 0, 3]}]), 20_000, 1)
     assert coarse.standard_error["mean:desk"][1] == alone.illuminance["desk"].standard_error[0, 0]
+
+
+def test_no_error_is_stated_of_light_that_is_counted_several_times() -> None:
+    """In a white sphere rays pass a detector again and again: of several cells, and of rays, no error is known.
+
+    That of a single cell holds: squares of deviations over 40 seeds, each over its own error, are χ² with 39 degrees.
+    """
+    plane = {"width": 12, "height": 12}
+    detectors = [
+        {"name": "grid", "kind": "illuminance", "columns": 2, "rows": 2, **plane},
+        {"name": "cell", "kind": "illuminance", "columns": 1, "rows": 1, **plane},
+        {"name": "rays", "kind": "rays", "shape": {"kind": "rectangle", **plane}},
+    ]
+    ball = {"shape": {"kind": "sphere", "radius": 10}, "finish": {"kind": "lambertian", "reflectance": 0.9}}
+    sphere = et.Scene(sources=[{**DIE, "at": [1, 2, 3]}], surfaces=[ball], detectors=detectors)
+    measures = ["mean:grid", "flux:grid", "flux:rays", "mean:cell"]
+    tables = [et.sweep(sphere, {"die.at.0": [1.0]}, measures, rays=500, seed=seed) for seed in range(40)]
+    assert all(np.isnan(table.standard_error[name]).all() for table in tables for name in measures[:3])
+    values, errors = (np.array([float(part["mean:cell"][0]) for part in parts]) for parts in (
+        tables, [table.standard_error for table in tables]))  # fmt: skip
+    squares = (((values - values.mean()) / errors) ** 2).sum()
+    assert SIGNIFICANCE / 2 < chi2.cdf(squares, 39) < 1 - SIGNIFICANCE / 2
 
 
 @pytest.mark.slow

@@ -26,6 +26,10 @@ Array = npt.NDArray[np.float64]
 Reads = Literal["ledger", "detector", "map", "observer"]
 
 
+ROUNDING = 1e-9
+"""By which a flux may exceed that of all rays because it was added up in another order: 10⁻¹⁶ of each of 10⁷ terms."""
+
+
 class Found(NamedTuple):
     """A number, its standard error (NaN where unknown) and its unit (empty if it has none).
 
@@ -224,7 +228,7 @@ def share_error(flux: float, result: TraceResult) -> float:
 
     That of a share of independent rays: √(p (1 − p)/n), n the number of equal rays that are as good as those of the sources
     (`TraceResult.effective_rays`). Rays are dealt to sources, and over sources, more evenly than by chance; so the error is
-    at most this.
+    at most this. NaN of more flux than there is: then rays were counted several times.
 
     Examples
     --------
@@ -235,6 +239,8 @@ def share_error(flux: float, result: TraceResult) -> float:
     """
     total = result.ledger.total.flux
     if not total > 0.0 or not result.effective_rays > 0.0:
+        return math.nan
+    if flux > total * (1.0 + ROUNDING):
         return math.nan
     share = min(max(flux / total, 0.0), 1.0)
     return total * math.sqrt(share * (1.0 - share) / result.effective_rays)
@@ -312,10 +318,13 @@ def _peak(step: Step, of: str) -> Found:
 def _cells_error(found: IlluminanceMap, result: TraceResult, inside: npt.NDArray[np.bool_] | None) -> float:
     """Standard error of the flux [flux unit] on some cells, if a ray meets one of them, once, or none.
 
-    The sums of squares of the cells are then those of all of them together: Σ w² − (Σ w)²/n of a cell is its variance.
+    The sums of squares of the cells are then those of all of them together: Σ w² − (Σ w)²/n of a cell is its variance. NaN
+    if more flux meets the cells than there is, so that rays did so several times.
     """
     area = found.screen.pixel_area / MM2_PER_M2
     counted = np.ones(found.values.shape, dtype=np.bool_) if inside is None else inside
+    if counted.sum() > 1 and found.flux > result.ledger.total.flux * (1.0 + ROUNDING):
+        return math.nan
     flux, error = found.values[counted] * area, np.nan_to_num(found.standard_error[counted]) * area
     if not flux.any() or not result.effective_rays > 0.0:
         return math.nan
