@@ -11,6 +11,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, FormatError
+from etendue.instruments.near_field.camera import Camera
+from etendue.instruments.near_field.far_field import step_notes
+from etendue.instruments.near_field.positions import ArmPositions
+from etendue.instruments.near_field.setting import Setting
 from oracles.verdicts import LARGEST_Z, SIGNIFICANCE
 from scipy.stats import chi2
 
@@ -351,6 +355,34 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
 def test_impossible_measurements_are_told(settings: dict[str, object], told: str) -> None:
     with pytest.raises(ArgumentError, match=told):
         et.NearFieldGoniophotometer(**{"step": 30, "camera_pixels": 16} | settings).measure(two_parts, size=3.4)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("step", "toward", "ways"),
+    [
+        ((30, 30), (0, 0, 1), ["along γ"]),
+        ((10, 90), (1, 0, 1), ["along C"]),
+        ((10, 30), (1, 0, 1), []),
+        ((10, 90), (0, 0, 1), []),
+    ],
+)
+def test_beams_between_positions_are_told(
+    step: tuple[float, float], toward: tuple[float, float, float], ways: list[str]
+) -> None:
+    """cos¹⁰ of the angle to an axis: where the flux of the positions is off by 2 %, a note says so.
+
+    With I = cosⁿ the flux is 2π/(n + 1).
+    """
+    stops = ArmPositions(*step)
+    axis = np.array(toward) / np.linalg.norm(toward)
+    gamma, c = np.radians(stops.gamma), np.radians(stops.c)
+    cosine = np.stack([np.sin(gamma) * np.cos(c), np.sin(gamma) * np.sin(c), np.cos(gamma)], axis=1) @ axis
+    light = np.maximum(cosine, 0.0) ** 10
+    off = abs(stops.weight @ light / (2 * np.pi / 11) - 1.0)
+    setting = Setting(stops, Camera(8), 100.0, 100.0, 5.0, (0.0, 0.0, 0.0), 4.0)
+    told = list(step_notes(setting, stops.table(light)))
+    assert [way for way in ("along γ", "along C") if any(way in note for note in told)] == ways
+    assert (off > 0.02) == bool(ways)
 
 
 @pytest.mark.parametrize("seed", [-1, 1 << 64, 0.5])

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.formats.input import as_path
-from etendue.instruments.near_field.far_field import far_field_notes
+from etendue.instruments.near_field.far_field import far_field_notes, step_notes
 from etendue.instruments.near_field.merging import Merging, stretches
 from etendue.instruments.near_field.pixel_rays import PixelRays, in_blocks
 from etendue.instruments.near_field.setting import Setting, counts_dtype
@@ -102,7 +102,10 @@ class NearFieldRun:
 
     @property
     def total_flux_error(self) -> float:
-        """Standard error of `total_flux` by that of the readings [`flux_unit`]."""
+        """Standard error of `total_flux` by that of the readings [`flux_unit`].
+
+        What the integral misses between positions is not in it; `notes` tell where a beam is too narrow for their steps.
+        """
         square = self.setting.photometer_distance**2 / MM2_PER_M2
         return float(np.linalg.norm(self.setting.positions.weight * self.illuminance_error)) * square
 
@@ -116,6 +119,7 @@ class NearFieldRun:
         stops = self.setting.positions
         square = self.setting.photometer_distance**2 / MM2_PER_M2
         values = stops.table(self.illuminance) * square
+        told = (*far_field_notes(self.setting, values), *step_notes(self.setting, values), *self.source_notes)
         return Intensity(
             stops.planes,
             stops.rings,
@@ -124,7 +128,7 @@ class NearFieldRun:
             self.flux_unit,
             self.total_flux_error,
             provenance=self.provenance.then("intensity by the photometer"),
-            notes=(*far_field_notes(self.setting, values), *self.source_notes),
+            notes=told,
         )
 
     # --- the camera --------------------------------------------------------------------------------------------------
@@ -282,6 +286,7 @@ class NearFieldRun:
             told.append(
                 f"how much longer an exposure is than the one before is known of exposure {which}: few pixels show in both"
             )
+        told += step_notes(self.setting, self.setting.positions.table(self.illuminance))
         return tuple(told)
 
     # --- rays --------------------------------------------------------------------------------------------------------
