@@ -87,6 +87,17 @@ def test_the_light_around_a_scene_is_all_of_it() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.slow
+def test_the_progress_of_a_scene_goes_on_through_the_fit() -> None:
+    """It rises from the first rays to all of them, and most of it is the fit's."""
+    seen: list[int] = []
+    lamp = {"kind": "surface", "shape": {"kind": "rectangle", "width": 2, "height": 1}, "flux": 5}
+    exhibit_of(et.Scene(sources=[lamp]), name="lamp", rays=5000, cache=False, progress=seen.append)
+    assert seen == sorted(seen)
+    assert seen[-1] == 5000
+    assert sum(done > 1250 for done in seen) > 3
+
+
 def test_curves_lie_on_the_faces_and_in_their_planes() -> None:
     """Of a ball: |x - c| = r within what simplification may take, in every plane that cuts it; and none is left out."""
     ball = {"shape": {"kind": "ball", "radius": 3}, "medium": "BK7", "at": [1, -2, 5]}

@@ -32,6 +32,9 @@ SCENE_RAYS = 2_000_000
 AROUND = 1.01
 """Radius of the sphere on which the light of a scene is collected, in radii of the ball about all that has an end."""
 
+TRACED = 0.25
+"""Of the work on a scene: the rest is the fit, whose search for a surface takes longer than the trace of most scenes."""
+
 COLLECTOR = "all light that leaves"
 """Name of the detector that is put around a scene."""
 
@@ -174,11 +177,18 @@ def exhibit_of(
     if isinstance(viewable, LightField):
         return Exhibit(field_subject(viewable, name, file), viewable)
     if isinstance(viewable, Scene):
-        light = light_of(viewable, rays or SCENE_RAYS, seed, threads, progress)
-        field = fit_or_recall(light, cache=cache, threads=threads)
+        whole = rays or SCENE_RAYS
+        light = light_of(viewable, whole, seed, threads, _part_of(progress, 0.0, TRACED, whole))
+        fitting = _part_of(progress, TRACED * whole, (1.0 - TRACED) * whole / len(light), whole)
+        field = fit_or_recall(light, cache=cache, threads=threads, progress=fitting)
         return Exhibit({**field_subject(field, name, file), **_scene_subject(viewable, seed)}, field, viewable)
     field = fit_or_recall(viewable, cache=cache, threads=threads, progress=progress)
     return Exhibit(field_subject(field, name, file), field)
+
+
+def _part_of(progress: Progress | None, before: float, each: float, whole: float) -> Progress | None:
+    """The progress of a part of the work, of which each ray counts as so much of one."""
+    return None if progress is None else lambda done: progress(min(round(before + each * done), int(whole)))
 
 
 def _scene_subject(scene: Scene, seed: int) -> dict[str, Any]:
