@@ -32,6 +32,7 @@ __all__ = [
     "index_leaf",
     "index_place",
     "index_sums",
+    "kept_ray_keys",
     "look_at_events",
     "look_at_scene",
     "losses",
@@ -39,6 +40,7 @@ __all__ = [
     "polya_average",
     "polya_evidence",
     "polya_posterior",
+    "ray_keys",
     "rays_of_part",
     "read_colours",
     "read_rays",
@@ -300,6 +302,14 @@ _Source: TypeAlias = RayTable | RingSource | FieldRays
 
 def read_rays(source: _Source, start: int, stop: int) -> tuple[_Floats, _Floats, _Floats]:
     """Rays ``start..stop`` as (position (n, 3) [mm], unit direction (n, 3), flux (n,))."""
+
+def ray_keys(position: _Floats, direction: _Floats) -> npt.NDArray[np.uint64]:
+    """A key of each ray's place and direction (n, 3), to single precision: that of copies is the same, that of others is not."""
+
+def kept_ray_keys(
+    source: _Source, ranges: Sequence[tuple[int, int]], every: int, threads: int | None = None
+) -> tuple[npt.NDArray[np.uint64], _Floats]:
+    """Keys that are multiples of `every`, and the flux, of the rays of ranges (start, stop) that have flux."""
 
 def read_colours(source: _Source, start: int, stop: int) -> _Floats:
     """What the records of rays ``start..stop`` state of their colours, as they were opened, shape (n,); (0,) if nothing."""

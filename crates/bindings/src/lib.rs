@@ -16,6 +16,7 @@ mod guide;
 mod patches;
 mod polya;
 mod ray_index;
+mod ray_keys;
 mod run;
 mod scan;
 mod scene;
@@ -47,6 +48,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<dealing::Dealing>()?;
     module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;
     module.add_function(wrap_pyfunction!(source::read_colours, module)?)?;
+    module.add_function(wrap_pyfunction!(ray_keys::ray_keys, module)?)?;
+    module.add_function(wrap_pyfunction!(ray_keys::kept_ray_keys, module)?)?;
     module.add_function(wrap_pyfunction!(source::draw_wavelengths, module)?)?;
     module.add_function(wrap_pyfunction!(scan::scan, module)?)?;
     module.add_function(wrap_pyfunction!(scan::scan_colours, module)?)?;

@@ -2,7 +2,7 @@
 //!
 //! Rays: `ray_batch` is a structure of arrays that the inner loops run over, `source` anything that yields rays by index,
 //! `table` records in memory or in a file, `stored` a stretch of a file, `tally` the flux account of a pass, `scan` the
-//! statistics of a ray set in one pass, `colours` its flux by wavelength.
+//! statistics of a ray set in one pass, `colours` its flux by wavelength, `ray_keys` what copies of a ray have in common.
 //!
 //! Surfaces: `shape` holds the kinds of surface, `mesh` triangles, `face` a shape in its place, `bounds` and `bvh` what spares
 //! the tests that cannot succeed. `ray_block`: rays that look for surfaces; `origin_faces`: the faces that they start on;
@@ -22,6 +22,7 @@ mod pass;
 pub mod pass_account;
 pub mod ray_batch;
 pub mod ray_block;
+pub mod ray_keys;
 pub mod scan;
 pub mod shape;
 pub mod source;

@@ -32,9 +32,6 @@ TAKEN = (
 )
 """What becomes of copies."""
 
-ODD = np.uint64(0x9E3779B97F4A7C15)
-SHIFT = np.uint64(29)
-
 
 def keys_of(position: FloatArray, direction: FloatArray) -> Keys:
     """A key of each ray's place and direction, to single precision: that of copies is the same, that of others is not.
@@ -48,14 +45,7 @@ def keys_of(position: FloatArray, direction: FloatArray) -> Keys:
     >>> bool(key[0] == key[1]), bool(key[0] == key[2])
     (True, False)
     """
-    # Single precision, since a direction that is normalised again may change in its last bit; adding 0 makes 0 of -0.
-    numbers = np.concatenate([position, direction], axis=1, dtype=np.float32, casting="same_kind")
-    numbers += np.float32(0.0)
-    key = np.zeros(len(numbers), dtype=np.uint64)
-    for pair in numbers.view(np.uint64).T:
-        key = (key ^ pair) * ODD
-        key ^= key >> SHIFT
-    return key
+    return _core.ray_keys(np.asarray(position, np.float64), np.asarray(direction, np.float64))
 
 
 class Repeats(NamedTuple):
@@ -97,24 +87,15 @@ class Repeats(NamedTuple):
         (Repeats(rays=300, repeated=0, excess=1.0), Repeats(rays=600, repeated=300, excess=2.0))
         """
         n, looked = len(rays), min(len(rays), STRETCHES * stretch)
-        every = np.uint64(max(1, looked // KEPT))
         starts = range(0, n, stretch) if looked == n else [i * n // STRETCHES for i in range(STRETCHES)]
-        kept, carried = [np.zeros(0, dtype=np.uint64)], [np.zeros(0)]
-        source = rays.core_source()
-        for start in starts:
-            position, direction, flux = _core.read_rays(source, start, min(start + stretch, n))
-            key = keys_of(position, direction)
-            lit = (key % every == 0) & (flux > 0.0)
-            kept.append(key[lit])
-            carried.append(flux[lit])
-        keys = np.concatenate(kept)
+        ranges = [(start, min(start + stretch, n)) for start in starts]
+        keys, flux = _core.kept_ray_keys(rays.core_source(), ranges, max(1, looked // KEPT))
         ordered = np.sort(keys)
         found = cls(keys.size, int(np.count_nonzero(ordered[1:] == ordered[:-1])))
         if not found.repeated:
             return found
         # Over the largest, so that no square is lost.
-        weight = np.concatenate(carried)
-        weight /= weight.max()
+        weight = flux / flux.max()
         together = np.bincount(np.unique(keys, return_inverse=True)[1], weight)
         return found._replace(excess=float((together**2).sum() / (weight**2).sum()))
 
