@@ -386,7 +386,7 @@ def test_intensity_of_a_field(run: Run, folder: Path, tmp_path: Path) -> None:
         (["sample", "{}/dome.h5", "-n", "5", "-o", "a.xyz"], 1, "belongs to no ray format"),
         (["sample", "{}/dome.h5", "-n", "5", "-o", "a.csv", "-o", "b.ray"], 1, "belongs to several formats: "),
         (["sample", "{}/dome.h5", "-n", "5", "-o", "none/a.csv"], 1, "does not exist"),
-        (["sample", "{}/dome.h5", "-n", "5", "-o", "a.csv", "--seed", "-1"], 1, "seed -1"),
+        (["sample", "{}/dome.h5", "-n", "5", "-o", "a.csv", "--seed", "-1"], 2, "give 0 or more"),
         (["sample", "{}/led.tm25ray", "-n", "5", "-o", "a.csv"], 1, "led.tm25ray"),
         (["sample", "{}/short.h5", "-n", "5", "-o", "a.csv"], 1, "short.h5"),
         (["sample", "{}/nothere.h5", "-n", "5", "-o", "a.csv"], 1, "nothere.h5: No such file"),
