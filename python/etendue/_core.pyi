@@ -304,7 +304,7 @@ def read_rays(source: _Source, start: int, stop: int) -> tuple[_Floats, _Floats,
     """Rays ``start..stop`` as (position (n, 3) [mm], unit direction (n, 3), flux (n,))."""
 
 def ray_keys(position: _Floats, direction: _Floats) -> npt.NDArray[np.uint64]:
-    """A key of each ray's place and direction (n, 3), to single precision: that of copies is the same, that of others is not."""
+    """A key of each ray's place and direction (n, 3), to single precision: the same for copies, another for others."""
 
 def kept_ray_keys(
     source: _Source, ranges: Sequence[tuple[int, int]], every: int, threads: int | None = None
