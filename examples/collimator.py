@@ -48,9 +48,11 @@ def main() -> None:
         agree(
             f"luminance {low:g} to {high:g} mm from the axis [cd/m²]", float(maps[0].values[ring].mean()), truth, error
         )
-    if max(float(lmap.values.max()) for lmap in maps) > die:
+    # Where small images of the die, reflected twice in the lens, lie on the large one, pixels have some noise.
+    brightest = max(float((lmap.values - 5.0 * np.nan_to_num(lmap.standard_error)).max()) for lmap in maps)
+    if brightest > die:
         raise SystemExit("a lens in air raises no luminance")
-    print("nowhere brighter than the die")
+    print("nowhere brighter than the die by more than the noise")
     titles = [f"{theta:g}° off the axis" for theta in looks]
     draw_maps(Path("collimator.png"), "A die behind a collimating lens", titles, [("", maps)], size=2.6)
     print("picture: collimator.png")
