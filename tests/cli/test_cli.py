@@ -353,6 +353,15 @@ def test_info_tells_of_rays_that_a_file_holds_twice(run: Run, folder: Path) -> N
     assert "repeat" not in run("info", folder / "led.dat").out
 
 
+def test_info_of_pencils_of_light_counts_all_their_rays(run: Run, tmp_path: Path) -> None:
+    """6 000 equal rays along three lines: light of no width, and no copies of three rays."""
+    place = np.tile(5.0 * np.eye(3), (2000, 1))
+    et.write_rays(tmp_path / "pencils.tm25ray", et.RaySet(place, np.tile([0.0, 0, 1], (6000, 1)), np.ones(6000)))
+    (facts,) = run("info", tmp_path / "pencils.tm25ray", "--json").json
+    assert facts["effective_rays"] == pytest.approx(6000)
+    assert not [c for c in facts["complaints"] if "repeat" in c["found"]]
+
+
 def test_info_tells_the_wavelengths_that_are_known(run: Run, tmp_path: Path, folder: Path) -> None:
     data = bytearray((folder / "watts.tm25ray").read_bytes())
     rays = np.asarray(et.read_rays(folder / "watts.tm25ray").records)

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from etendue.formats.rays import RAY_FORMATS
+from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress
-from etendue.quantities.repeated_rays import TAKEN, Repeats
+from etendue.quantities.repeated_rays import TAKEN
 from etendue.quantities.report import Complaint
 
 NO_RAY = "no ray can be used"
@@ -42,11 +43,10 @@ def ray_facts(rays: RaySet, path: str | Path, progress: Progress | None = None) 
     focus = rays.virtual_focus
     low, high = moments.flux_range
     known = len(rays) > rays.tally.unusable
-    repeats = rays.repeats() if rays.has_position else Repeats(0, 0)
-    complaints = rays.complaints
+    distinct, complaints = DistinctRays.of(rays, join=False), rays.complaints
     # A set that tells of copies itself tells enough.
-    if repeats.told is not None and rays.meaning.copies <= 1.0:
-        complaints = (*complaints, Complaint("warning", "rays", f"{repeats.told}: {TAKEN}"))
+    if distinct.told is not None and rays.meaning.copies <= 1.0:
+        complaints = (*complaints, Complaint("warning", "rays", f"{distinct.told}: {TAKEN}"))
     return {
         "file": str(path),
         "format": rays.provenance.format,
@@ -57,7 +57,7 @@ def ray_facts(rays: RaySet, path: str | Path, progress: Progress | None = None) 
         "total_flux": rays.total_flux,
         "header_flux": rays.header.get("total_flux"),
         "sum_flux": rays.tally.flux * rays.meaning.stored_flux_scale,
-        "effective_rays": rays.tally.effective_rays / repeats.excess,
+        "effective_rays": rays.tally.effective_rays / distinct.excess,
         "flux_per_ray": [low * rays.flux_scale, high * rays.flux_scale] if known else None,
         "bounding_box": moments.bounds.tolist() if known and rays.has_position else None,
         "virtual_focus": list(focus.point) if focus.determined else None,
