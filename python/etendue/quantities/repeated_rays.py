@@ -23,6 +23,12 @@ KEPT = 1 << 20
 STRETCHES = 64
 """Of larger sets than so many batches, as many are read, evenly spread; of a set merged with itself each with its copy."""
 
+GLANCE = 1 << 18
+"""Rays, some of all parts of a set, that tell whether it is worth comparing more."""
+
+HINT = 16
+"""Rays of a glance that repeat another one, from which on it is."""
+
 FEWEST, SHARE = 100, 0.01
 """Repeated rays, and their share, that are worth a word: text of few digits makes some by chance."""
 
@@ -48,6 +54,24 @@ def keys_of(position: FloatArray, direction: FloatArray) -> Keys:
     return _core.ray_keys(np.asarray(position, np.float64), np.asarray(direction, np.float64))
 
 
+def glanced_at(rays: int) -> list[tuple[int, int]]:
+    """Ranges (start, stop) of a large set among which copies show: its ends, and a piece in every stretch as long as these.
+
+    An end that stands anywhere else once more lies over such a piece there.
+
+    Examples
+    --------
+    >>> ranges = glanced_at(10_000_000)
+    >>> ranges[0], ranges[-1], len(ranges), sum(stop - start for start, stop in ranges) <= GLANCE
+    ((0, 65536), (9934464, 10000000), 153, True)
+    """
+    end = GLANCE // 4
+    starts = range(end, rays - end, end)
+    piece = max(2 * end // max(len(starts), 1), 4 * HINT)
+    pieces = [(start, min(start + piece, rays - end)) for start in starts]
+    return [(0, end), *pieces, (rays - end, rays)]
+
+
 class Repeats(NamedTuple):
     """Of rays that were compared: how many, how many of them repeat another one, and what that is worth.
 
@@ -70,7 +94,7 @@ class Repeats(NamedTuple):
 
     @classmethod
     def of(cls, rays: RayStream, stretch: int = BATCH) -> Repeats:
-        """Of a set with positions, in one pass over its rays.
+        """Of a set with positions, in one pass over its rays; of a large one, over few of them unless these show copies.
 
         Parameters
         ----------
@@ -87,12 +111,20 @@ class Repeats(NamedTuple):
         (Repeats(rays=300, repeated=0, excess=1.0), Repeats(rays=600, repeated=300, excess=2.0))
         """
         n, looked = len(rays), min(len(rays), STRETCHES * stretch)
+        if n > 2 * GLANCE:
+            found = cls._among(rays, glanced_at(n), 1)
+            if found.repeated < HINT:
+                return found
         starts = range(0, n, stretch) if looked == n else [i * n // STRETCHES for i in range(STRETCHES)]
-        ranges = [(start, min(start + stretch, n)) for start in starts]
-        keys, flux = _core.kept_ray_keys(rays.core_source(), ranges, max(1, looked // KEPT))
+        return cls._among(rays, [(start, min(start + stretch, n)) for start in starts], max(1, looked // KEPT))
+
+    @classmethod
+    def _among(cls, rays: RayStream, ranges: list[tuple[int, int]], every: int) -> Repeats:
+        """Of those rays of some ranges whose key is a multiple of a number."""
+        keys, flux = _core.kept_ray_keys(rays.core_source(), ranges, every)
         ordered = np.sort(keys)
         found = cls(keys.size, int(np.count_nonzero(ordered[1:] == ordered[:-1])))
-        if not found.repeated:
+        if found.repeated < FEWEST:
             return found
         # Over the largest, so that no square is lost.
         weight = flux / flux.max()
