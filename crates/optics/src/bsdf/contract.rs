@@ -250,6 +250,27 @@ pub trait Bsdf: Debug + Send + Sync {
         None
     }
 
+    /// The greatest share of light that leaves, all components together, whatever its direction and wavelength; 1 where that is
+    /// not known. What is beyond is absorbed before anything else has to be known of a ray.
+    fn most(&self) -> f64 {
+        let Some([angles, wavelengths]) = self.breakpoints() else {
+            return 1.0;
+        };
+        let mut most = 0.0;
+        for angle in angles {
+            let (s, c) = angle.sin_cos();
+            for wavelength in &wavelengths {
+                let media = Media {
+                    wavelength: *wavelength,
+                    front: 1.0,
+                    back: 1.0,
+                };
+                most = self.shares(Vec3::new(s, 0.0, c), &media).total().max(most);
+            }
+        }
+        most
+    }
+
     /// Density \[1/sr\] of scattered directions.
     #[inline]
     fn pdf(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {

@@ -217,6 +217,10 @@ impl Bsdf for Mixture {
         Some(all)
     }
 
+    fn most(&self) -> f64 {
+        self.members.iter().map(|(weight, bsdf)| weight * bsdf.most()).sum()
+    }
+
     fn incoming(&self, scattered: Vec3, media: &Media) -> [f64; 2] {
         let mut all = [0.0; 2];
         for (weight, bsdf) in &self.members {

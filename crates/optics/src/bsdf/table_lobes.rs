@@ -332,6 +332,12 @@ impl Lobes {
         blends.any(|blend| blend.shares[2] > 0.0)
     }
 
+    /// The greatest share of the light.
+    pub(super) fn most(&self) -> f64 {
+        let blends = self.rows.iter().flat_map(|row| &row.blends);
+        blends.map(Blend::share).fold(0.0, f64::max)
+    }
+
     /// The only row, if there is one.
     pub(super) fn lone(&self) -> Option<&Lobe> {
         match &self.rows[..] {

@@ -44,6 +44,8 @@ pub struct Tabulated {
     /// Whether any slice has a floor; and the same without it, if anything is left.
     floor: bool,
     lobes: Option<Arc<dyn Bsdf>>,
+    /// See [`Bsdf::most`].
+    most: f64,
 }
 
 impl Tabulated {
@@ -68,10 +70,14 @@ impl Tabulated {
 
     fn of(sides: [Sheets; 2], floor: bool, lobes: Option<Arc<dyn Bsdf>>) -> Self {
         let diffuse = [0, 1].map(|way| sides.iter().flatten().any(|(_, ways)| ways[way].is_some()));
+        // Between wavelengths and angles shares are no more than at both ends.
+        let most = |(_, ways): &(f64, [Option<Lobes>; 2])| ways.iter().flatten().map(Lobes::most).sum();
+        let most = sides.iter().flatten().map(most).fold(0.0, f64::max);
         Self {
             sides,
             floor,
             lobes,
+            most,
             facts: Facts {
                 specular: [false; 2],
                 diffuse,
@@ -240,6 +246,10 @@ impl Bsdf for Tabulated {
             diffuse,
             refraction: incident.z.abs(),
         }
+    }
+
+    fn most(&self) -> f64 {
+        self.most
     }
 
     fn evaluate(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {

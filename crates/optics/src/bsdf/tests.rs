@@ -300,6 +300,37 @@ fn product_and_rest_are_all() {
 }
 
 #[test]
+fn no_more_leaves_than_is_known_beforehand() {
+    // Of some it is known closely, of a table as well.
+    let mut close = Vec::new();
+    for Example { name, bsdf, .. } in kinds().iter().flatten() {
+        let most = bsdf.most();
+        let mut found = 0.0_f64;
+        for (media, k) in MEDIA
+            .iter()
+            .flat_map(|media| (0..720).map(move |k| (media, f64::from(k))))
+        {
+            let incident = direction((k * 0.0123).cos(), k * 0.137);
+            let total = bsdf.shares(incident, media).total();
+            assert!(total <= most + 1e-9, "{name}: {total}, {most}");
+            found = found.max(total);
+            if most + 1e-9 < 1.0 {
+                let drawn = bsdf.sample(incident, media, [most + 1e-9, 0.4]);
+                assert_eq!(drawn, Drawn::Absorbed, "{name}");
+            }
+        }
+        if most < 1.0 && found > 0.97 * most {
+            close.push(name.clone());
+        }
+    }
+    let kinds = ["lambertian", "mirror", "mixture", "tabulated"];
+    assert!(
+        kinds.iter().all(|kind| close.iter().any(|name| name.starts_with(kind))),
+        "{close:?}"
+    );
+}
+
+#[test]
 fn facts_are_true() {
     let mut some = [false; 4];
     for Example { name, bsdf, .. } in kinds().iter().flatten() {

@@ -344,6 +344,11 @@ impl<'a> BatchTrace<'a> {
             let n = media.at(scene, 0, state.wavelength).n;
             // Not so if it is NaN, either.
             if n > 0.0 {
+                // Before it is known where and under which angle, unless somebody asks for that.
+                if !wants.exitance && sheet.absorbs(numbers[k]) {
+                    out.ledger.book(Fate::OnFace(sheet.face), state.flux);
+                    continue;
+                }
                 // No later than where it is: the numbers move up.
                 let place = self.going.len();
                 (numbers[place], turns[place]) = (numbers[k], turns[k]);

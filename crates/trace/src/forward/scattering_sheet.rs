@@ -20,7 +20,12 @@ pub struct ScatteringSheet<'a> {
     bsdf: &'a dyn Bsdf,
     /// A direction that the first axis of its surface follows, if one is stated.
     axis: Option<Vec3>,
+    /// No more of the light than this leaves, wherever it comes from.
+    most: f64,
 }
+
+/// What shares may exceed the greatest one by, for rounding.
+const SLACK: f64 = 1e-9;
 
 impl<'a> ScatteringSheet<'a> {
     /// A face with this BSDF, and the direction that its first axis follows; None if it lets light through.
@@ -28,7 +33,19 @@ impl<'a> ScatteringSheet<'a> {
     pub fn of(face: u32, bsdf: &'a dyn Bsdf, axis: Option<Vec3>) -> Option<Self> {
         let facts = bsdf.facts();
         let back = !facts.specular[1] && !facts.diffuse[1];
-        back.then_some(Self { face, bsdf, axis })
+        back.then(|| Self {
+            face,
+            bsdf,
+            axis,
+            most: bsdf.most() + SLACK,
+        })
+    }
+
+    /// Whether the light that this number stands for is absorbed, wherever it comes from.
+    #[inline(always)]
+    #[must_use]
+    pub fn absorbs(&self, number: f64) -> bool {
+        number >= self.most
     }
 
     /// The share of light along `d` that its product sends back (see `Parts`).
