@@ -10,7 +10,6 @@ with so much memory bandwidth [GB/s] would give at most: cores over time, serial
 from __future__ import annotations
 
 import argparse
-import os
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,9 +23,9 @@ from etendue.lightfield.fitting import grids_for
 from etendue.scene import compile_scene
 from light_field_speed import DEPTHS, RINGS
 from scenes import analytic
-from timing import best, load
+from timing import best, cores, load
 
-CORES = os.cpu_count() or 1
+CORES = cores()
 
 
 class Job(NamedTuple):

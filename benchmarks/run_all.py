@@ -5,7 +5,8 @@
 Peers that are not installed are named and skipped: Mitsuba 3 (`mitsuba`, with LLVM, see `mitsuba_peer.py`), Radiance
 (`pyradiance`), numba, and a C compiler with OpenMP for `peers/plain.c`; for Embree see `tracer.py`. Both sides of a row are
 measured one after the other; each figure is the best of some tries. With repeats, the whole is done again, and the
-least and the largest ratio are printed.
+least and the largest ratio are printed. `taskset -c 0,1 python benchmarks/run_all.py` gives two cores to either side where
+there are more.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ from etendue.scene import compile_scene
 from light_field import families
 from light_field_speed import DEPTHS, RINGS, SAMPLES
 from scenes import glass, lattice
-from timing import best, load, timed
+from timing import best, cores, load, timed
 
 HERE = Path(__file__).parent
 LIBRARY = Path("/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1")
-CORES = os.cpu_count() or 1
+CORES = cores()
 CAVITY = et.Observer(55, 0, 1000), et.Screen(50, 25, 250, 125)
 RING_VIEW = et.Observer(20, 0, 1000), et.Screen(70, 70, 50, 50)
 
@@ -244,7 +245,8 @@ def machine() -> str:
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
     names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
-    return f"{names[0] if names else platform.processor()}, {CORES} cores; étendue {et.__version__}; {load()}"
+    used = f"{CORES} of {os.cpu_count()} cores"
+    return f"{names[0] if names else platform.processor()}, {used}; étendue {et.__version__}; {load()}"
 
 
 def main() -> None:

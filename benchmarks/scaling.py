@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -23,7 +22,7 @@ import trimesh
 from etendue import _core
 from etendue.scene import compile_scene
 from scenes import LENS, glass, lattice
-from timing import best, load, timed
+from timing import best, cores, load, timed
 
 
 def told(family: str, unit: str, numbers: Sequence[float], values: Sequence[float]) -> None:
@@ -169,7 +168,7 @@ def main() -> None:
     parser.add_argument("--triangles", type=float, default=1e6)
     options = parser.parse_args()
     warnings.simplefilter("ignore")
-    print(f"{load()}, {os.cpu_count()} of them used")
+    print(f"{load()}, {cores()} of them used")
     for job in list(chosen(options.only)):
         job(options)
 

@@ -22,6 +22,11 @@ def best(job: Callable[[], object], repeats: int) -> float:
     return min(timed(job)[0] for _ in range(repeats))
 
 
+def cores() -> int:
+    """Cores that this process may use: fewer than the machine has under `taskset`."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def load() -> str:
     """How busy the machine was: runnable processes over the last minute, beside its cores."""
     return f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
