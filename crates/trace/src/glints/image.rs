@@ -44,6 +44,21 @@ impl Glint {
     }
 }
 
+/// Ways through smooth surfaces as one number: 1 before the first of them; each adds a binary digit, 1 if light is transmitted.
+/// 0 where there are more than 31.
+pub const STRAIGHT: u32 = 1;
+
+/// The ways that lead on from such a number.
+#[inline]
+#[must_use]
+pub const fn led_on(ways: u32, transmitted: bool) -> u32 {
+    if ways == 0 || ways >> 31 == 1 {
+        0
+    } else {
+        ways << 1 | transmitted as u32
+    }
+}
+
 /// An image, of which source, and through which surfaces it is seen.
 #[derive(Clone, Debug)]
 pub(super) struct Found {

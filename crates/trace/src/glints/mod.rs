@@ -14,5 +14,5 @@ mod pixels;
 mod search;
 mod targets;
 
-pub use image::{Glint, density, draw};
+pub use image::{Glint, STRAIGHT, density, draw, led_on};
 pub use pixels::Glints;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use etendue_lightfield::View;
 use rayon::prelude::*;
 
-use super::image::{Found, Glint};
+use super::image::{Found, Glint, STRAIGHT, led_on};
 use super::search::{FromPixel, Search, Sight, tile_side};
 use super::targets::targets;
 use crate::lit_scene::LitScene;
@@ -38,6 +38,9 @@ pub struct Glints {
     images: Vec<Glint>,
     /// Where those of each pixel begin.
     begins: Vec<usize>,
+    /// In pixels that have some, the sources that are seen large, each through which surfaces; and where those of each pixel begin.
+    large: Vec<(usize, u32)>,
+    large_begins: Vec<usize>,
     /// For each source whether it has any.
     of: Vec<bool>,
 }
@@ -51,6 +54,8 @@ impl Glints {
         let mut result = Self {
             images: Vec::new(),
             begins: vec![0; view.pixels() + 1],
+            large: Vec::new(),
+            large_begins: vec![0; view.pixels() + 1],
             of: vec![false; sources],
         };
         let targets = targets(lit, view);
@@ -119,12 +124,13 @@ impl Glints {
         if found.iter().all(|(images, _)| images.is_empty()) {
             return result;
         }
+        let seen_in = |pixel: usize| window.binary_search(&pixel).map_or(&[][..], |at| &found[at].1[..]);
         let mut images: Vec<Vec<Found>> = vec![Vec::new(); pixels];
         for image in found.iter().flat_map(|(images, _)| images) {
             for pixel in touched(view, &image.glint) {
                 // In the midst of a large image lines that are spread evenly have no noise, and need no others.
                 let large = |sight: &Sight| sight.0 == image.source && sight.1 == image.ways;
-                let seen = window.binary_search(&pixel).map_or(&[][..], |at| &found[at].1[..]);
+                let seen = seen_in(pixel);
                 let here = &mut images[pixel];
                 let known = |other: &Found| {
                     other.source == image.source
@@ -142,6 +148,12 @@ impl Glints {
                 result.images.push(image.glint);
             }
             result.begins[pixel + 1] = result.images.len();
+            if !here.is_empty() {
+                let key = |ways: &[bool]| ways.iter().fold(STRAIGHT, |ways, way| led_on(ways, *way));
+                let known = seen_in(pixel).iter().map(|(source, ways)| (*source, key(ways)));
+                result.large.extend(known.filter(|(_, ways)| *ways > 0));
+            }
+            result.large_begins[pixel + 1] = result.large.len();
         }
         result
     }
@@ -156,6 +168,14 @@ impl Glints {
     #[must_use]
     pub fn has(&self, source: usize) -> bool {
         self.of[source]
+    }
+
+    /// Whether a source is seen large through some surfaces in a pixel that has images: lines that are spread evenly have no noise
+    /// there, and what they find is not shared with those that look for the images.
+    #[inline]
+    #[must_use]
+    pub fn is_large(&self, pixel: usize, source: usize, ways: u32) -> bool {
+        self.large[self.large_begins[pixel]..self.large_begins[pixel + 1]].contains(&(source, ways))
     }
 
     /// The images in a pixel.

@@ -45,12 +45,15 @@ pub(super) struct Branch {
     pub(super) direct: bool,
     /// Density by area with which lines of sight meet that surface there \[1/mm²\].
     pub(super) density: f64,
+    /// Its ways through smooth surfaces from the observer (see [`led_on`](crate::glints::led_on)).
+    pub(super) ways: u32,
 }
 
 /// One path: its random numbers, its wavelength, and the light that it has found, with its deviation.
 pub(super) struct Path {
     pub(super) numbers: Numbers,
     pub(super) line: usize,
+    pub(super) pixel: usize,
     /// Its pass, counted from the first of those that are made.
     pub(super) pass: usize,
     pub(super) sum: [f64; 2],

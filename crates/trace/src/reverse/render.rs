@@ -219,6 +219,8 @@ impl<'a> Renderer<'a> {
             block.paths.push(Path {
                 numbers,
                 line,
+                #[allow(clippy::cast_possible_truncation, reason = "a number of a pixel")]
+                pixel: pixel as usize,
                 pass: made as usize,
                 sum: [0.0; 2],
                 chance: 0.0,
@@ -248,6 +250,7 @@ impl<'a> Renderer<'a> {
                 drawn: false,
                 direct: true,
                 density: 0.0,
+                ways: glints::STRAIGHT,
             }));
         }
         starts.places.iter_mut().for_each(Vec::clear);

@@ -12,6 +12,7 @@ use multiversion::multiversion;
 
 use super::path_block::{Branch, PathBlock, Seen};
 use crate::buckets::Buckets;
+use crate::glints::led_on;
 use crate::medium_cache::MediumCache;
 use crate::scatter::SPLIT;
 use crate::scene::Scene;
@@ -192,6 +193,7 @@ impl PathBlock<'_> {
             for (k, i) in scratch.which.iter().enumerate() {
                 let mut branch = self.branches[*i as usize];
                 branch.weight *= shares[k];
+                branch.ways = led_on(branch.ways, transmitted);
                 let sides = &scratch.kinds[scratch.kind[k] as usize];
                 branch.stack = if transmitted { sides.after } else { sides.before };
                 if branch.weight > 0.0 {

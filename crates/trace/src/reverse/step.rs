@@ -6,7 +6,8 @@ use etendue_lightfield::leave::Sights;
 
 use super::diffuse::Known;
 use super::method::LeftOut;
-use super::path_block::{Branch, PathBlock, Seen};
+use super::path_block::{Branch, Path, PathBlock, Seen};
+use crate::glints::{Glints, led_on};
 use crate::interaction::interaction_of;
 use crate::scatter::{SPLIT, SurfaceEvent};
 
@@ -79,12 +80,17 @@ impl PathBlock<'_> {
                 reach,
             };
             sampler.mark(source, sights, marks);
-            let glints = method.glints.is_some_and(|glints| glints.has(number));
-            let is_small = |branch: &Branch| branch.seen == Seen::Smooth && glints;
+            let glints = method.glints.filter(|glints| glints.has(number));
+            // What is seen large in the same pixel is no small image, though seen beside one.
+            let is_small = |branch: &Branch, path: &Path| {
+                let small = |glints: &&Glints| !glints.is_large(path.pixel, number, branch.ways);
+                branch.seen == Seen::Smooth && (path.aimed || path.share < 1.0) && glints.as_ref().is_some_and(small)
+            };
             let is_caustic = |branch: &Branch| branch.seen == Seen::Caustic && branch.direct;
             let counts = |branch: &Branch| {
                 let elsewhere = is_caustic(branch) && method.left == LeftOut::Caustics;
-                !elsewhere && (is_small(branch) || !paths[branch.path as usize].aimed)
+                let path = &paths[branch.path as usize];
+                !elsewhere && (!path.aimed || is_small(branch, path))
             };
             let numbers = (0_u32..).zip(branches.iter().zip(&*marks));
             let those = numbers.filter(|(_, (branch, mark))| **mark && counts(branch));
@@ -92,7 +98,7 @@ impl PathBlock<'_> {
             sampler.along_all(source, sights, marked, reader, |i, hit| {
                 let branch = &branches[i];
                 let path = &mut paths[branch.path as usize];
-                let shared = if is_small(branch) { path.share } else { 1.0 };
+                let shared = if is_small(branch, path) { path.share } else { 1.0 };
                 let (_, wavelength, colour) = &lit.lines[path.line];
                 let mut weight = branch.weight * shared * colour[number];
                 let absorption = media.at(scene, branch.stack.top(), *wavelength).absorption;
@@ -136,6 +142,7 @@ impl PathBlock<'_> {
                 weight,
                 seen,
                 drawn: branch.drawn || drawn,
+                ways: led_on(branch.ways, transmitted),
                 direct: branch.direct && branch.scatters > 0,
                 ..*branch
             };
