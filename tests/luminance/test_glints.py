@@ -120,8 +120,9 @@ def test_glints_in_glass(kind: str) -> None:
 
 
 def test_a_ghost_leaves_the_image_about_it_without_noise() -> None:
-    """In the midst of the image of a die in a ball of glass of reflectance R: L (1 − R)², and where the ghost of two reflections
-    lies as well, L (1 − R)²(1 + R² + …). A place half a millimetre off the axis, under 8°, has 10⁻⁴ less at most."""
+    """In the midst of the image of a die in a ball of glass of reflectance R: L (1 − R)², and where the ghost of two
+    reflections lies as well, L (1 − R)²(1 + R² + …). A place half a millimetre off the axis, under 8°, has 10⁻⁴ less at
+    most."""
     index, flux, area = 1.5, 100.0, 2.0 * 1.6
     die = {"kind": "surface", "shape": {"kind": "rectangle", "width": 2.0, "height": 1.6}, "flux": flux}
     ball = {"shape": {"kind": "ball", "radius": 4}, "medium": {"index": index}, "at": [0.3, 0.2, 6]}
