@@ -12,7 +12,7 @@ use super::table_grid::bent;
 use super::table_lobes::Lobe;
 
 /// How many rays are drawn for together.
-pub(super) const TOGETHER: usize = 64;
+pub(super) const TOGETHER: usize = 32;
 
 type Lanes = [f64; TOGETHER];
 type Numbers = [u32; TOGETHER];

@@ -51,7 +51,7 @@ struct BatchTrace<'a> {
     sheet_rays: SheetRays,
     scattered_rays: ScatteredRays,
     interface_rays: InterfaceRays,
-    /// Fluxes of the rays that leave the scene.
+    /// Fluxes of rays that leave the scene, or are absorbed on a face.
     fluxes: Vec<f64>,
 }
 
@@ -335,10 +335,11 @@ impl<'a> BatchTrace<'a> {
             out,
             ..
         } = &mut self.block;
-        let (rays, scattered) = (&mut self.sheet_rays, &mut self.scattered_rays);
+        let (rays, scattered, absorbed) = (&mut self.sheet_rays, &mut self.scattered_rays, &mut self.fluxes);
         let [numbers, turns] = &mut self.numbers;
         scattered.media.clear();
         self.going.clear();
+        absorbed.clear();
         for (k, i) in which.iter().enumerate() {
             let state = &states[now.who[*i as usize] as usize];
             let n = media.at(scene, 0, state.wavelength).n;
@@ -346,7 +347,7 @@ impl<'a> BatchTrace<'a> {
             if n > 0.0 {
                 // Before it is known where and under which angle, unless somebody asks for that.
                 if !wants.exitance && sheet.absorbs(numbers[k]) {
-                    out.ledger.book(Fate::OnFace(sheet.face), state.flux);
+                    absorbed.push(state.flux);
                     continue;
                 }
                 // No later than where it is: the numbers move up.
@@ -381,10 +382,8 @@ impl<'a> BatchTrace<'a> {
             state.scattered = true;
         }
         scattered.sample(&sheet, rays, [numbers, turns]);
-        scattered.turn(&sheet, rays, |who| {
-            let flux = states[who as usize].flux;
-            out.ledger.book(Fate::OnFace(sheet.face), flux);
-        });
+        scattered.turn(&sheet, rays, |who| absorbed.push(states[who as usize].flux));
+        out.ledger.on_face[sheet.face as usize].add_all(absorbed);
         rays.go_on(sheet.face, next);
     }
 }
