@@ -18,6 +18,7 @@ LENS: dict[str, Any] = {
     "shape": {"kind": "lens", "radius": 3, "thickness": 2, "front": {"radius_of_curvature": 15}},
     "finishes": {"edge": {"kind": "lambertian", "reflectance": 0.3}},
 }
+FILM = {"kind": "prismatic-film", "width": 4, "height": 4, "thickness": 1, "pitch": 1, "apex_angle": 90}
 SCENE = et.Scene(
     wavelength=500,
     media={"glass": {"index": 1.5}},
@@ -25,10 +26,12 @@ SCENE = et.Scene(
     sources=[
         {"name": "die", "kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 3},
         {"kind": "point", "flux": 4},
+        {"name": "white", "kind": "point", "flux": 2, "spectrum": [[450, 1], [600, 2]]},
     ],
-    solids=[LENS],
+    solids=[LENS, {"name": "film", "shape": FILM, "medium": "PMMA"}],
     surfaces=[{"name": "a.b", "shape": {"kind": "disk", "radius": 9}, "finish": "wall"}],
     detectors=[{"name": "die", "kind": "illuminance", "width": 1, "height": 1, "columns": 4, "rows": 2}],
+    observers=[{"name": "eye", "distance": 100, "screen": {"width": 3, "height": 2, "columns": 4, "rows": 4}}],
 )
 
 
@@ -46,6 +49,10 @@ SCENE = et.Scene(
         ("sources.die.flux", 7, "W", lambda s: s.sources[0].flux),
         ("sources.1.flux", 8, "W", lambda s: s.sources[1].flux),
         ("sources.die.wavelength", 450, "nm", lambda s: s.sources[0].wavelength),
+        ("white.spectrum.1.0", 610, "nm", lambda s: s.sources[2].spectrum[1][0]),
+        ("white.spectrum.1.1", 3, "", lambda s: s.sources[2].spectrum[1][1]),
+        ("film.shape.apex_angle", 100, "°", lambda s: s.solids[1].shape.apex_angle),
+        ("eye.screen.width", 5, "mm", lambda s: s.observers[0].screen.width),
         ("detectors.die.columns", 5, "", lambda s: s.detectors[0].columns),
         ("glass.index", 1.6, "", lambda s: s.media["glass"].index),
         ("finishes.wall.reflectance", 0.7, "", lambda s: s.finishes["wall"].to_dict()["reflectance"]),
@@ -77,7 +84,7 @@ def numbers(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
     [
         ("lense.at.2", "Did you mean 'lens'"),
         ("solids.lenz.at.2", "unknown part among the solids 'lenz'. Did you mean 'lens'"),
-        ("solids.3.at.2", "Known: 0, lens"),
+        ("solids.3.at.2", "Known: 0, 1, film, lens"),
         ("die.flux", "2 parts of the scene are called 'die'; write sources.die.flux or detectors.die.flux"),
         ("lens.at", "is a row of 3 values; name one, numbered from 0, e.g. lens.at.0"),
         ("lens.at.3", "they are numbered from 0 to 2"),

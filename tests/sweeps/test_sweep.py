@@ -215,6 +215,13 @@ def test_the_error_of_a_flux_does_not_hang_on_the_cells() -> None:
     assert coarse.standard_error["mean:desk"][1] == alone.illuminance["desk"].standard_error[0, 0]
 
 
+def test_a_flux_in_a_row_has_the_unit_of_the_scene() -> None:
+    rings = {"name": "rings", "kind": "rings", "radii": [1, 2], "flux": [1, 2], "flux_unit": "W", "wavelength": 600}
+    table = et.sweep(et.Scene(sources=[rings]), {"rings.flux.0": [3, 4]}, "emitted", rays=100)
+    assert (table.unit("rings.flux.0"), table.unit("emitted")) == ("W", "W")
+    assert table["emitted"] == pytest.approx([5.0, 6.0])
+
+
 def test_no_error_is_stated_of_light_that_is_counted_several_times() -> None:
     """In a white sphere rays pass a detector again and again: of several cells, and of rays, no error is known.
 

@@ -22,8 +22,8 @@ ROWS = ("sources", "solids", "surfaces", "detectors", "observers")
 TABLES = ("media", "finishes")
 """Families whose parts are held by name."""
 
-DEGREES = ("angle", "spin", "rotation", "theta", "phi", "roll", "gamma_step")
-LENGTHS = ("target", "radius_of_curvature")
+DEGREES = ("angle", "spin", "rotation", "theta", "phi", "roll", "gamma_step", "apex_angle", "crease_angle")
+LENGTHS = ("target", "radius_of_curvature", "width", "height")
 """Keys of angles, and of lengths that have not the limit which tells all others."""
 
 Word = str | int
@@ -103,6 +103,8 @@ class Parameter:
             told = f"{told}.{word}"
         if isinstance(value, bool) or not (value is None or isinstance(value, int | float)):
             raise ArgumentError(f"{path}: {_why_not(value, told)}")
+        if key == "spectrum":  # rows of wavelength and share
+            return cls(path, tuple(words), "nm" if words[-1] == 0 else "")
         return cls(path, tuple(words), flux_unit if key == "flux" else _unit(key, annotation))
 
     def changed(self, scene: Scene, value: float) -> Scene:

@@ -171,7 +171,7 @@ def sweep_steps(
     """
     base = scene if isinstance(scene, Scene) else Scene.load(scene)
     axes = _axes(parameters)
-    flux_unit = compile_scene(base).flux_unit if any(path.endswith("flux") for path in axes) else "lm"
+    flux_unit = compile_scene(base).flux_unit if any("flux" in path for path in axes) else "lm"
     places = [Parameter.find(base, path, flux_unit) for path in axes]
     _refuse_twice(places)
     looked = _Looking(observer, screen, base)
