@@ -215,6 +215,31 @@ def test_the_error_of_a_flux_does_not_hang_on_the_cells() -> None:
     assert coarse.standard_error["mean:desk"][1] == alone.illuminance["desk"].standard_error[0, 0]
 
 
+def test_what_a_named_medium_absorbs_in_a_solid_is_that_of_the_solid() -> None:
+    """Of a beam through a slab (1 − R)(1 − a)/(1 − R a) stay in it, and (1 − R)² a/(1 − R² a²) get to the stop behind."""
+    slab = {"name": "slab", "shape": {"kind": "rod", "radius": 5, "height": 4}, "medium": "glass"}
+    scene = et.Scene(
+        media={"glass": {"index": 1.6, "absorption": 0.1}},
+        sources=[{"kind": "beam", "shape": {"kind": "disk", "radius": 1}, "flux": 20, "at": [0, 0, -2]}],
+        solids=[slab],
+        surfaces=[{"name": "glass", "shape": {"kind": "disk", "radius": 9}, "at": [0, 0, 9], "finish": "absorber"}],
+    )
+    r, a = (0.6 / 2.6) ** 2, math.exp(-0.4)
+    within = 20 * (1 - r) * (1 - a) / (1 - r * a)
+    behind = 20 * (1 - r) ** 2 * a / (1 - (r * a) ** 2)
+    places = np.linspace(-9, -2, 50)
+    measures = ["absorbed:slab", "absorbed:glass"]
+    tables = [et.sweep(scene, {"sources.0.at.2": [z]}, measures, rays=2000, seed=k) for k, z in enumerate(places)]
+    # A surface and a medium of one name are meant both.
+    for name, expected in zip(measures, (within, within + behind), strict=True):
+        values, errors = (np.array([float(part[name][0]) for part in parts]) for parts in (
+            tables, [table.standard_error for table in tables]))  # fmt: skip
+        assert_agree(values=values, expected=expected, standard_error=errors)
+    two = scene.replace(solids=[slab, slab | {"name": "other", "at": [0, 30, 0]}])
+    with pytest.raises(et.ArgumentError, match="slab and other are of the medium 'glass'"):
+        et.sweep(two, {"slab.at.0": [0]}, "absorbed:slab", rays=100)
+
+
 def test_a_flux_in_a_row_has_the_unit_of_the_scene() -> None:
     rings = {"name": "rings", "kind": "rings", "radii": [1, 2], "flux": [1, 2], "flux_unit": "W", "wavelength": 600}
     table = et.sweep(et.Scene(sources=[rings]), {"rings.flux.0": [3, 4]}, "emitted", rays=100)

@@ -278,13 +278,41 @@ def _absorbed(step: Step, of: str) -> Found:
     ledger = step.traced.ledger
     if not of:
         return _flux(ledger.absorbed.flux, step.traced)
-    entries = {**ledger.by_surface, **ledger.by_medium}
-    parts = [entry.flux for name, entry in entries.items() if name == of or name.startswith(f"{of}.")]
+    # A surface and a medium may have one name: then both are meant.
+    entries = [*ledger.by_surface.items(), *ledger.by_medium.items()]
+    parts = [entry.flux for name, entry in entries if name == of or name.startswith(f"{of}.")]
+    medium = _medium_of(step.scene, of)
+    if medium not in ("", of):
+        parts.append(ledger.by_medium[medium].flux)
     if not parts:
-        raise UnknownNameError(
-            "solid, surface, face or medium", of, {*entries, *(n.partition(".")[0] for n in entries)}
-        )
+        names = {name for name, _ in entries}
+        raise UnknownNameError("solid, surface, face or medium", of, {*names, *(n.partition(".")[0] for n in names)})
     return _flux(math.fsum(parts), step.traced)
+
+
+def _medium_of(scene: Scene, of: str) -> str:
+    """The named medium that absorbs in a solid, and in that one alone; empty if it is no solid, or nothing absorbs in it.
+
+    The ledger counts what is absorbed by media, not by the solids that they fill.
+
+    Raises
+    ------
+    ArgumentError
+        If something else is filled with it too.
+    """
+    filled = [(solid.name or f"solids[{i}]", solid.medium) for i, solid in enumerate(scene.solids)]
+    medium = dict(filled).get(of)
+    if not isinstance(medium, str) or medium not in scene.media or scene.media[medium].absorption == 0.0:
+        return ""
+    others = [name for name, held in filled if held == medium and name != of]
+    if scene.surroundings == medium:
+        others.append("the surroundings")
+    if others and medium != of:
+        raise ArgumentError(
+            f"absorbed:{of}: {of} and {others[0]} are of the medium {medium!r}, and what it absorbs in each is not known "
+            f"apart; give {of} a medium of its own, or measure absorbed:{medium}."
+        )
+    return medium
 
 
 def _whole(noun: str, of: str) -> None:
