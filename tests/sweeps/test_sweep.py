@@ -240,6 +240,12 @@ def test_what_a_named_medium_absorbs_in_a_solid_is_that_of_the_solid() -> None:
         et.sweep(two, {"slab.at.0": [0]}, "absorbed:slab", rays=100)
 
 
+def test_no_error_is_stated_of_light_that_no_ray_brought() -> None:
+    far = {"name": "rays", "kind": "rays", "shape": {"kind": "disk", "radius": 0.01}, "at": [0, 0, 5000]}
+    table = et.sweep(et.Scene(sources=[DIE], detectors=[far]), {"die.flux": [1]}, ["flux:rays", "absorbed"], rays=100)
+    assert all(table[name] == 0.0 and np.isnan(table.standard_error[name]) for name in ("flux:rays", "absorbed"))
+
+
 def test_a_flux_in_a_row_has_the_unit_of_the_scene() -> None:
     rings = {"name": "rings", "kind": "rings", "radii": [1, 2], "flux": [1, 2], "flux_unit": "W", "wavelength": 600}
     table = et.sweep(et.Scene(sources=[rings]), {"rings.flux.0": [3, 4]}, "emitted", rays=100)

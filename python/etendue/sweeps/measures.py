@@ -228,7 +228,7 @@ def share_error(flux: float, result: TraceResult) -> float:
 
     That of a share of independent rays: √(p (1 − p)/n), n the number of equal rays that are as good as those of the sources
     (`TraceResult.effective_rays`). Rays are dealt to sources, and over sources, more evenly than by chance; so the error is
-    at most this. NaN of more flux than there is: then rays were counted several times.
+    at most this. NaN of more flux than there is: then rays were counted several times; and of none: no ray tells how little.
 
     Examples
     --------
@@ -238,11 +238,11 @@ def share_error(flux: float, result: TraceResult) -> float:
     0.25
     """
     total = result.ledger.total.flux
-    if not total > 0.0 or not result.effective_rays > 0.0:
+    if not flux > 0.0 or not result.effective_rays > 0.0:
         return math.nan
     if flux > total * (1.0 + ROUNDING):
         return math.nan
-    share = min(max(flux / total, 0.0), 1.0)
+    share = min(flux / total, 1.0)
     return total * math.sqrt(share * (1.0 - share) / result.effective_rays)
 
 
