@@ -119,17 +119,31 @@ impl Dealing {
     }
 
     /// Rays of the first s sources among the first `done` rays.
+    fn edges(&self, done: u64) -> Vec<u64> {
+        let mut edges = vec![0; self.shares.len()];
+        self.split(0, self.shares.len() - 1, done, &mut edges);
+        edges
+    }
+
+    /// Rays dealt to the sources `from..to`: the first half of them takes its share, rounded down, and the others the rest.
+    ///
+    /// With one ray more, one half has one more and the other as many, so that no source ever has fewer, however faint it is:
+    /// of differences of rounded sums, ⌊n `Q_s`⌋ − ⌊n `Q_{s−1}`⌋, that is not so.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a share of `done`"
+        reason = "a share of `rays`"
     )]
-    fn edges(&self, done: u64) -> Vec<u64> {
-        let mut edges: Vec<u64> = self.shares.iter().map(|q| (q * done as f64).floor() as u64).collect();
-        if let Some(last) = edges.last_mut() {
-            *last = done;
+    fn split(&self, from: usize, to: usize, rays: u64, edges: &mut [u64]) {
+        edges[to] = edges[from] + rays;
+        if to - from < 2 {
+            return;
         }
-        edges
+        let middle = usize::midpoint(from, to);
+        let share = (self.shares[middle] - self.shares[from]) / (self.shares[to] - self.shares[from]);
+        let first = (share * rays as f64).floor() as u64;
+        self.split(from, middle, first, edges);
+        self.split(middle, to, rays - first, edges);
     }
 
     /// Rays of each source among the first `done` rays.
@@ -140,8 +154,7 @@ impl Dealing {
 
     /// The rays of each source in batch `batch`, counted among those of the source.
     ///
-    /// After b batches, source s has had ⌊b B `Q_s`⌋ − ⌊b B Q_{s−1}⌋ rays, Q being the sums of the shares of the flux: every
-    /// beginning of a run serves all sources in proportion, and each number is known without counting.
+    /// Every beginning of a run serves all sources in proportion, and each number is known without counting.
     #[must_use]
     pub fn batch(&self, batch: u64) -> Vec<Range<u64>> {
         let (from, to) = (self.first(batch), self.first(batch + 1));
@@ -276,6 +289,33 @@ mod tests {
         }
         assert_eq!(all, dealing.rays);
         assert_eq!(met.len(), 1007);
+    }
+
+    #[test]
+    fn faint_sources_give_out_each_ray_once_and_in_proportion() {
+        let fluxes = [1e3, 2e-3, 2e-3, 3e-10, 2e-3, 2e-3, 0.01, 1e3, 5e-4];
+        for each in [BATCH, 100] {
+            let rays = 40 * each + 77;
+            let dealing = Dealing::new(&fluxes, &[None; 9], rays).in_batches_of(each);
+            let mut next = vec![0; fluxes.len()];
+            for batch in 0..=40 {
+                let ranges = dealing.batch(batch);
+                let dealt: u64 = ranges.iter().map(|range| range.end - range.start).sum();
+                assert_eq!(dealt, dealing.first(batch + 1).min(rays) - dealing.first(batch));
+                for (range, next) in ranges.iter().zip(&mut next) {
+                    assert!(
+                        range.start == *next && range.end >= range.start,
+                        "{range:?} after {next}"
+                    );
+                    *next = range.end;
+                }
+            }
+            assert_eq!(next, dealing.counts);
+            let total: f64 = fluxes.iter().sum();
+            for (count, flux) in dealing.counts.iter().zip(fluxes) {
+                assert!((*count as f64 - rays as f64 * flux / total).abs() < 4.0);
+            }
+        }
     }
 
     #[test]
