@@ -271,6 +271,21 @@ def test_each_ray_of_a_set_once() -> None:
 # --- what is lost ----------------------------------------------------------------------------------------------------
 
 
+def test_light_that_gets_no_ray_is_told() -> None:
+    """Five candles beside a flood are of no ray, and their light is missing."""
+    flood = {"name": "flood", "kind": "point", "flux": 1e4}
+    candles = [{"name": f"candle {i}", "kind": "point", "flux": 2.0, "at": [0, 0, i]} for i in range(5)]
+    scene = et.Scene(sources=[*candles, flood])
+    few = et.trace(scene, rays=1000)
+    assert few.ledger.total.flux == pytest.approx(1e4, rel=1e-12)
+    (told,) = few.notes
+    assert told.startswith("candle 0, candle 1, candle 2 and 2 more: none of 1,000 rays")
+    assert "10 lm of 10010 lm are missing" in told
+    enough = et.trace(scene, rays=60_000)
+    assert enough.ledger.total.flux == pytest.approx(1e4 + 10, rel=1e-12)
+    assert not enough.notes
+
+
 def test_an_open_solid_is_named() -> None:
     """A pyramid without a base: rays leave it that have never entered it."""
     vertices = [[-5, -5, 0], [5, -5, 0], [5, 5, 0], [-5, 5, 0], [0, 0, 4]]

@@ -78,6 +78,17 @@ class Dealing:
         return _core.Dealing(list(self.flux), list(self.sets), self.rays)
 
     @property
+    def given(self) -> tuple[int, ...]:
+        """Rays of each source in the whole run.
+
+        Examples
+        --------
+        >>> Dealing((1e6, 1e-6, 1e6), (None, None, None), 101).given
+        (50, 0, 51)
+        """
+        return tuple(count for _, count in self.core.sources())
+
+    @property
     def strata(self) -> int:
         """Number of strata."""
         return self.core.strata()
@@ -159,5 +170,5 @@ class Dealing:
 
     def most_copies(self) -> float:
         """Largest number of copies of a ray, on average over its set; 1 if there are none."""
-        units, counts = self.core.done(self.rays), [count for _, count in self.core.sources()]
+        units, counts = self.core.done(self.rays), self.given
         return max([1.0, *(sum(counts[i] for i in sources) / units[j] for j, sources in self.copied() if units[j])])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from etendue import _core
@@ -12,6 +13,7 @@ from etendue.errors import ArgumentError, SceneError
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.intensity_nodes import MOST_CELLS, Nodes
 from etendue.quantities.node_choice import Choice
+from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import checked_seed
 from etendue.scene import Compiled, Scene
@@ -24,6 +26,9 @@ from etendue.units import FluxUnit
 DEFAULT_RAYS = 10**7
 MOST_RAYS = 1 << 50
 MOST_EVENTS = 10**9
+
+NAMED = 3
+"""Sources that a note names."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -146,6 +151,7 @@ def make_plan(
     check_cells(detections)
     # The faces of detectors stand behind those of the scene.
     detector_faces = [detection.name for detection in detections if detection.HAS_FACE]
+    dealing, source_names = Dealing.of(compiled.record["sources"], count), _unique(compiled.source_names)
     return Plan(
         scene.name,
         _text(scene),
@@ -154,13 +160,13 @@ def make_plan(
         seed,
         most_events,
         compiled.flux_unit,
-        Dealing.of(compiled.record["sources"], count),
-        _unique(compiled.source_names),
+        dealing,
+        source_names,
         _unique([*compiled.face_names, *detector_faces]),
         _unique(compiled.medium_names),
         tuple(_core.losses()),
         detections,
-        (*compiled.notes, *notes),
+        (*compiled.notes, *notes, *_left_out(dealing, source_names, compiled.flux_unit)),
         scene,
     )
 
@@ -182,6 +188,20 @@ def _rays(compiled: Compiled, rays: float | None) -> tuple[int, list[str]]:
     else:
         count = int(rays)
     return count, notes
+
+
+def _left_out(dealing: Dealing, names: tuple[str, ...], unit: FluxUnit) -> Iterator[str]:
+    """Sources so faint beside the others that none of the rays is theirs."""
+    faint = [(name, flux) for name, flux, rays in zip(names, dealing.flux, dealing.given, strict=True) if not rays]
+    if faint:
+        first = ", ".join(name for name, _ in faint[:NAMED]) + (
+            f" and {len(faint) - NAMED:,} more" if faint[NAMED:] else ""
+        )
+        lost, total = (counted(math.fsum(of), unit) for of in ((flux for _, flux in faint), dealing.flux))
+        yield (
+            f"{first}: none of {dealing.rays:,} rays, which are shared out by flux; {lost} of {total} are missing from the "
+            "result: trace more rays, or what is faint by itself"
+        )
 
 
 def _text(scene: Scene) -> str:
