@@ -15,7 +15,7 @@ from etendue.description.files import Files
 from etendue.description.values import Length, Pixels
 from etendue.quantities.illuminance_map import IlluminanceMap, Point
 from etendue.quantities.observer import Screen
-from etendue.quantities.powers_of_ten import counted
+from etendue.quantities.powers_of_ten import counted, rounded
 from etendue.scene.detectors.detector import Counted, Detection, Detector, Record, Recorded, Setting
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
@@ -111,19 +111,21 @@ def _chance_told(counted: Counted) -> Iterator[str]:
     flux = counted.flux
     missed = int((counted.rays == 0).sum())
     if missed == flux.size:
-        return
-    if missed:
+        yield (
+            "no ray met it on the side of its +z: it is dark there, faces away from the light, or was missed by chance; "
+            "'toward' turns it, and more rays tell"
+        )
+    elif missed:
         yield (
             f"no ray met {missed:,} of {flux.size:,} cells: they are dark, or were missed by chance, and least/mean is 0; "
             "more rays, or fewer cells, tell"
         )
-        return
-    share = lowered_by_chance(flux, counted.error)
-    if share > TOLD:
+    elif (share := lowered_by_chance(flux, counted.error)) > TOLD:
         at = int(flux.argmin())
+        known, low = (rounded(100 * of, 2) for of in (counted.error[at] / flux[at], share))
         yield (
-            f"the darkest of {flux.size:,} cells is known to {100 * counted.error[at] / flux[at]:.2g} %; chance may have "
-            f"lowered it, and least/mean, by up to {100 * share:.2g} %: more rays, or fewer cells, tell them better"
+            f"the darkest of {flux.size:,} cells is known to {known} %; chance may have lowered it, and least/mean, by up "
+            f"to {low} %: more rays, or fewer cells, tell them better"
         )
 
 
