@@ -5,14 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import etendue as et
 import numpy as np
 import pytest
 from etendue.description.files import Files
 from etendue.description.tables import Grid, on_common_nodes
 from etendue.errors import ArgumentError, SceneError
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.scatter.bsdf import Bsdf
 from etendue.scatter.materials import MATERIALS
 from etendue.scatter.models.shares import PARTS
+from etendue.scatter.table import BsdfTable
 from etendue.scene import Scene, compile_scene, finishes
+from etendue.scene.colour_dependence import telling_finishes
 from etendue.scene.finishes import BUILT_IN, FINISHES
 from scipy.interpolate import RegularGridInterpolator
 
@@ -191,6 +196,27 @@ def test_interfaces_on_surfaces_are_told_of() -> None:
         (note,) = compile_scene(Scene(surfaces=[{**disk, "name": "pane", "finish": finish}])).notes
         assert note.startswith("pane: an interface changes nothing")
     assert compile_scene(Scene(surfaces=[{**disk, "finish": "mirror"}])).notes == ()
+
+
+def test_finishes_that_treat_colours_differently_are_named_whatever_they_are_made_of() -> None:
+    """Those whose own reflectance at 60° differs between the wavelengths, and no others."""
+    white, red = 0.4, {"wavelength": [450, 650], "values": [0.2, 0.6]}
+    made: dict[str, Bsdf] = {}
+    for name, r in (("white", white), ("red", red)):
+        made[name] = et.bsdf.Lambertian(reflectance=r)
+        made[f"{name} mixture"] = et.bsdf.Mixture(
+            parts=[{"kind": "gaussian", "peak": 0.5, "sigma": 0.2}, {"kind": "lambertian", "reflectance": r}]
+        )
+        made[f"{name} coat"] = et.bsdf.RoughCoat(index=1.5, base_reflectance=r, roughness=0.3)
+    grid = PolarGrid("normal", np.array([0.0, 90.0]), np.array([0.0]))
+    for name, at in (("white table", {None: 0.1}), ("red table", {450.0: 0.1, 650.0: 0.2})):
+        slices = [BsdfSlice(direction(30.0, 0.0), [[f, f]], grid=grid, wavelength=line) for line, f in at.items()]
+        made[name] = BsdfTable(BsdfData(slices))
+    for lines in ([450.0, 650.0], [500.0, 510.0], [650.0, 700.0], [600.0]):
+        for name, finish in made.items():
+            values = [float(finish.reflectance(60, wavelength=line)) for line in lines]
+            told = list(telling_finishes([finish.record(HERE)], [name], np.array(lines)))
+            assert told == ([f"the finish {name!r}"] if np.ptp(values) > 1e-6 else []), (lines, values)
 
 
 def test_built_in_finishes() -> None:

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue.scatter.members import parts_of
 from etendue.scene.media import Sellmeier
 
 Array = npt.NDArray[np.float64]
-Record = Mapping[str, Any]
+Record = dict[str, Any]
 
 SAME = 1e-9
 """Values that differ by less, of a quantity of the order of 1, are taken for equal."""
@@ -48,10 +49,19 @@ def telling_finishes(rows: Sequence[Record], names: Sequence[str], wavelength: A
     ["the finish 'filter'"]
     """
     for row, name in zip(rows, names, strict=True):
-        tables = [value for value in row.values() if isinstance(value, Mapping) and "values" in value]
-        shares = (np.interp(wavelength, t["wavelength"], values) for t in tables for values in np.asarray(t["values"]))
-        if any(map(_differs, shares)):
+        if any(_tells(part, wavelength) for part in parts_of(row)):
             yield f"the finish {name!r}"
+
+
+def _tells(part: Record, wavelength: Array) -> bool:
+    """Whether a finish that is no sum of others differs between some wavelengths."""
+    if part["kind"] == "table":
+        known = [[of["wavelength"] for of in part[side]] for side in ("front", "back")]
+        # Linear between the wavelengths of its slices, constant beyond.
+        return any(len(at) > 1 and _differs(np.clip(wavelength, at[0], at[-1])) for at in known)
+    tables = [value for value in part.values() if isinstance(value, Mapping) and "values" in value]
+    shares = (np.interp(wavelength, t["wavelength"], values) for t in tables for values in np.asarray(t["values"]))
+    return any(map(_differs, shares))
 
 
 def _index(index: Record, wavelength: Array) -> Array:
