@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from etendue import _core
 from etendue.errors import SceneError
+from etendue.luminance import scene_map
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.spectrum import photopic_efficiency
 from etendue.scene import Compiled, Scene, compile_scene, sources
@@ -65,6 +66,39 @@ def test_watts_become_lumens_through_the_spectrum() -> None:
     assert (stated.flux_unit, stated.record["sources"][0]["flux"]) == ("lm", 10.0)
     with pytest.raises(SceneError, match=r"sources\[0\]: .*spectrum"):
         compiled(sources.Rays(rays=rays(flux_unit="W"), flux_unit="lm"))
+
+
+def test_watts_without_a_spectrum_become_lumens_through_the_colours_that_are_stated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """4 W at 500 nm are 4 K_m V(500) lm; of a spectrum with equal lumens at two lines, 4/Σ(½/(K_m V)); and back again."""
+    watts, lumens = rays(flux_unit="W"), rays(flux_unit="lm")
+    at = 683.0 * photopic_efficiency([500.0, 600.0])
+    two = [[500, 1], [600, 1]]
+    assert source(sources.Rays(rays=watts, flux_unit="lm", wavelength=500))["flux"] == pytest.approx(4 * at[0])
+    assert source(sources.Rays(rays=watts, flux_unit="lm", spectrum=two))["flux"] == pytest.approx(4 / (0.5 / at).sum())
+    assert source(sources.Rays(rays=lumens, flux_unit="W", spectrum=two))["flux"] == pytest.approx(4 / (0.5 * at).sum())
+    # What rays of a file know themselves goes first.
+    green = rays(flux_unit="W", spectra=(et.Spectrum([555.0], [1.0]),))
+    assert source(sources.Rays(rays=green, flux_unit="lm", wavelength=500))["flux"] == pytest.approx(4 * 683.0)
+    with pytest.raises(SceneError, match=r"V\(λ\) is 0 at wavelengths of \[900"):
+        compiled(sources.Rays(rays=watts, flux_unit="lm", wavelength=900))
+
+    # As a light field, and seen through a fitted one.
+    def fitted(rays: et.RaySet, **_: Any) -> et.LightField:
+        return et.LightField.fit(rays, et.Disk(radius=30), depths=(1, 1, 1, 1))
+
+    monkeypatch.setattr(scene_map, "fit_or_recall", fitted)
+    grey = et.RingSource(rays=5000).ray_set().replace(flux_unit="W")
+    field = fitted(grey)
+    stated = sources.Field(field=field, flux_unit="lm", wavelength=500)
+    assert source(stated)["flux"] == pytest.approx(field.total_flux * at[0])
+    fits: scene_map.Fits = {}
+    for line, efficacy in zip((500.0, 600.0), at, strict=True):
+        scene = Scene(sources=[sources.Rays(rays=grey, flux_unit="lm", wavelength=line)])
+        (seen,) = scene_map.with_fields(scene, cache=False, fits=fits)[0].sources
+        assert isinstance(seen, sources.Field)
+        assert seen.flux == pytest.approx(grey.total_flux * efficacy, rel=1e-3)
 
 
 def test_streams_of_rays_are_sources_too() -> None:

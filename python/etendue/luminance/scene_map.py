@@ -373,7 +373,7 @@ def _fitted(source: Rays, scene: Scene, threads: int | None, fits: Fits, *, cach
     (emitter,) = source.emitters(scene.files)
     # Only the flux in another unit is not a mere factor.
     origin = id(source.rays) if source.file is None else scene.files.find(source.file)
-    key = (origin, source.flux_unit, None if source.flux_unit is None else source.flux)
+    key = (origin, source.flux_unit, None if source.flux_unit is None else rays.total_flux)
     field = fits[key] if key in fits else fit_or_recall(rays, cache=cache, threads=threads)
     fits[key] = field
     scale = emitter.record["flux"] / rays.total_flux

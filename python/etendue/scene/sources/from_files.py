@@ -13,7 +13,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from etendue.description.files import Files
 from etendue.description.values import Positive
-from etendue.errors import ArgumentError
+from etendue.errors import ArgumentError, UnitError
 from etendue.formats.rays import read_rays
 from etendue.lightfield.light_field import LightField
 from etendue.quantities.distinct_rays import DistinctRays
@@ -37,7 +37,8 @@ class Rays(Source):
     flux : number, optional
         Total flux that overrides the file's [`flux_unit`].
     flux_unit : {"lm", "W"}, optional
-        Turns the rays into this unit, through the spectrum of the file; the file's own if left out.
+        Turns the rays into this unit, through the spectrum of the file, else that which is stated here; the file's own if
+        left out.
 
     Examples
     --------
@@ -97,7 +98,13 @@ class Rays(Source):
             return rays.with_total_flux(self.flux, self.flux_unit) if isinstance(rays, RaySet) else rays
         if not isinstance(rays, RaySet):
             raise ArgumentError(f"flux_unit: the rays are in {rays.flux_unit}, and cannot be turned into lm or W")
-        return rays.in_unit(self.flux_unit)
+        try:
+            return rays.in_unit(self.flux_unit)
+        except UnitError:
+            if not self.states_colours:
+                raise
+            total = self.stated_in_unit(rays.total_flux, self.flux_unit)
+            return rays.without_spectrum().with_total_flux(total, self.flux_unit)
 
     def _coloured(self, record: Record, rays: RayStream, unit: FluxUnit) -> Emitter:
         """With what the rays know of their colours, unless the user states these."""
@@ -145,7 +152,8 @@ class Field(Source):
     flux : number, optional
         Total flux that overrides the field's [`flux_unit`].
     flux_unit : {"lm", "W"}, optional
-        Turns the light into this unit, through the spectrum of the field; the field's own if left out.
+        Turns the light into this unit, through the spectrum of the field, else that which is stated here; the field's own if
+        left out.
 
     Examples
     --------
@@ -173,9 +181,12 @@ class Field(Source):
         if not field.total_flux > 0.0:
             raise ArgumentError("the light field carries no flux")
         unit = field.flux_unit if self.flux_unit is None else self.flux_unit
-        if self.flux is None and unit != field.flux_unit:
+        flux = self.flux
+        if flux is None and unit != field.flux_unit and field.spectrum is None and self.states_colours:
+            flux = self.stated_in_unit(field.total_flux, unit)
+        elif flux is None:
             field = field.in_unit(unit)
-        flux = field.total_flux if self.flux is None else self.flux
+            flux = field.total_flux
         mean = field.spectrum_is_mean and not self.states_colours
         return (Emitter({"kind": "field", "field": field.core, "flux": flux}, unit, field.spectrum, mean=mean),)
 

@@ -13,6 +13,7 @@ from pydantic import model_validator
 
 from etendue.description.files import Files
 from etendue.description.values import AsRow, FirstMistake, NotNegative, Wavelength
+from etendue.errors import UnitError
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
 from etendue.scene.placement import Placement
@@ -94,6 +95,29 @@ class Source(Placement, abc.ABC):
     def states_colours(self) -> bool:
         """Whether the user states the colours, whatever a file says."""
         return self.wavelength is not None or self.spectrum is not None
+
+    def stated_in_unit(self, flux: float, unit: FluxUnit) -> float:
+        """A flux in lumens or watts as the other, `unit`, by the colours that the user states.
+
+        Raises
+        ------
+        UnitError
+            If their light has no lumens.
+
+        Examples
+        --------
+        >>> from etendue.scene.sources import Rays
+        >>> round(Rays(file="led.tm25ray", wavelength=555).stated_in_unit(2.0, "lm"), 6)
+        1366.0
+        """
+        rows = self.spectrum if self.wavelength is None else ((self.wavelength, 1.0),)
+        assert rows is not None  # noqa: S101 - asked for where colours are stated
+        # Shares are those of the flux that the source sends out.
+        wavelength, shares = np.array(rows).T
+        efficacy = SpectralLines(wavelength, shares, unit).luminous_efficacy
+        if not efficacy > 0.0:
+            raise UnitError(f"lm and W cannot become each other: V(λ) is 0 at wavelengths of {wavelength.tolist()} nm")
+        return flux * efficacy if unit == "lm" else flux / efficacy
 
     @abc.abstractmethod
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
