@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import etendue as et
 import numpy as np
 import pytest
 from etendue.description.files import Files
@@ -127,6 +128,18 @@ def test_extrapolation_is_told() -> None:
     assert compile_scene(Scene(solids=[ball])).notes == ()
     (note,) = compile_scene(Scene(solids=[ball], wavelength=400)).notes
     assert note == "PMMA: its index was measured from 436.8 to 1052 nm and is extrapolated to 400 nm"
+
+
+def test_a_far_field_behind_surroundings_that_absorb_is_told() -> None:
+    """exp(−∞) is left of light that they absorb; a line beside their band escapes whole."""
+    band = {"index": 1.0, "absorption": {"wavelength": [500, 600], "values": [0.01, 0.0]}}
+    lamp = {"kind": "point", "flux": 3, "wavelength": 500}
+    far = {"name": "far", "kind": "intensity", "c_planes": 4, "gamma_step": 45}
+    for line, flux in ((500, 0.0), (650, 3.0)):
+        scene = Scene(surroundings=band, sources=[lamp | {"wavelength": line}], detectors=[far])
+        result = et.trace(scene, rays=1000)
+        assert result.intensity["far"].flux == pytest.approx(flux)
+        assert any(note.startswith("far: the surroundings absorb") for note in result.notes) == (not flux)
 
 
 def test_absorption_stays_an_array() -> None:

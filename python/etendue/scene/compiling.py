@@ -156,6 +156,7 @@ class _Compiler:
         self._detectors()
         self._check_indices()
         self._check_colours()
+        self._check_far_fields()
         if self.mistakes:
             raise SceneError(self.scene.name or "scene", self.mistakes)
         for doubt in doubts_about(self.rows, self.kinds, self.names["sources"]):
@@ -270,6 +271,19 @@ class _Compiler:
                     f"{', '.join(things)} treat{'s' if len(things) == 1 else ''} its wavelengths differently; where colour "
                     "changes with place or direction, only the rays themselves, traced forwards, keep it"
                 )
+
+    def _check_far_fields(self) -> None:
+        """Far fields behind surroundings that absorb: whatever they absorb is absorbed on a way without end."""
+        kinds = zip(self.names["detectors"], self.rows["detectors"], strict=True)
+        far = [name for name, row in kinds if row["kind"] == "intensity"]
+        if self.mistakes or not (far and self.used):
+            return
+        absorption = self.rows["media"][0]["absorption"]  # the surroundings are the first that is met
+        if np.interp(np.concatenate(self.used), absorption["wavelength"], absorption["per_mm"]).any():
+            self.notes.append(
+                f"{', '.join(far)}: the surroundings absorb, and of light that they absorb nothing gets to a far field; "
+                "fill a solid with what absorbs, or put a detector of rays where light shall be counted"
+            )
 
     def _assumed(self, name: str) -> list[str]:
         if "wavelength" in self.scene.model_fields_set:
