@@ -314,7 +314,7 @@ def test_trapped_light_is_told_with_its_medium() -> None:
     surfaces would not let it out, and the note does not advise them."""
     block = {"name": "guide", "shape": {"kind": "block", "width": 4, "height": 4, "depth": 4}, "medium": {"index": 1.5}}
     lamp = {"kind": "point", "flux": 1, "at": [0.1, 0.2, 2.3]}
-    result = et.trace(et.Scene(sources=[lamp], solids=[block]), 10_000, most_events=60)
+    result = et.trace(et.Scene(sources=[lamp], solids=[block]), 10_000, most_events=1000)
     assert_drawn_with(
         share=1 - 3 * (1 - math.sqrt(1 - 1 / 1.5**2)), hits=result.ledger.terminated.rays, rays=result.rays_done
     )
@@ -322,6 +322,12 @@ def test_trapped_light_is_told_with_its_medium() -> None:
     assert "trapped" in note
     assert "'guide.medium' absorbed nothing" in note
     assert "raise" not in note
+    # Few surfaces tell nothing: all light leaves a lens that it comes to from outside, and most needs two.
+    lens = {"shape": {"kind": "ball", "radius": 3}, "medium": "BK7", "at": [0, 0, 9]}
+    for few, left in ((1, False), (1000, True)):
+        through = et.trace(et.Scene(sources=[lamp], solids=[lens]), 1000, most_events=few)
+        assert (through.ledger.escaped.rays == 1000) == left == (not through.notes)
+        assert all("raise most_events from 1;" in note and "probably" not in note for note in through.notes)
     dim = {**block, "medium": {"index": 1.5, "absorption": 0.5}}
     assert not et.trace(et.Scene(sources=[lamp], solids=[dim]), 10_000).notes
 

@@ -18,6 +18,10 @@ NOTEWORTHY = 1e-9
 """Share of the emitted flux above which lost rays are told."""
 
 
+LONG = 1000
+"""Surfaces: what met fewer may have been on its way out."""
+
+
 class TraceWarning(UserWarning):
     """A trace went through, but something in the scene is not as it should be."""
 
@@ -118,21 +122,28 @@ class Ledger:
         together = total.rays == sum_.rays and abs(total.flux - sum_.flux) <= CLOSED * total.flux
         return together and self.imbalance <= CLOSED
 
-    def notes(self) -> tuple[str, ...]:
-        """What the user should know."""
+    def notes(self, most_events: int = LONG) -> tuple[str, ...]:
+        """What the user should know of a trace in which rays were given up after so many surfaces."""
         total, notes = self.total.flux, []
         if self.lost_share > NOTEWORTHY:
             reasons = "; ".join(f"{loss.flux / total:.2g} by {loss}" for loss in self.lost)
             notes.append(f"{self.lost_share:.2g} of the flux was lost: {reasons}")
         if total > 0.0 and self.terminated.flux > NOTEWORTHY * total:
             share = self.terminated.flux / total
-            notes.append(f"{share:.2g} of the flux met more surfaces than allowed and was given up: {self._endless()}")
+            notes.append(
+                f"{share:.2g} of the flux met more surfaces than allowed and was given up: {self._endless(most_events)}"
+            )
         if not self.closes:
             notes.append("the ledger does not close; this is a defect of étendue, please report it")
         return tuple(notes)
 
-    def _endless(self) -> str:
+    def _endless(self, most_events: int) -> str:
         """Why rays meet so many surfaces, and what to do."""
+        if most_events < LONG:
+            return (
+                f"raise most_events from {most_events:,}; what is still given up at {LONG:,} is trapped, in a clear solid "
+                "without absorption or between surfaces with a reflectance of 1"
+            )
         # The first medium is that of the surroundings, where no light goes to and fro by itself.
         clear = [repr(name) for name, absorbed in list(self.by_medium.items())[1:] if not absorbed.rays]
         if not clear:

@@ -109,7 +109,7 @@ class TraceResult(InNotebook):
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What the user should know."""
-        notes = [*self.plan.notes, *self._copies_told(), *self.ledger.notes()]
+        notes = [*self.plan.notes, *self._copies_told(), *self.ledger.notes(self.plan.most_events)]
         if not self.complete:
             notes.append(
                 f"{self.rays_done:,} of {self.rays_asked:,} rays were traced; every flux is scaled by {self.scale:.4g}"
