@@ -149,6 +149,22 @@ def test_rays_with_a_colour_each_keep_it_unless_one_is_stated() -> None:
     assert stated.notes == ("led: the rays' own colours are not used, because 'wavelength' is stated for all of them",)
 
 
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"wavelength": 940}, True),
+        ({"spectrum": [[550, 1], [850, 0.1]]}, True),
+        ({"spectrum": [[550, 1], [850, 0]]}, False),
+        ({"wavelength": 780}, False),
+        ({"wavelength": 940, "flux_unit": "W"}, False),
+    ],
+)
+def test_lumens_that_nobody_sees_are_told(keys: dict[str, Any], *, told: bool) -> None:
+    """V(λ) ends at 360 and 830 nm."""
+    notes = compiled(sources.Surface(shape=DISK, flux=1, **keys)).notes
+    assert [note.startswith("sources[0]: at ") and 'flux_unit = "W"' in note for note in notes] == [True] * told
+
+
 def test_a_spectrum_as_lines() -> None:
     """Trapezoids around the nodes; in lumens every node counts with V(λ), and the mean wavelength is that integral's."""
     nodes = np.array([400.0, 500.0, 550.0, 700.0, 900.0])

@@ -15,6 +15,7 @@ from etendue import _core
 from etendue.description.mistakes import join
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
 from etendue.quantities.fingerprint import fingerprint
+from etendue.quantities.spectrum import photopic_efficiency
 from etendue.scene.bodies.body import Body, Face
 from etendue.scene.colour_dependence import telling_finishes, telling_media
 from etendue.scene.finishes import BUILT_IN, Finish, Interface
@@ -393,7 +394,9 @@ class _Compiler:
                     self.notes += [f"{name}: {note}" for note in (*emitter.flux_notes, *emitter.notes)]
                     if emitter.mean:
                         self.means[name] = wavelengths
-                    if emitter.spectrum is None and not source.states_colours and emitter.flux_unit == "W":
+                    if emitter.flux_unit == "lm":
+                        self.notes += _no_lumens(name, wavelengths[shares > 0.0])
+                    elif emitter.spectrum is None and not source.states_colours:
                         self.notes += self._assumed(name)
         if len(units) > 1:
             text = " and ".join(f"{name!r} is in {unit}" for unit, name in units.items())
@@ -422,6 +425,16 @@ class _Compiler:
             with self._at(_place("detectors", i, detector.name)):
                 self.rows["detectors"].append(detector.record(self.files, observers, self.names["faces"]))
                 self.names["detectors"].append(detector.name or f"detectors[{i}]")
+
+
+def _no_lumens(name: str, wavelengths: npt.NDArray[np.float64]) -> list[str]:
+    """What is to be said of light in lumens at wavelengths that the eye does not see."""
+    dark = wavelengths[photopic_efficiency(wavelengths) == 0.0]
+    if not dark.size:
+        return []
+    return [
+        f'{name}: at {dark[0]:g} nm light has no lumens, since V(λ) is 0 there; state its flux in W, by flux_unit = "W"'
+    ]
 
 
 def _turned(axis: Axis, frame: Frame) -> list[float] | None:
