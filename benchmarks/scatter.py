@@ -12,7 +12,7 @@
    (`scalar_rgb`, `path`), and its light image beside `ptracer`: 1/(variance · time), the variance that of a pixel over
    independent runs.
 
-python benchmarks/scatter.py [--rays 1e6] [--peers]
+python benchmarks/scatter.py [--rays 1e6] [--only table] [--peers]
 """
 
 from __future__ import annotations
@@ -252,6 +252,9 @@ def one_round(
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=float, default=1e6)
+    parser.add_argument(
+        "--only", default="", help="some of the surfaces, as 'table,coated'; the Lambertian one is always there"
+    )
     parser.add_argument("--peers", action="store_true", help="beside Radiance and Mitsuba")
     given = parser.parse_args()
     rays = int(given.rays)
@@ -273,6 +276,10 @@ def main() -> None:
         "rough-coat": et.bsdf.RoughCoat(roughness=0.2, index=1.5, base_reflectance=0.8),
         "table": measured,
     }
+    if only := [name for name in given.only.split(",") if name]:
+        if unknown := set(only) - set(bsdfs):
+            parser.error(f"no such surface: {', '.join(sorted(unknown))}; known: {', '.join(bsdfs)}")
+        bsdfs = {name: bsdf for name, bsdf in bsdfs.items() if name in ("lambertian", *only)}
     incident, to = (
         direction(40.0, 180.0),
         et.bsdf.Lambertian(reflectance=1.0).sample(direction(40.0, 0.0), SAMPLES, seed=1),
