@@ -70,6 +70,20 @@ def test_the_mean_of_a_region_is_the_luminance_however_many_pixels_are_dead() ->
     assert np.mean(live) - truth > 20 * error
 
 
+def test_cells_that_no_ray_reached_leave_the_error_of_a_mean_known() -> None:
+    """k rays of equal flux in a region have the relative error 1/√k, however many of its cells they missed."""
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 100}
+    desk = {"name": "desk", "kind": "illuminance", "width": 50, "height": 40, "columns": 100, "rows": 80}
+    scene = et.Scene(sources=[lamp], detectors=[desk | {"at": [0, 0, 10], "toward": [0, 0, -1]}])
+    lmap, region = et.trace(scene, rays=20_000, seed=1).illuminance["desk"], Region(-20.1, 15.3, -12.2, 18.4)
+    inside = region.mask(lmap.screen)
+    assert (lmap.rays[inside] == 0).sum() > 100
+    found = region_statistics(lmap, region)
+    assert found.mean_error_apart == pytest.approx(found.mean / math.sqrt(lmap.rays[inside].sum()), rel=1e-3)
+    assert found.mean_error > found.mean_error_apart
+    assert (found.minimum, found.dead_pixels) == (0.0, 0)
+
+
 def test_the_error_of_a_mean_is_its_spread() -> None:
     """500 maps of 40 independent pixels: the spread of their means within 4 of its standard errors (6e-5)."""
     draws = np.random.default_rng(1).normal(10.0, 0.5, (500, 4, 10))

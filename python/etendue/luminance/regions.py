@@ -107,7 +107,8 @@ class RegionStatistics:
         Of the pixels counted, in `unit`.
     mean_error : float
         Standard error of the mean if all pixels err together: the mean of their errors, which no correlation exceeds.
-        Pixels of light fields and of smoothed maps are like that. NaN where no error is known.
+        Pixels of light fields and of smoothed maps are like that. NaN where that of a pixel is not known; cells of
+        illuminance that no ray reached count as 0 ± 0.
     mean_error_apart : float
         The same if each pixel errs by itself, as those do that count rays: the root of the sum of squares over their number.
     percentiles : tuple of pairs
@@ -198,10 +199,12 @@ def region_statistics(
         raise UnknownNameError("rule for dead pixels", dead, DEAD_RULES)
     inside = region.mask(lmap.screen)
     live = inside & ~np.isnan(lmap.values)
+    # A cell of illuminance that no ray reached is 0, of unknown error: it counts as a dead pixel does.
+    lit = live & ~((lmap.values == 0.0) & (lmap.rays == 0))
     if not live.any():
         raise ArgumentError(f"region_statistics: all {int(inside.sum())} pixels in {region} are dead.")
     counted = inside if dead == "zero" else live
-    values, errors = (np.where(live, array, 0.0)[counted] for array in (lmap.values, lmap.standard_error))
+    values, errors = (np.where(lit, array, 0.0)[counted] for array in (lmap.values, lmap.standard_error))
     mean, low, high = float(values.mean()), float(values.min()), float(values.max())
     return RegionStatistics(
         mean=mean,
