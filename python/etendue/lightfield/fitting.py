@@ -29,6 +29,7 @@ from etendue.lightfield.etendue_density import EtendueDensity, FitReport
 from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.fit_progress import FitProgress, Step
 from etendue.lightfield.focusing import focused
+from etendue.lightfield.narrow_beams import told_of_narrow_beams
 from etendue.lightfield.pilot_sample import check_near_field, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Plane, Surface
@@ -330,13 +331,14 @@ def fit_counts(
         symmetry=counts.symmetry,
         effective_rays=counts.tally.effective_rays,
     )
+    parts = final.fields(counts)
     return EtendueDensity(
         surface=counts.surface,
-        parts=final.fields(counts),
+        parts=parts,
         flux_unit=rays.flux_unit,
         report=report,
         provenance=rays.provenance.then(f"light field on {counts.surface.spec}"),
-        notes=_notes(counts),
+        notes=(*_notes(counts), *told_of_narrow_beams(parts, counts.part_flux)),
     )
 
 
