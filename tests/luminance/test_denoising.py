@@ -161,6 +161,17 @@ def test_same_bits_for_any_number_of_threads_and_any_odd_shape() -> None:
         assert np.isfinite(results[0].standard_error).all()
 
 
+def test_errors_that_pixels_share_do_not_go_out() -> None:
+    """A light field's pixels, which count no rays, may all be off by the same: a smooth map is off by as much."""
+    noisy = poisson_map(np.ones((8, 8)), 5.0, 1, et.Screen(1, 1, 8, 8))
+    shared = noisy.replace(rays=np.full((8, 8), -1))
+    apart, together = (et.denoise_map(lmap, shifts=2) for lmap in (noisy, shared))
+    np.testing.assert_array_equal(apart.values, together.values)
+    assert (together.standard_error >= np.nan_to_num(noisy.standard_error)).all()
+    assert (apart.standard_error < 0.8 * np.nan_to_num(noisy.standard_error)).any()
+    assert "err together" in together.notes[-1]
+
+
 def test_refusals() -> None:
     noisy = poisson_map(np.ones((4, 4)), 5.0, 1, et.Screen(1, 1, 4, 4))
     with pytest.raises(ArgumentError, match="shifts"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -14,6 +15,7 @@ from etendue.luminance.filters import FILTERS, filter_map, kernel
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
+from oracles.light_fields import SURFACES, make_field
 from scipy import ndimage, stats
 
 Array = npt.NDArray[np.float64]
@@ -192,6 +194,22 @@ def test_propagated_errors_are_right(name: str) -> None:
     low, high = stats.chi2.ppf([tail, 1 - tail], n - 1)
     assert high / (n - 1) < 1.13
     assert ((statistic > low) & (statistic < high)).all()
+
+
+@pytest.mark.parametrize("name", ["average", "weighted"])
+def test_errors_that_pixels_share_stay_as_they_are(name: str) -> None:
+    """If all pixels of a map are off by the same, a mean of them is off by as much, however often it is filtered."""
+    shared = make_map(np.full((7, 9), 110.0), np.full((7, 9), 10.0), np.full((7, 9), -1))
+    once = filter_map(shared, name)
+    np.testing.assert_allclose(once.standard_error, 10.0, rtol=1e-13)
+    assert "err together" in once.notes[-1]
+    apart = filter_map(shared.replace(rays=np.full((7, 9), 9)), name)
+    assert (apart.standard_error < 7.0).all()
+    twice = filter_map(apart, name)
+    np.testing.assert_allclose(twice.standard_error, filter_map(apart.replace(rays=shared.rays), name).standard_error)
+    field = make_field(SURFACES["plane"], seed=8, cells=(4, 4, 4, 4))
+    seen = et.luminance_map(field, Observer(25, 0, 1000), Screen(1, 1, 5, 5))
+    assert "err together" in filter_map(seen, name).notes[-1]
 
 
 def test_selective_errors_are_optimistic_on_pure_noise_as_the_note_says() -> None:

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from etendue.denoising.smoothing import smooth_counts
 from etendue.errors import ArgumentError
+from etendue.luminance.filters import TOGETHER, pixels_err_together
 from etendue.quantities.luminance_map import LuminanceMap
 
 Array = npt.NDArray[np.float64]
@@ -24,7 +25,8 @@ def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None
     Parameters
     ----------
     lmap : LuminanceMap
-        A map whose pixels are independent and whose standard errors are known: straight from `luminance_map`.
+        A map whose pixels are independent and whose standard errors are known: straight from `luminance_map`, by the cone or
+        of a scene. The errors of light fields, and of maps that were smoothed before, do not go out; a note says so.
     shifts : int
         Positions of the trees' dyadic grid, 1 to 1024; they are a fixed sequence.
     threads : int, optional
@@ -62,11 +64,15 @@ def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None
         )
     etendue = lmap.screen.cosine(lmap.observer)  # relative: constant factors cancel
     smooth = smooth_counts(*_poisson_sums(lmap, etendue), etendue, shifts=shifts, threads=threads)
+    error, notes = smooth.standard_error / etendue, (*lmap.notes, *smooth.notes)
+    if pixels_err_together(lmap):
+        error = np.fmax(error, lmap.standard_error)
+        notes = (*notes, TOGETHER)
     return lmap.replace(
         values=smooth.mass / etendue,
-        standard_error=smooth.standard_error / etendue,
+        standard_error=error,
         provenance=lmap.provenance.then(f"denoised by trees, edges and rings, {shifts} shifts"),
-        notes=(*lmap.notes, *smooth.notes),
+        notes=notes,
     )
 
 

@@ -19,6 +19,11 @@ Array = npt.NDArray[np.float64]
 Counts = npt.NDArray[np.int64]
 ArrayOrCounts = TypeVar("ArrayOrCounts", Array, Counts)
 
+SMOOTHING = ("filter ", "denoised ")
+"""How steps of the provenance begin that let the errors of pixels depend on each other."""
+
+TOGETHER = "pixels of light fields and of smoothed maps err together: standard errors are no less for it"
+
 PIXELS_AT_ONCE = 1 << 17
 """Pixels that the selective filters work on together, so that their intermediate arrays stay in the cache."""
 
@@ -94,10 +99,12 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     average; to leave the pixel out would lift its neighbours. A pixel stays dead where no ray came into the whole
     kernel. Eq. 2.6 selects nothing around a pixel that is dead or not above 0: it then keeps what it has.
 
-    *Standard errors.* σ²(g) = Σ w² σ²(f) for independent pixels of f, which those of the cone estimator are; a pixel
-    whose error is unknown makes the errors unknown of all that use it. Dead pixels add nothing, although a pixel
-    without rays is not known exactly. For the selective filters the error is that of the average of the pixels
-    *once selected*; as the noise itself decided on the selection, it is optimistic.
+    *Standard errors.* σ²(g) = Σ w² σ²(f) for independent pixels of f, which those of the cone estimator are. Pixels of
+    light fields, and of maps that were smoothed before, err together; of these it is σ(g) = Σ w σ(f), which no
+    correlation exceeds, and a note says so. Of a scene the lines of sight are independent from pixel to pixel, and what
+    a light field in it does not know is not. A pixel whose error is unknown makes the errors unknown of all that use it.
+    Dead pixels add nothing, although a pixel without rays is not known exactly. For the selective filters the error is
+    that of the average of the pixels *once selected*; as the noise itself decided on the selection, it is optimistic.
 
     Examples
     --------
@@ -121,14 +128,30 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     if chosen.selective and not (math.isfinite(gamma) and gamma > 0.0):
         raise ArgumentError(f"filter_map: gamma is {gamma}; give a finite fraction > 0, such as 0.2.")
     row_weights, column_weights = _weights(rows, chosen.weighted), _weights(columns, chosen.weighted)
-    stack = _Stack.of(lmap)
+    power = 1 if pixels_err_together(lmap) else 2
+    stack = _Stack.of(lmap, power)
     if chosen.selective:
-        filtered = _filter_selectively(stack, row_weights, column_weights, gamma)
+        filtered = _filter_selectively(stack, row_weights, column_weights, gamma, power)
     else:
-        filtered = _filter_linearly(stack, row_weights, column_weights)
+        filtered = _filter_linearly(stack, row_weights, column_weights, power)
     label = f"{kind} {rows}×{columns}" + (f", γ = {gamma:g}" if chosen.selective else "")
-    result = filtered.put_into(lmap, f"filter {label}")
+    result = filtered.put_into(lmap, f"filter {label}", power)
     return result.replace(notes=(*lmap.notes, *_report(lmap, result, label, chosen)))
+
+
+def pixels_err_together(lmap: LuminanceMap) -> bool:
+    """Whether the errors of neighbouring pixels are known to be much the same: of a light field, or smoothed before.
+
+    Examples
+    --------
+    >>> from etendue.quantities.observer import Observer, Screen
+    >>> lmap = LuminanceMap([[1.0, 2.0]], [[0.1, 0.1]], [[90, 50]], Observer(0, 0, 1000), Screen(2, 1, 2, 1))
+    >>> [pixels_err_together(one) for one in (lmap, filter_map(lmap, "average", 3), lmap.replace(rays=[[-1, -1]]))]
+    [False, True, True]
+    """
+    # Rays are counted by the cone, and lines of sight are as independent; light fields count none.
+    counted = lmap.rays[~np.isnan(lmap.values)] >= 0
+    return not counted.any() or any(step.startswith(SMOOTHING) for step in lmap.provenance.steps)
 
 
 def kernel(kind: str, size: int | tuple[int, int] = 5) -> Array:
@@ -189,8 +212,8 @@ class _Stack:
 
     value: Array
     """Luminance, 0 where dead."""
-    variance: Array
-    """Squared standard error, 0 where dead, NaN where unknown."""
+    error: Array
+    """Standard error to the power that adds up, 0 where dead, NaN where unknown."""
     rays: Counts
     """Rays, 0 where dead or unknown."""
     unknown: Counts
@@ -199,27 +222,27 @@ class _Stack:
     """1 where the pixel is not dead."""
 
     @classmethod
-    def of(cls, lmap: LuminanceMap) -> _Stack:
+    def of(cls, lmap: LuminanceMap, power: int) -> _Stack:
         dead = np.isnan(lmap.values)
         return cls(
             value=np.where(dead, 0.0, lmap.values),
-            variance=np.where(dead, 0.0, lmap.standard_error**2),
+            error=np.where(dead, 0.0, lmap.standard_error**power),
             rays=np.where(dead, 0, np.maximum(lmap.rays, 0)),
             unknown=(~dead & (lmap.rays < 0)).astype(np.int64),
             alive=(~dead).astype(np.int64),
         )
 
-    def put_into(self, lmap: LuminanceMap, step: str) -> LuminanceMap:
+    def put_into(self, lmap: LuminanceMap, step: str, power: int) -> LuminanceMap:
         dead = self.alive == 0
         return lmap.replace(
             values=np.where(dead, np.nan, self.value),
-            standard_error=np.where(dead, np.nan, np.sqrt(self.variance)),
+            standard_error=np.where(dead, np.nan, self.error ** (1.0 / power)),
             rays=np.where(self.unknown > 0, -1, self.rays),
             provenance=lmap.provenance.then(step),
         )
 
 
-def _filter_linearly(stack: _Stack, row_weights: Array, column_weights: Array) -> _Stack:
+def _filter_linearly(stack: _Stack, row_weights: Array, column_weights: Array, power: int) -> _Stack:
     """Eq. 2.5 with a kernel that is an outer product: first down the columns, then along the rows."""
 
     def spread(array: ArrayOrCounts, power: int) -> ArrayOrCounts:
@@ -230,7 +253,7 @@ def _filter_linearly(stack: _Stack, row_weights: Array, column_weights: Array) -
     inside = np.outer(_correlate(np.ones(rows), row_weights), _correlate(np.ones(columns), column_weights))
     return _Stack(
         value=spread(stack.value, 1) / inside,
-        variance=spread(stack.variance, 2) / inside**2,
+        error=spread(stack.error, power) / inside**power,
         rays=spread(stack.rays, 0),
         unknown=spread(stack.unknown, 0),
         alive=spread(stack.alive, 0),
@@ -246,26 +269,26 @@ def _correlate(array: ArrayOrCounts, weights: Array) -> ArrayOrCounts:
     return result
 
 
-def _filter_selectively(stack: _Stack, row_weights: Array, column_weights: Array, gamma: float) -> _Stack:
+def _filter_selectively(stack: _Stack, row_weights: Array, column_weights: Array, gamma: float, power: int) -> _Stack:
     """Fig. 2.4, in bands of rows."""
     rows, columns = stack.value.shape
     result = _Stack(*(np.zeros_like(getattr(stack, field.name)) for field in dataclasses.fields(_Stack)))
     band = max(1, PIXELS_AT_ONCE // columns)
     for start in range(0, rows, band):
         stop = min(start + band, rows)
-        for field, array in _select_band(stack, row_weights, column_weights, gamma, start, stop).items():
+        for field, array in _select_band(stack, row_weights, column_weights, gamma, power, start, stop).items():
             getattr(result, field)[start:stop] = array
     return result
 
 
 def _select_band(
-    stack: _Stack, row_weights: Array, column_weights: Array, gamma: float, start: int, stop: int
+    stack: _Stack, row_weights: Array, column_weights: Array, gamma: float, power: int, start: int, stop: int
 ) -> dict[str, npt.NDArray[Any]]:
     rows, columns = stack.value.shape
     centre = stack.value[start:stop]
     allowed = gamma * centre
     total = np.zeros_like(centre)
-    sums = {name: np.zeros_like(getattr(stack, name)[start:stop]) for name in ("value", "variance", "rays", "unknown")}
+    sums = {name: np.zeros_like(getattr(stack, name)[start:stop]) for name in ("value", "error", "rays", "unknown")}
     for down, row_weight in _offsets(row_weights, rows):
         here_rows, there_rows = _overlap(down, rows, start, stop)
         for right, column_weight in _offsets(column_weights, columns):
@@ -274,13 +297,13 @@ def _select_band(
             chosen = np.abs(stack.value[there] - centre[here]) < allowed[here]  # eq. 2.6
             weight = row_weight * column_weight
             total[here] += weight * chosen
-            for name, factor in (("value", weight), ("variance", weight**2), ("rays", 1), ("unknown", 1)):
+            for name, factor in (("value", weight), ("error", weight**power), ("rays", 1), ("unknown", 1)):
                 # `where` and not a product: the error of a pixel that was not chosen may be unknown (NaN).
                 np.add(sums[name][here], factor * getattr(stack, name)[there], out=sums[name][here], where=chosen)
     found = total > 0.0
     scale = np.where(found, total, 1.0)
     sums["value"] = sums["value"] / scale
-    sums["variance"] = sums["variance"] / scale**2
+    sums["error"] = sums["error"] / scale**power
     kept = {name: np.where(found, array, getattr(stack, name)[start:stop]) for name, array in sums.items()}
     return {**kept, "alive": stack.alive[start:stop]}
 
@@ -305,5 +328,7 @@ def _report(before: LuminanceMap, after: LuminanceMap, label: str, kind: FilterK
     change = f" ({100.0 * (new - old) / old:+.2f} %)".replace("-", "−") if old else ""
     dead = f"; dead pixels {before.dead_pixels} → {after.dead_pixels}" if before.dead_pixels else ""
     yield f"{label}: intensity {rounded(old)} → {counted(new, unit)}{change}{dead}"
+    if pixels_err_together(before) and np.isfinite(before.standard_error).any():
+        yield f"{label}: {TOGETHER}"
     if kind.selective:
         yield f"{label}: standard errors are optimistic, because the noise itself selected the pixels that are averaged"

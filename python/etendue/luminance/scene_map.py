@@ -359,17 +359,19 @@ def with_fields(
             sources.append(source.seen(scene.files) if isinstance(source, Gridded) else source)
             continue
         name = source.name or f"sources[{i}]"
-        field, surface, share = _fitted(source, scene, threads, {} if fits is None else fits, cache=cache)
-        sources.append(field)
+        seen, field, share = _fitted(source, scene, threads, {} if fits is None else fits, cache=cache)
+        sources.append(seen)
         lost = f"; {share:.2%} of the flux does not come from it" if share > 1e-4 else ""
-        notes.append(f"{name}: a light field on {surface} was fitted to its rays{lost}")
-        blurred = told_of_narrow_beams(field.field.parts, field.field.part_flux)
+        notes.append(f"{name}: a light field on {field.surface.told} was fitted to its rays{lost}")
+        blurred = told_of_narrow_beams(field.parts, field.part_flux)
         notes += [f"{name}: {note}" for note in (*blurred, *(source.rays.notes if source.rays is not None else ()))]
     return scene.replace(sources=tuple(sources)), notes
 
 
-def _fitted(source: Rays, scene: Scene, threads: int | None, fits: Fits, *, cache: bool) -> tuple[Field, str, float]:
-    """The light field of a ray source in its place, its carrier surface, and the share of the flux it does not hold."""
+def _fitted(
+    source: Rays, scene: Scene, threads: int | None, fits: Fits, *, cache: bool
+) -> tuple[Field, LightField, float]:
+    """The light field of a ray source in its place, as it was fitted, and the share of the flux it does not hold."""
     rays = source.ray_stream(scene.files)
     unit = source.flux_unit if source.flux_unit is not None else rays.flux_unit
     (emitter,) = source.emitters(scene.files)
@@ -388,7 +390,7 @@ def _fitted(source: Rays, scene: Scene, threads: int | None, fits: Fits, *, cach
         spectrum=source.spectrum,
         **place,
     )
-    return seen, field.surface.told, 1.0 - field.total_flux / rays.total_flux
+    return seen, field, 1.0 - field.total_flux / rays.total_flux
 
 
 def _unseen(compiled: Compiled, *, forwards: bool) -> list[str]:
