@@ -194,6 +194,47 @@ def test_figures_of_a_region_are_those_of_the_map(modules: Path) -> None:
     assert section[-1]["at"] + section[0]["at"] == pytest.approx(np.hypot(1.7, 0.15))
 
 
+REGION_OF_MAP = """
+import { PixelMap } from "./picture.js";
+import { measureRegion } from "./readings.js";
+import { View } from "./view.js";
+const at = new View({ ...data.view, columns: data.columns, rows: data.rows });
+const [values, errors] = [data.map.values, data.map.errors].map((list) => list.map((x) => x ?? NaN));
+const map = new PixelMap({ ...data.map, values, errors });
+console.log(JSON.stringify(await measureRegion(map, at, data.corners, () => true)));
+"""
+
+
+def test_dead_pixels_of_a_map_count_as_in_region_statistics(modules: Path) -> None:
+    """Of a map of few rays most pixels are dead: 0 ± 0 each, and what lies beyond the map is no pixel of it."""
+    rings = et.RingSource(rays=100_000, seed=3)
+    observer, screen = et.Observer(20, 30, 1000), et.Screen(40, 30, 40, 30)
+    lmap = et.luminance_map(rings, observer, screen, method=et.Cone(acceptance=2))
+    assert lmap.dead_pixels > 300
+    right, up, _ = screen.axes(observer)
+    arrays = {"values": lmap.values, "errors": lmap.standard_error}
+    plain = {name: np.where(np.isnan(array), None, array).ravel().tolist() for name, array in arrays.items()}
+    place = {"width": 40, "height": 30, "target": [0, 0, 0], "right": right.tolist(), "up": up.tolist()}
+    data = {
+        "map": {"columns": 40, "rows": 30, **place, **plain},
+        "view": {"theta": 20, "phi": 30, "distance": 1000, "target": [0, 0, 0], "width": 50},
+        "columns": 50,
+        "rows": 40,
+        "corners": [[-25, -8.2], [11.3, -8.2], [11.3, 9.4], [-25, 9.4]],
+    }
+    found = run(modules, REGION_OF_MAP, data)
+    truth = et.region_statistics(lmap, et.Region(-25, 11.3, -8.2, 9.4))
+    assert (found["pixels"], found["dead"]) == (truth.pixels, truth.dead_pixels)
+    for name, value in {
+        "mean": truth.mean,
+        "error": truth.mean_error,
+        "maximum": truth.maximum,
+        "minimum": 0.0,
+    }.items():
+        assert found[name] == pytest.approx(value, rel=1e-12), name
+    assert found["percentiles"] == pytest.approx([value for _, value in truth.percentiles], rel=1e-12)
+
+
 NUMBERS = """
 import { measured, plain, prefixed, ticks, typed, withUnit } from "./numbers.js";
 console.log(JSON.stringify([

@@ -28,6 +28,7 @@ function tableOf(title, rows, remove) {
 export function regionRows(figures, unit, fluxUnit) {
   if (!figures) return [["", "…"]];
   if (figures.pixels === 0) return [["", "no pixel has its middle in it"]];
+  if (figures.pixels === figures.dead) return [["", "all its pixels are dead: no ray came"]];
   const intensityUnit = fluxUnit === "lm" ? "cd" : "W/sr";
   const luminance = unit.includes("sr") || unit.startsWith("cd");
   const [low, middle, high] = figures.percentiles;
@@ -41,7 +42,8 @@ export function regionRows(figures, unit, fluxUnit) {
   ];
   if (luminance) rows.push(["intensity", withUnit(figures.intensity, intensityUnit)]);
   if (figures.flux) rows.push(["flux, all directions", measured(figures.flux.value, figures.flux.error, fluxUnit)]);
-  rows.push(["area", `${plain(figures.area, 4)} mm²`], ["pixels", String(figures.pixels)]);
+  const dead = figures.dead > 0 ? `, ${figures.dead} dead, as 0` : "";
+  rows.push(["area", `${plain(figures.area, 4)} mm²`], ["pixels", `${figures.pixels}${dead}`]);
   return rows;
 }
 

@@ -31,7 +31,7 @@ export class PixelMap {
     const [right, up] = this.shift(view);
     const x = Math.floor(((u + right) / this.width + 0.5) * this.columns);
     const y = Math.floor((0.5 - (v + up) / this.height) * this.rows);
-    if (!(x >= 0 && x < this.columns && y >= 0 && y < this.rows)) return { value: NaN, error: NaN };
+    if (!(x >= 0 && x < this.columns && y >= 0 && y < this.rows)) return { value: NaN, error: NaN, beyond: true };
     const at = y * this.columns + x;
     return { value: this.values[at], error: this.errors[at], column: x, row: y };
   }

@@ -74,17 +74,21 @@ export async function measureRegion(subject, view, corners, current) {
   const read = ([column, row]) => ({ ...subject.pixel(view, column, row, REGION_SAMPLES), column, row });
   const all = await inSlices(pixels, read, current);
   if (all === null) return null;
-  const live = all.filter((pixel) => Number.isFinite(pixel.value));
-  if (live.length === 0) return { pixels: 0, dead: all.length };
-  const sorted = Float64Array.from(live, (pixel) => pixel.value).sort();
+  const seen = all.filter((pixel) => !pixel.beyond);
+  const dead = seen.filter((pixel) => !Number.isFinite(pixel.value)).length;
+  if (seen.length === dead) return { pixels: seen.length, dead };
+  // A dead pixel, and a cell of illuminance that no ray reached, count as 0 ± 0, as in `etendue.region_statistics`: where rays
+  // are few, the pixels that one of them reached are too bright on average.
+  const counted = seen.map((p) => (p.value ? p : { ...p, value: 0, error: p.error || 0 }));
+  const sorted = Float64Array.from(counted, (pixel) => pixel.value).sort();
   const mean = sorted.reduce((sum, x) => sum + x, 0) / sorted.length;
   // Neighbours err together; so far as all of them do, the mean errs by the mean of their errors.
-  const error = live.reduce((sum, pixel) => sum + (pixel.error || 0), 0) / live.length;
-  const intensity = live.reduce((sum, p) => sum + p.value * view.cosine(p.column + 0.5, p.row + 0.5), 0);
+  const error = counted.reduce((sum, pixel) => sum + pixel.error, 0) / counted.length;
+  const intensity = counted.reduce((sum, p) => sum + p.value * view.cosine(p.column + 0.5, p.row + 0.5), 0);
   const [least, most] = [sorted[0], sorted[sorted.length - 1]];
   return {
-    pixels: live.length,
-    dead: all.length - live.length,
+    pixels: counted.length,
+    dead,
     area: areaOf(corners),
     mean,
     error,
