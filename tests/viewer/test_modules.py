@@ -14,6 +14,7 @@ import numpy.typing as npt
 import pytest
 from etendue.viewer.field_tables import FieldTables
 from oracles.light_fields import SURFACES, make_field
+from scipy import ndimage
 
 from viewer.views import page_views
 
@@ -66,47 +67,33 @@ console.log(JSON.stringify(found));
 """
 
 
-def averages(field: et.LightField, observer: et.Observer, screen: et.Screen) -> Array:
-    """Luminance of each pixel, by the sixteen points of a lattice that the page has in each of them."""
-    right, up, _ = screen.axes(observer)
-    i = np.arange(16)
-    u = ((np.arange(screen.columns)[:, None] + (i + 0.5) / 16) / screen.columns - 0.5) * screen.width
-    v = (0.5 - (np.arange(screen.rows)[:, None] + (9 * i % 16 + 0.5) / 16) / screen.rows) * screen.height
-    points = np.array(observer.target) + u[None, :, :, None] * right + v[:, None, :, None] * up
-    sight = (observer.position - points).reshape(-1, 3)
-    values = field.luminance(points.reshape(-1, 3), sight / np.linalg.norm(sight, axis=1)[:, None])[0]
-    means: Array = values.reshape(*screen.shape, 16).mean(axis=2)
-    return means
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SURFACES)
 def test_pixels_are_those_of_the_cores_map(modules: Path, name: str) -> None:
-    """Value within the bound that the page states, error within that of its steps, on every surface.
+    """Value within the bound that the page states, error within that of its steps, on every surface, edges among them.
 
-    The core takes more points where these differ much; errors are compared where it did not, mostly in small pixels.
+    No part of the surfaces is thinner than two pixels here: of those that are the core adds up the light over their outline.
     """
     field = make_field(SURFACES[name], seed=8)
     tables = FieldTables.of(field)
     columns, rows = 12, 8
     views = [
-        *page_views(count=8, columns=columns, rows=rows, seed=9),
+        *page_views(count=8, columns=columns, rows=rows, seed=9, closer=6.0),
         *page_views(count=24, columns=columns, rows=rows, seed=10, closer=30.0),
     ]
     data = {"field": tables.packed(), "views": [v.page for v in views], "columns": columns, "rows": rows}
     found = np.array(run(modules, READ, data)).reshape(len(views), rows, columns, 2)
-    lit = same = 0
+    lit = edges = 0
     for view, pixels in zip(views, found, strict=True):
-        values, lmap = averages(field, view.observer, view.screen), et.luminance_map(field, view.observer, view.screen)
-        bright = values > 0
+        lmap = et.luminance_map(field, view.observer, view.screen)
+        bright = lmap.values > 0
         assert ((pixels[..., 0] > 0) == bright).all()
-        assert np.abs(pixels[..., 0][bright] / values[bright] - 1).max(initial=0) < tables.bound + 1e-6
+        assert np.abs(pixels[..., 0][bright] / lmap.values[bright] - 1).max(initial=0) < tables.bound + 1e-6
+        assert np.abs(pixels[..., 1][bright] / lmap.standard_error[bright] - 1).max(initial=0) < ERROR_BOUND
         lit += int(bright.sum())
-        alike = bright & (np.abs(lmap.values - values) <= 1e-9 * values)
-        same += int(alike.sum())
-        assert np.abs(pixels[..., 1][alike] / lmap.standard_error[alike] - 1).max(initial=0) < ERROR_BOUND
+        edges += int((bright & ~ndimage.binary_erosion(bright, border_value=1)).sum())
     assert lit > 50
-    assert same > 50
+    assert edges > 5
 
 
 REGION = """

@@ -3,6 +3,15 @@
 import { cross } from "./chart.js";
 import { constantTable, readTable } from "./tables.js";
 
+// Of the core's `look.rs`: how many times as many points there are where they differ much, by which share of the error or of
+// the value their average may be off before there are, how many there are at most, and of how many each half is a lattice.
+const FINER = 16;
+const LEFT = [0.25, 0.005];
+const MOST_POINTS = 2048;
+const HALVES = 64;
+// Of fewer, as those of regions, the neighbours are not looked at: the pixels of a region make up for each other's edges.
+const OWN_POINTS = 16;
+
 /** The two cells between whose centres `x` lies, and the weight of the second. */
 function tent(x, n, wraps) {
   const t = x * n + 0.5;
@@ -32,6 +41,20 @@ function left(shares, area) {
   if (doublings >= last) return shares[last];
   const lower = Math.floor(doublings);
   return shares[lower] + (doublings - lower) * (shares[lower + 1] - shares[lower]);
+}
+
+/** How far the average over the points of a lattice may be off: by their variance, and by how every other of them differs. */
+function latticeError(values) {
+  const n = values.length;
+  const halves = [0, 0];
+  let squares = 0;
+  values.forEach((x, i) => {
+    halves[i % 2] += x;
+    squares += x * x;
+  });
+  const mean = (halves[0] + halves[1]) / n;
+  const byVariance = (0.4 * Math.sqrt(Math.max(squares / n - mean * mean, 0))) / n ** 0.75;
+  return n < HALVES ? byVariance : Math.max(byVariance, Math.abs(halves[0] - halves[1]) / n);
 }
 
 function gcd(a, b) {
@@ -121,9 +144,31 @@ export class Field {
     return { value, error: Math.sqrt(variance) };
   }
 
-  /** Mean luminance of a pixel of a view and its standard error, as the core's maps have them. */
+  /**
+   * Mean luminance of a pixel of a view and its standard error, as the core's maps have them: where points differ much, or a
+   * pixel beside it has another luminance, there are more of them, and what is left of the doubt is in the error.
+   */
   pixel(view, column, row, samples = 16) {
+    const seen = this.average(view, column, row, samples);
+    const wanted = Math.max(LEFT[0] * seen.error, LEFT[1] * seen.value);
+    if (samples === 1 || !(seen.left > wanted || this.stepBeside(view, column, row, samples, seen.value) > wanted)) return seen;
+    const { value, error, left } = this.average(view, column, row, Math.min(samples * FINER, MOST_POINTS));
+    return { value, error: Math.hypot(error, left) };
+  }
+
+  /** How far the average over a pixel may be off by an edge before its outermost points, of which the pixels beside it tell. */
+  stepBeside(view, column, row, samples, value) {
+    if (samples < OWN_POINTS) return 0;
+    const beside = [[-1, 0], [1, 0], [0, -1], [0, 1]].map(([right, down]) => [column + right, row + down]);
+    const there = beside.filter(([x, y]) => x >= 0 && x < view.columns && y >= 0 && y < view.rows);
+    const steps = there.map(([x, y]) => Math.abs(this.average(view, x, y, samples).value - value));
+    return (0.25 * Math.max(0, ...steps)) / samples;
+  }
+
+  /** The average over so many points of a pixel, its standard error, and how far it may be off that over the whole pixel. */
+  average(view, column, row, samples) {
     const lines = lattice(samples).map(([du, dv]) => view.line(column + du, row + dv));
+    const totals = new Float64Array(samples);
     let value = 0;
     let variance = 0;
     for (const part of this.parts) {
@@ -133,19 +178,21 @@ export class Field {
       const away = [0, 0];
       const squares = [0, 0];
       let points = 0;
-      for (const [point, direction] of lines) {
+      lines.forEach(([point, direction], at) => {
         const place = cross(part.chart, point, direction);
-        if (!place) continue;
+        if (!place) return;
         first ??= place;
         points += 1;
-        readPart(part, place).forEach((x, i) => (sums[i] += x));
+        const read = readPart(part, place);
+        totals[at] += read[0];
+        read.forEach((x, i) => (sums[i] += x));
         for (const axis of [0, 1]) {
           let step = place[axis] - first[axis];
           if (wraps && axis === 0) step -= Math.round(step);
           away[axis] += step;
           squares[axis] += step * step;
         }
-      }
+      });
       if (points === 0) continue;
       const side = (axis) => Math.sqrt(12 * Math.max(squares[axis] / points - (away[axis] / points) ** 2, 0));
       const area = side(0) * side(1);
@@ -157,6 +204,6 @@ export class Field {
         ((sums[2] * left(part.withinLeft, area * fine * fine)) / samples) ** 2 +
         (sums[3] / samples) ** 2;
     }
-    return { value, error: Math.sqrt(variance) };
+    return { value, error: Math.sqrt(variance), left: latticeError(totals) };
   }
 }
