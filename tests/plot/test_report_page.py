@@ -141,6 +141,25 @@ def test_the_standard_views_stand_about_the_light(file: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_source_that_shines_down_is_looked_at_from_below_and_dark_views_are_black() -> None:
+    """A Lambertian source that is turned over has the intensity Φ/π seen from below, within the error that it has if
+    all pixels err together; from above it is dark."""
+    rings = et.RingSource(rays=20_000)
+    turned = rings.ray_set().rotated((1, 0, 0), 180)
+    found = et.report_source(turned, surface=et.Sphere(radius=40), forecast=False)
+    assert [lmap.observer.theta for lmap in found.maps] == [180, 150, 120, 120]
+    assert 60 < found.maps[0].screen.width < 80
+    some = [et.Observer(0, 0, 1000), et.Observer(180, 0, 1000)]
+    above, below = et.report_source(turned, surface=et.Sphere(radius=40), observers=some, forecast=False).maps
+    known = below.relative_error
+    assert known is not None
+    assert abs(below.intensity / (rings.total_flux / np.pi) - 1) < known.flux_weighted
+    assert above.intensity < 0.02 * below.intensity
+    with pytest.raises(ArgumentError, match="no ray"):
+        et.report_source(turned, surface=et.Sphere(radius=40), observers=some[:1], forecast=False)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [3_000, 30_000])
 def test_what_more_rays_would_bring_is_told_or_why_not(number: int) -> None:
     told: list[int] = []

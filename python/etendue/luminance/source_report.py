@@ -18,7 +18,7 @@ from etendue.lightfield.forecast import FEWEST_RAYS, REFITS
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Surface
 from etendue.luminance.estimate import luminance_map
-from etendue.luminance.framing import centre_of_light, framed_screens, probe
+from etendue.luminance.framing import centre_of_light, framed, light_towards, probe
 from etendue.quantities.data_sheet import DataSheet, data_sheet
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
@@ -29,7 +29,10 @@ from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress
 
 VIEWS = ((0.0, 0.0), (30.0, 0.0), (60.0, 0.0), (60.0, 90.0))
-"""The standard set of observers: θ, φ [°]."""
+"""The standard set of observers: θ, φ [°]; 180° - θ of a source that shines down."""
+
+DOWN = 0.9
+"""Share of the flux that heads down if a source is to be looked at from below."""
 
 DISTANCE = 1000.0
 """Of the observers from the light [mm]; further if the light is wider than a tenth of that."""
@@ -153,7 +156,7 @@ def report_source(
         Carrier surface, as `LightField.fit` takes it.
     observers : sequence of Observer, optional
         (0°, 0°), (30°, 0°), (60°, 0°) and (60°, 90°) at 1 000 mm about the point that the light seems to come from, or ten
-        times as far as that light is wide, if not given.
+        times as far as that light is wide, if not given; from below, at 180° - θ, if nine tenths of it or more head down.
     title : str, optional
         Name of the file if not given.
     forecast : bool
@@ -176,7 +179,7 @@ def report_source(
     FormatError
         If the file is no ray file.
     ArgumentError
-        If there are no rays with positions, or no observers.
+        If there are no rays with positions, or no observers, or no light heads for any of them.
 
     Examples
     --------
@@ -199,9 +202,10 @@ def report_source(
     enough = len(rays) >= FEWEST_RAYS
     few = [f"{len(rays):,} rays are too few to forecast what more would bring; {FEWEST_RAYS:,} are not"]
     found = diagnose(field, rays if forecast and enough else None, seed=seed, threads=threads, progress=refitted)
-    views = list(observers) if observers is not None else _standard(field)
-    largest = max(framed_screens(field, views, PIXELS, PIXELS), key=lambda screen: screen.width)
-    screen = Screen(largest.width, largest.height, PIXELS, PIXELS)
+    some = probe(field)
+    views = list(observers) if observers is not None else _standard(some)
+    width = _width(some, views)
+    screen = Screen(width, width, PIXELS, PIXELS)
     maps = luminance_map(field, views, screen, threads=threads)
     origin = field.provenance
     steps = [("done", step) for step in origin.steps]
@@ -222,10 +226,17 @@ def report_source(
     )
 
 
-def _standard(field: LightField) -> list[Observer]:
-    """The standard set about the light, far enough for its size."""
-    some = probe(field)
+def _standard(some: RaySet) -> list[Observer]:
+    """The standard set about the light of which these are some rays, far enough for its size."""
     target = centre_of_light(some)
-    near = [Observer(theta, phi, DISTANCE, target=target) for theta, phi in VIEWS]
-    width = max(screen.width for screen in framed_screens(field, near, PIXELS, PIXELS))
-    return [Observer(theta, phi, max(DISTANCE, 10.0 * width), target=target) for theta, phi in VIEWS]
+    down = float(some.flux[some.direction[:, 2] < 0.0].sum()) >= DOWN * some.total_flux
+    views = [(180.0 - theta if down else theta, phi) for theta, phi in VIEWS]
+    distance = max(DISTANCE, 10.0 * _width(some, [Observer(*view, DISTANCE, target=target) for view in views]))
+    return [Observer(*view, distance, target=target) for view in views]
+
+
+def _width(some: RaySet, views: Sequence[Observer]) -> float:
+    """Of a square screen that shows the light to all who see any [mm]."""
+    screen = Screen(1.0, 1.0, PIXELS, PIXELS)
+    lit = [view for view in views if light_towards(some, view, screen).flux.any()]
+    return max(framed(some, view, PIXELS, PIXELS).width for view in lit or views)
