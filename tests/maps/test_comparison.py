@@ -5,12 +5,17 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.luminance.combination import combine_maps
 from etendue.luminance.comparison import Region, compare, cross_section
+from etendue.luminance.denoising import denoise_map
+from etendue.luminance.filters import filter_map
+from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
@@ -313,3 +318,19 @@ def test_cross_section_wants_one_coordinate(where: dict[str, float]) -> None:
 def test_cross_section_off_the_screen(where: dict[str, float]) -> None:
     with pytest.raises(ArgumentError, match="off the screen"):
         cross_section(make_map(VALUES, screen=Screen(8, 9, 4, 3)), **where)
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda lmap: compare(make_map([[1.0, 2.0]]), lmap),
+        lambda lmap: filter_map(lmap, "average"),
+        denoise_map,
+        lambda lmap: combine_maps([lmap, lmap]),
+    ],
+)
+def test_what_is_no_map_of_luminance_is_refused(ask: Callable[[Any], object]) -> None:
+    desk = IlluminanceMap([[400.0, 600.0]], [[4.0, 5.0]], [[900, 1100]], Screen(2000, 1000, 2, 1, "xy"))
+    for wrong, name in ((desk, "IlluminanceMap"), ("map.exr", "str")):
+        with pytest.raises(ArgumentError, match=f"a {name} is no map of luminance; give"):
+            ask(wrong)

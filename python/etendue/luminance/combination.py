@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from etendue.errors import ArgumentError
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
 
 
 def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
@@ -26,7 +26,7 @@ def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
     Raises
     ------
     ArgumentError
-        If there is no map, they differ in observer, screen or unit, or two have the same origin.
+        If there is no map, one is none of luminance, they differ in observer, screen or unit, or two have the same origin.
 
     Examples
     --------
@@ -39,6 +39,8 @@ def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
     """
     if not maps:
         raise ArgumentError("combine_maps: no maps.")
+    for lmap in maps:
+        check_luminance_map(lmap, "combine_maps")
     first = maps[0]
     for other in maps[1:]:
         for name in ("observer", "screen", "flux_unit"):

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
 from etendue.quantities.observer import Screen
 from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.printable import printable
@@ -289,7 +289,7 @@ def compare(
     Raises
     ------
     ArgumentError
-        If the maps differ in unit, pixels, screen or observer, or no pixel is left to compare.
+        If one is no map of luminance, the maps differ in unit, pixels, screen or observer, or no pixel is left to compare.
     UnknownNameError
         If there is no such rule for dead pixels.
 
@@ -308,6 +308,8 @@ def compare(
     """
     if dead not in DEAD_RULES:
         raise UnknownNameError("rule for dead pixels", dead, DEAD_RULES)
+    for lmap in (test, reference):
+        check_luminance_map(lmap, "compare")
     _check_comparable(test, reference, ignore_geometry)
     used = region.mask(reference.screen) if region else np.ones(reference.screen.shape, dtype=np.bool_)
     alive = ~(np.isnan(test.values) | np.isnan(reference.values))

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from etendue.denoising.smoothing import smooth_counts
 from etendue.errors import ArgumentError
 from etendue.luminance.filters import TOGETHER, pixels_err_together
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
 
 Array = npt.NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None
     ------
     ArgumentError
         If the map has no flux, a negative value, or a live pixel without a standard error above 0; if `shifts` is out of
-        its domain; or if the map has more than 16 million pixels.
+        its domain; or if the map has more than 16 million pixels, or is none of luminance.
 
     Examples
     --------
@@ -56,6 +56,7 @@ def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None
     >>> abs(smooth.intensity / noisy.intensity - 1) < 1e-12, smooth.dead_pixels
     (True, 0)
     """
+    check_luminance_map(lmap, "denoise_map")
     if not (isinstance(shifts, int) and 1 <= shifts <= 1024):
         raise ArgumentError(f"denoise_map: shifts is {shifts!r}; give a whole number from 1 to 1024.")
     if lmap.values.size > 1 << 24:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
 from etendue.quantities.powers_of_ten import counted, rounded
 
 Array = npt.NDArray[np.float64]
@@ -88,7 +88,7 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     UnknownNameError
         If there is no such filter.
     ArgumentError
-        If `size` is not odd and positive or `gamma` is not positive and finite.
+        If `size` is not odd and positive, `gamma` is not positive and finite, or the map is none of luminance.
 
     Notes
     -----
@@ -121,6 +121,7 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     >>> smooth.notes[0]
     'selective 3×3, γ = 0.2: intensity 0.001336 → 0.00133 cd (−0.47 %); dead pixels 1 → 1'
     """
+    check_luminance_map(lmap, "filter_map")
     if kind not in FILTERS:
         raise UnknownNameError("filter", kind, FILTERS)
     chosen = FILTERS[kind]

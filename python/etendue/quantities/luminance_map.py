@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from etendue.errors import ArgumentError
 from etendue.quantities.observer import Observer, Screen, observer_from_dict, observer_to_dict
 from etendue.quantities.pixel_map import MapValues, PixelMap
 from etendue.quantities.provenance import Provenance
@@ -90,3 +91,23 @@ class LuminanceMap(PixelMap):
     @classmethod
     def _geometry_from(cls, header: dict[str, Any]) -> dict[str, Any]:
         return {"observer": observer_from_dict(header["observer"]), "screen": Screen(**header["screen"])}
+
+
+def check_luminance_map(given: object, asker: str) -> None:
+    """Refuse what is no map of luminance, such as one of illuminance.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+
+    Examples
+    --------
+    >>> check_luminance_map("map.exr", "compare")
+    Traceback (most recent call last):
+    etendue.errors.ArgumentError: compare: a str is no map of luminance; give a LuminanceMap, of a file et.read_map(path).
+    """
+    if not isinstance(given, LuminanceMap):
+        raise ArgumentError(
+            f"{asker}: a {type(given).__name__} is no map of luminance; give a LuminanceMap, of a file et.read_map(path)."
+        )
