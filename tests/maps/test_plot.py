@@ -309,6 +309,17 @@ def test_cross_sections_draw_steps_with_bands(tmp_path: Path) -> None:
     assert imread(tmp_path / "cut.png").ndim == 3
 
 
+def test_cross_sections_of_several_maps_are_told_apart() -> None:
+    lmap = make_map([[1.0, 4.0, 3.0, 2.0]])
+    other = lmap.replace(provenance=Provenance("/data/second.ray"))
+    for maps, names in (
+        ([lmap], ["at 0 mm up"]),
+        ([lmap, other], ["led.tm25ray, at 0 mm up", "second.ray, at 0 mm up"]),
+    ):
+        legend = plot_cross_sections([cross_section(one, y=0) for one in maps]).axes[0].get_legend()
+        assert [text.get_text() for text in legend.get_texts()] == names
+
+
 def test_cross_sections_that_do_not_fit_together_are_refused() -> None:
     lmap = MAPS["tiny"]
     with pytest.raises(ArgumentError, match="no section"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
@@ -74,7 +75,7 @@ def plot_cross_sections(
     scale : {"auto", "linear", "log"}
         Scale of the luminance; ``"auto"`` is that of `plot_map`.
     labels : sequence of str, optional
-        One name per section; by default where it was cut.
+        One name per section; by default where it was cut, with the map's origin where these differ.
     title : str, optional
         First line; "Cross section" and where the map comes from if not given.
     ax : matplotlib.axes.Axes, optional
@@ -103,8 +104,8 @@ def plot_cross_sections(
     """
     _check(sections, labels)
     scale = choose_scale(np.concatenate([section.values for section in sections]), scale).name
-    names = labels if labels is not None else [_place(section) for section in sections]
     sources = {section.source for section in sections}
+    names = labels if labels is not None else [_place(section, of_several=len(sources) > 1) for section in sections]
     what = "Cross section" + ("s" if len(sections) > 1 else "")
     heading = title if title is not None else style.headed(what, sources.pop() if len(sources) == 1 else "")
     if ax is not None:
@@ -132,9 +133,10 @@ def _draw_all(axes: Axes, sections: Sequence[CrossSection], names: Sequence[str]
     style.put_numbers(axes.xaxis, name, "mm", edges[0], edges[-1])
 
 
-def _place(section: CrossSection) -> str:
-    """Where a section was cut."""
-    return f"at {style.plain(section.at)} mm {'up' if section.axis == 'x' else 'right'}"
+def _place(section: CrossSection, *, of_several: bool) -> str:
+    """Where a section was cut, and of which map if there are several."""
+    place = f"at {style.plain(section.at)} mm {'up' if section.axis == 'x' else 'right'}"
+    return f"{Path(section.source).name}, {place}" if of_several and section.source else place
 
 
 def _prepare(axes: Axes, sections: Sequence[CrossSection], scale: str) -> None:
