@@ -42,7 +42,15 @@ def filled_cells(part: PartField) -> tuple[float, int]:
 
 
 def told_of_narrow_beams(parts: Sequence[PartField], fluxes: Sequence[float]) -> Iterator[str]:
-    """What is to be said of the part with the most light, if its cells of direction blur it."""
+    """What is to be said of the part with the most light, if its cells of direction blur it.
+
+    Examples
+    --------
+    >>> beam = np.zeros((1, 1, 64, 64), dtype=np.float32)
+    >>> beam[0, 0, 30:34, 30:33] = 2.0
+    >>> [told.partition(",")[0] for told in told_of_narrow_beams([PartField(beam, beam, None, None, 1.0)], [100.0])]
+    ["the light fills no more than 12 of the light field's 4"]
+    """
     brightest = int(np.argmax(fluxes))
     filled, cells = filled_cells(parts[brightest])
     if not 0.0 < filled < ENOUGH:
