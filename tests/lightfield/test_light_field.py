@@ -10,6 +10,7 @@ import pytest
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.light_field import LightField
+from etendue.luminance.scene_map import with_fields
 from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm
 from oracles.verdicts import LARGEST_Z, assert_covers
 
@@ -315,19 +316,24 @@ def test_scores_of_surfaces_compare_the_same_rays() -> None:
     assert half - whole == pytest.approx(expected, abs=4 * loss + LARGEST_Z * fields[1].score_error)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("half_angle", "blurred"), [(1.0, True), (2.0, True), (40.0, False)])
-def test_a_beam_of_a_few_cells_of_direction_is_told_to_be_blurred(half_angle: float, blurred: bool) -> None:
-    """An even beam from a disk has L = Φ/(π² R² sin²α): the field has it within 4 errors (6e-5), or its maps say that they
-    are off by more, and that a narrow cone is not: it shows L (1 + cos a)/2, theory eq. 9."""
-    n, radius, rng = 6000, 5.0, np.random.default_rng(1)
+def beam(half_angle: float, n: int, radius: float = 5.0) -> et.RaySet:
+    """Even light from a disk, within a cone of directions: L = Φ/(π² R² sin²α) with Φ = 100 lm."""
+    rng = np.random.default_rng(1)
     r, p = radius * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
     s, q = math.sin(math.radians(half_angle)) * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
     x = np.stack([r * np.cos(p), r * np.sin(p), np.zeros(n)], axis=1)
     k = np.stack([s * np.cos(q), s * np.sin(q), np.sqrt(1 - s * s)], axis=1)
-    rays = et.RaySet(x, k, np.full(n, 100.0 / n))
-    truth = 100.0 / (math.pi * radius * math.sin(math.radians(half_angle))) ** 2 * 1e6
-    field = LightField.fit(rays, et.Disk(radius=radius), depths=(2, 2, 3, 3))
+    return et.RaySet(x, k, np.full(n, 100.0 / n))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("half_angle", "blurred"), [(1.0, True), (2.0, True), (40.0, False)])
+def test_a_beam_of_a_few_cells_of_direction_is_told_to_be_blurred(half_angle: float, blurred: bool) -> None:
+    """The field has the luminance of a beam within 4 errors (6e-5), or its maps say that they are off by more, and that a
+    narrow cone is not: it shows L (1 + cos a)/2, theory eq. 9."""
+    rays = beam(half_angle, 6000)
+    truth = 100.0 / (math.pi * 5.0 * math.sin(math.radians(half_angle))) ** 2 * 1e6
+    field = LightField.fit(rays, et.Disk(radius=5.0), depths=(2, 2, 3, 3))
     observer, screen = et.Observer(0, 0, 1e5), et.Screen(6, 6, 1, 1)
     lmap = et.luminance_map(field, observer, screen)
     off = abs(float(lmap.values[0, 0]) - truth) / float(lmap.standard_error[0, 0])
@@ -335,3 +341,11 @@ def test_a_beam_of_a_few_cells_of_direction_is_told_to_be_blurred(half_angle: fl
     narrow = et.luminance_map(rays, observer, screen, method=et.Cone(acceptance=half_angle / 2))
     expected = truth * (1 + math.cos(math.radians(half_angle / 2))) / 2
     assert abs(narrow.values[0, 0] - expected) < 4 * narrow.standard_error[0, 0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("half_angle", "blurred"), [(1.0, True), (40.0, False)])
+def test_a_scene_tells_that_the_field_of_a_narrow_beam_is_blurred(half_angle: float, blurred: bool) -> None:
+    lamp = {"kind": "rays", "name": "lamp", "rays": beam(half_angle, 3000)}
+    _, notes = with_fields(et.Scene(sources=[lamp]), cache=False)
+    assert any(note.startswith("lamp: the light fills no more than") for note in notes) == blurred
