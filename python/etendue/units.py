@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 FluxUnit = Literal["lm", "W"]
-FLUX_UNITS: tuple[str, ...] = get_args(FluxUnit)
+FLUX_UNITS: tuple[FluxUnit, ...] = get_args(FluxUnit)
 
 MM2_PER_M2 = 1e6
 """Square millimetres in a square metre: turns flux per (mm² sr) into cd/m² or W/(m² sr)."""

@@ -51,6 +51,48 @@ def test_counts_have_letters(run: Run, lamp: Path) -> None:
 
 def test_the_case_of_a_choice_does_not_matter(run: Run, lamp: Path) -> None:
     mapped(run, lamp, "--observer", "0,0", "--size", "20,20", "--scale", "Log")
+    usual = mapped(run, lamp, "--observer", "30,0", "--size", "20,20", "--plane", "xy")
+    base = ("--observer", "30,0", "--size", "20,20", "--acceptance", "5", "-o", "map.npz", "--json")
+    loose = run("luminance", lamp, *base, "--plane", "XY", "--method", "Cone")
+    assert loose.status == 0, loose.err
+    assert loose.json["maps"][0] == usual
+
+
+@pytest.mark.parametrize("unit", ["lm", "LM", "Lm", "W", "w"])
+def test_a_unit_is_the_same_in_any_case(run: Run, tmp_path: Path, unit: str) -> None:
+    """1 W at 555 nm, where V(λ) is 1, is 683 lm: for a ray file that is written, and for an intensity."""
+    green = et.RaySet([[0, 0, 0]] * 2, [[0, 0, 1], [0, 0.6, 0.8]], [0.5, 0.5], flux_unit="W", wavelength=[555.0] * 2)
+    et.write_rays(tmp_path / "green.tm25ray", green)
+    unit_found, flux = ("lm", 683.0) if unit.lower() == "lm" else ("W", 1.0)
+    assert run("convert", tmp_path / "green.tm25ray", "green.dat", "--unit", unit).status == 0
+    rays = et.read_rays("green.dat")
+    assert (rays.flux_unit, rays.total_flux) == (unit_found, pytest.approx(flux, rel=1e-5))
+    found = run(
+        "intensity", tmp_path / "green.tm25ray", "--unit", unit, "--c-planes", "4", "--gamma-step", "10", "--json"
+    )
+    assert found.json["flux_unit"] == unit_found
+    assert found.json["flux"] == pytest.approx(flux, rel=1e-5)
+
+
+def test_a_kind_of_picture_is_the_same_in_any_case(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[str] = []
+    monkeypatch.setattr("etendue.cli.intensity.plot_intensity", lambda *given, **_: drawn.append(given[2]))
+    et.write_intensity(tmp_path / "lamp.ies", et.Intensity(c=[0], gamma=[0, 45, 90], values=[[9, 5, 0]]))
+    for kind in ("cartesian", "Cartesian", "POLAR"):
+        assert run("intensity", tmp_path / "lamp.ies", "--kind", kind, "-o", "lamp.svg").status == 0
+    assert drawn == ["cartesian", "cartesian", "polar"]
+
+
+def test_choices_of_other_verbs_are_the_same_in_any_case(run: Run, lamp: Path) -> None:
+    mapped(run, lamp, "--observer", "0,0", "--size", "20,20", "--pixels", "8")
+    means = []
+    for kind, dead in (("average", "zero"), ("Average", "ZERO")):
+        assert run("filter", "map.npz", "--kind", kind, "-o", "smooth.npz").status == 0
+        means.append(run("compare", "smooth.npz", "map.npz", "--dead", dead, "--json").json)
+    assert means[0] == means[1]
+    patches = ("--surface", "plane:z=0", "--pixel", "40", "--threshold", "5", "-o", "patches")
+    assert run("patches", lamp, *patches, "--format", "LDT").status == 0
+    assert list(Path("patches/lids").glob("*.ldt"))
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import typer
@@ -112,13 +112,13 @@ def plot(
     json: Json = False,
 ) -> None:
     """Draw f in the plane of incidence, the lobe in direction cosines, and the shares over the angle of incidence."""
-    one_of(side, ("front", "back"), "--side")
+    met: Literal["front", "back"] = one_of(side, ("front", "back"), "--side")
     if not 0.0 <= incidence < RIGHT_ANGLE:
         raise typer.BadParameter(f"{incidence:g}° is not from 0 to below 90°", param_hint="--incidence")
     check_folder(output)
     bsdf = read_bsdf(file)
     complaints = [str(complaint) for complaint in bsdf.complaints]
-    plot_bsdf(bsdf, output, incidence=incidence, side="back" if side == "back" else "front", title=bsdf.name or None)
+    plot_bsdf(bsdf, output, incidence=incidence, side=met, title=bsdf.name or None)
     if json:
         print_json({"output": output, "complaints": complaints})
         return
@@ -136,12 +136,11 @@ def convert(
     json: Json = False,
 ) -> None:
     """Read a file, or several that belong together, and write another one; what gets lost is told."""
-    if format is not None:
-        one_of(format, BSDF_FORMATS, "--format")
+    named = None if format is None else one_of(format, BSDF_FORMATS, "--format")
     check_folder(output)
     bsdf = read_bsdf(files)
     complaints = [str(complaint) for complaint in bsdf.complaints]
-    notes = list(write_bsdf(output, bsdf, format))
+    notes = list(write_bsdf(output, bsdf, named))
     if json:
         print_json({"output": output, "complaints": complaints, "notes": notes})
         return
@@ -205,7 +204,7 @@ def fit(
     json: Json = False,
 ) -> None:
     """Make a table of goniometer scans, and say what they add up to."""
-    one_of(method, METHODS, "--method")
+    method = one_of(method, METHODS, "--method")
     check_folder(output)
     scans = read_scans(
         files, incident_flux=incident_flux, solid_angle=solid_angle, reflectance=reflectance, blank=blank

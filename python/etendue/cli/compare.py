@@ -51,7 +51,7 @@ def compare(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """NCC (3.5), NRMSE as printed (3.6), true RMSE over the reference's maximum, difference image (3.4), cross sections."""
-    one_of(dead, DEAD_RULES, "--dead")
+    rule = one_of(dead, DEAD_RULES, "--dead")
     scaling, shown = one_of(scale, SCALES, "--scale"), one_of(difference, DIFFERENCES, "--difference")
     if (section_output is None) != (section_x is None and section_y is None):
         raise typer.BadParameter("--section-output goes with --section-x or --section-y")
@@ -60,9 +60,7 @@ def compare(
     if region is not None:
         limits = Region(*numbers(region, 4, "--region", "-5,5,-2,2"))
     a, b = read_map(test), read_map(reference)
-    result = compare_maps(
-        a, b, region=limits, dead="zero" if dead == "zero" else "exclude", ignore_geometry=ignore_geometry
-    )
+    result = compare_maps(a, b, region=limits, dead=rule, ignore_geometry=ignore_geometry)
     if output is not None:
         plot_comparison(result, output, scaling, difference=shown, labels=(test.name, reference.name))
     if section_output is not None:

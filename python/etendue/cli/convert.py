@@ -74,8 +74,7 @@ def convert(
 def _unit(stated: str | None, fluxes: list[str | None], sets: list[RaySet]) -> FluxUnit | None:
     """The unit of the output: the stated one, else that of the fluxes, else lm if the files differ; None: the file's own."""
     if stated is not None:
-        one_of(stated, FLUX_UNITS, "--unit")
-        return "W" if stated == "W" else "lm"
+        return one_of(stated, FLUX_UNITS, "--unit")
     ends = {
         next((unit for unit in FLUX_UNITS if text.strip().endswith(unit)), None) for text in fluxes if text is not None
     }
@@ -116,5 +115,4 @@ def in_unit(light: Light, unit: str | None) -> Light:
     """The set or field in the unit that an option names."""
     if unit is None:
         return light
-    one_of(unit, FLUX_UNITS, "--unit")
-    return light.in_unit("lm" if unit == "lm" else "W")
+    return light.in_unit(one_of(unit, FLUX_UNITS, "--unit"))

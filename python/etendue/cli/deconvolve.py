@@ -97,7 +97,7 @@ def deconvolve(
     """Take the instrument out of a scan, and say how the iteration stopped and what it is sure of."""
     how: OperatorName = one_of(operator, ("rings", "slice"), "--operator")
     if method is not None:
-        one_of(method, METHODS, "--method")
+        method = one_of(method, METHODS, "--method")
     rule: str | int | None = stop
     if stop is not None:
         rule = int(stop) if stop.isdecimal() else one_of(stop, RULES, "--stop")
@@ -117,7 +117,7 @@ def deconvolve(
         flat = deconvolve_scan(measured, bare, operator=how, method=which, stop=rule, replicates=replicates, seed=seed)
         _tell(flat, scan, outputs, json=json)
         return
-    if operator != "rings":
+    if how != "rings":
         raise ArgumentError("--operator is for scans in one plane; this one is in two dimensions")
     if method not in {None, *get_args(DirectionalMethod)}:
         raise ArgumentError(f"--method {method} is for scans in one plane; {scan} is in two dimensions")

@@ -32,7 +32,7 @@ def filter_(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Smooth a map: opt needs no setting and keeps the flux; the four filters of the thesis report what they lose."""
-    one_of(kind, KINDS, "--kind")
+    kind = one_of(kind, KINDS, "--kind")
     colours = one_of(scale, SCALES, "--scale")
     check_outputs(output, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
     noisy = read_map(file)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -111,14 +111,14 @@ def goniometer(
         raise typer.BadParameter("--window needs a sample: the bare beam is the same across and along")
     if not window and (outside is not None or turn or head):
         raise typer.BadParameter("--outside, --turn and --head are for scans in two dimensions: add --window")
-    if window and plane != "in-plane":
-        raise typer.BadParameter("--plane is for scans in one plane; --window scans both")
     step = step if step is not None else BARE_STEP if no_sample else STEP
     which: Plane = one_of(plane, ("in-plane", "cross-plane"), "--plane")
+    if window and which != "in-plane":
+        raise typer.BadParameter("--plane is for scans in one plane; --window scans both")
     how: Method = one_of(method, ("trace", "quadrature"), "--method")
+    shape: Literal["uniform", "gaussian"] = one_of(profile, ("uniform", "gaussian"), "--profile")
     ways: tuple[Way, Way] = ("transmitted", "reflected")
     to = None if way is None else one_of(way, ways, "--way")
-    one_of(profile, ("uniform", "gaussian"), "--profile")
     if output is not None:
         check_folder(output)
     instrument = ScatterGoniometer(
@@ -127,7 +127,7 @@ def goniometer(
         distance,
         aperture=one_of(aperture_shape, ("disk", "square", "ring"), "--aperture-shape"),
         inner_diameter=inner,
-        profile="gaussian" if profile == "gaussian" else "uniform",
+        profile=shape,
         divergence=divergence,
         source_angle=source_angle,
         photons=photons,

@@ -71,7 +71,7 @@ def intensity(
 ) -> None:
     """Far-field intensity of rays, a light field, patches or an intensity file: in figures, as a file, as a picture."""
     outputs = output or []
-    one_of(kind, INTENSITY_KINDS, "--kind")
+    shape = one_of(kind, INTENSITY_KINDS, "--kind")
     check_outputs(outputs, (*INTENSITY_EXTENSIONS, *PICTURE_EXTENSIONS))
     if is_patch_folder(file):
         _refuse(file, "ray and intensity files", {"--photometry": photometry, "--flux": flux, "--unit": unit})
@@ -98,7 +98,7 @@ def intensity(
     losses = []
     for path in outputs:
         if path.suffix.lower() in PICTURE_EXTENSIONS:
-            plot_intensity(shown, path, "cartesian" if kind == "cartesian" else "polar", per_klm=per_klm)
+            plot_intensity(shown, path, shape, per_klm=per_klm)
         else:
             losses += [f"{path}: {note}" for note in write_intensity(path, result, rotate=rotate, mirror=mirror)]
     if json:

@@ -216,8 +216,7 @@ def luminance(
     json: Json = False,
 ) -> None:
     """Luminance maps with a standard error per pixel, from rays, a light field, a scene or a trace, for many observers."""
-    one_of(method, METHOD_NAMES, "--method")
-    one_of(plane, PLANES, "--plane")
+    method, plane = one_of(method, METHOD_NAMES, "--method"), one_of(plane, PLANES, "--plane")
     colours = one_of(scale, SCALES, "--scale")
     stated = {
         "acceptance": None if acceptance is None else _acceptance(acceptance),

@@ -64,14 +64,14 @@ def patches(
     json: Json = False,
 ) -> None:
     """Sample a ray file into patches, each with an intensity distribution of its own: thesis 3.2 and 3.3."""
-    one_of(format, PATCH_FORMATS, "--format")
+    lids = one_of(format, PATCH_FORMATS, "--format")
     at = one_of(centre_on, CENTRES, "--centre-on")
     first = whole_numbers(coarsest, 2, "--coarsest", "30,90")
     last = whole_numbers(finest, 2, "--finest", "1,1")
     scenes = [one_of(name, SCENES, "--scene") for name in scene or []]
     carrier = parse_surface(surface)
     rays = in_unit(with_flux(read_rays(file), flux), unit)
-    check_patch_folder(output, rays.flux_unit, format, scenes)
+    check_patch_folder(output, rays.flux_unit, lids, scenes)
     with progress_bar("rays", len(rays)) as progress:
         source = GriddedSource.fit(
             rays,
@@ -91,7 +91,7 @@ def patches(
             swept = threshold_sweep(
                 rays, carrier, pixel, thresholds, parallels, centre_on=at, seed=seed, progress=progress
             )
-    source.save_patches(output, format, scenes)
+    source.save_patches(output, lids, scenes)
     if swept is not None:
         with atomic_output(output / "sweep.csv") as temporary:
             temporary.write_text(swept.to_csv(), encoding="utf-8")

@@ -20,7 +20,7 @@ from etendue.units import MM2_PER_M2
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 DeadRule = Literal["zero", "exclude"]
-DEAD_RULES: tuple[str, ...] = get_args(DeadRule)
+DEAD_RULES: tuple[DeadRule, ...] = get_args(DeadRule)
 
 SAME_GEOMETRY = 1e-6
 """Relative difference up to which two lengths count as equal: numbers that passed through a text or float32 header."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 IntensityKind = Literal["polar", "cartesian"]
-INTENSITY_KINDS: tuple[str, ...] = get_args(IntensityKind)
+INTENSITY_KINDS: tuple[IntensityKind, ...] = get_args(IntensityKind)
 
 WIDTH = 5.6
 """Of the figure [inches]."""

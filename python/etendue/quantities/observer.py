@@ -13,7 +13,7 @@ from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 
 Plane = Literal["view", "xy"]
-PLANES: tuple[str, ...] = get_args(Plane)
+PLANES: tuple[Plane, ...] = get_args(Plane)
 MAX_PIXELS = 1 << 26
 """Most pixels of a screen: the sums over its rays take 24 bytes each."""
 
