@@ -149,6 +149,28 @@ def test_rays_have_the_lamp_s_places_and_directions(run: et.NearFieldRun, surfac
     assert high[steep, 0].max() < 1.4 + 0.15
 
 
+def test_light_between_positions_is_linear_up_to_the_axis_and_the_horizon() -> None:
+    """A Lambertian square, cos γ at the positions and linear between: flux of zones by quadrature, and their rays by χ².
+
+    Even on the axis, where one position stands for all, and at 90°, where light that goes to one side has its kink.
+    """
+
+    def square(points: Array, k: Array) -> Array:
+        up = np.where(k[:, 2] > 1e-9, k[:, 2], np.inf)
+        at = points - (points[:, 2] / up)[:, None] * k
+        return np.where((k[:, 2] > 1e-9) & (np.abs(at[:, :2]).max(axis=1) < 1.0), 1e6, 0.0)
+
+    seen = et.NearFieldGoniophotometer((15, 30), camera_pixels=16, distance=60, exposures=3, **QUIET)
+    rays = seen.measure(square, size=3.0, samples=16).ray_set(20_000, surface=et.Plane(z=0), seed=2)
+    edges = np.array([0.0, 4.0, 8.0, 15.0, 25.0, 35.0, 50.0, 65.0, 75.0, 82.0, 90.0])
+    counts = np.histogram(np.degrees(np.arccos(rays.direction[:, 2])), edges)[0]
+    gamma = (np.arange(90_000) + 0.5) / 1000.0
+    stops = np.arange(0.0, 91.0, 15.0)
+    light = np.interp(gamma, stops, np.cos(np.radians(stops))) * np.sin(np.radians(gamma))
+    expected = np.histogram(gamma, edges, weights=light)[0] * len(rays) / light.sum()
+    assert chi2.sf(((counts - expected) ** 2 / expected).sum(), expected.size - 1) > SIGNIFICANCE
+
+
 @pytest.mark.slow
 def test_any_stretch_of_a_ray_file_is_spread_over_the_light(run: et.NearFieldRun) -> None:
     """The first tenth has the mean direction of all rays."""

@@ -13,7 +13,6 @@ from etendue.instruments.near_field.camera import Camera
 from etendue.instruments.near_field.merging import Merging
 from etendue.instruments.near_field.positions import ArmPositions
 from etendue.instruments.near_field.starting_points import closest_surface, on_surface
-from etendue.quantities.angle_table import hat_integrals
 from oracles.verdicts import LARGEST_Z, SIGNIFICANCE
 from scipy.stats import chi2
 
@@ -42,13 +41,11 @@ def test_weights_integrate_a_tilted_lobe() -> None:
 
 
 def test_directions_between_positions_are_even() -> None:
-    """Positions drawn by the integrals of their hat functions, then directions between: the sphere evenly, by χ²."""
+    """Positions drawn by the solid angles of their hats, then directions between: the sphere evenly, by χ²."""
     stops = ArmPositions(30, 60)
     rng = np.random.default_rng(5)
-    ring = hat_integrals(stops.rings)
-    share = np.concatenate([ring[:1], np.repeat(ring[1:-1] / stops.planes.size, stops.planes.size), ring[-1:]]) / 2
     n = 200_000
-    k = stops.drawn(rng.choice(len(stops), n, p=share), rng)
+    k = stops.drawn(rng.choice(len(stops), n, p=stops.hat / (4.0 * math.pi)), rng)
     height = np.clip(((k[:, 2] + 1) / 2 * 20).astype(int), 0, 19)
     turn = np.clip(((np.arctan2(k[:, 1], k[:, 0]) / math.pi + 1) / 2 * 24).astype(int), 0, 23)
     counts = np.bincount(height * 24 + turn, minlength=480)

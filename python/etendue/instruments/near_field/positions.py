@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.angle_table import hat_integrals
 
 Array = npt.NDArray[np.float64]
 
@@ -92,7 +93,20 @@ class ArmPositions:
         Sums with them are integrals over the sphere of what is even in C and, in γ, a cubic spline above the horizon and
         another below it. Most lamps send light to one side only, so that their light has a kink at 90°.
         """
-        ring = 2.0 * np.pi * _spline_integrals(self.rings)
+        return self._dealt(_spline_integrals(self.rings))
+
+    @property
+    def hat(self) -> Array:
+        """Solid angle of the hat about each position [sr], shape (n,): 4π together.
+
+        A hat is the weight with which `drawn` spreads the light of a position: 1 there and falling linearly to its
+        neighbours. Light spread so has at each position just what was seen there.
+        """
+        return self._dealt(hat_integrals(self.rings))
+
+    def _dealt(self, rings: Array) -> Array:
+        """Integrals over γ of the rings, turned about the axis and dealt to their positions."""
+        ring = 2.0 * np.pi * rings
         inner = np.repeat(ring[1:-1] / self.planes.size, self.planes.size)
         return np.concatenate([ring[:1], inner, ring[-1:]])
 
@@ -110,8 +124,8 @@ class ArmPositions:
     def drawn(self, stops: npt.NDArray[np.intp], rng: np.random.Generator) -> Array:
         """A direction near each of some positions, drawn with the weight that they have in between, shape (n, 3).
 
-        That weight falls linearly to the neighbours, in γ and in C: a light that is constant stays so, and any other is
-        linear between positions.
+        That weight falls linearly to the neighbours, in γ and in C. Drawn by the solid angles of their hats (`hat`), a light
+        that is constant stays so, and any other is linear between positions.
         """
         gamma_of, n = self.gamma[stops], len(stops)
         gamma = np.zeros(n)

@@ -299,7 +299,8 @@ class NearFieldRun:
         start = np.searchsorted(lit, self.start).astype(np.intp)
         pixel = self.records["pixel"][lit]
         share = setting.illuminance_of(setting.screen, setting.distance).ravel()
-        weight = setting.positions.weight * self.scale * setting.distance**2 / MM2_PER_M2
+        # Directions fill hats. With the weights that integrate splines, light would be off about the axis and the horizon.
+        weight = setting.positions.hat * self.scale * setting.distance**2 / MM2_PER_M2
         flux = np.zeros(lit.size, dtype=np.float32)
         for some in stretches(lit.size):
             stop = np.searchsorted(start, np.arange(some.start, some.stop), side="right") - 1
