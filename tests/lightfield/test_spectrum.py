@@ -10,7 +10,7 @@ import etendue as et
 import h5py
 import numpy as np
 import pytest
-from etendue.errors import FormatError, UnitError
+from etendue.errors import ArgumentError, FormatError, UnitError
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Disk
 from etendue.quantities.spectral_lines import SpectralLines
@@ -139,6 +139,15 @@ def test_drawn_rays_have_wavelengths_with_their_shares(field: LightField, tmp_pa
         again = et.read_rays(tmp_path / name).wavelength
         assert again is not None
         np.testing.assert_allclose(again, wavelength, rtol=1e-6)
+    for name, stored_total in (("speos", True), ("speos-text", False)):
+        et.write_rays(tmp_path / name, field.rays(1000, seed=3), name)
+        rays_again = et.read_rays(tmp_path / name)
+        assert rays_again.column("wavelength").tolist() == wavelength[:1000].tolist()
+        np.testing.assert_allclose(rays_again.direction, drawn.direction[:1000], atol=1e-6)
+        if stored_total:
+            assert rays_again.total_flux == pytest.approx(field.total_flux, rel=1e-6)
+    with pytest.raises(ArgumentError, match="drawn in lumens"):
+        et.write_rays(tmp_path / "lumens.ray", field.in_unit("lm").rays(10), "speos")
     white = field.replace(spectrum=WHITE)
     et.write_rays(tmp_path / "white.tm25ray", white.rays(1000))
     read = et.read_rays(tmp_path / "white.tm25ray").spectra

@@ -101,7 +101,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     rays, notes = in_watts(rays, "'lighttools', which Speos reads as well and gives a spectrum")
     colour = RayColour.of(rays)
     # Energies lie between 0 and 1. Watts that do so already are left as they are: then they also sum to the header's.
-    largest = rays.moments().flux_range[1] * rays.flux_scale
+    largest = largest_flux(rays)
     scale = 1 / largest if largest > 1 else 1.0
     lumens = 0.0
 
@@ -119,18 +119,25 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def in_watts(rays: RayStream, instead: str) -> tuple[RaySet, list[str]]:
+def largest_flux(rays: RayStream) -> float:
+    """Flux of the strongest ray [`flux_unit`]; costs one pass, the first time of a ray set."""
+    if isinstance(rays, RaySet):
+        return rays.moments().flux_range[1] * rays.flux_scale
+    return max(float(batch.flux.max(initial=0.0)) for batch in rays.batches())
+
+
+def in_watts(rays: RayStream, instead: str) -> tuple[RayStream, list[str]]:
     """The rays as a Speos file, binary or text, holds them: in watts, with a wavelength each; and what was done.
 
     Raises
     ------
     ArgumentError
-        If they have no wavelengths; says what to write instead.
+        If they have no wavelengths, or are drawn in lumens; says what to do instead.
     UnitError
         If they carry lumens at wavelengths where V(λ) is 0.
     """
     colour = RayColour.of(rays)
-    if not (colour.has_wavelengths and isinstance(rays, RaySet)):
+    if not colour.has_wavelengths:
         raise ArgumentError(
             f"{rays.provenance.source}: a Speos file holds the wavelength of every ray, but this set has rays with "
             f"{colour.kind.value}. Write {instead}; or, if all rays have one wavelength, say so in Python: "
@@ -138,6 +145,11 @@ def in_watts(rays: RayStream, instead: str) -> tuple[RaySet, list[str]]:
         )
     if rays.flux_unit == "W":
         return rays, []
+    if not isinstance(rays, RaySet):
+        raise ArgumentError(
+            f"{rays.provenance.source}: a Speos file holds watts, and these rays are drawn in lumens. Fit the light field "
+            f"to rays in watts (etendue fit --unit W), or write {instead}."
+        )
     return rays.in_unit("W"), ["Lumens were turned into watts through the wavelengths: Speos energies are radiant."]
 
 

@@ -14,7 +14,7 @@ from etendue.errors import FormatError
 from etendue.formats.head import Head, file_provenance
 from etendue.formats.rays.ray_format import RayFormat
 from etendue.formats.rays.shared import FloatArray, RayColour, losses, wavelength_complaints
-from etendue.formats.rays.speos import in_watts
+from etendue.formats.rays.speos import in_watts, largest_flux
 from etendue.formats.rays.text_output import usable_rays, write_rows
 from etendue.formats.rays.text_rows import RowLayout, TextLine, head_lines, numbers, read_rows, whole
 from etendue.quantities.ray_records import RaySetMeaning
@@ -82,7 +82,7 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     rays, notes = in_watts(rays, "'lighttools-text', which needs none")
     colour = RayColour.of(rays)
     count = usable_rays(rays)
-    largest = rays.moments().flux_range[1] * rays.flux_scale
+    largest = largest_flux(rays)
     scale = 1 / largest if largest > 0 else 1.0
     written_before = 0
 
