@@ -170,12 +170,35 @@ def test_what_is_written(tmp_path: Path) -> None:
 
 
 def test_planes_of_c90_c270_go_from_270_over_0_to_90(tmp_path: Path) -> None:
-    led = lid("C90-C270", c=(20, 90, 160, 200, 270, 340), gamma=(0, 45, 90))
+    led = lid("C90-C270", c=(0, 20, 90, 160, 180, 200, 270, 340), gamma=(0, 45, 90))
     write_intensity(tmp_path / "a.ldt", led)
     lines = (tmp_path / "a.ldt").read_text(encoding="latin-1").splitlines()
-    assert [float(v) for v in lines[42:48]] == [20, 90, 160, 200, 270, 340]
-    table = np.array([float(v) for v in lines[51:]]).reshape(4, 3) * led.flux / 1000
-    assert np.allclose(table, led.planes([270, 340, 20, 90]), rtol=1e-5)
+    assert [float(v) for v in lines[42:50]] == [0, 20, 90, 160, 180, 200, 270, 340]
+    table = np.array([float(v) for v in lines[53:]]).reshape(5, 3) * led.flux / 1000
+    assert np.allclose(table, led.planes([270, 340, 0, 20, 90]), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("c", "isym"),
+    [
+        ((0, 30, 90, 150, 180, 210, 270, 330), 3),
+        ((90, 210, 270, 330), 0),
+        ((0, 20, 90, 160, 180, 270), 0),
+        ((20, 90, 160, 200, 240, 270, 300, 340), 0),
+    ],
+)
+def test_the_first_plane_of_c90_c270_is_where_every_reader_looks(tmp_path: Path, c: tuple[int, ...], isym: int) -> None:
+    """Plane Mc1 = 3/4 Mc + 1 of the list is 270° [Stockmar1990]; where it cannot be, all planes are stored."""
+    led = lid("C90-C270", c=c, gamma=(0, 45, 90))
+    write_intensity(tmp_path / "a.ldt", led)
+    lines = (tmp_path / "a.ldt").read_text(encoding="latin-1").splitlines()
+    assert int(lines[2]) == isym
+    planes, gammas = int(lines[3]), int(lines[5])
+    listed = [float(line) for line in lines[42 : 42 + planes]]
+    first = 3 * planes // 4 if isym == 3 else 0
+    table = np.array([float(line) for line in lines[42 + planes + gammas :]]).reshape(-1, gammas)
+    for row, values in enumerate(table * float(lines[28]) / 1000):
+        np.testing.assert_allclose(values, led.at(listed[(first + row) % planes], led.gamma), rtol=1e-5)
 
 
 def test_ratio_and_fraction_of_a_table_that_has_no_node_at_90(tmp_path: Path) -> None:

@@ -34,8 +34,12 @@ def write(intensity: Intensity, path: Path) -> tuple[str, ...]:
     if not flux > 0.0:
         raise ArgumentError(f"EULUMDAT states intensity per lumen, and this source has a flux of {flux:g} lm.")
     symmetry = whole.symmetry()
+    planes = _planes(whole, symmetry)
+    # Readers begin with plane 3/4 Mc + 1, and that must be 270°: there are tables in which it is another.
+    if symmetry == "C90-C270" and (planes.size % 4 or planes[3 * planes.size // 4] != 270.0):
+        symmetry = "none"
+        planes = _planes(whole, symmetry)
     values = _stored(whole, symmetry)
-    planes = unfolded(*folded(whole, symmetry), symmetry)[0]
     if planes.size > MOST_PLANES or whole.gamma.size > MOST_GAMMAS:
         raise ArgumentError(
             f"EULUMDAT holds at most {MOST_PLANES} planes of {MOST_GAMMAS} angles, not {planes.size} of "
@@ -62,6 +66,11 @@ def write(intensity: Intensity, path: Path) -> tuple[str, ...]:
     ]
     path.write_bytes("".join(f"{line}\r\n" for line in lines).encode("latin-1"))
     return (*notes, *general_losses(intensity), *_losses(facts))
+
+
+def _planes(whole: Intensity, symmetry: Symmetry) -> Array:
+    """C of all planes that the file lists [°]."""
+    return unfolded(*folded(whole, symmetry), symmetry)[0]
 
 
 def _stored(whole: Intensity, symmetry: Symmetry) -> Array:
