@@ -233,6 +233,16 @@ def test_the_cut_off_is_that_of_the_plane_that_reaches_furthest() -> None:
     assert cut_off_angle(et.Intensity([0], [0, 180], [[0.0, 0.0]])) == 0.0
 
 
+def test_no_cut_off_is_stated_of_a_peak_that_chance_could_have_made() -> None:
+    """Nine nodes alike with errors of their own size: the largest, less what chance lifts it by, is below 0."""
+    noise = et.Intensity([0], np.linspace(0, 180, 9), [[1.0, 0.9, 1.0, 0.8, 1.0, 0.9, 1.0, 0.8, 1.0]], 0.9)
+    assert noise.peak_intensity < 0.0
+    assert np.isnan(cut_off_angle(noise))
+    sheet = et.data_sheet(noise)
+    assert any(line.startswith("cut-off unknown") for line in sheet.lines())
+    assert sheet.to_dict()["cut_off"] is None
+
+
 def test_wrong_arguments_are_told() -> None:
     found = et.Intensity([0], [0, 90], [[1.0, 0.0]])
     with pytest.raises(ArgumentError, match="share is 1"):

@@ -159,7 +159,8 @@ def cut_off_angle(intensity: Intensity, share: float = CUT_OFF) -> float:
     Returns
     -------
     float
-        180 if the light goes all around.
+        180 if the light goes all around; NaN if so few rays are behind the table that chance alone could have made its
+        largest value (`Intensity.peak_intensity` is not above 0 there).
 
     Raises
     ------
@@ -174,12 +175,15 @@ def cut_off_angle(intensity: Intensity, share: float = CUT_OFF) -> float:
     """
     if not 0.0 < share < 1.0:
         raise ArgumentError(f"cut_off_angle: share is {share:g}; give a share of the intensity above 0 and below 1.")
+    limit = share * intensity.peak_intensity
+    if limit <= 0.0 < intensity.maximum:
+        return math.nan
     dark = [] if intensity.gamma[-1] == 180.0 else [0.0]
     gamma = np.append(intensity.gamma, intensity.gamma[-1:] if dark else [])
     edge = np.zeros((intensity.c.size, len(dark)))
     values, errors = np.hstack([intensity.values, edge]), np.hstack([known_errors(intensity), edge])
     # Between two planes the function lies between theirs, and so does its last edge.
-    _, last = _edges(gamma, values, errors, np.full(intensity.c.size, share * intensity.peak_intensity))
+    _, last = _edges(gamma, values, errors, np.full(intensity.c.size, limit))
     return float(np.nanmax(last, initial=0.0))
 
 

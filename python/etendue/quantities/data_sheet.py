@@ -27,7 +27,7 @@ class DataSheet:
         At 50 % and at 10 % of the largest intensity, in C0–C180 and C90–C270; one of each if the distribution is
         rotationally symmetric.
     cut_off : float
-        γ from which on no plane sends more than 1 % of the largest intensity [°].
+        γ from which on no plane sends more than 1 % of the largest intensity [°]; NaN where that is not known to be above 0.
     zones : tuple of (float, float, float, float)
         γ from, γ to [°], flux, its standard error [`flux_unit`], in steps of 10°.
     flux_code : tuple of float
@@ -69,11 +69,12 @@ class DataSheet:
     def lines(self) -> list[str]:
         """The figures in a few lines."""
         found = [f"beam angle (50 %) {_angles(self.beam)}", f"field angle (10 %) {_angles(self.field)}"]
-        found.append(
-            f"below 1 % of the peak from γ = {self.cut_off:.4g}° on"
-            if self.cut_off < 180.0
-            else "no cut-off at 1 % of the peak"
-        )
+        if math.isnan(self.cut_off):
+            found.append("cut-off unknown: chance alone could have made the peak")
+        elif self.cut_off < 180.0:
+            found.append(f"below 1 % of the peak from γ = {self.cut_off:.4g}° on")
+        else:
+            found.append("no cut-off at 1 % of the peak")
         code = " ".join("?" if math.isnan(share) else f"{share:.0f}" for share in self.flux_code)
         if not all(math.isnan(share) for share in self.flux_code):
             found.append(f"CIE flux code {code}")
@@ -86,7 +87,7 @@ class DataSheet:
         return {
             "beam_angle": [_plain(one) for one in self.beam],
             "field_angle": [_plain(one) for one in self.field],
-            "cut_off": self.cut_off,
+            "cut_off": _known(self.cut_off),
             "zonal_flux": [
                 {"from": low, "to": high, "flux": flux, "standard_error": _known(error)}
                 for low, high, flux, error in self.zones
