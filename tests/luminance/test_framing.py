@@ -124,6 +124,12 @@ def test_a_map_that_shows_the_whole_field_asks_no_rays(monkeypatch: pytest.Monke
     assert any("the screen shows" in note for note in part.notes)
 
 
+def test_a_file_that_is_dark_from_there_is_named(tmp_path: Path) -> None:
+    et.write_rays(tmp_path / "lamp.tm25ray", lamp(5000))
+    with pytest.raises(et.ArgumentError, match=r"no ray of lamp\.tm25ray heads for"):
+        et.luminance_map(tmp_path / "lamp.tm25ray", et.Observer(150, 0, 2000))
+
+
 def test_from_behind_it_is_dark() -> None:
     with pytest.raises(et.ArgumentError, match="from there the source is dark"):
         et.luminance_map(lamp(5000), et.Observer(150, 0, 2000), method="cone")

@@ -65,7 +65,8 @@ def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
         carry = flux > 0
         if carry.any():
             _check_squares(flux[carry], rays)
-            sample = RaySet(position[carry], direction[carry], flux[carry], flux_unit=rays.flux_unit)
+            kept = (position[carry], direction[carry], flux[carry])
+            sample = RaySet(*kept, flux_unit=rays.flux_unit, provenance=rays.provenance)
             _SAMPLES.add(sample)
             return sample
     raise ArgumentError("these rays carry no flux, so no light field can be fitted to them.")
