@@ -68,8 +68,9 @@ def recognise(head: Head) -> bool:
 def read(path: Path) -> RaySet:
     """Map a Zemax binary source file.
 
-    OpticStudio uses only the number of rays, the length unit, the record format and the flux type; so does this reader.
-    The rays' flux is absolute; the header's fluxes are reported.
+    OpticStudio uses only the number of rays, the length unit, the record format and the flux type; this reader also takes
+    the header's wavelength, 0 if it is composite, for that of rays that have none of their own. The rays' flux is absolute;
+    the header's fluxes are reported.
 
     Raises
     ------
