@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.instruments.near_field.setting import Setting
+from etendue.quantities.intensity import Intensity
 
 Array = npt.NDArray[np.float64]
 
@@ -27,6 +28,9 @@ LOWERED = math.log(2.0) / 2.0
 Each point of the disk sends its beam past the photometer by up to β/2; the mean square of that is β²/8, and the peak falls
 by the mean of 4 ln 2 (angle/w)².
 """
+
+FLUX_OF_TABLE = 5e-3
+"""By which share the flux of a table may differ from that of the photometer without a note."""
 
 STEPS_PER_BEAM = 3.0
 """Positions that a beam should have within its width along γ."""
@@ -53,8 +57,8 @@ def far_field_notes(setting: Setting, values: Array) -> Iterator[str]:
     >>> import etendue as et
     >>> disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
     >>> near = et.NearFieldGoniophotometer((30, 90), distance=40, camera_pixels=16)
-    >>> near.measure(et.Scene(sources=[disk]), samples=2).intensity().notes  # doctest: +ELLIPSIS
-    ("the photometer stands 7.07 times the lamp's size of 5.657 mm away; from 15 times on its intensities are ...",)
+    >>> near.measure(et.Scene(sources=[disk]), samples=2).intensity().notes[0]  # doctest: +ELLIPSIS
+    "the photometer stands 7.07 times the lamp's size of 5.657 mm away; from 15 times on its intensities are ..."
     """
     size, distance = setting.lamp_size, setting.photometer_distance
     if distance < FAR * size * (1.0 - ROUNDED):
@@ -106,6 +110,32 @@ def step_notes(setting: Setting, values: Array) -> Iterator[str]:
                 f"the beam is {width:.3g}° wide {way}, and positions are {step:.3g}° apart: the total flux, and the scale "
                 "of the images with it, may be off by more than the stated error; take smaller steps"
             )
+
+
+def table_notes(table: Intensity, total: float) -> Iterator[str]:
+    """What is to be said of a table whose straight lines between positions have another flux than the photometer.
+
+    Parameters
+    ----------
+    table : Intensity
+        Of the positions.
+    total : number
+        Flux by the photometer, a spline through the same values.
+
+    Examples
+    --------
+    >>> coarse = Intensity([0], [0, 30, 60, 90], [[100, 86.6, 50, 0]])
+    >>> list(table_notes(coarse, 314.2))
+    ['the table is linear between positions, which makes 306.8 lm of the 314.2 lm by the photometer; take smaller steps']
+    >>> list(table_notes(coarse, 307.5))
+    []
+    """
+    if abs(table.flux / total - 1.0) > FLUX_OF_TABLE:
+        unit = table.flux_unit
+        yield (
+            f"the table is linear between positions, which makes {table.flux:.4g} {unit} of the {total:.4g} {unit} by the "
+            "photometer; take smaller steps"
+        )
 
 
 def full_width(rings: Array, profile: Array, peak: int) -> float:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.formats.input import as_path
-from etendue.instruments.near_field.far_field import far_field_notes, step_notes
+from etendue.instruments.near_field.far_field import far_field_notes, step_notes, table_notes
 from etendue.instruments.near_field.merging import Merging, stretches
 from etendue.instruments.near_field.pixel_rays import PixelRays, in_blocks
 from etendue.instruments.near_field.setting import Setting, counts_dtype
@@ -119,8 +119,8 @@ class NearFieldRun:
         stops = self.setting.positions
         square = self.setting.photometer_distance**2 / MM2_PER_M2
         values = stops.table(self.illuminance) * square
-        told = (*far_field_notes(self.setting, values), *step_notes(self.setting, values), *self.source_notes)
-        return Intensity(
+        told = (*far_field_notes(self.setting, values), *step_notes(self.setting, values))
+        table = Intensity(
             stops.planes,
             stops.rings,
             values,
@@ -128,8 +128,8 @@ class NearFieldRun:
             self.flux_unit,
             self.total_flux_error,
             provenance=self.provenance.then("intensity by the photometer"),
-            notes=told,
         )
+        return table.replace(notes=(*told, *table_notes(table, self.total_flux), *self.source_notes))
 
     # --- the camera --------------------------------------------------------------------------------------------------
 
