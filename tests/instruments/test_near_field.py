@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import etendue as et
@@ -12,10 +13,11 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, FormatError
 from etendue.instruments.near_field.camera import Camera
-from etendue.instruments.near_field.far_field import step_notes
+from etendue.instruments.near_field.far_field import linear_notes, step_notes
 from etendue.instruments.near_field.positions import ArmPositions
 from etendue.instruments.near_field.setting import Setting
 from oracles.verdicts import LARGEST_Z, SIGNIFICANCE
+from scipy.interpolate import RegularGridInterpolator
 from scipy.stats import chi2
 
 Array = npt.NDArray[np.float64]
@@ -424,6 +426,31 @@ def test_beams_between_positions_are_told(
     told = list(step_notes(setting, stops.table(light)))
     assert [way for way in ("along γ", "along C") if any(way in note for note in told)] == ways
     assert (off > 0.02) == bool(ways)
+
+
+@pytest.mark.parametrize(
+    ("step", "gamma", "power"), [((5, 5), 90, 12), ((5, 10), 60, 8), ((10, 5), 90, 8), ((5, 5), 0, 20)]
+)
+def test_beams_that_straight_lines_lower_are_told(step: tuple[float, float], gamma: float, power: int) -> None:
+    """cosⁿ of the angle to an axis, at the positions and linear between: how much lower it is within a step of its peak."""
+    stops = ArmPositions(*step)
+
+    def beam(g: Array, c: Array) -> Array:
+        g, c, axis = np.radians(g), np.radians(c - 180.0), np.radians(gamma)
+        return np.maximum(np.sin(g) * np.cos(c) * np.sin(axis) + np.cos(g) * np.cos(axis), 0.0) ** power
+
+    table = beam(stops.rings[None, :], stops.planes[:, None])
+    linear = RegularGridInterpolator((stops.planes, stops.rings), table)
+    g = gamma + step[0] * (np.arange(200) + 0.5) / 200.0 * (-1.0 if gamma == 90 else 1.0)
+    c = 180.0 + step[1] * (np.arange(200) + 0.5) / 200.0
+    places = np.stack(np.meshgrid(c, g, indexing="ij"), axis=-1)
+    weight = np.sin(np.radians(g))[None, :]
+    lost = ((beam(places[..., 1], places[..., 0]) - linear(places)) * weight).mean() / weight.mean()
+    setting = Setting(stops, Camera(8), 100.0, 100.0, 5.0, (0.0, 0.0, 0.0), 4.0)
+    (note,) = linear_notes(setting, table)
+    stated = float(re.findall(r"by some ([0-9.]+)%", note)[0]) / 100.0
+    # What is left out is some three times (step/width)² of it.
+    assert stated == pytest.approx(lost, rel=0.15)
 
 
 @pytest.mark.parametrize("seed", [-1, 1 << 64, 0.5])

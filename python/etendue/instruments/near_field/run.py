@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.formats.input import as_path
-from etendue.instruments.near_field.far_field import far_field_notes, step_notes, table_notes
+from etendue.instruments.near_field.far_field import far_field_notes, linear_notes, step_notes, table_notes
 from etendue.instruments.near_field.merging import Merging, stretches
 from etendue.instruments.near_field.pixel_rays import PixelRays, in_blocks
 from etendue.instruments.near_field.setting import Setting, counts_dtype
@@ -378,7 +378,8 @@ class NearFieldRun:
         in_blocks(n, seed, make, progress)
         records = spool.array()
         share = astray / float(records["flux"].sum(dtype=np.float64))
-        notes = [*self.notes, f"rays start on {at.told}"]
+        told = linear_notes(self.setting, self.setting.positions.table(self.illuminance))
+        notes = [*self.notes, *told, f"rays start on {at.told}"]
         if share > 0.0:
             notes.append(f"{share:.3%} of the flux does not cross it: these rays start in the plane through the centre")
         drawn = "one ray for each lit pixel" if rays is None else f"{n} rays from the pixels, seed {seed}"
