@@ -104,8 +104,7 @@ def read_run(path: Path) -> Parts:
         notes = strict_json(node.text("notes"))
         if not (isinstance(notes, list) and all(isinstance(note, str) for note in notes)):
             raise node.error("attribute 'notes'", "no list of texts")
-        # `in` has just narrowed it, which the type checker cannot see.
-        return setting, *light, start, records, unit, provenance, tuple(notes)  # type: ignore[return-value]
+        return setting, *light, start, records, unit, provenance, tuple(notes)
 
 
 def _setting(node: Node) -> Setting:
