@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.lightfield.fitting import make_plan
 from etendue.lightfield.light_field import LightField
 from etendue.luminance.scene_map import with_fields
 from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm
@@ -349,3 +350,18 @@ def test_a_scene_tells_that_the_field_of_a_narrow_beam_is_blurred(half_angle: fl
     lamp = {"kind": "rays", "name": "lamp", "rays": beam(half_angle, 3000)}
     _, notes = with_fields(et.Scene(sources=[lamp]), cache=False)
     assert any(note.startswith("lamp: the light fills no more than") for note in notes) == blurred
+
+
+@pytest.mark.parametrize("seed", [2, 5, 6])
+def test_shapes_that_predict_alike_leave_the_grid_even(seed: int) -> None:
+    """Places and directions that have nothing to do with each other: images tell all, and what shapes of the grid gain
+    beside them is rounding, which led to four times the cells of direction, or sixteen."""
+    rng = np.random.default_rng(seed)
+    place = rng.uniform(-1, 1, (100_000, 2))
+    kept = 1.8 * rng.random(len(place)) < 1 + 0.8 * np.cos(np.pi * place[:, 0]) * np.cos(np.pi * place[:, 1])
+    place = place[kept][:8000]
+    sine, turn = np.sqrt(rng.random(8000)), 2 * np.pi * rng.random(8000)
+    directions = np.stack([sine * np.cos(turn), sine * np.sin(turn), np.sqrt(1 - sine**2)], axis=-1)
+    rays = et.RaySet(np.column_stack([place, np.zeros(8000)]), directions, np.ones(8000))
+    plan = make_plan(rays, et.Plane(0.0).sized_for(rays), None, seed, None)
+    assert plan.grids[0].depths == (4, 4, 4, 4)

@@ -67,6 +67,10 @@ a sixteenth of the time; sets of very many rays may fill more than the pilot's."
 LEAST_LEAD = 1e-3
 """[nat per ray] A smaller lead of a finer grid shows in no map."""
 
+LEAST_GAIN = 1.0
+"""[nat] What another shape of the grid has to gain on all held-out rays together. Where the images tell all there is, no
+shape does better than another, and roundings would lead to the longest one, which serves later steps badly."""
+
 LEAD = 3.0
 """Standard errors by which the score of a finer grid must lead a coarser one's to be taken."""
 
@@ -250,7 +254,7 @@ class _Shape:
 
 
 def _search(counted: Callable[[Depths], EtendueCounts], bits: int, lend: int, threads: int | None) -> _Shape:
-    """The best shape of a grid of so many halvings, from one shape on as long as the score rises."""
+    """The best shape of a grid of so many halvings, from one shape on as long as the score gains anything."""
     trial = counted(_depths(bits - 2, lend))
     images = _pilot_images(trial, threads)
     concentrations = choose_concentrations(trial, images, threads)
@@ -262,7 +266,7 @@ def _search(counted: Callable[[Depths], EtendueCounts], bits: int, lend: int, th
             trial = counted(_depths(bits - 2, best + step))
             c = concentrations[recipe]
             tried = grow_candidate(trial, "fitted", recipe, images, c, threads, POSITIONS[:1]).score(trial)
-            if tried.mean <= reached.mean:
+            if not (tried.mean - reached.mean) * len(tried.values) > LEAST_GAIN:
                 break
             best, reached = best + step, tried
     return _Shape(bits, best, concentrations, reached, _not_beaten(scores))

@@ -20,6 +20,10 @@ LEAST_TOLD = 30.0
 """Cells below which they cannot: the beam may be as narrow as light can be."""
 
 
+NARROW = 0.25
+"""Share of all cells from which on light is no beam: cells are as wide as few rays, or who stated them, would have it."""
+
+
 def filled_cells(part: PartField) -> tuple[float, int]:
     """How many cells of direction the light of a part fills, as many as even light would, and how many there are.
 
@@ -53,7 +57,7 @@ def told_of_narrow_beams(parts: Sequence[PartField], fluxes: Sequence[float]) ->
     """
     brightest = int(np.argmax(fluxes))
     filled, cells = filled_cells(parts[brightest])
-    if not 0.0 < filled < ENOUGH:
+    if not 0.0 < filled < min(ENOUGH, NARROW * cells):
         return
     off = "much more" if filled < LEAST_TOLD else f"some {100.0 * BLURRED / filled**0.5:.1g} % more"
     yield (
