@@ -20,9 +20,11 @@ mod monotone_cubic;
 mod rough_coat;
 mod rough_interface;
 mod rough_metal;
+mod table_arrivals;
 mod table_draw;
 mod table_grid;
 mod table_lobes;
+mod table_slices;
 mod tabulated;
 #[cfg(test)]
 mod tests;

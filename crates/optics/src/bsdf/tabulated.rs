@@ -13,18 +13,17 @@
 //! the plane of direction cosines, where area is projected solid angle; and again if the point lies outside the unit circle.
 
 use std::cell::RefCell;
-use std::ops::Range;
 use std::sync::Arc;
 
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
-use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
 use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares, by_cosine};
-use super::table_draw::{Group, TOGETHER};
+use super::table_draw::Group;
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lit, Lobe, Lobes, Way};
+use super::table_slices::again;
 
 /// Tables of light that meets one side: reflected and transmitted, by wavelength \[nm\].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -226,9 +225,6 @@ impl Side {
     }
 }
 
-/// How often is tried again for a point within the unit circle.
-const TRIES: u32 = 10_000;
-
 impl Bsdf for Tabulated {
     fn facts(&self) -> &Facts {
         &self.facts
@@ -302,73 +298,25 @@ impl Bsdf for Tabulated {
 
     /// As any BSDF does, but where a side has a single lobe, for many rays together.
     fn sample_many(&self, directions: &mut Vectors, media: &[Media], numbers: [&[f64]; 2], outcomes: &mut [Outcome]) {
-        GROUP.with_borrow_mut(|group| {
-            for first in (0..outcomes.len()).step_by(TOGETHER) {
-                let rays = first..outcomes.len().min(first + TOGETHER);
-                let heights = &directions[2][rays.clone()];
-                let above = heights.iter().filter(|z| **z > 0.0).count();
-                let lone = (above == 0 || above == rays.len())
-                    .then(|| self.lone(above > 0))
-                    .flatten();
-                if let Some((way, lobe)) = lone {
-                    let up = (above > 0) != way;
-                    sample_group(group, lobe, up, rays, directions, numbers, outcomes);
-                    continue;
-                }
-                for k in rays {
-                    let [x, y, z] = directions.each_ref().map(|list| list[k]);
-                    let drawn = self.sample(Vec3::new(x, y, z), &media[k], numbers.map(|list| list[k]));
-                    outcomes[k] = drawn.keep(directions, k);
-                }
-            }
-        });
+        let above = directions[2].iter().filter(|z| **z > 0.0).count();
+        let one_side = above == 0 || above == outcomes.len();
+        if let Some((way, lobe)) = one_side.then(|| self.lone(above > 0)).flatten() {
+            let mut all = directions.each_mut().map(Vec::as_mut_slice);
+            let up = (above > 0) != way;
+            GROUP.with_borrow_mut(|group| group.draw((lobe, up), &mut all, numbers, outcomes));
+            return;
+        }
+        for (k, outcome) in outcomes.iter_mut().enumerate() {
+            let [x, y, z] = directions.each_ref().map(|list| list[k]);
+            let drawn = self.sample(Vec3::new(x, y, z), &media[k], numbers.map(|list| list[k]));
+            *outcome = drawn.keep(directions, k);
+        }
     }
 }
 
 thread_local! {
     /// Room to work in: it would take a while to make it anew.
     static GROUP: RefCell<Box<Group>> = RefCell::new(Box::new(Group::new()));
-}
-
-/// What becomes of rays that meet one lobe.
-fn sample_group(
-    group: &mut Group,
-    lobe: &Lobe,
-    up: bool,
-    rays: Range<usize>,
-    directions: &mut Vectors,
-    numbers: [&[f64]; 2],
-    outcomes: &mut [Outcome],
-) {
-    let n = rays.len();
-    for axis in 0..2 {
-        group.incident[axis][..n].copy_from_slice(&directions[axis][rays.clone()]);
-        group.numbers[axis][..n].copy_from_slice(&numbers[axis][rays.clone()]);
-    }
-    group.draw(lobe, n, up);
-    for (list, found) in directions.iter_mut().zip(&group.direction) {
-        list[rays.clone()].copy_from_slice(&found[..n]);
-    }
-    for (outcome, absorbed) in outcomes[rays.clone()].iter_mut().zip(&group.absorbed) {
-        *outcome = if *absorbed > 0.0 {
-            Outcome::Absorbed
-        } else {
-            Outcome::Scattered
-        };
-    }
-    for (place, slice, numbers) in group.missed(n) {
-        let [x, y] = group.incident.each_ref().map(|list| list[place]);
-        let incident = Vec3::new(x, y, 0.0);
-        let found = again(&Incidence::new(incident), incident, lobe.slice(slice), numbers, up);
-        Drawn::Scattered(found).keep(directions, rays.start + place);
-    }
-}
-
-/// A direction where a first place was outside the unit circle.
-fn again(incidence: &Incidence, incident: Vec3, grid: &Grid, numbers: [f64; 2], up: bool) -> Vec3 {
-    let mut more = MoreNumbers::new(numbers);
-    let found = (1..TRIES).find_map(|_| incidence.direction(incident, grid.draw(more.pair()), up));
-    found.unwrap_or_else(|| by_cosine(up, numbers))
 }
 
 /// The floors.

@@ -183,23 +183,27 @@ fn samples_have_their_shares_and_density() {
 
 #[test]
 fn many_rays_are_drawn_for_as_each_by_itself() {
-    let stream = Stream::new(41, 0);
+    let (stream, n) = (Stream::new(41, 0), 300);
+    let numbers = [0, 1].map(|k| (0..n).map(|i| stream.uniforms(i, 0)[k]).collect::<Vec<f64>>());
+    let numbers = numbers.each_ref().map(|list| &list[..]);
+    // More than are ever worked on together; from both sides, and from either alone.
     for Example { name, bsdf, .. } in kinds().iter().flatten() {
-        // More than are ever worked on together.
-        let numbers = [0, 1].map(|k| (0..150).map(|i| stream.uniforms(i, 0)[k]).collect::<Vec<f64>>());
-        let incident: Vec<Vec3> = (0..150)
-            .map(|i| direction(HEIGHTS[i % HEIGHTS.len()], 0.137 * i as f64))
-            .collect();
-        let media: Vec<Media> = (0..150).map(|i| MEDIA[i % MEDIA.len()]).collect();
-        let numbers = numbers.each_ref().map(|list| &list[..]);
-        let mut found = [0, 1, 2].map(|axis| incident.iter().map(|d| [d.x, d.y, d.z][axis]).collect::<Vec<f64>>());
-        let (mut expected, mut outcomes) = (found.clone(), vec![Outcome::Absorbed; 150]);
-        bsdf.sample_many(&mut found, &media, numbers, &mut outcomes);
-        for i in 0..150 {
-            let alone = bsdf.sample(incident[i], &media[i], numbers.map(|list| list[i]));
-            assert_eq!(outcomes[i], alone.keep(&mut expected, i), "{name}");
-            let [found, expected] = [&found, &expected].map(|lists| lists.each_ref().map(|list| list[i]));
-            assert!(found == expected || outcomes[i] == Outcome::Absorbed, "{name}");
+        for side in [0.0, 1.0, -1.0] {
+            let towards = |i: u64| {
+                let height = HEIGHTS[i as usize % HEIGHTS.len()];
+                direction(if side == 0.0 { height } else { height.abs() * side }, 0.137 * i as f64)
+            };
+            let incident: Vec<Vec3> = (0..n).map(towards).collect();
+            let media: Vec<Media> = (0..incident.len()).map(|i| MEDIA[i % MEDIA.len()]).collect();
+            let mut found = [0, 1, 2].map(|axis| incident.iter().map(|d| [d.x, d.y, d.z][axis]).collect::<Vec<f64>>());
+            let (mut expected, mut outcomes) = (found.clone(), vec![Outcome::Absorbed; incident.len()]);
+            bsdf.sample_many(&mut found, &media, numbers, &mut outcomes);
+            for (i, incident) in incident.into_iter().enumerate() {
+                let alone = bsdf.sample(incident, &media[i], numbers.map(|list| list[i]));
+                assert_eq!(outcomes[i], alone.keep(&mut expected, i), "{name}");
+                let [found, expected] = [&found, &expected].map(|lists| lists.each_ref().map(|list| list[i]));
+                assert!(found == expected || outcomes[i] == Outcome::Absorbed, "{name}");
+            }
         }
     }
 }

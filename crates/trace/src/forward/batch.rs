@@ -281,19 +281,22 @@ impl<'a> BatchTrace<'a> {
 
     /// Rays that meet one face go on together, or are absorbed.
     fn bounce(&mut self, sheet: LambertianSheet, which: &[u32], now: &RayQueue, hits: &Hits, next: &mut RayQueue) {
-        let account = &mut self.block.out.ledger.on_face[sheet.face as usize];
         let [numbers, turns] = &mut self.numbers;
-        self.going.clear();
+        self.going.resize(which.len(), 0);
+        self.fluxes.clear();
+        let mut going = 0;
         for (k, i) in which.iter().enumerate() {
-            if sheet.absorbs(numbers[k]) {
-                account.add(self.block.states[now.who[*i as usize] as usize].flux);
-            } else {
-                // No later than where it is: the numbers move up.
-                let place = self.going.len();
-                (numbers[place], turns[place]) = (numbers[k], turns[k]);
-                self.going.push(*i);
+            let ends = sheet.absorbs(numbers[k]);
+            if ends {
+                self.fluxes.push(self.block.states[now.who[*i as usize] as usize].flux);
             }
+            // No later than where it is: the numbers move up.
+            (numbers[going], turns[going]) = (numbers[k], turns[k]);
+            self.going[going] = *i;
+            going += usize::from(!ends);
         }
+        self.going.truncate(going);
+        self.block.out.ledger.on_face[sheet.face as usize].add_all(&self.fluxes);
         self.sheet_rays.gather(now, hits, &self.going);
         let face = &self.block.scene.face_set.faces()[sheet.face as usize];
         self.sheet_rays.bounce(face, sheet, &self.numbers);
@@ -338,31 +341,45 @@ impl<'a> BatchTrace<'a> {
         let (rays, scattered, absorbed) = (&mut self.sheet_rays, &mut self.scattered_rays, &mut self.fluxes);
         let [numbers, turns] = &mut self.numbers;
         scattered.media.clear();
-        self.going.clear();
-        absorbed.clear();
+        let mut around = Media {
+            wavelength: f64::NAN,
+            front: f64::NAN,
+            back: f64::NAN,
+        };
+        scattered.media.resize(which.len(), around);
+        self.going.resize(which.len(), 0);
+        absorbed.resize(which.len(), 0.0);
+        // Those that go on and those that are absorbed, without branches, which nobody can foresee.
+        let (mut going, mut gone) = (0, 0);
         for (k, i) in which.iter().enumerate() {
             let state = &states[now.who[*i as usize] as usize];
-            let n = media.at(scene, 0, state.wavelength).n;
-            // Not so if it is NaN, either.
-            if n > 0.0 {
-                // Before it is known where and under which angle, unless somebody asks for that.
-                if !wants.exitance && sheet.absorbs(numbers[k]) {
-                    absorbed.push(state.flux);
-                    continue;
-                }
-                // No later than where it is: the numbers move up.
-                let place = self.going.len();
-                (numbers[place], turns[place]) = (numbers[k], turns[k]);
-                self.going.push(*i);
-                scattered.media.push(Media {
+            if around.wavelength != state.wavelength {
+                let n = media.at(scene, 0, state.wavelength).n;
+                around = Media {
                     wavelength: state.wavelength,
                     front: n,
                     back: n,
-                });
-            } else {
-                out.ledger.book(Fate::Lost(Loss::NoIndex, sheet.face), state.flux);
+                };
             }
+            // Not so if it is NaN, either.
+            let known = around.front > 0.0;
+            if !known {
+                out.ledger.book(Fate::Lost(Loss::NoIndex, sheet.face), state.flux);
+                continue;
+            }
+            // Before it is known where and under which angle, unless somebody asks for that.
+            let ends = !wants.exitance & sheet.absorbs(numbers[k]);
+            // No later than where it is: the numbers move up.
+            (numbers[going], turns[going]) = (numbers[k], turns[k]);
+            self.going[going] = *i;
+            scattered.media[going] = around;
+            absorbed[gone] = state.flux;
+            going += usize::from(!ends);
+            gone += usize::from(ends);
         }
+        self.going.truncate(going);
+        scattered.media.truncate(going);
+        absorbed.truncate(gone);
         rays.gather(now, hits, &self.going);
         rays.reach(&scene.face_set.faces()[sheet.face as usize]);
         let all = 0..self.going.len();

@@ -92,6 +92,7 @@ impl SheetRays {
     }
 
     /// How many.
+    #[cfg(test)]
     pub fn len(&self) -> usize {
         self.who.len()
     }
@@ -125,25 +126,17 @@ impl SheetRays {
         self.who[k]
     }
 
-    /// Turns the lines that have reached the face into those from there in some directions; some of them go on.
-    pub fn turn_to(&mut self, directions: &Vectors, goes_on: impl Fn(usize) -> bool) {
-        let n = self.len();
-        let [to_x, to_y, to_z] = directions.each_ref().map(|list| &list[..n]);
-        let [x, y, z] = self.d.each_mut().map(|list| &mut list[..n]);
-        let [ox, oy, oz] = self.o.each_mut().map(|list| &mut list[..n]);
-        let (who, part) = (&mut self.who[..n], &mut self.part[..n]);
-        let mut place = 0;
-        for k in 0..n {
-            // No later than where it is: the rays move up.
-            (who[place], part[place]) = (who[k], part[k]);
-            (ox[place], oy[place], oz[place]) = (ox[k], oy[k], oz[k]);
-            (x[place], y[place], z[place]) = (to_x[k], to_y[k], to_z[k]);
-            place += usize::from(goes_on(k));
-        }
-        self.who.truncate(place);
-        self.part.truncate(place);
-        for list in self.o.iter_mut().chain(&mut self.d) {
-            list.truncate(place);
+    /// Turns the lines that have reached the face into those from there in some directions, which are swapped for theirs. Some rays
+    /// are left out, told in rising order: the last ones take their places.
+    pub fn turn_to(&mut self, directions: &mut Vectors, gone: &[usize]) {
+        std::mem::swap(&mut self.d, directions);
+        for k in gone.iter().rev() {
+            // All behind it go on.
+            self.who.swap_remove(*k);
+            self.part.swap_remove(*k);
+            for list in self.o.iter_mut().chain(&mut self.d) {
+                list.swap_remove(*k);
+            }
         }
     }
 
