@@ -183,14 +183,14 @@ fn samples_have_their_shares_and_density() {
 
 #[test]
 fn many_rays_are_drawn_for_as_each_by_itself() {
-    let (stream, n) = (Stream::new(41, 0), 300);
-    let numbers = [0, 1].map(|k| (0..n).map(|i| stream.uniforms(i, 0)[k]).collect::<Vec<f64>>());
+    let (stream, n) = (Stream::new(41, 0), 300_usize);
+    let numbers = [0, 1].map(|k| (0..n).map(|i| stream.uniforms(i as u64, 0)[k]).collect::<Vec<f64>>());
     let numbers = numbers.each_ref().map(|list| &list[..]);
     // More than are ever worked on together; from both sides, and from either alone.
     for Example { name, bsdf, .. } in kinds().iter().flatten() {
         for side in [0.0, 1.0, -1.0] {
-            let towards = |i: u64| {
-                let height = HEIGHTS[i as usize % HEIGHTS.len()];
+            let towards = |i: usize| {
+                let height = HEIGHTS[i % HEIGHTS.len()];
                 direction(if side == 0.0 { height } else { height.abs() * side }, 0.137 * i as f64)
             };
             let incident: Vec<Vec3> = (0..n).map(towards).collect();

@@ -124,8 +124,14 @@ impl Glints {
         if found.iter().all(|(images, _)| images.is_empty()) {
             return result;
         }
+        result.take(view, &window, &found);
+        result
+    }
+
+    /// Takes in what was found from the pixels of a window.
+    fn take(&mut self, view: &View, window: &[usize], found: &[FromPixel]) {
         let seen_in = |pixel: usize| window.binary_search(&pixel).map_or(&[][..], |at| &found[at].1[..]);
-        let mut images: Vec<Vec<Found>> = vec![Vec::new(); pixels];
+        let mut images: Vec<Vec<Found>> = vec![Vec::new(); view.pixels()];
         for image in found.iter().flat_map(|(images, _)| images) {
             for pixel in touched(view, &image.glint) {
                 // In the midst of a large image lines that are spread evenly have no noise, and need no others.
@@ -144,18 +150,17 @@ impl Glints {
         }
         for (pixel, here) in images.iter().enumerate() {
             for image in here {
-                result.of[image.source] = true;
-                result.images.push(image.glint);
+                self.of[image.source] = true;
+                self.images.push(image.glint);
             }
-            result.begins[pixel + 1] = result.images.len();
+            self.begins[pixel + 1] = self.images.len();
             if !here.is_empty() {
                 let key = |ways: &[bool]| ways.iter().fold(STRAIGHT, |ways, way| led_on(ways, *way));
                 let known = seen_in(pixel).iter().map(|(source, ways)| (*source, key(ways)));
-                result.large.extend(known.filter(|(_, ways)| *ways > 0));
+                self.large.extend(known.filter(|(_, ways)| *ways > 0));
             }
-            result.large_begins[pixel + 1] = result.large.len();
+            self.large_begins[pixel + 1] = self.large.len();
         }
-        result
     }
 
     /// Number of pixels that have images.
