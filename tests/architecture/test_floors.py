@@ -376,7 +376,12 @@ def test_no_crate_is_unsafe_prints_or_opens_files() -> None:
             assert not re.search(word, code), f"{path.relative_to(ROOT)}: {word}"
 
 
-PARTS_OF_BSDFS = ("albedo", "facets", "monotone_cubic", "table_draw", "table_grid", "table_lobes")
+PARTS_OF_BSDFS = (
+    "albedo",
+    "facets",
+    "monotone_cubic",
+    *(f"table_{part}" for part in ("arrivals", "draw", "grid", "lobes", "slices")),
+)
 """What several kinds of BSDF are made of."""
 
 

@@ -8,8 +8,10 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import pytest
+from etendue.errors import ArgumentError
 from etendue.lightfield.field_rays import FieldRays
-from etendue.luminance.framing import centre_of_light, framed, light_towards
+from etendue.luminance.framing import centre_of_light, framed, framed_screens, light_towards
+from etendue.luminance.opening import open_source
 from oracles.light_fields import make_field
 from scipy import stats
 
@@ -135,3 +137,26 @@ def test_from_behind_it_is_dark() -> None:
         et.luminance_map(lamp(5000), et.Observer(150, 0, 2000), method="cone")
     lmap = et.luminance_map(lamp(5000), et.Observer(150, 0, 2000), et.Screen(9, 9, 4, 4), method="cone")
     assert any("from there the source is dark" in note for note in lmap.notes)
+
+
+@pytest.mark.slow
+def test_scenes_of_nothing_but_measured_sources_are_framed_by_their_light(tmp_path: Path) -> None:
+    """As the rays themselves are, turned and moved as the source is; whatever kind of source holds them."""
+    rays = lamp(20_000)
+    observer = et.Observer(20, 35, 2000, target=(4, 3, 7))
+    place = {"at": [1, 2, 3], "rotation": [0, 0, 90]}
+    scene = et.Scene(sources=[{"kind": "rays", "rays": rays, **place}])
+    turned = rays.rotated((0, 0, 1), 90).moved((1, 2, 3))
+    assert framed_screens(scene, [observer], 64, 32) == [framed(turned, observer, 64, 32)]
+    with pytest.raises(ArgumentError, match="nothing in the scene has an end"):
+        framed_screens(et.Scene(sources=[{"kind": "point", "flux": 1}]), [observer])
+    # Rays of a field and of patches are others, of the same light.
+    folder = tmp_path / "patches"
+    et.GriddedSource.fit(rays, et.Plane(z=7), pixel=1.0, threshold=20).save_patches(folder)
+    field = et.LightField.fit(rays, et.Plane(z=7), depths=(3, 3, 3, 3))
+    for source in ({"kind": "light-field", "field": field}, {"kind": "gridded", "file": str(folder), "draws": 1000}):
+        (screen,) = framed_screens(et.Scene(sources=[source]), [observer], 64, 32)
+        assert abs(screen.width / framed(rays, observer, 64, 32).width - 1) < 0.25
+    opened = open_source(folder)
+    assert isinstance(opened, et.Scene)
+    assert opened.sources[0].kind == "gridded"

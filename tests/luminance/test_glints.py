@@ -119,6 +119,7 @@ def test_glints_in_glass(kind: str) -> None:
     assert chi2.sf((z**2).sum(), len(z)) > SIGNIFICANCE
 
 
+@pytest.mark.slow
 def test_a_ghost_leaves_the_image_about_it_without_noise() -> None:
     """In the midst of the image of a die in a ball of glass of reflectance R: L (1 − R)², and where the ghost of two
     reflections lies as well, L (1 − R)²(1 + R² + …). A place half a millimetre off the axis, under 8°, has 10⁻⁴ less at

@@ -31,6 +31,7 @@ from etendue.cli.terminal import (
 )
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
+from etendue.formats.patch_folder import is_patch_folder
 from etendue.lightfield.light_field import LightField
 from etendue.luminance.estimate import Acceptance, luminance_map
 from etendue.luminance.framing import centre_of_light, framed_screens, probe
@@ -43,7 +44,7 @@ from etendue.luminance.methods import (
     kind_of_source,
     mismatch,
 )
-from etendue.luminance.opening import SCENE_EXTENSION
+from etendue.luminance.opening import SCENE_EXTENSION, open_source
 from etendue.luminance.regions import AnyRegion, parse_region, region_statistics
 from etendue.plot.animation import plot_animation
 from etendue.plot.colour_scale import SCALES, Scale
@@ -229,7 +230,8 @@ def luminance(
         "forward_rays": forward_rays,
         "gather": gather,
     }
-    scene = Scene.load(file) if file.suffix.lower() == SCENE_EXTENSION else None
+    is_scene = file.suffix.lower() == SCENE_EXTENSION or is_patch_folder(file)
+    scene = opened if is_scene and isinstance(opened := open_source(file), Scene) else None
     detected = _detected(file, detector)
     regions = [parse_region(text) for text in region or []]
     looked = detected if isinstance(detected, ScatterEvents) else scene
@@ -358,10 +360,13 @@ def _targets(output: list[Path], who: list[tuple[str, Observer]]) -> list[list[P
     Raises
     ------
     ArgumentError
-        If maps of several observers would be written to the same file, or one cannot be written.
+        If an output is stated twice, maps of several observers would be written to the same file, or one cannot be written.
     """
     targets = [[_named(path, observer, name) for path in output] for name, observer in who]
     everything = [path for paths in targets for path in paths]
+    if len(set(output)) < len(output):
+        twice = next(path for number, path in enumerate(output) if path in output[:number])
+        raise ArgumentError(f"{twice} is stated twice as an output.")
     if len(set(everything)) < len(everything):
         raise ArgumentError(
             "several observers would write to the same file; put {theta} and {phi}, or {observer}, into its name."

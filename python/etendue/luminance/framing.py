@@ -13,10 +13,12 @@ from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import pilot_sample
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 from etendue.scene import Scene, compile_scene
-from etendue.scene.framing import framed_screen
+from etendue.scene.compiling import Compiled
+from etendue.scene.framing import corners_of, framed_screen
 
 Array = npt.NDArray[np.float64]
 
@@ -140,6 +142,8 @@ def framed_screens(
 ) -> list[Screen]:
     """A screen for each observer, about his target, on which he sees the whole scene, or all light but strays.
 
+    Scenes of nothing but measured sources have no other end than their light.
+
     Raises
     ------
     ArgumentError
@@ -155,9 +159,41 @@ def framed_screens(
     """
     if isinstance(source, Scene):
         compiled = compile_scene(source)
-        return [framed_screen(compiled, observer, columns, rows) for observer in observers]
-    some = probe(source)
+        measured = None if len(corners_of(compiled)) else light_of_sources(source, compiled)
+        if measured is None:
+            return [framed_screen(compiled, observer, columns, rows) for observer in observers]
+        some = measured
+    else:
+        some = probe(source)
     return [framed(some, observer, columns, rows) for observer in observers]
+
+
+def light_of_sources(scene: Scene, compiled: Compiled) -> RaySet | None:
+    """Some rays of those sources of a scene whose extent nothing else tells, in their places; None if there are none.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> lamp = {"kind": "rays", "rays": et.RingSource(rays=1000), "at": [0, 0, 5], "flux": 3}
+    >>> scene = et.Scene(sources=[lamp])
+    >>> some = light_of_sources(scene, compile_scene(scene))
+    >>> round(some.total_flux, 9), some.position[:, 2].tolist() == [5.0] * 1000
+    (3.0, True)
+    """
+    parts = []
+    for source, record in zip(scene.sources, compiled.record["sources"], strict=True):
+        some = source.some_rays(scene.files, max(PROBED // len(scene.sources), 1))
+        if some is None:
+            continue
+        frame = source.frame()
+        flux = some.flux * (record["flux"] / some.total_flux)
+        parts.append((some.position @ frame.axes.T + frame.origin, some.direction @ frame.axes.T, flux))
+    if not parts:
+        return None
+    position, direction, flux = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return RaySet(
+        position, direction, flux, flux_unit=compiled.flux_unit, provenance=Provenance(scene.name or "the scene")
+    )
 
 
 def shows_whole(field: LightField, lmap: LuminanceMap) -> bool:

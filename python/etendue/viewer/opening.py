@@ -11,8 +11,10 @@ import numpy as np
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.input import as_path
 from etendue.formats.maps import is_map_file, read_any_map
+from etendue.formats.patch_folder import is_patch_folder
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
+from etendue.luminance.framing import light_of_sources
 from etendue.luminance.opening import open_source
 from etendue.quantities.pixel_map import PixelMap
 from etendue.quantities.ray_stream import Progress, RayStream
@@ -85,6 +87,8 @@ def open_viewable(path: str | os.PathLike[str], detector: str | None = None) -> 
     'nothing'
     """
     path = as_path(path)
+    if is_patch_folder(path):
+        return open_source(path)
     if is_result_file(path):
         return of_detector(TraceResult.load(path), detector)
     if detector is not None:
@@ -214,7 +218,10 @@ def light_of(
     >>> len(light_of(et.Scene(sources=[lamp]), 1000))
     1000
     """
-    corners = corners_of(compile_scene(scene))
+    compiled = compile_scene(scene)
+    corners = corners_of(compiled)
+    if len(corners) == 0 and (measured := light_of_sources(scene, compiled)) is not None:
+        corners = measured.position
     if len(corners) == 0:
         raise ArgumentError(
             f"{scene.name or 'the scene'}: nothing in it has an end, so that nothing can be put around it."

@@ -16,6 +16,7 @@ from etendue.description.values import Positive
 from etendue.errors import ArgumentError, UnitError
 from etendue.formats.rays import read_rays
 from etendue.lightfield.light_field import LightField
+from etendue.lightfield.pilot_sample import pilot_sample
 from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.ray_set import RaySet
@@ -106,6 +107,10 @@ class Rays(Source):
             total = self.stated_in_unit(rays.total_flux, self.flux_unit)
             return rays.without_spectrum().with_total_flux(total, self.flux_unit)
 
+    def some_rays(self, files: Files, most: int) -> RaySet:
+        """Some of its rays."""
+        return pilot_sample(self.ray_stream(files), most)
+
     def _coloured(self, record: Record, rays: RayStream, unit: FluxUnit) -> Emitter:
         """With what the rays know of their colours, unless the user states these."""
         by_ray = _have_colours(rays)
@@ -177,7 +182,7 @@ class Field(Source):
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
         """The field, its flux and its spectrum."""
-        field: LightField = LightField.load(files.find(self.file)) if self.file is not None else self.field  # type: ignore[assignment]
+        field = self._field(files)
         if not field.total_flux > 0.0:
             raise ArgumentError("the light field carries no flux")
         unit = field.flux_unit if self.flux_unit is None else self.flux_unit
@@ -189,6 +194,16 @@ class Field(Source):
             flux = field.total_flux
         mean = field.spectrum_is_mean and not self.states_colours
         return (Emitter({"kind": "field", "field": field.core, "flux": flux}, unit, field.spectrum, mean=mean),)
+
+    def some_rays(self, files: Files, most: int) -> RaySet:
+        """Rays drawn from it."""
+        return self._field(files).sample(most)
+
+    def _field(self, files: Files) -> LightField:
+        if self.field is not None:
+            return self.field
+        assert self.file is not None  # noqa: S101 - one of the two is given
+        return LightField.load(files.find(self.file))
 
 
 class Point(Source):

@@ -17,6 +17,7 @@ from etendue.formats.rays import read_rays
 from etendue.lightfield.gridded.core_patches import core_patches
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.surfaces import parse_surface
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
 from etendue.scene.placement import Placement
@@ -94,6 +95,10 @@ class Gridded(Source):
         scale = drawn.flux_scale * flux / drawn.total_flux
         record = {"kind": "rays", "rays": drawn.core_source(), "scale": scale, "flux": flux}
         return (Emitter(record, gridded.flux_unit, known, flux_notes=drawn.notes),)
+
+    def some_rays(self, files: Files, most: int) -> RaySet:
+        """Rays drawn from it."""
+        return self._gridded(files)[0].sample(most, self.seed)
 
     def _gridded(self, files: Files) -> tuple[GriddedSource, Spectrum | SpectralLines | None]:
         """The patches, and the spectrum of the rays that they were made of."""

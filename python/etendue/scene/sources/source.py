@@ -14,6 +14,7 @@ from pydantic import model_validator
 from etendue.description.files import Files
 from etendue.description.values import AsRow, FirstMistake, NotNegative, Wavelength
 from etendue.errors import UnitError
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
 from etendue.scene.placement import Placement
@@ -128,6 +129,16 @@ class Source(Placement, abc.ABC):
         ArgumentError, UnitError, FormatError, OSError
             If a file cannot be read, or does not fit.
         """
+
+    def some_rays(self, files: Files, most: int) -> RaySet | None:  # noqa: ARG002 - of most sources there are none
+        """Some of its rays, in its own frame, if these alone tell its extent; else None.
+
+        Raises
+        ------
+        ArgumentError, UnitError, FormatError, OSError
+            As `emitters`.
+        """
+        return None
 
     def colours(self, emitter: Emitter, default: float) -> tuple[Array, Array]:
         """Wavelengths [nm] and shares of the flux, with sum 1.
