@@ -229,6 +229,7 @@ def test_wrong_usage_ends_with_status_2(run: Run, folder: Path, arguments: list[
         ),
         (["luminance", "{}/led.tm25ray", "--observer", "0,0", "--size", "0,1", "-o", "a.npz"], "width is 0"),
         (["luminance", "{}/led.tm25ray", "--observer", "0,0", "--size", "1,1", "-o", "a.exrr"], ".exrr"),
+        (["luminance", "{}/led.tm25ray", "--observer", "0,0", "-o", "a.npz", "-o", "a.npz"], "a.npz is stated twice"),
         (
             ["luminance", "{}/led.tm25ray", "--observer", "0,0", "--size", "1,1", "-o", "a.npz", "--acceptance", "0"],
             "acceptance is 0",

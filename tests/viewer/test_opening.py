@@ -52,9 +52,24 @@ def test_what_cannot_be_shown_is_refused(files: Path) -> None:
         exhibit_of(FIELDS["lamp"], name="lamp", detector="card")
     with pytest.raises(ArgumentError, match="nothing in it has an end"):
         light_of(et.Scene(name="void"), 100)
+    point = et.RaySet(np.zeros((2, 3)), [[0, 0, 1], [0.6, 0, 0.8]], [1.0, 1.0])
+    with pytest.raises(ArgumentError, match="one point"):
+        light_of(et.Scene(sources=[{"kind": "rays", "rays": point}]), 100)
     dark = et.Scene(sources=[LAMP], surfaces=[{"shape": {"kind": "sphere", "radius": 9}, "finish": "absorber"}])
     with pytest.raises(ArgumentError, match="leaves it"):
         light_of(dark, 1000)
+
+
+def test_all_light_of_a_scene_of_nothing_but_rays_is_collected() -> None:
+    """Each ray once, in its place: along the same lines as in the file."""
+    rays = et.RingSource(rays=500).ray_set()
+    found = light_of(et.Scene(sources=[{"kind": "rays", "rays": rays, "at": [1, 2, 3]}]), 500)
+    assert isinstance(found, et.RaySet)
+    order, other = (np.lexsort(np.round(one.direction, 9).T) for one in (found, rays))
+    np.testing.assert_allclose(found.direction[order], rays.direction[other], atol=1e-9)
+    off = found.position[order] - (rays.position[other] + (1, 2, 3))
+    assert np.abs(np.cross(off, rays.direction[other])).max() < 1e-6
+    np.testing.assert_allclose(found.total_flux, rays.total_flux)
 
 
 def test_a_trace_shows_what_one_detector_saw() -> None:

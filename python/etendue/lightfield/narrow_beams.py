@@ -19,7 +19,6 @@ BLURRED = 0.3
 LEAST_TOLD = 30.0
 """Cells below which they cannot: the beam may be as narrow as light can be."""
 
-
 NARROW = 0.25
 """Share of all cells from which on light is no beam: cells are as wide as few rays, or who stated them, would have it."""
 
@@ -52,8 +51,8 @@ def told_of_narrow_beams(parts: Sequence[PartField], fluxes: Sequence[float]) ->
     --------
     >>> beam = np.zeros((1, 1, 64, 64), dtype=np.float32)
     >>> beam[0, 0, 30:34, 30:33] = 2.0
-    >>> [told.partition(",")[0] for told in told_of_narrow_beams([PartField(beam, beam, None, None, 1.0)], [100.0])]
-    ["the light fills no more than 12 of the light field's 4"]
+    >>> list(told_of_narrow_beams([PartField(beam, beam, None, None, 1.0)], [100.0]))  # doctest: +ELLIPSIS
+    ["the light fills no more than 12 of the light field's 4,096 cells of direction, which blur it: ..."]
     """
     brightest = int(np.argmax(fluxes))
     filled, cells = filled_cells(parts[brightest])

@@ -209,7 +209,7 @@ def light_of(
     Raises
     ------
     ArgumentError
-        If nothing in the scene has an end, or no light leaves it.
+        If nothing in the scene has an end, all of it is one point, or no light leaves it.
 
     Examples
     --------
@@ -228,6 +228,8 @@ def light_of(
         )
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     radius = AROUND * float(np.linalg.norm(corners - middle, axis=1).max())
+    if radius == 0.0:
+        raise ArgumentError(f"{scene.name or 'the scene'}: all its light comes from one point, which has no luminance.")
     # From the inside alone: what comes from outside is not the luminaire's.
     around = {
         "name": COLLECTOR,

@@ -53,6 +53,7 @@ pub(super) struct Branch {
 pub(super) struct Path {
     pub(super) numbers: Numbers,
     pub(super) line: usize,
+    /// The number of its pixel.
     pub(super) pixel: usize,
     /// Its pass, counted from the first of those that are made.
     pub(super) pass: usize,
