@@ -87,19 +87,28 @@ impl Alias {
         &self.slots
     }
 
-    /// The entry for a uniform number in (0, 1), and what is left of the number: uniform again, less than 1.
+    /// The number of the slot that a uniform number in (0, 1) falls into, and that and how far into it.
     #[inline]
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "below the number of slots"
+        reason = "below the number of slots, which is below 2^32"
     )]
-    pub fn pick_and_rest(&self, u: f64) -> (usize, f64) {
+    pub fn place(&self, u: f64) -> (u32, f64) {
         let scaled = u * self.slots.len() as f64;
-        let slot = (scaled as usize).min(self.slots.len() - 1);
+        let slot = (scaled as u32).min(self.slots.len() as u32 - 1);
+        (slot, scaled)
+    }
+
+    /// The entry for a uniform number in (0, 1), and what is left of the number: uniform again, less than 1.
+    #[inline]
+    #[must_use]
+    pub fn pick_and_rest(&self, u: f64) -> (usize, f64) {
+        let (slot, scaled) = self.place(u);
+        let within = scaled - f64::from(slot);
+        let slot = slot as usize;
         let (chance, alias) = (self.slots[slot].chance(), self.slots[slot].alias);
-        let within = scaled - slot as f64;
         // Without a branch: which of the two it is, nobody can foresee.
         let own = within < chance;
         let (part, share) = if own {

@@ -3,7 +3,7 @@
 /// Places in a list of rising numbers from 0 on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Guide {
-    /// For each of the even steps up to the end the first place whose number is above it.
+    /// For each of the even steps up to the end the first place whose number is not below it.
     first: Vec<u32>,
     /// Steps per unit.
     scale: f64,
@@ -23,7 +23,7 @@ impl Guide {
             Some(end) if *end > 0.0 && (steps as f64 / end).is_finite() => steps as f64 / end,
             _ => 0.0,
         };
-        let place = |step: usize| rising.partition_point(|x| *x * scale <= step as f64) as u32;
+        let place = |step: usize| rising.partition_point(|x| *x * scale < step as f64) as u32;
         Self {
             first: (0..steps).map(place).collect(),
             scale,
@@ -40,10 +40,8 @@ impl Guide {
     )]
     pub fn not_above<T>(&self, rising: &[T], x: f64, of: impl Fn(&T) -> f64) -> usize {
         let step = ((x * self.scale) as usize).min(self.first.len().saturating_sub(1));
+        // Numbers before this place are below the step, and so below `x`, whatever products are rounded to.
         let mut at = self.first.get(step).map_or(0, |first| *first as usize);
-        while at > 0 && of(&rising[at - 1]) > x {
-            at -= 1;
-        }
         // Whether one number lies below in the step nobody foresees, so it is counted; that there are more is rare.
         at += rising.get(at).map_or(0, |next| usize::from(of(next) <= x));
         while at < rising.len() && of(&rising[at]) <= x {

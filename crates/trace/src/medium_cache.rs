@@ -37,6 +37,17 @@ impl MediumCache {
         held.1
     }
 
+    /// What lies on both sides of a surface in the surroundings; None if they have no refractive index at this wavelength \[nm\].
+    #[inline]
+    pub fn around(&mut self, scene: &Scene, wavelength: f64) -> Option<Media> {
+        let n = self.at(scene, 0, wavelength).n;
+        (n > 0.0).then_some(Media {
+            wavelength,
+            front: n,
+            back: n,
+        })
+    }
+
     /// What lies on both sides of a surface, for light that comes out of `before`, to its front or its back.
     ///
     /// # Errors

@@ -96,15 +96,21 @@ pub fn axes_along(normal: Vec3, axis: Vec3) -> [Vec3; 3] {
     let laid = axis - normal * axis.dot(normal);
     let length = laid.length();
     let upright = length <= 1e-9 * axis.length();
-    let x = laid * (1.0 / length);
-    let y = normal.cross(x);
+    let own = laid * (1.0 / length);
     // By components: several at a time where many are asked for.
-    let [any_x, any_y] = across(normal);
-    let either = |any: Vec3, own: Vec3| {
-        let pick = |any: f64, own: f64| if upright { any } else { own };
-        Vec3::new(pick(any.x, own.x), pick(any.y, own.y), pick(any.z, own.z))
-    };
-    [either(any_x, x), either(any_y, y), normal]
+    let [any, _] = across(normal);
+    let pick = |any: f64, own: f64| if upright { any } else { own };
+    axes_from(
+        normal,
+        Vec3::new(pick(any.x, own.x), pick(any.y, own.y), pick(any.z, own.z)),
+    )
+}
+
+/// Axes of which the first and the third are known.
+#[inline(always)]
+#[must_use]
+pub fn axes_from(normal: Vec3, first: Vec3) -> [Vec3; 3] {
+    [first, normal.cross(first), normal]
 }
 
 /// Components of a unit vector along axes.

@@ -23,8 +23,9 @@ mod rough_metal;
 mod table_arrivals;
 mod table_draw;
 mod table_grid;
+mod table_lanes;
 mod table_lobes;
-mod table_slices;
+mod table_nodes;
 mod tabulated;
 #[cfg(test)]
 mod tests;

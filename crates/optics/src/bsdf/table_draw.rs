@@ -1,47 +1,39 @@
 //! Many rays at once off a table of one lobe: what [`Tabulated`](super::Tabulated) draws for each by itself, to the same bits.
 //!
-//! Step by step for many of them together. Sums, roots and angles are worked out several at a time; what is looked up in between
-//! is all over a memory that no cache holds, and without branches the processor waits for many of them at once.
+//! Step by step for many of them together. Sums, roots and angles are worked out several at a time, for those that are off
+//! slices and those that are off floors alike; what is looked up in between is all over a memory that no cache holds, and without
+//! branches the processor waits for many of them at once.
 
+use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
+use etendue_sampling::more_numbers::MoreNumbers;
+use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
-use super::contract::Outcome;
-use super::table_arrivals::{Arrivals, Lanes, TOGETHER, ZERO};
-use super::table_lobes::Lobe;
-use super::table_slices::OffSlices;
+use super::contract::{Outcome, by_cosine};
+use super::table_arrivals::{ABSORBED, Arrivals, OFF_FLOOR, OFF_SLICE};
+use super::table_grid::Grid;
+use super::table_lanes::{LANES, Lanes, TOGETHER, blocks};
+use super::table_lobes::{Incidence, Lobe};
+use super::table_nodes::Nodes;
+
+/// How often is tried again for a point within the unit circle.
+const TRIES: u32 = 10_000;
 
 /// What scatters rays that meet the same side of a surface, and where to.
 pub(super) struct Group {
     arrivals: Arrivals,
-    lobes: OffSlices,
-    floors: OffFloors,
-}
-
-/// Rays that floors scatter.
-struct OffFloors {
-    count: usize,
-    /// Number of each among the rays.
-    ray: [usize; TOGETHER],
-    /// Two random numbers.
-    rest: Lanes,
-    number: Lanes,
-    /// Where the light goes.
-    direction: [Lanes; 3],
+    nodes: Nodes,
+    direction: [Lanes<f64>; 3],
 }
 
 impl Group {
     pub const fn new() -> Self {
+        const ZERO: Lanes<f64> = Lanes::of(0.0);
         Self {
             arrivals: Arrivals::new(),
-            lobes: OffSlices::new(),
-            floors: OffFloors {
-                count: 0,
-                ray: [0; TOGETHER],
-                rest: ZERO,
-                number: ZERO,
-                direction: [ZERO; 3],
-            },
+            nodes: Nodes::new(),
+            direction: [ZERO; 3],
         }
     }
 
@@ -55,79 +47,96 @@ impl Group {
         numbers: [&[f64]; 2],
         outcomes: &mut [Outcome],
     ) {
-        let n = outcomes.len();
-        for first in (0..n).step_by(TOGETHER) {
-            let count = TOGETHER.min(n - first);
-            let rays = first..first + count;
-            self.arrivals.take([&*directions[0], &*directions[1]], numbers[0], rays);
-            self.arrivals.choose(lobe, count);
-            let Self {
-                arrivals,
-                lobes,
-                floors,
-            } = self;
+        for first in (0..outcomes.len()).step_by(TOGETHER) {
+            let rays = first..outcomes.len().min(first + TOGETHER);
+            let incident = [&directions[0][rays.clone()], &directions[1][rays.clone()]];
+            self.arrivals
+                .choose(lobe, incident, numbers.map(|list| &list[rays.clone()]));
             // Without branches, which nobody can foresee.
-            let (mut off_slices, mut slices) = ([0; TOGETHER], 0);
-            let (mut off_floors, mut evens) = ([0; TOGETHER], 0);
-            for (k, outcome) in outcomes[first..].iter_mut().take(TOGETHER).enumerate() {
-                let (goes, even) = (arrivals.absorbed[k] == 0.0, arrivals.floor[k] > 0.0);
-                *outcome = if goes { Outcome::Scattered } else { Outcome::Absorbed };
-                (off_slices[slices], off_floors[evens]) = (k, k);
-                slices += usize::from(goes & !even);
-                evens += usize::from(goes & even);
+            let (mut list, mut count) = ([0; TOGETHER], 0);
+            for (k, outcome) in outcomes[rays.clone()].iter_mut().enumerate() {
+                let kind = self.arrivals.kind[k];
+                *outcome = [Outcome::Absorbed, Outcome::Scattered][usize::from(kind != ABSORBED)];
+                list[count] = k;
+                count += usize::from(kind == OFF_SLICE);
             }
-            for k in &off_slices[..slices] {
-                if lobes.count == TOGETHER {
-                    lobes.draw(lobe, up, directions);
+            let off_slices = &list[..count];
+            self.nodes.draw(lobe, &self.arrivals, rays.len(), off_slices);
+            leave(self, rays.len(), if up { 1.0 } else { -1.0 });
+            for k in off_slices.iter().copied() {
+                if self.direction[2][k] == 0.0 {
+                    self.leave_after_all(lobe, up, k);
                 }
-                lobes.push(arrivals, *k, first, numbers[1]);
             }
-            for k in &off_floors[..evens] {
-                if floors.count == TOGETHER {
-                    floors.draw(up, directions);
-                }
-                floors.push(arrivals, *k, first, numbers[1]);
+            for (list, found) in directions.iter_mut().zip(&self.direction) {
+                found.give(&mut list[rays.clone()]);
             }
         }
-        self.lobes.draw(lobe, up, directions);
-        self.floors.draw(up, directions);
-    }
-}
-
-impl OffFloors {
-    /// One ray more.
-    #[inline]
-    fn push(&mut self, arrivals: &Arrivals, k: usize, first: usize, numbers: &[f64]) {
-        let at = self.count;
-        (self.ray[at], self.rest[at], self.number[at]) = (first + k, arrivals.rest[k], numbers[first + k]);
-        self.count += 1;
     }
 
-    /// Draws for all of them.
-    fn draw(&mut self, up: bool, directions: &mut [&mut [f64]; 3]) {
-        let n = std::mem::take(&mut self.count);
-        off_floors(self, if up { 1.0 } else { -1.0 });
-        for (list, found) in directions.iter_mut().zip(&self.direction) {
-            for (ray, found) in self.ray.iter().zip(found).take(n) {
-                list[*ray] = *found;
-            }
+    /// A direction for one whose place lies outside the unit circle.
+    fn leave_after_all(&mut self, lobe: &Lobe, up: bool, k: usize) {
+        let arrivals = &self.arrivals;
+        let [x, y] = arrivals.incident.each_ref().map(|lanes| lanes[k]);
+        let (incident, numbers) = (Vec3::new(x, y, 0.0), [arrivals.rest[k], arrivals.other[k]]);
+        let grid = lobe.slice(arrivals.slice[k] as usize);
+        let found = again(&Incidence::new(incident), incident, grid, numbers, up);
+        for (lanes, component) in self.direction.iter_mut().zip([found.x, found.y, found.z]) {
+            lanes[k] = component;
         }
     }
 }
 
-/// Directions off floors, as [`by_cosine`] says.
+/// A direction where a first place was outside the unit circle.
+pub(super) fn again(incidence: &Incidence, incident: Vec3, grid: &Grid, numbers: [f64; 2], up: bool) -> Vec3 {
+    let mut more = MoreNumbers::new(numbers);
+    let found = (1..TRIES).find_map(|_| incidence.direction(incident, grid.draw(more.pair()), up));
+    found.unwrap_or_else(|| by_cosine(up, numbers))
+}
+
+/// Directions off floors, as [`by_cosine`] says, and off slices, at the places that were drawn; the height of those outside the
+/// unit circle is 0.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn off_floors(floors: &mut OffFloors, sign: f64) {
-    let OffFloors {
-        rest,
-        number,
-        direction: [to_x, to_y, to_z],
-        ..
-    } = floors;
-    for k in 0..TOGETHER {
-        let cosine = (1.0 - rest[k]).sqrt();
-        let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
-        let (s, c) = sin_cos_turns(number[k]);
-        (to_x[k], to_y[k], to_z[k]) = (sine * c, sine * s, sign * cosine);
+fn leave(group: &mut Group, count: usize, sign: f64) {
+    let Group {
+        arrivals,
+        nodes,
+        direction,
+    } = group;
+    for b in blocks(count) {
+        let [x, y] = arrivals.incident.each_ref().map(|lanes| &lanes.0[b]);
+        let [c, s] = arrivals.forward.each_ref().map(|lanes| &lanes.0[b]);
+        let (kind, rest, number) = (&arrivals.kind.0[b], &arrivals.rest.0[b], &arrivals.other.0[b]);
+        let (azimuth, azimuths) = (&nodes.azimuth.0[b], &nodes.azimuths.0[b]);
+        let (top, far, left) = (&nodes.top.0[b], &nodes.far.0[b], &nodes.left.0[b]);
+        let (limit, bent) = (&nodes.limit.0[b], &nodes.bent.0[b]);
+        let mut to = [[0.0; LANES]; 3];
+        for k in 0..LANES {
+            let is_even = kind[k] == OFF_FLOOR;
+            // Azimuths with a density that falls linearly from the node towards the next ones.
+            let low = number[k] < 0.5;
+            let root = if low { 2.0 * number[k] } else { 2.0 - 2.0 * number[k] }.sqrt();
+            let aside = if low { root - 1.0 } else { 1.0 - root };
+            let turn = (azimuth[k] + aside) / azimuths[k];
+            let turn = if turn < 0.0 { turn + 1.0 } else { turn };
+            let straight = part_of(left[k], limit[k]).sqrt();
+            let along = if left[k] < limit[k] { straight } else { bent[k] };
+            let r = far[k] + along * (top[k] - far[k]);
+            let cosine = (1.0 - rest[k]).sqrt();
+            let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
+            let (sin, cos) = sin_cos_turns(if is_even { number[k] } else { turn });
+            let r = if is_even { sine } else { r };
+            let (ahead, across) = (r * cos, r * sin);
+            let px = c[k] * ahead - s[k] * across - x[k];
+            let py = s[k] * ahead + c[k] * across - y[k];
+            let square = 1.0 - px * px - py * py;
+            let height = if square > 0.0 { square } else { 0.0 }.sqrt();
+            to[0][k] = if is_even { ahead } else { px };
+            to[1][k] = if is_even { across } else { py };
+            to[2][k] = sign * if is_even { cosine } else { height };
+        }
+        for (lanes, to) in direction.iter_mut().zip(to) {
+            lanes.0[b] = to;
+        }
     }
 }

@@ -34,8 +34,8 @@ pub(super) struct Grid {
     azimuths: usize,
     /// f, azimuth by azimuth, at each radial coordinate.
     f: Vec<f64>,
-    /// How many radial coordinates, azimuths and places in the table of nodes there are.
-    size: [f64; 3],
+    /// How many radial coordinates and azimuths there are.
+    size: [f64; 2],
     /// Of `f`, by what each value contributes to the integral over the plane; None if that is 0.
     nodes: Option<Alias>,
     /// For each radial coordinate.
@@ -69,6 +69,8 @@ pub(super) struct Hat {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slope {
     pub far: f64,
+    /// Its part of the hat.
+    pub share: f64,
     /// The part of it that goes with s; the rest goes with s² towards 0, and with s (1 − s) away from it.
     pub linear: f64,
 }
@@ -111,9 +113,7 @@ impl Slice {
         if self.azimuths != other.azimuths || self.radial.is_empty() || other.radial.is_empty() {
             return Vec::new();
         }
-        let mut radial = [&self.radial[..], &other.radial[..]].concat();
-        radial.sort_by(f64::total_cmp);
-        radial.dedup();
+        let radial = finer(&self.radial, &other.radial);
         let [a, b] = [self, other].map(|slice| slice.on(&radial));
         let largest = a.iter().chain(&b).copied().fold(0.0, f64::max);
         let [little, nothing] = [LITTLE, NOTHING].map(|part| (part * largest).max(f64::MIN_POSITIVE));
@@ -203,11 +203,7 @@ impl Slice {
         };
         let weights: Vec<f64> = (0..f.len()).map(weight).collect();
         let nodes = Alias::new(&weights);
-        let size = [
-            all.len(),
-            *azimuths,
-            nodes.as_ref().map_or(1, |nodes| nodes.slots().len()),
-        ];
+        let size = [all.len(), *azimuths];
         let lowest = all.get(1).map_or(0, |r| leading(*r));
         let first_above = |bits: u64| all.partition_point(|r| *r < f64::from_bits(bits << SHIFT));
         Ok(Grid {
@@ -224,6 +220,26 @@ impl Slice {
             radial: all,
         })
     }
+}
+
+/// Of two lists of radial coordinates that rise from 0 the finer one at each place, and the ends of both. All of both would be
+/// twice as many, and nothing in either needs them.
+fn finer(one: &[f64], other: &[f64]) -> Vec<f64> {
+    /// By how much finer the other list has to be where both are alike.
+    const CLEARLY: f64 = 1.05;
+    // From the last coordinate that is not above a place to the next.
+    let step = |radial: &[f64], r: f64| {
+        let above = radial.partition_point(|x| *x <= r).max(1);
+        radial.get(above).map_or(f64::INFINITY, |next| next - radial[above - 1])
+    };
+    let is_finer = |r: f64| CLEARLY * step(other, r) < step(one, r);
+    let ends = [one, other].map(|radial| radial[radial.len() - 1]);
+    let of_one = one.iter().filter(|r| ends.contains(r) || !is_finer(**r));
+    let of_other = other.iter().filter(|r| ends.contains(r) || is_finer(**r));
+    let mut radial: Vec<f64> = of_one.chain(of_other).copied().collect();
+    radial.sort_by(f64::total_cmp);
+    radial.dedup();
+    radial
 }
 
 /// Whether the hats of a node, an azimuth and a radial coordinate, reach into the unit circle about −β₀ for any |β₀| of a range.
@@ -255,39 +271,73 @@ impl Hat {
             let straight = 0.5 * far.min(node);
             let bent = if far < node { step / 3.0 } else { step / 6.0 };
             let linear = if bent > 0.0 { straight / (straight + bent) } else { 1.0 };
-            (step * (straight + bent), Slope { far, linear })
+            (step * (straight + bent), far, linear)
         };
         let below = i.checked_sub(1).map(|below| &radial[below]);
-        let [(towards, inside), (away, outside)] = [below, radial.get(i + 1)].map(side);
-        let whole = towards + away;
-        let inner = if whole > 0.0 { towards / whole } else { 0.0 };
-        let slopes = [inside, outside];
+        let [inside, outside] = [below, radial.get(i + 1)].map(side);
+        let whole = inside.0 + outside.0;
+        let inner = if whole > 0.0 { inside.0 / whole } else { 0.0 };
+        let slope = |(_, far, linear), share| Slope { far, share, linear };
+        let slopes = [slope(inside, inner), slope(outside, 1.0 - inner)];
         (Self { node, inner, slopes }, whole)
+    }
+
+    /// The side that a number decides for.
+    #[inline(always)]
+    pub(super) fn side(&self, number: f64) -> Side<'_> {
+        let outwards = u8::from(number >= self.inner);
+        Side {
+            slope: &self.slopes[usize::from(outwards)],
+            // Without a branch, which nobody can foresee.
+            left: number - f64::from(outwards) * self.inner,
+            inwards: outwards == 0,
+        }
     }
 
     /// A radial coordinate with its density, from two numbers of which the second is not used up.
     #[inline]
     fn draw(&self, number: f64, other: f64) -> f64 {
-        let inwards = number < self.inner;
-        let slope = &self.slopes[usize::from(!inwards)];
-        let (left, share) = if inwards {
-            (number, self.inner)
+        let side = self.side(number);
+        let s = if side.is_bent() {
+            side.bent(other)
         } else {
-            (number - self.inner, 1.0 - self.inner)
+            part_of(side.left, side.limit()).sqrt()
         };
-        let s = if left < share * slope.linear {
-            part_of(left, share * slope.linear).sqrt()
-        } else {
-            bent([left / share, slope.linear], other, inwards)
-        };
-        slope.far + s * (self.node - slope.far)
+        side.slope.far + s * (self.node - side.slope.far)
+    }
+}
+
+/// A side of a hat, and what is left of the number that decided for it: less than its share.
+pub(super) struct Side<'a> {
+    pub slope: &'a Slope,
+    pub left: f64,
+    inwards: bool,
+}
+
+impl Side<'_> {
+    /// What is left where the part that goes with s ends.
+    #[inline(always)]
+    pub(super) fn limit(&self) -> f64 {
+        self.slope.share * self.slope.linear
+    }
+
+    /// Whether it is in the other part.
+    #[inline(always)]
+    pub(super) fn is_bent(&self) -> bool {
+        self.left >= self.limit()
+    }
+
+    /// The place s along the slope in that part.
+    #[inline]
+    pub(super) fn bent(&self, other: f64) -> f64 {
+        bent([self.left / self.slope.share, self.slope.linear], other, self.inwards)
     }
 }
 
 /// A place along a slope in the part that does not go with s, from what is left of a number and where that part begins, and from
 /// another number.
 #[inline]
-pub(super) fn bent([rest, linear]: [f64; 2], other: f64, inwards: bool) -> f64 {
+fn bent([rest, linear]: [f64; 2], other: f64, inwards: bool) -> f64 {
     // The largest of three numbers has the density 3 s², the middle one 6 s (1 − s).
     let first = part_of(rest - linear, 1.0 - linear);
     let [second, third] = MoreNumbers::new([rest, other]).pair();
@@ -379,21 +429,23 @@ impl Grid {
         })
     }
 
-    /// The table of nodes; without any, the first one takes all.
+    /// A place in the table of nodes, that and how far into it a number falls, and what it holds.
     #[inline]
-    pub(super) fn slots(&self) -> &[Slot] {
-        self.nodes.as_ref().map_or(
-            &[Slot {
-                own: u32::MAX,
-                alias: 0,
-            }],
-            Alias::slots,
-        )
+    pub(super) fn slot(&self, number: f64) -> (u32, f64, Slot) {
+        // Without any, the first node takes all.
+        const FIRST: Slot = Slot {
+            own: u32::MAX,
+            alias: 0,
+        };
+        self.nodes.as_ref().map_or((0, number, FIRST), |nodes| {
+            let (slot, scaled) = nodes.place(number);
+            (slot, scaled, nodes.slots()[slot as usize])
+        })
     }
 
-    /// How many radial coordinates, azimuths and places in the table of nodes there are.
+    /// How many radial coordinates and azimuths there are.
     #[inline]
-    pub(super) const fn size(&self) -> [f64; 3] {
+    pub(super) const fn size(&self) -> [f64; 2] {
         self.size
     }
 

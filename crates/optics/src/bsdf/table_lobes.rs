@@ -43,8 +43,16 @@ pub(super) struct Lobe {
     sines: Vec<f64>,
     guide: Guide,
     blends: Vec<Blend>,
-    /// From each sine to the next.
-    steps: Vec<Step>,
+    steps: Steps,
+}
+
+/// Shares alone, which need fewer steps than what f is multiplied by: few enough for the nearest cache.
+#[derive(Clone, Debug, Default)]
+struct Steps {
+    /// Rising sines of incidence from which on the steps hold.
+    from: Vec<f64>,
+    guide: Guide,
+    list: Vec<Step>,
 }
 
 /// Shares between two sines of incidence, in one line of a cache.
@@ -60,8 +68,29 @@ pub(super) struct Step {
 }
 
 impl Step {
+    /// Between two of some sines.
+    fn new([start, end]: [usize; 2], sines: &[f64], blends: &[Blend]) -> Self {
+        let width = sines[end] - sines[start];
+        let slope = |k: usize| (blends[end].shares[k] - blends[start].shares[k]) / width;
+        Self {
+            from: sines[start],
+            shares: blends[start].shares,
+            slopes: std::array::from_fn(|k| if width > 0.0 { slope(k) } else { 0.0 }),
+            first: u32::try_from(blends[start].first).unwrap_or(u32::MAX),
+        }
+    }
+
+    /// Whether all between two sines have its slices and, for all that anybody can see, its shares.
+    fn holds(&self, [start, end]: [usize; 2], sines: &[f64], blends: &[Blend]) -> bool {
+        (start + 1..=end).all(|i| {
+            let near = |(a, b): (&f64, f64)| (a - b).abs() <= TOLERANCE;
+            let mut shares = blends[i].shares.iter().zip(self.shares(sines[i]));
+            blends[i].first == blends[start].first && sines[i] > sines[start] && shares.all(near)
+        })
+    }
+
     #[inline]
-    fn shares(&self, sine: f64) -> [f64; 3] {
+    pub(super) fn shares(&self, sine: f64) -> [f64; 3] {
         let beyond = sine - self.from;
         std::array::from_fn(|k| self.shares[k] + beyond * self.slopes[k])
     }
@@ -131,7 +160,7 @@ impl Row {
             sines: Vec::new(),
             guide: Guide::default(),
             blends: Vec::new(),
-            steps: Vec::new(),
+            steps: Steps::default(),
         };
         lobe.fill(&of(|slice| slice.share), &of(|slice| slice.floor));
         Ok(lobe)
@@ -197,24 +226,8 @@ impl Lobe {
                 }
             }
         }
-        self.tabulate();
-    }
-
-    /// Shares from each sine to the next.
-    fn tabulate(&mut self) {
-        let pairs = self.sines.windows(2).zip(self.blends.windows(2));
-        let step = |(sines, blends): (&[f64], &[Blend])| {
-            let width = sines[1] - sines[0];
-            let slope = |k: usize| (blends[1].shares[k] - blends[0].shares[k]) / width;
-            Step {
-                from: sines[0],
-                shares: blends[0].shares,
-                slopes: std::array::from_fn(|k| if width > 0.0 { slope(k) } else { 0.0 }),
-                first: u32::try_from(blends[0].first).unwrap_or(u32::MAX),
-            }
-        };
-        self.steps = pairs.map(step).collect();
         self.guide = Guide::new(&self.sines[..self.sines.len() - 1]);
+        self.steps = Steps::new(&self.sines, &self.blends);
     }
 
     /// The place in the list after the last sine, but for the very last, that is not above this one.
@@ -227,7 +240,7 @@ impl Lobe {
     /// The step from the last sine that is not above this one.
     #[inline]
     pub(super) fn step(&self, sine: f64) -> &Step {
-        &self.steps[self.above(sine) - 1]
+        self.steps.at(sine)
     }
 
     /// The first of two slices, and the shares of both and of the floor.
@@ -288,6 +301,40 @@ impl Lobe {
     }
 }
 
+impl Steps {
+    /// Of blends at rising sines, as far as each step goes without its shares being off.
+    fn new(sines: &[f64], blends: &[Blend]) -> Self {
+        let mut steps = Vec::new();
+        let mut start = 0;
+        while start + 1 < sines.len() {
+            let mut end = start + 1;
+            while end + 1 < sines.len()
+                && Step::new([start, end + 1], sines, blends).holds([start, end + 1], sines, blends)
+            {
+                end += 1;
+            }
+            // Where two slices meet, a sine stands there twice.
+            if sines[end] > sines[start] {
+                steps.push(Step::new([start, end], sines, blends));
+            }
+            start = end;
+        }
+        let from: Vec<f64> = steps.iter().map(|step| step.from).collect();
+        Self {
+            guide: Guide::new(&from),
+            from,
+            list: steps,
+        }
+    }
+
+    /// The step from the last sine that is not above this one.
+    #[inline]
+    fn at(&self, sine: f64) -> &Step {
+        let above = self.guide.not_above(&self.from, sine, |from| *from);
+        &self.list[above.max(1) - 1]
+    }
+}
+
 impl Blend {
     fn towards(&self, other: &Self, part: f64) -> Self {
         let mean = |a: f64, b: f64| a + part * (b - a);
@@ -320,7 +367,7 @@ impl Lobes {
         let mut rows = self.rows.clone();
         for row in &mut rows {
             row.blends.iter_mut().for_each(|blend| blend.shares[2] = 0.0);
-            row.tabulate();
+            row.steps = Steps::new(&row.sines, &row.blends);
         }
         let left = rows.iter().flat_map(|row| &row.blends).any(|blend| blend.share() > 0.0);
         left.then_some(Self { rows })

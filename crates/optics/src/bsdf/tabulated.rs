@@ -20,10 +20,9 @@ use etendue_math::Vec3;
 use etendue_sampling::warp::part_of;
 
 use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares, by_cosine};
-use super::table_draw::Group;
+use super::table_draw::{Group, again};
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lit, Lobe, Lobes, Way};
-use super::table_slices::again;
 
 /// Tables of light that meets one side: reflected and transmitted, by wavelength \[nm\].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -234,7 +233,7 @@ impl Bsdf for Tabulated {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;
         let diffuse = match self.lone(front) {
-            Some((way, lobe)) => on_its_way(way, lobe.shares(incidence.sine).1.iter().sum()),
+            Some((way, lobe)) => on_its_way(way, lobe.blend(incidence.sine).share()),
             None => [false, true].map(|way| share(&self.lit(&incidence, front, way, media.wavelength))),
         };
         Shares {

@@ -4,12 +4,13 @@ use etendue_geometry::RayBatch;
 use etendue_geometry::hits::Hits;
 use etendue_geometry::origin_faces::NONE;
 use etendue_geometry::ray_batch::BLOCK;
+use etendue_geometry::surface_points::fill;
 use etendue_math::Vec3;
-use etendue_optics::bsdf::Media;
 use etendue_sampling::ordered::BATCH;
 use etendue_sampling::philox::{Pairs, fill_pairs};
 
 use super::block_trace::BlockTrace;
+use super::ending::Ending;
 use super::interfaces::{Crossed, InterfaceRays};
 use super::lambertian_sheet::{LambertianSheet, SheetRays};
 use super::queue::RayQueue;
@@ -46,8 +47,9 @@ struct BatchTrace<'a> {
     /// Rays whose random numbers are wanted, and the numbers.
     addresses: Vec<u64>,
     numbers: [Vec<f64>; 2],
-    /// Those of the rays that meet a face which are not absorbed.
-    going: Vec<u32>,
+    /// Those of the rays that meet a face whose medium is known.
+    known: Vec<u32>,
+    ending: Ending,
     sheet_rays: SheetRays,
     scattered_rays: ScatteredRays,
     interface_rays: InterfaceRays,
@@ -98,6 +100,7 @@ impl<'a> BatchTrace<'a> {
                 run,
                 media: MediumCache::new(scene),
                 states: Vec::with_capacity(BLOCK),
+                wavelength: None,
                 trails: None,
                 far: 0.0,
                 out: BatchSums::new(scene, detectors, run.rays.div_ceil(BATCH)),
@@ -111,7 +114,8 @@ impl<'a> BatchTrace<'a> {
             sorter: Sorter::new(scene, sheets(scene, wants), &scene.interfaces()),
             addresses: Vec::new(),
             numbers: Default::default(),
-            going: Vec::new(),
+            known: Vec::new(),
+            ending: Ending::default(),
             sheet_rays: SheetRays::default(),
             scattered_rays: ScatteredRays::default(),
             interface_rays: InterfaceRays::default(),
@@ -197,6 +201,9 @@ impl<'a> BatchTrace<'a> {
                 depth: if keeps { depth(run.seed, ray) } else { 0 },
             }
         }));
+        let states = &self.block.states;
+        let first = states.first().map(|state| state.wavelength);
+        self.block.wavelength = first.filter(|first| states.iter().all(|state| state.wavelength == *first));
         self.now.clear();
         if near.is_empty() && self.block.trails.is_none() && (0..n).all(|i| emitted.usable(i)) {
             let [o, d] = [&emitted.position, &emitted.direction].map(|lists| lists.each_ref().map(|list| &list[..n]));
@@ -281,23 +288,14 @@ impl<'a> BatchTrace<'a> {
 
     /// Rays that meet one face go on together, or are absorbed.
     fn bounce(&mut self, sheet: LambertianSheet, which: &[u32], now: &RayQueue, hits: &Hits, next: &mut RayQueue) {
-        let [numbers, turns] = &mut self.numbers;
-        self.going.resize(which.len(), 0);
-        self.fluxes.clear();
-        let mut going = 0;
-        for (k, i) in which.iter().enumerate() {
-            let ends = sheet.absorbs(numbers[k]);
-            if ends {
-                self.fluxes.push(self.block.states[now.who[*i as usize] as usize].flux);
-            }
-            // No later than where it is: the numbers move up.
-            (numbers[going], turns[going]) = (numbers[k], turns[k]);
-            self.going[going] = *i;
-            going += usize::from(!ends);
-        }
-        self.going.truncate(going);
+        let (going, gone) = self
+            .ending
+            .split(which, &mut self.numbers, |number| sheet.absorbs(number));
+        let states = &self.block.states;
+        let flux = |i: &u32| states[now.who[*i as usize] as usize].flux;
+        fill(&mut self.fluxes, gone.iter().map(flux));
         self.block.out.ledger.on_face[sheet.face as usize].add_all(&self.fluxes);
-        self.sheet_rays.gather(now, hits, &self.going);
+        self.sheet_rays.gather(now, hits, going);
         let face = &self.block.scene.face_set.faces()[sheet.face as usize];
         self.sheet_rays.bounce(face, sheet, &self.numbers);
         self.sheet_rays.go_on(sheet.face, next);
@@ -335,55 +333,47 @@ impl<'a> BatchTrace<'a> {
             wants,
             media,
             states,
+            wavelength,
             out,
             ..
         } = &mut self.block;
         let (rays, scattered, absorbed) = (&mut self.sheet_rays, &mut self.scattered_rays, &mut self.fluxes);
-        let [numbers, turns] = &mut self.numbers;
-        scattered.media.clear();
-        let mut around = Media {
-            wavelength: f64::NAN,
-            front: f64::NAN,
-            back: f64::NAN,
-        };
-        scattered.media.resize(which.len(), around);
-        self.going.resize(which.len(), 0);
-        absorbed.resize(which.len(), 0.0);
-        // Those that go on and those that are absorbed, without branches, which nobody can foresee.
-        let (mut going, mut gone) = (0, 0);
-        for (k, i) in which.iter().enumerate() {
-            let state = &states[now.who[*i as usize] as usize];
-            if around.wavelength != state.wavelength {
-                let n = media.at(scene, 0, state.wavelength).n;
-                around = Media {
-                    wavelength: state.wavelength,
-                    front: n,
-                    back: n,
-                };
+        let all_known = wavelength.is_some_and(|all| media.around(scene, all).is_some());
+        if !all_known {
+            self.known.clear();
+            for (k, i) in which.iter().enumerate() {
+                let state = &states[now.who[*i as usize] as usize];
+                if media.around(scene, state.wavelength).is_none() {
+                    out.ledger.book(Fate::Lost(Loss::NoIndex, sheet.face), state.flux);
+                    continue;
+                }
+                for list in &mut self.numbers {
+                    list[self.known.len()] = list[k];
+                }
+                self.known.push(*i);
             }
-            // Not so if it is NaN, either.
-            let known = around.front > 0.0;
-            if !known {
-                out.ledger.book(Fate::Lost(Loss::NoIndex, sheet.face), state.flux);
-                continue;
-            }
-            // Before it is known where and under which angle, unless somebody asks for that.
-            let ends = !wants.exitance & sheet.absorbs(numbers[k]);
-            // No later than where it is: the numbers move up.
-            (numbers[going], turns[going]) = (numbers[k], turns[k]);
-            self.going[going] = *i;
-            scattered.media[going] = around;
-            absorbed[gone] = state.flux;
-            going += usize::from(!ends);
-            gone += usize::from(ends);
         }
-        self.going.truncate(going);
-        scattered.media.truncate(going);
-        absorbed.truncate(gone);
-        rays.gather(now, hits, &self.going);
+        let known = if all_known { which } else { &self.known };
+        // Before it is known where and under which angle, unless somebody asks for that.
+        let early = !wants.exitance;
+        let (going, gone) = self
+            .ending
+            .split(known, &mut self.numbers, |number| early & sheet.absorbs(number));
+        fill(
+            absorbed,
+            gone.iter().map(|i| states[now.who[*i as usize] as usize].flux),
+        );
+        scattered.media.clear();
+        match wavelength.and_then(|all| media.around(scene, all)) {
+            Some(all) => scattered.media.resize(going.len(), all),
+            None => scattered.media.extend(going.iter().filter_map(|i| {
+                let state = &states[now.who[*i as usize] as usize];
+                media.around(scene, state.wavelength)
+            })),
+        }
+        rays.gather(now, hits, going);
         rays.reach(&scene.face_set.faces()[sheet.face as usize]);
-        let all = 0..self.going.len();
-        for k in all.filter(|_| wants.exitance) {
+        for k in (0..going.len()).filter(|_| wants.exitance) {
             let ray = rays.get(k);
             let place = FacePoint {
                 face: sheet.face,
@@ -398,7 +388,8 @@ impl<'a> BatchTrace<'a> {
             }
             state.scattered = true;
         }
-        scattered.sample(&sheet, rays, [numbers, turns]);
+        let n = going.len();
+        scattered.sample(&sheet, rays, self.numbers.each_ref().map(|list| &list[..n]));
         scattered.turn(&sheet, rays, |who| absorbed.push(states[who as usize].flux));
         out.ledger.on_face[sheet.face as usize].add_all(absorbed);
         rays.go_on(sheet.face, next);

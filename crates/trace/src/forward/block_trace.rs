@@ -20,6 +20,8 @@ pub struct BlockTrace<'a> {
     pub media: MediumCache,
     /// What each ray of the block carries.
     pub states: Vec<RayState>,
+    /// The wavelength of all of them, where it is the same \[nm\].
+    pub wavelength: Option<f64>,
     /// Where each ray has been, if that is wanted.
     pub trails: Option<Vec<Vec<Vec3>>>,
     /// How far a ray that escapes is followed on its trail \[mm\].

@@ -10,7 +10,7 @@ use etendue_optics::fresnel::reflect;
 use multiversion::multiversion;
 
 use super::lambertian_sheet::SheetRays;
-use crate::scatter::{Surface, along, axes, axes_along, local};
+use crate::scatter::{Surface, along, axes, axes_along, axes_from, local};
 
 /// A sheet that mirrors and scatters light back, or absorbs it.
 #[derive(Clone, Copy, Debug)]
@@ -63,6 +63,8 @@ pub struct ScatteredRays {
     pub media: Vec<Media>,
     /// To where each comes from, and where it goes, in the frame of the surface.
     towards: Vectors,
+    /// Its first axis there, if one is stated.
+    first_axes: Vectors,
     outcomes: Vec<Outcome>,
     /// Those that are absorbed.
     gone: Vec<usize>,
@@ -72,12 +74,18 @@ impl ScatteredRays {
     /// Draws what becomes of rays that have reached the sheet, and whose media are known, from two random numbers for each.
     pub fn sample(&mut self, sheet: &ScatteringSheet<'_>, rays: &SheetRays, numbers: [&[f64]; 2]) {
         let n = rays.normals()[0].len();
-        for list in &mut self.towards {
+        for list in self.towards.iter_mut().chain(&mut self.first_axes) {
             list.resize(n, 0.0);
         }
         match sheet.axis {
             None => outward(rays.normals(), rays.directions(), &mut self.towards),
-            Some(axis) => outward_along(axis, rays.normals(), rays.directions(), &mut self.towards),
+            Some(axis) => outward_along(
+                axis,
+                rays.normals(),
+                rays.directions(),
+                &mut self.towards,
+                &mut self.first_axes,
+            ),
         }
         self.outcomes.resize(n, Outcome::Absorbed);
         sheet
@@ -89,7 +97,7 @@ impl ScatteredRays {
     pub fn turn(&mut self, sheet: &ScatteringSheet<'_>, rays: &mut SheetRays, mut absorbed: impl FnMut(u32)) {
         match sheet.axis {
             None => in_space(rays.normals(), &mut self.towards),
-            Some(axis) => in_space_along(axis, rays.normals(), &mut self.towards),
+            Some(_) => in_space_along(rays.normals(), &self.first_axes, &mut self.towards),
         }
         let Self {
             towards,
@@ -129,7 +137,7 @@ fn goes_on(outcome: Outcome) -> bool {
 
 /// Changes each of many vectors, told the normal there.
 #[inline(always)]
-fn each(normals: &Vectors, vectors: &mut Vectors, change: impl Fn(usize, Vec3, Vec3) -> Vec3) {
+fn each(normals: &Vectors, vectors: &mut Vectors, mut change: impl FnMut(usize, Vec3, Vec3) -> Vec3) {
     let [x, y, z] = vectors.each_mut();
     let n = x.len();
     let [x, y, z] = [x, y, z].map(|list| &mut list[..n]);
@@ -150,13 +158,16 @@ fn outward(normals: &Vectors, directions: &Vectors, towards: &mut Vectors) {
     });
 }
 
-/// The same where the first axis follows a direction.
+/// The same where the first axis follows a direction, which tells what it is at each.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn outward_along(axis: Vec3, normals: &Vectors, directions: &Vectors, towards: &mut Vectors) {
+fn outward_along(axis: Vec3, normals: &Vectors, directions: &Vectors, towards: &mut Vectors, firsts: &mut Vectors) {
     let n = towards[0].len();
     let [dx, dy, dz] = directions.each_ref().map(|list| &list[..n]);
+    let [fx, fy, fz] = firsts.each_mut().map(|list| &mut list[..n]);
     each(normals, towards, |k, normal, _| {
-        local(&axes_along(normal, axis), -Vec3::new(dx[k], dy[k], dz[k]))
+        let axes = axes_along(normal, axis);
+        (fx[k], fy[k], fz[k]) = (axes[0].x, axes[0].y, axes[0].z);
+        local(&axes, -Vec3::new(dx[k], dy[k], dz[k]))
     });
 }
 
@@ -166,10 +177,14 @@ fn in_space(normals: &Vectors, vectors: &mut Vectors) {
     each(normals, vectors, |_, normal, v| along(&axes(normal), v));
 }
 
-/// The same where the first axis follows a direction.
+/// The same where the first axes are known.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn in_space_along(axis: Vec3, normals: &Vectors, vectors: &mut Vectors) {
-    each(normals, vectors, |_, normal, v| along(&axes_along(normal, axis), v));
+fn in_space_along(normals: &Vectors, firsts: &Vectors, vectors: &mut Vectors) {
+    let n = vectors[0].len();
+    let [fx, fy, fz] = firsts.each_ref().map(|list| &list[..n]);
+    each(normals, vectors, |k, normal, v| {
+        along(&axes_from(normal, Vec3::new(fx[k], fy[k], fz[k])), v)
+    });
 }
 
 #[cfg(test)]

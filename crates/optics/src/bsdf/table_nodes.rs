@@ -1,0 +1,119 @@
+//! Rays that slices of a table scatter, many at once: the nodes of their grids, and where about them.
+
+use etendue_sampling::alias::UNIT;
+use etendue_sampling::warp::part_of;
+use multiversion::multiversion;
+
+use super::table_arrivals::Arrivals;
+use super::table_lanes::{LANES, Lanes, TOGETHER, blocks};
+use super::table_lobes::Lobe;
+
+/// What slices draw for some rays. Those of the others mean nothing.
+pub(super) struct Nodes {
+    /// Of the slice how many radial coordinates and azimuths there are.
+    radii: Lanes<f64>,
+    pub azimuths: Lanes<f64>,
+    /// Of its alias table: a place, that and how far into it, and what it holds.
+    slot: Lanes<u32>,
+    scaled: Lanes<f64>,
+    chance: Lanes<u32>,
+    alias: Lanes<u32>,
+    /// The node: its azimuth and radial coordinate, and what is left of the number.
+    pub azimuth: Lanes<f64>,
+    radius: Lanes<u32>,
+    part: Lanes<f64>,
+    /// Of its hat the top and the far end of the side that is drawn from, what is left of the number, and where on that side
+    /// it begins to be bent.
+    pub top: Lanes<f64>,
+    pub far: Lanes<f64>,
+    pub left: Lanes<f64>,
+    pub limit: Lanes<f64>,
+    /// From the far end to the top, of those that are bent.
+    pub bent: Lanes<f64>,
+}
+
+impl Nodes {
+    pub const fn new() -> Self {
+        const ZERO: Lanes<f64> = Lanes::of(0.0);
+        Self {
+            radii: ZERO,
+            azimuths: ZERO,
+            slot: Lanes::of(0),
+            scaled: ZERO,
+            chance: Lanes::of(0),
+            alias: Lanes::of(0),
+            azimuth: ZERO,
+            radius: Lanes::of(0),
+            part: ZERO,
+            top: ZERO,
+            far: ZERO,
+            left: ZERO,
+            limit: ZERO,
+            bent: ZERO,
+        }
+    }
+
+    /// Draws for some of the first `n` rays.
+    pub fn draw(&mut self, lobe: &Lobe, arrivals: &Arrivals, n: usize, which: &[usize]) {
+        for k in which.iter().copied() {
+            let grid = lobe.slice(arrivals.slice[k] as usize);
+            let (place, scaled, slot) = grid.slot(arrivals.rest[k]);
+            [self.radii[k], self.azimuths[k]] = grid.size();
+            (self.slot[k], self.scaled[k]) = (place, scaled);
+            (self.chance[k], self.alias[k]) = (slot.own, slot.alias);
+        }
+        nodes(self, n);
+        let (mut list, mut count) = ([0; TOGETHER], 0);
+        for k in which.iter().copied() {
+            let hat = lobe.slice(arrivals.slice[k] as usize).hat(self.radius[k] as usize);
+            let side = hat.side(self.part[k]);
+            (self.top[k], self.far[k]) = (hat.node, side.slope.far);
+            (self.left[k], self.limit[k]) = (side.left, side.limit());
+            list[count] = k;
+            count += usize::from(side.is_bent());
+        }
+        for k in list.into_iter().take(count) {
+            let hat = lobe.slice(arrivals.slice[k] as usize).hat(self.radius[k] as usize);
+            self.bent[k] = hat.side(self.part[k]).bent(arrivals.other[k]);
+        }
+    }
+}
+
+/// Nodes of the slices.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "fewer than 2^16 radial coordinates"
+)]
+fn nodes(all: &mut Nodes, count: usize) {
+    for b in blocks(count) {
+        let (radii, slot, scaled) = (&all.radii.0[b], &all.slot.0[b], &all.scaled.0[b]);
+        let (chance, alias) = (&all.chance.0[b], &all.alias.0[b]);
+        let (mut azimuth, mut radius, mut part) = ([0.0; LANES], [0; LANES], [0.0; LANES]);
+        for k in 0..LANES {
+            let within = scaled[k] - f64::from(slot[k]);
+            let chance = f64::from(chance[k]) * UNIT;
+            let own = within < chance;
+            let (left, share) = if own {
+                (within, chance)
+            } else {
+                (within - chance, 1.0 - chance)
+            };
+            part[k] = part_of(left, share);
+            let node = f64::from(if own { slot[k] } else { alias[k] });
+            // A division of whole numbers: the nearest one to what lies half a step from its next.
+            azimuth[k] = whole((node + 0.5) / radii[k] - 0.5);
+            radius[k] = (node - azimuth[k] * radii[k]) as i32 as u32;
+        }
+        (all.azimuth.0[b], all.radius.0[b], all.part.0[b]) = (azimuth, radius, part);
+    }
+}
+
+/// The nearest whole number, of a small one.
+#[inline(always)]
+fn whole(x: f64) -> f64 {
+    // As an addition rounds; `round` is a call where the instruction set has no such thing.
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    (x + WHOLE) - WHOLE
+}
