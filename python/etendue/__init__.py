@@ -12,7 +12,7 @@ import importlib.util
 from typing import Any
 
 from etendue.quantities.notebook import InNotebook, Pages
-from etendue.quantities.pixel_map import MapOutlets, PixelMap
+from etendue.quantities.outlets import GoesOut, MapOutlets
 
 PUBLIC = {
     "etendue.errors": (
@@ -148,5 +148,5 @@ def _later(module: str, name: str) -> Any:
 
 
 # Maps are quantities, which cannot import the files and pictures above them; values in notebooks neither.
-PixelMap.outlets = MapOutlets(save=_later("etendue.formats.maps", "save_map"), plot=_later("etendue.plot", "plot_map"))
+GoesOut.outlets = MapOutlets(save=_later("etendue.formats.maps", "save_map"), plot=_later("etendue.plot", "plot_map"))
 InNotebook.pages = Pages(of=_later("etendue.plot.notebook", "notebook_page"))

@@ -380,7 +380,7 @@ PARTS_OF_BSDFS = (
     "albedo",
     "facets",
     "monotone_cubic",
-    *(f"table_{part}" for part in ("arrivals", "draw", "grid", "lobes", "slices")),
+    *(f"table_{part}" for part in ("arrivals", "draw", "grid", "lanes", "lobes", "nodes")),
 )
 """What several kinds of BSDF are made of."""
 

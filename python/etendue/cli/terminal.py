@@ -10,9 +10,8 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
 import typer
 from rich.console import Console
 from rich.text import Text
@@ -20,7 +19,9 @@ from rich.text import Text
 from etendue.cli.wording import in_options, of_parser, without_caller
 from etendue.errors import ArgumentError, SceneError, UnknownNameError
 from etendue.quantities.printable import printable
-from etendue.quantities.ray_stream import Progress as ProgressFunction
+
+if TYPE_CHECKING:
+    from etendue.quantities.ray_stream import Progress as ProgressFunction
 
 # Brackets and colons in the texts of files are brackets and colons, neither markup nor emoji.
 output = Console(soft_wrap=True, highlight=False, markup=False, emoji=False)
@@ -134,7 +135,8 @@ def _plain(data: Any) -> Any:
         return {str(k): _plain(v) for k, v in data.items()}
     if isinstance(data, list | tuple):
         return [_plain(v) for v in data]
-    if isinstance(data, np.generic):
+    # Help and mistakes are told without numpy; where nobody has imported it, nothing comes from it.
+    if (numpy := sys.modules.get("numpy")) and isinstance(data, numpy.generic):
         return _plain(data.item())
     if isinstance(data, float) and not math.isfinite(data):
         return None

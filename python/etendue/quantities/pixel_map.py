@@ -5,9 +5,9 @@ from __future__ import annotations
 import abc
 import dataclasses
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.labelled import dataset
 from etendue.quantities.notebook import InNotebook
 from etendue.quantities.observer import Screen
+from etendue.quantities.outlets import GoesOut
 from etendue.quantities.provenance import Provenance
 from etendue.units import FLUX_UNITS, FluxUnit
 
@@ -25,22 +26,7 @@ if TYPE_CHECKING:
 MapValues = npt.NDArray[np.float64]
 
 
-class MapOutlets(NamedTuple):
-    """Where maps go: functions of higher floors, which this one cannot import.
-
-    Parameters
-    ----------
-    save : callable
-        Of a map and a path; writes the file and returns what its format could not express.
-    plot : callable
-        Of a map, a path or None, and options of the picture; draws it.
-    """
-
-    save: Callable[[Any, Path], tuple[str, ...]]
-    plot: Callable[..., Any]
-
-
-class PixelMap(InNotebook, abc.ABC):
+class PixelMap(InNotebook, GoesOut, abc.ABC):
     """A map on a screen: frozen, with its error and its origin.
 
     A kind of map is a dataclass that has these fields and those of its geometry, and says how both are called.
@@ -77,9 +63,6 @@ class PixelMap(InNotebook, abc.ABC):
     UNITS: ClassVar[Mapping[FluxUnit, str]]
     QUANTITIES: ClassVar[Mapping[FluxUnit, str]]
     PIXELS: ClassVar[str] = "pixels"
-
-    outlets: ClassVar[MapOutlets]
-    """Set once, by the package itself (`etendue/__init__.py`), which alone knows all floors."""
 
     def __repr__(self) -> str:
         """Size, brightest pixel and origin."""
