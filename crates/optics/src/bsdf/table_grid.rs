@@ -544,6 +544,40 @@ mod tests {
     use crate::chi_squared::{CRITICAL, deviate};
 
     #[test]
+    fn of_two_grids_the_finer_one_is_taken_at_each_place() {
+        let even = |n: u32, from: f64| {
+            (0..n)
+                .map(|k| f64::from(k) * 0.1 + if k > 0 { from } else { 0.0 })
+                .collect::<Vec<_>>()
+        };
+        // Alike, but for where they stand: one of them, and the end of the other one.
+        let (one, other) = (even(21, 0.0), even(20, 0.04));
+        let found = finer(&one, &other);
+        assert!(one.iter().all(|r| found.contains(r)));
+        assert!(found.len() <= one.len() + 2, "{found:?}");
+        // Fine in the middle here, beyond it there: of both what is fine, and no step wider than the finer of both has there.
+        let one: Vec<f64> = (0..20).map(|k| 0.02 * f64::from(k)).chain([0.8, 1.2]).collect();
+        let other: Vec<f64> = (0..4)
+            .map(|k| 0.2 * f64::from(k))
+            .chain((0..20).map(|k| 0.8 + 0.03 * f64::from(k)))
+            .collect();
+        let found = finer(&one, &other);
+        assert!(found.is_sorted() && found[0] == 0.0 && found[found.len() - 1] == other[other.len() - 1]);
+        assert!(one[..19].iter().chain(&other[4..]).all(|r| found.contains(r)));
+        assert!(found.len() < one.len() + other.len() - 3, "{found:?}");
+        for pair in found.windows(2) {
+            let limit = if pair[1] < 0.39 {
+                0.021
+            } else if pair[0] > 0.79 {
+                0.031
+            } else {
+                0.201
+            };
+            assert!(pair[1] - pair[0] <= limit, "{pair:?}");
+        }
+    }
+
+    #[test]
     fn nodes_that_are_left_out_reach_nowhere_into_the_circle() {
         let radial = [0.0, 0.05, 0.3, 0.7, 1.1, 1.5, 2.0];
         let mut seen = [0; 2];

@@ -536,3 +536,39 @@ fn turns(x: f64, y: f64) -> f64 {
     let turn = if turn < 0.0 { turn + 1.0 } else { turn };
     if turn >= 1.0 { 0.0 } else { turn }
 }
+
+#[cfg(test)]
+mod tests {
+    use etendue_math::special::exp;
+
+    use super::*;
+
+    #[test]
+    fn shares_by_which_rays_are_drawn_are_those_of_the_table() {
+        let slice = |sine: f64, width: f64, floor: f64| Slice {
+            sine,
+            radial: (0..24).map(|i| 2.0 * (f64::from(i) / 23.0).powi(2)).collect(),
+            azimuths: 1,
+            f: (0..24)
+                .map(|i| exp(-0.5 * (2.0 * (f64::from(i) / 23.0).powi(2) / width).powi(2)))
+                .collect(),
+            share: 0.5 - 0.2 * sine,
+            floor,
+        };
+        let row = Row {
+            azimuth: 0.0,
+            slices: vec![slice(0.0, 0.3, 0.1), slice(0.5, 0.2, 0.2), slice(0.95, 0.4, 0.15)],
+        };
+        let lobe = row.lobe().expect("sound");
+        assert!(4 * lobe.steps.list.len() < 3 * lobe.sines.len());
+        for k in 0..=20_000 {
+            let sine = f64::from(k) / 20_000.0;
+            let (first, shares) = lobe.shares(sine);
+            let blend = lobe.blend(sine);
+            assert_eq!(first, blend.first);
+            for (share, known) in shares.into_iter().zip(blend.shares) {
+                assert!((share - known).abs() <= 1.0001 * TOLERANCE, "{sine}: {share} {known}");
+            }
+        }
+    }
+}
