@@ -15,7 +15,7 @@ from oracles.verdicts import LARGEST_Z, assert_covers, assert_drawn_with
 Array = npt.NDArray[np.float64]
 Function = Callable[[Array, Array], Array]
 
-RAYS, SEEDS = 20_000, range(880_000, 880_012)
+RAYS, SEEDS = 20_000, range(880_000, 880_008)
 
 
 def exponent(fwhm: float) -> float:
@@ -58,8 +58,6 @@ def lopsided() -> tuple[Callable[[int], et.RaySet], Function]:
 
 SOURCES = {
     "collimated": one(0.13, 0.0, 0.0),
-    "1°": one(1.0, 0.0, 0.0),
-    "10°": one(10.0, 0.0, 0.0),
     "10°, 40° off the axis": one(10.0, 200.0, 40.0),
     "1°, 40° off the axis": one(1.0, 77.0, 40.0),
     "0.5°, beside the axis": one(0.5, 310.0, 0.6),
@@ -139,19 +137,20 @@ SMOOTH = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("band", [(30.0, 60.0), (60.0, 80.0)])
-@pytest.mark.parametrize(("n", "seeds"), [(2_000, 40), (20_000, 12)])
+@pytest.mark.parametrize(("n", "seeds"), [(2_000, 24), (20_000, 8)])
 @pytest.mark.parametrize("name", SMOOTH)
-def test_few_rays_of_smooth_light_without_symmetry(name: str, n: int, seeds: int, band: tuple[float, float]) -> None:
+def test_few_rays_of_smooth_light_without_symmetry(name: str, n: int, seeds: int) -> None:
     """What steps around the axis blur is below the noise for few rays as well: errors cover the truth in each band of γ."""
     drawn, truth = SMOOTH[name]
-    found = []
+    found: dict[tuple[float, float], list[Array]] = {(30.0, 60.0): [], (60.0, 80.0): []}
     for seed in range(seeds):
         far = et.intensity_distribution(rays_of((drawn(n, 990_000 + seed), 1.0)))
-        rows = (far.gamma >= band[0]) & (far.gamma < band[1])
-        z = ((far.values - truth(far.c[:, None], far.gamma)) / far.standard_error)[:, rows]
-        found.append(z[np.isfinite(z)])
-    assert_covers(deviations=np.concatenate(found), effective=effective(found), one=(0.62, 0.74), two=(0.92, 0.98))
+        deviations = (far.values - truth(far.c[:, None], far.gamma)) / far.standard_error
+        for (low, high), those in found.items():
+            z = deviations[:, (far.gamma >= low) & (far.gamma < high)]
+            those.append(z[np.isfinite(z)])
+    for those in found.values():
+        assert_covers(deviations=np.concatenate(those), effective=effective(those), one=(0.62, 0.74), two=(0.92, 0.98))
 
 
 @pytest.mark.parametrize(
