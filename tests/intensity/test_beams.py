@@ -29,8 +29,6 @@ def read_back(intensity: et.Intensity, folder: Path) -> list[float]:
 
 BEAMS = [
     ("narrow", 1e5, 0.0, 0.0),
-    ("spot", 1e3, 0.0, 0.0),
-    ("wide", 10.0, 0.0, 0.0),
     ("Lambertian", 1.0, 0.0, 0.0),
     ("tilted", 1e4, 70.0, 20.0),
     ("beside the pole", 1e5, 250.0, 0.5),
@@ -99,25 +97,6 @@ def test_few_rays_of_a_lambertian_source_make_no_spike() -> None:
     assert np.abs(z).max() < LARGEST_Z
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("exponent", "c", "gamma"), [(1e3, 0.0, 0.0), (300.0, 70.0, 20.0), (1.0, 130.0, 35.0)])
-def test_errors_of_nodes_cover_the_truth_over_seeds(exponent: float, c: float, gamma: float) -> None:
-    """The node that a beam of known intensity is seen by, 40 times: the number of hits within 1.645 errors is binomial.
-
-    The truth is the intensity itself: what the steps blur is part of what the error has to cover.
-    """
-    n, flux, seeds = 25_000, 5.0, 40
-    inside = 0
-    for seed in range(seeds):
-        far = et.intensity_distribution(rays_of((beam(n, exponent=exponent, c=c, gamma=gamma, seed=1000 + seed), flux)))
-        assert far.flux == pytest.approx(flux, rel=1e-9)
-        near = direction(c=far.c[:, None], gamma=far.gamma) @ direction(c=c, gamma=gamma)
-        i, j = np.unravel_index(int(np.argmax(near)), near.shape)
-        truth = flux * float(lobe(exponent=exponent, c=c, gamma=gamma)(far.c[i], far.gamma[j]))
-        inside += bool(abs(far.values[i, j] - truth) < 1.645 * far.standard_error[i, j])
-    assert_drawn_with(share=0.9, hits=inside, rays=seeds)
-
-
 # --- traced ------------------------------------------------------------------------------------------------------------
 
 
@@ -157,7 +136,7 @@ def test_cells_of_earlier_versions_are_refused(tmp_path: Path, monkeypatch: pyte
 
 @pytest.mark.slow
 def test_traced_errors_cover_the_truth() -> None:
-    """A cosine emitter about an axis off every plane, at asked steps, 8 seeds: nodes with no ray in common."""
+    """A cosine emitter about an axis off every plane, at asked steps, 5 seeds: nodes with no ray in common."""
     c, gamma, exponent, flux = 101.0, 28.0, 3.0, 9.0
     source = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "exponent": exponent, "flux": flux,
               "toward": direction(c=c, gamma=gamma).tolist()}  # fmt: skip
@@ -166,7 +145,7 @@ def test_traced_errors_cover_the_truth() -> None:
     )
     inside = tried = 0
     truth: Array | None = None
-    for seed in range(8):
+    for seed in range(5):
         far = et.trace(scene, 60_000, seed).intensity.only
         truth = (
             flux * hat_means(lobe(exponent=exponent, c=c, gamma=gamma), c=far.c, gamma=far.gamma)[0]

@@ -29,7 +29,7 @@ def field_of(n: int, exponent: float, c: float, gamma: float, seed: int, cells: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("exponent", "c", "gamma"), [(1.0, 0.0, 0.0), (300.0, 40.0, 25.0), (1e5, 0.0, 0.0)])
+@pytest.mark.parametrize(("exponent", "c", "gamma"), [(300.0, 40.0, 25.0), (1e5, 0.0, 0.0)])
 def test_files_of_a_field_hold_its_flux(exponent: float, c: float, gamma: float, tmp_path: Path) -> None:
     """A reader's trapezium rule finds it to 0.1 %, of a beam of 0.4° too, whose peak the field cannot know."""
     field = field_of(30_000, exponent, c, gamma, 3, 5).replace(notes=("said before",))
@@ -66,11 +66,11 @@ def test_the_values_are_the_integral_over_the_surface() -> None:
 
 @pytest.mark.slow
 def test_errors_are_those_of_counting_and_cover_the_truth() -> None:
-    """8 fields: the error of a node is that of the rays themselves, to noise; within it lie no fewer than 68 %."""
+    """5 fields: the error of a node is that of the rays themselves, to noise; within it lie no fewer than 68 %."""
     n, exponent, c, gamma = 20_000, 6.0, 200.0, 30.0
     inside, tried, ratios = 0, 0, []
     truth: Array | None = None
-    for seed in range(8):
+    for seed in range(5):
         far = field_of(n, exponent, c, gamma, seed, 4).intensity(12, 15.0)
         if truth is None:
             truth = FLUX * hat_means(lobe(exponent=exponent, c=c, gamma=gamma), c=far.c, gamma=far.gamma)[0]

@@ -167,7 +167,7 @@ def test_lines_are_as_frequent_as_they_are_bright(which: str) -> None:
     Both are random: the variance of a class is that of its count and that of its average.
     """
     field = make_field(SURFACES[which], seed=11)
-    n = 300_000
+    n = 150_000
     point, direction, etendue = lines_out_of(field.surface, n, np.random.default_rng(2))
     value = field.luminance(points=point, directions=direction)[0] * MM2 * etendue / field.total_flux / n
     rays = field.sample(n, seed=5)
@@ -194,8 +194,8 @@ def test_lines_are_as_frequent_as_they_are_bright(which: str) -> None:
 def test_rays_leave_their_surface(which: str) -> None:
     """But for one in a million of those that graze it, whose crossing rounding may lose."""
     field = make_field(SURFACES[which], seed=4)
-    counts = count_rays(field.rays(500_000), field.surface, PartGrids((2, 2, 2, 2), (4, 4)))
-    assert counts.unmet_rays <= 3
+    counts = count_rays(field.rays(200_000), field.surface, PartGrids((2, 2, 2, 2), (4, 4)))
+    assert counts.unmet_rays <= 1
     assert sum(counts.part_flux) + counts.unmet_flux == pytest.approx(field.total_flux, rel=1e-12)
 
 
