@@ -42,17 +42,14 @@ def deviations(found: Smoothed, truth: Array) -> Array:
 # How many independent cells the cells of one image are worth, by the spread of their coverage over images of other seeds;
 # and the coverage within one and two errors, where those images showed that it is not that of normal deviates.
 HUNDRED_THOUSAND: dict[str, tuple[float, Share, Share]] = {
-    "die": (304, WITHIN_ONE, WITHIN_TWO),
     "turned die": (822, WITHIN_ONE, (0.93, WITHIN_TWO)),
     "stripes": (4925, (0.625, 0.655), (0.92, 0.94)),
     "blobs": (1486, (WITHIN_ONE, 0.74), (WITHIN_TWO, 0.975)),
 }
 # Rays, cells along a side, seeds.
 FEW_AND_MANY: dict[str, tuple[float, int, int, float, Share, Share]] = {
-    "blobs": (1e4, 128, 1, 149, WITHIN_ONE, WITHIN_TWO),
-    "disk": (2.5e3, 64, 4, 40, (WITHIN_ONE, 0.76), (0.945, 0.975)),
-    "halo": (2.5e5, 64, 4, 68, WITHIN_ONE, (0.92, WITHIN_TWO)),
-    "stripes": (1e6, 128, 1, 3531, (0.65, WITHIN_ONE), (0.92, 0.94)),
+    "disk": (2.5e3, 64, 3, 40, (WITHIN_ONE, 0.76), (0.945, 0.975)),
+    "halo": (2.5e5, 64, 2, 68, WITHIN_ONE, (0.92, WITHIN_TWO)),
 }
 
 
@@ -85,7 +82,7 @@ def test_error_bars_hold_for_few_rays_and_many(name: str) -> None:
 @pytest.mark.slow
 def test_a_uniform_image_stays_uniform() -> None:
     """Neither trees nor filters find structure in noise: only the total is uncertain."""
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         counts = np.random.default_rng(seed).poisson(1.0, (64, 64)).astype(np.float64)
         found = smoothed(counts, shifts=4)
         assert found.mass.std() < 0.01 * found.mass.mean()
@@ -97,7 +94,7 @@ def test_a_uniform_image_stays_uniform() -> None:
 
 @pytest.mark.slow
 def test_the_unit_of_weight_does_not_matter() -> None:
-    counts, _ = counts_of("halo", 3e4, 4, 64)
+    counts, _ = counts_of("halo", 2e4, 4, 48)
     plain = smoothed(counts, shifts=4)
     scaled = smooth_counts(2.5e-7 * counts, 2.5e-7**2 * counts, np.full_like(counts, 3e5), shifts=4)
     np.testing.assert_allclose(scaled.mass, 2.5e-7 * plain.mass, rtol=1e-6)
@@ -155,7 +152,7 @@ def test_halves_of_equal_rays_are_binomial_and_those_of_unequal_ones_have_the_sa
 @pytest.mark.slow
 def test_same_bits_for_any_number_of_threads() -> None:
     counts, _ = counts_of("die", 2e4, 8, 48)
-    results = [smoothed(counts[:, :37], shifts=5, threads=n) for n in (1, 2, 7)]
+    results = [smoothed(counts[:, :37], shifts=3, threads=n) for n in (1, 7)]
     assert len({r.mass.tobytes() + r.standard_error.tobytes() for r in results}) == 1
 
 

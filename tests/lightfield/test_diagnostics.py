@@ -298,8 +298,8 @@ class Trial:
 
     def __init__(self) -> None:
         self.source, self.surface = DieUnderDome(), Plane(z=0, width=2.6, height=2.6, centre=(0, 0))
-        self.x, self.k = self.source.rays(128 * self.N, seed=3)
-        self.fresh = self.source.rays(200_000, seed=4)
+        self.x, self.k = self.source.rays(64 * self.N, seed=3)
+        self.fresh = self.source.rays(60_000, seed=4)
         self.fields: dict[int, LightField] = {}
 
     def rays(self, n: int) -> et.RaySet:
@@ -330,15 +330,15 @@ def curve(trial: Trial) -> Forecast:
 @pytest.mark.slow
 def test_forecasts_come_true(trial: Trial, curve: Forecast) -> None:
     """The field really fitted to 4 and 16 times the rays; and to as many as are said to halve its error."""
-    scores = {m: trial.score(m * trial.N) for m in (1, 4, 16, 128)}
+    scores = {m: trial.score(m * trial.N) for m in (1, 4, 16, 64)}
     for m in (4, 16):
         forecast = curve.gain(m)
         true = scores[m] - scores[1]
         # Twice the interval of 68 % on a logarithmic scale: 95 %.
         assert forecast.value * (forecast.low / forecast.value) ** 2 < true, (m, forecast, true)
         assert true < forecast.value * (forecast.high / forecast.value) ** 2, (m, forecast, true)
-    # What endless rays would reach: the score of 128 times as many, and the little that the law adds.
-    end = scores[128] + curve.loss(128 * trial.N).value
+    # What endless rays would reach: the score of 64 times as many, and the little that the law adds.
+    end = scores[64] + curve.loss(64 * trial.N).value
     halved = trial.score(round(curve.factor(0.5).value * trial.N))
     share = math.sqrt((end - halved) / (end - scores[1]))
     low, high = (curve.factor(0.5).value / f for f in (curve.factor(0.5).high, curve.factor(0.5).low))
@@ -492,15 +492,14 @@ def test_where_fits_to_more_rays_gain_nothing_the_error_bars_are_a_bound() -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["plane", "dome with a window", "cylinder"])
+@pytest.mark.parametrize("name", ["dome with a window", "cylinder"])
 def test_the_picture_shows_what_was_found_and_repeats_its_bytes(name: str, tmp_path: Path) -> None:
     field = make_field(SURFACES[name], flux_unit="W" if name == "cylinder" else "lm")
     law = law_of_gains(RUNGS, gains_of(0.02, 0.5), np.eye(2) * 1e-10, 10_000)
     found = dataclasses.replace(diagnose(field), forecast=law)
-    figure = plot_characteristic(found)
-    if name == "plane":
-        for file in ("a.png", "b.png"):
-            plot_characteristic(found, tmp_path / file)
+    figure = plot_characteristic(found, tmp_path / "a.png")
+    if name == "cylinder":
+        plot_characteristic(found, tmp_path / "b.png")
         assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     unit = ("radiance [W/(m² sr)]", "flux [W]") if name == "cylinder" else ("luminance [cd/m²]", "flux [lm]")
     labels = [axes.get_ylabel() for axes in figure.axes]

@@ -473,7 +473,7 @@ def with_values(source: GriddedSource, values: Array) -> GriddedSource:
 @pytest.mark.parametrize("surface", [Hemisphere(radius=2), Cylinder(radius=2, bottom=0, top=3, ends=False)])
 def test_curved_patches_show_what_they_send(surface: Surface) -> None:
     """A surface of equal Lambertian patches looks the same from everywhere, and sends L · (its projected area)."""
-    n = 40_000
+    n = 20_000
     x, d = from_sphere(n, 3, 2.0, downwards=False)
     if isinstance(surface, Cylinder):
         x = np.column_stack([2 * unit(x[:, :2]), 3 * np.random.default_rng(1).random(n)])

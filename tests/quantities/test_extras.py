@@ -29,7 +29,7 @@ sys.meta_path.insert(0, Blocker())
 MAIN_JOB = """
 import etendue as et
 
-rays = et.RingSource(rays=100_000).ray_set()
+rays = et.RingSource(rays=20_000).ray_set()
 et.write_rays("led.tm25ray", rays, format="tm25")
 rays = et.read_rays("led.tm25ray")
 lmap = et.luminance_map(rays, et.Observer(0, 0, 1000), et.Screen(60, 60, 4, 4), method=et.Cone(acceptance=5))
