@@ -126,7 +126,7 @@ def test_the_field_is_as_sharp_as_the_smoother_that_is_told_the_plane(
     assert automatic.surface.focus is not None
     assert automatic.report.unmet_rays < 1e-4 * RAYS
     assert automatic.total_flux == pytest.approx(LED.total_flux, rel=1e-4)
-    cells, drawn = 100, 2_000_000
+    cells, drawn = 100, 500_000
     truth = LED.exitance(z=PLANE, side=LED.side, cells=cells, directions=16) / LED.total_flux
     ours = automatic.sample(drawn, seed=5)
     field = image(position=ours.position, direction=ours.direction, cells=cells) / drawn
@@ -154,16 +154,16 @@ def plain(rays: et.RaySet) -> et.LightField:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("theta", [0, 30, 60])
+@pytest.mark.parametrize("theta", [0, 60])
 def test_maps_are_sharp_from_every_side(automatic: et.LightField, plain: et.LightField, theta: float) -> None:
     """Against the truth, closer than the field on a flat plane, which is what stood before."""
     observer = et.Observer(theta, 25, 800, target=(*LED.centre, PLANE))
-    screen = et.Screen(2.2, 2.2, 96, 96)
+    screen = et.Screen(2.2, 2.2, 64, 64)
 
     def errors(field: et.LightField) -> float:
         lmap = et.luminance_map(field, observer, screen)
         points, sight = lmap_points(observer, screen)
-        true = LED.luminance(points=points, directions=sight).reshape(96, 96)
+        true = LED.luminance(points=points, directions=sight).reshape(64, 64)
         return float(np.sqrt(np.mean((lmap.values - true) ** 2)) / true.max())
 
     assert errors(automatic) < 0.85 * errors(plain)
@@ -268,8 +268,8 @@ def test_a_focused_field_lights_a_wall_as_its_rays_do(small: et.LightField) -> N
         observers=[{**eye, "screen": {"width": 3, "height": 3, "columns": 12, "rows": 12}}],
         detectors=[{"name": "image", "kind": "image", "observer": "eye"}],
     )
-    (lmap,) = et.luminance_map(scene, rays_per_pixel=2048, seed=4)
-    image = et.trace(scene, 8e6, 5).images["image"]
+    (lmap,) = et.luminance_map(scene, rays_per_pixel=1024, seed=4)
+    image = et.trace(scene, 5e6, 5).images["image"]
 
     def sixteenths(values: Array) -> Array:
         return values.reshape(4, 3, 4, 3).sum(axis=(1, 3))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import etendue as et
@@ -80,7 +81,7 @@ def test_images_are_used_for_a_disk_and_do_no_harm_to_an_entangled_source() -> N
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["film", "dome"])
 def test_error_bars_cover_the_truth(family: str) -> None:
-    """Cells within one and two standard errors, over three seeds.
+    """Cells within one and two standard errors, over two seeds.
 
     On a grid as coarse as this, errors are a little too small: fits to twelve other seeds covered 67.6 and 90.9 % of the
     cells of the film, and, since a product under a dome claims too much, 58.7 and 88.2 % of those of the dome. From seed to
@@ -93,7 +94,7 @@ def test_error_bars_cover_the_truth(family: str) -> None:
     index = rng.integers(0, 16, (3000, 4))
     steps = np.array([0.856675, 0.733892, 0.628707, 0.538597])
     deviations = []
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         field = LightField.fit(rays_of(source, 100_000, seed), surface, depths=DEPTHS)
         assert field.total_flux + field.report.unmet_flux == pytest.approx(source.total_flux, rel=1e-9)
         chart = field.surface.parts()[0].core()
@@ -109,7 +110,7 @@ def test_error_bars_cover_the_truth(family: str) -> None:
             sums += np.array([true, found]) / 48
         lit = sums[0] > 0
         deviations.append((sums[1] - sums[0])[lit] / errors[lit])
-    effective = 3 * (184 if family == "film" else 197)
+    effective = 2 * (184 if family == "film" else 197)
     assert_covers(deviations=np.concatenate(deviations), effective=effective, one=one, two=two)
 
 
@@ -137,19 +138,25 @@ def test_maps_show_the_truth_from_everywhere(film: tuple[PrismaticFilm, et.RaySe
         assert lmap.dead_pixels == 0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("theta", [0, 55])
-@pytest.mark.parametrize(("width", "height"), [(2.04, 1.3), (0.3, 0.3), (3, 0.002), (0.002, 0.001)])
-def test_pixels_of_any_size_show_all_the_light(width: float, height: float, theta: float) -> None:
-    """The light of a flat source seen from afar is what its luminance, read along lines from points all over it, adds up to:
-    in pixels that hold it, cut it, or are cut by it in slivers."""
+@functools.cache
+def even_rectangle(width: float, height: float) -> LightField:
+    """Of even light by the cosine law: the same for every direction that it is seen from."""
     rng = np.random.default_rng(2)
     n = 4000
     r, turn = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
     direction = np.stack([r * np.cos(turn), r * np.sin(turn), np.sqrt(1 - r**2)], axis=1)
     position = (rng.random((n, 3)) - 0.5) * [width, height, 0]
     plane = et.Plane(z=0, width=width, height=height, centre=(0, 0), focus=(0, 0, 0, 0))
-    field = LightField.fit(et.RaySet(position, direction, np.full(n, 100 / n)), plane)
+    return LightField.fit(et.RaySet(position, direction, np.full(n, 100 / n)), plane)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("theta", [0, 55])
+@pytest.mark.parametrize(("width", "height"), [(2.04, 1.3), (3, 0.002), (0.002, 0.001)])
+def test_pixels_of_any_size_show_all_the_light(width: float, height: float, theta: float) -> None:
+    """The light of a flat source seen from afar is what its luminance, read along lines from points all over it, adds up to:
+    in pixels that hold it, cut it, or are cut by it in slivers."""
+    field = even_rectangle(width, height)
     observer = et.Observer(theta, 20, 1e6)
     share = (np.arange(200) + 0.5) / 200 - 0.5
     u, v = (grid.ravel() for grid in np.meshgrid(share * width, share * height))
@@ -201,12 +208,12 @@ def test_a_refit_of_drawn_rays_agrees(film: tuple[PrismaticFilm, et.RaySet, Ligh
     a, sa = field.luminance(points=lines.position, directions=lines.direction)
     assert (sa > 0).all()
     deviations = []
-    for seed in (5, 6, 7):
+    for seed in (5, 6):
         again = LightField.fit(field.rays(200_000, seed=seed), field.surface, depths=DEPTHS)
         b, sb = again.luminance(points=lines.position, directions=lines.direction)
         assert np.median(np.abs(a / b - 1)) < 0.1
         deviations.append((a - b) / sb)
-    assert_covers(deviations=np.concatenate(deviations), effective=3 * 164, one=(0.6, 0.68), two=(0.87, 0.92))
+    assert_covers(deviations=np.concatenate(deviations), effective=2 * 164, one=(0.6, 0.68), two=(0.87, 0.92))
 
 
 @pytest.mark.slow

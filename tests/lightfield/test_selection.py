@@ -20,7 +20,7 @@ from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm, Struc
 
 Array = npt.NDArray[np.float64]
 
-N = 40_000
+N, MANY = 20_000, 40_000
 MOVE = np.array([0.3, -0.2, 0.75])
 """So that no depth is zero, and none is at an axis."""
 
@@ -48,7 +48,6 @@ def led_choice() -> SurfaceChoice:
 
 FLAT = {
     # source, kind, radius of the source [mm], largest error of the depth in such radii
-    "limb": (LimbDarkenedDisk(), Disk, 11.2, 2e-3),
     "film": (PrismaticFilm(), Disk, 11.2, 2e-3),
     "led": (StructuredLed(), Plane, 0.6, 2e-3),
     "die": (DieUnderDome(), Plane, 1.264, 0.01),
@@ -59,10 +58,14 @@ FLAT = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(FLAT))
-def test_a_flat_source_is_found_at_its_depth(name: str) -> None:
+def test_a_flat_source_is_found_at_its_depth(name: str, led_choice: SurfaceChoice) -> None:
     source, kind, radius, error = FLAT[name]
-    position, direction = source.rays(N, seed=1)  # type: ignore[attr-defined]
-    choice = choose_surface(rays_of(*scattered(position + MOVE, direction, 0.3 * radius)))
+    if name == "led":
+        choice = led_choice
+    else:
+        # What a dome blurs takes more rays.
+        position, direction = source.rays(N if name == "film" else MANY, seed=1)  # type: ignore[attr-defined]
+        choice = choose_surface(rays_of(*scattered(position + MOVE, direction, 0.3 * radius)))
     surface = choice.surface
     assert type(surface) is kind
     assert isinstance(surface, Plane | Disk | Dome)
@@ -94,11 +97,10 @@ def test_a_flat_source_is_found_at_its_depth(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3, 4])
-def test_a_film_of_few_details_is_found_by_its_rim(seed: int) -> None:
+def test_a_film_of_few_details_is_found_by_its_rim() -> None:
     """Its cut-offs move with the place, so that what is within it hardly tells the depth."""
-    position, direction = PrismaticFilm().rays(N, seed=seed)
-    choice = choose_surface(rays_of(*scattered(position + MOVE, direction, 3.0, seed)))
+    position, direction = PrismaticFilm().rays(N, seed=3)
+    choice = choose_surface(rays_of(*scattered(position + MOVE, direction, 3.0, 3)))
     assert isinstance(choice.surface, Disk)
     assert choice.surface.z == pytest.approx(MOVE[2], abs=2e-3 * 11.2)
 
@@ -169,10 +171,9 @@ def assert_alike(choice: SurfaceChoice, other: SurfaceChoice, length: float = 1.
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("length", [1e-3, 1e3])
-def test_the_unit_of_length_does_not_matter(length: float, led_choice: SurfaceChoice) -> None:
+def test_the_unit_of_length_does_not_matter(led_choice: SurfaceChoice) -> None:
     position, direction = led_lines()
-    assert_alike(led_choice, choose_surface(rays_of(position * length, direction)), length=length)
+    assert_alike(led_choice, choose_surface(rays_of(position * 1e-3, direction)), length=1e-3)
 
 
 @pytest.mark.slow
@@ -182,9 +183,9 @@ def test_the_number_of_threads_does_not_matter_nor_the_unit_of_flux(led_choice: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("move", [7.0, 1e6])
-def test_where_the_source_is_does_not_matter(move: float, led_choice: SurfaceChoice) -> None:
-    """Also so far off that coordinates have no more than ten digits for the source."""
+def test_where_the_source_is_does_not_matter(led_choice: SurfaceChoice) -> None:
+    """So far off that coordinates have no more than ten digits for the source."""
+    move = 1e6
     position, direction = led_lines()
     choice = choose_surface(rays_of(position + move, direction))
     assert isinstance(choice.surface, Plane)
@@ -212,7 +213,7 @@ def test_start_points_on_a_plane_of_any_depth_do_not_hide_the_source() -> None:
 
 @pytest.mark.slow
 def test_strays_far_off_do_not_matter(led_choice: SurfaceChoice) -> None:
-    position, direction = (values.copy() for values in led_lines())
+    position, direction = (values.copy() for values in led_lines(MANY))
     rng = np.random.default_rng(3)
     position[:400], direction[:400] = rng.normal(size=(400, 3)) * 100, rng.normal(size=(400, 3))
     choice = choose_surface(rays_of(position, direction / np.linalg.norm(direction, axis=1)[:, None]))
@@ -226,10 +227,10 @@ def test_strays_far_off_do_not_matter(led_choice: SurfaceChoice) -> None:
 @pytest.mark.slow
 def test_rays_without_a_place_do_not_matter() -> None:
     position, direction = (values.copy() for values in led_lines())
-    broken = np.arange(0, N, 5000)
+    broken = np.arange(0, N, 2500)
     position[broken, 1] = np.nan
     rays = rays_of(position, direction)
-    with pytest.warns(RayFileWarning, match="8 of 40,000 rays have a coordinate.*not finite"):
+    with pytest.warns(RayFileWarning, match="8 of 20,000 rays have a coordinate.*not finite"):
         assert rays.complaints
     choice = choose_surface(rays)
     assert isinstance(choice.surface, Plane)
@@ -242,7 +243,7 @@ def test_rays_without_a_place_do_not_matter() -> None:
 @pytest.mark.slow
 def test_a_point_is_where_its_rays_meet() -> None:
     rng = np.random.default_rng(4)
-    turn, square = rng.random(5000) * 2 * np.pi, 0.9 * rng.random(5000)
+    turn, square = rng.random(1500) * 2 * np.pi, 0.9 * rng.random(1500)
     k = np.stack([np.sqrt(square) * np.cos(turn), np.sqrt(square) * np.sin(turn), np.sqrt(1 - square)], axis=1)
     choice = choose_surface(rays_of(np.array([0.5, 0.3, 2.0]) + 5 * k, k))
     middle = np.mean([part.centre for part in choice.surface.parts()], axis=0)
@@ -251,12 +252,12 @@ def test_a_point_is_where_its_rays_meet() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("towards", [(0.0, 0.0, 1.0), (0.3, 0.1, 0.9)])
-def test_a_beam_keeps_its_cross_section(towards: tuple[float, float, float]) -> None:
+def test_a_beam_keeps_its_cross_section() -> None:
     """Any depth is as good for it: it stays where the rays start."""
+    towards = (0.3, 0.1, 0.9)
     rng = np.random.default_rng(5)
-    position = np.column_stack([rng.uniform(-1, 1, (5000, 2)) * [1.0, 0.6], np.full(5000, 4.0)])
-    choice = choose_surface(rays_of(position, np.tile(np.array(towards) / np.linalg.norm(towards), (5000, 1))))
+    position = np.column_stack([rng.uniform(-1, 1, (2000, 2)) * [1.0, 0.6], np.full(2000, 4.0)])
+    choice = choose_surface(rays_of(position, np.tile(np.array(towards) / np.linalg.norm(towards), (2000, 1))))
     surface = choice.surface
     assert isinstance(surface, Plane)
     assert (surface.width, surface.height, surface.z) == pytest.approx((2.0, 1.2, 4.0), rel=2e-3)
@@ -286,7 +287,6 @@ def test_too_few_rays_say_what_to_do() -> None:
 # --- the scorer ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("weighted", [False, True])
 def test_no_surface_predicts_better_than_the_truth(weighted: bool) -> None:
     """Gibbs' inequality: the densities add up to one. And the right surface comes close."""
@@ -322,7 +322,6 @@ FILES = {
     # A bar of 0.8 × 6 × 0.8 mm whose six faces all shine: the start points lie on them.
     "speos_pyspeos_Rays.ray": Box(0.8, 6.0, 0.8, centre=(0.0, 0.0, 31.75)),
     # Lines from a rod of 1.3 × 4.1 mm about Z; the start points, in a cube of 20 mm, do not show it.
-    "Cyl10k.1.ray": Cylinder(radius=0.65, bottom=9.0, top=13.1),
     "Cyl10k.1.tm25ray": Cylinder(radius=0.65, bottom=9.0, top=13.1),
 }
 
@@ -356,7 +355,7 @@ def test_depths_that_differ_are_told_apart(z: float, apart: float) -> None:
 @pytest.mark.slow
 def test_the_choice_is_told_in_the_words_of_the_trade() -> None:
     """What was chosen and why; every other surface with its distance, and a reason if it predicts better."""
-    choice = choose_surface(et.RingSource(rays=60_000))
+    choice = choose_surface(et.RingSource(rays=40_000))
     told = choice.notes[0]
     assert told.startswith(f"carrier surface {choice.surface.told}: ")
     assert "better than others" not in told

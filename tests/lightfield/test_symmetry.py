@@ -92,10 +92,11 @@ def test_what_a_field_was_folded_by_is_known_and_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("symmetry", ["none", "mirror-x", "c4"])
-@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize(
+    ("symmetry", "weighted", "n"), [("none", True, 1000), ("mirror-x", True, 4000), ("c4", False, 1000)]
+)
 def test_images_of_a_ray_tell_nothing_more_of_the_flux(
-    symmetry: str, weighted: bool, monkeypatch: pytest.MonkeyPatch
+    symmetry: str, weighted: bool, n: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Were the shares of all cells certain, every error bar would be that of the flux: √Σw² / Σw of the rays themselves."""
     monkeypatch.setattr(
@@ -103,8 +104,8 @@ def test_images_of_a_ray_tell_nothing_more_of_the_flux(
         "calibrate",
         lambda found, *_: (dataclasses.replace(found.tree, deviation=0 * found.tree.ratio), FineErrors()),
     )
-    weights = np.random.default_rng(7).gamma(2.0, 1.0, 4000) if weighted else np.ones(4000)
-    rays = et.RaySet(*rays_of(4000, 6), weights)
+    weights = np.random.default_rng(7).gamma(2.0, 1.0, n) if weighted else np.ones(n)
+    rays = et.RaySet(*rays_of(n, 6), weights)
     plane = et.Plane(z=0, width=2, height=2, centre=(0, 0))
     field = et.LightField.fit(rays, plane, depths=(1, 1, 1, 1), symmetry=symmetry)
     relative = field.parts[0].deviation / field.parts[0].ratio
@@ -122,7 +123,7 @@ def test_error_bars_of_folded_fields_cover_the_truth() -> None:
     plane = et.Plane(z=0, width=2 * source.radius, height=2 * source.radius, centre=(0, 0))
     centre = np.array([*source.centre, 0])
     deviations = []
-    for seed in range(8, 16):
+    for seed in range(8, 14):
         x, k = source.rays(n, seed=seed)
         half = et.RaySet(x - centre, k, np.full(n, source.total_flux / n))
         field = et.LightField.fit(half, plane, depths=(4, 4, 4, 4), symmetry="mirror-y")
@@ -136,7 +137,7 @@ def test_error_bars_of_folded_fields_cover_the_truth() -> None:
         )
         value, error = field.luminance(points=points, directions=directions)
         deviations.append((value - truth) / error)
-    assert_covers(deviations=np.concatenate(deviations), effective=8 * 45, one=(0.745, 0.785), two=(0.955, 0.975))
+    assert_covers(deviations=np.concatenate(deviations), effective=6 * 45, one=(0.745, 0.785), two=(0.955, 0.975))
 
 
 def test_an_asymmetry_of_two_per_cent_is_seen_with_a_million_rays() -> None:
