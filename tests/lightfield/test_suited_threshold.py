@@ -55,7 +55,7 @@ def test_rays_kept_back_score_nearly_as_well_as_with_the_best() -> None:
     """On two sources, one with sharp cut-offs and one under a dome, of few rays and many; what suited 10⁹ is far behind."""
     position, direction = DieUnderDome().rays(15_000, seed=4)
     dome = et.RaySet(position, direction, np.full(15_000, 1.0 / 15_000))
-    for rays, surface, pixel in ((film_rays(100_000), DISK, 1.0), (dome, et.Hemisphere(radius=1.3), 0.125)):
+    for rays, surface, pixel in ((film_rays(40_000), DISK, 1.0), (dome, et.Hemisphere(radius=1.3), 0.125)):
         suited = et.GriddedSource.fit(rays, surface, pixel).threshold
         sweep = threshold_sweep(rays, surface, pixel, (5.0, 1.0, 0.2, 0.05, 0.021, suited))
         best, here = sweep["score"].max(), sweep["score"][-1]
