@@ -17,7 +17,7 @@ from oracles.planted_numbers import planted_in_bytes, planted_in_text
 
 BINARY = {"tm25", "etd", "lighttools", "zemax", "speos", "asap"}
 
-MOST_FILES = 400
+MOST_FILES = 150
 
 RAYS = et.RaySet(
     [[1.5, -2, 0.25], [0.5, 3, -1]],

@@ -322,7 +322,7 @@ POSITION = st.one_of(st.integers(0, 300), st.integers(-200, -1), st.integers(0, 
 
 @pytest.mark.slow
 @every_format
-@settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=50, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(places=st.lists(st.tuples(POSITION, st.integers(0, 255)), min_size=1, max_size=8), cut=st.integers(0, 40))
 def test_damaged_bytes(ray_format: RayFormat, tmp_path: Path, places: list[tuple[int, int]], cut: int) -> None:
     data = damage(small_file(ray_format.name, tmp_path), places)
@@ -340,7 +340,7 @@ def test_damaged_bytes(ray_format: RayFormat, tmp_path: Path, places: list[tuple
 
 @pytest.mark.slow
 @every_format
-@settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(noise=st.binary(max_size=400))
 def test_noise_behind_a_true_beginning(ray_format: RayFormat, tmp_path: Path, noise: bytes) -> None:
     path = tmp_path / "noise"

@@ -19,6 +19,7 @@ import pytest
 from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
 from etendue.quantities.bsdf_data import BsdfSlice
+from formats.slanted import coarsen
 from oracles import rotated_samples as by_hand
 
 Array = npt.NDArray[np.float64]
@@ -180,8 +181,11 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> tuple[et.BsdfTable, et.
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", TABLES, ids=lambda form: form.name)
-def test_written_and_read_again(tmp_path: Path, sources: tuple[et.BsdfTable, et.BsdfTable], form: BsdfFormat) -> None:
+def test_written_and_read_again(
+    tmp_path: Path, sources: tuple[et.BsdfTable, et.BsdfTable], form: BsdfFormat, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What matrices of Klems and tensor trees hold is looked at in test_bsdf_formats.py, at the normal too."""
+    coarsen(monkeypatch, 10.0)
     turned, plain = sources
     if form.name not in ISOTROPIC:
         et.write_bsdf(tmp_path / "turned", turned, form.name)

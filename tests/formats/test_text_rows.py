@@ -367,7 +367,7 @@ def test_no_damage_leads_to_another_error(tmp_path: Path, text_format: RayFormat
     data = path.read_bytes()
     rng = np.random.default_rng(3)
     refused = 0
-    for _ in range(1500):
+    for _ in range(300):
         damaged = bytearray(data)
         for at in rng.integers(0, len(data), size=rng.integers(1, 4)):
             damaged[at] = rng.choice([rng.integers(0, 256), damaged[at] ^ (1 << rng.integers(0, 8))])
@@ -378,7 +378,7 @@ def test_no_damage_leads_to_another_error(tmp_path: Path, text_format: RayFormat
             refused += 1
         else:
             assert rays.records.dtype["flux"] == np.float64
-    assert 100 < refused < 1400  # the damage is neither harmless nor total
+    assert 20 < refused < 280  # the damage is neither harmless nor total
 
 
 def test_absurd_counts_allocate_nothing(tmp_path: Path) -> None:
