@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -99,6 +100,9 @@ def test_an_error_that_was_not_reached_is_told(run: Run, tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_an_interruption_leaves_a_valid_result(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("running", "work"):  # rounds of 65,536 rays
+        monkeypatch.setattr(f"etendue.tracing.{module}.BATCHES", 1)
+
     def interrupted(*arguments: Any, **options: Any) -> Any:
         rounds = et.trace_rounds(*arguments, **options)
 
@@ -116,11 +120,11 @@ def test_an_interruption_leaves_a_valid_result(run: Run, tmp_path: Path, monkeyp
 
     with monkeypatch.context() as patch:
         patch.setattr(trace_verb, "trace_rounds", interrupted)
-        status, out, err = run("trace", "lamp.toml", "--rays", "2.3e6", "-o", "part.h5", "-o", "top.csv")
+        status, out, err = run("trace", "lamp.toml", "--rays", "1.5e5", "-o", "part.h5", "-o", "top.csv")
     assert status == 130
     assert "valid result" in err
     part = et.TraceResult.load(tmp_path / "part.h5")
-    assert part.rays_done == 2 << 20
+    assert part.rays_done == 2 << 16
     assert part.ledger.closes
     assert et.read_illuminance_map(tmp_path / "top.csv").mean == part.illuminance.only.mean
     assert "were traced" in out
@@ -128,10 +132,9 @@ def test_an_interruption_leaves_a_valid_result(run: Run, tmp_path: Path, monkeyp
     assert status == 0
     whole = et.TraceResult.load(tmp_path / "whole.h5")
     assert whole.complete
-    assert whole.ledger == et.trace(et.Scene(**SCENE), 2.3e6).ledger
+    assert whole.ledger == et.trace(et.Scene(**SCENE), 1.5e5).ledger
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "status", "text"),
     [
@@ -151,7 +154,7 @@ def test_mistakes_are_found_before_any_ray_is_traced(
 ) -> None:
     monkeypatch.setattr(Rounds, "__next__", lambda _: pytest.fail("it began to trace"))
     before = set(tmp_path.iterdir())
-    found, out, err = run("trace", "lamp.toml", *arguments)
+    found, out, err = run("trace", "lamp.toml", "--rays", "1000", *arguments)
     assert found == status
     assert text in out + err
     assert set(tmp_path.iterdir()) == before
@@ -226,22 +229,35 @@ def test_several_observers_do_not_write_to_one_file(run: Run) -> None:
 # --- looking at the result of a trace --------------------------------------------------------------------------------
 
 
+KEEPERS = [{"name": "scatter", "kind": "scatter"}, {"name": "few", "kind": "scatter", "most": 500}]
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The lamp with two recorders of scattered light, traced."""
+    path = tmp_path_factory.mktemp("traced") / "r.h5"
+    et.trace(et.Scene(**{**SCENE, "detectors": [*SCENE["detectors"], *KEEPERS]}), 50_000, 3).save(path)
+    return path
+
+
 @pytest.fixture
-def traced(run: Run, tmp_path: Path) -> et.TraceResult:
-    """The lamp with two recorders of scattered light, traced by the program."""
-    kept = [{"name": "scatter", "kind": "scatter"}, {"name": "few", "kind": "scatter", "most": 500}]
-    et.Scene(**{**SCENE, "detectors": [*SCENE["detectors"], *kept]}).save(tmp_path / "lamp.toml")
-    status, out, _ = run("trace", "lamp.toml", "--rays", "50000", "--seed", "3", "-o", "r.h5")
-    assert status == 0
-    assert "scatter events, of 1 ray in" in out
+def traced(result: Path, tmp_path: Path) -> et.TraceResult:
+    """The same in the folder that the program works in."""
+    shutil.copy(result, tmp_path / "r.h5")
     return et.TraceResult.load(tmp_path / "r.h5")
+
+
+def test_how_many_scatter_events_are_kept_is_told(run: Run, tmp_path: Path) -> None:
+    et.Scene(**{**SCENE, "detectors": KEEPERS}).save(tmp_path / "lamp.toml")
+    outcome = run("trace", "lamp.toml", "--rays", "50000", "--seed", "3")
+    assert outcome.status == 0
+    assert "scatter events, of 1 ray in" in outcome.out
 
 
 VIEW = ["--observer", "60,190", "--distance", "90", "--target", "9,0,5", "--size", "10,8", "--pixels", "5,4"]
 EYE, GRID = et.Observer(60, 190, 90, target=(9, 0, 5)), et.Screen(10, 8, 5, 4)
 
 
-@pytest.mark.slow
 def test_luminance_of_scatter_events(run: Run, traced: et.TraceResult, tmp_path: Path) -> None:
     status, out, _ = run("luminance", "r.h5", "--detector", "scatter", *VIEW, "-o", "a.npz", "--json")
     assert status == 0
