@@ -69,17 +69,19 @@ console.log(JSON.stringify(found));
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SURFACES)
-def test_pixels_are_those_of_the_cores_map(modules: Path, name: str) -> None:
+def test_pixels_are_those_of_the_cores_map(modules: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Value within the bound that the page states, error within that of its steps, on every surface, edges among them.
 
     No part of the surfaces is thinner than two pixels here: of those that are the core adds up the light over their outline.
     """
+    # What a screen misses is told by rays that are drawn for each, and is not looked at here.
+    monkeypatch.setattr("etendue.luminance.estimate._with_missed", lambda _, maps: maps)
     field = make_field(SURFACES[name], seed=8)
     tables = FieldTables.of(field)
     columns, rows = 12, 8
     views = [
         *page_views(count=8, columns=columns, rows=rows, seed=9, closer=6.0),
-        *page_views(count=24, columns=columns, rows=rows, seed=10, closer=30.0),
+        *page_views(count=16, columns=columns, rows=rows, seed=10, closer=30.0),
     ]
     data = {"field": tables.packed(), "views": [v.page for v in views], "columns": columns, "rows": rows}
     found = np.array(run(modules, READ, data)).reshape(len(views), rows, columns, 2)
