@@ -23,12 +23,12 @@ def work():
     k[:, 2] = np.abs(k[:, 2])
     k /= np.linalg.norm(k, axis=1)[:, None]
     rays = et.RaySet(np.column_stack([rng.random((20_000, 2)), np.zeros(20_000)]), k, np.ones(20_000))
-    field = et.LightField.fit(rays, et.Plane(z=0, width=1, height=1, centre=(0.5, 0.5)), depths=(4, 4, 4, 4))
-    seen = et.luminance_map(field, et.Observer(10, 20, 500), et.Screen(2, 2, 40, 40)).values
-    grid = PolarGrid("cosines", np.linspace(0, 2, 9), np.arange(0.0, 360.0, 30.0))
+    field = et.LightField.fit(rays, et.Plane(z=0, width=1, height=1, centre=(0.5, 0.5)), depths=(3, 3, 3, 3))
+    seen = et.luminance_map(field, et.Observer(10, 20, 500), et.Screen(2, 2, 16, 16)).values
+    grid = PolarGrid("cosines", np.linspace(0, 2, 5), np.arange(0.0, 360.0, 60.0))
     slices = [
         BsdfSlice(direction(theta, phi), np.full(grid.shape, 0.1 + phi / 1e4), grid=grid)
-        for theta in (10.0, 60.0) for phi in np.arange(0.0, 360.0, 30.0)
+        for theta in (10.0, 60.0) for phi in np.arange(0.0, 360.0, 90.0)
     ]
     table = et.BsdfTable(BsdfData(slices, isotropic=False, mirrored=False))
     shared = table.reflectance(30.0, 45.0)
