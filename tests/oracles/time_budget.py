@@ -56,8 +56,6 @@ SLOW_EXAMPLES: frozenset[str] = frozenset(
         "etendue.plot.report_page.plot_report",
         "etendue.plot.report_page.report_html",
         "etendue.scatter.models.rough.RoughInterface",
-        "etendue.tracing.running.trace_rounds",
-        "etendue.tracing.work.TraceWork",
     }
 )
 """Docstrings whose examples are slow."""

@@ -188,7 +188,7 @@ def diagnose(
     --------
     >>> import etendue as et
     >>> from etendue.lightfield.surfaces import Disk
-    >>> rays = et.RingSource(rays=100_000)
+    >>> rays = et.RingSource(rays=20_000)
     >>> field = LightField.fit(rays, Disk(radius=30), depths=(4, 4, 2, 2))
     >>> diagnostics = diagnose(field, rays)
     >>> bool(diagnostics.lead > 0), len(diagnostics.spots), diagnostics.forecast.factor(0.5).value > 4

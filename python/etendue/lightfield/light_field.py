@@ -44,7 +44,7 @@ class LightField(EtendueDensity, InNotebook):
     Examples
     --------
     >>> import etendue as et
-    >>> field = et.LightField.fit(et.RingSource(rays=300_000), et.Disk(radius=30), depths=(4, 4, 3, 3))
+    >>> field = et.LightField.fit(et.RingSource(rays=100_000), et.Disk(radius=30), depths=(4, 4, 3, 3))
     >>> round(field.total_flux, 6)
     600.0
     >>> luminance, error = field.luminance([[0, 0, 0]], [[0, 0.6, 0.8]])
@@ -116,7 +116,7 @@ class LightField(EtendueDensity, InNotebook):
         Examples
         --------
         >>> import etendue as et
-        >>> field = et.LightField.fit(et.RingSource(rays=100_000), et.Disk(radius=30), depths=(4, 4, 3, 3))
+        >>> field = et.LightField.fit(et.RingSource(rays=30_000), et.Disk(radius=30), depths=(3, 3, 3, 3))
         >>> far = field.intensity()
         >>> round(far.flux, 6), bool(abs(far.at(0, 0) / (600 / 3.14159265) - 1) < 0.1)
         (600.0, True)

@@ -52,7 +52,7 @@ class TraceWork:
     --------
     >>> import etendue as et, pickle
     >>> lamp = {"kind": "point", "flux": 1}
-    >>> scene = et.Scene(sources=[lamp], detectors=[{"name": "far", "kind": "intensity"}])
+    >>> scene = et.Scene(sources=[lamp])
     >>> work = et.trace_work(scene, rays=2e6, seed=3)
     >>> there = pickle.loads(pickle.dumps(work))                   # in another process
     >>> last, first = there(1), work(0)
