@@ -372,15 +372,16 @@ def test_light_forwards_and_backwards_is_the_same(width: float) -> None:
         lobe = 0.5 / (2.0 * math.pi * width**2) * np.exp(-0.5 * np.sum(off * off, axis=-1) / width**2)
         return (0.2 / math.pi + lobe) * (1.0 + 0.3 * scattered[..., 0] - 0.2 * scattered[..., 1]) * 0.8
 
-    grid = PolarGrid("cosines", np.concatenate([[0.0], np.geomspace(0.01, 2.0, 60)]), np.arange(0.0, 360.0, 5.0))
+    grid = PolarGrid("cosines", np.concatenate([[0.0], np.geomspace(0.01, 2.0, 40)]), np.arange(0.0, 360.0, 10.0))
     slices = []
-    for theta in (0.0, 25.0, 50.0, 75.0):
-        for phi in (0.0,) if theta == 0.0 else np.arange(0.0, 360.0, 30.0):
+    for theta in (0.0, 35.0, 70.0):
+        for phi in (0.0,) if theta == 0.0 else np.arange(0.0, 360.0, 45.0):
             incident = direction(theta, phi)
             d = grid.directions(incident, transmitted=False)
             slices.append(BsdfSlice(incident, skewed(incident=incident, scattered=d), grid=grid))
     table = et.BsdfTable(BsdfData(slices, isotropic=False, mirrored=False))
-    forwards_and_backwards_agree(surfaces=two_walls({"kind": "bsdf", "bsdf": table, "axis": [0.3, 1.0, 0.2]}))
+    walls = two_walls({"kind": "bsdf", "bsdf": table, "axis": [0.3, 1.0, 0.2]})
+    forwards_and_backwards_agree(surfaces=walls, rays=600_000 if width < 0.1 else 200_000, lines=9000)
 
 
 def test_noise_below_nothing_is_told() -> None:
