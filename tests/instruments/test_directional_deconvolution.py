@@ -210,7 +210,7 @@ def test_what_is_mirrored_is_told_apart() -> None:
     """2 % under a lobe, which Richardson and Lucy alone take for a part of it; where there is none, none is told."""
     lobe = et.bsdf.Gaussian(peak=60.0, sigma=0.02, aspect=2.0)
     sample = et.bsdf.Mixture(parts=[lobe, FLOOR, et.bsdf.Mirror(reflectance=0.02)])
-    clean = et.ScatterGoniometer().measure_window(sample, THETA, 0.75, 6, turn=TURN, method="quadrature")
+    clean = et.ScatterGoniometer().measure_window(sample, THETA, 0.75, 4.5, turn=TURN, method="quadrature")
     scan = counted(scan=clean, peak=1e4, seed=1)
     exact = TurnedSample(sample, TURN).evaluate(scan.incident, scan.direction)
     alone = et.deconvolve_directions(scan, regular=False, replicates=0)

@@ -108,9 +108,9 @@ def test_the_quadrature_resolves_a_lobe_that_is_narrow_beside_the_instrument() -
     sigma = math.sin(math.radians(0.25)) / math.sqrt(2.0 * math.log(2.0))
     sample = et.bsdf.Gaussian(peak=0.92 / (2.0 * math.pi * sigma**2), sigma=sigma, way="transmitted")
     exact = goniometer.measure(sample, step=0.4, span=2, method="quadrature")
-    traced = goniometer.measure(sample, step=0.4, span=2, rays=1_000_000, seed=3, fresh=True)
+    traced = goniometer.measure(sample, step=0.4, span=2, rays=250_000, seed=3, fresh=True)
     assert (exact.flux > 1e-4).all()
-    error = np.sqrt(exact.flux * (1 - exact.flux) / 1_000_000)
+    error = np.sqrt(exact.flux * (1 - exact.flux) / 250_000)
     assert_agree(values=traced.flux, expected=exact.flux, standard_error=error)
 
 

@@ -125,10 +125,10 @@ def test_nothing_is_brighter_than_its_source(seed: int) -> None:
     scene = et.Scene(**random_system(seed))
     rng = np.random.default_rng(seed)
     brightest = 0.0
-    for k in range(4):
+    for k in range(3):
         theta, phi = np.degrees(np.arccos(rng.uniform(-0.5, 1))), rng.uniform(0, 360)
         seen = et.luminance_map(
-            scene, et.Observer(theta, phi, 60), et.Screen(18, 18, 24, 24), rays_per_pixel=64, seed=k + 1
+            scene, et.Observer(theta, phi, 60), et.Screen(18, 18, 24, 24), rays_per_pixel=32, seed=k + 1
         )
         over = seen.values / 1e6 - 1
         assert (over <= 1e-9 + 6 * seen.standard_error / 1e6).all()
@@ -138,7 +138,7 @@ def test_nothing_is_brighter_than_its_source(seed: int) -> None:
     toward = rng.normal(size=3)
     grid = {"kind": "illuminance", "width": 20, "height": 20, "columns": 8, "rows": 8, "at": -13 * toward /
             np.linalg.norm(toward), "toward": toward, "name": "grid"}  # fmt: skip
-    got = et.trace(scene.replace(detectors=[grid]), 2e5, seed + 1).illuminance["grid"]
+    got = et.trace(scene.replace(detectors=[grid]), 1e5, seed + 1).illuminance["grid"]
     known = got.standard_error > 0
     assert (got.values[known] / 1e6 <= math.pi + 6 * got.standard_error[known] / 1e6).all()
 

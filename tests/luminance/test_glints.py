@@ -85,7 +85,7 @@ def glass(kind: str) -> dict[str, Any]:
         "ball": {"shape": {"kind": "ball", "radius": 5}, "medium": {"index": 1.5}, "at": [1, 0.5, 10]},
         "torus": {"shape": {"kind": "torus", "major_radius": 5, "minor_radius": 2}, "medium": "PMMA", "at": [0, 1, 8]},
     }
-    lamp = {**LAMP, "shape": {"kind": "disk", "radius": 0.05}}
+    lamp = {**LAMP, "shape": {"kind": "disk", "radius": 0.08}}
     return {"sources": [{**lamp, "at": [4, 2, 30], "toward": [-0.1, -0.05, -1]}], "solids": [shapes[kind]]}
 
 
@@ -101,13 +101,13 @@ def test_glints_in_glass(kind: str) -> None:
     values = np.array([lmap.values for lmap in maps])
     error = np.array([lmap.standard_error for lmap in maps])
     mean = values.mean(axis=0)
-    # The brightest pixel, as a thousand times finer screens show it.
+    # The brightest pixel, as finer screens show it.
     row, column = (int(i) for i in np.unravel_index(np.argmax(mean), mean.shape))
     view = dict(screen.core_view(eye))
     width, height = view["width"] / 9, view["height"] / 7
     off = ((column + 0.5) * width - view["width"] / 2, view["height"] / 2 - (row + 0.5) * height)
     view["target"] = tuple(np.array(view["target"]) + np.array(view["right"]) * off[0] + np.array(view["up"]) * off[1])
-    view.update(width=width, height=height, columns=1024, rows=1024)
+    view.update(width=width, height=height, columns=600, rows=600)
     fine, *_ = _core.look_at_scene(core, view, 1, 5, MOST_EVENTS, "nothing", 0, 1)
     shown = fine[fine > 0]
     assert len(shown) > 20
@@ -153,7 +153,6 @@ def test_the_number_of_threads_does_not_matter() -> None:
 
     one = looked(1)
     assert any("lamps are small" in note for note in one.notes)
-    for threads in (2, 7):
-        found = looked(threads)
-        assert found.notes == one.notes
-        np.testing.assert_array_equal(found.values, one.values)
+    found = looked(7)
+    assert found.notes == one.notes
+    np.testing.assert_array_equal(found.values, one.values)

@@ -22,13 +22,13 @@ def furnace(body: str, times: int, radius: float) -> dict[str, Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("body", ROUND_BODIES)
-@pytest.mark.parametrize("times", [1, 2, 4])
+@pytest.mark.parametrize("times", [1, 4])
 @pytest.mark.parametrize("view", [(20, 30), (88, 200)])
 def test_every_pixel_of_a_smooth_mesh_shows_the_furnace(body: str, times: int, view: tuple[float, float]) -> None:
     """L ≡ 1 outside, so 1 in every pixel, rims seen at a grazing angle among them: without noise but for branches that are
     drawn by chance, which have errors."""
     observer, screen = et.Observer(*view, 60), et.Screen(21, 21, 24, 24)
-    lmap = et.luminance_map(et.Scene(**furnace(body, times, 100.0)), observer, screen, rays_per_pixel=64, seed=1)
+    lmap = et.luminance_map(et.Scene(**furnace(body, times, 100.0)), observer, screen, rays_per_pixel=32, seed=1)
     off, error = lmap.values / 1e6 - 1, lmap.standard_error / 1e6
     drawn = error > 1e-12
     assert np.abs(off[~drawn]).max() < 1e-9
@@ -44,7 +44,7 @@ def test_every_pixel_of_a_smooth_mesh_shows_the_furnace(body: str, times: int, v
 def test_a_clear_smooth_mesh_loses_no_light(body: str, times: int) -> None:
     """Forwards all of it gets out again, even what is totally reflected more than a thousand times."""
     scene = et.Scene(**furnace(body, times, 15.0))
-    ledger = et.trace(scene, rays=5e5, seed=1).ledger
+    ledger = et.trace(scene, rays=2e5, seed=1).ledger
     assert ledger.terminated.rays == 0
     assert not ledger.lost
     assert ledger.escaped.flux == pytest.approx(4 * (math.pi * 15) ** 2, rel=1e-12)

@@ -19,7 +19,7 @@ from oracles.cone import plain_statement
 def cloud() -> et.RaySet:
     """Rays of unequal flux from a lopsided cloud: most head upwards, one in five anywhere, some start far away."""
     rng = np.random.default_rng(8)
-    n = 300_000
+    n = 100_000
     position = rng.normal((1.0, -2.0, 0.5), (3.0, 2.0, 0.7), (n, 3))
     direction = rng.normal((0.3, 0.2, 1.0), (0.4, 0.3, 0.3), (n, 3))
     direction[::5] = rng.normal(size=(n // 5, 3))
@@ -48,7 +48,7 @@ OBSERVERS = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize("plane", ["view", "xy"])
-@pytest.mark.parametrize(("acceptance", "lit"), [(0.1, 4), (1.5, 10), (30.0, 16)])
+@pytest.mark.parametrize(("acceptance", "lit"), [(0.2, 4), (1.5, 10), (30.0, 16)])
 def test_counts_the_same_rays_for_every_observer(
     cloud: et.RaySet, index: et.RayIndex, acceptance: float, lit: int, plane: str
 ) -> None:

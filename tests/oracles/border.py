@@ -47,6 +47,15 @@ def _sag(shape: dict[str, Any], r: Array) -> Array:
     return z
 
 
+def _roots(a: float, b: float, c: float) -> list[float]:
+    """Real ones of a t² + b t + c, the smaller from the product of both."""
+    square = b * b - 4 * a * c
+    if square < 0:
+        return []
+    q = -(b + math.copysign(math.sqrt(square), b)) / 2
+    return [q / a] * (a != 0) + [c / q] * (q != 0)
+
+
 def _surface_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
     """(t, unit normal) where the line o + t d meets a shape, in its own coordinates."""
     found: list[tuple[float, Array]] = []
@@ -60,14 +69,13 @@ def _surface_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float
             w = np.array([shape["r2"], shape["r2"], shape["z2"]])
             linear = np.array([0.0, 0.0, shape["z1"]])
             a, b, c = w @ (d * d), 2 * (w @ (o * d)) + linear @ d, w @ (o * o) + linear @ o + shape["z0"]
-            for t in np.roots([a, b, c]):
-                if abs(t.imag) < 1e-9 * max(1, abs(t)):
-                    p = o + t.real * d
-                    low, high = shape["r"]
-                    r = math.hypot(p[0], p[1])
-                    if shape["z"][0] <= p[2] <= shape["z"][1] and low <= r <= high:
-                        n = 2 * w * p + linear
-                        found.append((float(t.real), n / np.linalg.norm(n)))
+            for t in _roots(float(a), float(b), float(c)):
+                p = o + t * d
+                low, high = shape["r"]
+                r = math.hypot(p[0], p[1])
+                if shape["z"][0] <= p[2] <= shape["z"][1] and low <= r <= high:
+                    n = 2 * w * p + linear
+                    found.append((t, n / np.linalg.norm(n)))
         case "asphere":
             found = _asphere_hits(shape, o, d)
         case "torus":

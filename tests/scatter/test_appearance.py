@@ -167,7 +167,7 @@ def test_reflection_haze_of_a_lobe_by_rays() -> None:
 
 
 @pytest.mark.slow
-def test_errors_of_a_table_are_what_its_cells_bring_one_by_one() -> None:
+def test_errors_of_a_table_are_what_its_cells_bring_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each cell moved by its error, one after the other: the root of the sum of squares is the error of gloss.
 
     That of twelve drawn tables squared, over it, times 11, is χ² with 11 degrees of freedom; bounds at 10⁻⁴ on both sides.
@@ -191,8 +191,10 @@ def test_errors_of_a_table_are_what_its_cells_bring_one_by_one() -> None:
             square += (specular_gloss(table(moved, known=False), 60) - plain) ** 2
     looks = appearance(table(values, known=True))
     assert 1.14 < 11.0 * looks.errors["gloss 60"] ** 2 / square < 37.4
-    assert appearance(table(values, known=True)).errors == looks.errors
-    assert appearance(table(values, known=True), seed=2).errors != looks.errors
+    monkeypatch.setattr("etendue.scatter.appearance.DRAWS", 2)
+    few = appearance(table(values, known=True))
+    assert appearance(table(values, known=True)).errors == few.errors
+    assert appearance(table(values, known=True), seed=2).errors != few.errors
     assert appearance(table(values, known=False)).errors == {}
 
 

@@ -319,7 +319,7 @@ def deviations(*, files: int, n: int, rays: int) -> Iterator[tuple[float, float]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("files", "n", "rays"), [(400, 800, 14_000), (60, 400, 150_000)])
+@pytest.mark.parametrize(("files", "n", "rays"), [(200, 800, 14_000), (60, 400, 150_000)])
 def test_stated_errors_cover_the_truth_over_independent_files(files: int, n: int, rays: int) -> None:
     """12 copies of each ray, and 260 across batches, beside another source, through many scatters."""
     off, relative = np.array(list(deviations(files=files, n=n, rays=rays))).T

@@ -74,7 +74,7 @@ def assert_same(found: Array, error: Array, truth: Array, truth_error: Array | f
 def test_transmission_by_angle(azimuth: int) -> None:
     """L_out = T(θ, φ) L: the known table; no light where total reflection turns back every line."""
     table = TABLE[azimuth]
-    found, error = seen(endless(), [(theta, azimuth) for theta in table], lines=2048)
+    found, error = seen(endless(), [(theta, azimuth) for theta in table], lines=512)
     truth = np.array(list(table.values()))
     assert (found[truth == 0.0] == 0.0).all()
     assert_same(found, error, truth, 1e-3)
@@ -124,7 +124,7 @@ def test_gain_above_a_reflecting_plate() -> None:
     The plate is far enough from the prisms that they cast no pattern on it.
     """
     plate = {"kind": "lambertian", "reflectance": 0.9}
-    found, error = seen(endless(gap=3.0, finish=plate), [(0.0, 0.0)], lines=8192)
+    found, error = seen(endless(gap=3.0, finish=plate), [(0.0, 0.0)], lines=4096)
     straight, straight_error = seen(endless(), [(0.0, 0.0)], lines=2048)
     mean, mean_error = mean_transmission()
     again = 1.0 - 0.9 * (1.0 - mean)

@@ -18,10 +18,13 @@ from etendue.tracing.result import TraceResult
 from oracles.results import bits
 from oracles.verdicts import LARGEST_Z, assert_drawn_with
 
-BATCHES = 8
+BATCHES = 2
 """Batches of a round here: with fewer than usual a trace of several rounds is short."""
 
 ONE_ROUND = BATCHES * _core.batch_size()
+
+MOST = 2_280
+"""Events kept: so few that they are thinned once more in the second round."""
 
 
 def luminaire(**more: Any) -> et.Scene:
@@ -45,7 +48,7 @@ def luminaire(**more: Any) -> et.Scene:
             {"name": "desk", "kind": "illuminance", "width": 40, "height": 30, "columns": 3, "rows": 2, "at": [0, 0, 30],
              "toward": [0, 0, -1]},
             {"name": "eye", "kind": "image", "observer": "side"},
-            {"name": "scatter", "kind": "scatter", "most": 64_000},
+            {"name": "scatter", "kind": "scatter", "most": MOST},
         ],
         "observers": [{"name": "side", "theta": 80, "phi": 190, "distance": 200, "target": [9, 0, 5], "screen": screen}],
     }  # fmt: skip

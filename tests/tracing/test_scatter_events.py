@@ -203,7 +203,7 @@ def test_rays_as_a_source_are_counted_once() -> None:
     # Behind the lamp a second one, that shines up.
     lamps = [led, {**led, "name": "up", "toward": [-0.3, -0.1, 1], "at": [2.1, 3.1, 14.5]}]
     shell = {"name": "all", "kind": "rays", "shape": {"kind": "sphere", "radius": 6}, "at": [2, 3, 14]}
-    caught = et.trace(et.Scene(**corner(sources=lamps, surfaces=[], detectors=[shell])), 12_000, 2)
+    caught = et.trace(et.Scene(**corner(sources=lamps, surfaces=[], detectors=[shell])), 5_000, 2)
     source = {"name": "file", "kind": "rays", "rays": caught.rays.only}
     events = et.trace(et.Scene(**corner(sources=[source])), None, 3).events.only
     black = [{**surface, "finish": "absorber"} for surface in corner()["surfaces"]]
