@@ -115,7 +115,6 @@ PAPER = {
 }
 
 
-@pytest.mark.slow
 def test_a_lit_paper_is_the_same_both_ways() -> None:
     """Connections and lines of sight by chance against rays forwards."""
     forwards_and_backwards_agree(surfaces=[PAPER], lamp=lamp(spin=30), rays=300_000)
