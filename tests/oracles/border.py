@@ -53,7 +53,7 @@ def _roots(a: float, b: float, c: float) -> list[float]:
     if square < 0:
         return []
     q = -(b + math.copysign(math.sqrt(square), b)) / 2
-    return [q / a] * (a != 0) + [c / q] * (q != 0)
+    return ([q / a] if a != 0 else []) + ([c / q] if q != 0 else [])
 
 
 def _surface_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
