@@ -108,9 +108,11 @@ def trace(
     for path in outputs:
         check_folder(path)
     scene = Scene.load(file)
+    # Mistakes are told before any ray is traced, and the nodes of far fields are chosen by rays.
+    _writers(outputs, [(own.name or f"detectors[{i}]", own.DETECTION.KIND) for i, own in enumerate(scene.detectors)])
     started = None if resume is None else TraceResult.load(resume)
     rounds = trace_rounds(scene, rays, seed, until=until, most_events=most_events, threads=threads, resume=started)
-    writers = _writers(outputs, rounds.plan)
+    writers = _writers(outputs, [(own.name, own.KIND) for own in rounds.plan.detections])
     require_apart([file, *scene.read_files()], [*outputs, *(path for path, _, _ in writers)])
     result: TraceResult | None = started
     interrupted = False
@@ -168,8 +170,10 @@ def _how_to_go_on(outputs: list[Path]) -> str:
     return f"to go on: {shlex.join(['etendue', *kept, '--resume', str(results[0])])}"
 
 
-def _writers(outputs: list[Path], plan: Plan) -> list[tuple[Path, str, Write]]:
+def _writers(outputs: list[Path], detectors: list[tuple[str, str]]) -> list[tuple[Path, str, Write]]:
     """What is to be written where: path, detector, writer; the path with the detector's name filled in.
+
+    Detectors are given by their names and kinds.
 
     Raises
     ------
@@ -185,13 +189,13 @@ def _writers(outputs: list[Path], plan: Plan) -> list[tuple[Path, str, Write]]:
         if not kinds:
             known = sorted({e for extensions, _ in OUTPUTS.values() for e in extensions} | set(RESULT_EXTENSIONS))
             raise ArgumentError(f"{path}: the extension {path.suffix!r} is none of the known ones: {', '.join(known)}.")
-        fitting = [d for d in plan.detections if d.KIND in kinds]
+        fitting = [(name, kind) for name, kind in detectors if kind in kinds]
         if not fitting:
             raise ArgumentError(f"{path}: the scene has no detector of the kind {' or '.join(kinds)}.")
         if len(fitting) > 1 and "{detector}" not in path.name:
-            names = ", ".join(d.name for d in fitting)
+            names = ", ".join(name for name, _ in fitting)
             raise ArgumentError(f"{path}: {names} would all be written here; put {{detector}} into its name.")
-        found += [(_named(path, d.name), d.name, OUTPUTS[d.KIND][1]) for d in fitting]
+        found += [(_named(path, name), name, OUTPUTS[kind][1]) for name, kind in fitting]
     _require_apart(found)
     return found
 
