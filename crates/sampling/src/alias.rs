@@ -87,7 +87,7 @@ impl Alias {
         &self.slots
     }
 
-    /// The number of the slot that a uniform number in (0, 1) falls into, and that and how far into it.
+    /// The number of the slot that a uniform number in (0, 1) falls into, and the same with how far into it the number falls.
     #[inline]
     #[must_use]
     #[allow(

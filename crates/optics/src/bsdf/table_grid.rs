@@ -429,7 +429,7 @@ impl Grid {
         })
     }
 
-    /// A place in the table of nodes, that and how far into it a number falls, and what it holds.
+    /// A place in the table of nodes, the same with how far into it the number falls, and what it holds.
     #[inline]
     pub(super) fn slot(&self, number: f64) -> (u32, f64, Slot) {
         // Without any, the first node takes all.

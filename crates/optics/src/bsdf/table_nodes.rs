@@ -13,7 +13,7 @@ pub(super) struct Nodes {
     /// Of the slice how many radial coordinates and azimuths there are.
     radii: Lanes<f64>,
     pub azimuths: Lanes<f64>,
-    /// Of its alias table: a place, that and how far into it, and what it holds.
+    /// Of its alias table: a place, the same with how far into it the number falls, and what it holds.
     slot: Lanes<u32>,
     scaled: Lanes<f64>,
     chance: Lanes<u32>,

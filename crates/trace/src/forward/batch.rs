@@ -338,8 +338,8 @@ impl<'a> BatchTrace<'a> {
             ..
         } = &mut self.block;
         let (rays, scattered, absorbed) = (&mut self.sheet_rays, &mut self.scattered_rays, &mut self.fluxes);
-        let all_known = wavelength.is_some_and(|all| media.around(scene, all).is_some());
-        if !all_known {
+        let same = wavelength.and_then(|all| media.around(scene, all));
+        if same.is_none() {
             self.known.clear();
             for (k, i) in which.iter().enumerate() {
                 let state = &states[now.who[*i as usize] as usize];
@@ -353,7 +353,7 @@ impl<'a> BatchTrace<'a> {
                 self.known.push(*i);
             }
         }
-        let known = if all_known { which } else { &self.known };
+        let known = if same.is_some() { which } else { &self.known };
         // Before it is known where and under which angle, unless somebody asks for that.
         let early = !wants.exitance;
         let (going, gone) = self
@@ -364,7 +364,7 @@ impl<'a> BatchTrace<'a> {
             gone.iter().map(|i| states[now.who[*i as usize] as usize].flux),
         );
         scattered.media.clear();
-        match wavelength.and_then(|all| media.around(scene, all)) {
+        match same {
             Some(all) => scattered.media.resize(going.len(), all),
             None => scattered.media.extend(going.iter().filter_map(|i| {
                 let state = &states[now.who[*i as usize] as usize];
