@@ -38,7 +38,7 @@ from timing import timed
 Array = npt.NDArray[np.float64]
 
 FLOOR, LOBE, SIGMA = 0.3, 0.4, 0.15
-ANGLES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 82.5)
+ANGLES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 66.5, 68.0, 70.0, 82.5)
 SAMPLES = 1_000_000
 FEW = 1000
 ROUNDS = 50

@@ -82,12 +82,13 @@ def test_a_single_azimuth_stands_for_all() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("theta", "bar"), [(0, 0.005), (10, 0.005), (30, 0.005), (50, 0.005), (60, 0.005), (70, 0.005), (82.5, 0.03)]
-)
-def test_shares_of_a_known_brdf(table: et.BsdfTable, theta: float, bar: float) -> None:
+def test_shares_of_a_known_brdf(table: et.BsdfTable) -> None:
     """pabopto2bsdf and bsdf2klems: up to 4 % off in between, 38 % at 82.5°."""
-    assert float(table.reflectance(theta)) == pytest.approx(quadrature(known, theta), rel=bar)
+    thetas = np.append(np.arange(0.0, 70.1, 2.5), [66.5, 82.5])
+    truth = np.array([quadrature(known, theta) for theta in thetas])
+    off = np.abs(table.reflectance(thetas) / truth - 1.0)
+    assert np.max(off[thetas <= 70.0]) < 0.004
+    assert off[-1] < 0.001
 
 
 def test_between_the_incidences_the_lobe_moves(table: et.BsdfTable) -> None:

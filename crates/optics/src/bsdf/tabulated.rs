@@ -5,7 +5,7 @@
 //! Lambertian floor apart from it; and the share of the flux of each.
 //!
 //! **In between.** At an angle of incidence between two slices both are moved with β₀ and added by their distance; the sum is
-//! scaled to the share there, a monotone cubic in β₀² through the shares of the slices `[Fritsch1984]`. Slices that are far
+//! scaled to the share there, a monotone cubic in β₀² through the shares of the slices `[Hyman1983]`. Slices that are far
 //! apart get others in between, ln f being linear in the angle of incidence. Beyond the first and the last angle the nearest
 //! slice moves on unchanged, and what leaves the unit circle of direction cosines is absorbed.
 //!
