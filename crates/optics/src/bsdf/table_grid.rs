@@ -34,16 +34,27 @@ pub(super) struct Grid {
     azimuths: usize,
     /// f, azimuth by azimuth, at each radial coordinate.
     f: Vec<f64>,
-    /// How many radial coordinates and azimuths there are.
-    size: [f64; 2],
-    /// Of `f`, by what each value contributes to the integral over the plane; None if that is 0.
-    nodes: Option<Alias>,
+    size: Size,
+    /// Of `f`, by what each value contributes to the integral over the plane; if that is 0, the first takes all. Of a slice whose
+    /// sides are alike one half and what both contribute.
+    nodes: Alias,
     /// For each radial coordinate.
     hats: Vec<Hat>,
     /// Of the radial coordinates, by the leading bits of a number: coordinates rise by ratios.
     first_below: Vec<u16>,
     /// Leading bits of the second radial coordinate.
     lowest: u64,
+}
+
+/// How many there are of what a slice draws from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size {
+    pub radii: f64,
+    pub azimuths: f64,
+    /// Places in the table of nodes.
+    pub places: f64,
+    /// Halves that the table stands for: 2 where both sides of the plane of incidence are alike.
+    pub halves: f64,
 }
 
 /// A slice with its integrals along each azimuth.
@@ -172,7 +183,7 @@ impl Slice {
         if radial.len() > usize::from(u16::MAX) {
             return Err("a slice has more than 65535 radial coordinates".into());
         }
-        if *azimuths == 0 || f.len() != azimuths * radial.len() {
+        if *azimuths == 0 || f.len() != azimuths * radial.len() || i32::try_from(f.len()).is_err() {
             return Err("values of a slice do not fit its grid".into());
         }
         if !f.iter().all(|value| value.is_finite() && *value >= 0.0) {
@@ -192,25 +203,19 @@ impl Slice {
         let on_all = |row: &[f64]| (0..all.len()).map(|i| row[i.min(row.len() - 1)]).collect::<Vec<f64>>();
         let f: Vec<f64> = f.chunks(radial.len()).flat_map(on_all).collect();
         let (hats, wholes): (Vec<Hat>, Vec<f64>) = (0..all.len()).map(|i| Hat::of(&all, i)).unzip();
-        let n = all.len();
-        let is_there = |node: usize| sines.is_none_or(|sines| reaches_in(&all, *azimuths, [node / n, node % n], sines));
-        let weight = |node: usize| {
-            if is_there(node) {
-                f[node] * wholes[node % n]
-            } else {
-                0.0
-            }
-        };
-        let weights: Vec<f64> = (0..f.len()).map(weight).collect();
-        let nodes = Alias::new(&weights);
-        let size = [all.len(), *azimuths];
+        let (nodes, halves) = nodes_of(&all, *azimuths, &f, &wholes, sines).ok_or("a slice has too many values")?;
         let lowest = all.get(1).map_or(0, |r| leading(*r));
         let first_above = |bits: u64| all.partition_point(|r| *r < f64::from_bits(bits << SHIFT));
         Ok(Grid {
             sine: self.sine,
             azimuths: *azimuths,
             f,
-            size: size.map(|n| n as f64),
+            size: Size {
+                radii: all.len() as f64,
+                azimuths: *azimuths as f64,
+                places: nodes.slots().len() as f64,
+                halves,
+            },
             nodes,
             hats,
             first_below: (lowest..=leading(END))
@@ -220,6 +225,32 @@ impl Slice {
             radial: all,
         })
     }
+}
+
+/// The table of the nodes of a slice by what they contribute, and the halves that it stands for; None: there are too many.
+fn nodes_of(
+    radial: &[f64],
+    azimuths: usize,
+    f: &[f64],
+    wholes: &[f64],
+    sines: Option<[f64; 2]>,
+) -> Option<(Alias, f64)> {
+    let n = radial.len();
+    let row = |j: usize| &f[j * n..(j + 1) * n];
+    let other_side = |j: usize| if j == 0 { 0 } else { azimuths - j };
+    let alike = azimuths > 2 && (1..=azimuths / 2).all(|j| row(j) == row(other_side(j)));
+    let drawn = if alike { azimuths / 2 + 1 } else { azimuths };
+    let weight = |node: usize| {
+        let [j, i] = [node / n, node % n];
+        if sines.is_some_and(|sines| !reaches_in(radial, azimuths, [j, i], sines)) {
+            return 0.0;
+        }
+        let times = if alike && other_side(j) != j { 2.0 } else { 1.0 };
+        times * f[node] * wholes[i]
+    };
+    let weights: Vec<f64> = (0..drawn * n).map(weight).collect();
+    let nodes = Alias::new(&weights).or_else(|| Alias::new(&[1.0]))?;
+    Some((nodes, if alike { 2.0 } else { 1.0 }))
 }
 
 /// Of two lists of radial coordinates that rise from 0 the finer one at each place, and the ends of both. All of both would be
@@ -358,6 +389,14 @@ fn moment(a: f64, b: f64, ga: f64, gb: f64, x: f64) -> f64 {
     h * (ga * a + h * (0.5 * (ga + slope * a) + h * slope / 3.0))
 }
 
+/// What is left of a number, less than 1, that one of so many halves is drawn by, and whether it is the second one.
+#[inline(always)]
+pub(super) fn half(number: f64, halves: f64) -> (f64, bool) {
+    let scaled = number * halves;
+    let other = scaled >= 1.0;
+    (scaled - f64::from(u8::from(other)), other)
+}
+
 impl Grid {
     /// The azimuth after one.
     #[inline]
@@ -423,29 +462,25 @@ impl Grid {
     #[inline]
     #[allow(clippy::cast_possible_truncation, reason = "a slice has fewer than 2^32 values")]
     pub(super) fn node(&self, number: f64) -> (u32, f64) {
-        self.nodes.as_ref().map_or((0, number), |nodes| {
-            let (node, rest) = nodes.pick_and_rest(number);
-            (node as u32, rest)
-        })
-    }
-
-    /// A place in the table of nodes, the same with how far into it the number falls, and what it holds.
-    #[inline]
-    pub(super) fn slot(&self, number: f64) -> (u32, f64, Slot) {
-        // Without any, the first node takes all.
-        const FIRST: Slot = Slot {
-            own: u32::MAX,
-            alias: 0,
+        let (node, rest) = self.nodes.pick_and_rest(number);
+        let (rest, other) = half(rest, self.size.halves);
+        let [n, azimuth] = [self.radial.len(), node / self.radial.len()];
+        let node = if other && azimuth > 0 {
+            node + (self.azimuths - 2 * azimuth) * n
+        } else {
+            node
         };
-        self.nodes.as_ref().map_or((0, number, FIRST), |nodes| {
-            let (slot, scaled) = nodes.place(number);
-            (slot, scaled, nodes.slots()[slot as usize])
-        })
+        (node as u32, rest)
     }
 
-    /// How many radial coordinates and azimuths there are.
-    #[inline]
-    pub(super) const fn size(&self) -> [f64; 2] {
+    /// What a place in the table of nodes holds.
+    #[inline(always)]
+    pub(super) fn slot(&self, place: u32) -> Slot {
+        self.nodes.slots()[place as usize]
+    }
+
+    #[inline(always)]
+    pub(super) const fn size(&self) -> Size {
         self.size
     }
 

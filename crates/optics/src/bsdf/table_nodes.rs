@@ -5,15 +5,18 @@ use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
 use super::table_arrivals::Arrivals;
+use super::table_grid::half;
 use super::table_lanes::{LANES, Lanes, TOGETHER, blocks};
 use super::table_lobes::Lobe;
 
 /// What slices draw for some rays. Those of the others mean nothing.
 pub(super) struct Nodes {
-    /// Of the slice how many radial coordinates and azimuths there are.
+    /// See `Size`.
     radii: Lanes<f64>,
     pub azimuths: Lanes<f64>,
-    /// Of its alias table: a place, the same with how far into it the number falls, and what it holds.
+    places: Lanes<f64>,
+    halves: Lanes<f64>,
+    /// Of the table of nodes: a place, the same with how far into it the number falls, and what it holds.
     slot: Lanes<u32>,
     scaled: Lanes<f64>,
     chance: Lanes<u32>,
@@ -38,6 +41,8 @@ impl Nodes {
         Self {
             radii: ZERO,
             azimuths: ZERO,
+            places: Lanes::of(1.0),
+            halves: Lanes::of(1.0),
             slot: Lanes::of(0),
             scaled: ZERO,
             chance: Lanes::of(0),
@@ -57,9 +62,14 @@ impl Nodes {
     pub fn draw(&mut self, lobe: &Lobe, arrivals: &Arrivals, n: usize, which: &[usize]) {
         for k in which.iter().copied() {
             let grid = lobe.slice(arrivals.slice[k] as usize);
-            let (place, scaled, slot) = grid.slot(arrivals.rest[k]);
-            [self.radii[k], self.azimuths[k]] = grid.size();
-            (self.slot[k], self.scaled[k]) = (place, scaled);
+            let size = grid.size();
+            (self.radii[k], self.azimuths[k]) = (size.radii, size.azimuths);
+            (self.places[k], self.halves[k]) = (size.places, size.halves);
+        }
+        places(self, &arrivals.rest, n);
+        // Nothing else here: the processor waits for as many places as it can look ahead.
+        for k in which.iter().copied() {
+            let slot = lobe.slice(arrivals.slice[k] as usize).slot(self.slot[k]);
             (self.chance[k], self.alias[k]) = (slot.own, slot.alias);
         }
         nodes(self, n);
@@ -79,6 +89,26 @@ impl Nodes {
     }
 }
 
+/// Places in the alias tables of the slices, by a random number.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "fewer than 2^31 places"
+)]
+fn places(all: &mut Nodes, number: &Lanes<f64>, count: usize) {
+    for b in blocks(count) {
+        let (number, places) = (&number.0[b], &all.places.0[b]);
+        let (mut slot, mut scaled) = ([0; LANES], [0.0; LANES]);
+        for k in 0..LANES {
+            scaled[k] = number[k] * places[k];
+            let last = places[k] - 1.0;
+            slot[k] = (if scaled[k] < last { scaled[k] } else { last }) as i32 as u32;
+        }
+        (all.slot.0[b], all.scaled.0[b]) = (slot, scaled);
+    }
+}
+
 /// Nodes of the slices.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 #[allow(
@@ -90,6 +120,7 @@ fn nodes(all: &mut Nodes, count: usize) {
     for b in blocks(count) {
         let (radii, slot, scaled) = (&all.radii.0[b], &all.slot.0[b], &all.scaled.0[b]);
         let (chance, alias) = (&all.chance.0[b], &all.alias.0[b]);
+        let (azimuths, halves) = (&all.azimuths.0[b], &all.halves.0[b]);
         let (mut azimuth, mut radius, mut part) = ([0.0; LANES], [0; LANES], [0.0; LANES]);
         for k in 0..LANES {
             let within = scaled[k] - f64::from(slot[k]);
@@ -100,11 +131,14 @@ fn nodes(all: &mut Nodes, count: usize) {
             } else {
                 (within - chance, 1.0 - chance)
             };
-            part[k] = part_of(left, share);
+            let (rest, other) = half(part_of(left, share), halves[k]);
+            part[k] = rest;
             let node = f64::from(if own { slot[k] } else { alias[k] });
             // A division of whole numbers: the nearest one to what lies half a step from its next.
-            azimuth[k] = whole((node + 0.5) / radii[k] - 0.5);
-            radius[k] = (node - azimuth[k] * radii[k]) as i32 as u32;
+            let turned = whole((node + 0.5) / radii[k] - 0.5);
+            radius[k] = (node - turned * radii[k]) as i32 as u32;
+            let mirrored = other & (turned > 0.0);
+            azimuth[k] = if mirrored { azimuths[k] - turned } else { turned };
         }
         (all.azimuth.0[b], all.radius.0[b], all.part.0[b]) = (azimuth, radius, part);
     }

@@ -340,23 +340,27 @@ impl super::contract::Examples for Tabulated {
         use super::table_grid::Slice;
         use super::table_lobes::Row;
 
-        let lobe = |width: f64, skew: f64, sine: f64, share: f64, floor: f64| {
+        let slice = |azimuths: usize, width: f64, [skew, aside]: [f64; 2], sine: f64, [share, floor]: [f64; 2]| {
             let radial: Vec<f64> = (0..24).map(|i| 2.0 * (f64::from(i) / 23.0).powi(2)).collect();
-            let azimuths = 12;
             let mut f = Vec::new();
             for j in 0..azimuths {
-                let turn = f64::from(j) / f64::from(azimuths);
-                let stretch = 1.0 + skew * (TAU * turn).cos() + 0.5 * skew * (TAU * turn).sin();
+                // Those of both sides have the same bits.
+                let turn = j.min(azimuths - j) as f64 / azimuths as f64;
+                let side = if 2 * j < azimuths { aside } else { -aside };
+                let stretch = 1.0 + skew * (TAU * turn).cos() + side * (TAU * turn).sin();
                 f.extend(radial.iter().map(|r| (-0.5 * (r / (width * stretch)).powi(2)).exp()));
             }
             Slice {
                 sine,
                 radial,
-                azimuths: 12,
+                azimuths,
                 f,
                 share,
                 floor,
             }
+        };
+        let lobe = |width: f64, skew: f64, sine: f64, share: f64, floor: f64| {
+            slice(12, width, [skew, 0.5 * skew], sine, [share, floor])
         };
         let row = |azimuth: f64, k: f64| Row {
             azimuth,
@@ -387,9 +391,19 @@ impl super::contract::Examples for Tabulated {
                 (600.0, [Some(faint.clone()), Some(faint.clone())]),
             ],
         };
+        // Alike on both sides of the plane of incidence, with an azimuth opposite to the first and without.
+        let alike = |azimuths: usize| Way {
+            rows: vec![Row {
+                azimuth: 0.0,
+                slices: [(0.4, 0.0, 0.5), (0.3, 0.6, 0.6), (0.5, 0.95, 0.4)]
+                    .map(|(width, sine, share)| slice(azimuths, width, [0.4, 0.0], sine, [share, 0.1]))
+                    .to_vec(),
+            }],
+        };
         let both = side([Some(turned), Some(faint)]);
         let one = side([Some(isotropic), None]);
-        [(&one, &one), (&both, &one), (&coloured, &both)]
+        let [even, odd] = [14, 9].map(|azimuths| side([Some(alike(azimuths)), None]));
+        [(&one, &one), (&both, &one), (&coloured, &both), (&even, &odd)]
             .map(|(a, b)| Self::new(a, b).expect("sound"))
             .to_vec()
     }
