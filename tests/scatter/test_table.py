@@ -88,7 +88,7 @@ def test_shares_of_a_known_brdf(table: et.BsdfTable) -> None:
     truth = np.array([quadrature(known, theta) for theta in thetas])
     off = np.abs(table.reflectance(thetas) / truth - 1.0)
     assert np.max(off[thetas <= 70.0]) < 0.004
-    assert off[-1] < 0.001
+    assert off[-1] < 0.006
 
 
 def test_between_the_incidences_the_lobe_moves(table: et.BsdfTable) -> None:
@@ -157,7 +157,7 @@ def test_a_slice_without_a_diffuse_part_has_neighbours_without() -> None:
     """0.6 is Lambertian at 0°, 20° and 60°; at 40° all lies within a cone, and then no floor is taken out of any."""
     slices = holed(beyond=0.3).data.slices
     lobes = lobes_of(slices, [one.integral() for one in slices], isotropic=True, mirrored=False)[0.0]
-    assert [lobe.floor for lobe in lobes] == [0.0, 0.0, 0.0, 0.0]
+    assert [lobe.floor for lobe in lobes] == [0.0] * 5
 
 
 @pytest.mark.parametrize("wide", [10.0, 30.0, 72.0, 150.0])
@@ -227,9 +227,9 @@ def test_what_radiates_more_than_it_receives_is_refused_with_the_angle() -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.5, 0.95])
-def test_below_the_first_incidence_the_lobe_keeps_shape_and_share(share: float) -> None:
+def test_a_single_incidence_stands_for_all_with_its_share(share: float) -> None:
     """A round Gaussian of σ = 0.15 at 60° alone, a fifth of which is cut by the horizon: at 0° it is share / (2π σ²) at its
-    peak, and round; it is cut at 75° as the function is, whose share is a quadrature."""
+    peak, and round; at 75° what the horizon leaves of it has the same share, and f grows as the quadratures of both say."""
 
     def lobe(*, incident: Array, scattered: Array) -> Array:
         off = incident[..., :2] + scattered[..., :2]
@@ -238,9 +238,10 @@ def test_below_the_first_incidence_the_lobe_keeps_shape_and_share(share: float) 
     grid = PolarGrid("cosines", np.append(0.0, np.geomspace(0.005, 2.0, 120)), np.array([0.0]))
     values = share / quadrature(lobe, 60.0) * np.exp(-0.5 * (grid.radial / SIGMA) ** 2)
     table = et.BsdfTable(BsdfData([BsdfSlice(direction(60.0, 180.0), values[None], grid=grid)]))
-    assert table.reflectance([0.0, 10.0, 40.0, 60.0]) == pytest.approx(share, rel=2e-3)
-    assert float(table.reflectance(75.0)) == pytest.approx(
-        share * quadrature(lobe, 75.0) / quadrature(lobe, 60.0), rel=0.01
+    assert table.reflectance([0.0, 10.0, 40.0, 60.0, 75.0, 89.0]) == pytest.approx(share, rel=2e-3)
+    mirrored = direction(75.0, 0.0)
+    assert float(table.evaluate(direction(75.0, 180.0), mirrored)) == pytest.approx(
+        share / quadrature(lobe, 75.0), rel=0.01
     )
     off = np.array([0.0, 0.1, 0.2, 0.3])
     peak = share / (2.0 * math.pi * SIGMA**2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -13,7 +14,7 @@ from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH
 from etendue.scatter.building import built
-from etendue.scatter.members import Record, members_of
+from etendue.scatter.members import Record, leaving, members_of
 
 Array = npt.NDArray[np.float64]
 
@@ -82,17 +83,15 @@ def balanced(data: BsdfData, shares: Sequence[float]) -> tuple[list[Record] | No
     if found != list(shares):
         records = members_of(data, found)
         members = [built(record) for record in records]
+    if (beyond := _beyond(data, members)) < 1.0 - CLOSE:
+        records = members_of(data, found, beyond)
+        members = [built(record) for record in records]
     total, place = max(_everywhere(data, members))
     _refuse(total, place)
     if total > 1.0 + CLOSE:
         scaled = f"{total:.6g} of the light leaves in all; everything is scaled by {1.0 / total:.6g}"
         complaints.setdefault(f"{place}, left", Complaint("warning", place, scaled))
     return records, 1.0 / max(total, 1.0), list(complaints.values())
-
-
-def _leaving(members: Sequence[_core.Bsdf], incident: Array, wavelength: float) -> Array:
-    """Share of light from directions of shape (n, 3) that does not stay, shape (n,)."""
-    return sum((one.shares(incident, (wavelength, 1.0, 1.0)).sum(axis=1) for one in members), np.zeros(len(incident)))
 
 
 def _at(one: BsdfSlice, data: BsdfData, members: Sequence[_core.Bsdf]) -> Iterator[tuple[float, float, float]]:
@@ -102,8 +101,24 @@ def _at(one: BsdfSlice, data: BsdfData, members: Sequence[_core.Bsdf]) -> Iterat
     sides = (False, True) if data.both_sides else (not one.front,)
     incident = np.concatenate([direction(one.theta, azimuths, behind=behind) for behind in sides])
     for wavelength in data.wavelengths or (WAVELENGTH,) if one.wavelength is None else (one.wavelength,):
-        scattered, other = (_leaving(part, incident, wavelength) for part in (members[n:], members[:n]))
+        scattered, other = (leaving(part, incident, wavelength) for part in (members[n:], members[:n]))
         yield float(scattered.max()), float(other.max()), wavelength
+
+
+def _beyond(data: BsdfData, members: Sequence[_core.Bsdf]) -> float:
+    """The part of what slices scatter beyond their last incidence that components leave room for."""
+    n, last = len(data.components), max((one.theta for one in data.slices), default=90.0)
+    if not n:
+        return 1.0
+    theta = np.arange(90.0, last, -STEP)
+    part = 1.0
+    for wavelength in data.wavelengths or (WAVELENGTH,):
+        for azimuth, behind in itertools.product(AROUND, (False, True)):
+            incident = direction(theta, azimuth, behind=behind)
+            scattered, other = (leaving(some, incident, wavelength) for some in (members[n:], members[:n]))
+            there = scattered > 0.0
+            part = min([part, *np.maximum(1.0 - other[there], 0.0) / scattered[there]])
+    return part
 
 
 def _everywhere(data: BsdfData, members: Sequence[_core.Bsdf]) -> Iterator[tuple[float, str]]:
@@ -117,7 +132,7 @@ def _everywhere(data: BsdfData, members: Sequence[_core.Bsdf]) -> Iterator[tuple
     incident = np.concatenate([direction(theta, phi, behind=behind) for behind in (False, True)])
     spectrum = [VISIBLE, _nodes(data, "wavelength")] if data.components else []
     for wavelength in np.unique(np.concatenate([data.wavelengths or [WAVELENGTH], *spectrum])):
-        found = _leaving(members, incident, float(wavelength))
+        found = leaving(members, incident, float(wavelength))
         most = int(np.argmax(found))
         yield float(found[most]), _place(data, theta[most % len(theta)], float(wavelength))
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from etendue.description.files import Files
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
-from etendue.scatter.bsdf import WAVELENGTH
-from etendue.scatter.models import MODELS
-from etendue.scatter.resampling import lobes_of
+import numpy as np
+import numpy.typing as npt
 
+from etendue import _core
+from etendue.description.files import Files
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
+from etendue.scatter.bsdf import WAVELENGTH
+from etendue.scatter.building import built
+from etendue.scatter.models import MODELS
+from etendue.scatter.resampling import Rest, lobes_of
+
+Array = npt.NDArray[np.float64]
 Record = dict[str, Any]
 Rows = list[Record]
 
@@ -60,7 +67,7 @@ def components_of(data: BsdfData) -> list[Record]:
     return [MODELS[part["kind"]](**part).record(Files()) for part in map(dict, data.components)]
 
 
-def members_of(data: BsdfData, shares: Sequence[float]) -> list[Record]:
+def members_of(data: BsdfData, shares: Sequence[float], beyond: float = 1.0) -> list[Record]:
     """Records of what adds up to a BSDF: one for each component; and one for the slices, or one for each way.
 
     The core interpolates between wavelengths with both ways together. Where they are not known at the same, each way has a
@@ -72,6 +79,8 @@ def members_of(data: BsdfData, shares: Sequence[float]) -> list[Record]:
         Of any kind.
     shares : sequence of float
         Of the flux that each slice scatters.
+    beyond : float
+        Part of what would be scattered beyond the last incidence that is scattered.
 
     Examples
     --------
@@ -83,7 +92,8 @@ def members_of(data: BsdfData, shares: Sequence[float]) -> list[Record]:
     sides = [[pair for pair in known if pair[0].front is front] for front in (True, False)]
     if data.both_sides:
         sides = [sides[0] or sides[1]]
-    ways = [[_by_wavelength(side, data, transmitted=way) for side in sides] for way in (False, True)]
+    rests = _rests(known, found, data, beyond)
+    ways = [[_by_wavelength(side, data, transmitted=way, rest=rests[way]) for side in sides] for way in (False, True)]
     there = [way for way in ways if any(way)]
     if len(there) == 2 and not any(a and b and a.keys() != b.keys() for a, b in zip(*ways, strict=True)):
         return [*found, _table(*ways)]
@@ -91,20 +101,54 @@ def members_of(data: BsdfData, shares: Sequence[float]) -> list[Record]:
     return found + [_table(way, empty) if way is ways[0] else _table(empty, way) for way in there]
 
 
-def _by_wavelength(known: Known, data: BsdfData, *, transmitted: bool) -> dict[float, Rows]:
+def leaving(members: Sequence[_core.Bsdf], incident: Array, wavelength: float) -> Array:
+    """Share of light from directions of shape (n, 3) that leaves the members of a sum, shape (n,).
+
+    Examples
+    --------
+    >>> data = BsdfData(components=({"kind": "lambertian", "reflectance": 0.5}, {"kind": "mirror", "reflectance": 0.1}))
+    >>> members = [built(record) for record in components_of(data)]
+    >>> leaving(members, direction([0.0, 80.0], 0.0), 555.0).tolist()
+    [0.6, 0.6]
+    """
+    return sum((one.shares(incident, (wavelength, 1.0, 1.0)).sum(axis=1) for one in members), np.zeros(len(incident)))
+
+
+def _rests(known: Known, components: Sequence[Record], data: BsdfData, beyond: float) -> tuple[Rest, Rest]:
+    """Of reflected and transmitted light: what components leave, shared as at the last incidence."""
+    members = [built(part) for part in components]
+
+    def left(theta: Array) -> Array:
+        taken = np.zeros(len(theta))
+        for behind, azimuth, wavelength in itertools.product(
+            (False, True), (0.0, 90.0), data.wavelengths or (WAVELENGTH,)
+        ):
+            taken = np.maximum(taken, leaving(members, direction(theta, azimuth, behind=behind), wavelength))
+        return np.maximum(1.0 - taken, 0.0)
+
+    last = [
+        max([(0.0, 0.0), *((one.theta, share) for one, share in known if one.transmitted is way)])[1]
+        for way in (False, True)
+    ]
+    whole = sum(last)
+    back, through = (Rest(left, share / whole if whole > 0.0 else 1.0, beyond) for share in last)
+    return back, through
+
+
+def _by_wavelength(known: Known, data: BsdfData, *, transmitted: bool, rest: Rest) -> dict[float, Rows]:
     """The rows of one way of light that meets a side; slices of no wavelength hold at all, where no other says more."""
     way = [pair for pair in known if pair[0].transmitted is transmitted]
     of_all = [pair for pair in way if pair[0].wavelength is None]
     stated = sorted({one.wavelength for one, _ in way if one.wavelength is not None})
     if not stated:
-        return {WAVELENGTH: _rows(of_all, data)} if of_all else {}
-    return {at: _rows([pair for pair in way if pair[0].wavelength == at] + of_all, data) for at in stated}
+        return {WAVELENGTH: _rows(of_all, data, rest)} if of_all else {}
+    return {at: _rows([pair for pair in way if pair[0].wavelength == at] + of_all, data, rest) for at in stated}
 
 
-def _rows(known: Known, data: BsdfData) -> Rows:
+def _rows(known: Known, data: BsdfData, rest: Rest) -> Rows:
     slices, shares = zip(*known, strict=True)
     mirrored = data.isotropic and data.mirrored
-    rows = lobes_of(slices, shares, isotropic=data.isotropic, mirrored=mirrored)
+    rows = lobes_of(slices, shares, isotropic=data.isotropic, mirrored=mirrored, rest=rest)
     return [
         {"azimuth": phi / 360.0, "slices": [lobe.record() for lobe in lobes]} for phi, lobes in sorted(rows.items())
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,12 @@ FEW = 80
 
 LOW = 0.05
 """Part of the projected solid angle whose values do not decide what is diffuse: more than a hole in a measurement."""
+
+RIM = 1.0 - 1e-9
+"""Sine of an incidence beyond which there is none."""
+
+STEPS_TO_THE_RIM = 12
+"""Incidences beyond the last, if components leave more of one than of another."""
 
 STEPS = 4.0
 """Floors of neighbouring incidences differ by this factor at most."""
@@ -64,15 +70,48 @@ class Lobe:
         return {"sine": self.sine, "radial": self.radial, "f": self.f, "share": self.share, "floor": self.floor}
 
 
+def _all(theta: Array) -> Array:
+    return np.ones(len(theta))
+
+
+@dataclasses.dataclass(frozen=True)
+class Rest:
+    """What is left of the light for one way of scattering it.
+
+    Parameters
+    ----------
+    left : callable
+        What components leave, by angle of incidence [°].
+    most : float
+        Share of this that may be scattered.
+    part : float
+        Beyond the last incidence, of what would be scattered there: between the angles at which it is known a smooth curve
+        may rise above what is left.
+    """
+
+    left: Callable[[Array], Array] = _all
+    most: float = 1.0
+    part: float = 1.0
+
+
 def lobes_of(
-    slices: Sequence[BsdfSlice], shares: Sequence[float], *, isotropic: bool, mirrored: bool
+    slices: Sequence[BsdfSlice],
+    shares: Sequence[float],
+    *,
+    isotropic: bool,
+    mirrored: bool,
+    rest: Rest | None = None,
 ) -> dict[float, list[Lobe]]:
     """Slices of one way and one wavelength on the grid of the core: by azimuth of incidence [°], of rising incidence.
 
     Beyond the rim of the hemisphere, where a slice holds nothing and the lobe of a neighbouring incidence may reach, f goes
-    on in proportion to that of the slice before; that of the first to its mean over azimuths. Below the first incidence its
-    lobe keeps its share. Single points stand for what is nearest to them. If incidences are not known at the same azimuths,
-    f is interpolated between azimuths, turned with them.
+    on in proportion to that of the slice before; that of the first to its mean over azimuths. Single points stand for what
+    is nearest to them. If incidences are not known at the same azimuths, f is interpolated between azimuths, turned with
+    them.
+
+    Below the first incidence its lobe keeps its share; of an isotropic sample it becomes the mean over azimuths at the
+    normal. Beyond the last the lobe stays as it is, and its share of what components leave goes on as it does there, by no
+    more than between the last two incidences.
 
     Light along the normal comes from no azimuth. Unless the sample is isotropic, f stays where it is in the frame of the
     sample: there is a row at azimuth 0, from which the core takes such light to come, and if no slice is known there, the
@@ -88,6 +127,8 @@ def lobes_of(
         Whether the azimuth of incidence does not matter.
     mirrored : bool
         Whether both sides of the plane of incidence are made equal.
+    rest : Rest, optional
+        What else takes of the light, if anything does.
 
     Raises
     ------
@@ -137,8 +178,55 @@ def lobes_of(
             for (sine, whole, share), floor in zip(members, _floors(lows), strict=True)
         ]
         # Below the first incidence no more is scattered than there, though less of the lobe is cut by the horizon.
-        found[row] = lobes if lobes[0].sine == 0.0 else [dataclasses.replace(lobes[0], sine=0.0), *lobes]
+        first = [] if lobes[0].sine == 0.0 else [_at_the_normal(lobes[0], isotropic=isotropic)]
+        found[row] = [*first, *lobes, *_to_the_rim(lobes, rest or Rest())]
     return found
+
+
+def _at_the_normal(first: Lobe, *, isotropic: bool) -> Lobe:
+    """What stands for light along the normal where it is not known. That of an isotropic sample knows no azimuth."""
+    f = np.broadcast_to(first.f.mean(axis=0), first.f.shape) if isotropic else first.f
+    return dataclasses.replace(first, sine=0.0, f=np.ascontiguousarray(f))
+
+
+def _to_the_rim(lobes: Sequence[Lobe], rest: Rest) -> list[Lobe]:
+    """What stands for light beyond the last incidence: the last lobe.
+
+    Its share of what components leave goes on straight, over the square of the sine, as a parabola through the last three
+    leaves the last, if that is the way from the one before, and by no more than between these two. There are steps if what
+    components leave is not always the same.
+    """
+    last = lobes[-1]
+    if last.sine > RIM:
+        return []
+    thetas = np.linspace(np.degrees(np.arcsin(last.sine)), 90.0, STEPS_TO_THE_RIM + 1)
+    known = np.degrees(np.arcsin([one.sine for one in lobes[-3:]]))
+    left, left_there = rest.left(thetas), rest.left(known)
+    if np.ptp(left) == 0.0:
+        thetas, left = thetas[[0, -1]], left[[0, -1]]
+    x = np.sin(np.radians(known)) ** 2
+    y = np.array([one.share + one.floor for one in lobes[-3:]]) / np.maximum(left_there, np.finfo(np.float64).tiny)
+    beyond = np.sin(np.radians(thetas[1:])) ** 2 - x[-1]
+    change = np.zeros(len(beyond))
+    if len(x) > 1:
+        slopes = np.diff(y) / np.diff(x)
+        steepness = slopes[-1]
+        if len(x) > 2:
+            steepness += (x[2] - x[1]) * (slopes[1] - slopes[0]) / (x[2] - x[0])
+        step = y[-1] - y[-2]
+        change = np.clip(steepness * beyond, min(step, 0.0), max(step, 0.0))
+    shares = np.clip(y[-1] + change, 0.0, max(rest.most, 0.0)) * left[1:] * rest.part
+    # Without a lobe all of it is in the floor.
+    floors = (
+        shares
+        if last.share <= 0.0
+        else np.minimum(last.floor * left[1:] / max(left[0], np.finfo(np.float64).tiny), shares)
+    )
+    sines = np.append(np.sin(np.radians(thetas[1:-1])), 1.0)
+    return [
+        dataclasses.replace(last, sine=float(sine), share=float(share - floor), floor=float(floor))
+        for sine, share, floor in zip(sines, shares, floors, strict=True)
+    ]
 
 
 TURN = 10.0

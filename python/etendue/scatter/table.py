@@ -25,7 +25,7 @@ class BsdfTable(Bsdf):
     """A BSDF as a table of slices, with the components that a file describes by models.
 
     Between incidences the lobe moves with the specular direction and keeps its energy, below the first as well; beyond the
-    last it moves unchanged, and what leaves the hemisphere is absorbed: docs/scatter.md. Samples are exact.
+    last its share goes on as it does there: docs/scatter.md. Samples are exact.
 
     Parameters
     ----------

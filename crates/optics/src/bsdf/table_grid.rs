@@ -124,6 +124,10 @@ impl Slice {
         if self.azimuths != other.azimuths || self.radial.is_empty() || other.radial.is_empty() {
             return Vec::new();
         }
+        // A lobe that does not change needs nothing in between.
+        if self.radial == other.radial && self.f == other.f {
+            return Vec::new();
+        }
         let radial = finer(&self.radial, &other.radial);
         let [a, b] = [self, other].map(|slice| slice.on(&radial));
         let largest = a.iter().chain(&b).copied().fold(0.0, f64::max);

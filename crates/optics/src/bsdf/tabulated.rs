@@ -7,7 +7,8 @@
 //! **In between.** At an angle of incidence between two slices both are moved with β₀ and added by their distance; the sum is
 //! scaled to the share there, a monotone cubic in β₀² through the shares of the slices `[Hyman1983]`. Slices that are far
 //! apart get others in between, ln f being linear in the angle of incidence. Beyond the first and the last angle the nearest
-//! slice moves on unchanged, and what leaves the unit circle of direction cosines is absorbed.
+//! slice moves on unchanged, and what leaves the unit circle of direction cosines is absorbed; tables that reach from the normal
+//! to grazing incidence have nothing beyond.
 //!
 //! **Drawing** is exact: a slice by its share, a node of its grid by what it contributes, a point by the hats about that node in
 //! the plane of direction cosines, where area is projected solid angle; and again if the point lies outside the unit circle.
