@@ -48,7 +48,11 @@ def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) ->
     told = run("bsdf", "info", "pet.h5", "--json")
     facts = json.loads(told.out)
     assert [one["share"] for one in facts["tables"]] == pytest.approx([0.7, 0.7], abs=1e-3)
-    assert "10°" in run("bsdf", "info", "pet.h5").out
+    text = run("bsdf", "info", "pet.h5").out
+    assert "10°" in text
+    assert "at 45°, " in text
+    assert "at 60°*, " in text
+    assert text.count("* extrapolated from 50°") == 1
     drawn = run("bsdf", "plot", "pet.h5", "-o", "pet.png", "--incidence", "30", "--json")
     assert json.loads(drawn.out)["output"] == "pet.png"
     assert Path("pet.png").stat().st_size > 5000
@@ -56,7 +60,10 @@ def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) ->
     assert converted.status == 0, converted.err
     assert "pet.txt: 2 slices read from pet.h5" in converted.out
     assert Path("pet.txt").read_text().startswith("TracePro Surface Property Data")
-    gloss = json.loads(run("bsdf", "gloss", "pet.h5", "--json").out)
+    told = run("bsdf", "gloss", "pet.h5", "--json")
+    gloss = json.loads(told.out)
+    assert gloss["extrapolated"] == {"gloss 60": 50.0, "gloss 85": 50.0}
+    assert any("gloss 60 and gloss 85: beyond the last incidence, 50°" in one for one in gloss["complaints"])
     assert set(gloss["gloss"]) == {"20", "60", "85"}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.scatter.appearance import appearance
 
 Array = npt.NDArray[np.float64]
 
@@ -73,7 +74,7 @@ def test_what_would_rise_above_all_of_the_light_rises_to_it() -> None:
 
 
 def test_both_ways_leave_no_more_than_all_grazing_light() -> None:
-    """0.6 and 0.3 rose from 45° to 60°, and go on to 2/3 and 1/3."""
+    """0.6 and 0.3 rose from 45° to 60°; what is reflected goes on to 2/3, what is transmitted rises no further."""
     slices = [
         lobed(theta, share, way=way)
         for theta, shares in ((45.0, (0.4, 0.2)), (60.0, (0.6, 0.3)))
@@ -81,7 +82,7 @@ def test_both_ways_leave_no_more_than_all_grazing_light() -> None:
     ]
     table = et.BsdfTable(BsdfData(slices))
     assert float(table.reflectance(89.99)) == pytest.approx(2.0 / 3.0, abs=1e-4)
-    assert float(table.transmittance(89.99)) == pytest.approx(1.0 / 3.0, abs=1e-4)
+    assert float(table.transmittance(89.99)) == pytest.approx(0.3, abs=1e-4)
     thetas = np.linspace(60.0, 89.99, 40)
     assert (np.asarray(table.reflectance(thetas)) + np.asarray(table.transmittance(thetas))).max() <= 1.0
 
@@ -117,3 +118,23 @@ def test_an_isotropic_table_knows_no_azimuth_at_the_normal() -> None:
     f = table.evaluate([0.0, 0.0, 1.0], direction(30.0, np.arange(0.0, 360.0, 15.0)))
     assert f.min() > 0.0
     assert f == pytest.approx(np.full(24, f.mean()), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_what_is_extrapolated_is_told_and_has_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Known to 60° from the front, to 75° from the back: gloss at 85° is beyond both."""
+    monkeypatch.setattr("etendue.scatter.appearance.DRAWS", 2)
+    front, back = ([lobed(theta, 0.5) for theta in thetas] for thetas in ((0.0, 30.0, 60.0), (0.0, 40.0, 75.0)))
+    behind = [
+        BsdfSlice(one.incident * [1.0, 1.0, -1.0], one.values, grid=one.grid, standard_error=0.1 * one.values)
+        for one in back
+    ]
+    ahead = [BsdfSlice(one.incident, one.values, grid=one.grid, standard_error=0.1 * one.values) for one in front]
+    table = et.BsdfTable(BsdfData([*ahead, *behind], both_sides=False))
+    assert table.known_to() == 60.0
+    assert table.known_to(side="back") == 75.0
+    assert table.known_to(transmitted=True) == 90.0
+    found = appearance(table)
+    assert found.extrapolated == {"gloss 85": 60.0}
+    assert set(found.errors) == {"gloss 20", "gloss 60", "reflection haze", "distinctness"}
+    assert appearance(et.bsdf.Lambertian(reflectance=0.5)).extrapolated == {}

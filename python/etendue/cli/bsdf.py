@@ -58,8 +58,13 @@ def info(files: Files, json: Json = False) -> None:
     colour = f" at {WAVELENGTH:g} nm" if bsdf.wavelengths else ""
     for key in ("reflectance", "transmittance"):
         if max(facts[key]) > 0.0:
-            told = ", ".join(f"{share:.4f} at {angle:g}°" for angle, share in zip(ANGLES, facts[key], strict=True))
-            say(f"{key}{colour}: {told}")
+            last = facts["known_to"][key]
+            told = ", ".join(
+                f"{share:.4f} at {angle:g}°{'*' if angle > last else ''}"
+                for angle, share in zip(ANGLES, facts[key], strict=True)
+            )
+            beyond = f" (* extrapolated from {last:g}°)" if last < max(ANGLES) else ""
+            say(f"{key}{colour}: {told}{beyond}")
     say(f"reciprocity: f there and back differ by {facts['reciprocity']:.1%} on average")
 
 
@@ -97,6 +102,10 @@ def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
         "angles": list(ANGLES),
         "reflectance": bsdf.reflectance(angles).tolist(),
         "transmittance": bsdf.transmittance(angles).tolist(),
+        "known_to": {
+            key: bsdf.known_to(transmitted=transmitted)
+            for key, transmitted in (("reflectance", False), ("transmittance", True))
+        },
         "reciprocity": bsdf.irreciprocity(),
         "complaints": [str(complaint) for complaint in bsdf.complaints],
     }
@@ -167,6 +176,10 @@ def gloss(
         complaints.append("note: light comes from azimuth 180°; turned about its normal, the sample looks different")
     if bsdf.wavelengths:
         complaints.append(f"note: all numbers are those of light of {WAVELENGTH:g} nm, not weighted with V(λ)")
+    if found.extrapolated:
+        last = next(iter(found.extrapolated.values()))
+        beyond = f"beyond the last incidence, {last:g}°, and extrapolated: it may be off by a factor"
+        complaints.append(f"warning: {' and '.join(found.extrapolated)}: {beyond}")
     if json:
         facts = {**dataclasses.asdict(found), "file": files[0] if len(files) == 1 else files}
         print_json({**facts, "complaints": complaints})

@@ -201,6 +201,10 @@ def _shares(axes: Axes, bsdf: Bsdf, side: Side) -> None:
     for (label, values, line), colour in zip(curves, style.LINES, strict=False):
         if values.max() > 0.0:
             axes.plot(theta, values, line, color=colour, lw=1.2, label=label)
+    # Of reflected light, if there is any.
+    last = bsdf.known_to(side=side, transmitted=not bsdf.reflects)
+    if last < theta[-1]:
+        axes.axvspan(last, 90.0, color=style.RULE, alpha=0.5, lw=0, label="extrapolated")
     axes.set(
         xlim=(0, 90),
         ylim=(0, 1.02),

@@ -62,6 +62,16 @@ IMAGE_INCIDENCE = 30.0
 IMAGE_SOURCE = (0.44, 5.0)
 """Angle of incidence [°] of distinctness of image and of haze near it, and the source's image [°] [ASTME4302019]_."""
 
+INCIDENCES = {
+    **{f"gloss {angle}": float(angle) for angle in RECEPTORS},
+    "reflection haze": HAZE_INCIDENCE,
+    "distinctness": IMAGE_INCIDENCE,
+}
+"""Angles of incidence of what is made of reflected light [°]."""
+
+CLOSE = 0.5
+"""What a table may miss of them [°]: about what the source subtends."""
+
 IMAGE_RECEPTORS = {
     "specular": (Receptor(0.0, 0.4, 5.0),),
     "0.3": (Receptor(-0.3, 0.14, 5.0), Receptor(0.3, 0.14, 5.0)),
@@ -108,7 +118,10 @@ class Appearance:
         Distinctness of image [%]; None if nothing is reflected.
     errors : mapping of str to float
         Standard errors, of "gloss 20", "gloss 60", "gloss 85", "haze", "reflection haze" and "distinctness"; empty if those
-        of the BSDF are not known.
+        of the BSDF are not known, and without those that are extrapolated.
+    extrapolated : mapping of str to float
+        Numbers for which light comes from beyond the last incidence of a table, likewise, with this incidence [°]: a table
+        knows nothing there, and how f grows towards grazing light may be a factor.
 
     Examples
     --------
@@ -123,6 +136,7 @@ class Appearance:
     reflection_haze: float
     distinctness: float | None
     errors: dict[str, float] = dataclasses.field(default_factory=dict)
+    extrapolated: dict[str, float] = dataclasses.field(default_factory=dict)
 
     def values(self) -> dict[str, float]:
         """All numbers by the names of their errors."""
@@ -339,6 +353,9 @@ def appearance(bsdf: Bsdf, seed: int = 1) -> Appearance:
     """
     found = _appearance(bsdf)
     data = bsdf.data if isinstance(bsdf, BsdfTable) else None
+    last = bsdf.known_to()
+    extrapolated = {name: last for name, angle in INCIDENCES.items() if name in found.values() and angle > last + CLOSE}
+    found = dataclasses.replace(found, extrapolated=extrapolated)
     if data is None or not any(one.standard_error is not None for one in data.slices):
         return found
     rng = np.random.default_rng(seed)
@@ -346,7 +363,7 @@ def appearance(bsdf: Bsdf, seed: int = 1) -> Appearance:
     errors = {
         name: float(np.std([one[name] for one in drawn if name in one], ddof=1)) / (1.0 if name in RATIOS else DIMMED)
         for name in found.values()
-        if sum(name in one for one in drawn) > 1
+        if sum(name in one for one in drawn) > 1 and name not in extrapolated
     }
     return dataclasses.replace(found, errors=errors)
 

@@ -310,6 +310,30 @@ class Bsdf(abc.ABC):
         a, b, c, d = (column.reshape(incident.shape[:-1]) for column in found.T)
         return a, b, c, d
 
+    def known_to(self, *, side: Side = "front", transmitted: bool = False) -> float:
+        """The last angle of incidence at which scattered light is known [°]; beyond it a table goes on by a rule.
+
+        Parameters
+        ----------
+        side : {"front", "back"}
+            The side that the light meets.
+        transmitted : bool
+            Of transmitted instead of reflected light.
+
+        Returns
+        -------
+        float
+            90 for models, and where nothing is tabled.
+
+        Examples
+        --------
+        >>> from etendue.scatter.models import Lambertian
+        >>> Lambertian(reflectance=0.5).known_to()
+        90.0
+        """
+        _ = side, transmitted
+        return 90.0
+
     def irreciprocity(self) -> float:
         """By how much f there and back differ on average, relative to their mean: 0 where light goes back as it came.
 

@@ -111,7 +111,7 @@ def lobes_of(
 
     Below the first incidence its lobe keeps its share; of an isotropic sample it becomes the mean over azimuths at the
     normal. Beyond the last the lobe stays as it is, and its share of what components leave goes on as it does there, by no
-    more than between the last two incidences.
+    more than between the last two incidences; that of transmitted light does not rise, as grazing light enters nothing.
 
     Light along the normal comes from no azimuth. Unless the sample is isotropic, f stays where it is in the frame of the
     sample: there is a row at azimuth 0, from which the core takes such light to come, and if no slice is known there, the
@@ -179,7 +179,7 @@ def lobes_of(
         ]
         # Below the first incidence no more is scattered than there, though less of the lobe is cut by the horizon.
         first = [] if lobes[0].sine == 0.0 else [_at_the_normal(lobes[0], isotropic=isotropic)]
-        found[row] = [*first, *lobes, *_to_the_rim(lobes, rest or Rest())]
+        found[row] = [*first, *lobes, *_to_the_rim(lobes, rest or Rest(), may_rise=not slices[0].transmitted)]
     return found
 
 
@@ -189,7 +189,7 @@ def _at_the_normal(first: Lobe, *, isotropic: bool) -> Lobe:
     return dataclasses.replace(first, sine=0.0, f=np.ascontiguousarray(f))
 
 
-def _to_the_rim(lobes: Sequence[Lobe], rest: Rest) -> list[Lobe]:
+def _to_the_rim(lobes: Sequence[Lobe], rest: Rest, *, may_rise: bool) -> list[Lobe]:
     """What stands for light beyond the last incidence: the last lobe.
 
     Its share of what components leave goes on straight, over the square of the sine, as a parabola through the last three
@@ -214,7 +214,7 @@ def _to_the_rim(lobes: Sequence[Lobe], rest: Rest) -> list[Lobe]:
         if len(x) > 2:
             steepness += (x[2] - x[1]) * (slopes[1] - slopes[0]) / (x[2] - x[0])
         step = y[-1] - y[-2]
-        change = np.clip(steepness * beyond, min(step, 0.0), max(step, 0.0))
+        change = np.clip(steepness * beyond, min(step, 0.0), max(step, 0.0) if may_rise else 0.0)
     shares = np.clip(y[-1] + change, 0.0, max(rest.most, 0.0)) * left[1:] * rest.part
     # Without a lobe all of it is in the floor.
     floors = (

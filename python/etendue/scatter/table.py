@@ -15,6 +15,7 @@ from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
 from etendue.quantities.report import Complaint
 from etendue.scatter.balance import MOST, balanced
 from etendue.scatter.bsdf import Bsdf as Bsdf  # noqa: PLC0414 - handed on to `etendue`
+from etendue.scatter.bsdf import Side
 from etendue.scatter.building import built
 from etendue.scatter.members import components_of, members_of, same_when_turned
 from etendue.scatter.scans.interpolations import tabulated
@@ -94,6 +95,16 @@ class BsdfTable(Bsdf):
     def incidences(self) -> tuple[float, ...]:
         """Angles of incidence at which it is known [°], in order."""
         return tuple(sorted({round(one.theta, 6) for one in self.data.slices}))
+
+    def known_to(self, *, side: Side = "front", transmitted: bool = False) -> float:
+        """See `Bsdf.known_to`."""
+        met = {"front": True, "back": False}[side]
+        thetas = [
+            one.theta
+            for one in self.data.slices
+            if one.transmitted is transmitted and (self.both_sides or one.front is met)
+        ]
+        return round(max(thetas, default=90.0), 6)
 
     def record(self, files: Files) -> dict[str, Any]:  # noqa: ARG002 - nothing in it comes from files
         """As the core takes it."""
