@@ -7,7 +7,8 @@
    the ways that it goes; and a bounce, which is what a ray takes beyond one in a black chamber, over the further surfaces
    that it meets. The least times of 50 rounds, without setting up the scenes.
 3. With `--peers` (needs `pyradiance` and `mitsuba`): the same BRDF through `pabopto2bsdf` and `bsdf2klems`; and the map of
-   the chamber from 55°, 126 × 63 pixels, with a satin paint beside Mitsuba's `roughplastic` of the same reflectance at 20°
+   the chamber from 55°, 126 × 63 pixels, with a satin paint and a table of it beside Mitsuba's `roughplastic` of the same
+   reflectance at 20°
    (`scalar_rgb`, `path`), and its light image beside `ptracer`: 1/(variance · time), the variance that of a pixel over
    independent runs.
 
@@ -17,6 +18,7 @@ python benchmarks/scatter.py [--rays 1e6] [--only table] [--peers]
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import os
 import subprocess
@@ -68,6 +70,20 @@ def table() -> et.BsdfTable:
         incident = direction(theta, 180.0)
         grid = PolarGrid("normal", np.linspace(0.0, 89.9, 56), np.arange(56) * (360.0 / 56))
         slices.append(BsdfSlice(incident, known(incident, grid.directions(incident, transmitted=False)), grid=grid))
+    return et.BsdfTable(BsdfData(tuple(slices)))
+
+
+def tabled(bsdf: et.Bsdf) -> et.BsdfTable:
+    """A table of a model, at 0, 5 … 85°."""
+    grid = PolarGrid("cosines", np.append(0.0, np.geomspace(1e-3, 2.0, 100)), np.arange(0.0, 360.0, 5.0))
+    slices = []
+    for theta in np.arange(0.0, 86.0, 5.0):
+        incident = direction(theta, 180.0)
+        scattered = grid.directions(incident, transmitted=False)
+        there = ~np.isnan(scattered[..., 0])
+        values = np.full(there.shape, np.nan)
+        values[there] = bsdf.evaluate(incident, scattered[there])
+        slices.append(BsdfSlice(incident, values, grid=grid))
     return et.BsdfTable(BsdfData(tuple(slices)))
 
 
@@ -201,32 +217,44 @@ def mitsuba_row() -> None:
         }
     )
     scene = chamber({"kind": "bsdf", "bsdf": paint})
+    walls = {"": scene, ", its table": chamber({"kind": "bsdf", "bsdf": tabled(paint)})}
 
-    def ours(seed: int, *, gather: bool) -> Array:
+    def ours(scene: et.Scene, seed: int, *, gather: bool) -> Array:
         how = et.PathTracing(rays_per_pixel=1024, seed=seed + 100, gather=gather)
         return np.nan_to_num(np.asarray(et.luminance_map(scene, observer, screen, method=how).values)) * 1e-6
 
     peer, their_mean = efficiency(lambda seed: np.asarray(mi.render(theirs, seed=seed, spp=64))[..., 0])
     row("satin chamber from 55°: mitsuba", f"{peer:.1f} /s", f"mean {their_mean:.3g} cd/mm²")
-    for name, gather in (("etendue", False), ("etendue, gather", True)):
-        own, own_mean = efficiency(lambda seed, gather=gather: ours(seed, gather=gather))
-        row(f"satin chamber from 55°: {name}", f"{own:.1f} /s", f"{own / peer:.2f} × mitsuba, mean {own_mean:.3g}")
+    for (wall, made), (name, gather) in itertools.product(
+        walls.items(), (("etendue", False), ("etendue, gather", True))
+    ):
+        own, own_mean = efficiency(lambda seed, made=made, gather=gather: ours(made, seed, gather=gather))
+        row(
+            f"satin chamber from 55°: {name}{wall}",
+            f"{own:.1f} /s",
+            f"{own / peer:.2f} × mitsuba, mean {own_mean:.3g}",
+        )
 
     # Forwards: rays from the lamps, each scatter connected to the eye.
     particles = mi.load_dict({"type": "ptracer", "max_depth": -1, "rr_depth": 100})
     eyes = {"name": "eye", "theta": 55, "phi": 0, "distance": 1000,
             "screen": {"width": 50, "height": 25, "columns": 126, "rows": 63}}  # fmt: skip
-    seen = scene.replace(observers=[eyes], detectors=[{"kind": "image", "name": "image", "observer": "eye"}])
 
-    def image(seed: int) -> Array:
+    def image(scene: et.Scene, seed: int) -> Array:
+        seen = scene.replace(observers=[eyes], detectors=[{"kind": "image", "name": "image", "observer": "eye"}])
         return np.nan_to_num(np.asarray(et.trace(seen, rays=1e6, seed=seed).images["image"].values)) * 1e-6
 
     peer, their_mean = efficiency(
         lambda seed: np.asarray(mi.render(theirs, integrator=particles, seed=seed, spp=64))[..., 0]
     )
     row("satin chamber, light image: mitsuba ptracer", f"{peer:.2f} /s", f"mean {their_mean:.3g} cd/mm²")
-    own, own_mean = efficiency(image)
-    row("satin chamber, light image: etendue", f"{own:.2f} /s", f"{own / peer:.2f} × mitsuba, mean {own_mean:.3g}")
+    for wall, made in walls.items():
+        own, own_mean = efficiency(lambda seed, made=made: image(made, seed))
+        row(
+            f"satin chamber, light image: etendue{wall}",
+            f"{own:.2f} /s",
+            f"{own / peer:.2f} × mitsuba, mean {own_mean:.3g}",
+        )
 
 
 def one_round(
