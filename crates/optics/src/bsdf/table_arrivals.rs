@@ -59,7 +59,7 @@ impl Arrivals {
         for k in 0..n {
             let step = lobe.step(self.sine[k]);
             self.first[k] = step.first;
-            for (lanes, share) in self.shares.iter_mut().zip(step.shares(self.sine[k])) {
+            for (lanes, share) in self.shares.iter_mut().zip(step.at(self.sine[k])) {
                 lanes[k] = share;
             }
         }

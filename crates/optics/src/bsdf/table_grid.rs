@@ -32,8 +32,9 @@ pub(super) struct Grid {
     /// From 0 to the end of the plane.
     radial: Vec<f64>,
     azimuths: usize,
-    /// f, azimuth by azimuth, at each radial coordinate.
+    /// f, azimuth by azimuth, at each radial coordinate; and how many azimuths are kept.
     f: Vec<f64>,
+    rows: usize,
     size: Size,
     /// Of `f`, by what each value contributes to the integral over the plane; if that is 0, the first takes all. Of a slice whose
     /// sides are alike one half and what both contribute.
@@ -207,13 +208,15 @@ impl Slice {
         let on_all = |row: &[f64]| (0..all.len()).map(|i| row[i.min(row.len() - 1)]).collect::<Vec<f64>>();
         let f: Vec<f64> = f.chunks(radial.len()).flat_map(on_all).collect();
         let (hats, wholes): (Vec<Hat>, Vec<f64>) = (0..all.len()).map(|i| Hat::of(&all, i)).unzip();
-        let (nodes, halves) = nodes_of(&all, *azimuths, &f, &wholes, sines).ok_or("a slice has too many values")?;
+        let (nodes, halves, rows) =
+            nodes_of(&all, *azimuths, &f, &wholes, sines).ok_or("a slice has too many values")?;
         let lowest = all.get(1).map_or(0, |r| leading(*r));
         let first_above = |bits: u64| all.partition_point(|r| *r < f64::from_bits(bits << SHIFT));
         Ok(Grid {
             sine: self.sine,
             azimuths: *azimuths,
-            f,
+            f: f[..rows * all.len()].to_vec(),
+            rows,
             size: Size {
                 radii: all.len() as f64,
                 azimuths: *azimuths as f64,
@@ -231,14 +234,15 @@ impl Slice {
     }
 }
 
-/// The table of the nodes of a slice by what they contribute, and the halves that it stands for; None: there are too many.
+/// The table of the nodes of a slice by what they contribute, the halves that it stands for, and how many azimuths are in it;
+/// None: there are too many.
 fn nodes_of(
     radial: &[f64],
     azimuths: usize,
     f: &[f64],
     wholes: &[f64],
     sines: Option<[f64; 2]>,
-) -> Option<(Alias, f64)> {
+) -> Option<(Alias, f64, usize)> {
     let n = radial.len();
     let row = |j: usize| &f[j * n..(j + 1) * n];
     let other_side = |j: usize| if j == 0 { 0 } else { azimuths - j };
@@ -254,7 +258,7 @@ fn nodes_of(
     };
     let weights: Vec<f64> = (0..drawn * n).map(weight).collect();
     let nodes = Alias::new(&weights).or_else(|| Alias::new(&[1.0]))?;
-    Some((nodes, if alike { 2.0 } else { 1.0 }))
+    Some((nodes, if alike { 2.0 } else { 1.0 }, drawn))
 }
 
 /// Of two lists of radial coordinates that rise from 0 the finer one at each place, and the ends of both. All of both would be
@@ -408,10 +412,16 @@ impl Grid {
         if j + 1 == self.azimuths { 0 } else { j + 1 }
     }
 
+    /// The azimuth whose values stand for those of an azimuth: where both sides are alike, those of one are kept.
+    #[inline]
+    const fn kept(&self, j: usize) -> usize {
+        if j < self.rows { j } else { self.azimuths - j }
+    }
+
     /// f along an azimuth.
     #[inline]
     fn row(&self, j: usize) -> &[f64] {
-        let n = self.radial.len();
+        let (n, j) = (self.radial.len(), self.kept(j));
         &self.f[j * n..(j + 1) * n]
     }
 
@@ -536,7 +546,7 @@ impl Integrals<'_> {
     #[inline]
     fn up_to(&self, j: usize, i: usize, r: f64) -> f64 {
         let (row, radial) = (self.grid.row(j), &self.grid.radial);
-        self.sums[j * radial.len() + i] + moment(radial[i], radial[i + 1], row[i], row[i + 1], r)
+        self.sums[self.grid.kept(j) * radial.len() + i] + moment(radial[i], radial[i + 1], row[i], row[i + 1], r)
     }
 
     /// The integral over the unit circle about −β₀.

@@ -39,14 +39,13 @@ pub(super) struct Lobes {
 pub(super) struct Lobe {
     azimuth: f64,
     slices: Arc<[Grid]>,
-    /// Sines of incidence, rising, between which what follows is linear.
-    sines: Vec<f64>,
-    guide: Guide,
-    blends: Vec<Blend>,
-    steps: Steps,
+    /// Of the flux, in each of two slices and in the floor.
+    shares: Steps,
+    /// What f of each of two slices is multiplied by, and the share of the floor.
+    factors: Steps,
 }
 
-/// Shares alone, which need fewer steps than what f is multiplied by: few enough for the nearest cache.
+/// Three numbers by the sine of incidence, linear in few steps: few enough for the nearest cache.
 #[derive(Clone, Debug, Default)]
 struct Steps {
     /// Rising sines of incidence from which on the steps hold.
@@ -55,44 +54,49 @@ struct Steps {
     list: Vec<Step>,
 }
 
-/// Shares between two sines of incidence, in one line of a cache.
+/// Three numbers between two sines of incidence, in one line of a cache.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Step {
-    pub from: f64,
-    /// At the first sine, of two slices and the floor, and by how much they rise with the sine.
-    pub shares: [f64; 3],
-    pub slopes: [f64; 3],
-    /// The first slice.
+    from: f64,
+    /// At the first sine, and by how much they rise with the sine.
+    values: [f64; 3],
+    slopes: [f64; 3],
+    /// The first of the two slices that they belong to.
     pub first: u32,
 }
 
+/// Some numbers at a sine, and what they may be off.
+type Values<'a> = dyn Fn(usize) -> ([f64; 3], [f64; 3]) + 'a;
+
 impl Step {
     /// Between two of some sines.
-    fn new([start, end]: [usize; 2], sines: &[f64], blends: &[Blend]) -> Self {
+    fn new([start, end]: [usize; 2], sines: &[f64], blends: &[Blend], values: &Values<'_>) -> Self {
         let width = sines[end] - sines[start];
-        let slope = |k: usize| (blends[end].shares[k] - blends[start].shares[k]) / width;
+        let [(at_start, _), (at_end, _)] = [values(start), values(end)];
+        let slope = |k: usize| (at_end[k] - at_start[k]) / width;
         Self {
             from: sines[start],
-            shares: blends[start].shares,
+            values: at_start,
             slopes: std::array::from_fn(|k| if width > 0.0 { slope(k) } else { 0.0 }),
             first: u32::try_from(blends[start].first).unwrap_or(u32::MAX),
         }
     }
 
-    /// Whether all between two sines have its slices and, for all that anybody can see, its shares.
-    fn holds(&self, [start, end]: [usize; 2], sines: &[f64], blends: &[Blend]) -> bool {
+    /// Whether all between two sines have its slices and, for all that anybody can see, its numbers.
+    fn holds(&self, [start, end]: [usize; 2], sines: &[f64], blends: &[Blend], values: &Values<'_>) -> bool {
         (start + 1..=end).all(|i| {
-            let near = |(a, b): (&f64, f64)| (a - b).abs() <= TOLERANCE;
-            let mut shares = blends[i].shares.iter().zip(self.shares(sines[i]));
-            blends[i].first == blends[start].first && sines[i] > sines[start] && shares.all(near)
+            let (there, off) = values(i);
+            let found = self.at(sines[i]);
+            let near = |k: usize| (there[k] - found[k]).abs() <= off[k];
+            blends[i].first == blends[start].first && sines[i] > sines[start] && (0..3).all(near)
         })
     }
 
     #[inline]
-    pub(super) fn shares(&self, sine: f64) -> [f64; 3] {
+    pub(super) fn at(&self, sine: f64) -> [f64; 3] {
         let beyond = sine - self.from;
-        std::array::from_fn(|k| self.shares[k] + beyond * self.slopes[k])
+        std::array::from_fn(|k| self.values[k] + beyond * self.slopes[k])
     }
 }
 
@@ -154,100 +158,103 @@ impl Row {
         let slices: Vec<Grid> = (0..between.len()).map(grid).collect::<Result<_, String>>()?;
         let squares: Vec<f64> = sines.iter().map(|sine| sine * sine).collect();
         let of = |pick: fn(&Slice) -> f64| Cubic::new(&squares, &self.slices.iter().map(pick).collect::<Vec<_>>());
-        let mut lobe = Lobe {
+        let (sines, blends) = blends_of(&slices, &of(|slice| slice.share), &of(|slice| slice.floor));
+        Ok(Lobe {
             azimuth: self.azimuth,
             slices: slices.into(),
-            sines: Vec::new(),
-            guide: Guide::default(),
-            blends: Vec::new(),
-            steps: Steps::default(),
-        };
-        lobe.fill(&of(|slice| slice.share), &of(|slice| slice.floor));
-        Ok(lobe)
+            shares: Steps::new(&sines, &blends, &|i| (blends[i].shares, [TOLERANCE; 3])),
+            factors: Steps::new(&sines, &blends, &|i| {
+                let ([a, b], floor) = (blends[i].factors, blends[i].shares[2]);
+                let off = TOLERANCE * (a.abs() + b.abs());
+                ([a, b, floor], [off, off, TOLERANCE])
+            }),
+        })
     }
 }
 
-impl Lobe {
-    /// Tables how light is shared, in steps that are halved until everything is linear within them.
-    fn fill(&mut self, share: &Cubic, floor: &Cubic) {
-        let slices = Arc::clone(&self.slices);
-        let integrals: Vec<Integrals<'_>> = slices.iter().map(Grid::integrals).collect();
-        let count = slices.len();
-        // From 0 to the first slice, from each to the next, from the last to 1.
-        let mut ends: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
-        ends.insert(0, 0.0);
-        ends.push(1.0);
-        for (k, pair) in ends.windows(2).enumerate() {
-            let [from, to] = [pair[0], pair[1]];
-            if from >= to {
-                continue;
-            }
-            let beyond = k == 0 || k == count;
-            let first = k.saturating_sub(1).min(count - 1);
-            let own = integrals[first].integral(slices[first].sine);
-            let at = |sine: f64| {
-                let square = sine * sine;
-                let (rho, floor) = (share.at(square), floor.at(square));
-                let (shares, factors) = if beyond {
-                    // The slice moves on unchanged.
-                    let factor = if own > 0.0 { rho / own } else { 0.0 };
-                    ([factor * integrals[first].integral(sine), 0.0], [factor, 0.0])
-                } else {
-                    let part = (sine - from) / (to - from);
-                    let energies = [integrals[first].integral(sine), integrals[first + 1].integral(sine)];
-                    let all = (1.0 - part) * energies[0] + part * energies[1];
-                    let factor = if all > 0.0 { rho / all } else { 0.0 };
-                    let factors = [factor * (1.0 - part), factor * part];
-                    ([factors[0] * energies[0], factors[1] * energies[1]], factors)
-                };
-                Blend {
-                    first,
-                    shares: [shares[0], shares[1], floor],
-                    factors,
-                }
+/// How light is shared, at sines from 0 to 1 between which everything is linear.
+fn blends_of(slices: &[Grid], share: &Cubic, floor: &Cubic) -> (Vec<f64>, Vec<Blend>) {
+    let (mut sines, mut blends) = (Vec::new(), Vec::new());
+    let mut push = |(sine, blend): (f64, Blend)| {
+        sines.push(sine);
+        blends.push(blend);
+    };
+    let integrals: Vec<Integrals<'_>> = slices.iter().map(Grid::integrals).collect();
+    let count = slices.len();
+    // From 0 to the first slice, from each to the next, from the last to 1.
+    let mut ends: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
+    ends.insert(0, 0.0);
+    ends.push(1.0);
+    for (k, pair) in ends.windows(2).enumerate() {
+        let [from, to] = [pair[0], pair[1]];
+        if from >= to {
+            continue;
+        }
+        let beyond = k == 0 || k == count;
+        let first = k.saturating_sub(1).min(count - 1);
+        let own = integrals[first].integral(slices[first].sine);
+        let at = |sine: f64| {
+            let square = sine * sine;
+            let (rho, floor) = (share.at(square), floor.at(square));
+            let (shares, factors) = if beyond {
+                // The slice moves on unchanged.
+                let factor = if own > 0.0 { rho / own } else { 0.0 };
+                ([factor * integrals[first].integral(sine), 0.0], [factor, 0.0])
+            } else {
+                let part = (sine - from) / (to - from);
+                let energies = [integrals[first].integral(sine), integrals[first + 1].integral(sine)];
+                let all = (1.0 - part) * energies[0] + part * energies[1];
+                let factor = if all > 0.0 { rho / all } else { 0.0 };
+                let factors = [factor * (1.0 - part), factor * part];
+                ([factors[0] * energies[0], factors[1] * energies[1]], factors)
             };
-            let mut last = (from, at(from));
-            self.push(last);
-            let mut left: Vec<_> = (1..=4)
-                .rev()
-                .map(|i| from + (to - from) * f64::from(i) / 4.0)
-                .map(|sine| (sine, at(sine)))
-                .collect();
-            while let Some(next) = left.pop() {
-                let sine = 0.5 * (last.0 + next.0);
-                let middle = (sine, at(sine));
-                if next.0 - last.0 < SMALLEST_STEP || middle.1.is_between(&last.1, &next.1) {
-                    self.push(middle);
-                    self.push(next);
-                    last = next;
-                } else {
-                    left.push(next);
-                    left.push(middle);
-                }
+            Blend {
+                first,
+                shares: [shares[0], shares[1], floor],
+                factors,
+            }
+        };
+        let mut last = (from, at(from));
+        push(last);
+        let mut left: Vec<_> = (1..=4)
+            .rev()
+            .map(|i| from + (to - from) * f64::from(i) / 4.0)
+            .map(|sine| (sine, at(sine)))
+            .collect();
+        while let Some(next) = left.pop() {
+            let sine = 0.5 * (last.0 + next.0);
+            let middle = (sine, at(sine));
+            if next.0 - last.0 < SMALLEST_STEP || middle.1.is_between(&last.1, &next.1) {
+                push(middle);
+                push(next);
+                last = next;
+            } else {
+                left.push(next);
+                left.push(middle);
             }
         }
-        self.guide = Guide::new(&self.sines[..self.sines.len() - 1]);
-        self.steps = Steps::new(&self.sines, &self.blends);
     }
+    (sines, blends)
+}
 
-    /// The place in the list after the last sine, but for the very last, that is not above this one.
-    #[inline(always)]
-    fn above(&self, sine: f64) -> usize {
-        let from = &self.sines[..self.sines.len() - 1];
-        self.guide.not_above(from, sine, |from| *from).max(1)
-    }
-
-    /// The step from the last sine that is not above this one.
+impl Lobe {
+    /// The first of two slices and, from the last sine on that is not above this one, the shares of both and of the floor.
     #[inline]
     pub(super) fn step(&self, sine: f64) -> &Step {
-        self.steps.at(sine)
+        self.shares.at(sine)
     }
 
     /// The first of two slices, and the shares of both and of the floor.
     #[inline]
     pub(super) fn shares(&self, sine: f64) -> (usize, [f64; 3]) {
         let step = self.step(sine);
-        (step.first as usize, step.shares(sine))
+        (step.first as usize, step.at(sine))
+    }
+
+    /// Of the flux, in all directions.
+    #[inline]
+    pub(super) fn share(&self, sine: f64) -> f64 {
+        self.shares(sine).1.iter().sum()
     }
 
     /// A slice, by its number.
@@ -256,31 +263,14 @@ impl Lobe {
         &self.slices[number]
     }
 
-    fn push(&mut self, (sine, blend): (f64, Blend)) {
-        self.sines.push(sine);
-        self.blends.push(blend);
-    }
-
-    #[inline]
-    pub(super) fn blend(&self, sine: f64) -> Blend {
-        let above = self.above(sine);
-        let (a, b) = (&self.blends[above - 1], &self.blends[above]);
-        let [from, to] = [self.sines[above - 1], self.sines[above]];
-        let part = if to > from {
-            ((sine - from) / (to - from)).clamp(0.0, 1.0)
-        } else {
-            0.0
-        };
-        a.towards(b, part)
-    }
-
     /// f \[1/sr\] for light that leaves towards a point of the plane of direction cosines.
     #[inline]
-    pub(super) fn at(&self, blend: &Blend, r: f64, turn: f64) -> f64 {
-        let mut f = blend.shares[2] * FRAC_1_PI;
-        let factors = blend.factors.into_iter().enumerate();
-        for (k, factor) in factors.filter(|(_, factor)| *factor > 0.0) {
-            f += factor * self.slices[blend.first + k].at(r, turn);
+    pub(super) fn at(&self, sine: f64, r: f64, turn: f64) -> f64 {
+        let step = self.factors.at(sine);
+        let [one, other, floor] = step.at(sine);
+        let mut f = floor * FRAC_1_PI;
+        for (k, factor) in [one, other].into_iter().enumerate().filter(|(_, factor)| *factor > 0.0) {
+            f += factor * self.slices[step.first as usize + k].at(r, turn);
         }
         f
     }
@@ -302,20 +292,22 @@ impl Lobe {
 }
 
 impl Steps {
-    /// Of blends at rising sines, as far as each step goes without its shares being off.
-    fn new(sines: &[f64], blends: &[Blend]) -> Self {
+    /// Of numbers of blends at rising sines, as far as each step goes without them being off.
+    fn new(sines: &[f64], blends: &[Blend], values: &Values<'_>) -> Self {
         let mut steps = Vec::new();
         let mut start = 0;
         while start + 1 < sines.len() {
             let mut end = start + 1;
-            while end + 1 < sines.len()
-                && Step::new([start, end + 1], sines, blends).holds([start, end + 1], sines, blends)
-            {
+            while end + 1 < sines.len() {
+                let ends = [start, end + 1];
+                if !Step::new(ends, sines, blends, values).holds(ends, sines, blends, values) {
+                    break;
+                }
                 end += 1;
             }
             // Where two slices meet, a sine stands there twice.
             if sines[end] > sines[start] {
-                steps.push(Step::new([start, end], sines, blends));
+                steps.push(Step::new([start, end], sines, blends, values));
             }
             start = end;
         }
@@ -325,6 +317,24 @@ impl Steps {
             from,
             list: steps,
         }
+    }
+
+    /// The three numbers where steps begin, and where they end.
+    fn ends(&self) -> impl Iterator<Item = [f64; 3]> {
+        let to = self.from.iter().skip(1).copied().chain([1.0]);
+        self.list
+            .iter()
+            .zip(to)
+            .flat_map(|(step, to)| [step.values, step.at(to)])
+    }
+
+    /// Without the floor.
+    fn without_floor(&self) -> Self {
+        let mut steps = self.clone();
+        for step in &mut steps.list {
+            (step.values[2], step.slopes[2]) = (0.0, 0.0);
+        }
+        steps
     }
 
     /// The step from the last sine that is not above this one.
@@ -354,11 +364,6 @@ impl Blend {
         let factors = self.factors.iter().zip(middle.factors);
         shares.into_iter().all(|(a, b)| near(*a, b, 1.0)) && factors.into_iter().all(|(a, b)| near(*a, b, scale))
     }
-
-    #[inline]
-    pub(super) fn share(&self) -> f64 {
-        self.shares.iter().sum()
-    }
 }
 
 impl Lobes {
@@ -366,23 +371,28 @@ impl Lobes {
     pub(super) fn without_floor(&self) -> Option<Self> {
         let mut rows = self.rows.clone();
         for row in &mut rows {
-            row.blends.iter_mut().for_each(|blend| blend.shares[2] = 0.0);
-            row.steps = Steps::new(&row.sines, &row.blends);
+            (row.shares, row.factors) = (row.shares.without_floor(), row.factors.without_floor());
         }
-        let left = rows.iter().flat_map(|row| &row.blends).any(|blend| blend.share() > 0.0);
+        let left = rows
+            .iter()
+            .flat_map(|row| row.shares.ends())
+            .flatten()
+            .any(|share| share > 0.0);
         left.then_some(Self { rows })
     }
 
     /// Whether any slice has a floor.
     pub(super) fn has_floor(&self) -> bool {
-        let mut blends = self.rows.iter().flat_map(|row| &row.blends);
-        blends.any(|blend| blend.shares[2] > 0.0)
+        self.rows
+            .iter()
+            .flat_map(|row| row.shares.ends())
+            .any(|shares| shares[2] > 0.0)
     }
 
     /// The greatest share of the light.
     pub(super) fn most(&self) -> f64 {
-        let blends = self.rows.iter().flat_map(|row| &row.blends);
-        blends.map(Blend::share).fold(0.0, f64::max)
+        let shares = self.rows.iter().flat_map(|row| row.shares.ends());
+        shares.map(|shares| shares.iter().sum()).fold(0.0, f64::max)
     }
 
     /// The only row, if there is one.
@@ -405,60 +415,61 @@ impl Lobes {
         let span = (other.azimuth - one.azimuth).rem_euclid(1.0);
         let part = (turn - one.azimuth).rem_euclid(1.0) / if span > 0.0 { span } else { 1.0 };
         Lit {
-            parts: [(one, 1.0 - part), (other, part)].map(|(row, part)| (row, part, row.blend(incidence.sine))),
+            sine: incidence.sine,
+            parts: [(one, 1.0 - part), (other, part)],
         }
     }
 }
 
-/// What light from one direction is shared by: the rows next to its azimuth, each with its part and its blend.
+/// What light from one direction is shared by: the rows next to its azimuth, each with its part.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lit<'a> {
-    parts: [(&'a Lobe, f64, Blend); 2],
+    sine: f64,
+    parts: [(&'a Lobe, f64); 2],
 }
 
 impl<'a> Lit<'a> {
     /// Of a single row.
-    fn of(row: &'a Lobe, incidence: &Incidence) -> Self {
-        let blend = row.blend(incidence.sine);
+    const fn of(row: &'a Lobe, incidence: &Incidence) -> Self {
         Self {
-            parts: [(row, 1.0, blend), (row, 0.0, blend)],
+            sine: incidence.sine,
+            parts: [(row, 1.0), (row, 0.0)],
         }
     }
 
-    fn there(&self) -> impl Iterator<Item = &(&'a Lobe, f64, Blend)> {
-        self.parts.iter().filter(|(_, part, _)| *part > 0.0)
+    fn there(&self) -> impl Iterator<Item = &(&'a Lobe, f64)> {
+        self.parts.iter().filter(|(_, part)| *part > 0.0)
     }
 
     /// Of the flux, in all directions.
     pub(super) fn share(&self) -> f64 {
         self.there()
-            .fold(0.0, |sum, (_, part, blend)| sum + part * blend.share())
+            .fold(0.0, |sum, (row, part)| sum + part * row.share(self.sine))
     }
 
-    /// Of the flux, in the floor.
+    /// Of the flux, in the floor: that of f.
     pub(super) fn floor(&self) -> f64 {
-        self.there()
-            .fold(0.0, |sum, (_, part, blend)| sum + part * blend.shares[2])
+        self.there().fold(0.0, |sum, (row, part)| {
+            sum + part * row.factors.at(self.sine).at(self.sine)[2]
+        })
     }
 
     /// f for light that leaves towards a point of the plane of direction cosines.
     pub(super) fn at(&self, r: f64, turn: f64) -> f64 {
-        let mut sum = 0.0;
-        for (row, part, blend) in self.there() {
-            sum += part * row.at(blend, r, turn);
-        }
-        sum
+        self.there()
+            .fold(0.0, |sum, (row, part)| sum + part * row.at(self.sine, r, turn))
     }
 
     /// A slice or a floor (None), picked by its share, with what is left of the number.
     pub(super) fn pick(&self, number: f64) -> (Option<&'a Grid>, f64) {
         let mut left = number * self.share();
         let mut last = (None, number);
-        for (row, part, blend) in self.there() {
-            for (k, share) in blend.shares.iter().enumerate() {
+        for (row, part) in self.there() {
+            let (first, shares) = row.shares(self.sine);
+            for (k, share) in shares.iter().enumerate() {
                 let share = part * share;
                 if share > 0.0 {
-                    last = (row.slices.get(blend.first + k).filter(|_| k < 2), part_of(left, share));
+                    last = (row.slices.get(first + k).filter(|_| k < 2), part_of(left, share));
                     if left < share {
                         return last;
                     }
@@ -560,14 +571,38 @@ mod tests {
             slices: vec![slice(0.0, 0.3, 0.1), slice(0.5, 0.2, 0.2), slice(0.95, 0.4, 0.15)],
         };
         let lobe = row.lobe().expect("sound");
-        assert!(4 * lobe.steps.list.len() < 3 * lobe.sines.len());
+        let of = |pick: fn(&Slice) -> f64| {
+            let squares: Vec<f64> = row.slices.iter().map(|slice| slice.sine * slice.sine).collect();
+            Cubic::new(&squares, &row.slices.iter().map(pick).collect::<Vec<_>>())
+        };
+        let (sines, blends) = blends_of(&lobe.slices, &of(|slice| slice.share), &of(|slice| slice.floor));
+        assert!(4 * lobe.shares.list.len() < 3 * sines.len());
         for k in 0..=20_000 {
             let sine = f64::from(k) / 20_000.0;
+            let above = sines[..sines.len() - 1].partition_point(|from| *from <= sine).max(1);
+            let (a, b) = (&blends[above - 1], &blends[above]);
+            let width = sines[above] - sines[above - 1];
+            let part = if width > 0.0 {
+                (sine - sines[above - 1]) / width
+            } else {
+                0.0
+            };
+            let blend = a.towards(b, part);
             let (first, shares) = lobe.shares(sine);
-            let blend = lobe.blend(sine);
             assert_eq!(first, blend.first);
             for (share, known) in shares.into_iter().zip(blend.shares) {
                 assert!((share - known).abs() <= 1.0001 * TOLERANCE, "{sine}: {share} {known}");
+            }
+            let step = lobe.factors.at(sine);
+            let [one, other, floor] = step.at(sine);
+            let scale: f64 = blend.factors.iter().sum();
+            assert_eq!(step.first as usize, blend.first);
+            assert!((floor - blend.shares[2]).abs() <= 1.0001 * TOLERANCE);
+            for (factor, known) in [one, other].into_iter().zip(blend.factors) {
+                assert!(
+                    (factor - known).abs() <= 1.0001 * TOLERANCE * scale,
+                    "{sine}: {factor} {known}"
+                );
             }
         }
     }

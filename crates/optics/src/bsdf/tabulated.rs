@@ -234,7 +234,7 @@ impl Bsdf for Tabulated {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;
         let diffuse = match self.lone(front) {
-            Some((way, lobe)) => on_its_way(way, lobe.blend(incidence.sine).share()),
+            Some((way, lobe)) => on_its_way(way, lobe.share(incidence.sine)),
             None => [false, true].map(|way| share(&self.lit(&incidence, front, way, media.wavelength))),
         };
         Shares {
@@ -255,7 +255,7 @@ impl Bsdf for Tabulated {
         let transmitted = front != (scattered.z > 0.0);
         if let Some((way, lobe)) = self.lone(front) {
             return if way == transmitted {
-                lobe.at(&lobe.blend(incidence.sine), r, turn)
+                lobe.at(incidence.sine, r, turn)
             } else {
                 0.0
             };
