@@ -123,6 +123,7 @@ def test_each_wavelength_is_told(run: Run) -> None:
     ]
     et.write_bsdf("rising.h5", et.BsdfTable(BsdfData(slices)))
     told = run("bsdf", "info", "rising.h5").out.splitlines()
+    assert told[0] == "rising.h5: etendue, no name, isotropic"
     assert [line.strip() for line in told[1:5]] == [
         "front, 10°, 450 nm: 0.2000 reflected",
         "front, 10°, 650 nm: 0.8000 reflected",
@@ -130,6 +131,17 @@ def test_each_wavelength_is_told(run: Run) -> None:
         "front, 50°, 650 nm: 0.8000 reflected",
     ]
     assert told[5].startswith("reflectance at 555 nm: 0.5150 at 0°")
+
+
+def test_the_format_is_told_first_of_several_files_that_of_each(run: Run) -> None:
+    """The keys of the JSON begin with file and format; files of two formats are told as both."""
+    et.write_bsdf("abg.h5", et.bsdf.ABg(a=0.01, b=0.02, g=1.5))
+    Path("abg.txt").write_text(surface_property(scatter=1, sections=[abg_side(a=0.01)]))
+    facts = json.loads(run("bsdf", "info", "abg.txt", "--json").out)
+    assert list(facts)[:2] == ["file", "format"]
+    assert facts["format"] == "tracepro"
+    assert run("bsdf", "info", "abg.txt").out.startswith("abg.txt: tracepro, ")
+    assert run("bsdf", "info", "abg.txt", "abg.h5").out.startswith("2 files: etendue, tracepro, ")
 
 
 @pytest.mark.parametrize("angle", ["95", "90", "-1", "nan"])

@@ -111,9 +111,13 @@ def mean_of_patches(one: BsdfSlice) -> Array:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
-def test_recognised_by_content_and_by_no_other_format(form: BsdfFormat) -> None:
+def test_recognised_by_content_and_by_no_other_format(form: BsdfFormat, tmp_path: Path) -> None:
+    """And what was read keeps the name of its format."""
     head = small(form)[:4096]
     assert [other.name for other in FORMATS if other.recognise(head)] == [form.name]
+    path = tmp_path / "file.any"
+    path.write_bytes(small(form))
+    assert read_bsdf_data(path).format == form.name
 
 
 @pytest.mark.slow

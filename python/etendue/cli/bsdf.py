@@ -38,7 +38,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 def info(files: Files, json: Json = False) -> None:
-    """Say what a file holds: incidences, sides, shares by angle, reciprocity, and what is not as it should be."""
+    """Say what a file holds: its format, incidences, sides, shares by angle, reciprocity, and what is wrong with it."""
     bsdf = read_bsdf(files)
     facts = _facts(files, bsdf)
     if json:
@@ -46,7 +46,8 @@ def info(files: Files, json: Json = False) -> None:
         return
     for complaint in facts["complaints"]:
         complain(complaint)
-    say(f"{_named(files)}: {bsdf.name or 'no name'}, {'isotropic' if bsdf.isotropic else 'anisotropic'}")
+    turned = "isotropic" if bsdf.isotropic else "anisotropic"
+    say(f"{_named(files)}: {facts['format']}, {bsdf.name or 'no name'}, {turned}")
     for one in facts["tables"]:
         stated = "" if one["stated"] is None else f", stated {one['stated']:.4f}"
         way = "transmitted" if one["transmitted"] else "reflected"
@@ -94,6 +95,7 @@ def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
     angles = np.array(ANGLES)
     return {
         "file": files[0] if len(files) == 1 else files,
+        "format": bsdf.data.format,
         "name": bsdf.name,
         "isotropic": bsdf.isotropic,
         "slices": len(bsdf.data.slices),

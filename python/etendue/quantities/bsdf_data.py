@@ -477,6 +477,8 @@ class BsdfData:
         Whether light that meets the back is treated as light that meets the front (nothing else is said about it).
     name, provenance, complaints, facts
         What the file calls it, where it comes from, what was not as it should be, and what else it says (text by name).
+    format : str
+        The format of the file that it was read from, by its name in the registry of formats; empty: of no file.
 
     Examples
     --------
@@ -494,6 +496,7 @@ class BsdfData:
     provenance: Provenance | None = None
     complaints: tuple[Complaint, ...] = ()
     facts: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    format: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "slices", tuple(self.slices))

@@ -102,6 +102,7 @@ def _joined(parts: Sequence[BsdfData], names: Sequence[str]) -> BsdfData:
         name=parts[0].name,
         complaints=tuple(complaints),
         facts=parts[0].facts,
+        format=", ".join(sorted({part.format for part in parts})),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 
@@ -79,7 +80,7 @@ def read_bsdf_data(path: str | os.PathLike[str]) -> BsdfData:
     Returns
     -------
     BsdfData
-        Slices and components as they stand in the file, in étendue's frame, with all complaints.
+        Slices and components as they stand in the file, in étendue's frame, with all complaints and the name of the format.
 
     Raises
     ------
@@ -106,7 +107,7 @@ def read_bsdf_data(path: str | os.PathLike[str]) -> BsdfData:
             head = stream.read(SNIFFED_BYTES)
         for candidate in BSDF_FORMATS.values():
             if candidate.recognise(head):
-                return candidate.read(readable)
+                return dataclasses.replace(candidate.read(readable), format=candidate.name)
     if path.suffix.lower() in REFUSED:
         what, advice = REFUSED[path.suffix.lower()]
         raise UnsupportedFormatError(path, "extension", f"this is {what}", advice)
