@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from etendue.errors import FormatError
 from etendue.formats.bsdf import read_bsdf_data
+from etendue.formats.bsdf.speos import write
 from etendue.quantities.bsdf_data import direction
 
 PHI = "\t0 90 180 270 360"
@@ -44,6 +46,29 @@ def test_values_are_scaled_to_the_spectrum(tmp_path: Path, type_of_values: int, 
     assert np.allclose(
         [forwards, left, backwards, right], np.array([3, 5, 1, 2]) * unit, rtol=1e-3 if type_of_values else 0.02
     )
+
+
+def test_the_factor_to_the_stated_share_is_told(tmp_path: Path) -> None:
+    """A table whose mean over azimuth is 2.75 adds up to 2.75 π: 40 % are stated, where the reference is in the table."""
+    path = tmp_path / "hand.anisotropicbsdf"
+    path.write_text(hand())
+    data = read_bsdf_data(path)
+    (told,) = data.complaints
+    assert str(told).startswith("note: 0° of incidence, reflection: the stated share is 0.4, the table adds up to ")
+    raw, factor = (float(word) for word in re.findall(r"up to (\S+):.* by (\S+)$", told.found)[0])
+    assert raw == pytest.approx(2.75 * math.pi, rel=1e-5)
+    assert factor == pytest.approx(0.4 / (2.75 * math.pi), rel=1e-5)
+    assert [one.stated for one in data.slices] == [0.4, None]
+    # A reference between the incidences is that of no table; and of a file that is scaled already nothing is told.
+    path.write_text(hand().replace("0 0\nspectrum", "20 0\nspectrum"))
+    between = read_bsdf_data(path)
+    assert [one.stated for one in between.slices] == [None, None]
+    assert "20° of incidence" in between.complaints[0].place
+    with (tmp_path / "again.anisotropicbsdf").open("w+b") as stream:
+        write(data, stream)
+    again = read_bsdf_data(tmp_path / "again.anisotropicbsdf")
+    assert again.complaints == ()
+    assert again.slices[0].stated == pytest.approx(0.4)
 
 
 def test_the_spectrum_is_weighted_with_v_of_lambda(tmp_path: Path) -> None:

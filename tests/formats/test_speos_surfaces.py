@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import etendue as et
@@ -61,6 +62,23 @@ def test_brdf_by_wavelength(tmp_path: Path) -> None:
     assert float(red.at(direction(30.0, 70.0))) == pytest.approx(0.5 / math.pi)
     assert through_red.transmitted
     assert float(through_red.at(direction(30.0, 70.0, behind=True))) == pytest.approx(0.2 / math.pi)
+
+
+def test_what_brdf_files_state_is_kept_beside_what_their_tables_add_up_to(tmp_path: Path) -> None:
+    """The flat tables of transmitted light, of 1 and 3, add up to π and 3π: 10 and 20 % are stated."""
+    path = tmp_path / "x.brdf"
+    path.write_text(BRDF)
+    data = read_bsdf_data(path)
+    assert [one.stated for one in data.slices] == pytest.approx([0.8, 0.5, 0.1, 0.2])
+    (told,) = data.complaints
+    assert told.place == "40° of incidence, transmission, 700 nm"
+    factors = re.search(r"adds up to (\S+): values are scaled by (\S+); at other places by (\S+) to (\S+)$", told.found)
+    assert factors is not None
+    raw, farthest, least, most = map(float, factors.groups())
+    assert (raw, farthest) == pytest.approx((3.0 * math.pi, 0.2 / (3.0 * math.pi)), rel=1e-5)
+    assert least == farthest
+    # At 400 nm, of light that is reflected, f rises from 2 to 3 and 4 at the rim: it is no more than at 700 nm, half of 1.
+    assert most == pytest.approx(0.5 / math.pi, rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -302,13 +302,30 @@ def test_a_narrow_streak_keeps_its_light(tmp_path: Path) -> None:
 
 
 def test_what_the_head_says_is_told(tmp_path: Path) -> None:
-    rows = [row(theta=0, left=0.1, reflected=(0.02, 0.1, 0, 2, 0))]
+    # ABg of g = 2 scatters πA ln(1 + 1/B) of light along the normal.
+    rows = [row(theta=0, left=0.02 * math.pi * math.log(11.0), reflected=(0.02, 0.1, 0, 2, 0))]
     text = surface_property(scatter=1, sections=[section(rows=rows)], coating=0, polarization=1)
     said = " ".join(str(one) for one in read(tmp_path, text).complaints)
     assert "Fresnel" in said
     assert "line 12: Polarization 1: light is unpolarised here, with the mean of S and P" in said
     quiet = surface_property(scatter=1, sections=[section(rows=rows)])
     assert read(tmp_path, quiet).complaints == ()
+
+
+def test_shares_that_leave_another_part_for_scatter_are_told(tmp_path: Path) -> None:
+    """Of ABg with g = 2 πA ln(1 + 1/B), of an even table π f: held against what the rows leave, and told beside it."""
+    rows = [row(theta=0, left=0.1, reflected=(0.02, 0.1, 0, 2, 0))]
+    (told,) = read(tmp_path, surface_property(scatter=1, sections=[section(rows=rows)])).complaints
+    assert f"leave 0.1 of the light for scatter at 0°, it makes {0.02 * math.pi * math.log(11.0):.4g}" in told.found
+    for transmitted, left in ((0.0, 0.3), (0.0, 0.1 * math.pi), (0.02, 0.3)):
+        polar = [[300, 0.55, 0, 0, b, a, 0.1, transmitted] for b in (0, 0.5) for a in (0, 120, 240)]
+        text = surface_property(scatter=5, sections=[section(rows=[row(theta=0, left=left)], table=polar)])
+        data = read(tmp_path, text)
+        total = math.pi * (0.1 + transmitted)
+        said = [f"leaves {left:.6g} of the light for scatter, the table adds up to {total:.6g}"]
+        assert [one.found.partition("shares ")[2] for one in data.complaints] == (said if left == 0.3 else [])
+        # What is left is that of both ways together: of either nothing is stated if there is light in both.
+        assert [one.stated for one in data.slices] == ([None, None] if transmitted else [pytest.approx(left)])
 
 
 def test_the_axis_that_the_file_does_not_state_is_told(tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def read(path: Path) -> BsdfData:
 
 def _plain(one: BsdfSlice) -> BsdfSlice:
     """Without its wavelength, where there is but one."""
-    return BsdfSlice(one.incident, one.values, one.transmitted, grid=one.grid, stated=one.stated)
+    return dataclasses.replace(one, wavelength=None)
 
 
 def _header(tokens: Tokens) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from codecs import BOM_UTF8
 from pathlib import Path
 from typing import BinaryIO
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.shares import scaled
 from etendue.formats.bsdf.tokens import ADVICE, Tokens
 from etendue.formats.encodings import decoded
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
@@ -28,6 +30,9 @@ PHI_STEP, TURN = 5.0, 45.0
 """Steps of the azimuth of scattered light and of the anisotropy angle [°]."""
 
 WAYS = ("reflection", "transmission")
+
+SAME = 1e-6
+"""Angles of incidence [°] that differ by less are one: they went through a direction and back."""
 
 
 def recognise(head: bytes) -> bool:
@@ -155,7 +160,7 @@ def slice_of(tokens: Tokens, theta: float, turn: float, transmitted: bool, *, in
 def _scaled(
     tokens: Tokens, slices: list[BsdfSlice], spectrum: tuple[float, float, Array, Array], complaints: list[Complaint]
 ) -> list[BsdfSlice]:
-    """All by the factor that gives the reference incidence the share of the spectrum."""
+    """All by the factor that gives the reference incidence the share of the spectrum, which is stated there."""
     theta, phi, wavelengths, shares = spectrum
     turns = np.array([(one.phi - 180.0) % 360.0 for one in slices])
     apart = np.abs((turns - phi + 180.0) % 360.0 - 180.0)
@@ -176,8 +181,15 @@ def _scaled(
         if wanted > 0.0:
             tokens.refuse("nothing is scattered at the reference incidence, though its spectrum says so")
         known = 1.0
+    else:
+        way = WAYS[near[0].transmitted]
+        complaints += scaled([(f"{theta:g}° of incidence, {way}", wanted, known)])
     factor = wanted / known
-    return [BsdfSlice(one.incident, one.values * factor, one.transmitted, grid=one.grid) for one in slices]
+    reference = [one for one in near if abs(one.theta - theta) < SAME]
+    return [
+        dataclasses.replace(one, values=one.values * factor, stated=wanted if one in reference else None)
+        for one in slices
+    ]
 
 
 def fits(data: BsdfData) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from codecs import BOM_UTF8
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.shares import scaled
 from etendue.formats.bsdf.speos import PHI_STEP, THETA, WAYS, flag, past_header, slice_of, table_rows
 from etendue.formats.bsdf.tokens import Tokens
 from etendue.formats.encodings import decoded
@@ -57,6 +59,7 @@ def read(path: Path) -> BsdfData:
     if (np.diff(waves) <= 0.0).any() or waves[0] <= 0.0:
         tokens.refuse("wavelengths do not rise")
     slices = []
+    tables: list[tuple[str, float, float]] = []
     for transmitted in (way for way in (False, True) if there[way]):
         for theta, wave in itertools.product(incidences, waves):
             share = tokens.number("share [%]")
@@ -66,13 +69,16 @@ def read(path: Path) -> BsdfData:
             known = one.integral()
             if share > 0.0 and not known > 0.0:
                 tokens.refuse("nothing is scattered, though the share says so")
-            factor = 0.01 * share / known if known > 0.0 else 0.0
+            stated = 0.01 * share
+            factor = stated / known if known > 0.0 else 0.0
+            if known > 0.0:
+                tables.append((f"{theta:g}° of incidence, {WAYS[transmitted]}, {wave:g} nm", stated, known))
             wavelength = None if waves.size == 1 else float(wave)
-            scaled = BsdfSlice(one.incident, one.values * factor, transmitted, grid=one.grid, wavelength=wavelength)
-            slices.append(scaled)
+            slices.append(dataclasses.replace(one, values=one.values * factor, wavelength=wavelength, stated=stated))
     if " ".join(tokens.words[tokens.at : tokens.at + 3]).casefold() != "end of file":
         tokens.refuse("the data do not end with 'End of file'")
-    return BsdfData(tuple(_of_one_colour(slices)), mirrored=False, name=path.stem)
+    complaints = tuple(scaled(tables))
+    return BsdfData(tuple(_of_one_colour(slices)), mirrored=False, name=path.stem, complaints=complaints)
 
 
 def _of_one_colour(slices: list[BsdfSlice]) -> list[BsdfSlice]:
@@ -83,7 +89,7 @@ def _of_one_colour(slices: list[BsdfSlice]) -> list[BsdfSlice]:
         own = [one for one in slices if one.wavelength == wave]
         if not all(np.array_equal(a.values, b.values, equal_nan=True) for a, b in zip(first, own, strict=True)):
             return slices
-    return [BsdfSlice(one.incident, one.values, one.transmitted, grid=one.grid) for one in first]
+    return [dataclasses.replace(one, wavelength=None) for one in first]
 
 
 def fits(data: BsdfData) -> bool:

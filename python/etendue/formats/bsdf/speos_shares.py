@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -140,4 +141,4 @@ def gaussian(
     one = BsdfSlice(incident, np.where(np.isnan(f), 0.0, f), transmitted, grid=grid, wavelength=wavelength)
     known = one.integral()
     factor = part / known if known > 0.0 else 0.0
-    return BsdfSlice(incident, one.values * factor, transmitted, grid=grid, wavelength=wavelength)
+    return dataclasses.replace(one, values=one.values * factor, stated=part)

@@ -15,7 +15,7 @@ from etendue.errors import UnsupportedFormatError
 from etendue.formats.bsdf import tracepro_tables
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.functions import values_on
-from etendue.formats.bsdf.tracepro_balance import Lit, chosen, only
+from etendue.formats.bsdf.tracepro_balance import Lit, chosen, only, unbalanced
 from etendue.formats.bsdf.tracepro_lines import (
     COLUMNS,
     SIDES,
@@ -94,7 +94,9 @@ def read(path: Path) -> BsdfData:
     if scatter in (TABLE, ASYMMETRIC):
         for side in sides:
             blocks = tracepro_tables.blocks_of(lines, side.rows, side.begin, side.end)
-            slices += tracepro_tables.slices_of(lines, blocks, front=side.front, turning=turning)
+            tables = tracepro_tables.slices_of(lines, side.rows, blocks, front=side.front, turning=turning)
+            slices += tables.slices
+            complaints += tables.complaints
     elif scatter != NONE:
         more, slices = _by_numbers(lines, sides, scatter, complaints, turning=turning)
         components += more
@@ -213,8 +215,7 @@ def _by_numbers(
             Way.of(lines, rows, numbers[way], front=side.front, transmitted=bool(way), strength=strength[way])
             for way in range(2)
         ]
-        left = 1.0 - values[:, 4:10].reshape(-1, 3, 2).mean(axis=2).sum(axis=1)
-        lit.append(Lit(ways, Numbers.of(lines, rows, left[:, None])))
+        lit.append(Lit(ways, Numbers.of(lines, rows, rows.left[:, None])))
     pairs = [[side.ways[way] for side in lit] for way in range(2)]
     pairs = [ways for ways in pairs if any(way.strong.any() for way in ways)]
     if not pairs:
@@ -222,6 +223,7 @@ def _by_numbers(
     known = readings(scatter, beta)
     if len(known) == 1:
         reading = only(known[0], lit, lines)
+        complaints += unbalanced(reading, lit, turning=turning)
     else:
         reading, complaint = chosen(known, lit, lines, turning=turning)
         complaints.append(complaint)

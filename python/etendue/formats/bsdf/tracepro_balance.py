@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import UnsupportedFormatError
+from etendue.formats.bsdf.shares import CLOSE as DISAGREES
 from etendue.formats.bsdf.tracepro_lines import Lines
 from etendue.formats.bsdf.tracepro_models import FLOATING, Numbers, Way
 from etendue.formats.bsdf.tracepro_readings import Reading
@@ -84,6 +85,20 @@ def only(reading: Reading, sides: Sequence[Lit], lines: Lines) -> Reading:
     if line is not None:
         raise lines.refuse(line, "numbers that make no BSDF: B has to be more than 0, unless g is 0, and A/B finite")
     return reading
+
+
+def unbalanced(reading: Reading, sides: Sequence[Lit], *, turning: bool) -> Iterator[Complaint]:
+    """A note if the shares leave more or less for scatter than a formula makes that is not in doubt, by more than 1 %.
+
+    Parameters
+    ----------
+    reading, sides, turning
+        As of `chosen`.
+    """
+    rows = list(_rows(reading, sides, turning=turning))
+    worst = max(rows, key=lambda row: row.off, default=None)
+    if worst is not None and worst.off > DISAGREES:
+        yield Complaint("note", "rows of shares", f"the formula does not agree with the shares: {worst}")
 
 
 def chosen(

@@ -51,6 +51,11 @@ class Rows:
     line: npt.NDArray[np.intp]
     values: Array
 
+    @property
+    def left(self) -> Array:
+        """What rows of shares leave for scatter: neither absorbed nor mirrored nor straight on, the mean of S and P."""
+        return np.asarray(1.0 - self.values[:, 4:10].reshape(-1, 3, 2).mean(axis=2).sum(axis=1))
+
     def where(self, kept: npt.NDArray[np.bool_]) -> Rows:
         """Some of them."""
         return Rows(self.line[kept], self.values[kept])

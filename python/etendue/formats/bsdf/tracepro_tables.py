@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.formats.bsdf.shares import CLOSE
 from etendue.formats.bsdf.tokens import ADVICE
 from etendue.formats.bsdf.tracepro_lines import TABLE_COLUMNS, Lines, Rows, once_at_the_normal
 from etendue.formats.bsdf.tracepro_models import forwards
 from etendue.quantities.bsdf_data import NORMAL, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
 
@@ -40,8 +44,18 @@ def _key(values: Array) -> Key:
     return wavelength, theta, phi
 
 
-def slices_of(lines: Lines, blocks: dict[Key, Rows], *, front: bool, turning: bool) -> list[BsdfSlice]:
+@dataclasses.dataclass(frozen=True)
+class Tables:
+    """Slices of one side, and what is to be told of them."""
+
+    slices: list[BsdfSlice]
+    complaints: list[Complaint]
+
+
+def slices_of(lines: Lines, shares: Rows, blocks: dict[Key, Rows], *, front: bool, turning: bool) -> Tables:
     """The slices of tables over |β − β₀| and azimuth; of light that is scattered at no incidence there are none.
+
+    What a row of shares leaves for scatter is the stated share, of both ways together: where one scatters alone, of it.
 
     Raises
     ------
@@ -49,7 +63,8 @@ def slices_of(lines: Lines, blocks: dict[Key, Rows], *, front: bool, turning: bo
         If a table is not complete.
     """
     several = len({key[0] for key in blocks}) > 1
-    slices = []
+    slices, complaints = [], []
+    left = {_key(key): max(float(value), 0.0) for key, value in zip(shares.values[:, 1:4], shares.left, strict=True)}
     largest = max(blocks.values(), key=lambda block: len(block.line)).values
     lists = np.unique(largest[:, 4]), np.unique(largest[:, 5])
     for (wavelength, theta, phi), block in blocks.items():
@@ -77,12 +92,27 @@ def slices_of(lines: Lines, blocks: dict[Key, Rows], *, front: bool, turning: bo
         light = (180.0 + (0.0 if turning else phi)) % 360.0
         incident = light_from(theta, light, behind=not front)
         grid = PolarGrid("cosines", beta, azimuth - forwards(light, turning=turning))
-        for transmitted in (False, True):
-            f = np.maximum(values[int(transmitted)], 0.0)
-            colour = 1e3 * wavelength if several else None
-            slices.append(BsdfSlice(incident, f, transmitted, grid=grid, wavelength=colour))
+        f = np.maximum(values, 0.0)
+        stated = left.get((wavelength, theta, phi))
+        colour = 1e3 * wavelength if several else None
+        both = [
+            BsdfSlice(
+                incident,
+                f[int(transmitted)],
+                transmitted,
+                grid=grid,
+                wavelength=colour,
+                stated=stated if f[int(transmitted)].any() and not f[int(not transmitted)].any() else None,
+            )
+            for transmitted in (False, True)
+        ]
+        slices += both
+        whole = sum(one.integral() for one in both)
+        if stated is not None and abs(whole - stated) > CLOSE * max(stated, whole):
+            text = f"the row of shares leaves {stated:.6g} of the light for scatter, the table adds up to {whole:.6g}"
+            complaints.append(Complaint("note", f"{theta:g}° of incidence", text))
     scattered = {one.transmitted for one in slices if one.values.any()}
-    return [one for one in slices if one.transmitted in scattered]
+    return Tables([one for one in slices if one.transmitted in scattered], complaints)
 
 
 def profiles_of(lines: Lines, shares: Rows, blocks: dict[Key, Rows]) -> tuple[Array, Array]:
