@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import math
 import re
@@ -15,6 +16,7 @@ import pytest
 from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data, write_bsdf_data
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.scatter.errors import with_standard_errors
 from etendue.scatter.models.finish import Finish
 
 Array = npt.NDArray[np.float64]
@@ -243,3 +245,69 @@ def test_a_lobe_that_is_wider_across_than_along_stays_so(
     found, expected = again.evaluate(incident, scattered), bsdf.evaluate(incident, scattered)
     step = 0.14 if form.name == "bird" else 0.07
     assert np.abs(found - expected).max() < step**2 / 8.0 * 2.0 * math.exp(-1.5) / 0.15**2 * 2.0
+
+
+def _measured(incident: Array, error: npt.ArrayLike, *, frame: str = "cosines") -> BsdfSlice:
+    """f of 0.1 with an error of so much at the specular direction, and from the far end of the grid on."""
+    grid = PolarGrid(frame, np.array([0.0, 0.4 if frame == "cosines" else 50.0]), np.array([0.0, 180.0]))  # type: ignore[arg-type]
+    return BsdfSlice(incident, np.full((2, 2), 0.1), grid=grid, standard_error=np.broadcast_to(error, (2, 2)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", WRITTEN, ids=lambda form: form.name)
+@pytest.mark.parametrize("frame", ["cosines", "specular"])
+def test_standard_errors_are_in_the_file_or_it_is_told_once(form: BsdfFormat, tmp_path: Path, frame: str) -> None:
+    """In the layout of some formats, and in that of others, for which a table is made."""
+    bsdf = et.BsdfTable(BsdfData([_measured(direction(30.0, 180.0), 0.01, frame=frame)]))
+    lost = et.write_bsdf(tmp_path / f"x{form.extensions[0]}", bsdf)
+    kept = form.name in ("etendue", "bird")
+    assert [note for note in lost if "place for standard errors" in note] == (
+        [] if kept else ["the format has no place for standard errors"]
+    )
+    (one,) = read_bsdf_data(tmp_path / f"x{form.extensions[0]}").slices if kept else (None,)
+    assert one is None or np.asarray(one.standard_error) == pytest.approx(0.01)
+    assert ("neighbouring values go together" in " ".join(lost)) is (form.name == "bird")
+
+
+def test_standard_errors_of_a_table_that_is_made_for_a_format(tmp_path: Path) -> None:
+    """Linear in |β − β₀| to 0.4, so that interpolating between two nodes is exact: 0.01 + 0.025 |β − β₀| there."""
+    bsdf = et.BsdfTable(BsdfData([_measured(direction(30.0, 90.0), [0.01, 0.02])]))
+    assert "the values are a table made for this format" in et.write_bsdf(tmp_path / "x.json", bsdf)
+    (one,) = read_bsdf_data(tmp_path / "x.json").slices
+    off = np.linalg.norm(one.directions[..., :2] + one.incident[:2], axis=-1)
+    assert off.max() > 1.4
+    assert np.asarray(one.standard_error) == pytest.approx(0.01 + 0.025 * np.minimum(off, 0.4), rel=1e-6)
+
+
+def test_standard_errors_between_azimuths_and_wavelengths() -> None:
+    """Linear in both, as f is: known at azimuths 180 and 270°, and at 450 and 650 nm."""
+    measured = [
+        dataclasses.replace(_measured(direction(30.0, 180.0 + turn), 0.01 + turn / 9e3 + red), wavelength=wave)
+        for turn in (0.0, 90.0)
+        for wave, red in ((450.0, 0.0), (650.0, 0.1))
+    ]
+    data = BsdfData(measured, isotropic=False)
+    grid = PolarGrid("normal", np.array([0.0, 80.0]), np.arange(0.0, 360.0, 60.0))
+    for turn, expected in ((0.0, 0.01), (45.0, 0.015), (90.0, 0.02), (225.0, 0.015)):
+        for wave, red in ((400.0, 0.0), (450.0, 0.0), (500.0, 0.025), (650.0, 0.1)):
+            one = BsdfSlice(direction(30.0, 180.0 + turn), np.full(grid.shape, 0.1), grid=grid, wavelength=wave)
+            (made,) = with_standard_errors(BsdfData([one], isotropic=False), data).slices
+            assert np.asarray(made.standard_error) == pytest.approx(expected + red, rel=1e-9)
+
+
+def test_standard_errors_of_points_turn_with_the_plane_of_incidence() -> None:
+    """Those of the nearest point; of a sample that may be turned, at the same place beside the plane of incidence.
+
+    Where errors are not known for all of the light, there are none.
+    """
+    points = direction(40.0, np.array([0.0, 90.0, 180.0, 270.0]))
+    errors = np.array([0.01, 0.02, 0.03, 0.04])
+    measured = BsdfSlice(direction(30.0, 180.0), np.full(4, 0.1), points=points, standard_error=errors)
+    grid = PolarGrid("normal", np.array([0.0, 38.0]), np.array([90.0, 180.0, 270.0, 360.0]) - 3.0)
+    one = BsdfSlice(direction(30.0, 270.0), np.full(grid.shape, 0.1), grid=grid)
+    (made,) = with_standard_errors(BsdfData([one]), BsdfData([measured])).slices
+    # Turned by 90°: what lay at azimuth 0, where the light goes, lies at 90° now.
+    assert np.asarray(made.standard_error)[:, 1] == pytest.approx(errors)
+    unknown = dataclasses.replace(measured, incident=direction(60.0, 180.0), standard_error=None)
+    both = BsdfData([one])
+    assert with_standard_errors(both, BsdfData([measured, unknown])) is both

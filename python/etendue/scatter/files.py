@@ -13,10 +13,11 @@ from etendue.description.files import Files
 from etendue.description.tables import constant, on_common_nodes
 from etendue.errors import ArgumentError
 from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data, write_bsdf_shares
-from etendue.formats.bsdf.bsdf_format import BsdfFormat, ShareTables
+from etendue.formats.bsdf.bsdf_format import NO_ERRORS, BsdfFormat, ShareTables
 from etendue.quantities.bsdf_data import LEAN, BsdfData
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf, Side
+from etendue.scatter.errors import with_standard_errors
 from etendue.scatter.members import parts_of, same_when_turned
 from etendue.scatter.models import MODELS
 from etendue.scatter.models.finish import Finish, Record
@@ -221,6 +222,10 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
         lost.append("light that is mirrored or goes on in a single direction is not in the file")
     asked = _Asked(bsdf)
     data = form.tabulate(asked)
+    if isinstance(bsdf, BsdfTable) and any(one.standard_error is not None for one in bsdf.data.slices):
+        data = with_standard_errors(data, bsdf.data) if form.holds_errors else data
+        if not any(one.standard_error is not None for one in data.slices):
+            lost.append("standard errors are known for a part of the light alone" if form.holds_errors else NO_ERRORS)
     if data.isotropic and not asked.isotropic:
         lost.append(f"only light from azimuth {data.slices[0].phi:g}° of an anisotropic sample is in the file")
     if asked.wavelengths and not data.wavelengths:

@@ -27,7 +27,7 @@ from etendue.formats.bsdf import (
     tracepro,
     zemax,
 )
-from etendue.formats.bsdf.bsdf_format import SNIFFED_BYTES, BsdfFormat, ShareTables
+from etendue.formats.bsdf.bsdf_format import NO_ERRORS, SNIFFED_BYTES, BsdfFormat, ShareTables
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import as_path, require_readable
 from etendue.formats.other_kind import other_kind
@@ -178,7 +178,9 @@ def write_bsdf_data(path: str | os.PathLike[str], data: BsdfData, format: str | 
             path, "layout", f"the table does not fit {form.title}", "In Python, write_bsdf brings it into that layout."
         )
     with atomic_output(path) as temporary, temporary.open("w+b") as stream:
-        return form.write(data, stream)
+        lost = form.write(data, stream)
+    errors = any(one.standard_error is not None for one in data.slices)
+    return (*lost, NO_ERRORS) if errors and not form.holds_errors else lost
 
 
 def write_bsdf_shares(path: str | os.PathLike[str], shares: ShareTables, format: str | None = None) -> None:

@@ -209,10 +209,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
     names = ["BSDF" if one.wavelength is None else f"{one.wavelength:.9g}nm" for one in places[0]]
     head.append(f"VARS {','.join([*ANGLES, *names])}")
     stream.write(("\n".join([*head, *rows]) + "\n").encode("ascii"))
-    lost = []
-    if any(one.standard_error is not None for one in data.slices):
-        lost.append("the format has no standard errors")
-    return tuple(lost)
+    return ()
 
 
 FORMAT = BsdfFormat("astm", "ASTM E1392/E2387 text", (".astm",), recognise, read, fits, tabulate, write)

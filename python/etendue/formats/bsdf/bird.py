@@ -207,7 +207,12 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         "data": {name: {"unit": units[name], "values": values} for name, values in columns.items() if values},
     }
     stream.write((json.dumps(content, ensure_ascii=False, allow_nan=False, indent=1) + "\n").encode("utf-8"))
-    return () if data.both_sides else ("only light that meets the front is written",)
+    lost = []
+    if any(one.standard_error is not None and one.interpolated for one in data.slices):
+        lost.append("the file does not say that standard errors of neighbouring values go together")
+    if not data.both_sides:
+        lost.append("only light that meets the front is written")
+    return tuple(lost)
 
 
-FORMAT = BsdfFormat("bird", "BiRD JSON", (".json",), recognise, read, fits, tabulate, write)
+FORMAT = BsdfFormat("bird", "BiRD JSON", (".json",), recognise, read, fits, tabulate, write, holds_errors=True)

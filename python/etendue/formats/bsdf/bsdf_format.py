@@ -84,6 +84,8 @@ class BsdfFormat:
     write_shares : callable, optional
         Writes shares of mirrored and Lambertian light, for formats that hold no tables. Raises ArgumentError for what they
         cannot hold.
+    holds_errors : bool
+        Whether standard errors of the values have a place in it.
     """
 
     name: str
@@ -95,7 +97,11 @@ class BsdfFormat:
     tabulate: Callable[[Tabulated], BsdfData] | None = None
     write: Callable[[BsdfData, BinaryIO], tuple[str, ...]] | None = None
     write_shares: Callable[[ShareTables, BinaryIO], None] | None = None
+    holds_errors: bool = False
 
 
 SNIFFED_BYTES = 4096
 """What `recognise` is given of a file."""
+
+NO_ERRORS = "the format has no place for standard errors"
+"""What is lost of a measured table in most formats."""

@@ -145,4 +145,4 @@ def _json(value: list[dict[str, Any]] | Mapping[str, Any]) -> str:
         raise ArgumentError(f"a component holds what no file can: {error}") from None
 
 
-FORMAT = BsdfFormat("etendue", "étendue BSDF", (".h5",), recognise, read, fits, tabulate, write)
+FORMAT = BsdfFormat("etendue", "étendue BSDF", (".h5",), recognise, read, fits, tabulate, write, holds_errors=True)

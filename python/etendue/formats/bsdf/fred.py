@@ -186,12 +186,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
             for (i, r), (k, a) in itertools.product(enumerate(polar), enumerate(grid.azimuth)):
                 lines.append(f"{r:.12g}\t{a:.9g}\t{one.values[k, i]:.9g}")
     stream.write(("\n".join(lines) + "\n").encode("ascii"))
-    lost = []
-    if any(one.standard_error is not None for one in data.slices):
-        lost.append("the format has no standard errors")
-    if not data.both_sides:
-        lost.append("only light that meets the front is written")
-    return tuple(lost)
+    return () if data.both_sides else ("only light that meets the front is written",)
 
 
 FORMAT = BsdfFormat("fred", "FRED tabulated scatter", (".dat",), recognise, read, fits, tabulate, write)

@@ -235,8 +235,6 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
             [",".join(f"{value:.9g}" for value in row) + "," for row in matrix],
         )
     stream.write(document(data.name, lines))
-    if any(one.standard_error is not None for one in data.slices):
-        return ("the format has no standard errors",)
     return ()
 
 

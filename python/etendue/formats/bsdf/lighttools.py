@@ -213,8 +213,6 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         lines.append(f"TIS {one.stated if one.stated is not None else one.integral():.9g}")
         lines += [" ".join(f"{value:.9g}" for value in row) for row in one.values]
     stream.write(("\n".join([*lines, "DataEnd"]) + "\n").encode("ascii"))
-    if any(one.standard_error is not None for one in data.slices):
-        return ("the format has no standard errors",)
     return ()
 
 

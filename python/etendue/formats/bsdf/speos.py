@@ -247,12 +247,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         for one in (one for own in ordered[transmitted].values() for one in own):
             lines += table_rows(one)
     stream.write(("\n".join([*lines, "End of file"]) + "\n").encode("ascii"))
-    lost = []
-    if any(one.standard_error is not None for one in data.slices):
-        lost.append("the format has no standard errors")
-    if not data.both_sides:
-        lost.append("only light that meets the front is written")
-    return tuple(lost)
+    return () if data.both_sides else ("only light that meets the front is written",)
 
 
 def table_rows(one: BsdfSlice) -> list[str]:

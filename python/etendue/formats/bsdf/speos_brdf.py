@@ -141,12 +141,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         one = by_place[way, theta, None if waves == [None] else wave]
         lines += [f"{100.0 * one.integral():.12g}", *table_rows(one)]
     stream.write(("\n".join([*lines, "End of file"]) + "\n").encode("ascii"))
-    lost = []
-    if any(one.standard_error is not None for one in data.slices):
-        lost.append("the format has no standard errors")
-    if not data.both_sides:
-        lost.append("only light that meets the front is written")
-    return tuple(lost)
+    return () if data.both_sides else ("only light that meets the front is written",)
 
 
 FORMAT = BsdfFormat("speos-brdf", "Speos BRDF", (".brdf",), recognise, read, fits, tabulate, write)

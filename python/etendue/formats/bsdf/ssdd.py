@@ -390,12 +390,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         table = np.stack([[by_place[phi, theta] for theta in thetas] for phi in phis])[:, :, order]
         lines += [f"{value:.9g}" for value in table.transpose(2, 3, 0, 1).ravel()]
     stream.write(("\n".join(lines) + "\n").encode("ascii"))
-    lost = []
-    if any(one.standard_error is not None for one in data.slices):
-        lost.append("the format has no standard errors")
-    if not data.both_sides:
-        lost.append("only light that meets the front is written")
-    return tuple(lost)
+    return () if data.both_sides else ("only light that meets the front is written",)
 
 
 FORMAT = BsdfFormat("ssdd", "SSDD", (".ssdd",), recognise, read, fits, tabulate, write)

@@ -274,10 +274,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         rows = [" ".join(f"{value:.9g}" for value in row) for row in cells]
         lines += block_of(name, [f"<AngleBasis>{BASIS}</AngleBasis>"], ["{", *rows, "}"])
     stream.write(document(data.name, lines))
-    lost = [f"values are means over {n} × {n} cells of scattered directions"]
-    if any(one.standard_error is not None for one in data.slices):
-        lost.append("the format has no standard errors")
-    return tuple(lost)
+    return (f"values are means over {n} × {n} cells of scattered directions",)
 
 
 FORMAT = BsdfFormat("tensor-tree", "tensor tree XML", (".tt.xml",), recognise, read, fits, tabulate, write)

@@ -178,8 +178,6 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
     lost = []
     if first.wavelength is not None:
         lost.append(f"no wavelength is in the file: its values are those at {first.wavelength:g} nm")
-    if any(one.standard_error is not None for one in data.slices):
-        lost.append("the format has no standard errors")
     if not first.front:
         lost.append("the format does not tell front from back")
     return tuple(lost)
