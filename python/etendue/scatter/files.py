@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +20,8 @@ from etendue.quantities.bsdf_data import LEAN, BsdfData
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf, Side
 from etendue.scatter.errors import with_standard_errors
-from etendue.scatter.members import parts_of, same_when_turned
+from etendue.scatter.formulas import formulas_of, regular_of_any
+from etendue.scatter.members import components_of, parts_of, same_when_turned
 from etendue.scatter.models import MODELS
 from etendue.scatter.models.finish import Finish, Record
 from etendue.scatter.models.shares import PARTS, Scattering
@@ -26,6 +29,9 @@ from etendue.scatter.table import BsdfTable
 
 INCIDENCES = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 85.0)
 """Angles [°] at which a model is tabled, and a file that holds models alone."""
+
+GRAZING, RIGHT_ANGLE = 89.0, 90.0
+"""Angle [°] besides these where a surface mirrors as well, most of it at grazing incidence; and the last there is."""
 
 MOST_WAVELENGTHS = 41
 """At which a model is tabled: spectra measured at each nanometre would make files of gigabytes."""
@@ -107,17 +113,21 @@ def _joined(parts: Sequence[BsdfData], names: Sequence[str]) -> BsdfData:
     )
 
 
+def _grids(record: Record) -> list[dict[str, Any]]:
+    """Tables of shares of a model."""
+    return [value for part in parts_of(record) for value in part.values() if isinstance(value, dict)]
+
+
 def _wavelengths(record: Record) -> set[float]:
     """Between which shares of a model are linear [nm]; none where they are the same at all."""
-    grids = [value for part in parts_of(record) for value in part.values() if isinstance(value, dict)]
-    nodes = [np.asarray(grid["wavelength"]) for grid in grids if "wavelength" in grid]
+    nodes = [np.asarray(grid["wavelength"]) for grid in _grids(record) if "wavelength" in grid]
     return {float(node) for one in nodes if one.size > 1 for node in one}
 
 
 class _Asked:
     """A BSDF as writers ask for it."""
 
-    def __init__(self, bsdf: Bsdf) -> None:
+    def __init__(self, bsdf: Bsdf, form: BsdfFormat) -> None:
         data = bsdf.data if isinstance(bsdf, BsdfTable) else None
         self._bsdf = bsdf
         self.name = data.name if data else type(bsdf).__name__
@@ -128,8 +138,18 @@ class _Asked:
         kept = np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), MOST_WAVELENGTHS)).round().astype(int))
         self.left_out = len(nodes) - kept.size
         self.wavelengths = tuple(sorted({nodes[k] for k in kept}.union(data.wavelengths if data else ())))
-        self.incidences: tuple[float, ...] = (bsdf.incidences if isinstance(bsdf, BsdfTable) else ()) or INCIDENCES
-        _, _, self.reflects, self.transmits = bsdf.ways
+        mirrored, refracted, self.reflects, self.transmits = bsdf.ways
+        models = (*INCIDENCES, GRAZING) if form.holds_regular and (mirrored or refracted) else INCIDENCES
+        self.incidences: tuple[float, ...] = (bsdf.incidences if isinstance(bsdf, BsdfTable) else ()) or models
+        kinks = [grid["angle"] for grid in _grids(record) if "angle" in grid]
+        self.angles = np.degrees(np.unique(np.concatenate([np.zeros(1), *kinks]))).round(9)
+
+    @property
+    def colour(self) -> float:
+        """The wavelength [nm] of what is written without one: what a table does not know is that of the nearest."""
+        if not self.wavelengths:
+            return WAVELENGTH
+        return min(max(WAVELENGTH, self.wavelengths[0]), self.wavelengths[-1])
 
     def evaluate(
         self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None
@@ -209,39 +229,68 @@ def _shares(bsdf: Bsdf, form: BsdfFormat) -> ShareTables:
 def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
     if form.fits is None or form.tabulate is None:
         raise ArgumentError(f"{form.title} is read only")
-    if isinstance(bsdf, Finish) and form.name == "etendue":
-        isotropic = same_when_turned(bsdf.record(Files()))
-        return BsdfData(components=(bsdf.to_dict(),), isotropic=isotropic, name=type(bsdf).__name__), ()
-    if isinstance(bsdf, BsdfTable) and form.fits(bsdf.data):
-        return bsdf.data, ()
-    mirrored, refracted, back, through = bsdf.ways
-    if not (back or through):
-        raise ArgumentError("nothing of this BSDF is scattered, so there is no table of it to write")
-    lost = []
-    if mirrored or refracted:
-        lost.append("light that is mirrored or goes on in a single direction is not in the file")
-    asked = _Asked(bsdf)
-    data = form.tabulate(asked)
+    for data in _as_it_is(bsdf):
+        if form.fits(data):
+            return data, ()
+    asked = _Asked(bsdf, form)
+    regular, lost = _regular(bsdf, asked, form)
+    if not (asked.reflects or asked.transmits):
+        if not regular:
+            raise ArgumentError("nothing of this BSDF is scattered, so there is no table of it to write")
+        data = BsdfData(components=tuple(regular), name=asked.name)
+        return data, (*lost, *_colours(asked, data))
+    data = dataclasses.replace(form.tabulate(asked), components=tuple(regular))
     if isinstance(bsdf, BsdfTable) and any(one.standard_error is not None for one in bsdf.data.slices):
         data = with_standard_errors(data, bsdf.data) if form.holds_errors else data
         if not any(one.standard_error is not None for one in data.slices):
             lost.append("standard errors are known for a part of the light alone" if form.holds_errors else NO_ERRORS)
     if data.isotropic and not asked.isotropic:
         lost.append(f"only light from azimuth {data.slices[0].phi:g}° of an anisotropic sample is in the file")
-    if asked.wavelengths and not data.wavelengths:
-        # What a table does not know is that of the nearest wavelength.
-        at = min(max(WAVELENGTH, asked.wavelengths[0]), asked.wavelengths[-1])
-        lost.append(f"no wavelength is in the file: its values are those at {at:g} nm")
-    elif asked.left_out:
-        lost.append(f"{asked.left_out} wavelengths between those of the file are left out")
+    lost += _colours(asked, data)
     if not asked.both_sides and len({one.front for one in data.slices}) == 1:
         lost.append("only light that meets the front is in the file, and reads as that of both sides")
     kept = {one.transmitted for one in data.slices}
-    if back and through and len(kept) == 1:
+    if asked.reflects and asked.transmits and len(kept) == 1:
         lost.append(f"the file holds {'transmitted' if True in kept else 'reflected'} light only")
     lost.append("the values are a table made for this format")
     lost += _too_coarse(bsdf, data)
     return data, tuple(lost)
+
+
+def _as_it_is(bsdf: Bsdf) -> Iterator[BsdfData]:
+    """What a format may hold without a new table: slices and components as they are, or components as plain formulas."""
+    if isinstance(bsdf, BsdfTable):
+        data, records = bsdf.data, components_of(bsdf.data)
+    elif isinstance(bsdf, Finish):
+        records = [bsdf.record(Files())]
+        isotropic = same_when_turned(records[0])
+        data = BsdfData(components=(bsdf.to_dict(),), isotropic=isotropic, name=type(bsdf).__name__)
+    else:
+        return
+    yield data
+    plain = formulas_of({"kind": "sum", "members": [(1.0, record) for record in records]})
+    if plain is not None:
+        yield dataclasses.replace(data, components=plain)
+
+
+def _regular(bsdf: Bsdf, asked: _Asked, form: BsdfFormat) -> tuple[list[dict[str, Any]], list[str]]:
+    """Light that is mirrored or goes straight on, if there is any and the format holds it; and what is lost of it."""
+    mirrored, refracted, _, _ = bsdf.ways
+    if not (mirrored or refracted):
+        return [], []
+    if not form.holds_regular:
+        return [], ["light that is mirrored or goes on in a single direction is not in the file"]
+    last = asked.incidences[-1] if asked.reflects or asked.transmits else RIGHT_ANGLE
+    return regular_of_any(bsdf, asked.angles, asked.colour, last)
+
+
+def _colours(asked: _Asked, data: BsdfData) -> list[str]:
+    """What is to be said of wavelengths."""
+    if asked.wavelengths and not data.wavelengths:
+        return [f"no wavelength is in the file: its values are those at {asked.colour:g} nm"]
+    if asked.left_out:
+        return [f"{asked.left_out} wavelengths between those of the file are left out"]
+    return []
 
 
 def _too_coarse(bsdf: Bsdf, data: BsdfData) -> list[str]:

@@ -84,6 +84,8 @@ class BsdfFormat:
     write_shares : callable, optional
         Writes shares of mirrored and Lambertian light, for formats that hold no tables. Raises ArgumentError for what they
         cannot hold.
+    holds_regular : bool
+        Whether light that is mirrored or goes straight on has a place beside tables: as a component with shares by angle.
     holds_errors : bool
         Whether standard errors of the values have a place in it.
     """
@@ -97,6 +99,7 @@ class BsdfFormat:
     tabulate: Callable[[Tabulated], BsdfData] | None = None
     write: Callable[[BsdfData, BinaryIO], tuple[str, ...]] | None = None
     write_shares: Callable[[ShareTables, BinaryIO], None] | None = None
+    holds_regular: bool = False
     holds_errors: bool = False
 
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.functions import AZIMUTH_STEP, RADIAL, sampled, values_on
+from etendue.formats.bsdf.regular import KEYS, regular_of
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number
@@ -325,8 +326,11 @@ def _linear(table: Array, places: list[list[tuple[npt.NDArray[np.intp], Array]]]
 
 
 def fits(data: BsdfData) -> bool:
-    """Whether the slices are one table about the specular direction for each way, from the front, without gaps."""
-    if not data.slices or data.components:
+    """Whether the slices are one table about the specular direction for each way, from the front, without gaps.
+
+    Beside them, or instead of them, there may be light that is mirrored or goes straight on.
+    """
+    if not (data.slices or data.components) or regular_of(data.components) is None:
         return False
     for transmitted in (False, True):
         own = [one for one in data.slices if one.transmitted == transmitted]
@@ -359,7 +363,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
 
 
 def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
-    """Write a block for each way, in ASCII; nine digits each."""
+    """Write a block for each way, and for light that is mirrored or goes straight on, in ASCII; nine digits each."""
     name = " ".join(data.name.encode("ascii", "replace").decode("ascii").replace("#", " ").split())
     lines = ["VERSION 0.2", "SOFTWARE etendue"]
     for transmitted in (False, True):
@@ -389,8 +393,16 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         by_place = {(round(one.phi, 6), round(one.theta, 9)): one.values for one in own}
         table = np.stack([[by_place[phi, theta] for theta in thetas] for phi in phis])[:, :, order]
         lines += [f"{value:.9g}" for value in table.transpose(2, 3, 0, 1).ravel()]
+    regular = regular_of(data.components)
+    assert regular is not None  # noqa: S101 - `fits` says so
+    for kind, share in zip(KEYS, regular.shares, strict=True):
+        if share.any():
+            lines += ["", f"DATA_TYPE {kind}", "COLOR_MODEL monochrome"]
+            lines.append("PARAM0_LIST " + " ".join(f"{angle:.9g}" for angle in regular.angle))
+            lines += [f"NAME {name}", "DATA ascii"] if name else ["DATA ascii"]
+            lines += [f"{value:.9g}" for value in share]
     stream.write(("\n".join(lines) + "\n").encode("ascii"))
     return () if data.both_sides else ("only light that meets the front is written",)
 
 
-FORMAT = BsdfFormat("ssdd", "SSDD", (".ssdd",), recognise, read, fits, tabulate, write)
+FORMAT = BsdfFormat("ssdd", "SSDD", (".ssdd",), recognise, read, fits, tabulate, write, holds_regular=True)
