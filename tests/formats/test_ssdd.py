@@ -198,3 +198,25 @@ def test_mistakes(tmp_path: Path, old: str, new: str, said: str) -> None:
 def test_transmitted_light_over_half_vectors_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedFormatError, match="half vectors"):
         read_bsdf_data(written(tmp_path, SPECIFICATION.replace("DATA_TYPE brdf", "DATA_TYPE btdf", 1)))
+
+
+@pytest.mark.parametrize("word", ["0.1x", "nan", "1e999"])
+@pytest.mark.parametrize("at", [0, 3, 7])
+def test_a_bad_value_is_named_with_its_line(tmp_path: Path, word: str, at: int) -> None:
+    """Of eight values in lines of their own, with a comment among them: the first is two lines below DATA."""
+    text = block("brdf", "specular", [[50], [], [0, 20], [0, 90, 180, 270]], np.full((4, 2, 1, 1), 0.05))
+    head, _, values = text.partition("DATA ascii\n")
+    rows = values.splitlines()
+    rows[at] = f"{word} # here"
+    path = written(tmp_path, "\n".join([f"{head}DATA ascii", "# a comment", *rows, ""]))
+    with pytest.raises(FormatError, match=f"'{word}' is no finite number") as caught:
+        read_bsdf_data(path)
+    (line,) = (k for k, text in enumerate(path.read_text().splitlines(), 1) if "# here" in text)
+    assert caught.value.place == f"line {line}"
+
+
+def test_what_is_told_of_a_block_names_the_line_above_its_values(tmp_path: Path) -> None:
+    values = np.full((4, 2, 1, 1), -0.05)
+    path = written(tmp_path, block("brdf", "specular", [[50], [], [0, 20], [0, 90, 180, 270]], values))
+    (line,) = (k for k, text in enumerate(path.read_text().splitlines(), 1) if text == "DATA ascii")
+    assert [one.place for one in read_bsdf_data(path).complaints] == [f"below line {line}"]

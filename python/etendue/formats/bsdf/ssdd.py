@@ -120,6 +120,7 @@ def _blocks(path: Path, data: bytes) -> tuple[list[Block], list[Complaint]]:
         if not keys["DATA_TYPE"].startswith("specular") and keys.get("PARAM_TYPE") not in SYSTEMS:
             found_text = f"PARAM_TYPE {keys.get('PARAM_TYPE')!r}"
             raise FormatError(path, f"line {line}", found_text[:100], f"It is one of {', '.join(SYSTEMS)}.")
+        begin = line
         lists = [_list(path, line, keys, f"PARAM{k}_LIST") for k in range(5)]
         waves = _list(path, line, keys, "WAVELENGTH_LIST")
         colours = MODELS[keys["COLOR_MODEL"]] or waves.size
@@ -139,9 +140,9 @@ def _blocks(path: Path, data: bytes) -> tuple[list[Block], list[Complaint]]:
         if values is None or not np.isfinite(values).all():
             raise FormatError(path, f"line {line}", f"not {count} finite values", ADVICE)
         if (negative := int((values < 0.0).sum())) > 0:
-            complaints.append(Complaint("warning", f"line {line}", f"{negative} values below 0 became 0"))
+            complaints.append(Complaint("warning", f"below line {begin}", f"{negative} values below 0 became 0"))
         shaped = np.maximum(values.astype(np.float64), 0.0).reshape(*sizes, colours)
-        found.append(Block(line, keys["DATA_TYPE"], keys["COLOR_MODEL"], dict(keys), [*lists, waves], shaped))
+        found.append(Block(begin, keys["DATA_TYPE"], keys["COLOR_MODEL"], dict(keys), [*lists, waves], shaped))
         keys = {}
     if not found or "DATA_TYPE" in keys:
         raise FormatError(path, f"line {line}", "a block of data is missing", ADVICE)
@@ -155,12 +156,17 @@ def _numbers(data: bytes, at: int, line: int, count: int, path: Path) -> tuple[A
     text = decoded(path, data[at:end])
     if text and not text.endswith("\n"):
         return None, at, line + text.count("\n")
-    words = re.sub(r"#[^\n]*", "", text).split()
-    try:
-        values = np.array([number(word) for word in words])
-    except ValueError as error:
-        raise FormatError(path, f"values below line {line}", str(error)[:100], ADVICE) from None
-    return (values if values.size == count else None), end, line + text.count("\n")
+    values: list[float] = []
+    for at_line, row in enumerate(text.split("\n"), line + 1):
+        for word in row.partition("#")[0].split():
+            try:
+                value = number(word)
+            except ValueError:
+                value = np.nan
+            if not np.isfinite(value):
+                raise FormatError(path, f"line {at_line}", f"{word[:40]!r} is no finite number", ADVICE)
+            values.append(value)
+    return (np.array(values) if len(values) == count else None), end, line + text.count("\n")
 
 
 def _list(path: Path, line: int, keys: dict[str, str], name: str) -> Array:
