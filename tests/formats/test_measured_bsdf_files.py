@@ -102,6 +102,21 @@ def test_files_of_single_incidences_are_read_together(tmp_path: Path) -> None:
         et.read_bsdf([])
 
 
+@pytest.mark.parametrize(("up", "phi"), [("#upphi 90", 0.0), ("#upphi 0", 90.0), ("#", 90.0), ("#upphi 130", 320.0)])
+def test_upwards_is_the_y_axis_of_pab_files(tmp_path: Path, up: str, phi: float) -> None:
+    """As pabopto2bsdf of Radiance has it: 0 unless stated, and azimuths count so that upwards is at 90°.
+
+    Values tell the azimuth of the file: it differs by as much from that of the direction as that of the light.
+    """
+    path = tmp_path / "x.dat"
+    path.write_bytes(pab(up=up))
+    (one,) = read_bsdf_data(path).slices
+    assert np.allclose(one.incident, direction(30.0, phi))
+    theta = np.degrees(np.arccos(one.directions[:, 2]))
+    found = np.degrees(np.arctan2(one.directions[:, 1], one.directions[:, 0]))
+    assert np.allclose((one.values - 0.1 - theta / 1000) * 10000, (found - phi) % 360.0, atol=1e-3)
+
+
 def test_pab_mistakes(tmp_path: Path) -> None:
     path = tmp_path / "x.dat"
     whole = pab().decode()
@@ -109,6 +124,8 @@ def test_pab_mistakes(tmp_path: Path) -> None:
         ("#intheta 30\n", "", "no angles of incidence"),
         ("in_file: 200", "in_file: 201", "201 are stated, 200"),
         ("#intheta 30", "#intheta 90", "light from θ 90"),
+        ("#upphi 90", "#upphi north", "#upphi is 'north'"),
+        ("#upphi 90", "#upphi nan", "#upphi is 'nan'"),
     ):
         path.write_text(whole.replace(old, new))
         with pytest.raises(FormatError, match=said):

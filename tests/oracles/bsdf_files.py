@@ -68,8 +68,10 @@ def rgl(
     )
 
 
-def pab(quantity: str = "BRDF", *, theta: float = 30.0, phi: float = 0.0, end: str = "\n") -> bytes:
-    """A mirrored lobe at scattered places, with values that tell θ and φ."""
+def pab(
+    quantity: str = "BRDF", *, theta: float = 30.0, phi: float = 0.0, up: str = "#upphi 90", end: str = "\n"
+) -> bytes:
+    """A mirrored lobe at scattered places, with values that tell θ and φ; upwards, which is y, is at azimuth 90°."""
     rng = np.random.default_rng(3)
     to, around = rng.uniform(0.0, 85.0, 200), rng.uniform(0.0, 360.0, 200)
     values = 0.1 + to / 1000.0 + around / 10000.0
@@ -80,7 +82,7 @@ def pab(quantity: str = "BRDF", *, theta: float = 30.0, phi: float = 0.0, end: s
         f"#format: theta phi {quantity}",
         f"#intheta {theta:g}",
         f"#inphi {phi:g}",
-        "#upphi 0",
+        up,
         f"#datapoints_in_file: {to.size}",
         *(f"{t:.6f}\t{a:.6f}\t{v:.9g}" for t, a, v in zip(to, around, values, strict=True)),
     ]

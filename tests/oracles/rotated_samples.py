@@ -113,12 +113,13 @@ def bird(*, thetas: Sequence[float], phis: Sequence[float], transmitted: bool) -
 
 
 def pab(*, thetas: Sequence[float], phis: Sequence[float], transmitted: bool) -> list[bytes]:
-    """A file for each incidence; directions as ASTM's, in degrees."""
+    """A file for each incidence; directions as ASTM's, in degrees, but upwards, which is y, is at azimuth 130°."""
     files = []
     for theta, phi in _blocks(thetas, phis):
-        head = ["#format: theta phi BSDF", f"#intheta {theta:g}", f"#inphi {phi:g}"]
+        head = ["#format: theta phi BSDF", f"#intheta {theta:g}", f"#inphi {(phi + 40.0) % 360.0:g}", "#upphi 130"]
         points = _points([theta], [phi], transmitted=transmitted)
-        files.append("\n".join([*head, *(f"{t:g} {a:g} {v:.9g}" for _, _, t, a, v in points), ""]).encode())
+        rows = (f"{t:g} {(a + 40.0) % 360.0:g} {v:.9g}" for _, _, t, a, v in points)
+        files.append("\n".join([*head, *rows, ""]).encode())
     return files
 
 

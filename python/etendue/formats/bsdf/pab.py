@@ -15,6 +15,9 @@ from etendue.formats.rays.text_rows import number, whole
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.report import Complaint
 
+UPWARDS = 90.0
+"""Azimuth of the upwards direction of a sample [°]: y, as in the XML of Radiance, which is made of such files."""
+
 HORIZON = 1e-3
 """Cosine below which the intensity is no longer divided by it."""
 
@@ -28,7 +31,8 @@ def read(path: Path) -> BsdfData:
     """Read one incidence; files of several are read together by `read_bsdf`.
 
     Directions are away from the sample, θ from the normal of its front, beyond 90° behind it, so that the mirrored direction
-    has the azimuth φ + 180°. DSF is f cosθ. Of three tristimulus values the second is read.
+    has the azimuth φ + 180°. `#upphi` is the azimuth of the upwards direction of the sample, 0 if it is not stated, and
+    becomes the y axis. DSF is f cosθ. Of three tristimulus values the second is read.
     """
     lines = ended_lines(path)
     keys: dict[str, str] = {}
@@ -60,7 +64,9 @@ def read(path: Path) -> BsdfData:
         f = f / np.maximum(np.abs(np.cos(np.radians(table[:, 0]))), HORIZON)
     if f.min() < 0.0:
         complaints.append(Complaint("warning", "values", f"{(f < 0.0).sum()} values below 0 became 0"))
-    angles = np.column_stack([np.full((len(table), 2), (theta, phi)), table[:, :2]])
+    turn = UPWARDS - _upwards(path, keys)
+    around = (table[:, 1] + turn) % 360.0
+    angles = np.column_stack([np.full((len(table), 2), (theta, (phi + turn) % 360.0)), table[:, 0], around])
     return BsdfData(
         tuple(slices_of(angles, f, complaints)),
         isotropic=True,
@@ -96,6 +102,19 @@ def _incidence(path: Path, keys: dict[str, str]) -> tuple[float, float]:
     if not 0.0 <= theta <= 180.0 or abs(theta - 90.0) < 1e-6 or not abs(phi) <= 360.0:
         raise FormatError(path, "header", f"light from θ {theta:g}°, φ {phi:g}°", "θ is below 90°, or beyond it.")
     return theta, phi
+
+
+def _upwards(path: Path, keys: dict[str, str]) -> float:
+    """The azimuth [°] of the upwards direction of the sample."""
+    stated = keys.get("upphi", "0")
+    try:
+        phi = number(stated)
+    except ValueError:
+        phi = np.nan
+    if not abs(phi) <= 360.0:
+        advice = "It is the azimuth of the upwards direction of the sample, in degrees."
+        raise FormatError(path, "header", f"#upphi is {stated[:20]!r}", advice)
+    return phi
 
 
 FORMAT = BsdfFormat("pab", "PAB goniophotometer text", (".pab.dat",), recognise, read)

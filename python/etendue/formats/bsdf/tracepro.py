@@ -240,7 +240,7 @@ def _by_numbers(
 def fits(data: BsdfData) -> bool:
     """Whether the slices are one table in direction cosines, the same for all incidences of a side; or there are formulas.
 
-    Beside tables there may be light that is mirrored or goes straight on, beside that lobes after ABg.
+    Formulas are light that is mirrored or goes straight on, which may also stand beside tables, and lobes after ABg.
     """
     if not data.slices:
         return bool(data.components) and plan_of(data) is not None
