@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError, UnsupportedFormatError
 from etendue.formats.bsdf import read_bsdf_data
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_data import BsdfData, direction
 from oracles.bsdf_files import COATED, SCATTERING, SIMPLE
 
 BRDF = """OPTIS - brdf surface file v8.0
@@ -235,6 +236,63 @@ def test_shares_are_written_and_read(tmp_path: Path, extension: str) -> None:
                 assert others == pytest.approx([one, one], abs=1e-11), (theta, wavelength, way)
     for complaint in again.complaints:
         assert "straight on" in str(complaint)
+
+
+@pytest.mark.slow
+def test_lobes_of_scattering_files_are_written_as_they_were_read(tmp_path: Path) -> None:
+    """The words of the file that stand for light: shares in per cent, and widths where there is some, up to 45°."""
+    source, copy = tmp_path / "x.scattering", tmp_path / "y.scattering"
+    source.write_text(SCATTERING)
+    bsdf = et.read_bsdf(source)
+    assert et.write_bsdf(copy, bsdf) == ()
+    first, second = (np.array(path.read_text().split()[10:52], float) for path in (source, copy))
+    lit = first > 0.0
+    assert second[lit] == pytest.approx(first[lit], rel=1e-8)
+    # Widths of lobes without light are those to which the reader widens them.
+    assert second[~lit].max() <= 0.01
+    again = et.read_bsdf(copy)
+    assert len(again.data.slices) == len(bsdf.data.slices)
+    for one, other in zip(bsdf.data.slices, again.data.slices, strict=True):
+        assert other.values == pytest.approx(one.values, rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_lobes_of_a_simple_surface_in_a_file_by_angle(tmp_path: Path) -> None:
+    """0.9 · (60 %, 30 %, 10 %) at all angles, 12° wide; what is mirrored at grazing incidence leaves room for it."""
+    path = tmp_path / "x.simplescattering"
+    path.write_text(SIMPLE)
+    simple = et.read_bsdf(path)
+    assert et.write_bsdf(tmp_path / "y.scattering", simple) == ()
+    again = et.read_bsdf(tmp_path / "y.scattering")
+    assert again.incidences == simple.incidences
+    pair = direction(50.0, 180.0), direction([45.0, 50.0, 60.0, 70.0], [0.0, 20.0, 300.0, 100.0])
+    assert again.evaluate(*pair) == pytest.approx(simple.evaluate(*pair), rel=1e-6)
+    grazing = {"angle": [0, 85, 90], "values": [0.0, 0.0, 0.735]}
+    data = dataclasses.replace(simple.data, components=({"kind": "mixed", "specular_reflectance": grazing},))
+    et.write_bsdf(tmp_path / "z.scattering", et.BsdfTable(data))
+    words = (tmp_path / "z.scattering").read_text().split()[-11:]
+    assert list(map(float, words)) == pytest.approx([90, 73.5, 0, 0, 0, 26.5, 0, 12, 0, 12, 0], abs=1e-6)
+    assert len(read_bsdf_data(tmp_path / "z.scattering").slices) == 7
+
+
+def test_lobes_that_speos_does_not_describe_are_refused(tmp_path: Path) -> None:
+    """One value 0.1 % off; kinks of other shares between the lobes; formats without lobes."""
+    path = tmp_path / "x.simplescattering"
+    path.write_text(SIMPLE)
+    data = read_bsdf_data(path)
+    one = data.slices[2]
+    values = one.values.copy()
+    values[3, 10] *= 1.001
+    bent = {"kind": "mixed", "diffuse_reflectance": {"angle": [0, 33, 90], "values": [0.1, 0.2, 0.1]}}
+    for slices, components, name in (
+        ([dataclasses.replace(one, values=values)], data.components, "y.scattering"),
+        ([one], (bent,), "y.scattering"),
+        ([one], data.components, "y.simplescattering"),
+        ([one], (), "y.coated"),
+    ):
+        with pytest.raises(ArgumentError, match="write"):
+            et.write_bsdf(tmp_path / name, et.BsdfTable(BsdfData(slices, components)))
+        assert not (tmp_path / name).exists()
 
 
 @pytest.mark.parametrize(

@@ -12,19 +12,17 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.description.files import Files
-from etendue.description.tables import constant, on_common_nodes
 from etendue.errors import ArgumentError
 from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data, write_bsdf_shares
-from etendue.formats.bsdf.bsdf_format import NO_ERRORS, BsdfFormat, ShareTables
+from etendue.formats.bsdf.bsdf_format import NO_ERRORS, BsdfFormat
 from etendue.quantities.bsdf_data import LEAN, BsdfData
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf, Side
 from etendue.scatter.errors import with_standard_errors
 from etendue.scatter.formulas import formulas_of, regular_of_any
 from etendue.scatter.members import components_of, parts_of, same_when_turned
-from etendue.scatter.models import MODELS
 from etendue.scatter.models.finish import Finish, Record
-from etendue.scatter.models.shares import PARTS, Scattering
+from etendue.scatter.share_tables import share_tables
 from etendue.scatter.table import BsdfTable
 
 INCIDENCES = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 85.0)
@@ -185,7 +183,8 @@ def write_bsdf(path: str | os.PathLike[str], bsdf: Bsdf, format: str | None = No
         If there is no such format.
     ArgumentError
         If nothing of it is scattered: mirrors and interfaces have no table; or the format is read only, or holds shares of
-        mirrored and Lambertian light (Speos' .coated, .scattering, .simplescattering) and the BSDF has lobes.
+        mirrored and Lambertian light (Speos' .coated, .scattering, .simplescattering) and the BSDF has lobes, but for those
+        that .scattering has.
     OSError
         If the file cannot be written.
 
@@ -199,31 +198,10 @@ def write_bsdf(path: str | os.PathLike[str], bsdf: Bsdf, format: str | None = No
     """
     form = bsdf_format(Path(path), format)
     if form.write_shares is not None:
-        write_bsdf_shares(path, _shares(bsdf, form), form.name)
+        write_bsdf_shares(path, share_tables(bsdf, form), form.name)
         return ()
     data, lost = _laid_out(bsdf, form)
     return lost + write_bsdf_data(path, data, form.name)
-
-
-def _shares(bsdf: Bsdf, form: BsdfFormat) -> ShareTables:
-    """A BSDF that has neither lobes nor tables."""
-    plain, name = bsdf, type(bsdf).__name__
-    if isinstance(bsdf, BsdfTable) and not bsdf.data.slices and len(bsdf.data.components) == 1:
-        (component,) = map(dict, bsdf.data.components)
-        plain, name = MODELS[component["kind"]](**component), bsdf.name
-    if not isinstance(plain, Scattering):
-        raise ArgumentError(
-            f"{form.title} holds shares of mirrored and Lambertian light, and this BSDF is more than that: write a table of "
-            "it, as .anisotropicbsdf or .brdf"
-        )
-    shares = plain.shares(Files())
-    angle, wavelength, values = on_common_nodes([shares.get(part, constant(0.0)) for part in PARTS])
-    there = dict(zip(PARTS, values, strict=True))
-    specular, diffuse = (
-        np.array([there[f"{part}_{way}"] for way in ("reflectance", "transmittance")])
-        for part in ("specular", "diffuse")
-    )
-    return ShareTables(name, angle, wavelength, specular, diffuse)
 
 
 def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:

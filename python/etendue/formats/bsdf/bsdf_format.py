@@ -39,7 +39,7 @@ class Tabulated(Protocol):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ShareTables:
-    """Shares of light that is mirrored, goes straight on, or is scattered evenly to each side.
+    """Shares of light that is mirrored, goes straight on, or is scattered to each side: evenly, or about these directions.
 
     Parameters
     ----------
@@ -50,6 +50,10 @@ class ShareTables:
         [nm], rising.
     specular, diffuse : array, shape (2, angles, wavelengths)
         Reflected and transmitted.
+    lobe : array, shape (2, angles, wavelengths), optional
+        The same of lobes whose intensity is Gaussian in the angle from the mirrored and the straight direction.
+    width : array, shape (2, 2, angles, wavelengths), optional
+        Their full widths at half maximum [°], in the plane of incidence and across it, reflected and transmitted.
     """
 
     name: str
@@ -57,6 +61,8 @@ class ShareTables:
     wavelength: Array
     specular: Array
     diffuse: Array
+    lobe: Array | None = None
+    width: Array | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,8 +88,7 @@ class BsdfFormat:
     write : callable, optional
         Writes data of that layout; None: the format holds no tables, or is read only. Returns what is lost, in sentences.
     write_shares : callable, optional
-        Writes shares of mirrored and Lambertian light, for formats that hold no tables. Raises ArgumentError for what they
-        cannot hold.
+        Writes shares, for formats that hold no tables. Raises ArgumentError for what they cannot hold.
     holds_regular : bool
         Whether light that is mirrored or goes straight on has a place beside tables: as a component with shares by angle.
     holds_errors : bool

@@ -58,7 +58,7 @@ def read(path: Path) -> BsdfData:
 
 def write_shares(shares: ShareTables, stream: BinaryIO) -> None:
     """Write mirrored and transmitted light, the same for both polarisations."""
-    if shares.diffuse.any():
+    if shares.diffuse.any() or shares.lobe is not None:
         raise ArgumentError("a Speos coated surface holds no scattered light: write it as .scattering")
     whole = whole_range(shares)
     lines = [*head(START, "v1.0", shares.name), f"{whole.angle.size} {whole.wavelength.size}"]

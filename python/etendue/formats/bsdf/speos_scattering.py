@@ -77,14 +77,16 @@ def read(path: Path) -> BsdfData:
 
 
 def write_shares(shares: ShareTables, stream: BinaryIO) -> None:
-    """Write specular and Lambertian light; no Gaussian lobe."""
+    """Write specular and Lambertian light, and Gaussian lobes."""
     whole = whole_range(shares)
     lines = [*head(START, "v1.0", shares.name), f"{whole.angle.size} {whole.wavelength.size}"]
     lines.append("\t" + "\t\t".join(f"{nm:.12g}" for nm in whole.wavelength))
-    none = np.zeros_like(whole.specular[:, 0])
+    none = np.zeros_like(whole.specular)
+    lobe, widths = (none if whole.lobe is None else whole.lobe), ((none, none) if whole.width is None else whole.width)
     for i, angle in enumerate(whole.angle):
-        parts = (whole.specular[:, i], whole.diffuse[:, i], none, none, none)
+        parts = (whole.specular[:, i], whole.diffuse[:, i], lobe[:, i])
         lines += [(f"{angle:.12g}" if k == 0 else "") + "\t" + per_cent(part.T) for k, part in enumerate(parts)]
+        lines += ["\t" + "\t".join(f"{value:.12g}" for value in each[:, i].T.ravel()) for each in widths]
     stream.write(("\n".join(lines) + "\n").encode())
 
 

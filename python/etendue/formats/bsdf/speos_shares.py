@@ -26,6 +26,9 @@ STEEPEST = 89.0
 NARROWEST = 0.01
 """Full width at half maximum [°] below which a lobe is drawn no narrower."""
 
+FIT = 1e-6
+"""Relative difference from a Gaussian of values that went through files of nine digits and more."""
+
 STEPS = np.concatenate([[0.0], np.geomspace(0.03, 3.0, 40)])
 """Angles from the specular direction over the full width at half maximum."""
 
@@ -80,7 +83,7 @@ def per_cent(values: npt.ArrayLike) -> str:
 
 
 def whole_range(shares: ShareTables) -> ShareTables:
-    """The same from 0 to 90°: beyond the first and the last angle shares do not change."""
+    """The same from 0 to 90°: beyond the first and the last angle shares do not change; widths are linear as well."""
     angle = np.unique(np.concatenate([[0.0, 0.5 * 180.0], np.clip(shares.angle, 0.0, 0.5 * 180.0)]))
 
     def at(values: Array) -> Array:
@@ -88,7 +91,14 @@ def whole_range(shares: ShareTables) -> ShareTables:
         found = [[np.interp(angle, shares.angle, column) for column in way.T] for way in columns]
         return np.swapaxes(np.array(found), 1, 2)
 
-    return ShareTables(shares.name, angle, shares.wavelength, at(shares.specular), at(shares.diffuse))
+    return dataclasses.replace(
+        shares,
+        angle=angle,
+        specular=at(shares.specular),
+        diffuse=at(shares.diffuse),
+        lobe=None if shares.lobe is None else at(shares.lobe),
+        width=None if shares.width is None else np.stack([at(each) for each in shares.width]),
+    )
 
 
 def share(tokens: Tokens, what: str) -> float:
@@ -142,3 +152,36 @@ def gaussian(
     known = one.integral()
     factor = part / known if known > 0.0 else 0.0
     return dataclasses.replace(one, values=one.values * factor, stated=part)
+
+
+def lobe_of(one: BsdfSlice) -> tuple[float, float, float] | None:
+    """Share and full widths [°], in the plane of incidence and across it, of a slice that `gaussian` makes; None of others.
+
+    Examples
+    --------
+    >>> lobe = gaussian(30.0, 0.4, (5.0, 12.0), transmitted=False, wavelength=None)
+    >>> [round(number, 9) for number in lobe_of(lobe)]
+    [0.4, 5.0, 12.0]
+    """
+    grid = one.grid
+    if grid is None or grid.frame != "specular" or grid.radial.size < 2 or grid.azimuth.size < 2 or not one.front:
+        return None
+    part, widest = one.integral(), float(grid.radial[1] / STEPS[1])
+    widths = (widest, widest)
+    if part > 0.0:
+        intensity = one.values * np.abs(one.directions[..., 2])
+        towards, across = (int(np.argmin(np.abs(grid.azimuth - angle))) for angle in (0.0, 0.5 * 180.0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fallen = -np.log(intensity[[towards, across], 1] / intensity[[towards, across], 0])
+            found = grid.radial[1] * np.sqrt(4.0 * math.log(2.0) / fallen)
+        if not (np.isfinite(found) & (found >= NARROWEST * (1.0 - FIT))).all():
+            return None
+        widths = float(found[0]), float(found[1])
+    made = gaussian(one.theta, part, widths, transmitted=one.transmitted, wavelength=one.wavelength)
+    there = made.grid
+    if there is None or there.shape != grid.shape:
+        return None
+    pairs = ((there.radial, grid.radial), (there.azimuth, grid.azimuth), (made.values, one.values))
+    if not all(np.allclose(a, b, rtol=0.0, atol=FIT * max(float(a.max()), FIT)) for a, b in pairs):
+        return None
+    return part, *widths

@@ -80,7 +80,9 @@ def _absorber(slices: list[BsdfSlice]) -> tuple[dict[str, str], ...]:
 
 
 def write_shares(shares: ShareTables, stream: BinaryIO) -> None:
-    """Write shares that are the same at all angles and wavelengths; no Gaussian lobe."""
+    """Write shares that are the same at all angles and wavelengths."""
+    if shares.lobe is not None:
+        raise ArgumentError("lobes of a Speos simple scattering surface are not written: write it as .scattering")
     parts = np.array([shares.specular, shares.diffuse]).reshape(2, 2, -1)
     if np.ptp(parts, axis=2).any():
         raise ArgumentError(
