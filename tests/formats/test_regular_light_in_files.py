@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
 import etendue as et
 import pytest
 from etendue.errors import ArgumentError
+from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data, write_bsdf_data
+from etendue.formats.bsdf.regular import regular_of
 from etendue.quantities.bsdf_data import direction
+from formats.slanted import SlantedOnce, coarsen
 from oracles.tracepro_files import NAMES, abg_side, ellipse, fixed, share, surface_property
 
 ENDS = pytest.mark.parametrize("end", [".txt", ".ssdd"])
@@ -47,6 +51,37 @@ def test_straight_light_is_kept_apart_from_mirrored_light(tmp_path: Path, end: s
     assert again.regular_reflectance(ANGLES) == pytest.approx(0.1)
     assert again.regular_transmittance([0, 45, 90]) == pytest.approx([0.8, 0.5, 0.2])
     assert again.ways == (True, True, False, False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["tracepro", "ssdd"])
+def test_shares_beside_a_table_without_symmetry(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of light from both sides, where the format has them; at the one incidence of the tables, which has all rows.
+
+    What is neither mirrored nor let straight on nor scattered is absorbed: so the shares of the rows add up to 1.
+    """
+    coarsen(monkeypatch, 30.0)
+    form = BSDF_FORMATS[name]
+    assert form.tabulate is not None
+    mixed = {
+        "kind": "mixed",
+        "specular_reflectance": {"angle": [60.0], "values": [0.2]},
+        "specular_transmittance": 0.05,
+    }
+    data = dataclasses.replace(form.tabulate(SlantedOnce()), components=(mixed,))
+    assert write_bsdf_data(tmp_path / "x", data, name) == ()
+    again = read_bsdf_data(tmp_path / "x")
+    regular = regular_of(again.components)
+    assert regular is not None
+    assert regular.at([60.0])[:, 0] == pytest.approx([0.2, 0.05])
+    assert len(again.slices) == len(data.slices)
+    for one in data.slices:
+        same = (other for other in again.slices if other.transmitted == one.transmitted)
+        near = max(same, key=lambda other: float(other.incident @ one.incident))
+        at = one.directions[..., 2] ** 2 > 0.01
+        assert near.at(one.directions[at]) == pytest.approx(one.values[at], rel=1e-6)
+    # A row that leaves another share for scatter than its tables have would be told.
+    assert not any("leaves" in complaint.found for complaint in again.complaints)
 
 
 def test_a_property_of_abg_and_mirrored_light_is_written_as_it_was_read(tmp_path: Path) -> None:
