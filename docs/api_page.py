@@ -27,7 +27,9 @@ GROUPS = {
         "scene", "Scene", "trace", "trace_rounds", "trace_work", "TraceWork", "TraceResult", "ScatterEvents",
         "IlluminanceMap", "read_illuminance_map", "sweep", "sweep_steps", "SweepTable",
     ),
-    "Scatter": ("bsdf", "Bsdf", "BsdfTable", "Scans", "read_bsdf", "read_scans", "write_bsdf"),
+    "Scatter": (
+        "bsdf", "Bsdf", "BsdfTable", "Scans", "read_bsdf", "read_scans", "write_bsdf", "fit_bsdf", "BsdfFit",
+    ),
     "Instruments": (
         "ScatterGoniometer", "GoniometerScan", "read_goniometer_scan", "Detector", "Baffle", "deconvolve", "Deconvolution",
         "revolved", "agreement", "Agreement", "NearFieldGoniophotometer", "NearFieldRun", "DirectionalScan",

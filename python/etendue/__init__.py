@@ -95,6 +95,7 @@ PUBLIC = {
     "etendue.quantities.spectrum": ("Spectrum",),
     "etendue.quantities.zonal_flux": ("zonal_flux",),
     "etendue.scatter.files": ("read_bsdf", "write_bsdf"),
+    "etendue.scatter.model_fit": ("BsdfFit", "fit_bsdf"),
     "etendue.scatter.scans.files": ("read_scans",),
     "etendue.scatter.scans.scans": ("Scans",),
     # `Bsdf.from_scans` makes tables: where those are made, `Bsdf` knows of them.

@@ -73,6 +73,7 @@ from etendue.quantities.spectrum import Spectrum
 from etendue.quantities.zonal_flux import zonal_flux
 from etendue.scatter import models as bsdf
 from etendue.scatter.files import read_bsdf, write_bsdf
+from etendue.scatter.model_fit import BsdfFit, fit_bsdf
 from etendue.scatter.scans.files import read_scans
 from etendue.scatter.scans.scans import Scans
 from etendue.scatter.table import Bsdf, BsdfTable
@@ -92,6 +93,7 @@ __all__ = [
     "BeamAngle",
     "Box",
     "Bsdf",
+    "BsdfFit",
     "BsdfTable",
     "ChangedFileWarning",
     "Cone",
@@ -163,6 +165,7 @@ __all__ = [
     "diagnose",
     "draw_scene",
     "filter_map",
+    "fit_bsdf",
     "intensity_distribution",
     "luminance_map",
     "parse_surface",

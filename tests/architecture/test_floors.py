@@ -258,7 +258,7 @@ WITHOUT_EXAMPLE = {
     "etendue.instruments.directional_operator": "likewise; its tests show it",
     "etendue.instruments.directional_scan.read_scan": "read_goniometer_scan or read_directional_scan, which show it",
     "etendue.instruments.goniometer_scan.known_of": "for readers of files",
-    "etendue.instruments.lobe_models": "what deconvolve_directions fits; its tests show it",
+    "etendue.scatter.lobe_models": "what deconvolve_directions fits; its tests show it",
     "etendue.instruments.lobe_splines": "what deconvolve_directions makes lobes of; its tests show it",
     "etendue.instruments.lobe_table.Lobe": "what bsdf_table takes",
     "etendue.instruments.lobe_table.polar_slice": "a step of bsdf_table, which shows it",

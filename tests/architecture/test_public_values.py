@@ -95,6 +95,9 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "RingSource": lambda: et.RingSource(rays=77, runs=3, seed=9),
     "Scans": lambda: et.Scans([[-0.6, 0, 0.8]] * 50, [[0.6, 0, 0.8]] * 50, [2.5] * 50),
     "Scene": scene,
+    "BsdfFit": lambda: et.fit_bsdf(
+        et.Scans([[-0.6, 0, 0.8]] * 3, [[0.6, 0, 0.8]] * 3, [0.1, 0.12, 0.11]), "lambertian"
+    ),
     "Bsdf": lambda: et.BsdfTable(BsdfData(components=({"kind": "lambertian", "reflectance": 0.2},))),
     "BsdfTable": lambda: et.BsdfTable(BsdfData(components=({"kind": "gaussian", "peak": 3.0, "sigma": 0.2},))),
     "ScatterGoniometer": lambda: et.ScatterGoniometer(profile=(1, 0.5), photons=1e6),

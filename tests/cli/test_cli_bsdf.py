@@ -53,6 +53,10 @@ def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) ->
     assert "at 45°, " in text
     assert "at 60°*, " in text
     assert text.count("* extrapolated from 50°") == 1
+    assert [one["stated"] for one in facts["tables"]] == [None, None]
+    assert [one["unscaled"] for one in facts["tables"]] == [one["share"] for one in shares]
+    line = text.splitlines()[1]
+    assert f"0.7000 reflected, {shares[0]['share']:.4f} before scaling" in line
     drawn = run("bsdf", "plot", "pet.h5", "-o", "pet.png", "--incidence", "30", "--json")
     assert json.loads(drawn.out)["output"] == "pet.png"
     assert Path("pet.png").stat().st_size > 5000
@@ -65,6 +69,62 @@ def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) ->
     assert gloss["extrapolated"] == {"gloss 60": 50.0, "gloss 85": 50.0}
     assert any("gloss 60 and gloss 85: beyond the last incidence, 50°" in one for one in gloss["complaints"])
     assert set(gloss["gloss"]) == {"20", "60", "85"}
+
+
+def test_a_model_instead_of_a_table(run: Run, scans: list[Path]) -> None:
+    """Exact values of a Gaussian on a floor: its numbers, to what is not known; and the file is that model."""
+    told = run("bsdf", "fit", *scans, "-o", "paint.h5", "--model", "lambertian+gaussian")
+    assert told.status == 0, told.err
+    assert "note: the scans have no standard errors" in told.err
+    assert "root mean square of relative residuals: 0.0%" in told.out
+    facts = run("bsdf", "fit", *scans, "-o", "paint.h5", "--model", "lambertian+gaussian", "--json").json
+    found = {name: one["value"] for name, one in facts["parameters"].items()}
+    assert found == pytest.approx({"peak": 1.0, "sigma": 0.2, "reflectance": 0.5}, rel=1e-6)
+    assert facts["chi2_per_dof"] is None
+    assert [one["theta"] for one in facts["shares"]] == [10.0, 50.0]
+    assert [one["kind"] for one in et.read_bsdf("paint.h5").data.components[0]["parts"]] == ["lambertian", "gaussian"]
+    wrong = run("bsdf", "fit", *scans, "-o", "no.h5", "--model", "abgg")
+    assert "Did you mean 'abg'?" in wrong.err
+    both = run("bsdf", "fit", *scans, "-o", "no.h5", "--model", "abg", "--method", "smooth")
+    assert both.status == 2
+    assert "leave one out" in both.err
+    assert not Path("no.h5").exists()
+
+
+def test_scans_with_errors_are_told_with_errors(run: Run) -> None:
+    """A flat sheet with errors of 2 %: its share is off by 2 % at most, and its model by less, with a χ² beside."""
+    rows = [
+        f"40,180,{theta},{phi},{0.2 + 0.004 * sign},0.004"
+        for phi, sign in ((0, 1), (90, -1), (180, 1), (270, -1))
+        for theta in range(0, 85, 10)
+    ]
+    Path("scan.csv").write_text("\n".join(["theta_i,phi_i,theta_s,phi_s,bsdf,standard_error", *rows]) + "\n")
+    (share,) = run("bsdf", "fit", "scan.csv", "-o", "sheet.h5", "--method", "shepard", "--json").json["shares"]
+    assert share["standard_error"] == pytest.approx(0.02 * share["share"], rel=0.03)
+    told = run("bsdf", "fit", "scan.csv", "-o", "sheet.h5", "--method", "shepard").out
+    assert re.search(r"40°: the scans add up to 0\.6\d\d ± 0\.01\d", told)
+    said = run("bsdf", "info", "sheet.h5").out.splitlines()[1]
+    assert said.endswith("reflected")
+    told = run("bsdf", "fit", "scan.csv", "-o", "sheet.h5", "--model", "lambertian").out
+    # Each value is off by one standard error: χ² is 36 of 35 degrees of freedom.
+    assert "reflectance: 0.6283 ± 0.0021" in told
+    assert "χ² per degree of freedom: 1.03 (35 degrees of freedom)" in told
+
+
+@pytest.mark.slow
+def test_a_workbook_of_scattered_positions(run: Run, samples: Path) -> None:
+    """The method is found by the data, JSON is all that is on standard output."""
+    folder = samples / "bsdf"
+    scan = (folder / "AnoBlackEC1_goniometer.xls", "--blank", folder / "blank_goniometer.xls")
+    told = run("bsdf", "fit", *scan, "-o", "ano.h5", "--json")
+    assert told.status == 0, told.err
+    assert told.json["method"] == "natural-neighbours"
+    assert "102 azimuths" in told.json["complaints"][0]
+    published = {
+        round(one.theta): one.integral() for one in et.read_bsdf(folder / "AnoBlackEC1onAlum.bsdf").data.slices
+    }
+    for one in told.json["shares"]:
+        assert one["share"] == pytest.approx(published[round(one["theta"])], rel=0.12)
 
 
 @pytest.mark.slow

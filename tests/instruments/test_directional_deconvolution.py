@@ -15,7 +15,6 @@ from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.instruments.directional_operator import matrix_of
 from etendue.instruments.directional_scan import DirectionalScan, read_directional_scan, read_scan
 from etendue.instruments.goniometer_scan import GoniometerScan
-from etendue.instruments.lobe_models import LOBE_MODELS
 from etendue.instruments.lobe_splines import splines_for
 from etendue.instruments.positions import hemisphere_around, window
 from etendue.instruments.regular_share import RegularShare
@@ -23,6 +22,7 @@ from etendue.instruments.round_blur import RoundBlur
 from etendue.instruments.total_variation import total_variation
 from etendue.instruments.turned_sample import TurnedSample, turned
 from etendue.quantities.bsdf_data import direction
+from etendue.scatter.lobe_models import LOBE_MODELS
 from oracles.verdicts import assert_agree, assert_differ
 
 Array = npt.NDArray[np.float64]

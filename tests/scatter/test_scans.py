@@ -16,7 +16,15 @@ from etendue.quantities.bsdf_data import PolarGrid, direction, mirrored
 from etendue.scatter.scans import harvey_shack
 from etendue.scatter.scans.files import read_scans
 from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction
-from etendue.scatter.scans.interpolations import METHODS, SMALLEST, horizon, radial_coordinates, tabulated
+from etendue.scatter.scans.interpolations import (
+    METHODS,
+    SMALLEST,
+    horizon,
+    radial_coordinates,
+    share_error,
+    suited,
+    tabulated,
+)
 from etendue.scatter.scans.scans import Scans
 
 Array = npt.NDArray[np.float64]
@@ -236,7 +244,7 @@ def test_impossible_scans_are_refused() -> None:
     with pytest.raises(ArgumentError, match="shape"):
         Scans(np.array(i), np.array(s), np.ones(2))
     with pytest.raises(ArgumentError, match="no unit vector"):
-        Scans(np.array(i), -np.array(s), np.ones(1))
+        Scans(np.array(i), 2.0 * np.array(s), np.ones(1))
     with pytest.raises(ArgumentError, match="not below 0"):
         Scans(np.array(i), np.array(s), -np.ones(1))
     with pytest.raises(ArgumentError, match="fewer than two"):
@@ -264,6 +272,53 @@ def test_what_no_method_can_make_a_table_of_is_told() -> None:
         bsdf_of_flux(1.0, 1.0, solid_angle=math.inf, direction=[0.0, 0.0, 1.0])
 
 
+def at_random(*, f: float) -> Scans:
+    """Directions of no order, within 50° of the normal."""
+    beta = np.random.default_rng(8).uniform(-0.54, 0.54, (400, 2))
+    to = np.column_stack([beta, np.sqrt(1.0 - np.sum(beta * beta, axis=1))])
+    return Scans(np.tile(direction(20.0, 180.0), (len(to), 1)), to, np.full(len(to), f))
+
+
+def test_the_method_suits_the_scans_if_none_is_stated() -> None:
+    """Two planes, one side of one plane, no planes at all; only what is not the usual one is told, with the reason."""
+    one_side = in_plane(f=0.25)
+    ahead = one_side.scattered[:, 0] > math.sin(math.radians(30.0)) - 1e-9
+    one_side = Scans(one_side.incident[ahead], one_side.scattered[ahead], one_side.values[ahead])
+    assert suited(in_plane(f=0.25)) == ("specular-centred", "")
+    method, why = suited(at_random(f=0.25))
+    assert method == "natural-neighbours"
+    assert "azimuths about the specular direction, and make no scans" in why
+    for scans, method, told in ((in_plane(f=0.25), "specular-centred", []), (one_side, "smooth", ["at one azimuth"])):
+        table = et.Bsdf.from_scans(scans)
+        assert isinstance(table, et.BsdfTable)
+        assert table.data.facts["interpolation"] == method
+        for complaint, part in zip(table.complaints, told, strict=True):
+            assert f"method {method}" in str(complaint)
+            assert part in str(complaint)
+
+
+def test_a_stated_method_that_cannot_work_names_those_that_can() -> None:
+    with pytest.raises(
+        ArgumentError, match=r"specular-centred: .* azimuths about .*: direction-cosines, natural-neigh.*, smooth$"
+    ):
+        tabulated(at_random(f=0.25), "specular-centred")
+    with pytest.raises(
+        ArgumentError, match=r"on a line.* specular-centred, natural-neighbours, radial-basis, shepard, smooth$"
+    ):
+        tabulated(in_plane(f=0.25), "direction-cosines")
+    with pytest.raises(ArgumentError, match=r"no value is above 0.*: specular-centred, natural-neighbours, shepard$"):
+        tabulated(in_plane(f=0.0), "smooth")
+
+
+def test_transmitted_light_is_no_part_of_scans(tmp_path: Path) -> None:
+    with pytest.raises(ArgumentError, match="behind the sample: scans hold reflected light alone"):
+        Scans([[0, 0, 1]] * 2, [[0, 0, 1], [0, 0.6, -0.8]], [0.1, 0.2])  # type: ignore[arg-type,list-item] # made arrays
+    path = tmp_path / "scan.csv"
+    path.write_text("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0,1\n30,180,150,0,1\n")
+    with pytest.raises(FormatError, match=r"row 2: light at 150° from the normal.*leave such rows out.*astm or pab"):
+        read_scans([path])
+
+
 @pytest.mark.parametrize("method", ["specular-centred", "shepard"])
 def test_errors_of_scans_are_those_of_the_table(method: str) -> None:
     """A mean of values that are all off by 4 % is off by 4 %."""
@@ -274,6 +329,7 @@ def test_errors_of_scans_are_those_of_the_table(method: str) -> None:
     assert one.interpolated
     assert one.standard_error is not None
     assert one.standard_error[there] == pytest.approx(0.04 * one.values[there])
+    assert share_error(one) == pytest.approx(0.04 * float(one.stated or 0.0))
     assert tabulated(scans, method).slices[0].standard_error is None
 
 
@@ -306,7 +362,7 @@ def test_a_table_is_the_first_thing_that_is_asked_for() -> None:
     code = """
 import etendue as et
 scattered = [[0.5, 0, 0.75**0.5], [-0.5, 0, 0.75**0.5], [0, 0.5, 0.75**0.5]]
-print(et.Bsdf.from_scans(et.Scans([[0, 0, 1]] * 3, scattered, [0.2] * 3)).incidences)
+print(et.Bsdf.from_scans(et.Scans([[0, 0, 1]] * 3, scattered, [0.2] * 3), "specular-centred").incidences)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "(0.0,)"

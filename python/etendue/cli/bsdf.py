@@ -14,12 +14,15 @@ from etendue.cli.guard import guarded
 from etendue.cli.terminal import check_folder, complain, one_of, print_json, say
 from etendue.formats.bsdf import BSDF_FORMATS
 from etendue.plot import plot_bsdf
+from etendue.quantities.bsdf_data import BsdfSlice
 from etendue.quantities.measured import measured
 from etendue.scatter.appearance import GLASS, appearance
 from etendue.scatter.bsdf import WAVELENGTH
 from etendue.scatter.files import read_bsdf, write_bsdf
+from etendue.scatter.model_fit import FITTED_MODELS, fit_bsdf
 from etendue.scatter.scans.files import read_scans
-from etendue.scatter.scans.interpolations import METHODS
+from etendue.scatter.scans.interpolations import AUTOMATIC, METHODS, share_error
+from etendue.scatter.scans.scans import Scans
 from etendue.scatter.table import BsdfTable
 
 app = typer.Typer(help="Files of scatter data: what they hold, pictures of it, other formats.", no_args_is_help=True)
@@ -50,6 +53,8 @@ def info(files: Files, json: Json = False) -> None:
     say(f"{_named(files)}: {facts['format']}, {bsdf.name or 'no name'}, {turned}")
     for one in facts["tables"]:
         stated = "" if one["stated"] is None else f", stated {one['stated']:.4f}"
+        if one["unscaled"] is not None:
+            stated = f", {one['unscaled']:.4f} before scaling"
         way = "transmitted" if one["transmitted"] else "reflected"
         place = f"{one['side']}, {one['theta']:g}°" + (f", azimuth {one['phi']:g}°" if not bsdf.isotropic else "")
         place += "" if one["wavelength"] is None else f", {one['wavelength']:g} nm"
@@ -78,6 +83,7 @@ def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
     first = {
         (one.front, one.transmitted, round(one.theta, 6), one.wavelength): one for one in reversed(bsdf.data.slices)
     }
+    of_scans = "interpolation" in bsdf.data.facts
     tables = [
         {
             "side": "front" if one.front else "back",
@@ -86,7 +92,9 @@ def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
             "transmitted": one.transmitted,
             "wavelength": one.wavelength,
             "share": one.integral(),
-            "stated": one.stated,
+            # Tables of scans keep there what the scans added up to; nothing was stated.
+            "stated": None if of_scans else one.stated,
+            "unscaled": one.stated if of_scans and one.stated != one.integral() else None,
         }
         for one in sorted(
             first.values(), key=lambda one: (not one.front, one.transmitted, one.theta, one.wavelength or 0.0)
@@ -199,10 +207,13 @@ def fit(
         list[Path],
         typer.Argument(help="Scans: CSV of theta_i,phi_i,theta_s,phi_s,bsdf or of stages; .xls of the RT-300S."),
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The table, of any format that étendue writes.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The BSDF, in any format that étendue writes.")],
     method: Annotated[
-        str, typer.Option("--method", help=f"From scans to a grid: {', '.join(METHODS)}.")
-    ] = "specular-centred",
+        str | None, typer.Option("--method", help=f"From scans to a grid: {', '.join(METHODS)}; else by the scans.")
+    ] = None,
+    model: Annotated[
+        str | None, typer.Option("--model", help=f"A model instead of a table: {', '.join(FITTED_MODELS)}.")
+    ] = None,
     reflectance: Annotated[
         float | None,
         typer.Option("--reflectance", help="Reflectance by an integrating sphere; each incidence is scaled to it."),
@@ -218,12 +229,46 @@ def fit(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Make a table of goniometer scans, and say what they add up to."""
-    method = one_of(method, METHODS, "--method")
+    """Make a table of goniometer scans, or fit a model to them, and say what they add up to."""
+    chosen = None if method is None else one_of(method, METHODS, "--method")
+    fitted = None if model is None else one_of(model, FITTED_MODELS, "--model")
+    if chosen is not None and fitted is not None:
+        raise typer.BadParameter("it is for tables, and --model asks for a model; leave one out", param_hint="--method")
     check_folder(output)
     scans = read_scans(
         files, incident_flux=incident_flux, solid_angle=solid_angle, reflectance=reflectance, blank=blank
     )
+    if fitted is not None:
+        _fit_model(scans, fitted, output, json=json)
+    else:
+        _fit_table(scans, chosen or AUTOMATIC, output, json=json)
+
+
+def _fit_model(scans: Scans, model: str, output: Path, *, json: bool) -> None:
+    found = fit_bsdf(scans, model)
+    notes = [*found.notes, *write_bsdf(output, found.table)]
+    if json:
+        parameters = {
+            name: {"value": value, "standard_error": found.standard_errors[name]}
+            for name, value in found.parameters.items()
+        }
+        shares = [
+            {"theta": round(theta, 6), "share": share, "standard_error": error}
+            for theta, share, error in zip(found.thetas, found.shares, found.share_errors, strict=True)
+        ]
+        fit = {name: getattr(found, name) for name in ("chi2_per_dof", "rms_residual", "degrees_of_freedom")}
+        print_json(
+            {"output": output, "model": found.kind, "parameters": parameters, "shares": shares, **fit, "notes": notes}
+        )
+        return
+    for note in notes:
+        complain(f"note: {note}")
+    for line in found.lines():
+        say(f"  {line}")
+    say(f"{output}: {found.kind} fitted to {scans.values.size} values at {len(scans.thetas)} incidences")
+
+
+def _fit_table(scans: Scans, method: str, output: Path, *, json: bool) -> None:
     table = BsdfTable.from_scans(scans, method)
     notes = list(write_bsdf(output, table))
     shares = [
@@ -232,9 +277,11 @@ def fit(
             "phi": round(one.phi, 6),
             "transmitted": one.transmitted,
             "share": one.stated,
+            "standard_error": share_error(one),
         }
         for one in table.data.slices
     ]
+    method = table.data.facts["interpolation"]
     turning = scans.anisotropy()
     complaints = [str(complaint) for complaint in table.complaints]
     if json:
@@ -246,12 +293,17 @@ def fit(
         complain(line)
     if math.isfinite(turning):
         say(f"  turning the sample changes values by {turning:.1%} (root mean square)")
-    scaled = "" if reflectance is None else f", scaled to {reflectance:g}"
-    for one in shares:
+    scaled = "" if scans.reflectance is None else f", scaled to {scans.reflectance:g}"
+    for one, held in zip(shares, table.data.slices, strict=True):
         place = f"{one['theta']:g}°" + ("" if table.isotropic else f", azimuth {one['phi']:g}°")
         way = " of transmitted light" if one["transmitted"] else ""
-        say(f"  {place}: the scans{way} add up to {one['share']:.4f}{scaled}")
+        say(f"  {place}: the scans{way} add up to {_share_told(held)}{scaled}")
     say(f"{output}: {len(table.data.slices)} incidences of {scans.values.size} values, {method}")
+
+
+def _share_told(one: BsdfSlice) -> str:
+    share, error = one.stated or 0.0, share_error(one)
+    return measured(share, error, "").rstrip() if math.isfinite(error) else f"{share:.4f}"
 
 
 for _name, _verb in (("info", info), ("plot", plot), ("convert", convert), ("gloss", gloss), ("fit", fit)):

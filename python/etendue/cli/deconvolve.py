@@ -21,13 +21,13 @@ from etendue.instruments.directional_deconvolution import (
 )
 from etendue.instruments.directional_scan import DirectionalScan, read_scan
 from etendue.instruments.goniometer_scan import GoniometerScan, read_goniometer_scan
-from etendue.instruments.lobe_models import LOBE_MODELS
 from etendue.instruments.operators import OperatorName
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.stopping import RULES
 from etendue.plot import plot_deconvolution, plot_directions
 from etendue.quantities.measured import measured
 from etendue.quantities.powers_of_ten import counted
+from etendue.scatter.lobe_models import LOBE_MODELS
 
 METHODS = sorted({*get_args(Method), *get_args(DirectionalMethod)})
 

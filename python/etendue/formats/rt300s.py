@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +43,8 @@ def read_rt300s(path: Path) -> dict[str, Array]:
     if len(data) > LARGEST:
         raise FormatError(path, "length", "more than 64 MiB", "No scan is so large.")
     try:
-        book = xlrd.open_workbook(file_contents=data, logfile=None, verbosity=-1)
+        # What the library has to say of encodings goes nowhere: standard output holds results alone.
+        book = xlrd.open_workbook(file_contents=data, logfile=io.StringIO(), verbosity=0)
         sheets = [(sheet.name, [sheet.row_values(row) for row in range(sheet.nrows)]) for sheet in book.sheets()]
     except Exception as error:  # noqa: BLE001 - the library stumbles over damage in ways of its own
         raise FormatError(path, "workbook", f"damaged ({type(error).__name__})", "Export the scan again.") from None

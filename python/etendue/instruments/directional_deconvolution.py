@@ -21,7 +21,6 @@ from etendue.instruments.directional_bands import error_of
 from etendue.instruments.directional_operator import ForwardModel, Instrument, forward_model
 from etendue.instruments.directional_scan import DirectionalScan, angles_of
 from etendue.instruments.goniometer_scan import GoniometerScan
-from etendue.instruments.lobe_models import LOBE_MODELS, Fitted
 from etendue.instruments.lobe_splines import SplineLobe
 from etendue.instruments.lobe_table import polar_slice
 from etendue.instruments.parametric_lobe import ModelLobe, parametric_lobe
@@ -31,6 +30,7 @@ from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.total_variation import STRENGTHS, total_variation
 from etendue.quantities.bsdf_data import BsdfSlice
 from etendue.quantities.ray_stream import checked_seed
+from etendue.scatter.lobe_models import LOBE_MODELS, Fitted
 
 Array = npt.NDArray[np.float64]
 DirectionalMethod = Literal["richardson-lucy", "total-variation", "parametric", "matrix"]

@@ -15,9 +15,9 @@ from etendue.instruments.counted_scan import CountedScan
 from etendue.instruments.courses import halves_of
 from etendue.instruments.directional_operator import FINENESS, Instrument, matrix_of
 from etendue.instruments.directional_scan import DirectionalScan
-from etendue.instruments.lobe_models import LOBE_MODELS, LobeModel, lobe_model
 from etendue.instruments.lobe_splines import DENSE, LobeSplines, splines_for
 from etendue.instruments.richardson_lucy import deviances
+from etendue.scatter.lobe_models import LOBE_MODELS, LobeModel, lobe_model
 
 Array = npt.NDArray[np.float64]
 

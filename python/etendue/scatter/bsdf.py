@@ -78,7 +78,7 @@ class Bsdf(abc.ABC):
     """The class of tables, which is made of this one: `etendue.scatter.table` sets it."""
 
     @classmethod
-    def from_scans(cls, scans: Scans, method: str = "specular-centred") -> Bsdf:
+    def from_scans(cls, scans: Scans, method: str = "automatic") -> Bsdf:
         """A table of what a goniometer measured.
 
         Parameters
@@ -86,7 +86,8 @@ class Bsdf(abc.ABC):
         scans : Scans
             Of all incidences, as `read_scans` reads them.
         method : {"specular-centred", "direction-cosines", "natural-neighbours", "radial-basis", "shepard", "smooth"}
-            The way from the measured directions to a grid.
+            The way from the measured directions to a grid; or "automatic": the first of these for scans through the
+            specular direction, another where there are none, and a note among the complaints of the table says so.
 
         Returns
         -------

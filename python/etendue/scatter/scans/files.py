@@ -92,6 +92,14 @@ def read_scans(
             i, s = incident_direction(stages[2], stages[3]), detector_direction(*stages)
             f = bsdf_of_flux(columns["flux"], arriving, solid_angle=solid_angle, direction=s)
             error = None if error is None else bsdf_of_flux(error, arriving, solid_angle=solid_angle, direction=s)
+        if (s[:, 2] < 0.0).any():
+            at = int(np.argmax(s[:, 2] < 0.0))
+            raise FormatError(
+                Path(path),
+                f"row {at + 1}",
+                f"light at {np.degrees(np.arccos(s[at, 2])):g}° from the normal, which the sample transmits",
+                "Scans take reflected light alone: leave such rows out. Files of astm or pab hold both, see `bsdf convert`.",
+            )
         if (f < 0.0).any():
             at = int(np.argmin(f))
             raise FormatError(

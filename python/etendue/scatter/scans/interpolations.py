@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -10,7 +11,9 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.report import Complaint
 from etendue.scatter.scans import harvey_shack
+from etendue.scatter.scans.arms import AT_CENTRE, MOST_ARMS, ON_ARM, apart, arms_of, azimuths_of, beside
 from etendue.scatter.scans.scans import NEAR, SAME, Scans
 
 Array = npt.NDArray[np.float64]
@@ -26,8 +29,14 @@ RADIAL, AZIMUTHS = 100, 36
 TURNED = 0.1
 """Azimuths of incidence that differ by less are one [°]."""
 
-ON_ARM = 2.5
-"""Azimuths about the specular direction that differ by less belong to one scan [°]."""
+SPARSE = 5.0
+"""Values on each azimuth that was measured, on average, below which they are none: by chance 72 azimuths hold a few each."""
+
+ON_A_LINE = 1e-9
+"""Distance in U, V below which directions lie on a line: rounding of unit vectors."""
+
+AUTOMATIC = "automatic"
+"""In place of a method: the one that suits the scans."""
 
 
 def radial_coordinates(smallest: float = SMALLEST) -> Array:
@@ -69,7 +78,10 @@ def direction_cosines(incident: Array, measured: Array, values: Array, wanted: A
 
 
 def radial_basis(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, None]:
-    """Thin plates through ln f in U, V, of not less than a thousandth of the least value.
+    """A sum of distances to the measured points in U, V, each times a weight, and a constant: through ln f.
+
+    f counts as no less than a thousandth of the least value. Thin plates are closer to f between scattered points, but go
+    on along their slope beyond scans in two planes, and lose up to 15 % of the light there at 75°.
 
     Raises
     ------
@@ -83,8 +95,8 @@ def radial_basis(incident: Array, measured: Array, values: Array, wanted: Array)
     points, own = np.unique(np.round(_planar(incident, measured), 9), axis=0, return_inverse=True)
     mean = np.bincount(own.ravel(), values) / np.bincount(own.ravel())
     logs = np.log(np.maximum(mean, 1e-3 * values[values > 0.0].min()))
-    plate = require("scipy.interpolate").RBFInterpolator(points, logs, kernel="linear")
-    return np.asarray(np.exp(np.minimum(plate(_planar(incident, wanted)), np.log(values.max())))), None
+    surface = require("scipy.interpolate").RBFInterpolator(points, logs, kernel="linear")
+    return np.asarray(np.exp(np.minimum(surface(_planar(incident, wanted)), np.log(values.max())))), None
 
 
 def _require_light(values: Array) -> None:
@@ -160,15 +172,15 @@ def specular_centred(incident: Array, measured: Array, values: Array, wanted: Ar
     """
     frame = PolarGrid("specular", np.zeros(1), np.zeros(1))
     r, a = frame.coordinates(measured, incident, transmitted=False)
-    centre = r < 0.05
-    arms = _arms(r[~centre], a[~centre])
+    centre = r < AT_CENTRE
+    arms = arms_of(r[~centre], a[~centre])
     peak = float(values[centre].mean()) if centre.any() else None
     curves = []
     for azimuth in arms:
-        own = ~centre & (_apart(a, azimuth) < ON_ARM)
+        own = ~centre & (apart(a, azimuth) < ON_ARM)
         if not own.any():
             # The mirror image in the plane of incidence.
-            own = ~centre & (_apart(a, -azimuth) < ON_ARM)
+            own = ~centre & (apart(a, -azimuth) < ON_ARM)
         order = np.argsort(r[own])
         x, y = r[own][order], values[own][order]
         start = [(0.0, peak if peak is not None else float(y[0]))]
@@ -183,27 +195,6 @@ def specular_centred(incident: Array, measured: Array, values: Array, wanted: Ar
     t = ((at_a - ring[k]) % 360.0) / (ring[k + 1] - ring[k])
     columns = np.arange(at_r.size)
     return (1.0 - t) * table[k, columns] + t * table[(k + 1) % len(arms), columns], None
-
-
-def _apart(a: Array, b: float) -> Array:
-    return np.asarray(np.abs((a - b + 180.0) % 360.0 - 180.0))
-
-
-def _arms(r: Array, a: Array) -> Array:
-    """Azimuths of the scans, with their mirror images if they lie on one side of the plane of incidence."""
-    if r.size < 2:
-        raise ArgumentError("fewer than two values beside the specular direction: nothing to interpolate")
-    one_side = any((_apart(a, middle) < 90.0 + ON_ARM).all() for middle in (90.0, 270.0))
-    found: list[float] = []
-    for azimuth in a[np.argsort(-r)].tolist():
-        for each in (azimuth % 360.0, -azimuth % 360.0)[: 2 if one_side else 1]:
-            if all(_apart(np.array(each), other) >= ON_ARM for other in found):
-                found.append(each)
-    if len(found) < 2 or len(found) > 72:
-        raise ArgumentError(
-            f"the values lie at {len(found)} azimuths about the specular direction; this method takes scans through it"
-        )
-    return np.array(sorted(found))
 
 
 def horizon(incident: Array, azimuth: float) -> float:
@@ -284,7 +275,75 @@ LINEAR = ("specular-centred", "direction-cosines", "natural-neighbours", "shepar
 """Those whose values are means of the measured ones: standard errors of these become some of the table."""
 
 
-def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = SMALLEST) -> BsdfData:
+LOGARITHMIC = ("radial-basis", "smooth")
+"""Those that take logarithms, and need light."""
+
+
+def suited(scans: Scans) -> tuple[str, str]:
+    """The method for scans of which nothing else is known, and why it is not the usual one.
+
+    Scans through the specular direction are left to the scheme that is made for them. Of a scan of one side alone f is
+    taken over the distance from that direction; scattered values are interpolated between all their neighbours.
+
+    Parameters
+    ----------
+    scans : Scans
+        All incidences.
+
+    Returns
+    -------
+    str, str
+        One of `METHODS`, and the reason; "specular-centred" has none.
+
+    Raises
+    ------
+    ArgumentError
+        If there are fewer than two values beside the specular direction at an incidence.
+
+    Examples
+    --------
+    >>> to = np.random.default_rng(1).uniform(-0.6, 0.6, (400, 3)) * [1, 1, 0] + [0, 0, 1]
+    >>> to /= np.linalg.norm(to, axis=1, keepdims=True)
+    >>> suited(Scans(np.tile([0.0, 0.0, 1.0], (400, 1)), to, np.full(400, 0.25)))[0]
+    'natural-neighbours'
+    """
+    counts, scattered = [], False
+    for incident, own in scans.by_incidence():
+        r, a = beside(scans, incident, own)
+        if r.size < 2:
+            raise ArgumentError("fewer than two values beside the specular direction: nothing to interpolate")
+        azimuths = azimuths_of(r, a)
+        measured = sum(bool((apart(a, each) < ON_ARM).any()) for each in azimuths)
+        scattered |= len(azimuths) > MOST_ARMS or r.size < SPARSE * measured
+        counts.append(len(azimuths))
+    if scattered:
+        why = f"the values lie at {max(counts)} azimuths about the specular direction, and make no scans through it"
+        return "natural-neighbours", why
+    if min(counts) < 2:
+        return (
+            "smooth",
+            "the values lie at one azimuth about the specular direction; f counts as the same at the others",
+        )
+    return "specular-centred", ""
+
+
+def _workable(scans: Scans) -> list[str]:
+    """The methods that can make a table of scans."""
+    found = dict.fromkeys(METHODS)
+    for incident, own in scans.by_incidence():
+        r, a = beside(scans, incident, own)
+        points = _planar(incident, scans.scattered[own])
+        if r.size < 2 or not 2 <= len(azimuths_of(r, a)) <= MOST_ARMS:
+            found.pop("specular-centred", None)
+        if np.linalg.matrix_rank(points - points[0], tol=ON_A_LINE) < 2:
+            found.pop("direction-cosines", None)
+        if not (scans.values[own] > 0.0).any():
+            for name in LOGARITHMIC:
+                found.pop(name, None)
+    return list(found)
+
+
+def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST) -> BsdfData:
     """A table on 100 logarithmic |β − β₀| and 36 azimuths for each incidence.
 
     Parameters
@@ -292,14 +351,15 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
     scans : Scans
         All incidences.
     method : str
-        One of `METHODS`.
+        One of `METHODS`, or "automatic" for the one that suits the scans; a note says which and why, if it is not the usual.
     smallest : float
         The smallest |β − β₀| above 0.
 
     Returns
     -------
     BsdfData
-        Isotropic if all light comes from one azimuth. Scaled to `scans.reflectance` where that is known; `stated` is the
+        Isotropic if all light comes from one azimuth; the fact "interpolation" says how it was made. Scaled to
+        `scans.reflectance` where that is known; `stated` is the
         share before. With standard errors where the scans have some and the method is linear, or finds its own (`smooth`).
 
     Raises
@@ -320,15 +380,19 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
     >>> round(tabulated(flat, method="shepard").slices[0].integral(), 3)
     0.785
     """
+    complaints: list[Complaint] = []
+    if method == AUTOMATIC:
+        method, why = suited(scans)
+        complaints += [Complaint("note", f"method {method}", why)] if why else []
     if method not in METHODS:
-        raise UnknownNameError("method of interpolation", method, METHODS)
+        raise UnknownNameError("method of interpolation", method, [*METHODS, AUTOMATIC])
     radial = radial_coordinates(smallest)
     slices = []
     groups = scans.by_incidence()
     turns: list[float] = []
     for incident, _ in groups:
         phi = _azimuth(incident)
-        if phi is not None and all(_apart(np.array(phi), other) > TURNED for other in turns):
+        if phi is not None and all(apart(np.array(phi), other) > TURNED for other in turns):
             turns.append(phi % 360.0)
     for measured, own in groups:
         incident = measured
@@ -341,7 +405,11 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
         grid = PolarGrid("cosines", radial, np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False, dtype=np.float64))
         at = grid.directions(incident, transmitted=False)
         there = ~np.isnan(at[..., 0])
-        f, error = METHODS[method](incident, scans.scattered[own], scans.values[own], at[there])
+        try:
+            f, error = METHODS[method](incident, scans.scattered[own], scans.values[own], at[there])
+        except ArgumentError as mistake:
+            others = [name for name in _workable(scans) if name != method]
+            raise ArgumentError(f"{method}: {mistake}. Methods that take these scans: {', '.join(others)}") from None
         if error is None and scans.standard_error is not None and method in LINEAR:
             # No less than that of a mean: as if all values that count for a place erred together.
             error, _ = METHODS[method](incident, scans.scattered[own], scans.standard_error[own], at[there])
@@ -361,7 +429,35 @@ def tabulated(scans: Scans, method: str = "specular-centred", smallest: float = 
         slices.append(
             BsdfSlice(incident, values * factor, grid=grid, stated=share, standard_error=scaled, interpolated=True)
         )
-    return BsdfData(tuple(slices), isotropic=len(turns) <= 1, mirrored=False, name="scans")
+    return BsdfData(
+        tuple(slices),
+        isotropic=len(turns) <= 1,
+        mirrored=False,
+        name="scans",
+        complaints=tuple(complaints),
+        facts={"interpolation": method},
+    )
+
+
+def share_error(one: BsdfSlice) -> float:
+    """How far the share of a slice before scaling may be off, if all its values err together; NaN without standard errors.
+
+    Parameters
+    ----------
+    one : BsdfSlice
+        Of a table of scans.
+
+    Examples
+    --------
+    >>> grid = PolarGrid("normal", [0.0, 90.0], [0.0])
+    >>> flat = {"values": [[0.2, 0.2]], "standard_error": [[0.01, 0.01]], "stated": 0.6}
+    >>> round(share_error(BsdfSlice(light_from(0.0, 0.0), grid=grid, **flat)), 6)
+    0.03
+    """
+    if one.standard_error is None or one.stated is None:
+        return float("nan")
+    off = dataclasses.replace(one, values=one.standard_error, standard_error=None).integral()
+    return one.stated * off / one.integral()
 
 
 def _azimuth(incident: Array) -> float | None:

@@ -68,6 +68,11 @@ class Scans:
             unit = np.abs(np.linalg.norm(vectors, axis=1) - 1.0) < SAME
             if not (unit & (vectors[:, 2] > 0.0)).all():
                 at = int(np.argmin(unit & (vectors[:, 2] > 0.0)))
+                if unit.all() and name == "scattered" and vectors[at, 2] < 0.0:
+                    raise ArgumentError(
+                        f"scattered[{at}] is {vectors[at].tolist()}, behind the sample: scans hold reflected light alone; "
+                        "make slices of a BsdfTable of transmitted light"
+                    )
                 raise ArgumentError(f"{name}[{at}] is {vectors[at].tolist()}, no unit vector in front of the sample")
         if not (np.isfinite(self.values) & (self.values >= 0.0)).all():
             raise ArgumentError("measured values are finite and not below 0")
