@@ -11,6 +11,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
+from etendue.plot.bsdf_picture import polar_surface
+from etendue.quantities.bsdf_data import direction
 from etendue.quantities.threshold_sweep import COLUMNS, ThresholdSweep
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -179,5 +181,38 @@ def test_light_from_behind_has_no_lobe_to_draw(incidence: float) -> None:
 
 
 def test_a_mirror_has_no_lobe_to_draw() -> None:
-    _, middle, _ = et.plot_bsdf(et.bsdf.Mirror(reflectance=0.9)).axes
-    assert "Nothing is scattered" in {middle.get_title(where) for where in ("left", "center", "right")}
+    _, disk, _, surface = et.plot_bsdf(et.bsdf.Mirror(reflectance=0.9)).axes
+    assert "Nothing is scattered" in {disk.get_title(where) for where in ("left", "center", "right")}
+    assert "Nothing is scattered" in {surface.get_title(where) for where in ("left", "center", "right")}
+    assert not surface.collections
+
+
+@pytest.mark.parametrize(
+    ("theta", "phi", "behind", "transmitted"), [(50.0, 200.0, False, True), (0.0, 0.0, True, False)]
+)
+def test_the_polar_surface_is_f_from_the_specular_direction_to_the_horizon(
+    theta: float, phi: float, behind: bool, transmitted: bool
+) -> None:
+    """Against the closed form of a Gaussian, on the side where the light goes; its last ring lies in the surface."""
+    way: Any = "transmitted" if transmitted else "reflected"
+    incident = direction(theta, phi, behind=behind)
+    bsdf = et.bsdf.Gaussian(peak=3.0, sigma=0.2, way=way)
+    toward, f = polar_surface(bsdf, incident, transmitted=transmitted)
+    side = 1.0 if behind == transmitted else -1.0
+    assert (side * toward[..., 2] > 0.0).all()
+    assert np.abs(toward[-1, :, 2]).max() < 1e-4
+    assert toward[0] == pytest.approx(np.broadcast_to(incident * [-1, -1, -1 if transmitted else 1], toward[0].shape))
+    square = np.sum((toward[..., :2] + incident[:2]) ** 2, axis=-1)
+    assert f == pytest.approx(3.0 * np.exp(-0.5 * square / 0.2**2), rel=1e-9)
+
+
+def test_the_polar_surface_shows_both_sides_where_light_goes() -> None:
+    """Transmitted light below what comes from the front, reflected light on the side of the back."""
+    for way, side, limits in (
+        ("transmitted", "front", (-1.0, 1.0)),
+        ("reflected", "back", (-1.0, 0.0)),
+    ):
+        drawn = et.plot_bsdf(et.bsdf.Gaussian(peak=3.0, sigma=0.2, way=way), side=side)  # type: ignore[arg-type] # both are
+        surface: Any = drawn.axes[-1]
+        assert len(surface.collections) == 1
+        assert surface.get_zlim() == pytest.approx(limits)

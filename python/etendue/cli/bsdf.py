@@ -130,7 +130,7 @@ def plot(
     side: Annotated[str, typer.Option("--side", help="The side that the light meets: front or back.")] = "front",
     json: Json = False,
 ) -> None:
-    """Draw f in the plane of incidence, the lobe in direction cosines, and the shares over the angle of incidence."""
+    """Draw f in the plane of incidence, the lobe in direction cosines and as a surface, and the shares by angle."""
     met: Literal["front", "back"] = one_of(side, ("front", "back"), "--side")
     if not 0.0 <= incidence < RIGHT_ANGLE:
         raise typer.BadParameter(f"{incidence:g}° is not from 0 to below 90°", param_hint="--incidence")

@@ -1,4 +1,4 @@
-"""A BSDF: curves in the plane of incidence, the lobe in direction cosines, shares over the angle of incidence."""
+"""A BSDF: curves in the plane of incidence, the lobe in direction cosines and as a surface, shares by angle of incidence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.plot import style
 from etendue.plot.map_picture import draw_slim_bar
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_data import PolarGrid, direction
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,17 +22,29 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-WIDTH, HEIGHT = 11.4, 3.6
+WIDTH, HEIGHT = 7.9, 7.3
 """Of the figure [inches]."""
 
-LEFT, BOTTOM, PANEL, GAP = 0.75, 0.6, 2.45, 1.35
-"""Margins of the first diagram, side of each, and room between two [inches]."""
+LEFT, BOTTOM, PANEL, ACROSS, UP = 0.75, 0.55, 2.65, 1.2, 0.9
+"""Margins of the diagrams, side of each, and room between two and between two rows [inches]."""
 
 INCIDENCES = (0.0, 30.0, 60.0, 75.0)
 """Angles of incidence that are shown [°]."""
 
 DECADES = 4.0
 """That logarithmic axes show below the largest value."""
+
+RINGS, SPOKES = 100, 120
+"""Of the polar surface: steps from the specular direction to the horizon, and around it."""
+
+SURFACE = "#f0b45a"
+"""Colour of the polar surface where it is lit."""
+
+NARROW = 5.0
+"""Logarithm by which the first of these steps is less than the last: lobes of a tenth of a degree still are round."""
+
+EDGE = 1e-6
+"""Part of the way to the horizon that is left, so that rounding leads nowhere beyond it."""
 
 
 @overload
@@ -70,9 +82,11 @@ def plot_bsdf(
 ) -> Figure | tuple[Axes, ...]:
     """Draw a BSDF.
 
-    Left f in the plane of incidence over the angle of the scattered light, negative on the side where light comes from;
-    in the middle f over the direction cosines of the scattered light, at one incidence; right the shares of the flux over
-    the angle of incidence. What is transmitted is dashed, and is left out in the middle if anything is reflected.
+    Four diagrams: f in the plane of incidence over the angle of the scattered light, negative on the side where light comes
+    from; f over the direction cosines of the scattered light, at one incidence; the shares of the flux over the angle of
+    incidence; and f at that incidence as a surface about the place where light arrives, whose distance from there is log f.
+    What is transmitted is dashed in the first and in the shares, lies behind in the surface, and is left out over direction
+    cosines if anything is reflected.
 
     Parameters
     ----------
@@ -83,11 +97,12 @@ def plot_bsdf(
     side : {"front", "back"}
         The side that the light meets.
     incidence : number
-        Angle of incidence [°] of the diagram in the middle, from 0 to below 90°.
+        Angle of incidence [°] of the diagrams of one incidence, from 0 to below 90°.
     title : str, optional
         Above everything.
     ax : three Axes, optional
-        matplotlib's, to draw on instead of a figure of its own; there is no path then.
+        matplotlib's, to draw the first three diagrams on instead of a figure of its own; there is no path then, and no
+        surface, which needs axes in three dimensions.
 
     Returns
     -------
@@ -107,7 +122,7 @@ def plot_bsdf(
     --------
     >>> from etendue.scatter.models import Gaussian
     >>> len(plot_bsdf(Gaussian(peak=5, sigma=0.15)).axes)
-    4
+    5
     """
     if not 0.0 <= incidence < 90.0:
         raise ArgumentError(f"incidence is {incidence!r}; give an angle from 0 to below 90°.")
@@ -118,12 +133,12 @@ def plot_bsdf(
             style.put_title(panels[0], title)
         return panels
     figure = style.new_figure(WIDTH, HEIGHT)
-    _draw(
-        [style.add_axes(figure, LEFT + k * (PANEL + GAP), BOTTOM, PANEL, PANEL) for k in range(3)],
-        bsdf,
-        side,
-        incidence,
-    )
+    right, upper = LEFT + PANEL + ACROSS, BOTTOM + PANEL + UP
+    places = ((LEFT, upper), (right, upper), (LEFT, BOTTOM))
+    _draw([style.add_axes(figure, *place, PANEL, PANEL) for place in places], bsdf, side, incidence)
+    across, up = right / WIDTH, BOTTOM / HEIGHT
+    solid = figure.add_axes((across, up, PANEL / WIDTH, PANEL / HEIGHT), projection="3d")
+    _surface(solid, bsdf, incidence, behind=side == "back")
     if title:
         style.add_text(figure, LEFT, HEIGHT - 0.25, title, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     return style.finish(figure, path)
@@ -187,6 +202,73 @@ def _lobe(axes: Axes, bsdf: Bsdf, theta: float, *, behind: bool) -> None:
     way = "transmitted" if transmitted else "reflected"
     scattered_at_all = bsdf.reflects or bsdf.transmits
     style.put_title(axes, f"f {way}, incidence {theta:g}°" if scattered_at_all else "Nothing is scattered")
+
+
+def _surface(axes: Any, bsdf: Bsdf, theta: float, *, behind: bool) -> None:
+    """Axes in three dimensions, of which matplotlib states no types."""
+    from matplotlib.colors import LightSource
+
+    incident = direction(theta, 180.0, behind=behind)
+    sheets = [polar_surface(bsdf, incident, transmitted=transmitted) for transmitted, _ in _ways(bsdf)]
+    top = max((float(f.max()) for _, f in sheets), default=0.0)
+    heights = [float(toward[0, 0, 2]) for toward, _ in sheets] + [float(incident[2])]
+    low, high = (float(any(sign * height > 0.0 for height in heights)) for sign in (-1.0, 1.0))
+    axes.set_axis_off()
+    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-low, high))
+    axes.set_box_aspect((2, 2, low + high), zoom=1.35)
+    axes.view_init(elev=-18 if high == 0.0 else 18, azim=-65)
+    rim = direction(90.0, np.linspace(0.0, 360.0, 181))
+    axes.plot(*rim.T, color=style.RULE, lw=0.8)
+    axes.plot(*np.stack([1.15 * incident, 0.0 * incident], axis=1), color=style.LINES[1], lw=1.2)
+    for toward, f in sheets if top > 0.0 else ():
+        radius = np.clip(1.0 + np.log10(np.maximum(f / top, 1e-300)) / DECADES, 0.0, 1.0)
+        axes.plot_surface(
+            *np.moveaxis(radius[..., None] * toward, -1, 0),
+            color=SURFACE,
+            lightsource=LightSource(azdeg=250, altdeg=-50 if high == 0.0 else 50),
+            rcount=RINGS,
+            ccount=SPOKES,
+            linewidth=0.0,
+            antialiased=False,
+            rasterized=True,
+        )
+    scattered = f"log f as distance, incidence {theta:g}°" if top > 0.0 else "Nothing is scattered from here"
+    style.put_title(axes, scattered if sheets else "Nothing is scattered")
+
+
+def polar_surface(bsdf: Bsdf, incident: Array, *, transmitted: bool) -> tuple[Array, Array]:
+    """Directions of one way of light and f there: rings about the specular direction, close together near it.
+
+    Parameters
+    ----------
+    bsdf : Bsdf
+        A model or a table.
+    incident : array, shape (3,)
+        Unit vector to where the light comes from.
+    transmitted : bool
+        About the direction straight on, behind the surface.
+
+    Returns
+    -------
+    array, array
+        Unit vectors of shape (rings, azimuths, 3), from the specular direction to the horizon; f [1/sr].
+
+    Examples
+    --------
+    >>> from etendue.scatter.models import Lambertian
+    >>> toward, f = polar_surface(Lambertian(reflectance=0.5), direction(40.0, 180.0), transmitted=False)
+    >>> toward[0, 0].round(3).tolist(), abs(toward[-1, :, 2]).max().round(3).tolist()
+    ([0.643, -0.0, 0.766], 0.0)
+    """
+    # In the sense in which normals of the surface point away from the middle, so that it is lit from outside.
+    azimuth = np.linspace(360.0, 0.0, SPOKES + 1)
+    # Heights are cos r · |i_z| + sin r · cos φ · √(1 − i_z²) at an angle r from the specular direction: 0 at the horizon.
+    height = abs(float(incident[2]))
+    horizon = np.degrees(np.arctan2(height, -np.cos(np.radians(azimuth)) * np.sqrt(max(0.0, 1.0 - height**2))))
+    steps = np.expm1(NARROW * np.linspace(0.0, 1.0 - EDGE, RINGS + 1)) / np.expm1(NARROW)
+    grid = PolarGrid("specular", np.zeros(1), np.zeros(1))
+    toward = grid.direction(steps[:, None] * horizon, azimuth, incident, transmitted=transmitted)
+    return toward, bsdf.evaluate(incident, toward)
 
 
 def _shares(axes: Axes, bsdf: Bsdf, side: Side) -> None:
