@@ -295,6 +295,23 @@ def test_mistakes_of_names_and_files(keys: dict[str, Any], expected: list[str]) 
         assert text in str(caught.value)
 
 
+def test_a_missing_file_of_a_finish_is_one_mistake_at_each_place(tmp_path: Path) -> None:
+    """Two surfaces that name it themselves, a solid by a name of the scene: each place once, with the nearest file."""
+    et.write_bsdf(tmp_path / "pet.h5", et.bsdf.Lambertian(reflectance=0.5))
+    missing = {"kind": "bsdf", "file": str(tmp_path / "pett.h5")}
+    disk = {"kind": "disk", "radius": 1}
+    keys = {
+        "finishes": {"film": missing},
+        "surfaces": [{"name": "wall", "shape": disk, "finish": missing}, {"shape": disk, "finish": missing}],
+        "solids": [{"shape": {"kind": "ball", "radius": 1}, "medium": "PC", "finish": "film"}],
+    }
+    with pytest.raises(SceneError) as caught:
+        compile_scene(Scene.from_dict(keys))
+    told = f"there is no file {tmp_path / 'pett.h5'}. Did you mean 'pet.h5'?"
+    places = ["finishes.film", 'surfaces[0] "wall": finish', "surfaces[1].finish"]
+    assert sorted(caught.value.mistakes) == [(place, told) for place in places]
+
+
 def test_all_mistakes_of_a_scene_are_told_at_once() -> None:
     keys = {key: value for mistake, _ in COMPILED for key, value in mistake.items() if key != "sources"}
     with pytest.raises(SceneError, match="mistakes\n"):

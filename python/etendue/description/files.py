@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import FormatError
+from etendue.errors import FormatError, nearest_name
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number
 
@@ -33,6 +33,25 @@ class Files:
     def find(self, name: str | Path) -> Path:
         """The path of a file that the scene names."""
         return self.folder / name
+
+
+def no_such_file(path: str | Path) -> str:
+    """What to say of a file that is not there: its path, and the nearest name in its folder.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = (Path(folder) / "pet.h5").write_bytes(b"")
+    ...     no_such_file(Path(folder) / "pett.h5").replace(folder, "…")
+    "there is no file …/pett.h5. Did you mean 'pet.h5'?"
+    """
+    missing = Path(path)
+    try:
+        near = nearest_name(missing.name, [one.name for one in missing.parent.iterdir()])
+    except OSError:
+        near = None
+    return f"there is no file {missing}" + (f". Did you mean {near!r}?" if near else "")
 
 
 def read_columns(path: Path) -> Array:

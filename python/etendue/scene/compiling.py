@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
+from etendue.description.files import no_such_file
 from etendue.description.mistakes import join
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
 from etendue.quantities.fingerprint import fingerprint
@@ -145,6 +146,7 @@ class _Compiler:
         self.means: dict[str, npt.NDArray[np.float64]] = {}
         self.bodies: dict[Body, _Faces] = {}
         self.named_finishes: dict[str, tuple[int, bool, Axis]] = {}
+        self.letting_in: set[tuple[str, str]] = set()
 
     def compiled(self) -> Compiled:
         """Everything, or all mistakes."""
@@ -192,7 +194,7 @@ class _Compiler:
         except EtendueError as error:
             self.mistakes.append((place, str(error)))
         except FileNotFoundError as error:
-            self.mistakes.append((place, f"there is no file {error.filename}"))
+            self.mistakes.append((place, no_such_file(error.filename)))
         except OSError as error:
             self.mistakes.append((place, f"{error.filename} cannot be read: {error.strerror}"))
 
@@ -235,7 +237,10 @@ class _Compiler:
             with self._at(f"finishes.{name}" if given in self.scene.finishes else place):
                 self.rows["finishes"].append(finish.record(self.files))
                 self.names["finishes"].append(name)
-        found = self.numbers[key], finish.lets_light_in(self.files), getattr(finish, "axis", None)
+                if finish.lets_light_in(self.files):
+                    self.letting_in.add(key)
+        # Of a finish whose file cannot be read nothing more is asked: that would be the same mistake again.
+        found = self.numbers[key], key in self.letting_in, getattr(finish, "axis", None)
         if isinstance(given, str):
             self.named_finishes[given] = found
         return found
