@@ -11,6 +11,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.scatter.materials import MATERIALS
 from oracles.tracepro_files import abg_side, surface_property
 
 from cli.outcome import Run
@@ -202,6 +203,22 @@ def test_the_format_is_told_first_of_several_files_that_of_each(run: Run) -> Non
     assert facts["format"] == "tracepro"
     assert run("bsdf", "info", "abg.txt").out.startswith("abg.txt: tracepro, ")
     assert run("bsdf", "info", "abg.txt", "abg.h5").out.startswith("2 files: etendue, tracepro, ")
+
+
+@pytest.mark.slow
+def test_materials_are_listed_with_what_they_rest_on(run: Run) -> None:
+    """All that a scene may name; shares of opal PMMA and of a holographic diffuser are stated ones."""
+    rows = {one["name"]: one for one in run("bsdf", "materials", "--json").json}
+    assert set(rows) == set(MATERIALS)
+    opal, diffuser = rows["opal-pmma"], rows["holographic-diffuser-5"]
+    assert (opal["kind"], opal["reflectance"], opal["transmittance"]) == ("lambertian", 0.38, 0.52)
+    assert diffuser["transmittance"] == pytest.approx(0.9, abs=1e-3)
+    told = run("bsdf", "materials").out.splitlines()
+    assert len(told) == len(MATERIALS)
+    assert all(
+        f"{name}: " in line and material.source in line
+        for line, (name, material) in zip(told, MATERIALS.items(), strict=True)
+    )
 
 
 @pytest.mark.parametrize("angle", ["95", "90", "-1", "nan"])

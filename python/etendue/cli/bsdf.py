@@ -19,6 +19,7 @@ from etendue.quantities.measured import measured
 from etendue.scatter.appearance import GLASS, appearance
 from etendue.scatter.bsdf import WAVELENGTH
 from etendue.scatter.files import read_bsdf, write_bsdf
+from etendue.scatter.materials import MATERIALS
 from etendue.scatter.model_fit import FITTED_MODELS, fit_bsdf
 from etendue.scatter.scans.files import read_scans
 from etendue.scatter.scans.interpolations import AUTOMATIC, METHODS, share_error
@@ -306,5 +307,36 @@ def _share_told(one: BsdfSlice) -> str:
     return measured(share, error, "").rstrip() if math.isfinite(error) else f"{share:.4f}"
 
 
-for _name, _verb in (("info", info), ("plot", plot), ("convert", convert), ("gloss", gloss), ("fit", fit)):
+NEAR_NORMAL = 8.0
+"""Angle at which integrating spheres measure reflectance [°]."""
+
+
+def materials(json: Json = False) -> None:
+    """List the materials that a scene may name as a finish: reflectance and transmittance at 8°, and what they rest on."""
+    found = [
+        {
+            "name": name,
+            "kind": material.finish.model_dump()["kind"],
+            "reflectance": float(material.finish.reflectance(NEAR_NORMAL)),
+            "transmittance": float(material.finish.transmittance(NEAR_NORMAL)),
+            "source": material.source,
+        }
+        for name, material in MATERIALS.items()
+    ]
+    if json:
+        print_json(found)
+        return
+    for one in found:
+        shares = f"R = {one['reflectance']:.2f}, T = {one['transmittance']:.2f}"
+        say(f"{one['name']}: {one['kind']}, {shares} at {NEAR_NORMAL:g}°; {one['source']}")
+
+
+for _name, _verb in (
+    ("info", info),
+    ("plot", plot),
+    ("convert", convert),
+    ("gloss", gloss),
+    ("fit", fit),
+    ("materials", materials),
+):
     app.command(_name)(guarded(f"bsdf {_name}", _verb))

@@ -57,7 +57,7 @@ class BsdfTable(Bsdf):
         self.complaints: tuple[Complaint, ...] = (*data.complaints, *told, *more)
 
     @classmethod
-    def from_scans(cls, scans: Scans, method: str = "specular-centred") -> BsdfTable:
+    def from_scans(cls, scans: Scans, method: str = "automatic") -> BsdfTable:
         """See `Bsdf.from_scans`."""
         return cls(tabulated(scans, method))
 
