@@ -45,6 +45,29 @@ def test_the_real_scan_without_its_blank_is_the_published_table(samples: Path) -
     assert abs(dirty[2] - 1.0) > 0.1
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "known",
+    [
+        et.bsdf.Mixture(
+            parts=[{"kind": "lambertian", "reflectance": 0.3}, {"kind": "gaussian", "peak": 1.0, "sigma": 0.15}]
+        ),
+        et.bsdf.RoughCoat(roughness=0.3, index=1.5, base_reflectance=0.5),
+    ],
+    ids=["gaussian", "coat"],
+)
+def test_the_method_that_is_chosen_finds_shares_of_known_surfaces(samples: Path, known: et.Bsdf) -> None:
+    """At the directions of the real scan, without noise: the directional-hemispherical reflectance to 1 %."""
+    folder = samples / "bsdf"
+    scans = et.read_scans([folder / "AnoBlackEC1_goniometer.xls"], blank=folder / "blank_goniometer.xls")
+    values = known.evaluate(scans.incident, scans.scattered)
+    table = et.Bsdf.from_scans(et.Scans(scans.incident, scans.scattered, values))
+    assert isinstance(table, et.BsdfTable)
+    assert table.data.facts["interpolation"] == "natural-neighbours"
+    for one in table.data.slices:
+        assert one.integral() == pytest.approx(float(known.reflectance(one.theta)), rel=0.01)
+
+
 def test_damage_is_told(samples: Path, tmp_path: Path) -> None:
     whole = samples / "bsdf" / "blank_goniometer.xls"
     assert read_rt300s(whole)["rt"].size == 2508
