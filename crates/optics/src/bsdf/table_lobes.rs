@@ -39,19 +39,19 @@ pub(super) struct Lobes {
 pub(super) struct Lobe {
     azimuth: f64,
     slices: Arc<[Grid]>,
-    /// Of the flux, in each of two slices and in the floor.
-    shares: Steps,
-    /// What f of each of two slices is multiplied by, and the share of the floor.
-    factors: Steps,
+    steps: Steps,
 }
 
-/// Three numbers by the sine of incidence, linear in few steps: few enough for the nearest cache.
+/// Numbers by the sine of incidence, linear in few steps: few enough for the nearest caches.
 #[derive(Clone, Debug, Default)]
 struct Steps {
     /// Rising sines of incidence from which on the steps hold.
     from: Vec<f64>,
     guide: Guide,
-    list: Vec<Step>,
+    /// Of the flux, in each of two slices and in the floor.
+    shares: Vec<Step>,
+    /// What f of each of two slices is multiplied by, and the share of the floor.
+    factors: Vec<Step>,
 }
 
 /// Three numbers between two sines of incidence, in one line of a cache.
@@ -66,14 +66,11 @@ pub(super) struct Step {
     pub first: u32,
 }
 
-/// Some numbers at a sine, and what they may be off.
-type Values<'a> = dyn Fn(usize) -> ([f64; 3], [f64; 3]) + 'a;
-
 impl Step {
-    /// Between two of some sines.
-    fn new([start, end]: [usize; 2], sines: &[f64], blends: &[Blend], values: &Values<'_>) -> Self {
+    /// Between two of some sines, for some numbers of the blends there.
+    fn new([start, end]: [usize; 2], sines: &[f64], blends: &[Blend], values: fn(&Blend) -> [f64; 3]) -> Self {
         let width = sines[end] - sines[start];
-        let [(at_start, _), (at_end, _)] = [values(start), values(end)];
+        let [at_start, at_end] = [start, end].map(|i| values(&blends[i]));
         let slope = |k: usize| (at_end[k] - at_start[k]) / width;
         Self {
             from: sines[start],
@@ -81,16 +78,6 @@ impl Step {
             slopes: std::array::from_fn(|k| if width > 0.0 { slope(k) } else { 0.0 }),
             first: u32::try_from(blends[start].first).unwrap_or(u32::MAX),
         }
-    }
-
-    /// Whether all between two sines have its slices and, for all that anybody can see, its numbers.
-    fn holds(&self, [start, end]: [usize; 2], sines: &[f64], blends: &[Blend], values: &Values<'_>) -> bool {
-        (start + 1..=end).all(|i| {
-            let (there, off) = values(i);
-            let found = self.at(sines[i]);
-            let near = |k: usize| (there[k] - found[k]).abs() <= off[k];
-            blends[i].first == blends[start].first && sines[i] > sines[start] && (0..3).all(near)
-        })
     }
 
     #[inline]
@@ -162,12 +149,7 @@ impl Row {
         Ok(Lobe {
             azimuth: self.azimuth,
             slices: slices.into(),
-            shares: Steps::new(&sines, &blends, &|i| (blends[i].shares, [TOLERANCE; 3])),
-            factors: Steps::new(&sines, &blends, &|i| {
-                let ([a, b], floor) = (blends[i].factors, blends[i].shares[2]);
-                let off = TOLERANCE * (a.abs() + b.abs());
-                ([a, b, floor], [off, off, TOLERANCE])
-            }),
+            steps: Steps::new(&sines, &blends),
         })
     }
 }
@@ -241,7 +223,7 @@ impl Lobe {
     /// The first of two slices and, from the last sine on that is not above this one, the shares of both and of the floor.
     #[inline]
     pub(super) fn step(&self, sine: f64) -> &Step {
-        self.shares.at(sine)
+        &self.steps.shares[self.steps.at(sine)]
     }
 
     /// The first of two slices, and the shares of both and of the floor.
@@ -266,7 +248,7 @@ impl Lobe {
     /// f \[1/sr\] for light that leaves towards a point of the plane of direction cosines.
     #[inline]
     pub(super) fn at(&self, sine: f64, r: f64, turn: f64) -> f64 {
-        let step = self.factors.at(sine);
+        let step = &self.steps.factors[self.steps.at(sine)];
         let [one, other, floor] = step.at(sine);
         let mut f = floor * FRAC_1_PI;
         for (k, factor) in [one, other].into_iter().enumerate().filter(|(_, factor)| *factor > 0.0) {
@@ -292,37 +274,34 @@ impl Lobe {
 }
 
 impl Steps {
-    /// Of numbers of blends at rising sines, as far as each step goes without them being off.
-    fn new(sines: &[f64], blends: &[Blend], values: &Values<'_>) -> Self {
-        let mut steps = Vec::new();
+    /// Of blends at rising sines, as far as each step goes without anything being off.
+    fn new(sines: &[f64], blends: &[Blend]) -> Self {
+        let mut steps = Self::default();
         let mut start = 0;
         while start + 1 < sines.len() {
+            let both =
+                |end: usize| [Blend::shares, Blend::factors].map(|of| Step::new([start, end], sines, blends, of));
             let mut end = start + 1;
-            while end + 1 < sines.len() {
-                let ends = [start, end + 1];
-                if !Step::new(ends, sines, blends, values).holds(ends, sines, blends, values) {
-                    break;
-                }
+            while end + 1 < sines.len() && holds(&both(end + 1), [start, end + 1], sines, blends) {
                 end += 1;
             }
             // Where two slices meet, a sine stands there twice.
             if sines[end] > sines[start] {
-                steps.push(Step::new([start, end], sines, blends, values));
+                let [shares, factors] = both(end);
+                steps.from.push(sines[start]);
+                steps.shares.push(shares);
+                steps.factors.push(factors);
             }
             start = end;
         }
-        let from: Vec<f64> = steps.iter().map(|step| step.from).collect();
-        Self {
-            guide: Guide::new(&from),
-            from,
-            list: steps,
-        }
+        steps.guide = Guide::new(&steps.from);
+        steps
     }
 
-    /// The three numbers where steps begin, and where they end.
+    /// The shares where steps begin, and where they end.
     fn ends(&self) -> impl Iterator<Item = [f64; 3]> {
         let to = self.from.iter().skip(1).copied().chain([1.0]);
-        self.list
+        self.shares
             .iter()
             .zip(to)
             .flat_map(|(step, to)| [step.values, step.at(to)])
@@ -331,21 +310,44 @@ impl Steps {
     /// Without the floor.
     fn without_floor(&self) -> Self {
         let mut steps = self.clone();
-        for step in &mut steps.list {
+        for step in steps.shares.iter_mut().chain(&mut steps.factors) {
             (step.values[2], step.slopes[2]) = (0.0, 0.0);
         }
         steps
     }
 
-    /// The step from the last sine that is not above this one.
+    /// The number of the step from the last sine that is not above this one.
     #[inline]
-    fn at(&self, sine: f64) -> &Step {
-        let above = self.guide.not_above(&self.from, sine, |from| *from);
-        &self.list[above.max(1) - 1]
+    fn at(&self, sine: f64) -> usize {
+        self.guide.not_above(&self.from, sine, |from| *from).max(1) - 1
     }
 }
 
+/// Whether all between two sines have the slices of steps and, for all that anybody can see, their shares and factors.
+fn holds([shares, factors]: &[Step; 2], [start, end]: [usize; 2], sines: &[f64], blends: &[Blend]) -> bool {
+    (start + 1..=end).all(|i| {
+        let blend = &blends[i];
+        let scale = blend.factors[0].abs() + blend.factors[1].abs();
+        let near = |found: [f64; 3], there: [f64; 3], scales: [f64; 3]| {
+            (0..3).all(|k| (there[k] - found[k]).abs() <= TOLERANCE * scales[k])
+        };
+        blend.first == blends[start].first
+            && sines[i] > sines[start]
+            && near(shares.at(sines[i]), blend.shares(), [1.0; 3])
+            && near(factors.at(sines[i]), blend.factors(), [scale, scale, 1.0])
+    })
+}
+
 impl Blend {
+    const fn shares(&self) -> [f64; 3] {
+        self.shares
+    }
+
+    /// With the share of the floor.
+    const fn factors(&self) -> [f64; 3] {
+        [self.factors[0], self.factors[1], self.shares[2]]
+    }
+
     fn towards(&self, other: &Self, part: f64) -> Self {
         let mean = |a: f64, b: f64| a + part * (b - a);
         Self {
@@ -371,11 +373,11 @@ impl Lobes {
     pub(super) fn without_floor(&self) -> Option<Self> {
         let mut rows = self.rows.clone();
         for row in &mut rows {
-            (row.shares, row.factors) = (row.shares.without_floor(), row.factors.without_floor());
+            row.steps = row.steps.without_floor();
         }
         let left = rows
             .iter()
-            .flat_map(|row| row.shares.ends())
+            .flat_map(|row| row.steps.ends())
             .flatten()
             .any(|share| share > 0.0);
         left.then_some(Self { rows })
@@ -385,13 +387,13 @@ impl Lobes {
     pub(super) fn has_floor(&self) -> bool {
         self.rows
             .iter()
-            .flat_map(|row| row.shares.ends())
+            .flat_map(|row| row.steps.ends())
             .any(|shares| shares[2] > 0.0)
     }
 
     /// The greatest share of the light.
     pub(super) fn most(&self) -> f64 {
-        let shares = self.rows.iter().flat_map(|row| row.shares.ends());
+        let shares = self.rows.iter().flat_map(|row| row.steps.ends());
         shares.map(|shares| shares.iter().sum()).fold(0.0, f64::max)
     }
 
@@ -447,11 +449,10 @@ impl<'a> Lit<'a> {
             .fold(0.0, |sum, (row, part)| sum + part * row.share(self.sine))
     }
 
-    /// Of the flux, in the floor: that of f.
+    /// Of the flux, in the floor.
     pub(super) fn floor(&self) -> f64 {
-        self.there().fold(0.0, |sum, (row, part)| {
-            sum + part * row.factors.at(self.sine).at(self.sine)[2]
-        })
+        self.there()
+            .fold(0.0, |sum, (row, part)| sum + part * row.shares(self.sine).1[2])
     }
 
     /// f for light that leaves towards a point of the plane of direction cosines.
@@ -576,7 +577,7 @@ mod tests {
             Cubic::new(&squares, &row.slices.iter().map(pick).collect::<Vec<_>>())
         };
         let (sines, blends) = blends_of(&lobe.slices, &of(|slice| slice.share), &of(|slice| slice.floor));
-        assert!(4 * lobe.shares.list.len() < 3 * sines.len());
+        assert!(4 * lobe.steps.from.len() < 3 * sines.len());
         for k in 0..=20_000 {
             let sine = f64::from(k) / 20_000.0;
             let above = sines[..sines.len() - 1].partition_point(|from| *from <= sine).max(1);
@@ -593,7 +594,7 @@ mod tests {
             for (share, known) in shares.into_iter().zip(blend.shares) {
                 assert!((share - known).abs() <= 1.0001 * TOLERANCE, "{sine}: {share} {known}");
             }
-            let step = lobe.factors.at(sine);
+            let step = &lobe.steps.factors[lobe.steps.at(sine)];
             let [one, other, floor] = step.at(sine);
             let scale: f64 = blend.factors.iter().sum();
             assert_eq!(step.first as usize, blend.first);
