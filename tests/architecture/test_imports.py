@@ -98,7 +98,8 @@ def test_info_imports_what_the_file_asks_for(tmp_path: Path) -> None:
     etendue.write_rays(tmp_path / "led.tm25ray", etendue.RingSource(rays=100).ray_set())
     modules = program(arguments=["info", str(tmp_path / "led.tm25ray")])
     assert "etendue.formats.rays" in modules
-    for part in ("scene", "scatter", "lightfield", "luminance", "tracing", "plot"):
+    others = ("formats.intensity", "formats.maps")
+    for part in ("scene", "scatter", "lightfield", "luminance", "tracing", "plot", *others):
         assert f"etendue.{part}" not in modules
 
 

@@ -59,13 +59,15 @@ def info(
 
 def _opened(path: Path, photometry: str | None) -> Found:
     """What the file is, looked for from what is quickly recognised to what is read to its end."""
-    # Whoever asks for an intensity file waits for no light fields, scenes or traces to be imported.
-    from etendue.formats.intensity import detect_intensity_format, read_intensity
-
+    # Whoever asks for one kind of file does not wait until the parts of all others are imported.
     if path.is_dir():
         patches = _patches(path)
         if patches is not None:
             return patches
+    elif photometry is None and _holds_binary_rays(path):
+        return _plainly(describe(path))
+    from etendue.formats.intensity import detect_intensity_format, read_intensity
+
     if detect_intensity_format(path) is not None:
         return _intensity(path, read_intensity(path, photometry))
     if photometry is not None:
@@ -75,6 +77,21 @@ def _opened(path: Path, photometry: str | None) -> Found:
         if found is not None:
             return found
     return _plainly(describe(path))
+
+
+def _holds_binary_rays(path: Path) -> bool:
+    """Whether it is of a binary format of rays: told without the parts of anything else. A pipe is left unread."""
+    from etendue.formats.head import Head
+    from etendue.formats.input import is_stream
+
+    if is_stream(path):
+        return False
+    head = Head.of(path)
+    if head.is_text:
+        return False
+    from etendue.formats.rays import RAY_FORMATS
+
+    return any(candidate.recognise(head) for candidate in RAY_FORMATS)
 
 
 def _looks(path: Path) -> Iterator[Callable[[Path], Found | None]]:
