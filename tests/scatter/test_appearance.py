@@ -236,7 +236,7 @@ def test_errors_of_a_table_that_scatters_nearly_everything(monkeypatch: pytest.M
 
     def looks(share: float, *components: dict[str, object]) -> Appearance:
         f = np.full(grid.shape, share / math.pi)
-        one = BsdfSlice(direction(20.0, 180.0), f, grid=grid, standard_error=0.5 * f)
+        one = BsdfSlice(direction(40.0, 180.0), f, grid=grid, standard_error=0.5 * f)
         return appearance(BsdfTable(BsdfData([one], components, isotropic=True)))
 
     whole, half = looks(0.99), looks(0.495)
