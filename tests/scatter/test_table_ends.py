@@ -8,6 +8,8 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
+from etendue.errors import UnknownNameError
+from etendue.formats.bsdf.functions import sampled
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
 from etendue.scatter.appearance import appearance
 
@@ -44,15 +46,7 @@ def test_beyond_the_last_incidence_the_share_goes_on(
 def test_a_gloss_paint_known_to_75_degrees_reflects_as_it_does_to_grazing_light() -> None:
     """The share of the model is a quadrature of the core; the lobe that stays as it is lost a tenth at the horizon."""
     paint = et.bsdf.RoughCoat(roughness=0.1, index=1.575, base_reflectance=0.99)
-    grid = PolarGrid("cosines", np.append(0.0, np.geomspace(1e-3, 2.0, 120)), np.arange(0.0, 360.0, 5.0))
-    slices = []
-    for theta in (5.0, 25.0, 45.0, 60.0, 75.0):
-        incident = direction(theta, 180.0)
-        scattered = grid.directions(incident, transmitted=False)
-        there = ~np.isnan(scattered[..., 0])
-        values = np.full(there.shape, np.nan)
-        values[there] = paint.evaluate(incident, scattered[there])
-        slices.append(BsdfSlice(incident, values, grid=grid))
+    slices = sampled(paint.evaluate, [(theta, 180.0) for theta in (5.0, 25.0, 45.0, 60.0, 75.0)])
     thetas = np.array([76.0, 80.0, 85.0, 89.0])
     found = et.BsdfTable(BsdfData(slices)).reflectance(thetas)
     assert found == pytest.approx(np.asarray(paint.reflectance(thetas)), rel=0.01)
@@ -134,6 +128,8 @@ def test_what_is_extrapolated_is_told_and_has_no_error(monkeypatch: pytest.Monke
     assert table.known_to() == 60.0
     assert table.known_to(side="back") == 75.0
     assert table.known_to(transmitted=True) == 90.0
+    with pytest.raises(UnknownNameError, match="front"):
+        table.known_to(side="frnt")  # type: ignore[arg-type]
     found = appearance(table)
     assert found.extrapolated == {"gloss 85": 60.0}
     assert set(found.errors) == {"gloss 20", "gloss 60", "reflection haze", "distinctness"}

@@ -79,28 +79,29 @@ def _named(files: list[Path]) -> str:
     return str(files[0]) if len(files) == 1 else f"{len(files)} files"
 
 
+def _table_facts(one: BsdfSlice, *, of_scans: bool) -> dict[str, Any]:
+    share = one.integral()
+    return {
+        "side": "front" if one.front else "back",
+        "theta": round(one.theta, 6),
+        "phi": round(one.phi, 6),
+        "transmitted": one.transmitted,
+        "wavelength": one.wavelength,
+        "share": share,
+        # Tables of scans keep there what the scans added up to; nothing was stated.
+        "stated": None if of_scans else one.stated,
+        "unscaled": one.stated if of_scans and one.stated != share else None,
+    }
+
+
 def _facts(files: list[Path], bsdf: BsdfTable) -> dict[str, Any]:
     # A file of many slices is told by the first azimuth.
     first = {
         (one.front, one.transmitted, round(one.theta, 6), one.wavelength): one for one in reversed(bsdf.data.slices)
     }
     of_scans = "interpolation" in bsdf.data.facts
-    tables = [
-        {
-            "side": "front" if one.front else "back",
-            "theta": round(one.theta, 6),
-            "phi": round(one.phi, 6),
-            "transmitted": one.transmitted,
-            "wavelength": one.wavelength,
-            "share": one.integral(),
-            # Tables of scans keep there what the scans added up to; nothing was stated.
-            "stated": None if of_scans else one.stated,
-            "unscaled": one.stated if of_scans and one.stated != one.integral() else None,
-        }
-        for one in sorted(
-            first.values(), key=lambda one: (not one.front, one.transmitted, one.theta, one.wavelength or 0.0)
-        )
-    ]
+    ordered = sorted(first.values(), key=lambda one: (not one.front, one.transmitted, one.theta, one.wavelength or 0.0))
+    tables = [_table_facts(one, of_scans=of_scans) for one in ordered]
     angles = np.array(ANGLES)
     return {
         "file": files[0] if len(files) == 1 else files,

@@ -58,6 +58,12 @@ def unit_vectors(name: str, values: npt.ArrayLike) -> Array:
     return np.asarray(given / length)
 
 
+def _known(side: Side) -> Side:
+    if side not in get_args(Side):
+        raise UnknownNameError("side", side, get_args(Side))
+    return side
+
+
 class Bsdf(abc.ABC):
     """Bidirectional scattering distribution function of a surface, with the light that it mirrors and refracts beside it.
 
@@ -299,8 +305,7 @@ class Bsdf(abc.ABC):
     def _shares(
         self, theta: npt.ArrayLike, phi: npt.ArrayLike, side: Side, media: tuple[float, float, float]
     ) -> tuple[Array, Array, Array, Array]:
-        if side not in get_args(Side):
-            raise UnknownNameError("side", side, get_args(Side))
+        side = _known(side)
         angles = np.asarray(theta, np.float64)
         if not ((angles >= 0.0) & (angles <= 90.0)).all():
             raise ArgumentError("angles of incidence are from 0 to 90°")
@@ -326,13 +331,20 @@ class Bsdf(abc.ABC):
         float
             90 for models, and where nothing is tabled.
 
+        Raises
+        ------
+        UnknownNameError
+            If there is no such side.
+
         Examples
         --------
         >>> from etendue.scatter.models import Lambertian
         >>> Lambertian(reflectance=0.5).known_to()
         90.0
         """
-        _ = side, transmitted
+        return self._last(_known(side), transmitted)
+
+    def _last(self, side: Side, transmitted: bool) -> float:  # noqa: ARG002 - a model is known at all angles
         return 90.0
 
     def irreciprocity(self) -> float:

@@ -39,6 +39,9 @@ RIM = 1.0 - 1e-9
 STEPS_TO_THE_RIM = 12
 """Incidences beyond the last, if components leave more of one than of another."""
 
+EVEN = 1e-9
+"""Shares that differ by less are the same: rounding of the core."""
+
 STEPS = 4.0
 """Floors of neighbouring incidences differ by this factor at most."""
 
@@ -202,7 +205,7 @@ def _to_the_rim(lobes: Sequence[Lobe], rest: Rest, *, may_rise: bool) -> list[Lo
     thetas = np.linspace(np.degrees(np.arcsin(last.sine)), 90.0, STEPS_TO_THE_RIM + 1)
     known = np.degrees(np.arcsin([one.sine for one in lobes[-3:]]))
     left, left_there = rest.left(thetas), rest.left(known)
-    if np.ptp(left) == 0.0:
+    if np.ptp(left) < EVEN:
         thetas, left = thetas[[0, -1]], left[[0, -1]]
     x = np.sin(np.radians(known)) ** 2
     y = np.array([one.share + one.floor for one in lobes[-3:]]) / np.maximum(left_there, np.finfo(np.float64).tiny)

@@ -96,13 +96,11 @@ class BsdfTable(Bsdf):
         """Angles of incidence at which it is known [°], in order."""
         return tuple(sorted({round(one.theta, 6) for one in self.data.slices}))
 
-    def known_to(self, *, side: Side = "front", transmitted: bool = False) -> float:
-        """See `Bsdf.known_to`."""
-        met = {"front": True, "back": False}[side]
+    def _last(self, side: Side, transmitted: bool) -> float:
         thetas = [
             one.theta
             for one in self.data.slices
-            if one.transmitted is transmitted and (self.both_sides or one.front is met)
+            if one.transmitted is transmitted and (self.both_sides or one.front is (side == "front"))
         ]
         return round(max(thetas, default=90.0), 6)
 
