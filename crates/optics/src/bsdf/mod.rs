@@ -21,11 +21,14 @@ mod rough_coat;
 mod rough_interface;
 mod rough_metal;
 mod table_arrivals;
+mod table_bounds;
 mod table_draw;
 mod table_grid;
 mod table_lanes;
 mod table_lobes;
 mod table_nodes;
+mod table_product;
+mod table_sides;
 mod tabulated;
 #[cfg(test)]
 mod tests;
@@ -43,7 +46,8 @@ pub use rough_interface::RoughInterface;
 pub use rough_metal::RoughMetal;
 pub use table_grid::Slice;
 pub use table_lobes::{Row, Way};
-pub use tabulated::{Side, Tabulated};
+pub use table_sides::Side;
+pub use tabulated::Tabulated;
 
 /// A BSDF from the name of its kind and its parameters; None if there is no such kind.
 ///

@@ -454,6 +454,18 @@ impl Grid {
         near + v * (far - near)
     }
 
+    /// How many azimuths there are.
+    pub(super) const fn azimuths(&self) -> usize {
+        self.azimuths
+    }
+
+    /// The least f from an azimuth to the next, between two distances from β₀.
+    pub(super) fn least(&self, j: usize, [from, to]: [f64; 2]) -> f64 {
+        let nodes = self.below(from)..=self.below(to) + 1;
+        let rows = [j, self.after(j)].into_iter().flat_map(|j| &self.row(j)[nodes.clone()]);
+        rows.copied().fold(f64::INFINITY, f64::min)
+    }
+
     /// The azimuths on both sides of one, and how far on it is.
     #[allow(
         clippy::cast_possible_truncation,

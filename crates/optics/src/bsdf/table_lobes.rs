@@ -239,6 +239,39 @@ impl Lobe {
         self.shares(sine).1.iter().sum()
     }
 
+    pub(super) fn slices(&self) -> &[Grid] {
+        &self.slices
+    }
+
+    /// Between two sines of incidence: the first of two slices, and the least that f of each is multiplied by and that the share
+    /// of the floor is, for each step that reaches there.
+    pub(super) fn least_factors(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = (usize, [f64; 3])> {
+        let ends = self.steps.from.iter().skip(1).copied().chain([1.0]);
+        let steps = self.steps.factors.iter().zip(ends);
+        let there = steps.filter(move |(step, end)| step.from <= to && *end >= from);
+        there.map(move |(step, end)| {
+            let [one, other] = [from.max(step.from), to.min(end)].map(|sine| step.at(sine));
+            (
+                step.first as usize,
+                std::array::from_fn(|k| f64::min(one[k], other[k]).max(0.0)),
+            )
+        })
+    }
+
+    /// A floor alone, by its shares at some sines from 0 to 1, between which it is linear.
+    pub(super) fn of_floor(&self, sines: &[f64], shares: &[f64]) -> Self {
+        let floor = |share: &f64| Blend {
+            shares: [0.0, 0.0, *share],
+            ..Blend::default()
+        };
+        let blends: Vec<Blend> = shares.iter().map(floor).collect();
+        Self {
+            azimuth: self.azimuth,
+            slices: Arc::default(),
+            steps: Steps::every(sines, &blends),
+        }
+    }
+
     /// A slice, by its number.
     #[inline]
     pub(super) fn slice(&self, number: usize) -> &Grid {
@@ -296,6 +329,19 @@ impl Steps {
         }
         steps.guide = Guide::new(&steps.from);
         steps
+    }
+
+    /// The same, from each sine to the next.
+    fn every(sines: &[f64], blends: &[Blend]) -> Self {
+        let each =
+            |of: fn(&Blend) -> [f64; 3]| (1..sines.len()).map(move |end| Step::new([end - 1, end], sines, blends, of));
+        let from = sines[..sines.len() - 1].to_vec();
+        Self {
+            guide: Guide::new(&from),
+            from,
+            shares: each(Blend::shares).collect(),
+            factors: each(Blend::factors).collect(),
+        }
     }
 
     /// The shares where steps begin, and where they end.
@@ -395,6 +441,15 @@ impl Lobes {
     pub(super) fn most(&self) -> f64 {
         let shares = self.rows.iter().flat_map(|row| row.steps.ends());
         shares.map(|shares| shares.iter().sum()).fold(0.0, f64::max)
+    }
+
+    pub(super) fn rows(&self) -> &[Lobe] {
+        &self.rows
+    }
+
+    /// Other rows in the place of these.
+    pub(super) fn with_rows(rows: Vec<Lobe>) -> Self {
+        Self { rows }
     }
 
     /// The only row, if there is one.
@@ -532,7 +587,7 @@ impl Incidence {
 }
 
 /// The azimuth of a point \[turns\], from 0 to 1.
-fn turns(x: f64, y: f64) -> f64 {
+pub(super) fn turns(x: f64, y: f64) -> f64 {
     if x == 0.0 && y == 0.0 {
         return 0.0;
     }

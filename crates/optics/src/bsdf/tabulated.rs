@@ -14,35 +14,28 @@
 //! the plane of direction cosines, where area is projected solid angle; and again if the point lies outside the unit circle.
 
 use std::cell::RefCell;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
-use etendue_sampling::warp::part_of;
 
 use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares, by_cosine};
 use super::table_draw::{Group, again};
 use super::table_grid::Grid;
-use super::table_lobes::{Incidence, Lit, Lobe, Lobes, Way};
-
-/// Tables of light that meets one side: reflected and transmitted, by wavelength \[nm\].
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Side {
-    /// Rising wavelengths, each with the tables of both ways; empty: everything is absorbed.
-    pub sheets: Vec<(f64, [Option<Way>; 2])>,
-}
-
-/// For each wavelength the tables of both ways.
-type Sheets = Vec<(f64, [Option<Lobes>; 2])>;
+use super::table_lobes::{Incidence, Lobes};
+use super::table_product::{TableProduct, TableRest};
+use super::table_sides::{Side, Sides, pick, share};
 
 /// A table of scattered light.
 #[derive(Clone, Debug)]
 pub struct Tabulated {
-    sides: [Sheets; 2],
+    sides: Sides,
     facts: Facts,
     /// Whether any slice has a floor; and the same without it, if anything is left.
     floor: bool,
     lobes: Option<Arc<dyn Bsdf>>,
+    /// What it is a product and a rest of, where that is more than the floors; found when somebody asks.
+    product: OnceLock<Option<(TableProduct, Arc<dyn Bsdf>)>>,
     /// See [`Bsdf::most`].
     most: f64,
 }
@@ -51,31 +44,24 @@ impl Tabulated {
     /// # Errors
     /// What is wrong with the tables.
     pub fn new(front: &Side, back: &Side) -> Result<Self, String> {
-        let sides = [front, back].map(Side::lobes);
-        let [front, back] = sides;
-        let sides = [front?, back?];
-        let all = || sides.iter().flatten().flat_map(|(_, ways)| ways).flatten();
-        let floor = all().any(Lobes::has_floor);
-        let lobes = floor.then(|| {
-            sides.each_ref().map(|sheets| {
-                let without = |ways: &[Option<Lobes>; 2]| ways.each_ref().map(|way| way.as_ref()?.without_floor());
-                sheets.iter().map(|(at, ways)| (*at, without(ways))).collect::<Sheets>()
-            })
-        });
-        let lobes = lobes.filter(|sides| sides.iter().flatten().flat_map(|(_, ways)| ways).any(Option::is_some));
+        let sides = Sides::new(front, back)?;
+        let floor = sides.each().flatten().flatten().any(Lobes::has_floor);
+        let lobes = floor.then(|| sides.map(Lobes::without_floor));
+        let lobes = lobes.filter(|sides| sides.each().flatten().any(Option::is_some));
         let lobes = lobes.map(|sides| Arc::new(Self::of(sides, false, None)) as Arc<dyn Bsdf>);
         Ok(Self::of(sides, floor, lobes))
     }
 
-    fn of(sides: [Sheets; 2], floor: bool, lobes: Option<Arc<dyn Bsdf>>) -> Self {
-        let diffuse = [0, 1].map(|way| sides.iter().flatten().any(|(_, ways)| ways[way].is_some()));
+    fn of(sides: Sides, floor: bool, lobes: Option<Arc<dyn Bsdf>>) -> Self {
+        let diffuse = [0, 1].map(|way| sides.each().any(|ways| ways[way].is_some()));
         // Between wavelengths and angles shares are no more than at both ends.
-        let most = |(_, ways): &(f64, [Option<Lobes>; 2])| ways.iter().flatten().map(Lobes::most).sum();
-        let most = sides.iter().flatten().map(most).fold(0.0, f64::max);
+        let most = |ways: &[Option<Lobes>; 2]| ways.iter().flatten().map(Lobes::most).sum();
+        let most = sides.each().map(most).fold(0.0, f64::max);
         Self {
             sides,
             floor,
             lobes,
+            product: OnceLock::new(),
             most,
             facts: Facts {
                 specular: [false; 2],
@@ -88,32 +74,18 @@ impl Tabulated {
         }
     }
 
-    /// The tables next to a wavelength, each with its part.
-    fn sheets(&self, front: bool, wavelength: f64) -> [(&[Option<Lobes>; 2], f64); 2] {
-        const NONE: &[Option<Lobes>; 2] = &[None, None];
-        let side = &self.sides[usize::from(!front)];
-        let above = side.partition_point(|(at, _)| *at <= wavelength);
-        match (above.checked_sub(1), side.get(above)) {
-            (None, None) => [(NONE, 0.0); 2],
-            (None, Some((_, only))) => [(only, 1.0), (NONE, 0.0)],
-            (Some(last), None) => [(&side[last].1, 1.0), (NONE, 0.0)],
-            (Some(below), Some((upper, next))) => {
-                let (lower, this) = &side[below];
-                let part = (wavelength - lower) / (upper - lower);
-                [(this, 1.0 - part), (next, part)]
-            }
-        }
-    }
-
-    /// The only lobe of light that meets a side, where it is one for all wavelengths, azimuths and ways; and its way. Most
-    /// tables have one, and nothing has to be put together for it.
-    #[inline]
-    fn lone(&self, front: bool) -> Option<(bool, &Lobe)> {
-        match &self.sides[usize::from(!front)][..] {
-            [(_, [Some(lobes), None])] => lobes.lone().map(|lobe| (false, lobe)),
-            [(_, [None, Some(lobes)])] => lobes.lone().map(|lobe| (true, lobe)),
-            _ => None,
-        }
+    /// A product that is more than the floors, and the rest of the light.
+    fn product_and_rest(&self) -> Option<(TableProduct, Arc<dyn Bsdf>)> {
+        let product = TableProduct::of(&self.sides)?;
+        let table = Self {
+            product: OnceLock::new(),
+            ..self.clone()
+        };
+        let rest = TableRest {
+            table: Arc::new(table),
+            product: product.clone(),
+        };
+        Some((product, Arc::new(rest)))
     }
 
     /// What scatters light; None: it is absorbed.
@@ -121,14 +93,14 @@ impl Tabulated {
     fn picked(&self, incident: Vec3, media: &Media, numbers: [f64; 2]) -> Option<Picked<'_>> {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;
-        let (way, (grid, number)) = if let Some((way, lobe)) = self.lone(front) {
+        let (way, (grid, number)) = if let Some((way, lobe)) = self.sides.lone(front) {
             let shares = lobe.shares(incidence.sine);
             let share = shares.1.iter().sum::<f64>();
             // Shares that should add up to 1 may fall short of it by rounding.
             let scattered = numbers[0] < share || share >= 1.0 - 1e-12;
             (way, scattered.then(|| lobe.pick(shares, numbers[0]))?)
         } else {
-            let ways = [false, true].map(|way| self.lit(&incidence, front, way, media.wavelength));
+            let ways = [false, true].map(|way| self.sides.lit(&incidence, front, way, media.wavelength));
             let shares = Shares {
                 specular: [0.0; 2],
                 diffuse: ways.each_ref().map(share),
@@ -145,43 +117,11 @@ impl Tabulated {
             up: front != way,
         })
     }
-
-    /// What one way of light is shared by: next to a wavelength, each with its part.
-    fn lit(&self, incidence: &Incidence, front: bool, transmitted: bool, wavelength: f64) -> Ways<'_> {
-        self.sheets(front, wavelength).map(|(ways, part)| {
-            let lobes = ways[usize::from(transmitted)].as_ref().filter(|_| part > 0.0)?;
-            Some((lobes.lit(incidence), part))
-        })
-    }
 }
-
-/// Next to a wavelength, each with its part.
-type Ways<'a> = [Option<(Lit<'a>, f64)>; 2];
 
 /// A share of one way, and none of the other.
 const fn on_its_way(transmitted: bool, share: f64) -> [f64; 2] {
     if transmitted { [0.0, share] } else { [share, 0.0] }
-}
-
-fn share(ways: &Ways<'_>) -> f64 {
-    ways.iter()
-        .flatten()
-        .fold(0.0, |sum, (lit, part)| sum + part * lit.share())
-}
-
-/// A slice or a floor (None), picked by its share, with what is left of the number.
-fn pick<'a>(ways: &Ways<'a>, number: f64) -> (Option<&'a Grid>, f64) {
-    let mut left = number * share(ways);
-    let mut picked = (None, number);
-    for (lit, part) in ways.iter().flatten() {
-        let share = part * lit.share();
-        picked = lit.pick(part_of(left, share));
-        if left < share {
-            break;
-        }
-        left -= share;
-    }
-    picked
 }
 
 /// Light that is scattered by a slice or a floor, before it is known where to.
@@ -208,23 +148,6 @@ impl Picked<'_> {
     }
 }
 
-impl Side {
-    fn lobes(&self) -> Result<Sheets, String> {
-        if self
-            .sheets
-            .windows(2)
-            .any(|pair| pair[0].0.partial_cmp(&pair[1].0) != Some(std::cmp::Ordering::Less))
-        {
-            return Err("wavelengths do not rise".into());
-        }
-        let sheet = |(wavelength, ways): &(f64, [Option<Way>; 2])| {
-            let [a, b] = ways.each_ref().map(|way| way.as_ref().map(Way::lobes).transpose());
-            Ok((*wavelength, [a?, b?]))
-        };
-        self.sheets.iter().map(sheet).collect()
-    }
-}
-
 impl Bsdf for Tabulated {
     fn facts(&self) -> &Facts {
         &self.facts
@@ -233,9 +156,9 @@ impl Bsdf for Tabulated {
     fn shares(&self, incident: Vec3, media: &Media) -> Shares {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;
-        let diffuse = match self.lone(front) {
+        let diffuse = match self.sides.lone(front) {
             Some((way, lobe)) => on_its_way(way, lobe.share(incidence.sine)),
-            None => [false, true].map(|way| share(&self.lit(&incidence, front, way, media.wavelength))),
+            None => [false, true].map(|way| share(&self.sides.lit(&incidence, front, way, media.wavelength))),
         };
         Shares {
             specular: [0.0; 2],
@@ -253,18 +176,24 @@ impl Bsdf for Tabulated {
         let (r, turn) = incidence.place(incident, scattered);
         let front = incident.z > 0.0;
         let transmitted = front != (scattered.z > 0.0);
-        if let Some((way, lobe)) = self.lone(front) {
+        if let Some((way, lobe)) = self.sides.lone(front) {
             return if way == transmitted {
                 lobe.at(incidence.sine, r, turn)
             } else {
                 0.0
             };
         }
-        let ways = self.lit(&incidence, front, transmitted, media.wavelength);
+        let ways = self.sides.lit(&incidence, front, transmitted, media.wavelength);
         ways.iter().flatten().map(|(lit, part)| part * lit.at(r, turn)).sum()
     }
 
     fn parts(&self) -> Option<Parts<'_>> {
+        if let Some((product, rest)) = self.product.get_or_init(|| self.product_and_rest()) {
+            return Some(Parts {
+                product,
+                rest: Some(rest),
+            });
+        }
         self.floor.then_some(Parts {
             product: self,
             rest: self.lobes.as_ref(),
@@ -274,12 +203,15 @@ impl Bsdf for Tabulated {
     fn draw(&self, incident: Vec3, transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3 {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;
-        let (grid, number) = match self.lone(front) {
+        let (grid, number) = match self.sides.lone(front) {
             Some((_, lobe)) => {
                 let shares = lobe.shares(incidence.sine);
                 lobe.pick(shares, numbers[0] * shares.1.iter().sum::<f64>())
             }
-            None => pick(&self.lit(&incidence, front, transmitted, media.wavelength), numbers[0]),
+            None => pick(
+                &self.sides.lit(&incidence, front, transmitted, media.wavelength),
+                numbers[0],
+            ),
         };
         let picked = Picked {
             incidence,
@@ -300,7 +232,7 @@ impl Bsdf for Tabulated {
     fn sample_many(&self, directions: &mut Vectors, media: &[Media], numbers: [&[f64]; 2], outcomes: &mut [Outcome]) {
         let above = directions[2].iter().filter(|z| **z > 0.0).count();
         let one_side = above == 0 || above == outcomes.len();
-        if let Some((way, lobe)) = one_side.then(|| self.lone(above > 0)).flatten() {
+        if let Some((way, lobe)) = one_side.then(|| self.sides.lone(above > 0)).flatten() {
             let mut all = directions.each_mut().map(Vec::as_mut_slice);
             let up = (above > 0) != way;
             GROUP.with_borrow_mut(|group| group.draw((lobe, up), &mut all, numbers, outcomes));
@@ -322,11 +254,7 @@ thread_local! {
 /// The floors.
 impl Product for Tabulated {
     fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2] {
-        let incidence = Incidence::new(incident);
-        [false, true].map(|way| {
-            let ways = self.lit(&incidence, incident.z > 0.0, way, media.wavelength);
-            ways.iter().flatten().map(|(lit, part)| part * lit.floor()).sum()
-        })
+        self.sides.floors(incident, media)
     }
 }
 
@@ -339,7 +267,7 @@ impl super::contract::Examples for Tabulated {
         use std::f64::consts::TAU;
 
         use super::table_grid::Slice;
-        use super::table_lobes::Row;
+        use super::table_lobes::{Row, Way};
 
         let slice = |azimuths: usize, width: f64, [skew, aside]: [f64; 2], sine: f64, [share, floor]: [f64; 2]| {
             let radial: Vec<f64> = (0..24).map(|i| 2.0 * (f64::from(i) / 23.0).powi(2)).collect();
