@@ -1,7 +1,7 @@
 //! The surface event: what becomes of light at a surface that it meets. Rays from the sources and lines of sight both ask here.
 
 use etendue_math::Vec3;
-use etendue_optics::bsdf::{Bsdf, Component, Drawn, Media, Parts, Shares};
+use etendue_optics::bsdf::{Bsdf, Component, Drawn, Media, Outward, Parts, Shares};
 use etendue_optics::source::surface::across;
 
 use crate::interaction::Interaction;
@@ -306,36 +306,48 @@ impl<'a> SurfaceEvent<'a> {
         (along(&self.surface.axes, direction), stack)
     }
 
-    /// How much diffuse light that goes where the line of sight came from may have come from its side and from the other one
-    /// (see [`Bsdf::incoming`]).
+    /// What is to be known of diffuse light that goes where the line of sight came from (see [`Bsdf::outward`]).
     #[inline]
     #[must_use]
-    pub fn incoming(&self) -> [f64; 2] {
-        self.surface.bsdf.incoming(self.outward, &self.surface.media)
+    pub fn outward(&self) -> Outward {
+        self.surface.bsdf.outward(self.outward, &self.surface.media)
     }
 
     /// A direction that such light may have come from, on one of the sides, in space.
     #[inline]
     #[must_use]
-    pub fn draw_incoming(&self, transmitted: bool, numbers: [f64; 2]) -> Vec3 {
+    pub fn draw_incoming(&self, outward: &Outward, transmitted: bool, numbers: [f64; 2]) -> Vec3 {
         let bsdf = self.surface.bsdf;
-        let k = bsdf.draw_incoming(self.outward, transmitted, &self.surface.media, numbers);
+        let k = bsdf.draw_incoming(outward, transmitted, &self.surface.media, numbers);
         self.scattered(k).0
     }
 
     /// Light that comes from `k`, away from the surface, and goes where the line of sight came from.
     #[inline]
     #[must_use]
-    pub fn from(&self, k: Vec3) -> Incoming {
+    pub fn from(&self, k: Vec3, outward: &Outward) -> Incoming {
         let incident = local(&self.surface.axes, k);
+        let (f, about) = self.surface.bsdf.incoming_light(incident, outward, &self.surface.media);
+        self.incoming(k, incident, f, about)
+    }
+
+    /// The same for a direction that was drawn, with the density \[1/sr\] with which that is done on its side.
+    #[inline]
+    #[must_use]
+    pub fn drawn_from(&self, k: Vec3, outward: &Outward) -> (Incoming, f64) {
+        let incident = local(&self.surface.axes, k);
+        let (f, density, about) = self.surface.bsdf.drawn_light(incident, outward, &self.surface.media);
+        (self.incoming(k, incident, f, about), density)
+    }
+
+    #[inline]
+    fn incoming(&self, k: Vec3, incident: Vec3, f: f64, about: f64) -> Incoming {
         let transmitted = (incident.z > 0.0) != self.interaction.front;
-        let (bsdf, media) = (self.surface.bsdf, &self.surface.media);
-        let (f, density) = bsdf.incoming_light(incident, self.outward, media);
         Incoming {
             transmitted,
             f: f * self.surface.tilt(k, -self.d, self.outward.z),
             cosine: k.dot(self.surface.side).abs(),
-            density,
+            about,
             stack: if transmitted {
                 self.interaction.after
             } else {
@@ -354,8 +366,8 @@ pub struct Incoming {
     pub f: f64,
     /// Of the angle of incidence.
     pub cosine: f64,
-    /// Density \[1/sr\] with which this direction is drawn on its side.
-    pub density: f64,
+    /// About the density \[1/sr\] with which this direction is drawn on its side (see [`Bsdf::incoming_light`]).
+    pub about: f64,
     /// The solids that it comes through.
     pub stack: SolidStack,
 }

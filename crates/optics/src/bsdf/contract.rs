@@ -324,27 +324,38 @@ pub trait Bsdf: Debug + Send + Sync {
         ([mirrored, refracted], shares)
     }
 
-    /// How much diffuse light that leaves along `scattered` may have come from its own side and from the other one, whatever its
-    /// direction there: not 0 where there may be any.
-    ///
-    /// As much as would go there, if light went back as it comes, and a little of all where there is some at other angles.
-    fn incoming(&self, scattered: Vec3, media: &Media) -> [f64; 2] {
+    /// What is to be known of light that leaves along `scattered`, before it is asked where it came from.
+    fn outward(&self, scattered: Vec3, media: &Media) -> Outward {
         let diffuse = self.facts().diffuse;
         if !diffuse[0] && !diffuse[1] {
-            return [0.0; 2];
+            return Outward {
+                scattered,
+                back: [0.0; 2],
+                chances: [0.0; 2],
+            };
         }
-        let shares = self.shares(scattered, media).diffuse;
-        let least = f64::max(ANYWHERE * (shares[0] + shares[1]), f64::MIN_POSITIVE);
-        std::array::from_fn(|side| if diffuse[side] { shares[side].max(least) } else { 0.0 })
+        let back = self.shares(scattered, media).diffuse;
+        // As much as would go there, if light went back as it comes, and a little of all where there is some at other angles.
+        let least = f64::max(ANYWHERE * (back[0] + back[1]), f64::MIN_POSITIVE);
+        Outward {
+            scattered,
+            back,
+            chances: std::array::from_fn(|side| if diffuse[side] { back[side].max(least) } else { 0.0 }),
+        }
     }
 
     /// A direction that light may have come from, on the side of `scattered` or on the other one.
     ///
     /// Where light would go that came from there, and now and then anywhere, for what does not go back as it came.
     #[inline]
-    fn draw_incoming(&self, scattered: Vec3, transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3 {
+    fn draw_incoming(&self, outward: &Outward, transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3 {
         let [first, turn] = numbers;
-        let chance = self.chance_of_any(scattered, transmitted, media);
+        let chance = if self.facts().lambertian || outward.back[usize::from(transmitted)] <= 0.0 {
+            1.0
+        } else {
+            ANYWHERE
+        };
+        let scattered = outward.scattered;
         if first < chance {
             return by_cosine((scattered.z > 0.0) != transmitted, [part_of(first, chance), turn]);
         }
@@ -356,44 +367,60 @@ pub trait Bsdf: Debug + Send + Sync {
         )
     }
 
-    /// f \[1/sr\] for light from `incident` to `scattered`, and the density \[1/sr\] of [`draw_incoming`](Bsdf::draw_incoming) on
-    /// the side of `incident`: who looks for light asks for both.
+    /// f \[1/sr\] for light from `incident`, and about the density \[1/sr\] of [`draw_incoming`](Bsdf::draw_incoming) on its side,
+    /// by which directions towards sources are weighted against those that are drawn: any function does, where it is not 0.
     #[inline]
-    fn incoming_light(&self, incident: Vec3, scattered: Vec3, media: &Media) -> (f64, f64) {
-        let f = self.evaluate(incident, scattered, media);
-        if self.facts().lambertian {
-            return (f, proposed(incident, 0.0, 0.0));
-        }
-        let transmitted = (incident.z > 0.0) != (scattered.z > 0.0);
-        let share = self.shares(scattered, media).diffuse[usize::from(transmitted)];
-        if share <= 0.0 {
-            return (f, proposed(incident, 0.0, share));
-        }
-        let back = if self.facts().reciprocal {
-            // f over n² on the side where light leaves is the same there and back.
-            let [here, there] = media.seen_from(incident);
-            let ratio = if transmitted { here / there } else { 1.0 };
-            f * ratio * ratio * incident.z.abs()
+    fn incoming_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64) {
+        let (f, density, _) = self.drawn_light(incident, outward, media);
+        (f, density)
+    }
+
+    /// f \[1/sr\] for light from `incident`, the density \[1/sr\] itself, and what
+    /// [`incoming_light`](Bsdf::incoming_light) says about it.
+    #[inline]
+    fn drawn_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64, f64) {
+        let f = self.evaluate(incident, outward.scattered, media);
+        let share = outward.back_from(incident);
+        let density = if self.facts().lambertian || share <= 0.0 {
+            proposed(incident, 0.0, 0.0)
+        } else if self.facts().reciprocal {
+            outward.as_if_reciprocal(incident, f, media)
         } else {
-            self.pdf(scattered, incident, media)
+            proposed(incident, self.pdf(outward.scattered, incident, media), share)
         };
-        (f, proposed(incident, back, share))
+        (f, density, density)
+    }
+}
+
+/// Light that leaves along a direction, of which it is asked where it came from.
+#[derive(Clone, Copy, Debug)]
+pub struct Outward {
+    /// The direction.
+    pub scattered: Vec3,
+    /// Shares of diffuse light that came from there: back to the same side, and to the other one.
+    pub back: [f64; 2],
+    /// How much diffuse light may have come from the same side and from the other one, whatever its direction there: not 0 where
+    /// there may be any.
+    pub chances: [f64; 2],
+}
+
+impl Outward {
+    /// The share of light that came from there, on the side of `incident`.
+    #[inline]
+    #[must_use]
+    pub fn back_from(&self, incident: Vec3) -> f64 {
+        self.back[usize::from((incident.z > 0.0) != (self.scattered.z > 0.0))]
     }
 
-    /// Density \[1/sr\] of [`draw_incoming`](Bsdf::draw_incoming) on the side of `incident`.
+    /// The density of [`draw_incoming`](Bsdf::draw_incoming) at `incident` on its side, if light goes back as it comes: f over n² on
+    /// the side where light leaves is the same there and back.
     #[inline]
-    fn incoming_pdf(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {
-        self.incoming_light(incident, scattered, media).1
-    }
-
-    /// The part of the directions of [`draw_incoming`](Bsdf::draw_incoming) that may be any.
-    #[inline]
-    fn chance_of_any(&self, scattered: Vec3, transmitted: bool, media: &Media) -> f64 {
-        if self.facts().lambertian || self.shares(scattered, media).diffuse[usize::from(transmitted)] <= 0.0 {
-            1.0
-        } else {
-            ANYWHERE
-        }
+    #[must_use]
+    pub fn as_if_reciprocal(&self, incident: Vec3, f: f64, media: &Media) -> f64 {
+        let [here, there] = media.seen_from(incident);
+        let transmitted = (incident.z > 0.0) != (self.scattered.z > 0.0);
+        let ratio = if transmitted { here / there } else { 1.0 };
+        proposed(incident, f * ratio * ratio * incident.z.abs(), self.back_from(incident))
     }
 }
 

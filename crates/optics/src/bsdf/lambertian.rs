@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Facts, Media, Parts, Product, Shares};
+use super::contract::{Bsdf, Facts, Media, Outward, Parts, Product, Shares};
 use crate::table::Table;
 
 /// Cosines of the angle of incidence at which is asked how much light may come from a side.
@@ -70,11 +70,17 @@ impl Bsdf for Lambertian {
         Some(Table::breakpoints(&self.tables))
     }
 
-    fn incoming(&self, _scattered: Vec3, media: &Media) -> [f64; 2] {
-        self.tables.each_ref().map(|table| {
+    fn outward(&self, scattered: Vec3, media: &Media) -> Outward {
+        let chances = self.tables.each_ref().map(|table| {
             let most = ASKED.map(|cosine| table.at(cosine, media.wavelength));
             most.into_iter().fold(0.0, f64::max)
-        })
+        });
+        // Directions are drawn without regard to what goes back.
+        Outward {
+            scattered,
+            back: chances,
+            chances,
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use etendue_math::Vec3;
 use etendue_sampling::warp::part_of;
 
-use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, Shares};
+use super::contract::{Bsdf, Facts, Media, Outward, Parameters, Parts, Product, Shares};
 use super::lambertian::Lambertian;
 use super::mirror::Mirror;
 use crate::table::Table;
@@ -221,37 +221,73 @@ impl Bsdf for Mixture {
         self.members.iter().map(|(weight, bsdf)| weight * bsdf.most()).sum()
     }
 
-    fn incoming(&self, scattered: Vec3, media: &Media) -> [f64; 2] {
-        let mut all = [0.0; 2];
+    fn outward(&self, scattered: Vec3, media: &Media) -> Outward {
+        let mut all = Outward {
+            scattered,
+            back: [0.0; 2],
+            chances: [0.0; 2],
+        };
         for (weight, bsdf) in &self.members {
-            let own = bsdf.incoming(scattered, media);
-            all = [all[0] + weight * own[0], all[1] + weight * own[1]];
+            let own = bsdf.outward(scattered, media);
+            for side in 0..2 {
+                all.back[side] += weight * own.back[side];
+                all.chances[side] += weight * own.chances[side];
+            }
         }
         all
     }
 
-    fn draw_incoming(&self, scattered: Vec3, transmitted: bool, media: &Media, [which, turn]: [f64; 2]) -> Vec3 {
+    fn draw_incoming(&self, outward: &Outward, transmitted: bool, media: &Media, [which, turn]: [f64; 2]) -> Vec3 {
         let side = usize::from(transmitted);
-        let share = |(weight, bsdf): &(f64, Arc<dyn Bsdf>)| weight * bsdf.incoming(scattered, media)[side];
+        let share =
+            |(weight, bsdf): &(f64, Arc<dyn Bsdf>)| weight * bsdf.outward(outward.scattered, media).chances[side];
         let (member, rest) = pick(&self.members, share, which);
-        member.draw_incoming(scattered, transmitted, media, [rest, turn])
+        let own = member.outward(outward.scattered, media);
+        member.draw_incoming(&own, transmitted, media, [rest, turn])
     }
 
-    fn incoming_light(&self, incident: Vec3, scattered: Vec3, media: &Media) -> (f64, f64) {
-        let side = usize::from((incident.z > 0.0) != (scattered.z > 0.0));
-        let (mut f, mut sum, mut total) = (0.0, 0.0, 0.0);
+    fn incoming_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64) {
+        let (f, [density]) = self.light(incident, outward, media, |bsdf, own| {
+            let (f, density) = bsdf.incoming_light(incident, own, media);
+            (f, [density])
+        });
+        (f, density)
+    }
+
+    fn drawn_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64, f64) {
+        let (f, [density, about]) = self.light(incident, outward, media, |bsdf, own| {
+            let (f, density, about) = bsdf.drawn_light(incident, own, media);
+            (f, [density, about])
+        });
+        (f, density, about)
+    }
+}
+
+impl Mixture {
+    /// f, and means of densities over the members by the chances of each.
+    #[inline]
+    fn light<const N: usize>(
+        &self,
+        incident: Vec3,
+        outward: &Outward,
+        media: &Media,
+        of: impl Fn(&dyn Bsdf, &Outward) -> (f64, [f64; N]),
+    ) -> (f64, [f64; N]) {
+        let side = usize::from((incident.z > 0.0) != (outward.scattered.z > 0.0));
+        let (mut f, mut sums, mut total) = (0.0, [0.0; N], 0.0);
         for (weight, bsdf) in &self.members {
-            let share = weight * bsdf.incoming(scattered, media)[side];
-            if share > 0.0 {
-                let (own, density) = bsdf.incoming_light(incident, scattered, media);
+            let there = bsdf.outward(outward.scattered, media);
+            let chance = weight * there.chances[side];
+            if chance > 0.0 {
+                let (own, densities) = of(&**bsdf, &there);
                 f += weight * own;
-                sum += share * density;
-                total += share;
+                sums = std::array::from_fn(|k| sums[k] + chance * densities[k]);
+                total += chance;
             } else {
-                f += weight * bsdf.evaluate(incident, scattered, media);
+                f += weight * bsdf.evaluate(incident, outward.scattered, media);
             }
         }
-        (f, if total > 0.0 { sum / total } else { 0.0 })
+        (f, sums.map(|sum| if total > 0.0 { sum / total } else { 0.0 }))
     }
 }
 

@@ -34,7 +34,7 @@ mod tabulated;
 mod tests;
 
 pub use coated::Coated;
-pub use contract::{Bsdf, Component, Drawn, Facts, Media, Outcome, Parameters, Parts, Product, Shares};
+pub use contract::{Bsdf, Component, Drawn, Facts, Media, Outcome, Outward, Parameters, Parts, Product, Shares};
 pub use cosine_power::CosinePower;
 pub use interface::Interface;
 pub use lambertian::Lambertian;

@@ -8,7 +8,7 @@ use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
 use super::albedo::ByHeight;
-use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, Shares, by_cosine, proposed};
+use super::contract::{Bsdf, Facts, Media, Outward, Parameters, Parts, Product, Shares, by_cosine, proposed};
 use super::rough_interface::{RoughFacets, above, from_side};
 use crate::table::Table;
 
@@ -149,10 +149,11 @@ impl Bsdf for RoughCoat {
     }
 
     /// As any BSDF does, but what the coat does to the direction of the line of sight is looked up once.
-    fn incoming_light(&self, incident: Vec3, scattered: Vec3, media: &Media) -> (f64, f64) {
-        let front = incident.z > 0.0;
+    fn drawn_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64, f64) {
+        let (front, scattered) = (incident.z > 0.0, outward.scattered);
         if front != (scattered.z > 0.0) {
-            return (0.0, proposed(incident, 0.0, 0.0));
+            let density = proposed(incident, 0.0, 0.0);
+            return (0.0, density, density);
         }
         let ratio = self.ratio(incident, media);
         let [there, back] = [incident, scattered].map(|d| self.mirrored(d, ratio));
@@ -161,10 +162,8 @@ impl Bsdf for RoughCoat {
             .rough
             .reflected(above(front, incident), above(front, scattered), ratio);
         let f = coat + (1.0 - there) * (1.0 - back) * FRAC_1_PI * leaves / let_in;
-        (
-            f,
-            proposed(incident, f * incident.z.abs(), back + (1.0 - back) * leaves),
-        )
+        let density = proposed(incident, f * incident.z.abs(), back + (1.0 - back) * leaves);
+        (f, density, density)
     }
 
     fn parts(&self) -> Option<Parts<'_>> {

@@ -239,6 +239,15 @@ impl Lobe {
         self.shares(sine).1.iter().sum()
     }
 
+    /// The same with other slices.
+    pub(super) fn with_slices(&self, slices: Vec<Slice>) -> Result<Self, String> {
+        let row = Row {
+            azimuth: self.azimuth,
+            slices,
+        };
+        row.lobe()
+    }
+
     pub(super) fn slices(&self) -> &[Grid] {
         &self.slices
     }

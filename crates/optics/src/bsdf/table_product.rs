@@ -8,10 +8,12 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
 use etendue_math::Vec3;
+use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::more_numbers::MoreNumbers;
 
-use super::contract::{Bsdf, Facts, Media, Product, Shares, by_cosine};
+use super::contract::{Bsdf, Facts, Media, Outward, Product, Shares, by_cosine, proposed};
 use super::table_bounds::{Least, RINGS, edge, least};
+use super::table_grid::Grid;
 use super::table_lobes::{Lobe, Lobes};
 use super::table_sides::Sides;
 
@@ -43,11 +45,13 @@ pub(super) struct TableProduct {
 pub(super) struct TableRest {
     pub table: Arc<dyn Bsdf>,
     pub product: TableProduct,
+    /// A table of nearly that: the rest itself is none, since the product does not move with β₀.
+    pub like: Arc<dyn Bsdf>,
 }
 
 impl TableProduct {
-    /// None if the floors are as much, or if it is a small part of the light.
-    pub fn of(table: &Sides) -> Option<Self> {
+    /// With a table of nearly all that it leaves; None if the floors are as much, or if it is a small part of the light.
+    pub fn of(table: &Sides) -> Option<(Self, Sides)> {
         let lobes = table.lobes();
         let known = least(&lobes.iter().map(|(lobe, _)| *lobe).collect::<Vec<_>>());
         let squares: AtEdges = std::array::from_fn(|k| edge(k).powi(2));
@@ -77,13 +81,46 @@ impl TableProduct {
             return None;
         }
         let sines: AtEdges = std::array::from_fn(edge);
-        let mut shares = shares.iter();
-        let mut floor = |lobe: &Lobe| lobe.of_floor(&sines, shares.next().unwrap_or(&[0.0; RINGS + 1]));
-        Some(Self {
-            shares: table.map(|lobes| Some(Lobes::with_rows(lobes.rows().iter().map(&mut floor).collect()))),
+        let floors: Vec<Lobe> = lobes
+            .iter()
+            .zip(&shares)
+            .map(|((lobe, _), shares)| lobe.of_floor(&sines, shares))
+            .collect();
+        let mut each = floors.iter().cloned();
+        let product = Self {
+            shares: table.map(|lobes| Some(Lobes::with_rows(each.by_ref().take(lobes.rows().len()).collect()))),
             luminance,
             squares,
-        })
+        };
+        let left = |((lobe, front), floor): (&(&Lobe, bool), &Lobe)| product.left(lobe, floor, *front);
+        let left: Result<Vec<Lobe>, String> = lobes.iter().zip(&floors).map(left).collect();
+        let mut each = left.ok()?.into_iter();
+        let rest = table.map(|lobes| Some(Lobes::with_rows(each.by_ref().take(lobes.rows().len()).collect())));
+        Some((product, rest))
+    }
+
+    /// l on one side, by the square of the sine of the angle.
+    #[inline]
+    fn luminance(&self, front: bool, square: f64) -> f64 {
+        let above = self.squares.partition_point(|edge| *edge <= square).clamp(1, RINGS);
+        let [from, to] = [self.squares[above - 1], self.squares[above]];
+        let l = &self.luminance[usize::from(!front)];
+        let part = ((square - from) / (to - from)).min(1.0);
+        l[above - 1] + part * (l[above] - l[above - 1])
+    }
+
+    /// Slices of what the product leaves of a lobe at the incidence of each, the same share of all: only directions are drawn
+    /// from them.
+    fn left(&self, lobe: &Lobe, floor: &Lobe, front: bool) -> Result<Lobe, String> {
+        let slice = |grid: &Grid| {
+            let share = floor.shares(grid.sine).1[2] * FRAC_1_PI;
+            let left = |r: f64, turn: f64| {
+                let square = grid.sine * grid.sine + r * (2.0 * grid.sine * sin_cos_turns(turn).1 + r);
+                (lobe.at(grid.sine, r, turn) - share * self.luminance(front, square)).max(0.0)
+            };
+            grid.with(left, 0.5)
+        };
+        lobe.with_slices(lobe.slices().iter().map(slice).collect())
     }
 }
 
@@ -164,11 +201,7 @@ impl Product for TableProduct {
 
     fn leaving(&self, scattered: Vec3, _media: &Media) -> f64 {
         let square = scattered.x * scattered.x + scattered.y * scattered.y;
-        let above = self.squares.partition_point(|edge| *edge <= square).clamp(1, RINGS);
-        let [from, to] = [self.squares[above - 1], self.squares[above]];
-        let l = &self.luminance[usize::from(scattered.z < 0.0)];
-        let part = ((square - from) / (to - from)).min(1.0);
-        l[above - 1] + part * (l[above] - l[above - 1])
+        self.luminance(scattered.z > 0.0, square)
     }
 
     fn is_even(&self) -> bool {
@@ -209,6 +242,23 @@ impl Bsdf for TableRest {
         let way = usize::from((incident.z > 0.0) != (scattered.z > 0.0));
         let product = self.product.arriving(incident, media)[way] * self.product.leaving(scattered, media);
         (self.table.evaluate(incident, scattered, media) - product * FRAC_1_PI).max(0.0)
+    }
+
+    fn draw_incoming(&self, outward: &Outward, transmitted: bool, media: &Media, numbers: [f64; 2]) -> Vec3 {
+        let like = self.like.outward(outward.scattered, media);
+        self.like.draw_incoming(&like, transmitted, media, numbers)
+    }
+
+    fn incoming_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64) {
+        let f = self.evaluate(incident, outward.scattered, media);
+        (f, outward.as_if_reciprocal(incident, f, media))
+    }
+
+    fn drawn_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64, f64) {
+        let (f, about) = self.incoming_light(incident, outward, media);
+        let like = self.like.outward(outward.scattered, media);
+        let back = self.like.pdf(outward.scattered, incident, media);
+        (f, proposed(incident, back, like.back_from(incident)), about)
     }
 
     /// Directions of the table, of which each stays with the part of f that is not in the product.

@@ -469,18 +469,29 @@ fn directions_that_light_may_come_from_are_drawn_with_their_density_and_none_is_
     every(|example, bsdf, media, scattered| {
         let Example { name, quadrature, .. } = example;
         stream += 1;
-        let chances = bsdf.incoming(scattered, media);
+        let outward = bsdf.outward(scattered, media);
         let whole = |d: Vec3| {
             let transmitted = (d.z > 0.0) != (scattered.z > 0.0);
-            let chance = chances[usize::from(transmitted)];
+            let chance = outward.chances[usize::from(transmitted)];
             if chance > 0.0 {
-                bsdf.incoming_pdf(d, scattered, media)
+                let (f, density, about) = bsdf.drawn_light(d, &outward, media);
+                assert_eq!((f, about), bsdf.incoming_light(d, &outward, media), "{name}");
+                assert!(
+                    (density > 0.0) == (about > 0.0) && about.is_finite(),
+                    "{name}: {density}, {about}"
+                );
+                density
             } else {
                 0.0
             }
         };
         let expected = integrals(12, whole);
-        for (side, chance) in chances.into_iter().enumerate().filter(|(_, chance)| *chance > 0.0) {
+        for (side, chance) in outward
+            .chances
+            .into_iter()
+            .enumerate()
+            .filter(|(_, chance)| *chance > 0.0)
+        {
             let front = (scattered.z > 0.0) == (side == 0);
             let half = if front {
                 0..BANDS * SECTORS
@@ -493,7 +504,7 @@ fn directions_that_light_may_come_from_are_drawn_with_their_density_and_none_is_
             let mut counts = vec![0; BANDS * SECTORS];
             for i in 0..DRAWN {
                 let [a, b, ..] = numbers.uniforms(i, 0);
-                let d = bsdf.draw_incoming(scattered, side == 1, media, [a, b]);
+                let d = bsdf.draw_incoming(&outward, side == 1, media, [a, b]);
                 assert!(
                     (d.length() - 1.0).abs() < 1e-12 && (d.z > 0.0) == front,
                     "{name}: {d:?}"

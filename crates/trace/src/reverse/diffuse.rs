@@ -3,7 +3,7 @@
 
 use etendue_geometry::hits::{Hits, TIE};
 use etendue_math::Vec3;
-use etendue_optics::bsdf::Bsdf;
+use etendue_optics::bsdf::{Bsdf, Outward};
 
 use super::method::LeftOut;
 use super::path_block::{Branch, Connection, PathBlock, Seen};
@@ -33,10 +33,10 @@ struct Spread<'a> {
 }
 
 impl Spread<'_> {
-    /// Density \[1/sr\] of a direction to where light comes from.
+    /// Of a direction to where light comes from, with the density \[1/sr\] of its side, or about that.
     #[inline]
-    fn density(&self, k: Vec3, light: &Incoming) -> f64 {
-        let drawn = self.chances[usize::from(light.transmitted)] * light.density;
+    fn density(&self, k: Vec3, light: &Incoming, of_side: f64) -> f64 {
+        let drawn = self.chances[usize::from(light.transmitted)] * of_side;
         self.guide
             .as_ref()
             .map_or(drawn, |near| (1.0 - SHARE) * drawn + SHARE * near.density(k))
@@ -71,7 +71,8 @@ impl PathBlock<'_> {
         if self.method.left == LeftOut::Scattered && branch.direct && branch.scatters == 0 {
             return;
         }
-        let (interaction, sides) = (event.interaction(), event.incoming());
+        let (interaction, outward) = (event.interaction(), event.outward());
+        let sides = outward.chances;
         let total = sides[0] + sides[1];
         if total <= 0.0 {
             return;
@@ -99,17 +100,19 @@ impl PathBlock<'_> {
             let number = numbers.draw() / SHARE;
             (number < 1.0).then(|| near.draw([number, height, turn]))
         });
-        self.reach_out(&branch, event, &spread, all);
+        self.reach_out(&branch, (event, &outward), &spread, all);
 
-        let k = guided.unwrap_or_else(|| event.draw_incoming(through, [height, turn]));
-        let light = event.from(k);
-        let density = spread.density(k, &light);
-        let share = light.f * light.cosine / density;
+        let k = guided.unwrap_or_else(|| event.draw_incoming(&outward, through, [height, turn]));
+        let (light, density) = event.drawn_from(k, &outward);
+        let share = light.f * light.cosine / spread.density(k, &light, density);
         if share > 0.0 {
             let next = Branch {
                 stack: light.stack,
                 weight: branch.weight * share,
-                seen: Seen::Diffuse { density, all },
+                seen: Seen::Diffuse {
+                    density: spread.density(k, &light, light.about),
+                    all,
+                },
                 drawn: false,
                 travelled: 0.0,
                 scatters: branch.scatters + 1,
@@ -120,7 +123,13 @@ impl PathBlock<'_> {
     }
 
     /// Notes connections of a diffuse scatter to the sources.
-    fn reach_out(&mut self, branch: &Branch, event: &SurfaceEvent<'_>, spread: &Spread<'_>, all: bool) {
+    fn reach_out(
+        &mut self,
+        branch: &Branch,
+        (event, outward): (&SurfaceEvent<'_>, &Outward),
+        spread: &Spread<'_>,
+        all: bool,
+    ) {
         let (scene, interaction) = (self.lit.scene, event.interaction());
         let path = &mut self.paths[branch.path as usize];
         let (_, _, colour) = &self.lit.lines[path.line];
@@ -143,14 +152,14 @@ impl PathBlock<'_> {
                 continue;
             };
             let k = (beacon.point - interaction.point).normalized();
-            let light = event.from(k);
+            let light = event.from(k, outward);
             if light.f * light.cosine * beacon.irradiance <= 0.0 {
                 continue;
             }
             let mut share = branch.weight * colour[number] * light.f * light.cosine / picked;
             if beacon.density.is_finite() {
                 let mine = picked * beacon.density;
-                share *= mine / (mine + spread.density(k, &light));
+                share *= mine / (mine + spread.density(k, &light, light.about));
             }
             self.shadows.push(interaction.point, k, interaction.origin_faces);
             self.connections.push(Connection {
