@@ -2,8 +2,8 @@
 //!
 //! Incident and scattered directions are both cut into rings about the normal of a degree and a half each. A scattered ring is cut
 //! into sectors; while the incidence moves through its ring, the place of a sector in the slices of the table, which move
-//! with β₀, stays within a range of distances and azimuths, and f is linear between nodes of the grid: it is nowhere less than
-//! at the nodes of the cells that the range touches.
+//! with β₀, stays within a range of distances and azimuths. There f is linear between nodes of the grid in both: it is least at
+//! a node, or at the edge of the range.
 
 use std::f64::consts::FRAC_1_PI;
 
@@ -16,13 +16,14 @@ use super::table_lobes::{Lobe, turns};
 pub(super) const RINGS: usize = 64;
 
 /// Sectors of a ring: a multiple of 4, so that sines and cosines rise or fall throughout each.
-const SECTORS: usize = 64;
+const SECTORS: usize = 128;
 
-/// Steps of |β − β₀| for which the least values of a slice are kept.
-const RADII: usize = 128;
+/// Steps of the azimuth and of |β − β₀|, which goes up to 2, for which the least values of a slice are kept.
+const TURNS: usize = 128;
+const RADII: usize = 256;
 
-/// Such steps in a unit of |β − β₀|, which goes up to 2.
-const PER_UNIT: f64 = 64.0;
+/// Such steps in a unit of |β − β₀|.
+const PER_UNIT: f64 = 0.5 * RADII as f64;
 
 /// What angles and distances may be off by rounding.
 const ROUNDING: f64 = 1e-9;
@@ -45,11 +46,8 @@ struct Region {
     width: f64,
 }
 
-/// The least values of a slice, by azimuth, from each to the next, and by steps of the distance.
-struct Lows {
-    azimuths: usize,
-    lows: Vec<f64>,
-}
+/// The least values of a slice, by steps of the azimuth and of the distance.
+struct Lows(Vec<[f64; RADII]>);
 
 /// The least f \[1/sr\] of each lobe for each ring of incidence and of scattered directions.
 pub(super) fn least(lobes: &[&Lobe]) -> Vec<Vec<Least>> {
@@ -74,24 +72,26 @@ pub(super) fn least(lobes: &[&Lobe]) -> Vec<Vec<Least>> {
 fn least_of(lobe: &Lobe, lows: &[Lows], sines: [f64; 2], regions: &[Region]) -> Least {
     let mut by_slice: Vec<Option<Vec<f64>>> = vec![None; lows.len()];
     let mut least = [f64::INFINITY; RINGS];
-    for (first, factors) in lobe.least_factors(sines) {
-        let used = [0, 1]
-            .map(|k| (first + k, factors[k]))
-            .into_iter()
-            .filter(|(_, factor)| *factor > 0.0);
-        let mut f = vec![factors[2] * FRAC_1_PI; regions.len()];
-        for (number, factor) in used {
-            let there = by_slice[number]
-                .get_or_insert_with(|| regions.iter().map(|region| lows[number].within(region)).collect());
-            for (f, low) in f.iter_mut().zip(there) {
-                *f += factor * *low;
+    for (first, factors) in lobe.factors(sines) {
+        for number in (first..lows.len()).take(2) {
+            by_slice[number].get_or_insert_with(|| regions.iter().map(|region| lows[number].within(region)).collect());
+        }
+        let low = |number: usize, k: usize| {
+            by_slice
+                .get(number)
+                .and_then(Option::as_ref)
+                .map_or(0.0, |there| there[k])
+        };
+        for (ring, least) in least.iter_mut().enumerate() {
+            for k in ring * SECTORS..(ring + 1) * SECTORS {
+                // Linear in the sine from one end to the other.
+                let [one, other] = [low(first, k), low(first + 1, k)];
+                let f = factors.map(|[a, b, floor]| a * one + b * other + floor * FRAC_1_PI);
+                *least = least.min(f[0]).min(f[1]);
             }
         }
-        for (least, f) in least.iter_mut().zip(f.chunks(SECTORS)) {
-            *least = f.iter().copied().fold(*least, f64::min);
-        }
     }
-    least
+    least.map(|f| f.max(0.0))
 }
 
 impl Region {
@@ -147,12 +147,16 @@ fn range(numbers: [[f64; 2]; 2]) -> [f64; 2] {
 
 impl Lows {
     fn of(slice: &Grid) -> Self {
-        let azimuths = slice.azimuths();
-        let mut lows = Vec::with_capacity(azimuths * RADII);
-        for j in 0..azimuths {
-            lows.extend((0..RADII).map(|step| slice.least(j, [step, step + 1].map(|k| k as f64 / PER_UNIT))));
-        }
-        Self { azimuths, lows }
+        let each = |step: usize| {
+            let [from, to] = [step, step + 1].map(|k| k as f64 / TURNS as f64);
+            let nodes = (0..slice.azimuths()).map(|j| j as f64 / slice.azimuths() as f64);
+            let inside = nodes.filter(|turn| from < *turn && *turn < to);
+            let lows = inside.chain([from, to]).map(|turn| lows_along(slice, turn));
+            lows.fold([f64::INFINITY; RADII], |all, lows| {
+                std::array::from_fn(|k| all[k].min(lows[k]))
+            })
+        };
+        Self((0..TURNS).map(each).collect())
     }
 
     /// The least value within a region.
@@ -162,11 +166,29 @@ impl Lows {
         reason = "turns are not negative"
     )]
     fn within(&self, region: &Region) -> f64 {
-        let [first, last] =
-            [region.turn, region.turn + region.width].map(|turn| (turn * self.azimuths as f64) as usize);
+        let [first, last] = [region.turn, region.turn + region.width].map(|turn| (turn * TURNS as f64) as usize);
         let [near, far] = region.steps;
-        let row = |j: usize| &self.lows[j % self.azimuths * RADII..][near..=far];
-        let all = (first..=last.min(first + self.azimuths - 1)).flat_map(row);
+        let all = (first..=last.min(first + TURNS - 1)).flat_map(|step| &self.0[step % TURNS][near..=far]);
         all.copied().fold(f64::INFINITY, f64::min)
     }
+}
+
+/// The least values along an azimuth, by steps of the distance.
+fn lows_along(slice: &Grid, turn: f64) -> [f64; RADII] {
+    let (radial, f) = (slice.radial(), slice.along(turn));
+    let mut lows = [f64::INFINITY; RADII];
+    let mut i = 0;
+    let mut last = f[0];
+    for (k, low) in lows.iter_mut().enumerate() {
+        let end = (k + 1) as f64 / PER_UNIT;
+        *low = last;
+        while i + 2 < radial.len() && radial[i + 1] <= end {
+            i += 1;
+            *low = low.min(f[i]);
+        }
+        let part = ((end - radial[i]) / (radial[i + 1] - radial[i])).min(1.0);
+        last = f[i] + part * (f[i + 1] - f[i]);
+        *low = low.min(last);
+    }
+    lows
 }

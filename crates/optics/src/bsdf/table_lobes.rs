@@ -252,18 +252,15 @@ impl Lobe {
         &self.slices
     }
 
-    /// Between two sines of incidence: the first of two slices, and the least that f of each is multiplied by and that the share
-    /// of the floor is, for each step that reaches there.
-    pub(super) fn least_factors(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = (usize, [f64; 3])> {
+    /// Between two sines of incidence: the first of two slices, and what f of each is multiplied by and the share of the floor, where
+    /// each step that reaches there begins and ends.
+    pub(super) fn factors(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = (usize, [[f64; 3]; 2])> {
         let ends = self.steps.from.iter().skip(1).copied().chain([1.0]);
         let steps = self.steps.factors.iter().zip(ends);
         let there = steps.filter(move |(step, end)| step.from <= to && *end >= from);
         there.map(move |(step, end)| {
-            let [one, other] = [from.max(step.from), to.min(end)].map(|sine| step.at(sine));
-            (
-                step.first as usize,
-                std::array::from_fn(|k| f64::min(one[k], other[k]).max(0.0)),
-            )
+            let sines = [from.max(step.from), to.min(end)];
+            (step.first as usize, sines.map(|sine| step.at(sine)))
         })
     }
 
@@ -600,16 +597,13 @@ pub(super) fn turns(x: f64, y: f64) -> f64 {
     if x == 0.0 && y == 0.0 {
         return 0.0;
     }
-    let steep = y.abs() > x.abs();
-    let angle = if steep {
-        let right = atan_eighths(x / y);
-        (if y > 0.0 { 2.0 } else { 6.0 }) - right
-    } else {
-        let right = atan_eighths(y / x);
-        (if x > 0.0 { 0.0 } else { 4.0 }) + right
-    };
+    // Without branches: nobody foresees where light goes.
+    let [along, across] = [x, y].map(f64::abs);
+    let angle = atan_eighths(along.min(across) / along.max(across));
+    let angle = if across > along { 2.0 - angle } else { angle };
+    let angle = if x < 0.0 { 4.0 - angle } else { angle };
+    let angle = if y < 0.0 { 8.0 - angle } else { angle };
     let turn = angle / 8.0;
-    let turn = if turn < 0.0 { turn + 1.0 } else { turn };
     if turn >= 1.0 { 0.0 } else { turn }
 }
 

@@ -277,3 +277,104 @@ impl Bsdf for TableRest {
         by_cosine((incident.z > 0.0) != transmitted, numbers)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use etendue_sampling::philox::Stream;
+
+    use super::*;
+    use crate::bsdf::{Mixture, RoughCoat, Row, Side, Slice, Way};
+    use crate::table::Table;
+
+    const MEDIA: Media = Media {
+        wavelength: 555.0,
+        front: 1.0,
+        back: 1.0,
+    };
+
+    /// A direction at an angle with this sine, from which light goes on along +x.
+    fn at(sine: f64) -> Vec3 {
+        Vec3::new(-sine, 0.0, ((1.0 - sine) * (1.0 + sine)).sqrt())
+    }
+
+    /// A table of reflected light at some angles \[°\].
+    fn tabled(bsdf: &dyn Bsdf, angles: &[f64]) -> Sides {
+        let radial: Vec<f64> = std::iter::once(0.0)
+            .chain((0..100).map(|k| 1e-3 * 2000_f64.powf(f64::from(k) / 99.0)))
+            .collect();
+        let slice = |angle: &f64| {
+            let incident = at(angle.to_radians().sin());
+            let places = (0..72).flat_map(|j| radial.iter().map(move |r| (*r, f64::from(j) / 72.0)));
+            let mut f = Vec::new();
+            for (r, turn) in places {
+                let (s, c) = sin_cos_turns(turn);
+                let (mut x, mut y) = (r * c - incident.x, r * s);
+                // Beyond the horizon as just before it.
+                let length = (x * x + y * y).sqrt().max(1.0) * (1.0 + 1e-9);
+                (x, y) = (x / length, y / length);
+                let scattered = Vec3::new(x, y, (1.0 - x * x - y * y).sqrt());
+                f.push(bsdf.evaluate(incident, scattered, &MEDIA));
+            }
+            Slice {
+                sine: angle.to_radians().sin(),
+                radial: radial.clone(),
+                azimuths: 72,
+                f,
+                share: bsdf.shares(incident, &MEDIA).diffuse[0],
+                floor: 0.0,
+            }
+        };
+        let row = Row {
+            azimuth: 0.0,
+            slices: angles.iter().map(slice).collect(),
+        };
+        let side = Side {
+            sheets: vec![(555.0, [Some(Way { rows: vec![row] }), None])],
+        };
+        Sides::new(&side, &Side::default()).expect("sound")
+    }
+
+    #[test]
+    fn what_a_coated_base_sends_out_is_found() {
+        let paint = RoughCoat::new([0.2, 0.2], true, 1.5, Table::constant(0.8)).expect("sound");
+        let angles: Vec<f64> = (0..18).map(|k| 5.0 * f64::from(k)).collect();
+        let sides = tabled(&paint, &angles);
+        let (found, _) = TableProduct::of(&sides).expect("there is one");
+        let known = paint.parts().expect("has parts").product;
+        let lobes = sides.lobes();
+        let bounds = least(&[lobes[0].0]);
+        for n in (0..RINGS).step_by(4) {
+            let row: Vec<String> = (0..RINGS)
+                .step_by(4)
+                .map(|j| {
+                    let mut truth = f64::INFINITY;
+                    for (ia, jb) in (0..5).flat_map(|a| (0..5).map(move |b| (a, b))) {
+                        let sine = edge(n) + (edge(n + 1) - edge(n)) * ia as f64 / 4.0;
+                        let r = edge(j) + (edge(j + 1) - edge(j)) * jb as f64 / 4.0;
+                        for t in 0..256 {
+                            let (s, c) = sin_cos_turns(t as f64 / 256.0);
+                            let (x, y) = (r * c - sine, r * s);
+                            truth = truth.min(lobes[0].0.at(
+                                sine,
+                                (x * x + y * y).sqrt(),
+                                crate::bsdf::table_lobes::turns(x, y),
+                            ));
+                        }
+                    }
+                    format!("{:.2}", bounds[0][n][j] / truth)
+                })
+                .collect();
+            eprintln!("{}", row.join(" "));
+        }
+        for k in 0..18 {
+            let d = at((5.0 * f64::from(k) + 0.2).to_radians().sin());
+            eprintln!(
+                "{k} a {:.4} of {:.4}   l {:.4} of {:.4}",
+                found.arriving(d, &MEDIA)[0],
+                known.arriving(d, &MEDIA)[0],
+                found.leaving(d, &MEDIA),
+                known.leaving(d, &MEDIA)
+            );
+        }
+    }
+}
