@@ -53,16 +53,37 @@ pub fn sin_cos_turns(u: f64) -> (f64, f64) {
 }
 
 /// atan t in units of a quarter right angle (π/4), for −1 ≤ t ≤ 1; exact at −1, 0 and 1, else to 4e-16.
+#[inline(always)]
+#[must_use]
+pub fn atan_eighths(t: f64) -> f64 {
+    let angle = octant(t.abs(), 1.0);
+    if t < 0.0 { -angle } else { angle }
+}
+
+/// The angle of a point that is not the origin from the first axis, as a fraction of a turn from 0 to 1, to 1e-16.
+#[inline(always)]
+#[must_use]
+pub fn turns_of(x: f64, y: f64) -> f64 {
+    // By comparisons and not by branches: nobody foresees where points lie.
+    let [along, across] = [x.abs(), y.abs()];
+    let steep = across > along;
+    let angle = octant(along.min(across), along.max(across));
+    let angle = if steep { 2.0 - angle } else { angle };
+    let angle = if x < 0.0 { 4.0 - angle } else { angle };
+    let angle = if y < 0.0 { 8.0 - angle } else { angle };
+    let turn = 0.125 * angle;
+    if turn >= 1.0 { 0.0 } else { turn }
+}
+
+/// atan low/high in units of a quarter right angle (π/4), for 0 ≤ low ≤ high.
 ///
 /// Above tan π/8 by atan t = π/4 + atan((t − 1)/(t + 1)); an odd polynomial of degree 21 (3e-17), interpolated at
 /// Chebyshev nodes in 50 digits.
 #[inline(always)]
-#[must_use]
-pub fn atan_eighths(t: f64) -> f64 {
+fn octant(low: f64, high: f64) -> f64 {
     const QUARTER: f64 = 4.0 / std::f64::consts::PI;
-    let a = t.abs();
-    let steep = a > 0.414_213_562_373_095_03;
-    let x = if steep { (a - 1.0) / (a + 1.0) } else { a };
+    let steep = low > 0.414_213_562_373_095_03 * high;
+    let x = if steep { low - high } else { low } / if steep { low + high } else { high };
     let x2 = x * x;
     let series = polynomial!(
         x2,
@@ -81,13 +102,40 @@ pub fn atan_eighths(t: f64) -> f64 {
         ]
     );
     let small = QUARTER * (x * series);
-    let angle = if steep { 1.0 + small } else { small };
-    if t < 0.0 { -angle } else { angle }
+    if steep { 1.0 + small } else { small }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn angles_of_points_are_those_of_the_library() {
+        for k in 0..4000 {
+            let angle = f64::from(k) * std::f64::consts::TAU / 4000.0;
+            let (x, y) = (1e-3 * angle.cos(), 1e-3 * angle.sin());
+            let expected = (y.atan2(x) / std::f64::consts::TAU).rem_euclid(1.0);
+            let off = (turns_of(x, y) - expected).abs();
+            assert!(off.min(1.0 - off) < 3e-16, "{k}: {off}");
+            // Both sides of the first axis alike.
+            assert!((turns_of(x, -y) - (1.0 - turns_of(x, y))).rem_euclid(1.0) % 1.0 < 3e-16 || y == 0.0);
+        }
+        for (k, [x, y]) in [
+            [1.0, 0.0],
+            [2.0, 2.0],
+            [0.0, 0.5],
+            [-1.0, 1.0],
+            [-1.0, 0.0],
+            [-3.0, -3.0],
+            [0.0, -1.0],
+            [1.0, -1.0],
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            assert_eq!(turns_of(x, y), k as f64 / 8.0);
+        }
+    }
 
     #[test]
     fn agrees_with_the_c_library_over_the_whole_turn() {

@@ -467,21 +467,6 @@ impl Grid {
         near + v * (far - near)
     }
 
-    /// A slice of other values on the same grid, and with this share.
-    pub(super) fn with(&self, value: impl Fn(f64, f64) -> f64, share: f64) -> Slice {
-        // Sides that are alike stay so.
-        let turns = (0..self.azimuths).map(|j| self.kept(j) as f64 / self.azimuths as f64);
-        let values = turns.flat_map(|turn| self.radial.iter().map(move |r| (*r, turn)));
-        Slice {
-            sine: self.sine,
-            radial: self.radial.clone(),
-            azimuths: self.azimuths,
-            f: values.map(|(r, turn)| value(r, turn)).collect(),
-            share,
-            floor: 0.0,
-        }
-    }
-
     /// How many azimuths there are.
     pub(super) const fn azimuths(&self) -> usize {
         self.azimuths

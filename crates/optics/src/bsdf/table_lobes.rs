@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 use etendue_math::Vec3;
-use etendue_math::trig::{atan_eighths, sin_cos_turns};
+use etendue_math::trig::{sin_cos_turns, turns_of};
 use etendue_sampling::guide::Guide;
 use etendue_sampling::ordered::inside;
 use etendue_sampling::warp::part_of;
@@ -237,15 +237,6 @@ impl Lobe {
     #[inline]
     pub(super) fn share(&self, sine: f64) -> f64 {
         self.shares(sine).1.iter().sum()
-    }
-
-    /// The same with other slices.
-    pub(super) fn with_slices(&self, slices: Vec<Slice>) -> Result<Self, String> {
-        let row = Row {
-            azimuth: self.azimuth,
-            slices,
-        };
-        row.lobe()
     }
 
     pub(super) fn slices(&self) -> &[Grid] {
@@ -592,19 +583,10 @@ impl Incidence {
     }
 }
 
-/// The azimuth of a point \[turns\], from 0 to 1.
+/// The azimuth of a point \[turns\], from 0 to 1; 0 in the middle.
+#[inline]
 pub(super) fn turns(x: f64, y: f64) -> f64 {
-    if x == 0.0 && y == 0.0 {
-        return 0.0;
-    }
-    // Without branches: nobody foresees where light goes.
-    let [along, across] = [x, y].map(f64::abs);
-    let angle = atan_eighths(along.min(across) / along.max(across));
-    let angle = if across > along { 2.0 - angle } else { angle };
-    let angle = if x < 0.0 { 4.0 - angle } else { angle };
-    let angle = if y < 0.0 { 8.0 - angle } else { angle };
-    let turn = angle / 8.0;
-    if turn >= 1.0 { 0.0 } else { turn }
+    if x == 0.0 && y == 0.0 { 0.0 } else { turns_of(x, y) }
 }
 
 #[cfg(test)]

@@ -110,12 +110,21 @@ impl Sides {
 
     /// The shares of the floors, reflected and transmitted.
     pub fn floors(&self, incident: Vec3, media: &Media) -> [f64; 2] {
-        let incidence = Incidence::new(incident);
+        let (incidence, front) = (Incidence::new(incident), incident.z > 0.0);
+        if let Some((transmitted, lobe)) = self.lone(front) {
+            return on_its_way(transmitted, lobe.shares(incidence.sine).1[2]);
+        }
         [false, true].map(|way| {
-            let ways = self.lit(&incidence, incident.z > 0.0, way, media.wavelength);
+            let ways = self.lit(&incidence, front, way, media.wavelength);
             ways.iter().flatten().map(|(lit, part)| part * lit.floor()).sum()
         })
     }
+}
+
+/// A share of one way, and none of the other.
+#[inline]
+pub(super) const fn on_its_way(transmitted: bool, share: f64) -> [f64; 2] {
+    if transmitted { [0.0, share] } else { [share, 0.0] }
 }
 
 /// The share of one way.

@@ -24,7 +24,7 @@ use super::table_draw::{Group, again};
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lobes};
 use super::table_product::{TableProduct, TableRest};
-use super::table_sides::{Side, Sides, pick, share};
+use super::table_sides::{Side, Sides, on_its_way, pick, share};
 
 /// A table of scattered light.
 #[derive(Clone, Debug)]
@@ -76,7 +76,7 @@ impl Tabulated {
 
     /// A product that is more than the floors, and the rest of the light.
     fn product_and_rest(&self) -> Option<(TableProduct, Arc<dyn Bsdf>)> {
-        let (product, like) = TableProduct::of(&self.sides)?;
+        let product = TableProduct::of(&self.sides)?;
         let table = Self {
             product: OnceLock::new(),
             ..self.clone()
@@ -84,7 +84,6 @@ impl Tabulated {
         let rest = TableRest {
             table: Arc::new(table),
             product: product.clone(),
-            like: Arc::new(Self::of(like, false, None)),
         };
         Some((product, Arc::new(rest)))
     }
@@ -118,11 +117,6 @@ impl Tabulated {
             up: front != way,
         })
     }
-}
-
-/// A share of one way, and none of the other.
-const fn on_its_way(transmitted: bool, share: f64) -> [f64; 2] {
-    if transmitted { [0.0, share] } else { [share, 0.0] }
 }
 
 /// Light that is scattered by a slice or a floor, before it is known where to.

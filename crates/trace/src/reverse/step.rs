@@ -18,6 +18,9 @@ const SURE: u32 = 3;
 /// down to where the light before it errs as much. Of 1, 2, 4 and 8 it did best for satin paint and for a table.
 const REST: f64 = 4.0;
 
+/// The part of diffuse light that goes on at least.
+const LEAST: f64 = 0.05;
+
 impl PathBlock<'_> {
     pub(super) fn step(&mut self, hits: &Hits, i: usize) {
         let scene = self.lit.scene;
@@ -125,7 +128,9 @@ impl PathBlock<'_> {
 
     /// Branches at a surface.
     fn surface_event(&mut self, branch: &Branch, event: &SurfaceEvent<'_>) {
-        let (smooth, shares) = event.seen();
+        let facts = event.bsdf().facts();
+        let is_specular = facts.specular != [false; 2];
+        let (smooth, shares) = if is_specular { event.seen() } else { Default::default() };
         let seen = if branch.seen == Seen::Smooth {
             Seen::Smooth
         } else {
@@ -148,7 +153,7 @@ impl PathBlock<'_> {
             };
             block.push(event.interaction(), d, branch);
         };
-        let is_diffuse = event.bsdf().facts().is_diffuse();
+        let is_diffuse = facts.is_diffuse();
         if branch.seen == Seen::Smooth {
             let met = &mut self.paths[branch.path as usize].met;
             met[0] |= smooth != [0.0; 2];
@@ -177,15 +182,19 @@ impl PathBlock<'_> {
             }
             return;
         }
+        let mortal = branch.scatters > SURE || branch.weight <= SPLIT || known;
         // What goes on is drawn by the shares of the flux; radiance carries its factor (n₁/n₂)² besides. Whatever the diffuse
-        // share is from here, light may be scattered to here from elsewhere.
-        let scattered = left.map_or(0.0, |left| {
-            let diffuse = if known { left.shares().diffuse } else { shares.diffuse };
-            (diffuse[0] + diffuse[1]).max(0.05)
-        });
+        // share is from here, light may be scattered to here from elsewhere. A single way that is sure needs no share.
+        let scattered = match &left {
+            None => 0.0,
+            Some(_) if !mortal && !is_specular => 1.0,
+            Some(left) => {
+                let [one, other] = if known || !is_specular { left.shares() } else { shares }.diffuse;
+                (one + other).max(LEAST)
+            }
+        };
         let [mirrored, refracted] = shares.specular;
         let total = mirrored + refracted + scattered;
-        let mortal = branch.scatters > SURE || branch.weight <= SPLIT || known;
         let alive = if known { REST * total } else { total };
         let alive = if mortal { alive.min(1.0) } else { 1.0 };
         let number = self.paths[branch.path as usize].numbers.draw();
