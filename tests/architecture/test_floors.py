@@ -380,7 +380,10 @@ PARTS_OF_BSDFS = (
     "albedo",
     "facets",
     "monotone_cubic",
-    *(f"table_{part}" for part in ("arrivals", "draw", "grid", "lanes", "lobes", "nodes")),
+    *(
+        f"table_{part}"
+        for part in ("arrivals", "bounds", "draw", "grid", "lanes", "lobes", "nodes", "product", "sides")
+    ),
 )
 """What several kinds of BSDF are made of."""
 

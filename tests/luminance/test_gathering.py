@@ -71,6 +71,18 @@ def leaning_table() -> et.BsdfTable:
     return et.BsdfTable(BsdfData(tuple(slices)))
 
 
+def table_without_a_horizon() -> et.BsdfTable:
+    """A base that falls to nothing at 80° and a lobe, as most files have it: R about 0.8."""
+    slices = []
+    for theta in np.arange(0.0, 86.0, 5.0):
+        incident, grid = direction(theta, 180.0), PolarGrid("normal", np.linspace(0.0, 88.0, 89), np.arange(72) * 5.0)
+        scattered = grid.directions(incident, transmitted=False)
+        base = 0.42 * np.sqrt(np.maximum(scattered[..., 2] - 0.1736, 0.0)) * (1.0 - 0.2 * incident[2])
+        off = np.sum((incident + scattered)[..., :2] ** 2, axis=-1)
+        slices.append(BsdfSlice(incident, base + 0.25 * np.exp(-off / (2 * 0.2**2)), grid=grid))
+    return et.BsdfTable(BsdfData(tuple(slices)))
+
+
 def agrees_with_the_light_image(*, scene: dict[str, Any], gathered: et.LuminanceMap, rays: float, sharp: float) -> None:
     """Rays forwards, each scatter connected to the eye, know nothing of patches."""
     image = et.trace(et.Scene(**scene), rays, 9).images["image"]
@@ -112,6 +124,24 @@ def test_what_does_not_depend_on_where_light_came_from_is_known_of_any_finish() 
     known = seen(et.Scene(**scene), rays_per_pixel=1024, seed=3, gather=True)
     agrees_with_the_light_image(scene=scene, gathered=known, rays=2e6, sharp=0.03)
     assert any("known light" in note for note in known.notes)
+
+
+@pytest.mark.slow
+def test_the_base_of_a_table_is_known_though_nothing_leaves_near_the_horizon() -> None:
+    """There is no Lambertian floor in it; of what leaves by the same distribution from anywhere patches know most."""
+    paint = {"kind": "bsdf", "bsdf": table_without_a_horizon()}
+    scene = painted(floor=paint, left=paint, right=paint, back=paint)
+    known = seen(et.Scene(**scene), rays_per_pixel=2048, seed=3, gather=True)
+    agrees_with_the_light_image(scene=scene, gathered=known, rays=2e6, sharp=0.03)
+    assert any("known light" in note for note in known.notes)
+    # In a chamber most of the light has met the wall before.
+    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 2.5}, "flux": 1, "at": [4.5, 3, 0.1]}
+    walls = [{"shape": {"kind": "cylinder", "radius": 20, "height": 20}}, {"shape": {"kind": "disk", "radius": 20}}]
+    chamber = et.Scene(sources=[lamp], surfaces=[{**wall, "finish": paint} for wall in walls])
+    look = {"observer": et.Observer(55, 0, 1000), "screen": et.Screen(50, 25, 20, 10), "rays_per_pixel": 512, "seed": 3}
+    plain, known = (et.luminance_map(chamber, gather=gather, **look) for gather in (False, True))
+    lit = plain.values > 0.05 * np.median(plain.values)
+    assert np.median((plain.standard_error[lit] / known.standard_error[lit]) ** 2) > 1.2
 
 
 @pytest.mark.slow

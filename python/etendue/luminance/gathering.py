@@ -50,7 +50,7 @@ def survey_notes(survey: _core.Survey) -> list[str]:
     """How much of the diffuse surfaces' light is known beforehand."""
     patches, usable = survey.patches()
     if not patches:
-        why = "no surface with a diffuse part (which a table with empty directions lacks) could be cut into patches"
+        why = "no surface with a diffuse base (which a table of lobes alone lacks) could be cut into patches"
         return [f"{why}: every line of sight was followed to the sources"]
     return [f"lines of sight end at {patches:,} patches of diffuse surfaces, {usable:.0%} of them with known light"]
 

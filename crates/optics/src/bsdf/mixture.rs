@@ -1,6 +1,6 @@
 //! Several BSDFs at once, each with its part: diffuse + specular paint, a coat with holes.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use etendue_math::Vec3;
 use etendue_sampling::warp::part_of;
@@ -15,6 +15,12 @@ use crate::table::Table;
 pub struct Mixture {
     members: Vec<(f64, Arc<dyn Bsdf>)>,
     facts: Facts,
+    apart: OnceLock<Apart>,
+}
+
+/// A mixture taken apart: found when somebody asks, since members may have to look for their parts.
+#[derive(Clone, Debug)]
+struct Apart {
     /// Numbers of the members whose products are taken together; and what scatters light beside them, if anything does.
     products: Vec<usize>,
     rest: Option<Arc<dyn Bsdf>>,
@@ -59,31 +65,46 @@ impl Mixture {
             constant,
             fresnel: false,
         };
-        // All that are even, or one that is not.
-        let has = |number: &usize, even: bool| {
-            let (weight, bsdf) = &members[*number];
-            *weight > 0.0 && bsdf.parts().is_some_and(|parts| parts.product.is_even() == even)
-        };
-        let mut products: Vec<usize> = (0..members.len()).filter(|k| has(k, true)).collect();
-        if products.is_empty() {
-            products.extend((0..members.len()).find(|k| has(k, false)));
-        }
-        let mut others = Vec::new();
-        for (number, (weight, bsdf)) in members.iter().enumerate() {
-            let left = if products.contains(&number) {
-                bsdf.parts().and_then(|parts| parts.rest)
-            } else {
-                Some(bsdf).filter(|bsdf| bsdf.facts().is_diffuse())
-            };
-            others.extend(left.filter(|_| *weight > 0.0).map(|left| (*weight, Arc::clone(left))));
-        }
-        let rest = (!products.is_empty() && !others.is_empty()).then(|| Arc::new(Self::of(others)) as Arc<dyn Bsdf>);
         Self {
             members,
             facts,
-            products,
-            rest,
+            apart: OnceLock::new(),
         }
+    }
+
+    /// All products that are even, or one that is not: what scatters more.
+    fn apart(&self) -> &Apart {
+        self.apart.get_or_init(|| {
+            let mut sets: Vec<(f64, Vec<usize>)> = vec![(0.0, Vec::new())];
+            for (number, (weight, bsdf)) in self.members.iter().enumerate() {
+                let Some(parts) = bsdf.parts().filter(|_| *weight > 0.0) else {
+                    continue;
+                };
+                let share = weight * typical(parts.product);
+                if parts.product.is_even() {
+                    sets[0].0 += share;
+                    sets[0].1.push(number);
+                } else {
+                    sets.push((share, vec![number]));
+                }
+            }
+            // Of equals the first.
+            let some = sets.into_iter().rev().filter(|(_, numbers)| !numbers.is_empty());
+            let best = some.max_by(|a, b| a.0.total_cmp(&b.0));
+            let products = best.map_or_else(Vec::new, |(_, products)| products);
+            let mut others = Vec::new();
+            for (number, (weight, bsdf)) in self.members.iter().enumerate() {
+                let left = if products.contains(&number) {
+                    bsdf.parts().and_then(|parts| parts.rest)
+                } else {
+                    Some(bsdf).filter(|bsdf| bsdf.facts().is_diffuse())
+                };
+                others.extend(left.filter(|_| *weight > 0.0).map(|left| (*weight, Arc::clone(left))));
+            }
+            let rest =
+                (!products.is_empty() && !others.is_empty()).then(|| Arc::new(Self::of(others)) as Arc<dyn Bsdf>);
+            Apart { products, rest }
+        })
     }
 
     /// Of mirrored and refracted, scattered and through-scattered light by their shares; None if a share is negative or they exceed 1 together.
@@ -183,9 +204,10 @@ impl Bsdf for Mixture {
     }
 
     fn parts(&self) -> Option<Parts<'_>> {
-        (!self.products.is_empty()).then_some(Parts {
+        let Apart { products, rest } = self.apart();
+        (!products.is_empty()).then_some(Parts {
             product: self,
-            rest: self.rest.as_ref(),
+            rest: rest.as_ref(),
         })
     }
 
@@ -295,7 +317,7 @@ impl Mixture {
     /// The products that are taken together, each with its weight.
     #[inline]
     fn products(&self) -> impl Iterator<Item = (f64, &dyn Product)> {
-        self.products.iter().filter_map(|number| {
+        self.apart().products.iter().filter_map(|number| {
             let (weight, bsdf) = &self.members[*number];
             Some((*weight, bsdf.parts()?.product))
         })
@@ -321,6 +343,18 @@ impl Product for Mixture {
     fn is_even(&self) -> bool {
         self.products().all(|(_, product)| product.is_even())
     }
+}
+
+/// What a product scatters of light that comes at 45°, from both sides.
+fn typical(product: &dyn Product) -> f64 {
+    let media = Media {
+        wavelength: 555.0,
+        front: 1.0,
+        back: 1.0,
+    };
+    let height = std::f64::consts::FRAC_1_SQRT_2;
+    let each = [height, -height].map(|z| product.arriving(Vec3::new(height, 0.0, z), &media));
+    each.as_flattened().iter().sum()
 }
 
 /// The member that a number from 0 to 1 picks by shares, and what is left of the number.

@@ -250,8 +250,11 @@ mod tests {
     use etendue_math::trig::sin_cos_turns;
     use etendue_sampling::philox::Stream;
 
+    use super::super::rough_coat::RoughCoat;
+    use super::super::table_grid::Slice;
+    use super::super::table_lobes::{Incidence, Row, Way};
+    use super::super::table_sides::Side;
     use super::*;
-    use crate::bsdf::{RoughCoat, Row, Side, Slice, Way};
     use crate::table::Table;
 
     const MEDIA: Media = Media {
@@ -337,7 +340,7 @@ mod tests {
         for k in 0..200_000 {
             let [a, b, c, _] = numbers.uniforms(k, 0);
             let (incident, scattered) = (at(a), by_cosine(true, [b, c]));
-            let place = crate::bsdf::table_lobes::Incidence::new(incident).place(incident, scattered);
+            let place = Incidence::new(incident).place(incident, scattered);
             let there = product.arriving(incident, &MEDIA)[0] * product.leaving(scattered, &MEDIA) * FRAC_1_PI;
             let left = lobe.at(a, place.0, place.1) - there;
             assert!(left >= -1e-12, "{incident:?} {scattered:?}: {left} beside {there}");
