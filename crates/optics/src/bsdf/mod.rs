@@ -24,11 +24,13 @@ mod table_arrivals;
 mod table_bounds;
 mod table_draw;
 mod table_grid;
+mod table_hats;
 mod table_lanes;
 mod table_lobes;
 mod table_nodes;
 mod table_product;
 mod table_sides;
+mod table_steps;
 mod tabulated;
 #[cfg(test)]
 mod tests;
