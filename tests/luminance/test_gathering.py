@@ -261,7 +261,7 @@ def test_nothing_diffuse_is_told() -> None:
     lmap = et.luminance_map(
         et.Scene(sources=[lamp]), et.Observer(0, 0, 100), et.Screen(2, 2, 2, 2), rays_per_pixel=4, gather=True
     )
-    assert any("no surface with a diffuse part" in note for note in lmap.notes)
+    assert any("no surface with a diffuse base" in note for note in lmap.notes)
     assert lmap.values.max() > 0
 
 
