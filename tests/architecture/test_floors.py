@@ -382,7 +382,19 @@ PARTS_OF_BSDFS = (
     "monotone_cubic",
     *(
         f"table_{part}"
-        for part in ("arrivals", "bounds", "draw", "grid", "hats", "lanes", "lobes", "nodes", "product", "sides", "steps")
+        for part in (
+            "arrivals",
+            "bounds",
+            "draw",
+            "grid",
+            "hats",
+            "lanes",
+            "lobes",
+            "nodes",
+            "product",
+            "sides",
+            "steps",
+        )
     ),
 )
 """What several kinds of BSDF are made of."""
