@@ -367,28 +367,33 @@ pub trait Bsdf: Debug + Send + Sync {
         )
     }
 
-    /// f \[1/sr\] for light from `incident`, and about the density \[1/sr\] of [`draw_incoming`](Bsdf::draw_incoming) on its side,
-    /// by which directions towards sources are weighted against those that are drawn: any function does, where it is not 0.
+    /// f \[1/sr\] for light from `incident`, and about the density \[1/sr\] of [`draw_incoming`](Bsdf::draw_incoming) on its side, by
+    /// which directions towards sources are weighted against those that are drawn: any function does, where it is not 0.
+    ///
+    /// The density itself if light goes back as it comes; nearly that of tables, whose f need not be asked for twice.
     #[inline]
     fn incoming_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64) {
-        let (f, density, _) = self.drawn_light(incident, outward, media);
-        (f, density)
+        let f = self.evaluate(incident, outward.scattered, media);
+        let about = if self.facts().lambertian {
+            proposed(incident, 0.0, 0.0)
+        } else {
+            outward.as_if_reciprocal(incident, f, media)
+        };
+        (f, about)
     }
 
     /// f \[1/sr\] for light from `incident`, the density \[1/sr\] itself, and what
     /// [`incoming_light`](Bsdf::incoming_light) says about it.
     #[inline]
     fn drawn_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64, f64) {
-        let f = self.evaluate(incident, outward.scattered, media);
-        let share = outward.back_from(incident);
-        let density = if self.facts().lambertian || share <= 0.0 {
-            proposed(incident, 0.0, 0.0)
-        } else if self.facts().reciprocal {
-            outward.as_if_reciprocal(incident, f, media)
+        let (f, about) = self.incoming_light(incident, outward, media);
+        let (facts, share) = (self.facts(), outward.back_from(incident));
+        let density = if facts.lambertian || facts.reciprocal || share <= 0.0 {
+            about
         } else {
             proposed(incident, self.pdf(outward.scattered, incident, media), share)
         };
-        (f, density, density)
+        (f, density, about)
     }
 }
 

@@ -149,11 +149,10 @@ impl Bsdf for RoughCoat {
     }
 
     /// As any BSDF does, but what the coat does to the direction of the line of sight is looked up once.
-    fn drawn_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64, f64) {
+    fn incoming_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64) {
         let (front, scattered) = (incident.z > 0.0, outward.scattered);
         if front != (scattered.z > 0.0) {
-            let density = proposed(incident, 0.0, 0.0);
-            return (0.0, density, density);
+            return (0.0, proposed(incident, 0.0, 0.0));
         }
         let ratio = self.ratio(incident, media);
         let [there, back] = [incident, scattered].map(|d| self.mirrored(d, ratio));
@@ -163,7 +162,7 @@ impl Bsdf for RoughCoat {
             .reflected(above(front, incident), above(front, scattered), ratio);
         let f = coat + (1.0 - there) * (1.0 - back) * FRAC_1_PI * leaves / let_in;
         let density = proposed(incident, f * incident.z.abs(), back + (1.0 - back) * leaves);
-        (f, density, density)
+        (f, density)
     }
 
     fn parts(&self) -> Option<Parts<'_>> {

@@ -173,7 +173,7 @@ impl Slice {
             return Err("values of a slice do not fit its grid".into());
         }
         if !f.iter().all(|value| (0.0..=f64::from(f32::MAX)).contains(value)) {
-            return Err("a value of f is negative or not finite".into());
+            return Err("a value of f is not from 0 to 3.4e38".into());
         }
         if !(0.0..=1.0).contains(&self.sine) {
             return Err("a sine of incidence is not from 0 to 1".into());

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use etendue_math::Vec3;
 use etendue_sampling::more_numbers::MoreNumbers;
 
-use super::contract::{Bsdf, Facts, Media, Outward, Product, Shares, by_cosine, proposed};
+use super::contract::{Bsdf, Facts, Media, Product, Shares, by_cosine};
 use super::table_bounds::{Least, RINGS, edge, least};
 use super::table_lobes::{Lobe, Lobes};
 use super::table_sides::Sides;
@@ -215,17 +215,6 @@ impl Bsdf for TableRest {
         let way = usize::from((incident.z > 0.0) != (scattered.z > 0.0));
         let product = self.product.arriving(incident, media)[way] * self.product.leaving(scattered, media);
         (self.table.evaluate(incident, scattered, media) - product * FRAC_1_PI).max(0.0)
-    }
-
-    fn incoming_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64) {
-        let f = self.evaluate(incident, outward.scattered, media);
-        (f, outward.as_if_reciprocal(incident, f, media))
-    }
-
-    fn drawn_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64, f64) {
-        let (f, about) = self.incoming_light(incident, outward, media);
-        let back = self.pdf(outward.scattered, incident, media);
-        (f, proposed(incident, back, outward.back_from(incident)), about)
     }
 
     /// Directions of the table, of which each stays with the part of f that is not in the product.

@@ -19,7 +19,7 @@ use std::sync::{Arc, OnceLock};
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Outward, Parts, Product, Shares, by_cosine, proposed};
+use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares, by_cosine};
 use super::table_draw::{Group, again};
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lobes};
@@ -215,18 +215,6 @@ impl Bsdf for Tabulated {
             up: front != transmitted,
         };
         picked.direction(incident)
-    }
-
-    /// About the density by what goes the other way: tables are nearly reciprocal, and that is what is looked up anyway.
-    fn incoming_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64) {
-        let f = self.evaluate(incident, outward.scattered, media);
-        (f, outward.as_if_reciprocal(incident, f, media))
-    }
-
-    fn drawn_light(&self, incident: Vec3, outward: &Outward, media: &Media) -> (f64, f64, f64) {
-        let (f, about) = self.incoming_light(incident, outward, media);
-        let back = self.pdf(outward.scattered, incident, media);
-        (f, proposed(incident, back, outward.back_from(incident)), about)
     }
 
     /// As any BSDF does, but what light is shared by is looked up once.
