@@ -384,14 +384,13 @@ PARTS_OF_BSDFS = (
         f"table_{part}"
         for part in (
             "arrivals",
-            "bounds",
+            "base",
             "draw",
             "grid",
             "hats",
             "lanes",
             "lobes",
             "nodes",
-            "product",
             "sides",
             "steps",
         )

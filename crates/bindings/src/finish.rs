@@ -46,9 +46,12 @@ pub fn finish(dict: &Bound<'_, PyDict>) -> PyResult<Arc<dyn Bsdf>> {
             let sum = Mixture::new(members?).ok_or_else(|| refuse("parts below 0, or more than 1 together"))?;
             Ok(Arc::new(sum))
         }
-        "table" => Ok(Arc::new(
-            Tabulated::new(&side(dict, "front")?, &side(dict, "back")?).map_err(refuse)?,
-        )),
+        "table" => {
+            let sides = [side(dict, "front")?, side(dict, "back")?];
+            let bases: [Vec<f64>; 2] = get(dict, "bases")?;
+            let table = Tabulated::new(sides.each_ref(), bases.each_ref().map(Vec::as_slice)).map_err(refuse)?;
+            Ok(Arc::new(table))
+        }
         other => match described(other, &Described(dict)) {
             Some(bsdf) => bsdf.map_err(refuse),
             None => Err(refuse(format!("no finish is called {other}"))),
@@ -84,7 +87,7 @@ fn row(dict: &Bound<'_, PyDict>) -> PyResult<Row> {
             azimuths: f.as_array().nrows(),
             f: f.as_array().iter().copied().collect(),
             share: get(of, "share")?,
-            floor: get(of, "floor")?,
+            base: get(of, "base")?,
         })
     };
     let slices: PyResult<Vec<_>> = slices.iter().map(slice).collect();

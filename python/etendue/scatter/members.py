@@ -12,6 +12,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.description.files import Files
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
+from etendue.scatter.bases import Base, base_of
 from etendue.scatter.bsdf import WAVELENGTH
 from etendue.scatter.building import built
 from etendue.scatter.models import MODELS
@@ -93,12 +94,19 @@ def members_of(data: BsdfData, shares: Sequence[float], beyond: float = 1.0) -> 
     if data.both_sides:
         sides = [sides[0] or sides[1]]
     rests = _rests(known, found, data, beyond)
-    ways = [[_by_wavelength(side, data, transmitted=way, rest=rests[way]) for side in sides] for way in (False, True)]
+    bases = _bases(sides)
+    ways = [
+        [
+            _by_wavelength(side, data, transmitted=way, base=bases[behind != way], rest=rests[way])
+            for behind, side in enumerate(sides)
+        ]
+        for way in (False, True)
+    ]
     there = [way for way in ways if any(way)]
     if len(there) == 2 and not any(a and b and a.keys() != b.keys() for a, b in zip(*ways, strict=True)):
-        return [*found, _table(*ways)]
+        return [*found, _table(ways[0], ways[1], bases)]
     empty: list[dict[float, Rows]] = [{} for _ in sides]
-    return found + [_table(way, empty) if way is ways[0] else _table(empty, way) for way in there]
+    return found + [_table(way, empty, bases) if way is ways[0] else _table(empty, way, bases) for way in there]
 
 
 def leaving(members: Sequence[_core.Bsdf], incident: Array, wavelength: float) -> Array:
@@ -135,27 +143,39 @@ def _rests(known: Known, components: Sequence[Record], data: BsdfData, beyond: f
     return back, through
 
 
-def _by_wavelength(known: Known, data: BsdfData, *, transmitted: bool, rest: Rest) -> dict[float, Rows]:
+def _bases(sides: Sequence[Known]) -> tuple[Base, Base]:
+    """Of light that leaves on the front and on the back, from slices of light that meets either, or of light that meets both."""
+
+    def leaving(front: bool) -> Base:
+        known = zip((True, False), (sides[0], sides[-1]), strict=True)
+        return base_of([one for lit, side in known for one, _ in side if (lit != one.transmitted) is front])
+
+    return leaving(front=True), leaving(front=False)
+
+
+def _by_wavelength(known: Known, data: BsdfData, *, transmitted: bool, base: Base, rest: Rest) -> dict[float, Rows]:
     """The rows of one way of light that meets a side; slices of no wavelength hold at all, where no other says more."""
     way = [pair for pair in known if pair[0].transmitted is transmitted]
     of_all = [pair for pair in way if pair[0].wavelength is None]
     stated = sorted({one.wavelength for one, _ in way if one.wavelength is not None})
     if not stated:
-        return {WAVELENGTH: _rows(of_all, data, rest)} if of_all else {}
-    return {at: _rows([pair for pair in way if pair[0].wavelength == at] + of_all, data, rest) for at in stated}
+        return {WAVELENGTH: _rows(of_all, data, base, rest)} if of_all else {}
+    return {at: _rows([pair for pair in way if pair[0].wavelength == at] + of_all, data, base, rest) for at in stated}
 
 
-def _rows(known: Known, data: BsdfData, rest: Rest) -> Rows:
+def _rows(known: Known, data: BsdfData, base: Base, rest: Rest) -> Rows:
     slices, shares = zip(*known, strict=True)
     mirrored = data.isotropic and data.mirrored
-    rows = lobes_of(slices, shares, isotropic=data.isotropic, mirrored=mirrored, rest=rest)
+    rows = lobes_of(slices, shares, isotropic=data.isotropic, mirrored=mirrored, base=base, rest=rest)
     return [
         {"azimuth": phi / 360.0, "slices": [lobe.record() for lobe in lobes]} for phi, lobes in sorted(rows.items())
     ]
 
 
-def _table(reflected: Sequence[dict[float, Rows]], transmitted: Sequence[dict[float, Rows]]) -> Record:
-    """Of light that meets the front and the back, or either."""
+def _table(
+    reflected: Sequence[dict[float, Rows]], transmitted: Sequence[dict[float, Rows]], bases: tuple[Base, Base]
+) -> Record:
+    """Of light that meets the front and the back, or either; bases are of light that leaves there."""
     sides = [
         [
             {"wavelength": at, "reflected": back.get(at), "transmitted": through.get(at)}
@@ -163,4 +183,4 @@ def _table(reflected: Sequence[dict[float, Rows]], transmitted: Sequence[dict[fl
         ]
         for back, through in zip(reflected, transmitted, strict=True)
     ]
-    return {"kind": "table", "front": sides[0], "back": sides[-1]}
+    return {"kind": "table", "front": sides[0], "back": sides[-1], "bases": [base.luminances for base in bases]}

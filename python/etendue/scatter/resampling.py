@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.bsdf_data import NORMAL, BsdfSlice
+from etendue.scatter.bases import Base, even_out, share_in
 
 Array = npt.NDArray[np.float64]
 
@@ -29,10 +30,6 @@ CANDIDATES = 400
 FEW = 80
 """The same for slices of single points, none of which is closer to another than some hundredths."""
 
-
-LOW = 0.05
-"""Part of the projected solid angle whose values do not decide what is diffuse: more than a hole in a measurement."""
-
 RIM = 1.0 - 1e-9
 """Sine of an incidence beyond which there is none."""
 
@@ -41,9 +38,6 @@ STEPS_TO_THE_RIM = 12
 
 EVEN = 1e-9
 """Shares that differ by less are the same: rounding of the core."""
-
-STEPS = 4.0
-"""Floors of neighbouring incidences differ by this factor at most."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,20 +51,20 @@ class Lobe:
     radial : array, shape (n,)
         |β − β₀|, from 0.
     f : array, shape (m, n)
-        Without the floor [1/sr], at m azimuths evenly from the direction of β₀.
-    share, floor : float
-        Of the flux: in the lobe, and Lambertian.
+        Without the base [1/sr], at m azimuths evenly from the direction of β₀.
+    share, base : float
+        Of the flux: in the lobe, and in the base.
     """
 
     sine: float
     radial: Array
     f: Array
     share: float
-    floor: float
+    base: float
 
     def record(self) -> dict[str, object]:
         """As the core takes it."""
-        return {"sine": self.sine, "radial": self.radial, "f": self.f, "share": self.share, "floor": self.floor}
+        return {"sine": self.sine, "radial": self.radial, "f": self.f, "share": self.share, "base": self.base}
 
 
 def _all(theta: Array) -> Array:
@@ -103,6 +97,7 @@ def lobes_of(
     *,
     isotropic: bool,
     mirrored: bool,
+    base: Base | None = None,
     rest: Rest | None = None,
 ) -> dict[float, list[Lobe]]:
     """Slices of one way and one wavelength on the grid of the core: by azimuth of incidence [°], of rising incidence.
@@ -130,6 +125,8 @@ def lobes_of(
         Whether the azimuth of incidence does not matter.
     mirrored : bool
         Whether both sides of the plane of incidence are made equal.
+    base : Base, optional
+        How light leaves that has forgotten where it came from; f of it is taken off the lobes. Lambertian, unless given.
     rest : Rest, optional
         What else takes of the light, if anything does.
 
@@ -154,13 +151,9 @@ def lobes_of(
     found: dict[float, list[Lobe]] = {}
     kept: dict[tuple[float, float], Array] = {}
     for row in rows:
-        before: Array | None = None
         members: list[tuple[float, Array, float]] = []
-        lows: list[tuple[float, float]] = []
         if normal is not None:
-            before = _swung(normal[0], row)
-            members.append((0.0, before, normal[1]))
-            lows.append(_low(radial, np.where(radial <= 1.0, before, np.nan)))
+            members.append((0.0, np.where(radial <= 1.0, _swung(normal[0], row), np.nan), normal[1]))
         for theta in sorted(by_theta):
             known = by_theta[theta]
             f, share, sine = np.zeros((azimuths, radial.size)), 0.0, 0.0
@@ -173,17 +166,33 @@ def lobes_of(
                 sine = math.sin(math.radians(one.theta))
             if mirrored:
                 f = 0.5 * (f + f[(-np.arange(azimuths)) % azimuths])
-            before = _continued(f, before)
-            members.append((sine, before, share))
-            lows.append(_low(radial, f))
-        lobes = [
-            _lobe(sine, radial, whole, share, floor=floor)
-            for (sine, whole, share), floor in zip(members, _floors(lows), strict=True)
-        ]
+            members.append((sine, f, share))
+        lobes = _lobes(members, radial, base or Base())
         # Below the first incidence no more is scattered than there, though less of the lobe is cut by the horizon.
         first = [] if lobes[0].sine == 0.0 else [_at_the_normal(lobes[0], isotropic=isotropic)]
         found[row] = [*first, *lobes, *_to_the_rim(lobes, rest or Rest(), may_rise=not slices[0].transmitted)]
     return found
+
+
+def _lobes(members: Sequence[tuple[float, Array, float]], radial: Array, base: Base) -> list[Lobe]:
+    """Of rising sines of incidence, f that is NaN beyond the hemisphere, and shares."""
+    found = []
+    before: Array | None = None
+    leaving = [base.at(_cosines(sine, radial, len(f))) for sine, f, _ in members]
+    parts = even_out([share_in(f, there, share) for (_, f, share), there in zip(members, leaving, strict=True)])
+    for (sine, f, share), there, part in zip(members, leaving, parts, strict=True):
+        below = part / np.pi * there
+        before = _continued(np.maximum(f - below, 0.0), before, part / np.pi)
+        chosen = _chosen(radial, before, before + below)
+        lobe = np.ascontiguousarray(before[:, chosen])
+        found.append(Lobe(sine, radial[chosen], lobe, share - part, part))
+    return found
+
+
+def _cosines(sine: float, radial: Array, azimuths: int) -> Array:
+    """Of the angle from the normal at places about β₀; 0 beyond the hemisphere."""
+    along = np.cos(np.arange(azimuths) * (2.0 * np.pi / azimuths))[:, None]
+    return np.asarray(np.sqrt(np.maximum(1.0 - sine**2 - radial * (radial + 2.0 * sine * along), 0.0)))
 
 
 def _at_the_normal(first: Lobe, *, isotropic: bool) -> Lobe:
@@ -208,7 +217,7 @@ def _to_the_rim(lobes: Sequence[Lobe], rest: Rest, *, may_rise: bool) -> list[Lo
     if np.ptp(left) < EVEN:
         thetas, left = thetas[[0, -1]], left[[0, -1]]
     x = np.sin(np.radians(known)) ** 2
-    y = np.array([one.share + one.floor for one in lobes[-3:]]) / np.maximum(left_there, np.finfo(np.float64).tiny)
+    y = np.array([one.share + one.base for one in lobes[-3:]]) / np.maximum(left_there, np.finfo(np.float64).tiny)
     beyond = np.sin(np.radians(thetas[1:])) ** 2 - x[-1]
     change = np.zeros(len(beyond))
     if len(x) > 1:
@@ -219,16 +228,16 @@ def _to_the_rim(lobes: Sequence[Lobe], rest: Rest, *, may_rise: bool) -> list[Lo
         step = y[-1] - y[-2]
         change = np.clip(steepness * beyond, min(step, 0.0), max(step, 0.0) if may_rise else 0.0)
     shares = np.clip(y[-1] + change, 0.0, max(rest.most, 0.0)) * left[1:] * rest.part
-    # Without a lobe all of it is in the floor.
-    floors = (
+    # Without a lobe all of it is in the base.
+    bases = (
         shares
         if last.share <= 0.0
-        else np.minimum(last.floor * left[1:] / max(left[0], np.finfo(np.float64).tiny), shares)
+        else np.minimum(last.base * left[1:] / max(left[0], np.finfo(np.float64).tiny), shares)
     )
     sines = np.append(np.sin(np.radians(thetas[1:-1])), 1.0)
     return [
-        dataclasses.replace(last, sine=float(sine), share=float(share - floor), floor=float(floor))
-        for sine, share, floor in zip(sines, shares, floors, strict=True)
+        dataclasses.replace(last, sine=float(sine), share=float(share - base), base=float(base))
+        for sine, share, base in zip(sines, shares, bases, strict=True)
     ]
 
 
@@ -296,38 +305,6 @@ def _directions(one: BsdfSlice, radial: Array, azimuths: int, phi: float) -> Arr
     return np.asarray(found)
 
 
-def _low(radial: Array, f: Array) -> tuple[float, float]:
-    """The smallest value, and that which f stays under in `LOW` of the projected solid angle; NaN: beyond the hemisphere."""
-    weights = np.broadcast_to(radial * np.gradient(radial), f.shape)[~np.isnan(f)]
-    values = f[~np.isnan(f)]
-    order = np.argsort(values)
-    reached = np.cumsum(weights[order])
-    return float(values[order[0]]), float(values[order[np.searchsorted(reached, LOW * reached[-1])]])
-
-
-def _floors(lows: Sequence[tuple[float, float]]) -> list[float]:
-    """What is Lambertian of slices that are interpolated together, from the smallest and the low value of each.
-
-    A single value below the rest would leave the diffuse part of its slice in the lobe, and a mean of the logarithms of
-    lobes with and without it is neither. So the same is left in all lobes: the most by which any smallest value lies below.
-    For the same reason no floor is more than `STEPS` times that of its neighbour; beside a slice with a large hole is none.
-    """
-    left = max(low - least for least, low in lows)
-    floors = [max(low - left, 0.0) for _, low in lows]
-    for order in (range(1, len(floors)), range(len(floors) - 2, -1, -1)):
-        for k in order:
-            floors[k] = min(floors[k], STEPS * floors[k - order.step])
-    return floors
-
-
-def _lobe(sine: float, radial: Array, f: Array, share: float, *, floor: float) -> Lobe:
-    lambertian = min(np.pi * floor, share)
-    raised = np.maximum(f - floor, 0.0)
-    chosen = _chosen(radial, raised)
-    lobe = np.ascontiguousarray(raised[:, chosen])
-    return Lobe(sine, radial[chosen], lobe, max(share - lambertian, 0.0), lambertian)
-
-
 def _azimuths(one: BsdfSlice) -> int:
     finest = one.grid.azimuth.size if one.grid is not None else 0
     return finest if finest >= 360 else 2 * finest
@@ -366,10 +343,11 @@ def _nearest(one: BsdfSlice, directions: Array) -> Array:
     return found
 
 
-def _continued(f: Array, before: Array | None) -> Array:
+def _continued(f: Array, before: Array | None, level: float = 0.0) -> Array:
     """Missing values along each azimuth in proportion to those of the slice before, or to the mean of all azimuths.
 
-    The mean falls away from the specular direction, or is held: what rises there is another lobe, as of light sent back.
+    A base of about this level was taken off both, beside which what is left may be nothing. The mean falls away from the
+    specular direction, or is held: what rises there is another lobe, as of light sent back.
     """
     # At grazing incidence the hemisphere may end before the first step: the specular direction itself is common to all.
     centre = f[:, 0][~np.isnan(f[:, 0])]
@@ -383,13 +361,13 @@ def _continued(f: Array, before: Array | None) -> Array:
         mean = np.where(known, f, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
         before = np.broadcast_to(np.minimum.accumulate(np.where(known.any(axis=0), mean, np.inf)), f.shape)
     there = np.take_along_axis(before, last, axis=1)
-    ratio = np.divide(before, there, out=np.ones_like(before), where=missing & (there > 0.0))
+    ratio = np.divide(before + level, there + level, out=np.ones_like(before), where=missing & (there + level > 0.0))
     return np.asarray(held * ratio)
 
 
-def _chosen(radial: Array, f: Array) -> npt.NDArray[np.intp]:
-    """Radial coordinates between which f is nearly linear: halved from the ends where it is not."""
-    allowed = ACCURACY * (f + 1e-3 * f.max())
+def _chosen(radial: Array, f: Array, whole: Array) -> npt.NDArray[np.intp]:
+    """Radial coordinates between which f is nearly linear beside the whole with the base: halved from the ends where not."""
+    allowed = ACCURACY * (whole + 1e-3 * whole.max())
     kept = {0, len(radial) - 1}
     open_ = [(0, len(radial) - 1)]
     while open_:

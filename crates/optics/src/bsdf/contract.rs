@@ -18,7 +18,7 @@
 //! [`incoming`](Bsdf::incoming), [`draw_incoming`](Bsdf::draw_incoming) and [`incoming_pdf`](Bsdf::incoming_pdf) propose
 //! directions that diffuse light may come from. Whoever takes one weighs it by f |cos θᵢ| over its density.
 //!
-//! **Taken apart.** Many BSDFs have a part f = a(incident) l(scattered)/π: Lambertian light, that under a clear coat, the floor of
+//! **Taken apart.** Many BSDFs have a part f = a(incident) l(scattered)/π: Lambertian light, that under a clear coat, the base of
 //! a table. What it sends out anywhere is known as soon as the light that arrives is summed with the weights a, wherever it came
 //! from. Whoever knows this sum needs to look for the light of the rest only: [`Parts`].
 

@@ -1,8 +1,9 @@
-//! Rays that meet a table of one lobe, many at once: which slices and floors scatter them.
+//! Rays that meet a table of one lobe, many at once: which slices scatter them, or the base.
 
 use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
+use super::table_base::Base;
 use super::table_lanes::{LANES, Lanes, blocks};
 use super::table_lobes::Lobe;
 
@@ -20,15 +21,15 @@ pub(super) struct Arrivals {
     shares: [Lanes<f64>; 3],
     /// One of the kinds below.
     pub kind: Lanes<u32>,
-    /// The number of the slice, and what is left of the random number.
+    /// The number of the slice, and what is left of the random number; of the base the square of the sine that it draws.
     pub slice: Lanes<u32>,
     pub rest: Lanes<f64>,
 }
 
-/// A ray that is absorbed, and one that a slice or a floor scatters.
+/// A ray that is absorbed, and one that a slice or the base scatters.
 pub(super) const ABSORBED: u32 = 0;
 pub(super) const OFF_SLICE: u32 = 1;
-pub(super) const OFF_FLOOR: u32 = 2;
+pub(super) const OFF_BASE: u32 = 2;
 
 impl Arrivals {
     pub const fn new() -> Self {
@@ -48,7 +49,7 @@ impl Arrivals {
     }
 
     /// Takes some rays in, as many as can be, and chooses for them.
-    pub fn choose(&mut self, lobe: &Lobe, incident: [&[f64]; 2], [numbers, others]: [&[f64]; 2]) {
+    pub fn choose(&mut self, (lobe, base): (&Lobe, &Base), incident: [&[f64]; 2], [numbers, others]: [&[f64]; 2]) {
         let n = numbers.len();
         for (own, given) in self.incident.iter_mut().zip(incident) {
             own.take(given);
@@ -64,6 +65,13 @@ impl Arrivals {
             }
         }
         picks(self, n);
+        if !base.is_even() {
+            for k in 0..n {
+                if self.kind[k] == OFF_BASE {
+                    self.rest[k] = base.square(self.rest[k]);
+                }
+            }
+        }
     }
 }
 
@@ -85,7 +93,7 @@ fn incidences(arrivals: &mut Arrivals, count: usize) {
     }
 }
 
-/// Slices or floors by their shares.
+/// Slices or the base by their shares.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn picks(arrivals: &mut Arrivals, count: usize) {
     for b in blocks(count) {
@@ -93,22 +101,22 @@ fn picks(arrivals: &mut Arrivals, count: usize) {
         let shares = arrivals.shares.each_ref().map(|lanes| &lanes.0[b]);
         let (mut kind, mut slice, mut rest) = ([ABSORBED; LANES], [0; LANES], [0.0; LANES]);
         for k in 0..LANES {
-            let [a, b, even] = shares.map(|shares| shares[k]);
-            let all = a + b + even;
+            let [a, b, base] = shares.map(|shares| shares[k]);
+            let all = a + b + base;
             // Shares that should add up to 1 may fall short of it by rounding.
             let goes = (number[k] < all) | (all >= 1.0 - 1e-12);
             let left = [number[k], number[k] - a, number[k] - a - b];
             let is_first = left[0] < a;
-            let is_even = !is_first & (left[1] >= b) & (even > 0.0);
-            let is_second = !is_first & !is_even & (b > 0.0);
-            let (part, share) = if is_even {
-                (left[2], even)
+            let is_base = !is_first & (left[1] >= b) & (base > 0.0);
+            let is_second = !is_first & !is_base & (b > 0.0);
+            let (part, share) = if is_base {
+                (left[2], base)
             } else if is_second {
                 (left[1], b)
             } else {
                 (left[0], a)
             };
-            let scattered = if is_even { OFF_FLOOR } else { OFF_SLICE };
+            let scattered = if is_base { OFF_BASE } else { OFF_SLICE };
             kind[k] = if goes { scattered } else { ABSORBED };
             slice[k] = first[k] + u32::from(is_second);
             rest[k] = part_of(part, share);

@@ -1,7 +1,7 @@
 //! Many rays at once off a table of one lobe: what [`Tabulated`](super::Tabulated) draws for each by itself, to the same bits.
 //!
 //! Step by step for many of them together. Sums, roots and angles are worked out several at a time, for those that are off
-//! slices and those that are off floors alike; what is looked up in between is all over a memory that no cache holds, and without
+//! slices and those that are off the base alike; what is looked up in between is all over a memory that no cache holds, and without
 //! branches the processor waits for many of them at once.
 
 use etendue_math::Vec3;
@@ -11,7 +11,8 @@ use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
 use super::contract::{Outcome, by_cosine};
-use super::table_arrivals::{ABSORBED, Arrivals, OFF_FLOOR, OFF_SLICE};
+use super::table_arrivals::{ABSORBED, Arrivals, OFF_BASE, OFF_SLICE};
+use super::table_base::Base;
 use super::table_grid::Grid;
 use super::table_lanes::{LANES, Lanes, TOGETHER, blocks};
 use super::table_lobes::{Incidence, Lobe};
@@ -42,7 +43,7 @@ impl Group {
     /// [`Bsdf::sample_many`]: super::contract::Bsdf::sample_many
     pub fn draw(
         &mut self,
-        (lobe, up): (&Lobe, bool),
+        (lobe, base, up): (&Lobe, &Base, bool),
         directions: &mut [&mut [f64]; 3],
         numbers: [&[f64]; 2],
         outcomes: &mut [Outcome],
@@ -51,7 +52,7 @@ impl Group {
             let rays = first..outcomes.len().min(first + TOGETHER);
             let incident = [&directions[0][rays.clone()], &directions[1][rays.clone()]];
             self.arrivals
-                .choose(lobe, incident, numbers.map(|list| &list[rays.clone()]));
+                .choose((lobe, base), incident, numbers.map(|list| &list[rays.clone()]));
             // Without branches, which nobody can foresee.
             let (mut list, mut count) = ([0; TOGETHER], 0);
             for (k, outcome) in outcomes[rays.clone()].iter_mut().enumerate() {
@@ -94,7 +95,7 @@ pub(super) fn again(incidence: &Incidence, incident: Vec3, grid: &Grid, numbers:
     found.unwrap_or_else(|| by_cosine(up, numbers))
 }
 
-/// Directions off floors, as [`by_cosine`] says, and off slices, at the places that were drawn; the height of those outside the
+/// Directions off the base, as [`by_cosine`] says of the square of a sine, and off slices, at the places that were drawn; the height of those outside the
 /// unit circle is 0.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn leave(group: &mut Group, count: usize, sign: f64) {
@@ -112,7 +113,7 @@ fn leave(group: &mut Group, count: usize, sign: f64) {
         let (limit, bent) = (&nodes.limit.0[b], &nodes.bent.0[b]);
         let mut to = [[0.0; LANES]; 3];
         for k in 0..LANES {
-            let is_even = kind[k] == OFF_FLOOR;
+            let is_base = kind[k] == OFF_BASE;
             // Azimuths with a density that falls linearly from the node towards the next ones.
             let low = number[k] < 0.5;
             let root = if low { 2.0 * number[k] } else { 2.0 - 2.0 * number[k] }.sqrt();
@@ -124,16 +125,16 @@ fn leave(group: &mut Group, count: usize, sign: f64) {
             let r = far[k] + along * (top[k] - far[k]);
             let cosine = (1.0 - rest[k]).sqrt();
             let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
-            let (sin, cos) = sin_cos_turns(if is_even { number[k] } else { turn });
-            let r = if is_even { sine } else { r };
+            let (sin, cos) = sin_cos_turns(if is_base { number[k] } else { turn });
+            let r = if is_base { sine } else { r };
             let (ahead, across) = (r * cos, r * sin);
             let px = c[k] * ahead - s[k] * across - x[k];
             let py = s[k] * ahead + c[k] * across - y[k];
             let square = 1.0 - px * px - py * py;
             let height = if square > 0.0 { square } else { 0.0 }.sqrt();
-            to[0][k] = if is_even { ahead } else { px };
-            to[1][k] = if is_even { across } else { py };
-            to[2][k] = sign * if is_even { cosine } else { height };
+            to[0][k] = if is_base { ahead } else { px };
+            to[1][k] = if is_base { across } else { py };
+            to[2][k] = sign * if is_base { cosine } else { height };
         }
         for (lanes, to) in direction.iter_mut().zip(to) {
             lanes.0[b] = to;

@@ -1,6 +1,6 @@
 //! A slice of a table of scattered light: f on a polar grid, its integrals, and points drawn from it.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_PI, TAU};
 
 use etendue_math::special::{exp, ln};
 use etendue_math::trig::sin_cos_turns;
@@ -19,10 +19,10 @@ pub struct Slice {
     pub azimuths: usize,
     /// f \[1/sr\], azimuth by azimuth; constant beyond the last radial coordinate.
     pub f: Vec<f64>,
-    /// Share of the flux at this incidence, without the floor.
+    /// Share of the flux at this incidence, without the base.
     pub share: f64,
-    /// Share of the flux that is Lambertian.
-    pub floor: f64,
+    /// Share of the flux in the base.
+    pub base: f64,
 }
 
 /// A slice that can be asked and drawn from.
@@ -89,7 +89,8 @@ const NOTHING: f64 = 1e-9;
 
 impl Slice {
     /// Slices between this incidence and another one, close to each other: the logarithm of f is linear in the angle of incidence, so
-    /// that a lobe that grows and narrows stays one lobe. Where one of both has nothing, f is linear itself: a hole is no lobe.
+    /// that a lobe that grows and narrows stays one lobe. Where one of both has nothing, f is linear itself: a hole is no lobe. And what
+    /// is little beside the base is nearly linear: it is the logarithm of all of the light, with a base of this share by the sine.
     ///
     /// None where the grids differ in azimuths.
     #[allow(
@@ -97,7 +98,7 @@ impl Slice {
         clippy::cast_sign_loss,
         reason = "at most 18 steps"
     )]
-    pub(super) fn up_to(&self, other: &Self) -> Vec<Self> {
+    pub(super) fn up_to(&self, other: &Self, base: impl Fn(f64) -> f64) -> Vec<Self> {
         let [from, to] = [self.sine, other.sine].map(|sine| sine.min(1.0).asin());
         let steps = ((to - from) / STEP).ceil() as usize;
         if self.azimuths != other.azimuths || self.radial.is_empty() || other.radial.is_empty() {
@@ -111,22 +112,27 @@ impl Slice {
         let [a, b] = [self, other].map(|slice| slice.on(&radial));
         let largest = a.iter().chain(&b).copied().fold(0.0, f64::max);
         let [little, nothing] = [LITTLE, NOTHING].map(|part| (part * largest).max(f64::MIN_POSITIVE));
+        let below = |base: f64| little + base * FRAC_1_PI;
+        let [under, under_other] = [self, other].map(|slice| below(slice.base));
         (1..steps)
             .map(|k| {
                 let part = k as f64 / steps as f64;
+                let sine = (from + part * (to - from)).sin();
+                let there = below(base(sine));
                 let mean = |(a, b): (&f64, &f64)| {
-                    let geometric = (exp((1.0 - part) * ln(a + little) + part * ln(b + little)) - little).max(0.0);
+                    let all = exp((1.0 - part) * ln(a + under) + part * ln(b + under_other));
+                    let geometric = (all - there).max(0.0);
                     let linear = (1.0 - part) * a + part * b;
                     let least = a.min(*b);
                     linear + (geometric - linear) * least / (least + nothing)
                 };
                 Self {
-                    sine: (from + part * (to - from)).sin(),
+                    sine,
                     radial: radial.clone(),
                     azimuths: self.azimuths,
                     f: a.iter().zip(&b).map(mean).collect(),
                     share: 0.0,
-                    floor: 0.0,
+                    base: 0.0,
                 }
             })
             .collect()
@@ -178,8 +184,8 @@ impl Slice {
         if !(0.0..=1.0).contains(&self.sine) {
             return Err("a sine of incidence is not from 0 to 1".into());
         }
-        if !(self.share >= 0.0 && self.floor >= 0.0 && self.share + self.floor <= 1.0 + 1e-9) {
-            return Err(format!("{} of the flux leaves", self.share + self.floor));
+        if !(self.share >= 0.0 && self.base >= 0.0 && self.share + self.base <= 1.0 + 1e-9) {
+            return Err(format!("{} of the flux leaves", self.share + self.base));
         }
         let mut all = radial.clone();
         if radial[radial.len() - 1] < END {
@@ -354,27 +360,6 @@ impl Grid {
         };
         let (near, far) = (along(j), along(k));
         near + v * (far - near)
-    }
-
-    /// How many azimuths there are.
-    pub(super) const fn azimuths(&self) -> usize {
-        self.azimuths
-    }
-
-    /// Radial coordinates, from 0 to the end of the plane.
-    pub(super) fn radial(&self) -> &[f64] {
-        &self.radial
-    }
-
-    /// f at all of them along an azimuth \[turns\].
-    pub(super) fn along(&self, turn: f64) -> Vec<f64> {
-        let (j, k, v) = self.around(turn);
-        let both = self
-            .row(j)
-            .iter()
-            .zip(self.row(k))
-            .map(|(a, b)| [f64::from(*a), f64::from(*b)]);
-        both.map(|[a, b]| a + v * (b - a)).collect()
     }
 
     /// The azimuths on both sides of one, and how far on it is.
@@ -589,7 +574,7 @@ mod tests {
             azimuths: 3,
             f: vec![1.0, 5.0, 0.1, 0.0, 2.0, 0.3, 4.0, 0.0, 0.5, 0.0, 0.0, 0.7],
             share: 0.5,
-            floor: 0.0,
+            base: 0.0,
         };
         let grid = slice.grid(None).expect("sound");
         let (radii, turns) = (40, 24);

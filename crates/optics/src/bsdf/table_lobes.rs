@@ -67,10 +67,13 @@ impl Row {
         if sines.is_empty() || sines.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err("angles of incidence do not rise".into());
         }
+        let squares: Vec<f64> = sines.iter().map(|sine| sine * sine).collect();
+        let of = |pick: fn(&Slice) -> f64| Cubic::new(&squares, &self.slices.iter().map(pick).collect::<Vec<_>>());
+        let [share, base] = [of(|slice| slice.share), of(|slice| slice.base)];
         let mut between: Vec<Slice> = Vec::new();
         for (k, slice) in self.slices.iter().enumerate() {
             if let Some(before) = k.checked_sub(1).map(|before| &self.slices[before]) {
-                between.extend(before.up_to(slice));
+                between.extend(before.up_to(slice, |sine| base.at(sine * sine)));
             }
             between.push(slice.clone());
         }
@@ -81,9 +84,7 @@ impl Row {
             between[k].grid(Some([from, to]))
         };
         let slices: Vec<Grid> = (0..between.len()).map(grid).collect::<Result<_, String>>()?;
-        let squares: Vec<f64> = sines.iter().map(|sine| sine * sine).collect();
-        let of = |pick: fn(&Slice) -> f64| Cubic::new(&squares, &self.slices.iter().map(pick).collect::<Vec<_>>());
-        let steps = Steps::of(&slices, &of(|slice| slice.share), &of(|slice| slice.floor));
+        let steps = Steps::of(&slices, &share, &base);
         Ok(Lobe {
             azimuth: self.azimuth,
             slices: slices.into(),
@@ -93,13 +94,13 @@ impl Row {
 }
 
 impl Lobe {
-    /// The first of two slices and, from the last sine on that is not above this one, the shares of both and of the floor.
+    /// The first of two slices and, from the last sine on that is not above this one, the shares of both and of the base.
     #[inline]
     pub(super) fn step(&self, sine: f64) -> &Step {
         self.steps.shares(sine)
     }
 
-    /// The first of two slices, and the shares of both and of the floor.
+    /// The first of two slices, and the shares of both and of the base.
     #[inline]
     pub(super) fn shares(&self, sine: f64) -> (usize, [f64; 3]) {
         let step = self.step(sine);
@@ -112,43 +113,25 @@ impl Lobe {
         self.shares(sine).1.iter().sum()
     }
 
-    pub(super) fn slices(&self) -> &[Grid] {
-        &self.slices
-    }
-
-    /// Between two sines of incidence: see [`Steps::factors_between`].
-    pub(super) fn factors(&self, sines: [f64; 2]) -> impl Iterator<Item = (usize, [[f64; 3]; 2])> {
-        self.steps.factors_between(sines)
-    }
-
-    /// A floor alone, by its shares at some sines from 0 to 1, between which it is linear.
-    pub(super) fn of_floor(&self, sines: &[f64], shares: &[f64]) -> Self {
-        Self {
-            azimuth: self.azimuth,
-            slices: Arc::default(),
-            steps: Steps::of_floor(sines, shares),
-        }
-    }
-
     /// A slice, by its number.
     #[inline]
     pub(super) fn slice(&self, number: usize) -> &Grid {
         &self.slices[number]
     }
 
-    /// f \[1/sr\] for light that leaves towards a point of the plane of direction cosines.
+    /// f \[1/sr\] for light that leaves towards a point of the plane of direction cosines, where the base has this luminance.
     #[inline]
-    pub(super) fn at(&self, sine: f64, r: f64, turn: f64) -> f64 {
+    pub(super) fn at(&self, sine: f64, (r, turn): (f64, f64), luminance: f64) -> f64 {
         let step = self.steps.factors(sine);
-        let [one, other, floor] = step.at(sine);
-        let mut f = floor * FRAC_1_PI;
+        let [one, other, base] = step.at(sine);
+        let mut f = base * luminance * FRAC_1_PI;
         for (k, factor) in [one, other].into_iter().enumerate().filter(|(_, factor)| *factor > 0.0) {
             f += factor * self.slices[step.first as usize + k].at(r, turn);
         }
         f
     }
 
-    /// A slice or a floor (None), picked by its share, with what is left of a number that is less than the share of all, as a
+    /// A slice or the base (None), picked by its share, with what is left of a number that is less than the share of all, as a
     /// number from 0 to 1.
     #[inline]
     pub(super) fn pick(&self, (first, shares): (usize, [f64; 3]), mut left: f64) -> (Option<&Grid>, f64) {
@@ -165,11 +148,11 @@ impl Lobe {
 }
 
 impl Lobes {
-    /// Without the floor of any slice; None if there is nothing else.
-    pub(super) fn without_floor(&self) -> Option<Self> {
+    /// Without the base; None if there is nothing else.
+    pub(super) fn without_base(&self) -> Option<Self> {
         let mut rows = self.rows.clone();
         for row in &mut rows {
-            row.steps = row.steps.without_floor();
+            row.steps = row.steps.without_base();
         }
         let left = rows
             .iter()
@@ -179,8 +162,8 @@ impl Lobes {
         left.then_some(Self { rows })
     }
 
-    /// Whether any slice has a floor.
-    pub(super) fn has_floor(&self) -> bool {
+    /// Whether there is a base.
+    pub(super) fn has_base(&self) -> bool {
         self.rows
             .iter()
             .flat_map(|row| row.steps.ends())
@@ -191,15 +174,6 @@ impl Lobes {
     pub(super) fn most(&self) -> f64 {
         let shares = self.rows.iter().flat_map(|row| row.steps.ends());
         shares.map(|shares| shares.iter().sum()).fold(0.0, f64::max)
-    }
-
-    pub(super) fn rows(&self) -> &[Lobe] {
-        &self.rows
-    }
-
-    /// Other rows in the place of these.
-    pub(super) fn with_rows(rows: Vec<Lobe>) -> Self {
-        Self { rows }
     }
 
     /// The only row, if there is one.
@@ -254,19 +228,19 @@ impl<'a> Lit<'a> {
             .fold(0.0, |sum, (row, part)| sum + part * row.share(self.sine))
     }
 
-    /// Of the flux, in the floor.
-    pub(super) fn floor(&self) -> f64 {
+    /// Of the flux, in the base.
+    pub(super) fn base(&self) -> f64 {
         self.there()
             .fold(0.0, |sum, (row, part)| sum + part * row.shares(self.sine).1[2])
     }
 
-    /// f for light that leaves towards a point of the plane of direction cosines.
-    pub(super) fn at(&self, r: f64, turn: f64) -> f64 {
+    /// f for light that leaves towards a point of the plane of direction cosines, where the base has this luminance.
+    pub(super) fn at(&self, place: (f64, f64), luminance: f64) -> f64 {
         self.there()
-            .fold(0.0, |sum, (row, part)| sum + part * row.at(self.sine, r, turn))
+            .fold(0.0, |sum, (row, part)| sum + part * row.at(self.sine, place, luminance))
     }
 
-    /// A slice or a floor (None), picked by its share, with what is left of the number.
+    /// A slice or the base (None), picked by its share, with what is left of the number.
     pub(super) fn pick(&self, number: f64) -> (Option<&'a Grid>, f64) {
         let mut left = number * self.share();
         let mut last = (None, number);

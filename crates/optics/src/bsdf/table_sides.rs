@@ -4,6 +4,7 @@ use etendue_math::Vec3;
 use etendue_sampling::warp::part_of;
 
 use super::contract::Media;
+use super::table_base::Base;
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lit, Lobe, Lobes, Way};
 
@@ -19,7 +20,11 @@ type Sheets = Vec<(f64, [Option<Lobes>; 2])>;
 
 /// The tables of both sides, the front first, ready to be asked.
 #[derive(Clone, Debug)]
-pub(super) struct Sides([Sheets; 2]);
+pub(super) struct Sides {
+    sheets: [Sheets; 2],
+    /// Of light that leaves on the front and on the back.
+    bases: [Base; 2],
+}
 
 /// Next to a wavelength, each with its part.
 pub(super) type Ways<'a> = [Option<(Lit<'a>, f64)>; 2];
@@ -42,26 +47,24 @@ impl Side {
 }
 
 impl Sides {
+    /// Of light that meets the front and the back, with the bases of light that leaves there.
+    ///
     /// # Errors
     /// What is wrong with the tables.
-    pub fn new(front: &Side, back: &Side) -> Result<Self, String> {
-        let [front, back] = [front, back].map(Side::lobes);
-        Ok(Self([front?, back?]))
+    pub fn new([front, back]: [&Side; 2], bases: [Base; 2]) -> Result<Self, String> {
+        let sheets = [front.lobes()?, back.lobes()?];
+        Ok(Self { sheets, bases })
+    }
+
+    /// The base of light that leaves on a side.
+    #[inline]
+    pub fn base(&self, front: bool) -> &Base {
+        &self.bases[usize::from(!front)]
     }
 
     /// All tables of both ways.
     pub fn each(&self) -> impl Iterator<Item = &[Option<Lobes>; 2]> {
-        self.0.iter().flatten().map(|(_, ways)| ways)
-    }
-
-    /// Every lobe, with whether its light leaves on the front.
-    pub fn lobes(&self) -> Vec<(&Lobe, bool)> {
-        let sheets = self.0.iter().zip([true, false]);
-        let ways = sheets.flat_map(|(sheets, front)| sheets.iter().map(move |(_, ways)| (ways, front)));
-        let ways = ways.flat_map(|(ways, front)| ways.iter().zip([front, !front]));
-        ways.filter_map(|(lobes, front)| Some((lobes.as_ref()?, front)))
-            .flat_map(|(lobes, front)| lobes.rows().iter().map(move |lobe| (lobe, front)))
-            .collect()
+        self.sheets.iter().flatten().map(|(_, ways)| ways)
     }
 
     /// The same with others in the place of these.
@@ -69,13 +72,19 @@ impl Sides {
         let mut sheet = |(at, ways): &(f64, [Option<Lobes>; 2])| {
             (*at, ways.each_ref().map(|lobes| lobes.as_ref().and_then(&mut other)))
         };
-        Self(self.0.each_ref().map(|sheets| sheets.iter().map(&mut sheet).collect()))
+        Self {
+            sheets: self
+                .sheets
+                .each_ref()
+                .map(|sheets| sheets.iter().map(&mut sheet).collect()),
+            bases: self.bases.clone(),
+        }
     }
 
     /// The tables next to a wavelength, each with its part.
     fn sheets(&self, front: bool, wavelength: f64) -> [(&[Option<Lobes>; 2], f64); 2] {
         const NONE: &[Option<Lobes>; 2] = &[None, None];
-        let side = &self.0[usize::from(!front)];
+        let side = &self.sheets[usize::from(!front)];
         let above = side.partition_point(|(at, _)| *at <= wavelength);
         match (above.checked_sub(1), side.get(above)) {
             (None, None) => [(NONE, 0.0); 2],
@@ -93,7 +102,7 @@ impl Sides {
     /// tables have one, and nothing has to be put together for it.
     #[inline]
     pub fn lone(&self, front: bool) -> Option<(bool, &Lobe)> {
-        match &self.0[usize::from(!front)][..] {
+        match &self.sheets[usize::from(!front)][..] {
             [(_, [Some(lobes), None])] => lobes.lone().map(|lobe| (false, lobe)),
             [(_, [None, Some(lobes)])] => lobes.lone().map(|lobe| (true, lobe)),
             _ => None,
@@ -108,15 +117,15 @@ impl Sides {
         })
     }
 
-    /// The shares of the floors, reflected and transmitted.
-    pub fn floors(&self, incident: Vec3, media: &Media) -> [f64; 2] {
+    /// The shares in the bases, reflected and transmitted.
+    pub fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2] {
         let (incidence, front) = (Incidence::new(incident), incident.z > 0.0);
         if let Some((transmitted, lobe)) = self.lone(front) {
             return on_its_way(transmitted, lobe.shares(incidence.sine).1[2]);
         }
         [false, true].map(|way| {
             let ways = self.lit(&incidence, front, way, media.wavelength);
-            ways.iter().flatten().map(|(lit, part)| part * lit.floor()).sum()
+            ways.iter().flatten().map(|(lit, part)| part * lit.base()).sum()
         })
     }
 }
@@ -134,7 +143,7 @@ pub(super) fn share(ways: &Ways<'_>) -> f64 {
         .fold(0.0, |sum, (lit, part)| sum + part * lit.share())
 }
 
-/// A slice or a floor (None), picked by its share, with what is left of the number.
+/// A slice or the base (None), picked by its share, with what is left of the number.
 pub(super) fn pick<'a>(ways: &Ways<'a>, number: f64) -> (Option<&'a Grid>, f64) {
     let mut left = number * share(ways);
     let mut picked = (None, number);

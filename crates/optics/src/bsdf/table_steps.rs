@@ -1,4 +1,4 @@
-//! How light is shared by the slices of a table and its floor, by the sine of incidence.
+//! How light is shared by the slices of a table and its base, by the sine of incidence.
 
 use etendue_sampling::guide::Guide;
 
@@ -11,9 +11,9 @@ pub(super) struct Steps {
     /// Rising sines of incidence from which on the steps hold.
     from: Vec<f64>,
     guide: Guide,
-    /// Of the flux, in each of two slices and in the floor.
+    /// Of the flux, in each of two slices and in the base.
     shares: Vec<Step>,
-    /// What f of each of two slices is multiplied by, and the share of the floor.
+    /// What f of each of two slices is multiplied by, and the share of the base.
     factors: Vec<Step>,
 }
 
@@ -51,11 +51,11 @@ impl Step {
 }
 
 /// How light from an angle of incidence is shared by slices.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Blend {
     /// The first of the two slices from here to the next sine; the other one follows it.
     first: usize,
-    /// Of the flux, in each of the two and in the floor.
+    /// Of the flux, in each of the two and in the base.
     shares: [f64; 3],
     /// What f of each of the two slices is multiplied by.
     factors: [f64; 2],
@@ -68,7 +68,7 @@ const TOLERANCE: f64 = 5e-6;
 const SMALLEST_STEP: f64 = 1e-4;
 
 /// How light is shared, at sines from 0 to 1 between which everything is linear.
-fn blends_of(slices: &[Grid], share: &Cubic, floor: &Cubic) -> (Vec<f64>, Vec<Blend>) {
+fn blends_of(slices: &[Grid], share: &Cubic, base: &Cubic) -> (Vec<f64>, Vec<Blend>) {
     let (mut sines, mut blends) = (Vec::new(), Vec::new());
     let mut push = |(sine, blend): (f64, Blend)| {
         sines.push(sine);
@@ -90,7 +90,7 @@ fn blends_of(slices: &[Grid], share: &Cubic, floor: &Cubic) -> (Vec<f64>, Vec<Bl
         let own = integrals[first].integral(slices[first].sine);
         let at = |sine: f64| {
             let square = sine * sine;
-            let (rho, floor) = (share.at(square), floor.at(square));
+            let (rho, base) = (share.at(square), base.at(square));
             let (shares, factors) = if beyond {
                 // The slice moves on unchanged.
                 let factor = if own > 0.0 { rho / own } else { 0.0 };
@@ -105,7 +105,7 @@ fn blends_of(slices: &[Grid], share: &Cubic, floor: &Cubic) -> (Vec<f64>, Vec<Bl
             };
             Blend {
                 first,
-                shares: [shares[0], shares[1], floor],
+                shares: [shares[0], shares[1], base],
                 factors,
             }
         };
@@ -133,30 +133,10 @@ fn blends_of(slices: &[Grid], share: &Cubic, floor: &Cubic) -> (Vec<f64>, Vec<Bl
 }
 
 impl Steps {
-    /// Of slices, by shares and floors over the square of the sine.
-    pub fn of(slices: &[Grid], share: &Cubic, floor: &Cubic) -> Self {
-        let (sines, blends) = blends_of(slices, share, floor);
+    /// Of slices, by shares in the lobe and in the base over the square of the sine.
+    pub fn of(slices: &[Grid], share: &Cubic, base: &Cubic) -> Self {
+        let (sines, blends) = blends_of(slices, share, base);
         Self::new(&sines, &blends)
-    }
-
-    /// Of a floor alone, by its shares at some sines from 0 to 1, between which it is linear.
-    pub fn of_floor(sines: &[f64], shares: &[f64]) -> Self {
-        let blend = |share: &f64| Blend {
-            shares: [0.0, 0.0, *share],
-            ..Blend::default()
-        };
-        let blends: Vec<Blend> = shares.iter().map(blend).collect();
-        let each = |of: fn(&Blend) -> [f64; 3]| {
-            let step = |end: usize| Step::new([end - 1, end], sines, &blends, of);
-            (1..sines.len()).map(step).collect()
-        };
-        let from = sines[..sines.len() - 1].to_vec();
-        Self {
-            guide: Guide::new(&from),
-            from,
-            shares: each(Blend::shares),
-            factors: each(Blend::factors),
-        }
     }
 
     /// The step with the shares of the flux at a sine.
@@ -165,21 +145,10 @@ impl Steps {
         &self.shares[self.at(sine)]
     }
 
-    /// The step with what f of two slices is multiplied by, and with the share of the floor.
+    /// The step with what f of two slices is multiplied by, and with the share of the base.
     #[inline]
     pub fn factors(&self, sine: f64) -> &Step {
         &self.factors[self.at(sine)]
-    }
-
-    /// Between two sines: the first of two slices, and these numbers where each step that reaches there begins and ends.
-    pub fn factors_between(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = (usize, [[f64; 3]; 2])> {
-        let ends = self.from.iter().skip(1).copied().chain([1.0]);
-        let steps = self.factors.iter().zip(ends);
-        let there = steps.filter(move |(step, end)| step.from <= to && *end >= from);
-        there.map(move |(step, end)| {
-            let sines = [from.max(step.from), to.min(end)];
-            (step.first as usize, sines.map(|sine| step.at(sine)))
-        })
     }
 
     /// Of blends at rising sines, as far as each step goes without anything being off.
@@ -215,8 +184,8 @@ impl Steps {
             .flat_map(|(step, to)| [step.values, step.at(to)])
     }
 
-    /// Without the floor.
-    pub fn without_floor(&self) -> Self {
+    /// Without the base.
+    pub fn without_base(&self) -> Self {
         let mut steps = self.clone();
         for step in steps.shares.iter_mut().chain(&mut steps.factors) {
             (step.values[2], step.slopes[2]) = (0.0, 0.0);
@@ -251,7 +220,7 @@ impl Blend {
         self.shares
     }
 
-    /// With the share of the floor.
+    /// With the share of the base.
     const fn factors(&self) -> [f64; 3] {
         [self.factors[0], self.factors[1], self.shares[2]]
     }
@@ -285,7 +254,7 @@ mod tests {
 
     #[test]
     fn shares_by_which_rays_are_drawn_are_those_of_the_table() {
-        let slice = |sine: f64, width: f64, floor: f64| Slice {
+        let slice = |sine: f64, width: f64, base: f64| Slice {
             sine,
             radial: (0..24).map(|i| 2.0 * (f64::from(i) / 23.0).powi(2)).collect(),
             azimuths: 1,
@@ -293,7 +262,7 @@ mod tests {
                 .map(|i| exp(-0.5 * (2.0 * (f64::from(i) / 23.0).powi(2) / width).powi(2)))
                 .collect(),
             share: 0.5 - 0.2 * sine,
-            floor,
+            base,
         };
         let slices = [slice(0.0, 0.3, 0.1), slice(0.5, 0.2, 0.2), slice(0.95, 0.4, 0.15)];
         let grids: Vec<Grid> = slices.iter().map(|slice| slice.grid(None).expect("sound")).collect();
@@ -301,9 +270,9 @@ mod tests {
             let squares: Vec<f64> = slices.iter().map(|slice| slice.sine * slice.sine).collect();
             Cubic::new(&squares, &slices.iter().map(pick).collect::<Vec<_>>())
         };
-        let (share, floor) = (of(|slice| slice.share), of(|slice| slice.floor));
-        let steps = Steps::of(&grids, &share, &floor);
-        let (sines, blends) = blends_of(&grids, &share, &floor);
+        let (share, base) = (of(|slice| slice.share), of(|slice| slice.base));
+        let steps = Steps::of(&grids, &share, &base);
+        let (sines, blends) = blends_of(&grids, &share, &base);
         assert!(4 * steps.from.len() < 3 * sines.len());
         for k in 0..=20_000 {
             let sine = f64::from(k) / 20_000.0;
@@ -322,10 +291,10 @@ mod tests {
                 assert!((share - known).abs() <= 1.0001 * TOLERANCE, "{sine}: {share} {known}");
             }
             let step = steps.factors(sine);
-            let [one, other, floor] = step.at(sine);
+            let [one, other, base] = step.at(sine);
             let scale: f64 = blend.factors.iter().sum();
             assert_eq!(step.first as usize, blend.first);
-            assert!((floor - blend.shares[2]).abs() <= 1.0001 * TOLERANCE);
+            assert!((base - blend.shares[2]).abs() <= 1.0001 * TOLERANCE);
             for (factor, known) in [one, other].into_iter().zip(blend.factors) {
                 assert!(
                     (factor - known).abs() <= 1.0001 * TOLERANCE * scale,

@@ -1,8 +1,8 @@
 //! A table of scattered light by direction: measured, or made of a model.
 //!
 //! **What is stored.** For each way (reflected, transmitted) and each azimuth and angle of incidence a *slice*: f on a polar
-//! grid about the specular direction in the plane of direction cosines, |β − β₀| and azimuth from the direction of β₀; a
-//! Lambertian floor apart from it; and the share of the flux of each.
+//! grid about the specular direction in the plane of direction cosines, |β − β₀| and azimuth from the direction of β₀; and the share
+//! of the flux in it and in the *base*, which leaves with one distribution from all incidences.
 //!
 //! **In between.** At an angle of incidence between two slices both are moved with β₀ and added by their distance; the sum is
 //! scaled to the share there, a monotone cubic in β₀² through the shares of the slices `[Hyman1983]`. Slices that are far
@@ -14,16 +14,16 @@
 //! the plane of direction cosines, where area is projected solid angle; and again if the point lies outside the unit circle.
 
 use std::cell::RefCell;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares, by_cosine};
+use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares};
+use super::table_base::Base;
 use super::table_draw::{Group, again};
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lobes};
-use super::table_product::{TableProduct, TableRest};
 use super::table_sides::{Side, Sides, on_its_way, pick, share};
 
 /// A table of scattered light.
@@ -31,37 +31,38 @@ use super::table_sides::{Side, Sides, on_its_way, pick, share};
 pub struct Tabulated {
     sides: Sides,
     facts: Facts,
-    /// Whether any slice has a floor; and the same without it, if anything is left.
-    floor: bool,
+    /// Whether any slice has a part in the base; and the same without it, if anything is left.
+    base: bool,
     lobes: Option<Arc<dyn Bsdf>>,
-    /// What it is a product and a rest of, where that is more than the floors; found when somebody asks.
-    product: OnceLock<Option<(TableProduct, Arc<dyn Bsdf>)>>,
     /// See [`Bsdf::most`].
     most: f64,
 }
 
 impl Tabulated {
+    /// Of light that meets the front and the back. The bases are of light that leaves on the front and on the back: luminances of
+    /// any scale at cosines of the angle from the normal that fall evenly from 1 to 0; none: Lambertian.
+    ///
     /// # Errors
     /// What is wrong with the tables.
-    pub fn new(front: &Side, back: &Side) -> Result<Self, String> {
-        let sides = Sides::new(front, back)?;
-        let floor = sides.each().flatten().flatten().any(Lobes::has_floor);
-        let lobes = floor.then(|| sides.map(Lobes::without_floor));
+    pub fn new(sides: [&Side; 2], bases: [&[f64]; 2]) -> Result<Self, String> {
+        let [front, back] = bases.map(Base::new);
+        let sides = Sides::new(sides, [front?, back?])?;
+        let base = sides.each().flatten().flatten().any(Lobes::has_base);
+        let lobes = base.then(|| sides.map(Lobes::without_base));
         let lobes = lobes.filter(|sides| sides.each().flatten().any(Option::is_some));
         let lobes = lobes.map(|sides| Arc::new(Self::of(sides, false, None)) as Arc<dyn Bsdf>);
-        Ok(Self::of(sides, floor, lobes))
+        Ok(Self::of(sides, base, lobes))
     }
 
-    fn of(sides: Sides, floor: bool, lobes: Option<Arc<dyn Bsdf>>) -> Self {
+    fn of(sides: Sides, base: bool, lobes: Option<Arc<dyn Bsdf>>) -> Self {
         let diffuse = [0, 1].map(|way| sides.each().any(|ways| ways[way].is_some()));
         // Between wavelengths and angles shares are no more than at both ends.
         let most = |ways: &[Option<Lobes>; 2]| ways.iter().flatten().map(Lobes::most).sum();
         let most = sides.each().map(most).fold(0.0, f64::max);
         Self {
             sides,
-            floor,
+            base,
             lobes,
-            product: OnceLock::new(),
             most,
             facts: Facts {
                 specular: [false; 2],
@@ -72,20 +73,6 @@ impl Tabulated {
                 fresnel: false,
             },
         }
-    }
-
-    /// A product that is more than the floors, and the rest of the light.
-    fn product_and_rest(&self) -> Option<(TableProduct, Arc<dyn Bsdf>)> {
-        let product = TableProduct::of(&self.sides)?;
-        let table = Self {
-            product: OnceLock::new(),
-            ..self.clone()
-        };
-        let rest = TableRest {
-            table: Arc::new(table),
-            product: product.clone(),
-        };
-        Some((product, Arc::new(rest)))
     }
 
     /// What scatters light; None: it is absorbed.
@@ -113,18 +100,20 @@ impl Tabulated {
         Some(Picked {
             incidence,
             grid,
+            base: self.sides.base(front != way),
             numbers: [number, numbers[1]],
             up: front != way,
         })
     }
 }
 
-/// Light that is scattered by a slice or a floor, before it is known where to.
+/// Light that is scattered by a slice or a base, before it is known where to.
 #[derive(Clone, Copy)]
 struct Picked<'a> {
     incidence: Incidence,
-    /// None: a floor.
+    /// None: the base.
     grid: Option<&'a Grid>,
+    base: &'a Base,
     /// Two numbers that have not been used.
     numbers: [f64; 2],
     up: bool,
@@ -135,7 +124,7 @@ impl Picked<'_> {
     #[inline]
     fn direction(&self, incident: Vec3) -> Vec3 {
         let Some(grid) = self.grid else {
-            return by_cosine(self.up, self.numbers);
+            return self.base.direction(self.up, self.numbers);
         };
         let place = grid.draw(self.numbers);
         let found = self.incidence.direction(incident, place, self.up);
@@ -168,28 +157,26 @@ impl Bsdf for Tabulated {
 
     fn evaluate(&self, incident: Vec3, scattered: Vec3, media: &Media) -> f64 {
         let incidence = Incidence::new(incident);
-        let (r, turn) = incidence.place(incident, scattered);
+        let place = incidence.place(incident, scattered);
         let front = incident.z > 0.0;
         let transmitted = front != (scattered.z > 0.0);
+        let luminance = self.leaving(scattered, media);
         if let Some((way, lobe)) = self.sides.lone(front) {
             return if way == transmitted {
-                lobe.at(incidence.sine, r, turn)
+                lobe.at(incidence.sine, place, luminance)
             } else {
                 0.0
             };
         }
         let ways = self.sides.lit(&incidence, front, transmitted, media.wavelength);
-        ways.iter().flatten().map(|(lit, part)| part * lit.at(r, turn)).sum()
+        ways.iter()
+            .flatten()
+            .map(|(lit, part)| part * lit.at(place, luminance))
+            .sum()
     }
 
     fn parts(&self) -> Option<Parts<'_>> {
-        if let Some((product, rest)) = self.product.get_or_init(|| self.product_and_rest()) {
-            return Some(Parts {
-                product,
-                rest: Some(rest),
-            });
-        }
-        self.floor.then_some(Parts {
+        self.base.then_some(Parts {
             product: self,
             rest: self.lobes.as_ref(),
         })
@@ -211,6 +198,7 @@ impl Bsdf for Tabulated {
         let picked = Picked {
             incidence,
             grid,
+            base: self.sides.base(front != transmitted),
             numbers: [number, numbers[1]],
             up: front != transmitted,
         };
@@ -230,7 +218,8 @@ impl Bsdf for Tabulated {
         if let Some((way, lobe)) = one_side.then(|| self.sides.lone(above > 0)).flatten() {
             let mut all = directions.each_mut().map(Vec::as_mut_slice);
             let up = (above > 0) != way;
-            GROUP.with_borrow_mut(|group| group.draw((lobe, up), &mut all, numbers, outcomes));
+            let base = self.sides.base(up);
+            GROUP.with_borrow_mut(|group| group.draw((lobe, base, up), &mut all, numbers, outcomes));
             return;
         }
         for (k, outcome) in outcomes.iter_mut().enumerate() {
@@ -246,10 +235,19 @@ thread_local! {
     static GROUP: RefCell<Box<Group>> = RefCell::new(Box::new(Group::new()));
 }
 
-/// The floors.
+/// The base.
 impl Product for Tabulated {
     fn arriving(&self, incident: Vec3, media: &Media) -> [f64; 2] {
-        self.sides.floors(incident, media)
+        self.sides.arriving(incident, media)
+    }
+
+    #[inline]
+    fn leaving(&self, scattered: Vec3, _media: &Media) -> f64 {
+        self.sides.base(scattered.z > 0.0).luminance(scattered.z.abs())
+    }
+
+    fn is_even(&self) -> bool {
+        [true, false].iter().all(|front| self.sides.base(*front).is_even())
     }
 }
 
@@ -264,7 +262,7 @@ impl super::contract::Examples for Tabulated {
         use super::table_grid::Slice;
         use super::table_lobes::{Row, Way};
 
-        let slice = |azimuths: usize, width: f64, [skew, aside]: [f64; 2], sine: f64, [share, floor]: [f64; 2]| {
+        let slice = |azimuths: usize, width: f64, [skew, aside]: [f64; 2], sine: f64, [share, base]: [f64; 2]| {
             let radial: Vec<f64> = (0..24).map(|i| 2.0 * (f64::from(i) / 23.0).powi(2)).collect();
             let mut f = Vec::new();
             for j in 0..azimuths {
@@ -280,11 +278,11 @@ impl super::contract::Examples for Tabulated {
                 azimuths,
                 f,
                 share,
-                floor,
+                base,
             }
         };
-        let lobe = |width: f64, skew: f64, sine: f64, share: f64, floor: f64| {
-            slice(12, width, [skew, 0.5 * skew], sine, [share, floor])
+        let lobe = |width: f64, skew: f64, sine: f64, share: f64, base: f64| {
+            slice(12, width, [skew, 0.5 * skew], sine, [share, base])
         };
         let row = |azimuth: f64, k: f64| Row {
             azimuth,
@@ -327,8 +325,19 @@ impl super::contract::Examples for Tabulated {
         let both = side([Some(turned), Some(faint)]);
         let one = side([Some(isotropic), None]);
         let [even, odd] = [14, 9].map(|azimuths| side([Some(alike(azimuths)), None]));
-        [(&one, &one), (&both, &one), (&coloured, &both), (&even, &odd)]
-            .map(|(a, b)| Self::new(a, b).expect("sound"))
-            .to_vec()
+        // Bases that fall towards the horizon, to 0 before it, and with a hole; the middle of steps is where a lattice looks.
+        let [falling, ending, broken] = [
+            &[1.0, 0.9, 0.7, 0.4, 0.1][..],
+            &[2.0, 2.0, 1.0, 0.0, 0.0],
+            &[1.0, 0.0, 3.0],
+        ];
+        [
+            ([&one, &one], [&[][..]; 2]),
+            ([&both, &one], [falling, &[]]),
+            ([&coloured, &both], [ending, falling]),
+            ([&even, &odd], [falling, broken]),
+        ]
+        .map(|(sides, bases)| Self::new(sides, bases).expect("sound"))
+        .to_vec()
     }
 }
