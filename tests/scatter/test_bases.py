@@ -52,6 +52,7 @@ def shares(table: et.BsdfTable) -> tuple[Array, Array]:
     return np.degrees(np.arcsin([one["sine"] for one in rows])), np.array([one["base"] for one in rows])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step", "noise", "least"), [(5.0, 0.0, 0.96), (20.0, 0.0, 0.96), (20.0, 0.05, 0.8)])
 def test_all_of_a_base_is_found(step: float, noise: float, least: float) -> None:
     """A lobe in the way of a slice takes nothing from it. With noise of 5 % the lowest of thousands of values decides."""
@@ -69,6 +70,7 @@ def test_all_of_a_base_is_found(step: float, noise: float, least: float) -> None
     assert (base.at(np.array([0.0, 0.1, 0.15])) == 0.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step", "bar"), [(5.0, 0.035), (20.0, 0.04)])
 def test_a_base_stays_where_it_is_between_incidences(step: float, bar: float) -> None:
     """Moved with the specular direction it would be wrong by a tenth and by a third, root mean square. What is left is
@@ -85,6 +87,7 @@ def test_a_base_stays_where_it_is_between_incidences(step: float, bar: float) ->
         assert math.sqrt(np.mean(off**2)) < bar, theta
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transmitted", [False, True])
 def test_what_a_base_sends_out_is_drawn_by_it(transmitted: bool) -> None:
     """A table that is nothing but a base, reflected or transmitted: f at any angles, and the mean sin² of samples."""
@@ -112,6 +115,16 @@ def test_what_a_base_sends_out_is_drawn_by_it(transmitted: bool) -> None:
     # Two-sided, 1 in 10⁴, beside what 1° steps of the grid and l between cosines are off.
     assert abs(found.mean() - mean) < 3.9 * spread / math.sqrt(found.size) + 5e-4
     assert (drawn[:, 2] * sign > 0.0).all()
+
+
+def test_a_lobe_at_one_incidence_is_no_base() -> None:
+    """Nobody can tell whether it moves; it does, as lobes of most surfaces do."""
+    incident = direction(0.0, 0.0)
+    scattered = GRID.directions(incident, transmitted=False)
+    lobe = np.exp(-np.sum((incident + scattered)[..., :2] ** 2, axis=-1) / (2.0 * 0.2**2))
+    table = et.BsdfTable(BsdfData([BsdfSlice(incident, lobe, grid=GRID)]))
+    f = table.evaluate(direction(40.0, 180.0), direction([0.0, 40.0], 0.0))
+    assert f[0] < 0.1 * f[1]
 
 
 def test_a_share_in_a_base_is_nowhere_too_much() -> None:

@@ -134,6 +134,7 @@ def holed(*, f: float | None = None, beyond: float = 2.0) -> et.BsdfTable:
     return et.BsdfTable(BsdfData(slices, mirrored=False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.0, 0.5])
 def test_one_low_value_changes_f_there_alone(part: float) -> None:
     """Elsewhere f is what it is of the same table without it: to what f is linear within where f is known, and to a quarter

@@ -10,6 +10,7 @@ so a few are tried.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,6 +31,9 @@ AROUND = 36
 
 FEW = 2
 """Of these, as many as do not decide what is in the base: a hole in a measurement."""
+
+SPAN = 0.5
+"""How far the specular direction has to move between slices, in direction cosines, before what stays can be told from it."""
 
 CLEARLY = 1.02
 """By how much more than a Lambertian base another one has to be."""
@@ -79,7 +83,8 @@ def base_of(slices: Sequence[BsdfSlice]) -> Base:
     Parameters
     ----------
     slices : sequence of BsdfSlice
-        Of any incidences, wavelengths and ways. Those of single points are left out, as points say little of rings.
+        Of any incidences, wavelengths and ways. Those of single points are left out, as points say little of rings. Where
+        incidences lie close together a lobe about the specular direction looks like a base; then the base is Lambertian.
 
     Examples
     --------
@@ -88,11 +93,12 @@ def base_of(slices: Sequence[BsdfSlice]) -> Base:
     >>> falling = [BsdfSlice(direction(theta, 0.0), [[0.3, 0.2, 0.0]], grid=grid) for theta in (0.0, 50.0)]
     >>> base = base_of(falling)
     >>> [round(float(base.at(np.array(cosine)) / base.at(np.array(1.0))), 2) for cosine in (1.0, 0.7, 0.1)]
-    [1.0, 0.68, 0.08]
+    [1.0, 0.67, 0.09]
     """
-    least = np.array([_least(one) for one in slices if one.grid is not None and not np.isnan(one.values).all()])
-    if not least.size:
+    known = [one for one in slices if one.grid is not None and not np.isnan(one.values).all()]
+    if np.ptp([math.sin(math.radians(one.theta)) for one in known] or [0.0]) < SPAN:
         return Base()
+    least = np.array([_least(one) for one in known])
     squares = _squares(1)
     areas = 0.5 * (np.diff(squares, prepend=0.0) + np.diff(squares, append=1.0))
     lambertian = float(least.min(axis=1).sum())

@@ -144,7 +144,7 @@ def _rests(known: Known, components: Sequence[Record], data: BsdfData, beyond: f
 
 
 def _bases(sides: Sequence[Known]) -> tuple[Base, Base]:
-    """Of light that leaves on the front and on the back, from slices of light that meets either, or of light that meets both."""
+    """Of light that leaves on the front and on the back; slices are of light that meets each, or either."""
 
     def leaving(front: bool) -> Base:
         known = zip((True, False), (sides[0], sides[-1]), strict=True)
