@@ -10,6 +10,7 @@ goniophotometer says of them: a diffuse surface, a diffuse and specular one, a t
 from __future__ import annotations
 
 import argparse
+import itertools
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,12 +21,16 @@ from etendue.plot import style
 from etendue.plot.region_marks import draw_marks, marks_of
 from experiments import goniometer
 from experiments.chamber import DIAMETER, FLUX, HEIGHT, SHEET, Finish, chamber
+from experiments.goniometer import smoothed, table
 from experiments.panels import LINES, ROOT, legend_below, map_grid, new_figure, print_table, put_bar_at, save
 from matplotlib.colors import Normalize, PowerNorm
 
 EYE = et.Observer(theta=55, phi=90, distance=1000, target=(0, 0, HEIGHT))
 REGION = et.Region(left=-10, right=10, bottom=-10.5, top=-2.5)
 """X 15 to 35 mm and Y 15 to 23 mm of a screen of 50 mm × 25 mm, from its upper left corner."""
+
+MANY = 128
+"""Lines of sight per pixel from which on diffuse light is gathered."""
 
 BRIGHTEST = 2500.0
 """Luminance at the end of the colours of two lamps over a plate [cd/m²]."""
@@ -99,7 +104,8 @@ def shares_of_the_light() -> None:
 
 
 def look(finish: Finish, screen: et.Screen, lines: int, edge: Finish | str = "absorber") -> et.LuminanceMap:
-    method = et.PathTracing(rays_per_pixel=lines, forward_rays=0)
+    # What patches know of the wall has to be found out first, which few lines do not pay for.
+    method = et.PathTracing(rays_per_pixel=lines, forward_rays=0, gather=lines >= MANY)
     return et.luminance_map(chamber(finish, edge), EYE, screen, method=method)
 
 
@@ -271,6 +277,20 @@ def print_fewer_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, ray
         )
 
 
+def print_noisy_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, rays: int) -> None:
+    """What few scans with errors give: joined by straight lines, and smoothed as far as the values say."""
+    print("\nPET: six scans, each value with noise")
+    for noise, (name, made) in itertools.product((0.0, 0.05, 0.2), {"lines": table, "smooth": smoothed}.items()):
+        wall = finish_of(made(PET, PET_ANGLES, noise))
+        lmap = look(wall, truth.screen, lines)
+        c, same = et.compare(lmap, truth, REGION), alike(distribution(wall, rays), lid)
+        most, mean, _ = numbers(lmap)
+        print(
+            f"    {noise:.0%}, {name}: NCC of the map {100 * c.ncc:.1f} %, NRMSE {100 * c.nrmse_thesis:.1f} %, "
+            f"maximum {most}, mean {mean} cd/m², NCC of the LID {same:.2f} %"
+        )
+
+
 def look_at_edges(screen: et.Screen, lines: int) -> dict[str, et.LuminanceMap]:
     """Figure 4.17."""
     print(
@@ -322,6 +342,7 @@ def main() -> None:
         print_material(material, maps[material], far[material], seconds)
     pet = maps["PET"]
     print_fewer_scans(pet["truth"], far["PET"]["truth"], lines, rays)
+    print_noisy_scans(pet["truth"], far["PET"]["truth"], lines, rays)
     edges = look_at_edges(screen, lines)
     rest = look(without_specular(materials["PET"]["diffuse + specular"]), screen, lines)
     light = split(rest, pet["diffuse + specular"], pet["truth"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import etendue as et
@@ -42,6 +43,7 @@ def total_reflectance(bsdf: et.Bsdf) -> float:
     return float(bsdf.reflectance(8.0))
 
 
+@functools.cache
 def scan(bsdf: et.Bsdf, theta: float) -> BsdfSlice:
     """F in the plane of incidence and in that across it through the specular direction."""
     incident = direction(theta, 180.0)
@@ -53,11 +55,33 @@ def scan(bsdf: et.Bsdf, theta: float) -> BsdfSlice:
     return BsdfSlice(incident, values, grid=grid)
 
 
-def table(bsdf: et.Bsdf, thetas: tuple[float, ...]) -> et.BsdfTable:
+def noisy(bsdf: et.Bsdf, theta: float, noise: float) -> BsdfSlice:
+    """The same with a relative standard error of each value."""
+    one = scan(bsdf, theta)
+    errors = np.random.default_rng(round(1000 * theta)).standard_normal(one.values.shape)
+    return BsdfSlice(one.incident, one.values * np.maximum(1.0 + noise * errors, 0.0), grid=one.grid)
+
+
+def smoothed(bsdf: et.Bsdf, thetas: tuple[float, ...], noise: float) -> et.Bsdf:
+    """The scans at some angles as the package makes a table of scans with errors: smooth, as far as the values say."""
+    slices = [noisy(bsdf, theta, noise) for theta in thetas]
+    known = [~np.isnan(one.values) for one in slices]
+    values = np.concatenate([one.values[there] for one, there in zip(slices, known, strict=True)])
+    scans = et.Scans(
+        np.concatenate([np.tile(one.incident, (there.sum(), 1)) for one, there in zip(slices, known, strict=True)]),
+        np.concatenate([one.directions[there] for one, there in zip(slices, known, strict=True)]),
+        values,
+        standard_error=noise * values,
+        reflectance=total_reflectance(bsdf),
+    )
+    return et.Bsdf.from_scans(scans, method="smooth")
+
+
+def table(bsdf: et.Bsdf, thetas: tuple[float, ...], noise: float = 0.0) -> et.BsdfTable:
     """The scans at some angles as a table, linear in azimuth between the planes, each with the reflectance of the sphere."""
     slices = []
     for theta in thetas:
-        one = scan(bsdf, theta)
+        one = noisy(bsdf, theta, noise)
         # Two planes say too much of some lobes: a table of a tenth is one that can be asked.
         alone = et.BsdfTable(BsdfData((BsdfSlice(one.incident, 0.1 * one.values, grid=one.grid),), mirrored=True))
         factor = 0.1 * total_reflectance(bsdf) / float(alone.reflectance(theta))
