@@ -159,6 +159,58 @@ def test_merl_that_was_not_measured_is_left_out(tmp_path: Path) -> None:
     assert float(np.nanmin(data.slices[3].values)) == pytest.approx(0.2, rel=1e-6)
 
 
+def bilinear(table: Array, u: Array, v: Array) -> Array:
+    """Over the unit square, by hats about the nodes."""
+    i, j = u * (table.shape[1] - 1), v * (table.shape[0] - 1)
+    wx = np.maximum(1.0 - np.abs(i[..., None] - np.arange(table.shape[1])), 0.0)
+    wy = np.maximum(1.0 - np.abs(j[..., None] - np.arange(table.shape[0])), 0.0)
+    return np.asarray(np.einsum("...x,...y,yx->...", wx, wy, table))
+
+
+def warped(density: Array, incident: Array, scattered: Array) -> tuple[float, float, float, float]:
+    """Coordinates of the half vector, and its distribution functions along x and y, by midpoints over the density."""
+    middle = (np.arange(2000) + 0.5) / 2000
+    half = (incident + scattered) / np.linalg.norm(incident + scattered)
+    u = math.sqrt(math.acos(half[2]) * 2.0 / math.pi)
+    v = (math.atan2(half[1], half[0]) + math.pi) / (2.0 * math.pi)
+    along = bilinear(density, middle, np.full(2000, v))
+    rows = bilinear(density, *np.meshgrid(middle, middle)).mean(axis=1)
+    return u, v, float(along[middle < u].sum() / along.sum()), float(rows[middle < v].sum() / rows.sum())
+
+
+@pytest.mark.slow
+def test_rgl_between_measured_incidences(tmp_path: Path) -> None:
+    """As Mitsuba's `measured`: densities of visible normals are normalised, then they and the values are linear in the angle."""
+    rng = np.random.default_rng(6)
+    single = np.float32
+    first, second = rng.uniform(0.2, 2.0, (2, 5, 4))
+    y, x = np.linspace(0, 1, 6)[:, None], np.linspace(0, 1, 7)
+    low, high = 0.05 + 0.03 * x + 0.04 * y, 0.02 + 0.06 * x + 0.01 * y
+    fields = {
+        "phi_i": np.zeros(1, single),
+        "theta_i": np.radians([0.0, 40.0]).astype(single),
+        "ndf": np.ones((2, 2), single),
+        "sigma": np.ones((2, 2), single),
+        # Of another scale.
+        "vndf": np.stack([first, 5.0 * second]).astype(single)[None],
+        "spectra": np.stack([low, high]).astype(single)[None, :, None],
+        "wavelengths": np.array([555.0], single),
+        "jacobian": np.zeros(1, np.uint8),
+    }
+    path = tmp_path / "x.bsdf"
+    path.write_bytes(tensors(fields))
+    data = read_bsdf_data(path)
+    assert [round(one.theta, 3) for one in data.slices] == [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0]
+    one, part = data.slices[3], 15.0 / 40.0
+    means = [bilinear(d, *np.meshgrid(*2 * [(np.arange(600) + 0.5) / 600])).mean() for d in (first, second)]
+    density = (1.0 - part) * first / means[0] + part * second / means[1]
+    for s in (direction(20.0, 130.0), direction(65.0, 200.0), direction(40.0, 260.0)):
+        _, _, left, below = warped(density, one.incident, s)
+        known = [0.05 + 0.03 * left + 0.04 * below, 0.02 + 0.06 * left + 0.01 * below]
+        expected = ((1.0 - part) * known[0] + part * known[1]) / s[2]
+        assert float(one.at(s)) == pytest.approx(expected, rel=0.01)
+
+
 @pytest.mark.slow
 def test_rgl_warp_against_a_quadrature(tmp_path: Path) -> None:
     """f cosθ = a + b x' + c y', x' and y' being the distribution functions of the density of visible normals.
@@ -173,21 +225,8 @@ def test_rgl_warp_against_a_quadrature(tmp_path: Path) -> None:
     path.write_bytes(rgl(vndf=density, values=values, ndf=ndf, sigma=sigma))
     data = read_bsdf_data(path)
     (one,) = (one for one in data.slices if abs(one.theta - 30.0) < 1e-3)
-
-    def bilinear(table: Array, u: Array, v: Array) -> Array:
-        i, j = u * (table.shape[1] - 1), v * (table.shape[0] - 1)
-        wx = np.maximum(1.0 - np.abs(i[..., None] - np.arange(table.shape[1])), 0.0)
-        wy = np.maximum(1.0 - np.abs(j[..., None] - np.arange(table.shape[0])), 0.0)
-        return np.asarray(np.einsum("...x,...y,yx->...", wx, wy, table))
-
-    middle = (np.arange(2000) + 0.5) / 2000
     for s in (direction(20.0, 130.0), direction(65.0, 200.0), direction(40.0, 260.0)):
-        half = (one.incident + s) / np.linalg.norm(one.incident + s)
-        u = math.sqrt(math.acos(half[2]) * 2.0 / math.pi)
-        v = (math.atan2(half[1], half[0]) + math.pi) / (2.0 * math.pi)
-        along = bilinear(density, middle, np.full(2000, v))
-        rows = bilinear(density, *np.meshgrid(middle, middle)).mean(axis=1)
-        left, below = along[middle < u].sum() / along.sum(), rows[middle < v].sum() / rows.sum()
+        u, v, left, below = warped(density, one.incident, s)
         # Of the light: θ as on the axis of half angles, and the azimuth 0, which is the middle of the second.
         from_light = math.sqrt(math.radians(30.0) * 2.0 / math.pi)
         scale = bilinear(ndf, np.array(u), np.array(v)) / (4.0 * bilinear(sigma, np.array(from_light), np.array(0.5)))

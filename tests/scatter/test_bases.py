@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pytest
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
 from etendue.scatter.bases import Base, base_of, share_in
+from etendue.scatter.resampling import lobes_of
 
 Array = npt.NDArray[np.float64]
 
@@ -133,3 +134,22 @@ def test_a_share_in_a_base_is_nowhere_too_much() -> None:
     f = np.array([0.6, 0.2, 0.075, 0.0, np.nan]) / np.pi
     assert share_in(f, leaving, 0.3) == pytest.approx(0.15)
     assert share_in(np.append(f[:1], [0.0] * 4), leaving, 0.3) == 0.0
+
+
+@pytest.mark.slow
+def test_beyond_the_horizon_is_nothing_brighter_than_what_is_known() -> None:
+    """f goes on there in proportion to the slice before; at grazing incidence it rises with every slice, and what is left beside
+    a base may rise from hardly anything."""
+    metal = et.bsdf.RoughMetal(roughness=0.35, reflectance=0.6)
+    found = []
+    for theta in np.arange(0.0, 86.0, 5.0):
+        incident = direction(theta, 180.0)
+        scattered = GRID.directions(incident, transmitted=False)
+        f = np.asarray(metal.evaluate(incident, scattered)) + 0.1 * scattered[..., 2] * (
+            0.2 + np.abs(scattered[..., 1])
+        )
+        found.append(BsdfSlice(incident, f, grid=GRID))
+    lobes = lobes_of(found, [one.integral() for one in found], isotropic=True, mirrored=False, base=base_of(found))[0.0]
+    assert max(lobe.base for lobe in lobes) > 0.02
+    for one, lobe in zip(found, lobes, strict=False):
+        assert lobe.f.max() <= one.values.max() * (1.0 + 1e-9)

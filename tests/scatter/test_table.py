@@ -162,6 +162,7 @@ def test_a_slice_without_a_diffuse_part_has_neighbours_without() -> None:
     assert [lobe.base for lobe in lobes] == [0.0] * 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wide", [10.0, 30.0, 72.0, 150.0])
 def test_a_hole_in_a_slice_stays_a_hole(wide: float) -> None:
     """R = 0.4 and a lobe that moves with the incidence; at 40° a sector about the light is dark. Between incidences f is the

@@ -347,13 +347,15 @@ def _continued(f: Array, before: Array | None, level: float = 0.0) -> Array:
     """Missing values along each azimuth in proportion to those of the slice before, or to the mean of all azimuths.
 
     A base of about this level was taken off both, beside which what is left may be nothing. The mean falls away from the
-    specular direction, or is held: what rises there is another lobe, as of light sent back.
+    specular direction, or is held: what rises there is another lobe, as of light sent back. Nothing becomes more than what is
+    known, however often f rises from slice to slice.
     """
     # At grazing incidence the hemisphere may end before the first step: the specular direction itself is common to all.
     centre = f[:, 0][~np.isnan(f[:, 0])]
     f = f.copy()
     f[:, 0] = np.where(np.isnan(f[:, 0]), centre.mean() if centre.size else np.nanmean(f), f[:, 0])
     missing = np.isnan(f)
+    most = np.nanmax(f)
     last = np.maximum.accumulate(np.where(missing, 0, np.arange(f.shape[1])), axis=1)
     held = np.take_along_axis(f, last, axis=1)
     if before is None:
@@ -362,7 +364,7 @@ def _continued(f: Array, before: Array | None, level: float = 0.0) -> Array:
         before = np.broadcast_to(np.minimum.accumulate(np.where(known.any(axis=0), mean, np.inf)), f.shape)
     there = np.take_along_axis(before, last, axis=1)
     ratio = np.divide(before + level, there + level, out=np.ones_like(before), where=missing & (there + level > 0.0))
-    return np.asarray(held * ratio)
+    return np.asarray(np.where(missing, np.minimum(held * ratio, most), f))
 
 
 def _chosen(radial: Array, f: Array, whole: Array) -> npt.NDArray[np.intp]:

@@ -30,6 +30,9 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 STEEPEST = 89.0
 """Incidences beyond this [°] are left out."""
 
+STEP = 5.0
+"""Incidences that lie farther apart [°] get others in between, interpolated as by the authors of the format."""
+
 ISOTROPIC = 2
 """Azimuths of incidence up to which a sample is isotropic, as its authors have it."""
 
@@ -43,7 +46,7 @@ def recognise(head: bytes) -> bool:
 
 
 def read(path: Path) -> BsdfData:
-    """Read the BRDF at the incidences that were measured, as the authors of the format interpolate it.
+    """Read the BRDF at incidences that were measured and at others in between, as the authors of the format interpolate it.
 
     f cosθ of the scattered direction is tabled; it is divided by the cosine. Of spectra the mean weighted by V(λ) is taken,
     under light of equal energy, of RGB the luminance. A sample that was measured over a part of the turn is taken to be its
@@ -57,20 +60,23 @@ def read(path: Path) -> BsdfData:
     expected = (phi_i.size, theta_i.size)
     if vndf.shape[:2] != expected or values.shape[:2] != expected or min(*ndf.shape, *sigma.shape, *vndf.shape[2:]) < 2:
         raise FormatError(path, "fields", "tables that do not fit the angles of incidence", ADVICE)
+    # Densities of visible normals are normalised before they are interpolated.
+    vndf = vndf / np.maximum(_integrals(vndf), np.finfo(np.float64).tiny)[..., None, None]
     jacobian = bool(np.any(fields["jacobian"])) if "jacobian" in fields else False
     isotropic = phi_i.size <= ISOTROPIC
     slices = []
-    for (j, phi), (i, theta) in itertools.product(enumerate(phi_i), enumerate(theta_i)):
+    for (j, phi), (i, part, theta) in itertools.product(enumerate(phi_i), _incidences(theta_i)):
         if theta > STEEPEST or (isotropic and j):
             continue
-        table = _Table(values[j, i], _Warp(vndf[j, i]), ndf, sigma, jacobian=jacobian, isotropic=isotropic)
+        level, density = (_between(tables[j], i, part) for tables in (values, vndf))
+        table = _Table(level, _Warp(density), ndf, sigma, jacobian=jacobian, isotropic=isotropic)
         for azimuth, signs in [(float(phi), (1.0, 1.0))] if isotropic else _images(phi_i, j):
             slices += sampled(table.image(*signs), [(float(theta), azimuth)])
     if not slices:
         raise FormatError(path, "theta_i", "no incidence below 89°", ADVICE)
     text = bytes(fields["description"].ravel().astype("u1").tolist()) if "description" in fields else b""
     name = text.decode("utf-8", "replace").strip("\0 \n")[:100]
-    note = "sampled at the measured incidences; light is scattered by the table made of it"
+    note = "sampled at the measured incidences and in steps of 5° at most; light is scattered by the table made of it"
     return BsdfData(
         tuple(slices),
         isotropic=isotropic,
@@ -78,6 +84,21 @@ def read(path: Path) -> BsdfData:
         name=name or path.stem,
         complaints=(Complaint("note", "values", said), Complaint("note", "grid", note)),
     )
+
+
+def _incidences(theta_i: Array) -> list[tuple[int, float, float]]:
+    """Angles of incidence [°]: the number of the measured one below, how far on to the next one, and the angle."""
+    found = []
+    for i, theta in enumerate(theta_i):
+        step = float(theta_i[i + 1] - theta) if i + 1 < theta_i.size else 0.0
+        parts = max(int(np.ceil(step / STEP)), 1)
+        found += [(i, k / parts, float(theta + step * k / parts)) for k in range(parts)]
+    return found
+
+
+def _between(tables: Array, i: int, part: float) -> Array:
+    """Between two incidences, linear in the angle."""
+    return np.asarray(tables[i] if part == 0.0 else (1.0 - part) * tables[i] + part * tables[i + 1])
 
 
 def _images(phi_i: Array, j: int) -> list[tuple[float, tuple[float, float]]]:
@@ -165,6 +186,13 @@ def _luminance(path: Path, fields: dict[str, npt.NDArray[np.generic]]) -> tuple[
     if rgb.shape[2] != LUMINANCE.size:
         raise FormatError(path, "rgb", f"{rgb.shape[2]} colours", ADVICE)
     return np.einsum("l,pilyx->piyx", LUMINANCE, rgb), "of red, green and blue the luminance is read"
+
+
+def _integrals(tables: Array) -> Array:
+    """Over the unit square of functions that are bilinear on grids, the last two axes."""
+    return np.asarray(
+        np.trapezoid(np.trapezoid(tables, axis=-1), axis=-1) / ((tables.shape[-1] - 1) * (tables.shape[-2] - 1))
+    )
 
 
 class _Warp:
