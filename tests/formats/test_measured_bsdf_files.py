@@ -180,7 +180,7 @@ def warped(density: Array, incident: Array, scattered: Array) -> tuple[float, fl
 
 @pytest.mark.slow
 def test_rgl_between_measured_incidences(tmp_path: Path) -> None:
-    """As Mitsuba's `measured`: densities of visible normals are normalised, then they and the values are linear in the angle."""
+    """As Mitsuba's `measured`: densities of visible normals are normalised; they and the values are linear in the angle."""
     rng = np.random.default_rng(6)
     single = np.float32
     first, second = rng.uniform(0.2, 2.0, (2, 5, 4))

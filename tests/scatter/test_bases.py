@@ -138,8 +138,8 @@ def test_a_share_in_a_base_is_nowhere_too_much() -> None:
 
 @pytest.mark.slow
 def test_beyond_the_horizon_is_nothing_brighter_than_what_is_known() -> None:
-    """f goes on there in proportion to the slice before; at grazing incidence it rises with every slice, and what is left beside
-    a base may rise from hardly anything."""
+    """f goes on there in proportion to the slice before; at grazing incidence it rises with every slice, and what is left
+    beside a base may rise from hardly anything."""
     metal = et.bsdf.RoughMetal(roughness=0.35, reflectance=0.6)
     found = []
     for theta in np.arange(0.0, 86.0, 5.0):

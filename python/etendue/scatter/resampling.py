@@ -347,8 +347,8 @@ def _continued(f: Array, before: Array | None, level: float = 0.0) -> Array:
     """Missing values along each azimuth in proportion to those of the slice before, or to the mean of all azimuths.
 
     A base of about this level was taken off both, beside which what is left may be nothing. The mean falls away from the
-    specular direction, or is held: what rises there is another lobe, as of light sent back. Nothing becomes more than what is
-    known, however often f rises from slice to slice.
+    specular direction, or is held: what rises there is another lobe, as of light sent back. Nothing becomes more than what
+    is known, however often f rises from slice to slice.
     """
     # At grazing incidence the hemisphere may end before the first step: the specular direction itself is common to all.
     centre = f[:, 0][~np.isnan(f[:, 0])]
