@@ -298,8 +298,9 @@ def main() -> None:
         "gaussian": et.bsdf.Gaussian(peak=LOBE / (2 * math.pi * SIGMA**2), sigma=SIGMA),
         "coated": et.bsdf.Coated(index=1.5, base_reflectance=0.8),
         "rough-metal": et.bsdf.RoughMetal(roughness=0.2, index=0.96, extinction=6.69),
-        "rough-coat": et.bsdf.RoughCoat(roughness=0.2, index=1.5, base_reflectance=0.8),
+        "rough-coat": (paint := et.bsdf.RoughCoat(roughness=0.2, index=1.5, base_reflectance=0.8)),
         "table": measured,
+        "table-of-paint": tabled(paint),
     }
     if only := [name for name in given.only.split(",") if name]:
         if unknown := set(only) - set(bsdfs):

@@ -39,6 +39,21 @@ def scans(tmp_path: Path) -> list[Path]:
     return paths
 
 
+def test_scans_behind_a_sample(run: Run, scans: list[Path]) -> None:
+    """The same lobe about the direction straight on: θ of the detector counts on from the normal of the front."""
+    head, *rows = scans[0].read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    through = [",".join([i, p, str(180.0 - float(s)), *rest]) for i, p, s, *rest in cells]
+    Path("through.csv").write_text("\n".join([head, *through]) + "\n")
+    fitted = run("bsdf", "fit", "through.csv", "-o", "opal.h5", "--transmittance", "0.5")
+    assert fitted.status == 0, fitted.err
+    assert "10°: the scans of transmitted light add up to 0.7" in fitted.out
+    assert "scaled to 0.5" in fitted.out
+    (one,) = json.loads(run("bsdf", "info", "opal.h5", "--json").out)["tables"]
+    assert (one["transmitted"], one["share"]) == (True, pytest.approx(0.5, abs=1e-3))
+    assert run("bsdf", "fit", "through.csv", "-o", "abg.h5", "--model", "abg").status != 0
+
+
 @pytest.mark.slow
 def test_scans_to_a_table_and_what_is_said_of_it(run: Run, scans: list[Path]) -> None:
     fitted = run("bsdf", "fit", *scans, "-o", "pet.h5", "--reflectance", "0.7", "--json")

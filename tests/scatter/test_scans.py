@@ -13,6 +13,8 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.quantities.bsdf_data import PolarGrid, direction, mirrored
+from etendue.scatter.materials import MATERIALS
+from etendue.scatter.model_fit import fit_bsdf
 from etendue.scatter.scans import harvey_shack
 from etendue.scatter.scans.files import read_scans
 from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction
@@ -310,13 +312,63 @@ def test_a_stated_method_that_cannot_work_names_those_that_can() -> None:
         tabulated(in_plane(f=0.0), "smooth")
 
 
-def test_transmitted_light_is_no_part_of_scans(tmp_path: Path) -> None:
-    with pytest.raises(ArgumentError, match="behind the sample: scans hold reflected light alone"):
-        Scans([[0, 0, 1]] * 2, [[0, 0, 1], [0, 0.6, -0.8]], [0.1, 0.2])  # type: ignore[arg-type,list-item] # made arrays
+def test_transmitted_light_is_the_mirror_image_of_reflected_light(tmp_path: Path) -> None:
+    """A lobe about the direction straight on makes the slices of one about the specular direction, on the other side."""
+    front = in_plane(f=0.25)
+    through = front.scattered * [1.0, 1.0, -1.0]
+    for method in ("automatic", "shepard", "smooth"):
+        (one,) = tabulated(front, method).slices
+        (other,) = tabulated(Scans(front.incident, through, front.values), method).slices
+        assert (one.transmitted, other.transmitted) == (False, True)
+        assert np.array_equal(one.values, other.values, equal_nan=True)
+        assert one.stated == other.stated
+    both = Scans(
+        np.concatenate([front.incident, front.incident]),
+        np.concatenate([front.scattered, through]),
+        np.concatenate([front.values, 0.5 * front.values]),
+        reflectance=0.6,
+        transmittance=0.3,
+    )
+    table = et.Bsdf.from_scans(both)
+    assert table.reflectance(30.0) == pytest.approx(0.6, abs=1e-3)
+    assert table.transmittance(30.0) == pytest.approx(0.3, abs=1e-3)
+    # From a file θ counts on from the normal of the front.
     path = tmp_path / "scan.csv"
-    path.write_text("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0,1\n30,180,150,0,1\n")
-    with pytest.raises(FormatError, match=r"row 2: light at 150° from the normal.*leave such rows out.*astm or pab"):
-        read_scans([path])
+    path.write_text("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0,1\n30,180,150,0,2\n")
+    read = read_scans([path], transmittance=0.4)
+    assert read.scattered[:, 2] == pytest.approx([math.cos(math.radians(30.0)), -math.cos(math.radians(30.0))])
+    assert read.transmittance == 0.4
+    with pytest.raises(ArgumentError, match=r"scattered\[1\].*behind the sample: models are fitted to reflected light"):
+        fit_bsdf(read, "lambertian")
+    with pytest.raises(ArgumentError, match=r"scattered\[0\] is .*, no unit vector beside the sample"):
+        Scans([[0, 0, 1]], [[0, 1, 0]], [0.1])  # type: ignore[arg-type,list-item] # made arrays
+    with pytest.raises(ArgumentError, match=r"transmittance is 1\.2"):
+        Scans([[0, 0, 1]], [[0, 0, 1]], [0.1], transmittance=1.2)  # type: ignore[arg-type,list-item] # made arrays
+
+
+@pytest.mark.slow
+def test_a_diffuser_from_scans_behind_it() -> None:
+    """A holographic diffuser of 20°, scanned in six planes at four incidences: f and T are its own."""
+    diffuser = MATERIALS["holographic-diffuser-20"].finish
+    grid = PolarGrid(
+        "specular", np.append(np.arange(0.0, 30.0, 1.0), np.arange(30.0, 150.0, 5.0)), np.arange(12) * 30.0
+    )
+    incident, scattered, values = [], [], []
+    for theta in (0.0, 20.0, 40.0, 60.0):
+        light = direction(theta, 180.0)
+        to = grid.directions(light, transmitted=True).reshape(-1, 3)
+        to = to[to[:, 2] < -0.02]
+        incident.append(np.tile(light, (len(to), 1)))
+        scattered.append(to)
+        values.append(diffuser.evaluate(light, to))
+    table = et.Bsdf.from_scans(Scans(*map(np.concatenate, (incident, scattered, values))))
+    assert (table.reflectance([0.0, 30.0]) == 0.0).all()
+    thetas = np.array([0.0, 20.0, 30.0, 40.0])
+    assert table.transmittance(thetas) == pytest.approx(diffuser.transmittance(thetas), rel=0.02)
+    at = direction(np.arange(100.0, 180.0, 8.0)[:, None], np.arange(0.0, 360.0, 45.0))
+    for theta in (0.0, 30.0, 40.0):
+        known = diffuser.evaluate(direction(theta, 180.0), at)
+        assert np.abs(table.evaluate(direction(theta, 180.0), at) - known).max() < 0.05 * known.max()
 
 
 @pytest.mark.parametrize("method", ["specular-centred", "shepard"])

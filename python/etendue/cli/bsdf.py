@@ -220,6 +220,10 @@ def fit(
         float | None,
         typer.Option("--reflectance", help="Reflectance by an integrating sphere; each incidence is scaled to it."),
     ] = None,
+    transmittance: Annotated[
+        float | None,
+        typer.Option("--transmittance", help="Transmittance by an integrating sphere, for scans behind the sample."),
+    ] = None,
     incident_flux: Annotated[
         Path | None, typer.Option("--incident-flux", help="For stages: the file with the flux on the sample.")
     ] = None,
@@ -238,7 +242,12 @@ def fit(
         raise typer.BadParameter("it is for tables, and --model asks for a model; leave one out", param_hint="--method")
     check_folder(output)
     scans = read_scans(
-        files, incident_flux=incident_flux, solid_angle=solid_angle, reflectance=reflectance, blank=blank
+        files,
+        incident_flux=incident_flux,
+        solid_angle=solid_angle,
+        reflectance=reflectance,
+        transmittance=transmittance,
+        blank=blank,
     )
     if fitted is not None:
         _fit_model(scans, fitted, output, json=json)
@@ -295,12 +304,13 @@ def _fit_table(scans: Scans, method: str, output: Path, *, json: bool) -> None:
         complain(line)
     if math.isfinite(turning):
         say(f"  turning the sample changes values by {turning:.1%} (root mean square)")
-    scaled = "" if scans.reflectance is None else f", scaled to {scans.reflectance:g}"
     for one, held in zip(shares, table.data.slices, strict=True):
         place = f"{one['theta']:g}°" + ("" if table.isotropic else f", azimuth {one['phi']:g}°")
-        way = " of transmitted light" if one["transmitted"] else ""
+        way = " of transmitted light" if held.transmitted else ""
+        total = scans.transmittance if held.transmitted else scans.reflectance
+        scaled = "" if total is None else f", scaled to {total:g}"
         say(f"  {place}: the scans{way} add up to {_share_told(held)}{scaled}")
-    say(f"{output}: {len(table.data.slices)} incidences of {scans.values.size} values, {method}")
+    say(f"{output}: {len(table.data.slices)} slices of {scans.values.size} values, {method}")
 
 
 def _share_told(one: BsdfSlice) -> str:

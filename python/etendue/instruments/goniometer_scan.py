@@ -220,12 +220,12 @@ class GoniometerScan:
         Raises
         ------
         ArgumentError
-            If it is a scan without a sample or of transmitted light, or the solid angle is not known.
+            If it is a scan without a sample, or the solid angle is not known.
         """
-        if not self.sample or self.way == "transmitted":
-            raise ArgumentError("scans for tables are of light that a sample reflects")
+        if not self.sample:
+            raise ArgumentError("scans for tables are of light that a sample scatters; this one is of the beam alone")
         incident = np.tile(light_from(self.incidence, 180.0), (self.angle.size, 1))
-        scattered = detector_directions(self.angle, self.incidence, self.plane, behind=False)
+        scattered = detector_directions(self.angle, self.incidence, self.plane, behind=self.way == "transmitted")
         return Scans(incident, scattered, self.bsdf, self.bsdf_error)
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -237,6 +237,12 @@ def fit_bsdf(scans: Scans, model: str) -> BsdfFit:
     """
     if model not in FITTED_MODELS:
         raise UnknownNameError("model to fit", model, FITTED_MODELS)
+    if (scans.scattered[:, 2] < 0.0).any():
+        at = int(np.argmax(scans.scattered[:, 2] < 0.0))
+        raise ArgumentError(
+            f"scattered[{at}] is {scans.scattered[at].tolist()}, behind the sample: models are fitted to reflected light; "
+            "leave transmitted light out, or make a table"
+        )
     if scans.reflectance is not None:
         raise ArgumentError(
             "a reflectance scales tables; a model is fitted to the values as they are: leave the reflectance out"

@@ -28,6 +28,7 @@ def read_scans(
     incident_flux: str | os.PathLike[str] | None = None,
     solid_angle: float | None = None,
     reflectance: float | None = None,
+    transmittance: float | None = None,
     blank: str | os.PathLike[str] | None = None,
 ) -> Scans:
     r"""Read scans from files, all of one sample.
@@ -36,7 +37,8 @@ def read_scans(
     ----------
     paths : sequence of path
         Each with the columns theta_i, phi_i, theta_s, phi_s [°] and bsdf [1/sr]: of the direction to where the light comes
-        from and of the detector, azimuths from the x axis of the sample; or alpha, beta, gamma, delta [°] and flux, of the
+        from and of the detector, azimuths from the x axis of the sample, θ from the normal of the side that the light meets:
+        transmitted light has theta_s above 90°; or alpha, beta, gamma, delta [°] and flux, of the
         stages. A column standard_error may follow, in the unit of the values. Or workbooks (.xls) of the goniometer
         RT-300S, whose signal is π f |cos θ|; positions within `SHADOW` of the light, where the detector stands in its way,
         are left out.
@@ -44,7 +46,7 @@ def read_scans(
         For files of stages: a file of the same columns, whose mean flux is that on the sample.
     solid_angle : float, optional
         For files of stages: of the aperture [sr].
-    reflectance : float, optional
+    reflectance, transmittance : float, optional
         Of an integrating sphere.
     blank : path, optional
         For workbooks: of the same positions without a sample, subtracted.
@@ -92,14 +94,6 @@ def read_scans(
             i, s = incident_direction(stages[2], stages[3]), detector_direction(*stages)
             f = bsdf_of_flux(columns["flux"], arriving, solid_angle=solid_angle, direction=s)
             error = None if error is None else bsdf_of_flux(error, arriving, solid_angle=solid_angle, direction=s)
-        if (s[:, 2] < 0.0).any():
-            at = int(np.argmax(s[:, 2] < 0.0))
-            raise FormatError(
-                Path(path),
-                f"row {at + 1}",
-                f"light at {np.degrees(np.arccos(s[at, 2])):g}° from the normal, which the sample transmits",
-                "Scans take reflected light alone: leave such rows out. Files of astm or pab hold both, see `bsdf convert`.",
-            )
         if (f < 0.0).any():
             at = int(np.argmin(f))
             raise FormatError(
@@ -116,6 +110,7 @@ def read_scans(
         np.concatenate(values),
         np.concatenate([error for error in errors if error is not None]) if whole else None,
         reflectance,
+        transmittance,
     )
 
 

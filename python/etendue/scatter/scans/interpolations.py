@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -359,8 +359,8 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
     -------
     BsdfData
         Isotropic if all light comes from one azimuth; the fact "interpolation" says how it was made. Scaled to
-        `scans.reflectance` where that is known; `stated` is the
-        share before. With standard errors where the scans have some and the method is linear, or finds its own (`smooth`).
+        `scans.reflectance` and `scans.transmittance` where these are known; `stated` is the share before. With standard
+        errors where the scans have some and the method is linear, or finds its own (`smooth`).
 
     Raises
     ------
@@ -380,21 +380,40 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
     >>> round(tabulated(flat, method="shepard").slices[0].integral(), 3)
     0.785
     """
-    complaints: list[Complaint] = []
-    if method == AUTOMATIC:
-        method, why = suited(scans)
-        complaints += [Complaint("note", f"method {method}", why)] if why else []
-    if method not in METHODS:
+    if method not in (*METHODS, AUTOMATIC):
         raise UnknownNameError("method of interpolation", method, [*METHODS, AUTOMATIC])
-    radial = radial_coordinates(smallest)
-    slices = []
-    groups = scans.by_incidence()
     turns: list[float] = []
-    for incident, _ in groups:
+    for incident, _ in scans.by_incidence():
         phi = _azimuth(incident)
         if phi is not None and all(apart(np.array(phi), other) > TURNED for other in turns):
             turns.append(phi % 360.0)
-    for measured, own in groups:
+    complaints: list[Complaint] = []
+    slices: list[BsdfSlice] = []
+    methods: list[str] = []
+    for transmitted in (False, True):
+        way = scans.way(transmitted=transmitted)
+        if way is None:
+            continue
+        own, why = suited(way) if method == AUTOMATIC else (method, "")
+        told = f"method {own}" + (" for transmitted light" if transmitted else "")
+        complaints += [Complaint("note", told, why)] if why else []
+        methods += [own] if own not in methods else []
+        slices += _slices(way, own, radial_coordinates(smallest), turns, transmitted=transmitted)
+    return BsdfData(
+        tuple(slices),
+        isotropic=len(turns) <= 1,
+        mirrored=False,
+        name="scans",
+        complaints=tuple(complaints),
+        facts={"interpolation": ", ".join(methods)},
+    )
+
+
+def _slices(
+    scans: Scans, method: str, radial: Array, turns: Sequence[float], *, transmitted: bool
+) -> Iterator[BsdfSlice]:
+    """A slice for each incidence of what is reflected, or of the mirror image of what is transmitted."""
+    for measured, own in scans.by_incidence():
         incident = measured
         if _azimuth(measured) is None and len(turns) == 1:
             # The sample was not turned: the plane of incidence is the same along the normal.
@@ -418,25 +437,16 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
         if error is not None:
             errors = np.full(grid.shape, np.nan)
             errors[there] = error
-        one = BsdfSlice(incident, values, grid=grid)
+        # The same grid of direction cosines, on the side where the light leaves.
+        one = BsdfSlice(incident, values, transmitted, grid=grid)
         share = one.integral()
         factor = 1.0
         if scans.reflectance is not None:
             if not share > 0.0:
-                raise ArgumentError("nothing is scattered: the values cannot be scaled to a reflectance")
+                raise ArgumentError("nothing is scattered: the values cannot be scaled to a share of the light")
             factor = scans.reflectance / share
         scaled = None if errors is None else errors * factor
-        slices.append(
-            BsdfSlice(incident, values * factor, grid=grid, stated=share, standard_error=scaled, interpolated=True)
-        )
-    return BsdfData(
-        tuple(slices),
-        isotropic=len(turns) <= 1,
-        mirrored=False,
-        name="scans",
-        complaints=tuple(complaints),
-        facts={"interpolation": method},
-    )
+        yield dataclasses.replace(one, values=values * factor, stated=share, standard_error=scaled, interpolated=True)
 
 
 def share_error(one: BsdfSlice) -> float:

@@ -24,24 +24,25 @@ TURNED = 2e-3
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Scans:
-    """BRDF at measured pairs of directions, light meeting and leaving the front.
+    """BSDF at measured pairs of directions of light that meets the front; it is reflected, or transmitted to the back.
 
     Parameters
     ----------
     incident, scattered : array, shape (n, 3)
-        Unit vectors away from the surface, +z the normal: to where the light comes from, and to the detector.
+        Unit vectors away from the surface, +z the normal: to where the light comes from, and to the detector, which is
+        behind the sample (z < 0) for transmitted light.
     values : array, shape (n,)
         f [1/sr].
     standard_error : array, shape (n,), optional
         Of the values [1/sr].
-    reflectance : float, optional
-        Total reflectance of an integrating sphere; tables are scaled to it at each incidence.
+    reflectance, transmittance : float, optional
+        Total ones of an integrating sphere; tables are scaled to them at each incidence.
 
     Raises
     ------
     ArgumentError
-        If shapes do not fit, a direction is no unit vector in front of the sample, a value or a
-        standard error is not finite or below 0.
+        If shapes do not fit, a direction is no unit vector, light comes from behind the sample or leaves along it, a value
+        or a standard error is not finite or below 0.
 
     Examples
     --------
@@ -55,6 +56,7 @@ class Scans:
     values: Array
     standard_error: Array | None = None
     reflectance: float | None = None
+    transmittance: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("incident", "scattered", "values", "standard_error"):
@@ -64,16 +66,14 @@ class Scans:
         n = self.values.shape
         if len(n) != 1 or not n[0] or self.incident.shape != (*n, 3) or self.scattered.shape != (*n, 3):
             raise ArgumentError("scans are n pairs of directions of shape (n, 3) with n values")
-        for name, vectors in (("incident", self.incident), ("scattered", self.scattered)):
-            unit = np.abs(np.linalg.norm(vectors, axis=1) - 1.0) < SAME
-            if not (unit & (vectors[:, 2] > 0.0)).all():
-                at = int(np.argmin(unit & (vectors[:, 2] > 0.0)))
-                if unit.all() and name == "scattered" and vectors[at, 2] < 0.0:
-                    raise ArgumentError(
-                        f"scattered[{at}] is {vectors[at].tolist()}, behind the sample: scans hold reflected light alone; "
-                        "make slices of a BsdfTable of transmitted light"
-                    )
-                raise ArgumentError(f"{name}[{at}] is {vectors[at].tolist()}, no unit vector in front of the sample")
+        sides = (("incident", self.incident, "in front of"), ("scattered", np.abs(self.scattered), "beside"))
+        for name, vectors, where in sides:
+            sound = (np.abs(np.linalg.norm(vectors, axis=1) - 1.0) < SAME) & (vectors[:, 2] > 0.0)
+            if not sound.all():
+                at = int(np.argmin(sound))
+                raise ArgumentError(
+                    f"{name}[{at}] is {getattr(self, name)[at].tolist()}, no unit vector {where} the sample"
+                )
         if not (np.isfinite(self.values) & (self.values >= 0.0)).all():
             raise ArgumentError("measured values are finite and not below 0")
         if self.standard_error is not None:
@@ -81,8 +81,10 @@ class Scans:
                 raise ArgumentError("standard errors have the shape of the values")
             if not (np.isfinite(self.standard_error) & (self.standard_error >= 0.0)).all():
                 raise ArgumentError("standard errors are finite and not below 0")
-        if self.reflectance is not None and not 0.0 < self.reflectance <= 1.0:
-            raise ArgumentError(f"reflectance is {self.reflectance:g}; it must be more than 0 and at most 1")
+        for name in ("reflectance", "transmittance"):
+            share = getattr(self, name)
+            if share is not None and not 0.0 < share <= 1.0:
+                raise ArgumentError(f"{name} is {share:g}; it must be more than 0 and at most 1")
 
     @classmethod
     def from_stages(
@@ -124,6 +126,29 @@ class Scans:
         to = detector_direction(*angles.T)
         f = bsdf_of_flux(scattered_flux, incident_flux, solid_angle=solid_angle, direction=to)
         return cls(incident_direction(angles[:, 2], angles[:, 3]), to, f, reflectance=reflectance)
+
+    def way(self, *, transmitted: bool) -> Scans | None:
+        """What is reflected, or the mirror image at the surface of what is transmitted; None if there is none.
+
+        In that image light that goes straight on stands where mirrored light would, so that all that is known of lobes about
+        the specular direction holds for it. Its `reflectance` is the transmittance.
+
+        Examples
+        --------
+        >>> both = Scans([[0, 0, 1]] * 2, [[0, 0, 1], [0, 0.6, -0.8]], [0.1, 0.2], transmittance=0.5)
+        >>> both.way(transmitted=True).scattered.tolist(), both.way(transmitted=True).reflectance
+        ([[0.0, 0.6, 0.8]], 0.5)
+        """
+        own = (self.scattered[:, 2] < 0.0) == transmitted
+        if not own.any():
+            return None
+        return Scans(
+            self.incident[own],
+            np.concatenate([self.scattered[own, :2], np.abs(self.scattered[own, 2:])], axis=1),
+            self.values[own],
+            None if self.standard_error is None else self.standard_error[own],
+            self.transmittance if transmitted else self.reflectance,
+        )
 
     def by_incidence(self) -> list[tuple[Array, npt.NDArray[np.intp]]]:
         """Each direction of incidence, by angle, and which values belong to it: the mean of those that are `NEAR`."""
