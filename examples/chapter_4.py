@@ -1,6 +1,6 @@
 """Chapter 4 of the thesis: how well a surface must be described before the luminance of a lamp comes out right.
 
-    python examples/chapter_4.py             # coarse pixels and few lines of sight, a minute
+    python examples/chapter_4.py             # coarse pixels and few lines of sight, two minutes
     python examples/chapter_4.py --full      # 125 × 250 pixels: the tables of docs/chapter-4.md
 
 The mixing chamber is traced with materials that are known, in place of those that were measured, and with what a virtual
