@@ -3,11 +3,9 @@
 //! f of the base is a(incident) l(scattered)/π. What a matt surface or the paint under a clear coat sends out is of this form, and it
 //! stays where it is when the incidence changes, while a lobe moves with the specular direction.
 
+use super::contract::by_cosine;
 use etendue_math::Vec3;
 use etendue_sampling::guide::Guide;
-use etendue_sampling::warp::part_of;
-
-use super::contract::by_cosine;
 
 /// l, the luminance over that of Lambertian light of the same flux, on one side of a surface. Between cosines of the angle from
 /// the normal that fall evenly from 1 to 0 it is linear in the square of the sine, by which projected solid angle is even.
@@ -28,6 +26,8 @@ struct Step {
     width: f64,
     /// l at both ends.
     ends: [f64; 2],
+    /// One over its part of the flux; 0 if that is 0.
+    per_flux: f64,
 }
 
 impl Step {
@@ -55,6 +55,7 @@ impl Base {
             from: square(k),
             width: square(k + 1) - square(k),
             ends: [ends[0], ends[1]],
+            per_flux: 0.0,
         };
         let mut steps: Vec<Step> = luminances.windows(2).enumerate().map(step).collect();
         let mean: f64 = steps.iter().map(Step::flux).sum();
@@ -63,6 +64,8 @@ impl Base {
         }
         for step in &mut steps {
             step.ends = step.ends.map(|l| l / mean);
+            let flux = step.flux();
+            step.per_flux = if flux > 0.0 { 1.0 / flux } else { 0.0 };
         }
         let sum = |sum: &mut f64, step: &Step| {
             let before = *sum;
@@ -108,7 +111,7 @@ impl Base {
         let k = self.guide.not_above(&self.before, number, |before| *before).max(1) - 1;
         let step = &self.steps[k];
         let [near, far] = step.ends;
-        let part = part_of(number - self.before[k], step.flux());
+        let part = (number - self.before[k]) * step.per_flux;
         // Where l changes linearly, the flux grows as a parabola does.
         let below = near + (near * near + part * (far * far - near * near)).max(0.0).sqrt();
         let along = if below > 0.0 { part * (near + far) / below } else { 0.0 };
