@@ -185,12 +185,18 @@ def test_total_scatter_of_a_lobe() -> None:
     assert total_scatter(angle, lobe) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_scans_of_reflected_light_become_tables() -> None:
+def test_scans_become_tables() -> None:
+    """Of reflected and of transmitted light, whose detector stands behind the sample."""
     scan = et.ScatterGoniometer().measure(LOPSIDED, 30.0, step=5, span=15, method="quadrature")
     values = scan.scans()
     assert values.values == pytest.approx(scan.bsdf)
     assert values.scattered[0] == pytest.approx(direction(15.0, 0.0))
-    with pytest.raises(ArgumentError, match="reflects"):
+    sample = et.bsdf.Gaussian(peak=6.0, sigma=0.08, way="transmitted")
+    through = et.ScatterGoniometer().measure(sample, 30.0, step=5, span=15, method="quadrature")
+    values = through.scans()
+    assert values.values == pytest.approx(through.bsdf)
+    assert values.scattered[0] == pytest.approx(direction(15.0, 0.0, behind=True))
+    with pytest.raises(ArgumentError, match="of the beam alone"):
         et.ScatterGoniometer().instrument_function().scans()
 
 
