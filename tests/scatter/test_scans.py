@@ -342,6 +342,10 @@ def test_transmitted_light_is_the_mirror_image_of_reflected_light(tmp_path: Path
         fit_bsdf(read, "lambertian")
     with pytest.raises(ArgumentError, match=r"scattered\[0\] is .*, no unit vector beside the sample"):
         Scans([[0, 0, 1]], [[0, 1, 0]], [0.1])  # type: ignore[arg-type,list-item] # made arrays
+    for share, place in (("transmittance", "behind"), ("reflectance", "in front of")):
+        one_way = front.scattered if share == "transmittance" else through
+        with pytest.raises(ArgumentError, match=f"{share} is stated, and no value was measured {place} the sample"):
+            Scans(front.incident, one_way, front.values, **{share: 0.5})  # type: ignore[arg-type] # one of two names
     with pytest.raises(ArgumentError, match=r"transmittance is 1\.2"):
         Scans([[0, 0, 1]], [[0, 0, 1]], [0.1], transmittance=1.2)  # type: ignore[arg-type,list-item] # made arrays
 

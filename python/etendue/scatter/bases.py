@@ -70,7 +70,7 @@ class Base:
     luminances: Array = dataclasses.field(default_factory=lambda: np.ones(0))
 
     def at(self, cosine: Array) -> Array:
-        """By the cosine, linear in its square between those."""
+        """The luminance l by the cosine of the angle from the normal, of any shape; linear in its square between those."""
         if not self.luminances.size:
             return np.ones(np.shape(cosine))
         edges = np.linspace(1.0, 0.0, self.luminances.size)

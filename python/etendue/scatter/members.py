@@ -145,9 +145,13 @@ def _rests(known: Known, components: Sequence[Record], data: BsdfData, beyond: f
 
 def _bases(sides: Sequence[Known]) -> tuple[Base, Base]:
     """Of light that leaves on the front and on the back; slices are of light that meets each, or either."""
+    if len(sides) == 1:
+        # The same slices leave on both.
+        base = base_of([one for one, _ in sides[0]])
+        return base, base
 
     def leaving(front: bool) -> Base:
-        known = zip((True, False), (sides[0], sides[-1]), strict=True)
+        known = zip((True, False), sides, strict=True)
         return base_of([one for lit, side in known for one, _ in side if (lit != one.transmitted) is front])
 
     return leaving(front=True), leaving(front=False)

@@ -3,9 +3,10 @@
 //! f of the base is a(incident) l(scattered)/π. What a matt surface or the paint under a clear coat sends out is of this form, and it
 //! stays where it is when the incidence changes, while a lobe moves with the specular direction.
 
-use super::contract::by_cosine;
 use etendue_math::Vec3;
 use etendue_sampling::guide::Guide;
+
+use super::contract::by_cosine;
 
 /// l, the luminance over that of Lambertian light of the same flux, on one side of a surface. Between cosines of the angle from
 /// the normal that fall evenly from 1 to 0 it is linear in the square of the sine, by which projected solid angle is even.

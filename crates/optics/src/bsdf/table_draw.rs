@@ -95,8 +95,8 @@ pub(super) fn again(incidence: &Incidence, incident: Vec3, grid: &Grid, numbers:
     found.unwrap_or_else(|| by_cosine(up, numbers))
 }
 
-/// Directions off the base, as [`by_cosine`] says of the square of a sine, and off slices, at the places that were drawn; the height of those outside the
-/// unit circle is 0.
+/// Directions off the base, as [`by_cosine`] says of the square of a sine, and off slices, at the places that were drawn; the
+/// height of those outside the unit circle is 0.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn leave(group: &mut Group, count: usize, sign: f64) {
     let Group {

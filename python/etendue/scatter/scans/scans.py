@@ -42,7 +42,7 @@ class Scans:
     ------
     ArgumentError
         If shapes do not fit, a direction is no unit vector, light comes from behind the sample or leaves along it, a value
-        or a standard error is not finite or below 0.
+        or a standard error is not finite or below 0, or a share is stated of light of which there is no value.
 
     Examples
     --------
@@ -85,6 +85,9 @@ class Scans:
             share = getattr(self, name)
             if share is not None and not 0.0 < share <= 1.0:
                 raise ArgumentError(f"{name} is {share:g}; it must be more than 0 and at most 1")
+            place = "behind" if name == "transmittance" else "in front of"
+            if share is not None and not ((self.scattered[:, 2] < 0.0) == (name == "transmittance")).any():
+                raise ArgumentError(f"{name} is stated, and no value was measured {place} the sample: leave it out")
 
     @classmethod
     def from_stages(
@@ -95,6 +98,7 @@ class Scans:
         *,
         solid_angle: float,
         reflectance: float | None = None,
+        transmittance: float | None = None,
     ) -> Scans:
         """From the raw angles of the four stages and fluxes.
 
@@ -106,7 +110,7 @@ class Scans:
             Of each position, and on the sample: n numbers, or one.
         solid_angle : float
             Of the aperture [sr].
-        reflectance : float, optional
+        reflectance, transmittance : float, optional
             As of the class.
 
         Raises
@@ -125,7 +129,8 @@ class Scans:
             raise ArgumentError("stages are rows of α, β, γ, δ")
         to = detector_direction(*angles.T)
         f = bsdf_of_flux(scattered_flux, incident_flux, solid_angle=solid_angle, direction=to)
-        return cls(incident_direction(angles[:, 2], angles[:, 3]), to, f, reflectance=reflectance)
+        incident = incident_direction(angles[:, 2], angles[:, 3])
+        return cls(incident, to, f, reflectance=reflectance, transmittance=transmittance)
 
     def way(self, *, transmitted: bool) -> Scans | None:
         """What is reflected, or the mirror image at the surface of what is transmitted; None if there is none.
