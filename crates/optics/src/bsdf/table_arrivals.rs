@@ -3,8 +3,8 @@
 use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
-use super::table_base::Base;
-use super::table_lanes::{LANES, Lanes, blocks};
+use super::table_base::{Base, Within};
+use super::table_lanes::{LANES, Lanes, TOGETHER, blocks};
 use super::table_lobes::Lobe;
 
 /// Some rays, until it is known what scatters each.
@@ -17,6 +17,7 @@ pub(super) struct Arrivals {
     sine: Lanes<f64>,
     pub forward: [Lanes<f64>; 2],
     /// See `Step`.
+    place: Lanes<u32>,
     first: Lanes<u32>,
     shares: [Lanes<f64>; 3],
     /// One of the kinds below.
@@ -24,6 +25,8 @@ pub(super) struct Arrivals {
     /// The number of the slice, and what is left of the random number; of the base the square of the sine that it draws.
     pub slice: Lanes<u32>,
     pub rest: Lanes<f64>,
+    /// See `Within`, of those off the base.
+    within: [Lanes<f64>; 5],
 }
 
 /// A ray that is absorbed, and one that a slice or the base scatters.
@@ -40,11 +43,13 @@ impl Arrivals {
             other: ZERO,
             sine: ZERO,
             forward: [ZERO; 2],
+            place: Lanes::of(0),
             first: Lanes::of(0),
             shares: [ZERO; 3],
             kind: Lanes::of(ABSORBED),
             slice: Lanes::of(0),
             rest: ZERO,
+            within: [ZERO; 5],
         }
     }
 
@@ -57,8 +62,12 @@ impl Arrivals {
         self.number.take(numbers);
         self.other.take(others);
         incidences(self, n);
+        // Places first: the processor looks ahead over as many as it can.
         for k in 0..n {
-            let step = lobe.step(self.sine[k]);
+            self.place[k] = lobe.place(self.sine[k]);
+        }
+        for k in 0..n {
+            let step = lobe.step(self.place[k]);
             self.first[k] = step.first;
             for (lanes, share) in self.shares.iter_mut().zip(step.at(self.sine[k])) {
                 lanes[k] = share;
@@ -66,11 +75,25 @@ impl Arrivals {
         }
         picks(self, n);
         if !base.is_even() {
+            // Without branches, which nobody can foresee.
+            let (mut list, mut count) = ([0; TOGETHER], 0);
             for k in 0..n {
-                if self.kind[k] == OFF_BASE {
-                    self.rest[k] = base.square(self.rest[k]);
+                list[count] = k;
+                count += usize::from(self.kind[k] == OFF_BASE);
+            }
+            for k in list.into_iter().take(count) {
+                let Within {
+                    from,
+                    width,
+                    near,
+                    far,
+                    part,
+                } = base.within(self.rest[k]);
+                for (lanes, value) in self.within.iter_mut().zip([from, width, near, far, part]) {
+                    lanes[k] = value;
                 }
             }
+            squares(self, n);
         }
     }
 }
@@ -122,5 +145,25 @@ fn picks(arrivals: &mut Arrivals, count: usize) {
             rest[k] = part_of(part, share);
         }
         (arrivals.kind.0[b], arrivals.slice.0[b], arrivals.rest.0[b]) = (kind, slice, rest);
+    }
+}
+
+/// What those off the base draw.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn squares(arrivals: &mut Arrivals, count: usize) {
+    for b in blocks(count) {
+        let [from, width, near, far, part] = arrivals.within.each_ref().map(|lanes| &lanes.0[b]);
+        let (kind, rest) = (&arrivals.kind.0[b], &mut arrivals.rest.0[b]);
+        for k in 0..LANES {
+            let within = Within {
+                from: from[k],
+                width: width[k],
+                near: near[k],
+                far: far[k],
+                part: part[k],
+            };
+            let square = within.square();
+            rest[k] = if kind[k] == OFF_BASE { square } else { rest[k] };
+        }
     }
 }

@@ -38,6 +38,29 @@ impl Step {
     }
 }
 
+/// A step, and the part of its flux that is nearer to the normal than what is drawn.
+pub(super) struct Within {
+    pub from: f64,
+    pub width: f64,
+    pub near: f64,
+    pub far: f64,
+    pub part: f64,
+}
+
+impl Within {
+    /// The square of the sine.
+    #[inline(always)]
+    pub fn square(&self) -> f64 {
+        let Self { near, far, part, .. } = *self;
+        // Where l changes linearly, the flux grows as a parabola does.
+        let grown = near * near + part * (far * far - near * near);
+        let below = near + if grown > 0.0 { grown } else { 0.0 }.sqrt();
+        let along = if below > 0.0 { part * (near + far) / below } else { 0.0 };
+        let square = self.from + self.width * along;
+        if square < 1.0 { square } else { 1.0 }
+    }
+}
+
 impl Base {
     /// From luminances of any scale at cosines evenly from 1 to 0; none: Lambertian.
     ///
@@ -107,16 +130,24 @@ impl Base {
     #[inline]
     pub fn square(&self, number: f64) -> f64 {
         if self.is_even() {
-            return number;
+            number
+        } else {
+            self.within(number).square()
         }
+    }
+
+    /// The step that a number from 0 to 1 draws from; not of one that is even.
+    #[inline(always)]
+    pub fn within(&self, number: f64) -> Within {
         let k = self.guide.not_above(&self.before, number, |before| *before).max(1) - 1;
         let step = &self.steps[k];
-        let [near, far] = step.ends;
-        let part = (number - self.before[k]) * step.per_flux;
-        // Where l changes linearly, the flux grows as a parabola does.
-        let below = near + (near * near + part * (far * far - near * near)).max(0.0).sqrt();
-        let along = if below > 0.0 { part * (near + far) / below } else { 0.0 };
-        (step.from + step.width * along).min(1.0)
+        Within {
+            from: step.from,
+            width: step.width,
+            near: step.ends[0],
+            far: step.ends[1],
+            part: (number - self.before[k]) * step.per_flux,
+        }
     }
 
     /// A direction on the front or on the back, from two numbers.

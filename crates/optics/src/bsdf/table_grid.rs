@@ -40,8 +40,6 @@ pub(super) struct Grid {
     /// Of `f`, by what each value contributes to the integral over the plane; if that is 0, the first takes all. Of a slice whose
     /// sides are alike one half and what both contribute.
     nodes: Alias,
-    /// For each radial coordinate.
-    hats: Vec<Hat>,
     /// Of the radial coordinates, by the leading bits of a number: coordinates rise by ratios.
     first_below: Vec<u16>,
     /// Leading bits of the second radial coordinate.
@@ -194,7 +192,7 @@ impl Slice {
         // Constant beyond the last of its coordinates.
         let on_all = |row: &[f64]| (0..all.len()).map(|i| row[i.min(row.len() - 1)]).collect::<Vec<f64>>();
         let f: Vec<f64> = f.chunks(radial.len()).flat_map(on_all).collect();
-        let (hats, wholes): (Vec<Hat>, Vec<f64>) = (0..all.len()).map(|i| Hat::of(&all, i)).unzip();
+        let wholes: Vec<f64> = (0..all.len()).map(|i| Hat::of(&all, i).whole()).collect();
         let (nodes, halves, rows) =
             nodes_of(&all, *azimuths, &f, &wholes, sines).ok_or("a slice has too many values")?;
         let lowest = all.get(1).map_or(0, |r| leading(*r));
@@ -211,7 +209,6 @@ impl Slice {
                 halves,
             },
             nodes,
-            hats,
             first_below: (lowest..=leading(END))
                 .map(|bits| first_above(bits).max(1) as u16 - 1)
                 .collect(),
@@ -408,8 +405,8 @@ impl Grid {
 
     /// The hat of a radial coordinate.
     #[inline]
-    pub(super) fn hat(&self, i: usize) -> &Hat {
-        &self.hats[i]
+    pub(super) fn hat(&self, i: usize) -> Hat {
+        Hat::of(&self.radial, i)
     }
 
     /// The second part: a point from the hats of a node.
@@ -424,7 +421,7 @@ impl Grid {
             1.0 - (2.0 - 2.0 * number).sqrt()
         };
         let turn = (f64::from(azimuth) + aside) / self.azimuths as f64;
-        let r = self.hats[i as usize].draw(rest, number);
+        let r = self.hat(i as usize).draw(rest, number);
         (r, if turn < 0.0 { turn + 1.0 } else { turn })
     }
 

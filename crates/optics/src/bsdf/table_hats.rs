@@ -4,58 +4,72 @@ use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
 /// The function of r that is 1 at a radial coordinate, 0 at those next to it, and linear in between, times r: the density of
-/// what belongs to that coordinate.
+/// what belongs to that coordinate. All about it is worked out when it is asked: lists of it would crowd the caches.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
 pub(super) struct Hat {
+    pub below: f64,
     pub node: f64,
-    /// The part of it that lies nearer to 0.
-    pub inner: f64,
-    /// Towards 0, and away from it.
-    pub slopes: [Slope; 2],
+    pub above: f64,
 }
 
-/// One side of a hat. With s from 0 at the far end to 1 at its top the density is s (far + s (node − far)).
+/// One side of a hat, and what is left of the number that decided for it: less than its share. With s from 0 at the far end to 1
+/// at its top the density is s (far + s (node − far)).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slope {
+pub(super) struct Side {
     pub far: f64,
+    pub left: f64,
     /// Its part of the hat.
-    pub share: f64,
+    share: f64,
     /// The part of it that goes with s; the rest goes with s² towards 0, and with s (1 − s) away from it.
-    pub linear: f64,
+    linear: f64,
+    inwards: bool,
 }
 
 impl Hat {
-    /// The hat of a radial coordinate, and its integral.
-    pub(super) fn of(radial: &[f64], i: usize) -> (Self, f64) {
-        let node = radial[i];
-        let side = |other: Option<&f64>| {
-            // Nothing beyond the first and the last coordinate.
-            let far = other.copied().unwrap_or(node);
-            let step = (node - far).abs();
-            let straight = 0.5 * far.min(node);
-            let bent = if far < node { step / 3.0 } else { step / 6.0 };
-            let linear = if bent > 0.0 { straight / (straight + bent) } else { 1.0 };
-            (step * (straight + bent), far, linear)
+    /// The hat of a radial coordinate. There is nothing beyond the first and the last one.
+    #[inline(always)]
+    pub(super) fn of(radial: &[f64], i: usize) -> Self {
+        Self {
+            below: radial[i.saturating_sub(1)],
+            node: radial[i],
+            above: radial[(i + 1).min(radial.len() - 1)],
+        }
+    }
+
+    /// Of both sides the integral, and what of their mean goes with s and otherwise.
+    #[inline(always)]
+    fn sides(&self) -> [(f64, f64, f64); 2] {
+        let side = |step: f64, nearer: f64, bent: f64| {
+            let straight = 0.5 * nearer;
+            (step * (straight + bent), straight, bent)
         };
-        let below = i.checked_sub(1).map(|below| &radial[below]);
-        let [inside, outside] = [below, radial.get(i + 1)].map(side);
-        let whole = inside.0 + outside.0;
-        let inner = if whole > 0.0 { inside.0 / whole } else { 0.0 };
-        let slope = |(_, far, linear), share| Slope { far, share, linear };
-        let slopes = [slope(inside, inner), slope(outside, 1.0 - inner)];
-        (Self { node, inner, slopes }, whole)
+        let [inside, outside] = [self.node - self.below, self.above - self.node];
+        [
+            side(inside, self.below, inside * (1.0 / 3.0)),
+            side(outside, self.node, outside * (1.0 / 6.0)),
+        ]
+    }
+
+    /// Its integral.
+    pub(super) fn whole(&self) -> f64 {
+        self.sides().iter().map(|(whole, ..)| whole).sum()
     }
 
     /// The side that a number decides for.
     #[inline(always)]
-    pub(super) fn side(&self, number: f64) -> Side<'_> {
-        let outwards = u8::from(number >= self.inner);
+    pub(super) fn side(&self, number: f64) -> Side {
+        let [inside, outside] = self.sides();
+        let whole = inside.0 + outside.0;
+        let inner = if whole > 0.0 { inside.0 / whole } else { 0.0 };
+        let inwards = number < inner;
+        // Selections, not branches, which nobody can foresee.
+        let (_, straight, bent) = if inwards { inside } else { outside };
         Side {
-            slope: &self.slopes[usize::from(outwards)],
-            // Without a branch, which nobody can foresee.
-            left: number - f64::from(outwards) * self.inner,
-            inwards: outwards == 0,
+            far: if inwards { self.below } else { self.above },
+            left: number - if inwards { 0.0 } else { inner },
+            share: if inwards { inner } else { 1.0 - inner },
+            linear: if bent > 0.0 { straight / (straight + bent) } else { 1.0 },
+            inwards,
         }
     }
 
@@ -68,22 +82,15 @@ impl Hat {
         } else {
             part_of(side.left, side.limit()).sqrt()
         };
-        side.slope.far + s * (self.node - side.slope.far)
+        side.far + s * (self.node - side.far)
     }
 }
 
-/// A side of a hat, and what is left of the number that decided for it: less than its share.
-pub(super) struct Side<'a> {
-    pub slope: &'a Slope,
-    pub left: f64,
-    inwards: bool,
-}
-
-impl Side<'_> {
+impl Side {
     /// What is left where the part that goes with s ends.
     #[inline(always)]
     pub(super) fn limit(&self) -> f64 {
-        self.slope.share * self.slope.linear
+        self.share * self.linear
     }
 
     /// Whether it is in the other part.
@@ -95,7 +102,7 @@ impl Side<'_> {
     /// The place s along the slope in that part.
     #[inline]
     pub(super) fn bent(&self, other: f64) -> f64 {
-        bent([self.left / self.slope.share, self.slope.linear], other, self.inwards)
+        bent([self.left / self.share, self.linear], other, self.inwards)
     }
 }
 

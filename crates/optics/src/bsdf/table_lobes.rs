@@ -94,16 +94,22 @@ impl Row {
 }
 
 impl Lobe {
-    /// The first of two slices and, from the last sine on that is not above this one, the shares of both and of the base.
+    /// The place of the step for a sine.
     #[inline]
-    pub(super) fn step(&self, sine: f64) -> &Step {
-        self.steps.shares(sine)
+    pub(super) fn place(&self, sine: f64) -> u32 {
+        self.steps.place(sine)
+    }
+
+    /// The first of two slices and the shares of both and of the base, in the step of a place.
+    #[inline]
+    pub(super) fn step(&self, place: u32) -> &Step {
+        self.steps.shares(place)
     }
 
     /// The first of two slices, and the shares of both and of the base.
     #[inline]
     pub(super) fn shares(&self, sine: f64) -> (usize, [f64; 3]) {
-        let step = self.step(sine);
+        let step = self.step(self.place(sine));
         (step.first as usize, step.at(sine))
     }
 
@@ -122,7 +128,7 @@ impl Lobe {
     /// f \[1/sr\] for light that leaves towards a point of the plane of direction cosines, where the base has this luminance.
     #[inline]
     pub(super) fn at(&self, sine: f64, (r, turn): (f64, f64), luminance: f64) -> f64 {
-        let step = self.steps.factors(sine);
+        let step = self.steps.factors(self.place(sine));
         let [one, other, base] = step.at(sine);
         let mut f = base * luminance * FRAC_1_PI;
         for (k, factor) in [one, other].into_iter().enumerate().filter(|(_, factor)| *factor > 0.0) {
@@ -154,26 +160,18 @@ impl Lobes {
         for row in &mut rows {
             row.steps = row.steps.without_base();
         }
-        let left = rows
-            .iter()
-            .flat_map(|row| row.steps.ends())
-            .flatten()
-            .any(|share| share > 0.0);
+        let left = rows.iter().any(|row| row.steps.most() > 0.0);
         left.then_some(Self { rows })
     }
 
     /// Whether there is a base.
     pub(super) fn has_base(&self) -> bool {
-        self.rows
-            .iter()
-            .flat_map(|row| row.steps.ends())
-            .any(|shares| shares[2] > 0.0)
+        self.rows.iter().any(|row| row.steps.has_base())
     }
 
     /// The greatest share of the light.
     pub(super) fn most(&self) -> f64 {
-        let shares = self.rows.iter().flat_map(|row| row.steps.ends());
-        shares.map(|shares| shares.iter().sum()).fold(0.0, f64::max)
+        self.rows.iter().map(|row| row.steps.most()).fold(0.0, f64::max)
     }
 
     /// The only row, if there is one.

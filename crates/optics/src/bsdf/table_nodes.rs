@@ -6,6 +6,7 @@ use multiversion::multiversion;
 
 use super::table_arrivals::Arrivals;
 use super::table_grid::half;
+use super::table_hats::Hat;
 use super::table_lanes::{LANES, Lanes, TOGETHER, blocks};
 use super::table_lobes::Lobe;
 
@@ -25,9 +26,11 @@ pub(super) struct Nodes {
     pub azimuth: Lanes<f64>,
     radius: Lanes<u32>,
     part: Lanes<f64>,
-    /// Of its hat the top and the far end of the side that is drawn from, what is left of the number, and where on that side
-    /// it begins to be bent.
+    /// Its hat.
+    below: Lanes<f64>,
     pub top: Lanes<f64>,
+    above: Lanes<f64>,
+    /// Of the side that is drawn from the far end, what is left of the number, and where the side begins to be bent.
     pub far: Lanes<f64>,
     pub left: Lanes<f64>,
     pub limit: Lanes<f64>,
@@ -50,7 +53,9 @@ impl Nodes {
             azimuth: ZERO,
             radius: Lanes::of(0),
             part: ZERO,
+            below: ZERO,
             top: ZERO,
+            above: ZERO,
             far: ZERO,
             left: ZERO,
             limit: ZERO,
@@ -73,19 +78,47 @@ impl Nodes {
             (self.chance[k], self.alias[k]) = (slot.own, slot.alias);
         }
         nodes(self, n);
-        let (mut list, mut count) = ([0; TOGETHER], 0);
         for k in which.iter().copied() {
             let hat = lobe.slice(arrivals.slice[k] as usize).hat(self.radius[k] as usize);
-            let side = hat.side(self.part[k]);
-            (self.top[k], self.far[k]) = (hat.node, side.slope.far);
-            (self.left[k], self.limit[k]) = (side.left, side.limit());
+            (self.below[k], self.top[k], self.above[k]) = (hat.below, hat.node, hat.above);
+        }
+        sides(self, n);
+        let (mut list, mut count) = ([0; TOGETHER], 0);
+        for k in which.iter().copied() {
             list[count] = k;
-            count += usize::from(side.is_bent());
+            count += usize::from(self.left[k] >= self.limit[k]);
         }
         for k in list.into_iter().take(count) {
-            let hat = lobe.slice(arrivals.slice[k] as usize).hat(self.radius[k] as usize);
-            self.bent[k] = hat.side(self.part[k]).bent(arrivals.other[k]);
+            self.bent[k] = self.hat(k).side(self.part[k]).bent(arrivals.other[k]);
         }
+    }
+
+    /// The hat of the node of one ray.
+    fn hat(&self, k: usize) -> Hat {
+        Hat {
+            below: self.below[k],
+            node: self.top[k],
+            above: self.above[k],
+        }
+    }
+}
+
+/// Sides of the hats.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn sides(all: &mut Nodes, count: usize) {
+    for b in blocks(count) {
+        let (below, top, above, part) = (&all.below.0[b], &all.top.0[b], &all.above.0[b], &all.part.0[b]);
+        let (mut far, mut left, mut limit) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for k in 0..LANES {
+            let hat = Hat {
+                below: below[k],
+                node: top[k],
+                above: above[k],
+            };
+            let side = hat.side(part[k]);
+            (far[k], left[k], limit[k]) = (side.far, side.left, side.limit());
+        }
+        (all.far.0[b], all.left.0[b], all.limit.0[b]) = (far, left, limit);
     }
 }
 

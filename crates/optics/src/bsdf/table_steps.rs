@@ -5,7 +5,7 @@ use etendue_sampling::guide::Guide;
 use super::monotone_cubic::Cubic;
 use super::table_grid::{Grid, Integrals};
 
-/// Numbers by the sine of incidence, linear in few steps: few enough for the nearest caches.
+/// Numbers by the sine of incidence, parabolas in few steps: few enough for the nearest caches.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Steps {
     /// Rising sines of incidence from which on the steps hold.
@@ -22,31 +22,68 @@ pub(super) struct Steps {
 #[repr(align(64))]
 pub(super) struct Step {
     from: f64,
-    /// At the first sine, and by how much they rise with the sine.
+    /// At the first sine, and with what they change by the sine and by its square; of these single precision is enough.
     values: [f64; 3],
-    slopes: [f64; 3],
+    slopes: [f32; 3],
+    bends: [f32; 3],
     /// The first of the two slices that they belong to.
     pub first: u32,
 }
 
 impl Step {
-    /// Between two of some sines, for some numbers of the blends there.
+    /// Between two of some sines, for some numbers of the blends there: through both and one in the middle.
+    #[allow(clippy::cast_possible_truncation, reason = "single precision is meant")]
     fn new([start, end]: [usize; 2], sines: &[f64], blends: &[Blend], values: fn(&Blend) -> [f64; 3]) -> Self {
-        let width = sines[end] - sines[start];
-        let [at_start, at_end] = [start, end].map(|i| values(&blends[i]));
-        let slope = |k: usize| (at_end[k] - at_start[k]) / width;
+        let middle = usize::midpoint(start, end);
+        let [near, far] = [middle, end].map(|i| sines[i] - sines[start]);
+        let [at_start, at_middle, at_end] = [start, middle, end].map(|i| values(&blends[i]));
+        let slope = |k: usize, to: [f64; 3], width: f64| {
+            if width > 0.0 {
+                (to[k] - at_start[k]) / width
+            } else {
+                0.0
+            }
+        };
+        let bend = |k: usize| {
+            if near > 0.0 && near < far {
+                (slope(k, at_end, far) - slope(k, at_middle, near)) / (far - near)
+            } else {
+                0.0
+            }
+        };
         Self {
             from: sines[start],
             values: at_start,
-            slopes: std::array::from_fn(|k| if width > 0.0 { slope(k) } else { 0.0 }),
+            slopes: std::array::from_fn(|k| (slope(k, at_end, far) - bend(k) * far) as f32),
+            bends: std::array::from_fn(|k| bend(k) as f32),
             first: u32::try_from(blends[start].first).unwrap_or(u32::MAX),
         }
+    }
+
+    /// For the shares and for the factors.
+    fn both(ends: [usize; 2], sines: &[f64], blends: &[Blend]) -> [Self; 2] {
+        [Blend::shares, Blend::factors].map(|of| Self::new(ends, sines, blends, of))
     }
 
     #[inline]
     pub(super) fn at(&self, sine: f64) -> [f64; 3] {
         let beyond = sine - self.from;
-        std::array::from_fn(|k| self.values[k] + beyond * self.slopes[k])
+        let at = |k: usize| self.values[k] + beyond * (f64::from(self.slopes[k]) + beyond * f64::from(self.bends[k]));
+        // Where a share ends a parabola may go below 0 by what it may be off.
+        std::array::from_fn(|k| at(k).max(0.0))
+    }
+
+    /// No sum of the three is greater up to another sine.
+    fn most(&self, to: f64) -> f64 {
+        let sum = |list: [f32; 3]| list.map(f64::from).iter().sum::<f64>();
+        let [slope, bend] = [sum(self.slopes), sum(self.bends)];
+        let at = |sine: f64| self.at(sine).iter().sum::<f64>();
+        // Where the sum is greatest, or one of the ends.
+        let top = if bend < 0.0 { self.from - 0.5 * slope / bend } else { to };
+        [self.from, to, top.clamp(self.from, to)]
+            .map(at)
+            .into_iter()
+            .fold(0.0, f64::max)
     }
 }
 
@@ -64,91 +101,123 @@ struct Blend {
 /// What interpolated shares may be off.
 const TOLERANCE: f64 = 5e-6;
 
-/// The smallest step of the sine of incidence for which shares are tabled.
+/// Steps of the sine of incidence are not made smaller than this.
 const SMALLEST_STEP: f64 = 1e-4;
 
-/// How light is shared, at sines from 0 to 1 between which everything is linear.
-fn blends_of(slices: &[Grid], share: &Cubic, base: &Cubic) -> (Vec<f64>, Vec<Blend>) {
-    let (mut sines, mut blends) = (Vec::new(), Vec::new());
-    let mut push = |(sine, blend): (f64, Blend)| {
-        sines.push(sine);
-        blends.push(blend);
-    };
-    let integrals: Vec<Integrals<'_>> = slices.iter().map(Grid::integrals).collect();
-    let count = slices.len();
-    // From 0 to the first slice, from each to the next, from the last to 1.
-    let mut ends: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
-    ends.insert(0, 0.0);
-    ends.push(1.0);
-    for (k, pair) in ends.windows(2).enumerate() {
-        let [from, to] = [pair[0], pair[1]];
-        if from >= to {
-            continue;
-        }
-        let beyond = k == 0 || k == count;
-        let first = k.saturating_sub(1).min(count - 1);
-        let own = integrals[first].integral(slices[first].sine);
-        let at = |sine: f64| {
-            let square = sine * sine;
-            let (rho, base) = (share.at(square), base.at(square));
-            let (shares, factors) = if beyond {
-                // The slice moves on unchanged.
-                let factor = if own > 0.0 { rho / own } else { 0.0 };
-                ([factor * integrals[first].integral(sine), 0.0], [factor, 0.0])
-            } else {
-                let part = (sine - from) / (to - from);
-                let energies = [integrals[first].integral(sine), integrals[first + 1].integral(sine)];
-                let all = (1.0 - part) * energies[0] + part * energies[1];
-                let factor = if all > 0.0 { rho / all } else { 0.0 };
-                let factors = [factor * (1.0 - part), factor * part];
-                ([factors[0] * energies[0], factors[1] * energies[1]], factors)
-            };
-            Blend {
-                first,
-                shares: [shares[0], shares[1], base],
-                factors,
-            }
+/// What light is shared by between two slices, or before the first and beyond the last one.
+struct Between<'a> {
+    /// Sines of both ends.
+    ends: [f64; 2],
+    /// The first of two slices, or the only one.
+    first: usize,
+    slices: Vec<&'a Integrals<'a>>,
+    /// The integral of the only one, where it stands.
+    own: f64,
+    /// In the lobe and in the base, over the square of the sine.
+    share: &'a Cubic,
+    base: &'a Cubic,
+}
+
+impl Between<'_> {
+    fn at(&self, sine: f64) -> Blend {
+        let square = sine * sine;
+        let (rho, base) = (self.share.at(square), self.base.at(square));
+        let [from, to] = self.ends;
+        let (shares, factors) = if let [one, other] = self.slices[..] {
+            let part = (sine - from) / (to - from);
+            let energies = [one.integral(sine), other.integral(sine)];
+            let all = (1.0 - part) * energies[0] + part * energies[1];
+            let factor = if all > 0.0 { rho / all } else { 0.0 };
+            let factors = [factor * (1.0 - part), factor * part];
+            ([factors[0] * energies[0], factors[1] * energies[1]], factors)
+        } else {
+            // The slice moves on unchanged.
+            let factor = if self.own > 0.0 { rho / self.own } else { 0.0 };
+            ([factor * self.slices[0].integral(sine), 0.0], [factor, 0.0])
         };
-        let mut last = (from, at(from));
-        push(last);
-        let mut left: Vec<_> = (1..=4)
-            .rev()
-            .map(|i| from + (to - from) * f64::from(i) / 4.0)
-            .map(|sine| (sine, at(sine)))
-            .collect();
-        while let Some(next) = left.pop() {
-            let sine = 0.5 * (last.0 + next.0);
-            let middle = (sine, at(sine));
-            if next.0 - last.0 < SMALLEST_STEP || middle.1.is_between(&last.1, &next.1) {
-                push(middle);
-                push(next);
-                last = next;
-            } else {
-                left.push(next);
-                left.push(middle);
-            }
+        Blend {
+            first: self.first,
+            shares: [shares[0], shares[1], base],
+            factors,
         }
     }
-    (sines, blends)
+
+    /// What is there at sines from one end to the other: between each and the next but one it is a parabola, for all that
+    /// anybody can see.
+    fn blends(&self) -> Vec<(f64, Blend)> {
+        let [from, to] = self.ends;
+        let there = |sine: f64| (sine, self.at(sine));
+        let halves = |[one, other]: [(f64, Blend); 2]| [one, there(0.5 * (one.0 + other.0)), other];
+        let mut found = vec![there(from)];
+        let mut left: Vec<_> = (0..4)
+            .rev()
+            .map(|k| [k, k + 1].map(|k| there(from + (to - from) * f64::from(k) / 4.0)))
+            .map(halves)
+            .collect();
+        while let Some([start, middle, end]) = left.pop() {
+            let [near, far] = [[start, middle], [middle, end]].map(halves);
+            let all = [start, near[1], middle, far[1], end];
+            let (sines, blends): (Vec<f64>, Vec<Blend>) = all.into_iter().unzip();
+            if end.0 - start.0 < SMALLEST_STEP || holds(&Step::both([0, 4], &sines, &blends), [0, 4], &sines, &blends) {
+                found.extend(&all[1..]);
+            } else {
+                left.extend([far, near]);
+            }
+        }
+        found
+    }
+}
+
+/// How light is shared by slices with these integrals, from the sine 0 to 1.
+fn all_between<'a>(integrals: &'a [Integrals<'a>], sines: &[f64], [share, base]: [&'a Cubic; 2]) -> Vec<Between<'a>> {
+    let last = sines.len() - 1;
+    // From 0 to the first slice, from each to the next, from the last to 1.
+    let mut ends = sines.to_vec();
+    ends.insert(0, 0.0);
+    ends.push(1.0);
+    let between = |(k, ends): (usize, &[f64])| {
+        let first = k.saturating_sub(1);
+        let alone = k == 0 || first == last;
+        Between {
+            ends: [ends[0], ends[1]],
+            first,
+            slices: integrals[first..=if alone { first } else { k }].iter().collect(),
+            own: integrals[first].integral(sines[first]),
+            share,
+            base,
+        }
+    };
+    let all = ends.windows(2).enumerate().map(between);
+    all.filter(|between| between.ends[0] < between.ends[1]).collect()
 }
 
 impl Steps {
     /// Of slices, by shares in the lobe and in the base over the square of the sine.
     pub fn of(slices: &[Grid], share: &Cubic, base: &Cubic) -> Self {
-        let (sines, blends) = blends_of(slices, share, base);
+        let integrals: Vec<Integrals<'_>> = slices.iter().map(Grid::integrals).collect();
+        let sines: Vec<f64> = slices.iter().map(|grid| grid.sine).collect();
+        let all = all_between(&integrals, &sines, [share, base]);
+        let (sines, blends): (Vec<f64>, Vec<Blend>) = all.iter().flat_map(Between::blends).unzip();
         Self::new(&sines, &blends)
     }
 
-    /// The step with the shares of the flux at a sine.
+    /// The place of the step from the last sine that is not above this one.
     #[inline]
-    pub fn shares(&self, sine: f64) -> &Step {
-        &self.shares[self.at(sine)]
+    #[allow(clippy::cast_possible_truncation, reason = "fewer than 2^32 steps")]
+    pub fn place(&self, sine: f64) -> u32 {
+        self.guide.not_above(&self.from, sine, |from| *from).max(1) as u32 - 1
     }
 
-    /// The step with what f of two slices is multiplied by, and with the share of the base.
+    /// A step with the shares of the flux.
     #[inline]
-    pub fn factors(&self, sine: f64) -> &Step {
-        &self.factors[self.at(sine)]
+    pub fn shares(&self, place: u32) -> &Step {
+        &self.shares[place as usize]
+    }
+
+    /// A step with what f of two slices is multiplied by, and with the share of the base.
+    #[inline]
+    pub fn factors(&self, place: u32) -> &Step {
+        &self.factors[place as usize]
     }
 
     /// Of blends at rising sines, as far as each step goes without anything being off.
@@ -156,8 +225,7 @@ impl Steps {
         let mut steps = Self::default();
         let mut start = 0;
         while start + 1 < sines.len() {
-            let both =
-                |end: usize| [Blend::shares, Blend::factors].map(|of| Step::new([start, end], sines, blends, of));
+            let both = |end: usize| Step::both([start, end], sines, blends);
             let mut end = start + 1;
             while end + 1 < sines.len() && holds(&both(end + 1), [start, end + 1], sines, blends) {
                 end += 1;
@@ -175,28 +243,30 @@ impl Steps {
         steps
     }
 
-    /// The shares where steps begin, and where they end.
-    pub fn ends(&self) -> impl Iterator<Item = [f64; 3]> {
+    /// The greatest sum of shares.
+    pub fn most(&self) -> f64 {
         let to = self.from.iter().skip(1).copied().chain([1.0]);
         self.shares
             .iter()
             .zip(to)
-            .flat_map(|(step, to)| [step.values, step.at(to)])
+            .map(|(step, to)| step.most(to))
+            .fold(0.0, f64::max)
     }
 
     /// Without the base.
     pub fn without_base(&self) -> Self {
         let mut steps = self.clone();
         for step in steps.shares.iter_mut().chain(&mut steps.factors) {
-            (step.values[2], step.slopes[2]) = (0.0, 0.0);
+            (step.values[2], step.slopes[2], step.bends[2]) = (0.0, 0.0, 0.0);
         }
         steps
     }
 
-    /// The number of the step from the last sine that is not above this one.
-    #[inline]
-    fn at(&self, sine: f64) -> usize {
-        self.guide.not_above(&self.from, sine, |from| *from).max(1) - 1
+    /// Whether anything is in the base.
+    pub fn has_base(&self) -> bool {
+        self.shares
+            .iter()
+            .any(|step| step.values[2] > 0.0 || step.slopes[2] != 0.0 || step.bends[2] != 0.0)
     }
 }
 
@@ -223,25 +293,6 @@ impl Blend {
     /// With the share of the base.
     const fn factors(&self) -> [f64; 3] {
         [self.factors[0], self.factors[1], self.shares[2]]
-    }
-
-    fn towards(&self, other: &Self, part: f64) -> Self {
-        let mean = |a: f64, b: f64| a + part * (b - a);
-        Self {
-            first: self.first,
-            shares: std::array::from_fn(|k| mean(self.shares[k], other.shares[k])),
-            factors: std::array::from_fn(|k| mean(self.factors[k], other.factors[k])),
-        }
-    }
-
-    /// Whether it is what lies halfway between two others, for all that anybody can see.
-    fn is_between(&self, one: &Self, other: &Self) -> bool {
-        let middle = one.towards(other, 0.5);
-        let near = |a: f64, b: f64, scale: f64| (a - b).abs() <= TOLERANCE * scale;
-        let shares = self.shares.iter().zip(middle.shares);
-        let scale = self.factors[0].abs() + self.factors[1].abs();
-        let factors = self.factors.iter().zip(middle.factors);
-        shares.into_iter().all(|(a, b)| near(*a, b, 1.0)) && factors.into_iter().all(|(a, b)| near(*a, b, scale))
     }
 }
 
@@ -272,35 +323,32 @@ mod tests {
         };
         let (share, base) = (of(|slice| slice.share), of(|slice| slice.base));
         let steps = Steps::of(&grids, &share, &base);
-        let (sines, blends) = blends_of(&grids, &share, &base);
-        assert!(4 * steps.from.len() < 3 * sines.len());
+        let integrals: Vec<Integrals<'_>> = grids.iter().map(Grid::integrals).collect();
+        let sines: Vec<f64> = slices.iter().map(|slice| slice.sine).collect();
+        let all = all_between(&integrals, &sines, [&share, &base]);
+        assert!(steps.from.len() < 200, "{}", steps.from.len());
         for k in 0..=20_000 {
             let sine = f64::from(k) / 20_000.0;
-            let above = sines[..sines.len() - 1].partition_point(|from| *from <= sine).max(1);
-            let (a, b) = (&blends[above - 1], &blends[above]);
-            let width = sines[above] - sines[above - 1];
-            let part = if width > 0.0 {
-                (sine - sines[above - 1]) / width
-            } else {
-                0.0
-            };
-            let blend = a.towards(b, part);
-            let step = steps.shares(sine);
-            assert_eq!(step.first as usize, blend.first);
-            for (share, known) in step.at(sine).into_iter().zip(blend.shares) {
-                assert!((share - known).abs() <= 1.0001 * TOLERANCE, "{sine}: {share} {known}");
+            let there = all.iter().rfind(|between| between.ends[0] <= sine);
+            let blend = there.expect("from 0 on").at(sine);
+            let place = steps.place(sine);
+            let [shares, factors] = [steps.shares(place), steps.factors(place)];
+            assert_eq!(
+                [shares.first, factors.first].map(|first| first as usize),
+                [blend.first; 2]
+            );
+            for (share, known) in shares.at(sine).into_iter().zip(blend.shares) {
+                assert!((share - known).abs() <= 2.0 * TOLERANCE, "{sine}: {share} {known}");
             }
-            let step = steps.factors(sine);
-            let [one, other, base] = step.at(sine);
             let scale: f64 = blend.factors.iter().sum();
-            assert_eq!(step.first as usize, blend.first);
-            assert!((base - blend.shares[2]).abs() <= 1.0001 * TOLERANCE);
-            for (factor, known) in [one, other].into_iter().zip(blend.factors) {
+            for (k, (factor, known)) in factors.at(sine).into_iter().zip(blend.factors()).enumerate() {
+                let scale = if k < 2 { scale } else { 1.0 };
                 assert!(
-                    (factor - known).abs() <= 1.0001 * TOLERANCE * scale,
+                    (factor - known).abs() <= 2.0 * TOLERANCE * scale,
                     "{sine}: {factor} {known}"
                 );
             }
+            assert!(shares.at(sine).iter().sum::<f64>() <= steps.most());
         }
     }
 }
