@@ -11,8 +11,8 @@ pub struct MoreNumbers {
 impl MoreNumbers {
     /// That of two numbers.
     #[must_use]
-    pub fn new(numbers: [f64; 2]) -> Self {
-        let [a, b] = numbers.map(f64::to_bits);
+    pub const fn new(numbers: [f64; 2]) -> Self {
+        let [a, b] = [numbers[0].to_bits(), numbers[1].to_bits()];
         Self {
             state: a.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ b.rotate_left(32),
         }

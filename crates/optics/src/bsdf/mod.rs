@@ -30,6 +30,7 @@ mod table_lobes;
 mod table_nodes;
 mod table_sides;
 mod table_steps;
+mod table_waiting;
 mod tabulated;
 #[cfg(test)]
 mod tests;

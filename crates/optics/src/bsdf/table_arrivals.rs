@@ -4,8 +4,14 @@ use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
 use super::table_base::{Base, Within};
-use super::table_lanes::{LANES, Lanes, TOGETHER, blocks};
+use super::table_lanes::{LANES, Lanes as AnyLanes, blocks};
 use super::table_lobes::Lobe;
+
+/// How many rays are taken in together, in so many blocks.
+pub(super) const TOGETHER: usize = BLOCKS * LANES;
+const BLOCKS: usize = 4;
+
+pub(super) type Lanes<T> = AnyLanes<T, BLOCKS>;
 
 /// Some rays, until it is known what scatters each.
 pub(super) struct Arrivals {
@@ -101,7 +107,7 @@ impl Arrivals {
 /// Sines and azimuths of incidence.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn incidences(arrivals: &mut Arrivals, count: usize) {
-    for b in blocks(count) {
+    for b in blocks::<BLOCKS>(count) {
         let [x, y] = arrivals.incident.each_ref().map(|lanes| &lanes.0[b]);
         let [c, s] = arrivals.forward.each_mut().map(|lanes| &mut lanes.0[b]);
         let sine = &mut arrivals.sine.0[b];
@@ -119,7 +125,7 @@ fn incidences(arrivals: &mut Arrivals, count: usize) {
 /// Slices or the base by their shares.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn picks(arrivals: &mut Arrivals, count: usize) {
-    for b in blocks(count) {
+    for b in blocks::<BLOCKS>(count) {
         let (number, first) = (&arrivals.number.0[b], &arrivals.first.0[b]);
         let shares = arrivals.shares.each_ref().map(|lanes| &lanes.0[b]);
         let (mut kind, mut slice, mut rest) = ([ABSORBED; LANES], [0; LANES], [0.0; LANES]);
@@ -151,7 +157,7 @@ fn picks(arrivals: &mut Arrivals, count: usize) {
 /// What those off the base draw.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn squares(arrivals: &mut Arrivals, count: usize) {
-    for b in blocks(count) {
+    for b in blocks::<BLOCKS>(count) {
         let [from, width, near, far, part] = arrivals.within.each_ref().map(|lanes| &lanes.0[b]);
         let (kind, rest) = (&arrivals.kind.0[b], &mut arrivals.rest.0[b]);
         for k in 0..LANES {

@@ -6,16 +6,10 @@ use std::ops::{Index, IndexMut};
 /// are few rays, few blocks are worked on.
 pub(super) const LANES: usize = 16;
 
-/// How many blocks there are.
-const BLOCKS: usize = 4;
+/// A value for each of some rays, in so many blocks.
+pub(super) struct Lanes<T, const BLOCKS: usize>(pub [[T; LANES]; BLOCKS]);
 
-/// How many rays are drawn for together.
-pub(super) const TOGETHER: usize = BLOCKS * LANES;
-
-/// A value for each of these rays, block by block.
-pub(super) struct Lanes<T>(pub [[T; LANES]; BLOCKS]);
-
-impl<T: Copy> Lanes<T> {
+impl<T: Copy, const BLOCKS: usize> Lanes<T, BLOCKS> {
     pub const fn of(value: T) -> Self {
         Self([[value; LANES]; BLOCKS])
     }
@@ -39,12 +33,12 @@ impl<T: Copy> Lanes<T> {
     }
 }
 
-/// The blocks that so many rays take.
-pub(super) fn blocks(count: usize) -> std::ops::Range<usize> {
+/// The blocks that so many rays take, of all blocks.
+pub(super) fn blocks<const BLOCKS: usize>(count: usize) -> std::ops::Range<usize> {
     0..count.div_ceil(LANES).min(BLOCKS)
 }
 
-impl<T> Index<usize> for Lanes<T> {
+impl<T, const BLOCKS: usize> Index<usize> for Lanes<T, BLOCKS> {
     type Output = T;
 
     #[inline(always)]
@@ -53,7 +47,7 @@ impl<T> Index<usize> for Lanes<T> {
     }
 }
 
-impl<T> IndexMut<usize> for Lanes<T> {
+impl<T, const BLOCKS: usize> IndexMut<usize> for Lanes<T, BLOCKS> {
     #[inline(always)]
     fn index_mut(&mut self, k: usize) -> &mut T {
         &mut self.0.as_flattened_mut()[k]
@@ -66,12 +60,14 @@ mod tests {
 
     #[test]
     fn values_stand_where_they_are_put() {
-        let all: Vec<f64> = (0..TOGETHER).map(|k| k as f64).collect();
-        for n in [0, 1, LANES, LANES + 3, TOGETHER] {
-            let mut lanes = Lanes::of(-1.0);
+        const BLOCKS: usize = 3;
+        let all: Vec<f64> = (0..BLOCKS * LANES).map(|k| k as f64).collect();
+        for n in [0, 1, LANES, LANES + 3, all.len()] {
+            let mut lanes = Lanes::<f64, BLOCKS>::of(-1.0);
             lanes.take(&all[..n]);
-            assert!((0..TOGETHER).all(|k| lanes[k] == if k < n { all[k] } else { -1.0 }));
-            assert!(blocks(n).end * LANES >= n && blocks(n).end * LANES < n + LANES);
+            assert!((0..all.len()).all(|k| lanes[k] == if k < n { all[k] } else { -1.0 }));
+            let end = blocks::<BLOCKS>(n).end;
+            assert!(end * LANES >= n && end * LANES < n + LANES);
             let mut given = vec![-2.0; n];
             lanes.give(&mut given);
             assert_eq!(given, all[..n]);

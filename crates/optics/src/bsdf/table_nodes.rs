@@ -4,43 +4,51 @@ use etendue_sampling::alias::UNIT;
 use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
-use super::table_arrivals::Arrivals;
+use super::table_arrivals::TOGETHER;
 use super::table_grid::half;
 use super::table_hats::Hat;
-use super::table_lanes::{LANES, Lanes, TOGETHER, blocks};
+use super::table_lanes::{LANES, Lanes, blocks};
 use super::table_lobes::Lobe;
 
-/// What slices draw for some rays. Those of the others mean nothing.
+/// So many rays are worth working on together.
+pub(super) const ENOUGH: usize = 2 * LANES;
+
+/// The most that wait: not quite enough, and those that arrive together.
+pub(super) const MOST: usize = ENOUGH + TOGETHER;
+
+pub(super) type WaitingLanes<T> = Lanes<T, { MOST / LANES }>;
+
+/// What slices draw for rays that wait for it.
 pub(super) struct Nodes {
     /// See `Size`.
-    radii: Lanes<f64>,
-    pub azimuths: Lanes<f64>,
-    places: Lanes<f64>,
-    halves: Lanes<f64>,
+    radii: WaitingLanes<f64>,
+    pub azimuths: WaitingLanes<f64>,
+    places: WaitingLanes<f64>,
+    halves: WaitingLanes<f64>,
     /// Of the table of nodes: a place, the same with how far into it the number falls, and what it holds.
-    slot: Lanes<u32>,
-    scaled: Lanes<f64>,
-    chance: Lanes<u32>,
-    alias: Lanes<u32>,
+    slot: WaitingLanes<u32>,
+    scaled: WaitingLanes<f64>,
+    chance: WaitingLanes<u32>,
+    alias: WaitingLanes<u32>,
     /// The node: its azimuth and radial coordinate, and what is left of the number.
-    pub azimuth: Lanes<f64>,
-    radius: Lanes<u32>,
-    part: Lanes<f64>,
+    pub azimuth: WaitingLanes<f64>,
+    radius: WaitingLanes<u32>,
+    part: WaitingLanes<f64>,
     /// Its hat.
-    below: Lanes<f64>,
-    pub top: Lanes<f64>,
-    above: Lanes<f64>,
+    below: WaitingLanes<f64>,
+    pub top: WaitingLanes<f64>,
+    above: WaitingLanes<f64>,
     /// Of the side that is drawn from the far end, what is left of the number, and where the side begins to be bent.
-    pub far: Lanes<f64>,
-    pub left: Lanes<f64>,
-    pub limit: Lanes<f64>,
+    pub far: WaitingLanes<f64>,
+    pub left: WaitingLanes<f64>,
+    pub limit: WaitingLanes<f64>,
     /// From the far end to the top, of those that are bent.
-    pub bent: Lanes<f64>,
+    pub bent: WaitingLanes<f64>,
 }
 
 impl Nodes {
     pub const fn new() -> Self {
-        const ZERO: Lanes<f64> = Lanes::of(0.0);
+        const ZERO: WaitingLanes<f64> = Lanes::of(0.0);
         Self {
             radii: ZERO,
             azimuths: ZERO,
@@ -63,33 +71,38 @@ impl Nodes {
         }
     }
 
-    /// Draws for some of the first `n` rays.
-    pub fn draw(&mut self, lobe: &Lobe, arrivals: &Arrivals, n: usize, which: &[usize]) {
-        for k in which.iter().copied() {
-            let grid = lobe.slice(arrivals.slice[k] as usize);
-            let size = grid.size();
+    /// Draws for the first `n` rays, told their slices and two random numbers for each.
+    pub fn draw(
+        &mut self,
+        lobe: &Lobe,
+        n: usize,
+        slices: &WaitingLanes<u32>,
+        [numbers, others]: [&WaitingLanes<f64>; 2],
+    ) {
+        for k in 0..n {
+            let size = lobe.slice(slices[k] as usize).size();
             (self.radii[k], self.azimuths[k]) = (size.radii, size.azimuths);
             (self.places[k], self.halves[k]) = (size.places, size.halves);
         }
-        places(self, &arrivals.rest, n);
+        places(self, numbers, n);
         // Nothing else here: the processor waits for as many places as it can look ahead.
-        for k in which.iter().copied() {
-            let slot = lobe.slice(arrivals.slice[k] as usize).slot(self.slot[k]);
+        for k in 0..n {
+            let slot = lobe.slice(slices[k] as usize).slot(self.slot[k]);
             (self.chance[k], self.alias[k]) = (slot.own, slot.alias);
         }
         nodes(self, n);
-        for k in which.iter().copied() {
-            let hat = lobe.slice(arrivals.slice[k] as usize).hat(self.radius[k] as usize);
+        for k in 0..n {
+            let hat = lobe.slice(slices[k] as usize).hat(self.radius[k] as usize);
             (self.below[k], self.top[k], self.above[k]) = (hat.below, hat.node, hat.above);
         }
         sides(self, n);
-        let (mut list, mut count) = ([0; TOGETHER], 0);
-        for k in which.iter().copied() {
+        let (mut list, mut count) = ([0; MOST], 0);
+        for k in 0..n {
             list[count] = k;
             count += usize::from(self.left[k] >= self.limit[k]);
         }
         for k in list.into_iter().take(count) {
-            self.bent[k] = self.hat(k).side(self.part[k]).bent(arrivals.other[k]);
+            self.bent[k] = self.hat(k).side(self.part[k]).bent(others[k]);
         }
     }
 
@@ -106,7 +119,7 @@ impl Nodes {
 /// Sides of the hats.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn sides(all: &mut Nodes, count: usize) {
-    for b in blocks(count) {
+    for b in blocks::<{ MOST / LANES }>(count) {
         let (below, top, above, part) = (&all.below.0[b], &all.top.0[b], &all.above.0[b], &all.part.0[b]);
         let (mut far, mut left, mut limit) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for k in 0..LANES {
@@ -129,8 +142,8 @@ fn sides(all: &mut Nodes, count: usize) {
     clippy::cast_sign_loss,
     reason = "fewer than 2^31 places"
 )]
-fn places(all: &mut Nodes, number: &Lanes<f64>, count: usize) {
-    for b in blocks(count) {
+fn places(all: &mut Nodes, number: &WaitingLanes<f64>, count: usize) {
+    for b in blocks::<{ MOST / LANES }>(count) {
         let (number, places) = (&number.0[b], &all.places.0[b]);
         let (mut slot, mut scaled) = ([0; LANES], [0.0; LANES]);
         for k in 0..LANES {
@@ -150,7 +163,7 @@ fn places(all: &mut Nodes, number: &Lanes<f64>, count: usize) {
     reason = "fewer than 2^16 radial coordinates"
 )]
 fn nodes(all: &mut Nodes, count: usize) {
-    for b in blocks(count) {
+    for b in blocks::<{ MOST / LANES }>(count) {
         let (radii, slot, scaled) = (&all.radii.0[b], &all.slot.0[b], &all.scaled.0[b]);
         let (chance, alias) = (&all.chance.0[b], &all.alias.0[b]);
         let (azimuths, halves) = (&all.azimuths.0[b], &all.halves.0[b]);

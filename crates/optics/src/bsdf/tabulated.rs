@@ -21,10 +21,11 @@ use etendue_math::Vec3;
 
 use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares};
 use super::table_base::Base;
-use super::table_draw::{Group, again};
+use super::table_draw::Group;
 use super::table_grid::Grid;
 use super::table_lobes::{Incidence, Lobes};
 use super::table_sides::{Side, Sides, on_its_way, pick, share};
+use super::table_waiting::off_slice;
 
 /// A table of scattered light.
 #[derive(Clone, Debug)]
@@ -126,9 +127,7 @@ impl Picked<'_> {
         let Some(grid) = self.grid else {
             return self.base.direction(self.up, self.numbers);
         };
-        let place = grid.draw(self.numbers);
-        let found = self.incidence.direction(incident, place, self.up);
-        found.unwrap_or_else(|| again(&self.incidence, incident, grid, self.numbers, self.up))
+        off_slice(&self.incidence, incident, grid, self.numbers, self.up)
     }
 }
 
