@@ -5,7 +5,9 @@
 2. Samples and values per second of each model and of the table, and the chamber of thesis chapter 4 traced forwards with
    each, all beside a Lambertian surface of the same reflectance at normal incidence: a ray; a segment, which is a ray over
    the ways that it goes; and a bounce, which is what a ray takes beyond one in a black chamber, over the further surfaces
-   that it meets. The least times of 50 rounds, without setting up the scenes.
+   that it meets. Of samples and values the least times of 10 rounds; of the chamber, without setting it up, the medians of 50
+   rounds in which each surface takes its turn, with the quartiles of their ratios: a bounce is a small difference, and the
+   machine's speed swings.
 3. With `--peers` (needs `pyradiance` and `mitsuba`): the same BRDF through `pabopto2bsdf` and `bsdf2klems`; and the map of
    the chamber from 55°, 126 × 63 pixels, with a satin paint and a table of it beside Mitsuba's `roughplastic` of the same
    reflectance at 20°
@@ -44,6 +46,7 @@ ANGLES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 66.5, 68.0, 70.0, 82.5)
 SAMPLES = 1_000_000
 FEW = 1000
 ROUNDS = 50
+TIMES = 10
 
 
 def row(job: str, value: str, ratio: str = "") -> None:
@@ -257,21 +260,21 @@ def mitsuba_row() -> None:
         )
 
 
-def one_round(
-    bsdfs: Mapping[str, et.Bsdf], scenes: Mapping[str, et.Scene], directions: tuple[Array, Array], rays: int
-) -> dict[str, tuple[float, ...]]:
-    """Times of `SAMPLES` samples and values, of `FEW` and of all rays of the chamber [s], each surface in turn."""
-    incident, to = directions
-    found = {}
-    for name, scene in scenes.items():
-        traced = [timed(lambda scene=scene, n=n: et.trace(scene, rays=n, seed=1))[0] for n in (FEW, rays)]
-        if bsdf := bsdfs.get(name):
-            drawn = timed(lambda bsdf=bsdf: bsdf.sample(incident, SAMPLES, seed=2))[0]
-            asked = timed(lambda bsdf=bsdf: bsdf.evaluate(incident, to))[0]
-            found[name] = drawn, asked, *traced
-        else:
-            found[name] = 0.0, 0.0, *traced
-    return found
+def asked(bsdf: et.Bsdf, incident: Array, to: Array) -> tuple[float, float]:
+    """The least times of a sample and of a value [s]."""
+    drawn = min(timed(lambda: bsdf.sample(incident, SAMPLES, seed=2))[0] for _ in range(TIMES))
+    valued = min(timed(lambda: bsdf.evaluate(incident, to))[0] for _ in range(TIMES))
+    return drawn / SAMPLES, valued / SAMPLES
+
+
+def chambers(scenes: Mapping[str, et.Scene], rays: int) -> dict[str, Array]:
+    """Times of a ray of each chamber [s], without setting it up, by round."""
+    found: dict[str, list[float]] = {name: [] for name in scenes}
+    for _ in range(ROUNDS):
+        for name, scene in scenes.items():
+            few, all_ = (timed(lambda scene=scene, n=n: et.trace(scene, rays=n, seed=1))[0] for n in (FEW, rays))
+            found[name].append((all_ - few) / (rays - FEW))
+    return {name: np.array(times) for name, times in found.items()}
 
 
 def main() -> None:
@@ -316,27 +319,26 @@ def main() -> None:
         bsdfs[name].sample(incident, 10, seed=1)
         assert et.trace(scene, rays=1000, seed=1).ledger.closes  # noqa: S101 - what does not close is no benchmark
     gone = {name: ways(scene) for name, scene in scenes.items()}
-    # The machine's speed swings within a run: each round takes its turn with all of them, and the least times are compared.
-    rounds = [one_round(bsdfs, {"black": black, **scenes}, (incident, to), rays) for _ in range(ROUNDS)]
-    least = {name: np.min([found[name] for found in rounds], axis=0) for name in rounds[0]}
+    drawn, valued = "a sample", "a value"
+    single = {name: dict(zip((drawn, valued), asked(bsdf, incident, to), strict=True)) for name, bsdf in bsdfs.items()}
+    for name in bsdfs:
+        for what, took in single[name].items():
+            row(f"{name}: {what}", f"{1e9 * took:.0f} ns", f"{took / single['lambertian'][what]:.2f} × lambertian")
+    times = chambers({"black": black, **scenes}, rays)
 
-    def a_ray(name: str) -> float:
-        """Without what the scene takes to be set up."""
-        few, all_ = least[name][2:]
-        return float((all_ - few) / (rays - FEW))
-
-    def figures(name: str) -> dict[str, float]:
+    def figures(name: str) -> dict[str, Array]:
         return {
-            "a sample": least[name][0] / SAMPLES,
-            "a value": least[name][1] / SAMPLES,
-            "a ray of the chamber": a_ray(name),
-            "a segment there": a_ray(name) / gone[name],
-            "a bounce there": (a_ray(name) - a_ray("black")) / (gone[name] - 1.0),
+            "a ray of the chamber": times[name],
+            "a segment there": times[name] / gone[name],
+            "a bounce there": (times[name] - times["black"]) / (gone[name] - 1.0),
         }
 
     for name in bsdfs:
         for what, took in figures(name).items():
-            row(f"{name}: {what}", f"{1e9 * took:.0f} ns", f"{took / figures('lambertian')[what]:.2f} × lambertian")
+            plain = figures("lambertian")[what]
+            low, high = np.percentile(took / plain, [25, 75])
+            ratio = f"{np.median(took) / np.median(plain):.2f} × lambertian"
+            row(f"{name}: {what}", f"{1e9 * np.median(took):.0f} ns", f"{ratio} ({low:.2f} to {high:.2f})")
     if given.peers:
         radiance_row()
         mitsuba_row()

@@ -44,7 +44,7 @@ def parts_of(record: Record) -> Iterator[Record]:
 
 
 def same_when_turned(record: Record) -> bool:
-    """Whether no lobe of a model is wider across the axis than along it, and no surface rougher.
+    """Whether no lobe of a model is wider across the axis than along it, no surface rougher, and no table by azimuth.
 
     Examples
     --------
@@ -53,8 +53,17 @@ def same_when_turned(record: Record) -> bool:
     [True, False]
     """
     return all(
-        part.get("aspect", 1.0) == 1.0 and part.get("alpha_x") == part.get("alpha_y") for part in parts_of(record)
+        part.get("aspect", 1.0) == 1.0 and part.get("alpha_x") == part.get("alpha_y") and not _by_azimuth(part)
+        for part in parts_of(record)
     )
+
+
+def _by_azimuth(part: Record) -> bool:
+    """Whether it is a table of several azimuths of incidence."""
+    if part["kind"] != "table":
+        return False
+    ways = [one[way] for side in ("front", "back") for one in part[side] for way in ("reflected", "transmitted")]
+    return any(way is not None and len(way) > 1 for way in ways)
 
 
 def components_of(data: BsdfData) -> list[Record]:

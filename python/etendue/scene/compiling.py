@@ -17,6 +17,7 @@ from etendue.description.mistakes import join
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.spectrum import photopic_efficiency
+from etendue.scatter.members import same_when_turned
 from etendue.scene.bodies.body import Body, Face
 from etendue.scene.colour_dependence import telling_finishes, telling_media
 from etendue.scene.finishes import BUILT_IN, Finish, Interface
@@ -147,6 +148,7 @@ class _Compiler:
         self.bodies: dict[Body, _Faces] = {}
         self.named_finishes: dict[str, tuple[int, bool, Axis]] = {}
         self.letting_in: set[tuple[str, str]] = set()
+        self.axes: dict[tuple[str, str], Axis] = {}
 
     def compiled(self) -> Compiled:
         """Everything, or all mistakes."""
@@ -235,12 +237,16 @@ class _Compiler:
         if key not in self.numbers:
             self.numbers[key] = len(self.rows["finishes"])
             with self._at(f"finishes.{name}" if given in self.scene.finishes else place):
-                self.rows["finishes"].append(finish.record(self.files))
+                record = finish.record(self.files)
+                self.rows["finishes"].append(record)
+                # An axis that changes nothing would cost time at each surface that a ray meets.
+                if not same_when_turned(record):
+                    self.axes[key] = getattr(finish, "axis", None)
                 self.names["finishes"].append(name)
                 if finish.lets_light_in(self.files):
                     self.letting_in.add(key)
         # Of a finish whose file cannot be read nothing more is asked: that would be the same mistake again.
-        found = self.numbers[key], key in self.letting_in, getattr(finish, "axis", None)
+        found = self.numbers[key], key in self.letting_in, self.axes.get(key)
         if isinstance(given, str):
             self.named_finishes[given] = found
         return found
