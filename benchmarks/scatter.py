@@ -5,9 +5,9 @@
 2. Samples and values per second of each model and of the table, and the chamber of thesis chapter 4 traced forwards with
    each, all beside a Lambertian surface of the same reflectance at normal incidence: a ray; a segment, which is a ray over
    the ways that it goes; and a bounce, which is what a ray takes beyond one in a black chamber, over the further surfaces
-   that it meets. Of samples and values the least times of 10 rounds; of the chamber, without setting it up, the medians of 50
-   rounds in which each surface takes its turn, with the quartiles of their ratios: a bounce is a small difference, and the
-   machine's speed swings.
+   that it meets. Of samples and values the least times of 10 rounds; of the chamber, without setting it up, the medians of
+   50 rounds in which each surface takes its turn, with the quartiles of their ratios: a bounce is a small difference, and
+   the machine's speed swings.
 3. With `--peers` (needs `pyradiance` and `mitsuba`): the same BRDF through `pabopto2bsdf` and `bsdf2klems`; and the map of
    the chamber from 55°, 126 × 63 pixels, with a satin paint and a table of it beside Mitsuba's `roughplastic` of the same
    reflectance at 20°

@@ -95,8 +95,8 @@ impl Waiting {
             if self.tries[i] < TRIES {
                 self.wait_on(i);
             } else {
-                let last = self.more[i].pair();
-                tell(directions, self.ray[i], by_cosine(up, last));
+                let numbers = self.more[i].pair();
+                tell(directions, self.ray[i], by_cosine(up, numbers));
             }
         }
     }
