@@ -38,7 +38,10 @@ SURFACES: dict[str, et.Bsdf] = {
         parts=[{"kind": "lambertian", "reflectance": 0.3}, {"kind": "abg", "a": 0.01, "b": 0.1, "g": 2}]
     ),
     "wide-mixture": et.bsdf.Mixture(
-        parts=[{"kind": "lambertian", "reflectance": 0.3}, {"kind": "gaussian", "peak": 1.0, "sigma": 0.2, "aspect": 0.4}]
+        parts=[
+            {"kind": "lambertian", "reflectance": 0.3},
+            {"kind": "gaussian", "peak": 1.0, "sigma": 0.2, "aspect": 0.4},
+        ]
     ),
     "round-table": tabled(wide=1.0, isotropic=True),
     "wide-table": tabled(wide=3.0, isotropic=False),
