@@ -26,8 +26,11 @@ from experiments.panels import LINES, ROOT, legend_below, map_grid, new_figure, 
 from matplotlib.colors import Normalize, PowerNorm
 
 EYE = et.Observer(theta=55, phi=90, distance=1000, target=(0, 0, HEIGHT))
-REGION = et.Region(left=-10, right=10, bottom=-10.5, top=-2.5)
-"""X 15 to 35 mm and Y 15 to 23 mm of a screen of 50 mm × 25 mm, from its upper left corner."""
+REGION = et.Region(left=-10, right=10, bottom=-12.5, top=-2.5)
+"""X 15 to 35 mm and Y 15 to 25 mm of a screen of 50 mm × 25 mm, from its upper left corner: what is compared."""
+
+AROUND_HIGHLIGHTS = et.Region(left=-10, right=10, bottom=-10.5, top=-2.5)
+"""The same to Y 23 mm, where U is taken; the rim of the aperture and the black below it lie beyond."""
 
 MANY = 128
 """Lines of sight per pixel from which on diffuse light is gathered."""
@@ -115,9 +118,9 @@ def distribution(finish: Finish, rays: int) -> et.Intensity:
 
 
 def numbers(lmap: et.LuminanceMap) -> tuple[str, str, str]:
-    """Maximum, mean, and U: least over mean, of the region."""
-    values = lmap.values[REGION.mask(lmap.screen)]
-    return f"{values.max():.0f}", f"{values.mean():.0f}", f"{values.min() / values.mean():.2f}"
+    """Maximum and mean of the region, and U: least over mean around the highlights."""
+    values, inner = (lmap.values[region.mask(lmap.screen)] for region in (REGION, AROUND_HIGHLIGHTS))
+    return f"{values.max():.0f}", f"{values.mean():.0f}", f"{inner.min() / inner.mean():.2f}"
 
 
 def draw_materials(path: Path) -> None:
@@ -153,16 +156,16 @@ def draw_materials(path: Path) -> None:
 
 
 def draw_maps(path: Path, heading: str, rows: Mapping[str, Mapping[str, et.LuminanceMap]]) -> None:
-    """A row of maps for each material, a column for each description, the region of table 4.1 within them."""
+    """A row of maps for each material, a column for each description, the regions of table 4.1 within them."""
     columns = list(max(rows.values(), key=len))
     last = len(columns) - 1
-    facts = ["1: the region of table 4.1"]
+    facts = ["1: the region of tables 4.1 and 4.2    2: that of U"]
     grid = map_grid((2.3, 1.15), columns, list(rows), {last: "each"}, heading=heading, facts=facts)
     for row, maps in enumerate(rows.values()):
         most = 1.02 * max(float(np.quantile(lmap.values, 0.999)) for lmap in maps.values())
         for name, lmap in maps.items():
             image = grid.show(row, columns.index(name), lmap, Normalize(0.0, most))
-            draw_marks(grid.panels[row, columns.index(name)], marks_of(lmap, [REGION]))
+            draw_marks(grid.panels[row, columns.index(name)], marks_of(lmap, [REGION, AROUND_HIGHLIGHTS]))
         data = np.stack([lmap.values for lmap in maps.values()])
         put_bar_at(grid.bars[last][row], image, data, lmap.quantity, lmap.unit)
     grid.save(path)
@@ -248,7 +251,7 @@ def print_material(
 ) -> None:
     """Table 4.1 or 4.2, with the numbers of the thesis."""
     truth = maps["truth"]
-    print(f"\n{material}: region X 15–35 mm, Y 15–23 mm\n")
+    print(f"\n{material}: region X 15–35 mm, Y 15–25 mm; U of Y 15–23 mm\n")
     rows = []
     for name, lmap in maps.items():
         c = et.compare(lmap, truth, REGION)
