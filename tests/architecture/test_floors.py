@@ -393,6 +393,7 @@ PARTS_OF_BSDFS = (
             "nodes",
             "sides",
             "steps",
+            "waiting",
         )
     ),
 )
