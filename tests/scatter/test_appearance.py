@@ -241,7 +241,8 @@ def test_errors_of_a_table_that_scatters_nearly_everything(monkeypatch: pytest.M
 
     whole, half = looks(0.99), looks(0.495)
     for name in ("gloss 20", "reflection haze"):
-        assert whole.errors[name] == pytest.approx(2.0 * half.errors[name], rel=1e-9)
+        # As exactly as shares between incidences are tabled.
+        assert whole.errors[name] == pytest.approx(2.0 * half.errors[name], rel=1e-5)
     assert whole.errors["distinctness"] == pytest.approx(half.errors["distinctness"], rel=1e-6)
     # What is mirrored is known.
     glossy = looks(0.495, {"kind": "mirror", "reflectance": 0.04})

@@ -116,7 +116,8 @@ def _beyond(data: BsdfData, members: Sequence[_core.Bsdf]) -> float:
         for azimuth, behind in itertools.product(AROUND, (False, True)):
             incident = direction(theta, azimuth, behind=behind)
             scattered, other = (leaving(some, incident, wavelength) for some in (members[n:], members[:n]))
-            there = scattered > 0.0
+            # Where next to nothing is left, as at the rim, shares are as good as 0.
+            there = scattered > CLOSE
             part = min([part, *np.maximum(1.0 - other[there], 0.0) / scattered[there]])
     return part
 

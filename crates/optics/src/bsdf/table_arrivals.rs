@@ -5,7 +5,7 @@ use multiversion::multiversion;
 
 use super::table_base::{Base, Within};
 use super::table_lanes::{LANES, Lanes as AnyLanes, blocks};
-use super::table_lobes::Lobe;
+use super::table_lobes::{ALL, Lobe};
 
 /// How many rays are taken in together, in so many blocks.
 pub(super) const TOGETHER: usize = BLOCKS * LANES;
@@ -132,8 +132,7 @@ fn picks(arrivals: &mut Arrivals, count: usize) {
         for k in 0..LANES {
             let [a, b, base] = shares.map(|shares| shares[k]);
             let all = a + b + base;
-            // Shares that should add up to 1 may fall short of it by rounding.
-            let goes = (number[k] < all) | (all >= 1.0 - 1e-12);
+            let goes = (number[k] < all) | (all >= ALL);
             let left = [number[k], number[k] - a, number[k] - a - b];
             let is_first = left[0] < a;
             let is_base = !is_first & (left[1] >= b) & (base > 0.0);

@@ -13,6 +13,9 @@ use super::monotone_cubic::Cubic;
 use super::table_grid::{Grid, Slice};
 use super::table_steps::{Step, Steps};
 
+/// Shares that should add up to 1 may fall short of it by as much as they are rounded; what reaches this is all of the light.
+pub(super) const ALL: f64 = 1.0 - 1e-6;
+
 /// Slices at one azimuth of incidence, with rising sines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
@@ -116,7 +119,7 @@ impl Lobe {
     /// Of the flux, in all directions.
     #[inline]
     pub(super) fn share(&self, sine: f64) -> f64 {
-        self.shares(sine).1.iter().sum()
+        self.shares(sine).1.iter().sum::<f64>().min(1.0)
     }
 
     /// A slice, by its number.
@@ -224,6 +227,7 @@ impl<'a> Lit<'a> {
     pub(super) fn share(&self) -> f64 {
         self.there()
             .fold(0.0, |sum, (row, part)| sum + part * row.share(self.sine))
+            .min(1.0)
     }
 
     /// Of the flux, in the base.

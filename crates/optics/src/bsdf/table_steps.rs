@@ -98,8 +98,9 @@ struct Blend {
     factors: [f64; 2],
 }
 
-/// What interpolated shares may be off.
+/// What interpolated shares may be off, in parts of all that is scattered, or of [`LEAST`] where that is less.
 const TOLERANCE: f64 = 5e-6;
+const LEAST: f64 = 1e-3;
 
 /// Steps of the sine of incidence are not made smaller than this.
 const SMALLEST_STEP: f64 = 1e-4;
@@ -280,14 +281,19 @@ fn holds([shares, factors]: &[Step; 2], [start, end]: [usize; 2], sines: &[f64],
         };
         blend.first == blends[start].first
             && sines[i] > sines[start]
-            && near(shares.at(sines[i]), blend.shares(), [1.0; 3])
-            && near(factors.at(sines[i]), blend.factors(), [scale, scale, 1.0])
+            && near(shares.at(sines[i]), blend.shares(), [blend.all(); 3])
+            && near(factors.at(sines[i]), blend.factors(), [scale, scale, blend.all()])
     })
 }
 
 impl Blend {
     const fn shares(&self) -> [f64; 3] {
         self.shares
+    }
+
+    /// The shares together, or [`LEAST`].
+    fn all(&self) -> f64 {
+        self.shares.iter().sum::<f64>().max(LEAST)
     }
 
     /// With the share of the base.
@@ -327,6 +333,8 @@ mod tests {
         let sines: Vec<f64> = slices.iter().map(|slice| slice.sine).collect();
         let all = all_between(&integrals, &sines, [&share, &base]);
         assert!(steps.from.len() < 200, "{}", steps.from.len());
+        // Between the sines at which steps are held against the shares they may be off by a little more.
+        let most_off = 3.0 * TOLERANCE;
         for k in 0..=20_000 {
             let sine = f64::from(k) / 20_000.0;
             let there = all.iter().rfind(|between| between.ends[0] <= sine);
@@ -338,15 +346,15 @@ mod tests {
                 [blend.first; 2]
             );
             for (share, known) in shares.at(sine).into_iter().zip(blend.shares) {
-                assert!((share - known).abs() <= 2.0 * TOLERANCE, "{sine}: {share} {known}");
+                assert!(
+                    (share - known).abs() <= most_off * blend.all(),
+                    "{sine}: {share} {known}"
+                );
             }
             let scale: f64 = blend.factors.iter().sum();
             for (k, (factor, known)) in factors.at(sine).into_iter().zip(blend.factors()).enumerate() {
-                let scale = if k < 2 { scale } else { 1.0 };
-                assert!(
-                    (factor - known).abs() <= 2.0 * TOLERANCE * scale,
-                    "{sine}: {factor} {known}"
-                );
+                let scale = if k < 2 { scale } else { blend.all() };
+                assert!((factor - known).abs() <= most_off * scale, "{sine}: {factor} {known}");
             }
             assert!(shares.at(sine).iter().sum::<f64>() <= steps.most());
         }

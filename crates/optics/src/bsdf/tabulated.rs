@@ -23,7 +23,7 @@ use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares
 use super::table_base::Base;
 use super::table_draw::Group;
 use super::table_grid::Grid;
-use super::table_lobes::{Incidence, Lobes};
+use super::table_lobes::{ALL, Incidence, Lobes};
 use super::table_sides::{Side, Sides, on_its_way, pick, share};
 use super::table_waiting::off_slice;
 
@@ -84,8 +84,7 @@ impl Tabulated {
         let (way, (grid, number)) = if let Some((way, lobe)) = self.sides.lone(front) {
             let shares = lobe.shares(incidence.sine);
             let share = shares.1.iter().sum::<f64>();
-            // Shares that should add up to 1 may fall short of it by rounding.
-            let scattered = numbers[0] < share || share >= 1.0 - 1e-12;
+            let scattered = numbers[0] < share || share >= ALL;
             (way, scattered.then(|| lobe.pick(shares, numbers[0]))?)
         } else {
             let ways = [false, true].map(|way| self.sides.lit(&incidence, front, way, media.wavelength));
