@@ -333,8 +333,9 @@ mod tests {
         let sines: Vec<f64> = slices.iter().map(|slice| slice.sine).collect();
         let all = all_between(&integrals, &sines, [&share, &base]);
         assert!(steps.from.len() < 200, "{}", steps.from.len());
-        // Between the sines at which steps are held against the shares they may be off by a little more.
-        let most_off = 3.0 * TOLERANCE;
+        // Between the five sines of a cell steps and shares may both be off a parabola through the same three, and these from
+        // each other.
+        let most_off = 4.0 * TOLERANCE;
         for k in 0..=20_000 {
             let sine = f64::from(k) / 20_000.0;
             let there = all.iter().rfind(|between| between.ends[0] <= sine);
