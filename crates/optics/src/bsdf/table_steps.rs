@@ -157,9 +157,11 @@ impl Between<'_> {
             .collect();
         while let Some([start, middle, end]) = left.pop() {
             let [near, far] = [[start, middle], [middle, end]].map(halves);
-            let all = [start, near[1], middle, far[1], end];
+            // Beside both ends as well: where f has a kink, a parabola is off most there.
+            let [first, last] = [[start, near[1]], [far[1], end]].map(|ends| halves(ends)[1]);
+            let all = [start, first, near[1], middle, far[1], last, end];
             let (sines, blends): (Vec<f64>, Vec<Blend>) = all.into_iter().unzip();
-            if end.0 - start.0 < SMALLEST_STEP || holds(&Step::both([0, 4], &sines, &blends), [0, 4], &sines, &blends) {
+            if end.0 - start.0 < SMALLEST_STEP || holds(&Step::both([0, 6], &sines, &blends), [0, 6], &sines, &blends) {
                 found.extend(&all[1..]);
             } else {
                 left.extend([far, near]);
@@ -333,7 +335,7 @@ mod tests {
         let sines: Vec<f64> = slices.iter().map(|slice| slice.sine).collect();
         let all = all_between(&integrals, &sines, [&share, &base]);
         assert!(steps.from.len() < 200, "{}", steps.from.len());
-        // Between the five sines of a cell steps and shares may both be off a parabola through the same three, and these from
+        // Between the seven sines of a cell steps and shares may both be off a parabola through the same three, and these from
         // each other.
         let most_off = 4.0 * TOLERANCE;
         for k in 0..=20_000 {
