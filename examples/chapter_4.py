@@ -156,16 +156,16 @@ def draw_materials(path: Path) -> None:
 
 
 def draw_maps(path: Path, heading: str, rows: Mapping[str, Mapping[str, et.LuminanceMap]]) -> None:
-    """A row of maps for each material, a column for each description, the regions of table 4.1 within them."""
+    """A row of maps for each material, a column for each description, the region of table 4.1 within them."""
     columns = list(max(rows.values(), key=len))
     last = len(columns) - 1
-    facts = ["1: the region of tables 4.1 and 4.2    2: that of U"]
+    facts = ["1: the region of tables 4.1 and 4.2"]
     grid = map_grid((2.3, 1.15), columns, list(rows), {last: "each"}, heading=heading, facts=facts)
     for row, maps in enumerate(rows.values()):
         most = 1.02 * max(float(np.quantile(lmap.values, 0.999)) for lmap in maps.values())
         for name, lmap in maps.items():
             image = grid.show(row, columns.index(name), lmap, Normalize(0.0, most))
-            draw_marks(grid.panels[row, columns.index(name)], marks_of(lmap, [REGION, AROUND_HIGHLIGHTS]))
+            draw_marks(grid.panels[row, columns.index(name)], marks_of(lmap, [REGION]))
         data = np.stack([lmap.values for lmap in maps.values()])
         put_bar_at(grid.bars[last][row], image, data, lmap.quantity, lmap.unit)
     grid.save(path)
