@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.scatter.models import MODELS
 from etendue.scene import compile_scene
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +35,11 @@ SURFACES: dict[str, et.Bsdf] = {
     "wide": et.bsdf.Gaussian(peak=1.0, sigma=0.2, aspect=3.0),
     "metal": et.bsdf.RoughMetal(roughness=0.3, index=0.96, extinction=6.69),
     "brushed": et.bsdf.RoughMetal(roughness=0.1, roughness_across=0.5, index=0.96, extinction=6.69),
+    "coat": et.bsdf.RoughCoat(roughness=0.3, index=1.5, base_reflectance=0.8),
+    "brushed-coat": et.bsdf.RoughCoat(roughness=0.1, roughness_across=0.4, index=1.5, base_reflectance=0.8),
+    "abg": et.bsdf.ABg(a=0.01, b=0.1, g=2),
+    "wide-abg": et.bsdf.ABg(a=0.01, b=0.1, g=2, aspect=2.0),
+    "wide-harvey-shack": et.bsdf.HarveyShack(b0=0.8, l=0.1, s=-2.5, aspect=2.0),
     "mixture": et.bsdf.Mixture(
         parts=[{"kind": "lambertian", "reflectance": 0.3}, {"kind": "abg", "a": 0.01, "b": 0.1, "g": 2}]
     ),
@@ -46,6 +52,14 @@ SURFACES: dict[str, et.Bsdf] = {
     "round-table": tabled(wide=1.0, isotropic=True),
     "wide-table": tabled(wide=3.0, isotropic=False),
 }
+
+CHANGED_MODELS = ("wide", "brushed", "brushed-coat", "wide-abg", "wide-harvey-shack")
+
+
+def test_every_model_that_turning_may_change_is_among_them() -> None:
+    """But for rough glass, which is the boundary of a solid; its record is that of the other rough surfaces."""
+    turning = {kind for kind, model in MODELS.items() if {"aspect", "roughness_across"} & set(model.model_fields)}
+    assert turning - {"rough-interface"} == {getattr(SURFACES[name], "kind", None) for name in CHANGED_MODELS}
 
 
 def turned(directions: Array, by: float) -> Array:
@@ -69,4 +83,4 @@ def test_surfaces_have_an_axis_where_it_changes_anything(name: str) -> None:
     }
     (face,) = compile_scene(et.Scene(surfaces=[wall], sources=[{"kind": "point", "flux": 1}])).record["faces"]
     assert face["axis"] == ([0.3, 1.0, 0.2] if changes else None)
-    assert changes == (name.startswith("wide") or name == "brushed")
+    assert changes == name.startswith(("wide", "brushed"))

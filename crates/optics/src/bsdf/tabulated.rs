@@ -60,6 +60,8 @@ impl Tabulated {
         // Between wavelengths and angles shares are no more than at both ends.
         let most = |ways: &[Option<Lobes>; 2]| ways.iter().flatten().map(Lobes::most).sum();
         let most = sides.each().map(most).fold(0.0, f64::max);
+        // What reaches this is all of the light: see `picked`.
+        let most = if most >= ALL { 1.0 } else { most };
         Self {
             sides,
             base,
