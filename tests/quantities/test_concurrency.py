@@ -1,12 +1,15 @@
-"""Items that are worked on side by side: their order, how many at once, and what fails."""
+"""Items that are worked on side by side: their order, how many at once, and what fails. Threads of linear algebra."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
 
+import etendue as et
+import numpy as np
 import pytest
-from etendue.concurrency import in_order
+from etendue.concurrency import in_order, one_blas_thread
+from threadpoolctl import threadpool_info, threadpool_limits
 
 
 def test_results_keep_their_order_though_later_items_are_ready_first() -> None:
@@ -48,3 +51,53 @@ def test_an_error_is_raised_in_its_place_and_ends_the_work() -> None:
     with pytest.raises(ValueError, match="two"):
         done.extend(in_order(work, range(100), 2))
     assert len(done) <= 2
+
+
+def blas_threads() -> set[int]:
+    """How many threads NumPy's linear algebra has, of each library that is loaded."""
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+@pytest.fixture
+def three_threads() -> Iterator[None]:
+    """NumPy's linear algebra on three threads, on whatever machine."""
+    np.ones((2, 2)) @ np.ones(2)  # the library is loaded
+    if not blas_threads():
+        pytest.skip("NumPy has a library of linear algebra whose threads cannot be set")
+    with threadpool_limits(3, "blas"):
+        assert blas_threads() == {3}
+        yield
+
+
+def test_linear_algebra_has_one_thread_until_the_last_has_done(three_threads: None) -> None:
+    entered, left = threading.Event(), threading.Event()
+
+    def other() -> None:
+        with one_blas_thread:
+            entered.set()
+            assert left.wait(30)
+
+    thread = threading.Thread(target=other)
+    with one_blas_thread:
+        thread.start()
+        assert entered.wait(30)
+        assert blas_threads() == {1}
+    # The first has left; what it found must not come back yet.
+    assert blas_threads() == {1}
+    left.set()
+    thread.join()
+    assert blas_threads() == {3}
+
+
+def test_what_was_set_comes_back_after_an_error(three_threads: None) -> None:
+    with pytest.raises(ValueError, match="two"), one_blas_thread:
+        raise ValueError("two")
+    assert blas_threads() == {3}
+
+
+def test_a_fit_leaves_linear_algebra_as_it_was_and_has_one_thread_meanwhile(three_threads: None) -> None:
+    seen: set[int] = set()
+    rays = et.RingSource(rays=2_000)
+    et.LightField.fit(rays, et.Disk(radius=30), depths=(2, 2, 2, 2), progress=lambda *_: seen.update(blas_threads()))
+    assert seen == {1}
+    assert blas_threads() == {3}
