@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
-from threadpoolctl import ThreadpoolController
+from threadpoolctl import threadpool_limits
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+Given = ParamSpec("Given")
 
 
 def in_order(function: Callable[[Item], Result], items: Iterable[Item], workers: int) -> Iterator[Result]:
@@ -48,39 +47,18 @@ def in_order(function: Callable[[Item], Result], items: Iterable[Item], workers:
                 future.cancel()
 
 
-class OneBlasThread(contextlib.ContextDecorator):
-    """NumPy's linear algebra on one thread, for work that takes turns with the core: by ``with``, or as a decorator.
+def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    """The function, during which NumPy's linear algebra has one thread: for work that takes turns with the core.
 
     OpenBLAS, which NumPy's wheels bring, keeps its threads running for some hundredths of a second after each product, in
-    case there is another: on processors that the core's threads want by then. What is set is the number of threads of the
-    whole process: products of other threads of Python have one, too, until the last of those who asked for it has done.
+    case there is another: on processors that the core's threads want by then. The number is one of the whole process;
+    of several threads of Python only the first sets it, until it is done.
 
     Examples
     --------
     >>> import numpy as np
-    >>> with one_blas_thread:
-    ...     np.ones((2, 2)) @ np.ones(2)
-    array([2., 2.])
+    >>> on_one_blas_thread(lambda a: a @ a)(np.array([3.0, 4.0])).item()
+    25.0
     """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._within = 0
-        self._limit: contextlib.AbstractContextManager[object] = contextlib.nullcontext()
-
-    def __enter__(self) -> None:
-        with self._lock:
-            self._within += 1
-            if self._within == 1:
-                self._limit = ThreadpoolController().limit(limits=1, user_api="blas")
-                self._limit.__enter__()
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._within -= 1
-            if not self._within:
-                self._limit.__exit__(None, None, None)
-
-
-one_blas_thread = OneBlasThread()
-"""The one for all: it counts who is within."""
+    limited: Callable[Given, Result] = threadpool_limits.wrap(limits=1, user_api="blas")(function)
+    return limited

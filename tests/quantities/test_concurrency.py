@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import etendue as et
 import numpy as np
 import pytest
-from etendue.concurrency import in_order, one_blas_thread
+from etendue.concurrency import in_order, on_one_blas_thread
 from threadpoolctl import threadpool_info, threadpool_limits
 
 
@@ -69,33 +69,45 @@ def three_threads() -> Iterator[None]:
         yield
 
 
-def test_linear_algebra_has_one_thread_until_the_last_has_done(three_threads: None) -> None:
+@pytest.mark.usefixtures("three_threads")
+def test_linear_algebra_has_one_thread_and_what_was_set_comes_back() -> None:
+    assert on_one_blas_thread(blas_threads)() == {1}
+    assert blas_threads() == {3}
+
+    @on_one_blas_thread
+    def fails() -> None:
+        raise ValueError("two")
+
+    with pytest.raises(ValueError, match="two"):
+        fails()
+    assert blas_threads() == {3}
+
+
+@pytest.mark.usefixtures("three_threads")
+def test_of_two_threads_of_python_neither_leaves_it_limited() -> None:
     entered, left = threading.Event(), threading.Event()
 
-    def other() -> None:
-        with one_blas_thread:
-            entered.set()
-            assert left.wait(30)
+    @on_one_blas_thread
+    def longer() -> None:
+        entered.set()
+        assert left.wait(30)
 
-    thread = threading.Thread(target=other)
-    with one_blas_thread:
+    thread = threading.Thread(target=longer)
+
+    @on_one_blas_thread
+    def first() -> None:
         thread.start()
         assert entered.wait(30)
         assert blas_threads() == {1}
-    # The first has left; what it found must not come back yet.
-    assert blas_threads() == {1}
+
+    first()
     left.set()
     thread.join()
     assert blas_threads() == {3}
 
 
-def test_what_was_set_comes_back_after_an_error(three_threads: None) -> None:
-    with pytest.raises(ValueError, match="two"), one_blas_thread:
-        raise ValueError("two")
-    assert blas_threads() == {3}
-
-
-def test_a_fit_leaves_linear_algebra_as_it_was_and_has_one_thread_meanwhile(three_threads: None) -> None:
+@pytest.mark.usefixtures("three_threads")
+def test_a_fit_leaves_linear_algebra_as_it_was_and_has_one_thread_meanwhile() -> None:
     seen: set[int] = set()
     rays = et.RingSource(rays=2_000)
     et.LightField.fit(rays, et.Disk(radius=30), depths=(2, 2, 2, 2), progress=lambda *_: seen.update(blas_threads()))

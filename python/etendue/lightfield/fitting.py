@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from etendue.concurrency import one_blas_thread
+from etendue.concurrency import on_one_blas_thread
 from etendue.errors import ArgumentError
 from etendue.lightfield.calibration import calibrate
 from etendue.lightfield.candidate import (
@@ -95,7 +95,7 @@ class Plan:
     recipes: tuple[str, ...] = tuple(RECIPES)
 
 
-@one_blas_thread
+@on_one_blas_thread
 def fit_light_field(
     rays: RayStream,
     surface: Surface | Literal["auto"],

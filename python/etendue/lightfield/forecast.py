@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.concurrency import one_blas_thread
+from etendue.concurrency import on_one_blas_thread
 from etendue.errors import ArgumentError
 from etendue.lightfield.candidate import (
     MIXED_IN,
@@ -156,7 +156,7 @@ class Forecast:
         return Predicted(float(value), float(low), float(high))
 
 
-@one_blas_thread
+@on_one_blas_thread
 def make_forecast(
     field: LightField,
     rays: RayStream,

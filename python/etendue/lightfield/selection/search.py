@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from etendue.concurrency import one_blas_thread
+from etendue.concurrency import on_one_blas_thread
 from etendue.errors import ArgumentError
 from etendue.lightfield.focusing import focused_about
 from etendue.lightfield.pilot_sample import FEWEST, even_density, pilot_sample
@@ -68,7 +68,7 @@ class SurfaceChoice:
     notes: tuple[str, ...]
 
 
-@one_blas_thread
+@on_one_blas_thread
 def choose_surface(
     rays: RayStream,
     *,
