@@ -246,7 +246,10 @@ class FieldRays:
 
 @final
 class Scene:
-    """A scene, ready to be traced and to be looked at; `record` is what `etendue.scene.compile_scene` makes."""
+    """A scene, ready to be traced and to be looked at; `record` is what `etendue.scene.compile_scene` makes.
+
+    Its faces come as columns: ``record["faces"]`` is a `etendue.scene.face_rows.FaceRows`.
+    """
 
     def __new__(cls, record: dict[str, Any]) -> Scene: ...
     def with_far_fields(self, nodes: list[FarField]) -> Scene:

@@ -18,6 +18,7 @@ from etendue.errors import ArgumentError
 from etendue.scene import Scene, compile_scene
 from etendue.scene.bodies import BODIES
 from etendue.scene.extents import box_of
+from etendue.scene.face_rows import FaceRows
 from etendue.scene.placement import Placement
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.shape import Trim
@@ -219,7 +220,7 @@ def test_lines_cross_the_curves_as_often_as_they_meet_the_face(kind: str, sectio
     part, plane = face(kind, TILTED, TRIMS[kind] if trimmed else None), Section.parse(section)
     (curves,) = cut_faces([part], plane)
     record = compile_scene(Scene(surfaces=[{"shape": {"kind": "disk", "radius": 1}, "finish": "absorber"}])).record
-    core = _core.Scene({**record, "faces": [{**record["faces"][0], **part}]})
+    core = _core.Scene({**record, "faces": FaceRows.of([{**record["faces"][0], **part}])})
     size = float(np.ptp(box_of(part["shape"]), axis=0).max())
     rng = np.random.default_rng(7)
     angle, shift = rng.uniform(0, 2 * np.pi, 300), rng.uniform(-size, size, 300)

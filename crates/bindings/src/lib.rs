@@ -8,6 +8,7 @@ mod cone;
 mod counts;
 mod dealing;
 mod detector;
+mod faces;
 mod far_field;
 mod field;
 mod finish;

@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, OnceLock};
 
-use etendue_math::Vec3;
 use etendue_optics::bsdf::Bsdf;
 use etendue_optics::light_sampler::LightSampler;
 use etendue_optics::medium::{Index, Medium};
@@ -10,27 +9,19 @@ use etendue_optics::source::{Emitter, IntensityTable, Pattern, Source, SpectralL
 use etendue_optics::table::Curve;
 use etendue_trace::detector::{Detector, Intensity};
 use etendue_trace::lit_scene::{LitScene, light_samplers};
-use etendue_trace::scene::{Scene as CoreScene, SceneFace};
+use etendue_trace::scene::Scene as CoreScene;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::bsdf::Bsdf as BuiltBsdf;
 use crate::detector::detector;
+use crate::faces::faces;
 use crate::far_field::FarField;
 use crate::field::LightField;
 use crate::finish::finish;
 use crate::patches::patches;
-use crate::scene_values::{Dict, face, frame, get, inner, list, optional, refuse, shape};
+use crate::scene_values::{Dict, frame, get, inner, list, optional, refuse, shape};
 use crate::view::View;
-
-fn part(dict: &Bound<'_, PyDict>) -> PyResult<SceneFace> {
-    Ok(SceneFace {
-        face: face(dict)?,
-        solid: optional(dict, "solid")?,
-        finish: get(dict, "finish")?,
-        axis: optional::<[f64; 3]>(dict, "axis")?.map(|[x, y, z]| Vec3::new(x, y, z)),
-    })
-}
 
 fn curve(dict: Dict<'_, '_>, y: &str) -> PyResult<Curve> {
     Curve::new(get(dict, "wavelength")?, get(dict, y)?).ok_or_else(|| refuse("not a table over increasing wavelengths"))
@@ -195,7 +186,7 @@ impl Scene {
     #[new]
     fn new(record: &Bound<'_, PyDict>) -> PyResult<Self> {
         let each = |key: &str| list(record, key);
-        let parts: Vec<SceneFace> = each("faces")?.iter().map(part).collect::<PyResult<_>>()?;
+        let parts = faces(&get(record, "faces")?)?;
         let finishes: Vec<Bound<'_, PyAny>> = get(record, "finishes")?;
         let finishes = finishes.iter().map(finish_of).collect::<PyResult<_>>()?;
         let media = each("media")?.iter().map(medium).collect::<PyResult<_>>()?;

@@ -49,16 +49,20 @@ pub fn list<'py>(dict: Dict<'_, 'py>, key: &str) -> PyResult<Vec<Bound<'py, PyDi
 
 /// The place of a record.
 pub fn frame(dict: Dict<'_, '_>) -> PyResult<Frame> {
-    let v: Vec<f64> = get(dict, "frame")?;
-    let [ox, oy, oz, xx, xy, xz, yx, yy, yz, zx, zy, zz] = v[..] else {
-        return Err(refuse(format!("a frame has 12 numbers, not {}", v.len())));
-    };
-    Ok(Frame {
+    let numbers: Vec<f64> = get(dict, "frame")?;
+    let numbers = numbers.try_into();
+    let numbers = numbers.map_err(|n: Vec<f64>| refuse(format!("a frame has 12 numbers, not {}", n.len())))?;
+    Ok(frame_of(numbers))
+}
+
+/// A place from its origin and the x, y and z axis.
+pub fn frame_of([ox, oy, oz, xx, xy, xz, yx, yy, yz, zx, zy, zz]: [f64; 12]) -> Frame {
+    Frame {
         origin: Vec3::new(ox, oy, oz),
         x: Vec3::new(xx, xy, xz),
         y: Vec3::new(yx, yy, yz),
         z: Vec3::new(zx, zy, zz),
-    })
+    }
 }
 
 fn outline(dict: Dict<'_, '_>) -> PyResult<Outline> {
@@ -135,11 +139,31 @@ pub fn shape(dict: Dict<'_, '_>) -> PyResult<Shape> {
     })
 }
 
-pub fn face(dict: Dict<'_, '_>) -> PyResult<Face> {
+/// What a face is, wherever it stands.
+#[derive(Clone)]
+pub struct Form {
+    shape: Shape,
+    trims: Vec<HalfSpace>,
+    flipped: bool,
+}
+
+impl Form {
+    /// The face of this form that stands there.
+    pub fn at(self, frame: Frame) -> Face {
+        Face {
+            shape: self.shape,
+            frame,
+            trims: self.trims,
+            flipped: self.flipped,
+        }
+    }
+}
+
+/// The form of a record.
+pub fn form(dict: Dict<'_, '_>) -> PyResult<Form> {
     let trims: Option<Vec<[f64; 4]>> = optional(dict, "trims")?;
-    Ok(Face {
+    Ok(Form {
         shape: shape(&inner(dict, "shape")?)?,
-        frame: frame(dict)?,
         trims: trims
             .unwrap_or_default()
             .into_iter()
@@ -150,4 +174,9 @@ pub fn face(dict: Dict<'_, '_>) -> PyResult<Face> {
             .collect(),
         flipped: optional(dict, "flip")?.unwrap_or(false),
     })
+}
+
+/// The face of a record.
+pub fn face(dict: Dict<'_, '_>) -> PyResult<Face> {
+    Ok(form(dict)?.at(frame(dict)?))
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,12 +46,12 @@ def _feed(digest: Any, value: Any) -> None:
             for key in sorted(value):
                 _feed(digest, key)
                 _feed(digest, value[key])
-        case list() | tuple():
+        case str():
+            digest.update(b"s%d:" % len(value) + value.encode())
+        case Sequence():
             digest.update(b"[%d" % len(value))
             for held in value:
                 _feed(digest, held)
-        case str():
-            digest.update(b"s%d:" % len(value) + value.encode())
         case bool() | None:
             digest.update(repr(value).encode())
         case int() | float() | np.number():

@@ -51,9 +51,8 @@ def core_scene(record: Mapping[str, Any]) -> _core.Scene:
 
     Examples
     --------
-    >>> empty = {key: [] for key in ("finishes", "faces", "solids", "sources", "detectors")}
-    >>> air = {"index": {"kind": "constant", "n": 1.0}, "absorption": {"wavelength": [500.0], "per_mm": [0.0]}}
-    >>> core_scene({**empty, "media": [air]}).may_focus()
+    >>> import etendue as et
+    >>> core_scene(et.scene.compile_scene(et.Scene()).record).may_focus()
     False
     """
     return _core.Scene({**record, "finishes": [built(finish) for finish in record["finishes"]]})

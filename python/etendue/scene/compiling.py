@@ -18,13 +18,13 @@ from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameEr
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.spectrum import photopic_efficiency
 from etendue.scatter.members import same_when_turned
-from etendue.scene.bodies.body import Body, Face
+from etendue.scene.bodies.body import Body
 from etendue.scene.colour_dependence import telling_finishes, telling_media
+from etendue.scene.face_rows import BodyFaces, FaceGathering, FaceRows
 from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
 from etendue.scene.media_library import MEDIA
 from etendue.scene.overlaps import Kind, doubts_about
-from etendue.scene.placement import Frame
 from etendue.scene.scene import Scene
 from etendue.scene.shapes.shape import WHOLE
 from etendue.scene.things import Solid, Surface
@@ -42,8 +42,8 @@ class Compiled:
     Parameters
     ----------
     record : mapping
-        ``media``, ``finishes``, ``solids``, ``faces``, ``sources``, ``detectors``: rows of plain values and arrays.
-        Lengths are in mm, angles in radians, wavelengths in nm.
+        ``media``, ``finishes``, ``solids``, ``faces``, ``sources``, ``detectors``: rows of plain values and arrays; those
+        of the faces are `etendue.scene.face_rows.FaceRows`. Lengths are in mm, angles in radians, wavelengths in nm.
     medium_names, finish_names, solid_names, face_names, source_names, detector_names : tuple of str
         One for each entry of the rows, in their order. What has no name is called by its place, as ``solids[0]``.
     flux_unit : {"lm", "W"}
@@ -102,28 +102,17 @@ def compile_scene(scene: Scene) -> Compiled:
     return _Compiler(scene).compiled()
 
 
-class _Faces:
-    """The faces of a body, wherever it stands.
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Dressed:
+    """What a body has by its finishes, wherever it stands and whatever it is called."""
 
-    Parameters
-    ----------
-    faces : tuple of Face
-        In the coordinates of the body.
-    """
-
-    def __init__(self, faces: tuple[Face, ...]) -> None:
-        self.faces = faces
-        self.doubts = [doubt for face in faces for doubt in face.doubts]
-        self._origins = np.array([face.frame.origin for face in faces])
-        # Transposed: the axes of a face are the rows.
-        self._axes = np.array([face.frame.axes.T for face in faces])
-
-    def placed(self, frame: Frame) -> list[list[float]]:
-        """The records of all frames (`Frame.record`) in a body that stands so."""
-        origins = frame.origin + self._origins @ frame.axes.T
-        axes = self._axes @ frame.axes.T
-        rows: list[list[float]] = np.concatenate([origins, axes.reshape(-1, 9)], axis=1).tolist()
-        return rows
+    finishes: list[int]
+    """Number of that of each face."""
+    axes: list[tuple[tuple[float, float, float], npt.NDArray[np.int64]]]
+    """Axes of finishes, and the faces that have them."""
+    lets_in: bool
+    """Whether light enters by any face."""
+    notes: list[str]
 
 
 class _Compiler:
@@ -136,16 +125,18 @@ class _Compiler:
         self.notes: list[str] = []
         self.doubts: list[str] = []
         self.rows: dict[str, list[Record]] = {
-            key: [] for key in ("media", "finishes", "solids", "faces", "sources", "detectors")
+            key: [] for key in ("media", "finishes", "solids", "sources", "detectors")
         }
-        self.names: dict[str, list[str]] = {key: [] for key in self.rows}
+        self.faces = FaceGathering()
+        self.names: dict[str, list[str]] = {key: [] for key in (*self.rows, "faces")}
         self.media: list[tuple[str, str, Medium]] = []
         self.numbers: dict[tuple[str, str], int] = {}
         self.kinds: list[Kind] = []
         self.sets: list[Any] = []
         self.used: list[npt.NDArray[np.float64]] = []
         self.means: dict[str, npt.NDArray[np.float64]] = {}
-        self.bodies: dict[Body, _Faces] = {}
+        self.bodies: dict[Body, BodyFaces] = {}
+        self.dressed: dict[tuple[object, ...], _Dressed] = {}
         self.named_finishes: dict[str, tuple[int, bool, Axis]] = {}
         self.letting_in: set[tuple[str, str]] = set()
         self.axes: dict[tuple[str, str], Axis] = {}
@@ -164,11 +155,12 @@ class _Compiler:
         self._check_far_fields()
         if self.mistakes:
             raise SceneError(self.scene.name or "scene", self.mistakes)
-        for doubt in doubts_about(self.rows, self.kinds, self.names["sources"]):
+        record = {**self.rows, "faces": self.faces.rows()}
+        for doubt in doubts_about(record, self.kinds, self.names["sources"]):
             self._doubt(doubt, 4)
         names = {key: tuple(held) for key, held in self.names.items()}
         return Compiled(
-            dict(self.rows),
+            record,
             names["media"],
             names["finishes"],
             names["solids"],
@@ -309,54 +301,63 @@ class _Compiler:
 
     def _solid(self, place: str, name: str, solid: Solid) -> None:
         number = len(self.rows["solids"])
-        frame = solid.frame()
-        entered = closed = False
+        lets_in = closed = False
         with self._at(join(place, "shape")):
             body = self._body(solid.shape)
             closed = not body.doubts
             for doubt in body.doubts:
                 self._doubt(f"{place}: {doubt}", 5)
-            self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(body.faces)]
-            # By the key that states it: faces with one finish share it.
-            finishes: dict[str | None, tuple[int, bool, list[float] | None]] = {}
-            for face, placed in zip(body.faces, body.placed(frame), strict=True):
-                key, given = solid.finish_of(face)
-                if key not in finishes:
-                    where, owner = ("finish", name) if key is None else (f"finishes.{key}", f"{name}.{key}")
-                    finish, lets_in, axis = self._finish(join(place, where), owner, given)
-                    finishes[key] = finish, lets_in, _turned(axis, frame)
-                finish, lets_in, turned = finishes[key]
-                entered |= lets_in
-                self.notes += [f"{name}: {note}" for note in (*face.notes, *(face.facet_notes if lets_in else ()))]
-                self.rows["faces"].append(
-                    {
-                        "shape": face.shape,
-                        "frame": placed,
-                        "trims": [],
-                        "solid": number,
-                        "flip": face.flip,
-                        "finish": finish,
-                        "axis": turned,
-                    }
-                )
-                self.names["faces"].append(f"{name}.{face.name}")
-        if solid.medium is None and entered:
+            dressed = self._dressed(place, name, solid, body)
+            lets_in = dressed.lets_in
+            self.notes += [f"{name}: {note}" for note in dressed.notes]
+            self.faces.add_body(body, solid.frame(), number, dressed.finishes, dressed.axes)
+            self.names["faces"] += [f"{name}.{face}" for face in body.names]
+        if solid.medium is None and lets_in:
             text = "is missing; light enters this solid, so its refractive index is needed"
             self.mistakes.append((join(place, "medium"), text))
         medium = 0 if solid.medium is None else self._medium(join(place, "medium"), name, solid.medium)
         self.rows["solids"].append({"medium": medium})
-        self.kinds.append(Kind(name, not entered, closed))
+        self.kinds.append(Kind(name, not lets_in, closed))
         self.names["solids"].append(name)
 
-    def _body(self, body: Body) -> _Faces:
+    def _body(self, body: Body) -> BodyFaces:
         """The faces of a body; equal ones share theirs, so that a file is read once and its numbers are worked out once."""
         try:
             found = self.bodies.get(body)
         except TypeError:  # it holds arrays, which have no hash
-            return _Faces(body.faces(self.files))
+            return BodyFaces(body.faces(self.files))
         if found is None:
-            found = self.bodies[body] = _Faces(body.faces(self.files))
+            found = self.bodies[body] = BodyFaces(body.faces(self.files))
         return found
+
+    def _dressed(self, place: str, name: str, solid: Solid, body: BodyFaces) -> _Dressed:
+        """What a body has by its finishes; equal ones share it if all their finishes have names and nothing is wrong."""
+        key = (body, solid.finish, *solid.finishes.items())
+        # Finishes without names are called by their solids.
+        named = all(isinstance(given, str) for given in (solid.finish, *solid.finishes.values()))
+        if named and key in self.dressed:
+            return self.dressed[key]
+        before = len(self.mistakes)
+        self.mistakes += [(join(place, inner), text) for inner, text in solid.check_names(body.faces)]
+        # By the key that states it: faces with one finish share it.
+        finishes: dict[str | None, tuple[int, bool, Axis]] = {}
+        with_axis: dict[str | None, list[int]] = {}
+        numbers, notes = [], []
+        for i, face in enumerate(body.faces):
+            stated, given = solid.finish_of(face)
+            if stated not in finishes:
+                where, owner = ("finish", name) if stated is None else (f"finishes.{stated}", f"{name}.{stated}")
+                finishes[stated] = self._finish(join(place, where), owner, given)
+            finish, lets_in, axis = finishes[stated]
+            numbers.append(finish)
+            notes += [*face.notes, *(face.facet_notes if lets_in else ())]
+            if axis is not None:
+                with_axis.setdefault(stated, []).append(i)
+        axes = [(axis, np.array(with_axis[stated])) for stated, (_, _, axis) in finishes.items() if axis is not None]
+        dressed = _Dressed(numbers, axes, any(lets_in for _, lets_in, _ in finishes.values()), notes)
+        if named and len(self.mistakes) == before:
+            self.dressed[key] = dressed
+        return dressed
 
     def _surface(self, place: str, name: str, surface: Surface) -> None:
         with self._at(join(place, "shape")):
@@ -365,18 +366,8 @@ class _Compiler:
             finish, _, axis = self._finish(join(place, "finish"), name, surface.finish)
             if surface.finish in ("interface", Interface()):
                 self.notes.append(f"{name}: an interface changes nothing on a surface that is no solid's")
-            frame = surface.frame()
-            self.rows["faces"].append(
-                {
-                    "shape": sheet.shape,
-                    "frame": frame.record(),
-                    "trims": sheet.trims,
-                    "solid": None,
-                    "flip": False,
-                    "finish": finish,
-                    "axis": _turned(axis, frame),
-                }
-            )
+            form = {"shape": sheet.shape, "trims": sheet.trims, "flip": False}
+            self.faces.add_sheet(form, surface.frame(), finish, axis)
             self.names["faces"].append(name)
 
     # --- light and what becomes of it ----------------------------------------------------------------------------------
@@ -416,7 +407,7 @@ class _Compiler:
 
     def _check_cut(self, place: str, row: Record) -> None:
         """A mistake if the tracer cannot draw from what is left of a surface: nothing, or not what it can cut."""
-        nothing: Record = {key: [] for key in self.rows}
+        nothing: Record = {**{key: [] for key in self.rows}, "faces": FaceRows.of([])}
         try:
             _core.Scene({**nothing, "media": [Medium(index=1.0).record(self.files)], "sources": [row]})
         except ValueError as error:
@@ -446,11 +437,6 @@ def _no_lumens(name: str, wavelengths: npt.NDArray[np.float64]) -> list[str]:
     return [
         f'{name}: at {dark[0]:g} nm light has no lumens, since V(λ) is 0 there; state its flux in W, by flux_unit = "W"'
     ]
-
-
-def _turned(axis: Axis, frame: Frame) -> list[float] | None:
-    """A direction of a frame in the world."""
-    return None if axis is None else (frame.axes @ np.asarray(axis)).tolist()
 
 
 def _place(family: str, i: int, name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -78,12 +79,12 @@ def corners_of(compiled: Compiled) -> Array:
     return np.concatenate([np.zeros((0, 3)), *(finite_boxes(record["faces"]) or finite_boxes(record["sources"]))])
 
 
-def finite_boxes(things: list[dict[str, Any]]) -> list[Array]:
+def finite_boxes(things: Sequence[dict[str, Any]]) -> list[Array]:
     """The corners in the world of the boxes around those faces or sources that have an end, shape (8, 3) each [mm].
 
     Parameters
     ----------
-    things : list of records
+    things : sequence of records
         ``compiled.record["faces"]`` or ``["sources"]``.
 
     Examples

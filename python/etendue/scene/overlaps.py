@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.scene.extents import box_of
+from etendue.scene.face_rows import FaceRows
 
 Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.int64]
@@ -41,8 +42,6 @@ PAIRS_AT_ONCE = 1 << 18
 
 DEEPEST = 4
 """Solids that a ray may be in at once."""
-
-_CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,20 +117,21 @@ class _Solids:
         self.record = record
         self.names = [f'"{kind.name}"' for kind in kinds]
         self.opaque = [kind.opaque for kind in kinds]
-        closed = [face for face in record["faces"] if face["solid"] is not None and kinds[face["solid"]].closed]
-        # Equal bodies share the shapes of their faces.
-        shapes = {id(face["shape"]): face["shape"] for face in closed}
-        boxes = {key: box_of(shape) for key, shape in shapes.items()}
+        faces: FaceRows = record["faces"]
+        # The last stands for no solid, whose number is -1.
+        closed = faces.chosen(np.array([*(kind.closed for kind in kinds), False])[faces.solids])
+        boxes = np.array([box_of(form["shape"]) for form in closed.forms]).reshape(-1, 2, 3)[closed.form]
         # A face of absurd numbers may have no place.
-        known = {key: box for key, box in boxes.items() if np.isfinite(box).all()}
-        self.faces = [face for face in closed if id(face["shape"]) in known]
-        self.boxes = np.array([known[id(face["shape"])] for face in self.faces]).reshape(-1, 2, 3)
-        self.owner = np.array([face["solid"] for face in self.faces], dtype=np.int64)
+        known = np.isfinite(boxes).all(axis=(1, 2))
+        self.faces, self.boxes = closed.chosen(known), boxes[known]
+        self.owner = self.faces.solids
         self.low, self.high = np.full((len(kinds), 3), np.inf), np.full((len(kinds), 3), -np.inf)
-        self.frames = np.array([face["frame"] for face in self.faces], dtype=np.float64).reshape(-1, 4, 3)
-        corners = self.placed(np.arange(len(self.faces))[:, None], _CORNERS)
-        np.minimum.at(self.low, self.owner, corners.min(axis=1))
-        np.maximum.at(self.high, self.owner, corners.max(axis=1))
+        self.frames = self.faces.frames.reshape(-1, 4, 3)
+        # Of the corners of a face's box the least and the greatest coordinates: sums of the least and the greatest parts.
+        ends = np.stack([self.boxes[:, 0], self.boxes[:, 0] + (self.boxes[:, 1] - self.boxes[:, 0])], axis=1)
+        parts = ends[..., None] * self.frames[:, None, 1:]
+        np.minimum.at(self.low, self.owner, parts.min(axis=1).sum(axis=1) + self.frames[:, 0])
+        np.maximum.at(self.high, self.owner, parts.max(axis=1).sum(axis=1) + self.frames[:, 0])
         self.sizes = (self.high - self.low).max(axis=1)
 
     def placed(self, faces: Numbers, at: Array) -> Array:
@@ -148,7 +148,9 @@ class _Solids:
 
     @functools.cached_property
     def _core(self) -> _core.Scene:
-        return _bare(self.record, [{**face, "solid": None, "finish": 0} for face in self.faces], [])
+        n = len(self.faces)
+        bare = dataclasses.replace(self.faces, solids=np.full(n, -1), finishes=np.zeros(n, dtype=np.int64))
+        return _bare(self.record, bare, [])
 
     def crossings(self, starts: Array, directions: Array) -> tuple[Numbers, Numbers, Array]:
         """Where lines cross solids ahead: number of the line, of the solid, distance [mm]; in order along each line."""
@@ -175,7 +177,7 @@ class _Solids:
         return inside, outside
 
 
-def _bare(record: Record, faces: list[Record], sources: list[Record]) -> _core.Scene:
+def _bare(record: Record, faces: FaceRows, sources: list[Record]) -> _core.Scene:
     """Faces and sources in the scene's surroundings, and nothing else."""
     return _core.Scene(
         {
@@ -239,9 +241,11 @@ def _overlaps(solids: _Solids) -> Iterator[str]:
 def _near(solids: _Solids) -> Iterator[tuple[int, int]]:
     """Pairs of solids whose boxes have a space in common, the first listed first."""
     order = np.argsort(solids.low[:, 0], kind="stable")
-    low, high, sizes = solids.low[order], solids.high[order], solids.sizes[order]
+    # By axis, since only one is looked at at a time.
+    low, high = np.ascontiguousarray(solids.low[order].T), np.ascontiguousarray(solids.high[order].T)
+    sizes = solids.sizes[order]
     # How many of those that begin later along x begin before each has ended.
-    counts = np.maximum(np.searchsorted(low[:, 0], high[:, 0]) - np.arange(1, len(order) + 1), 0)
+    counts = np.maximum(np.searchsorted(low[0], high[0]) - np.arange(1, len(order) + 1), 0)
     start = 0
     while start < len(order):
         # So many solids at a time that their pairs take little memory; one at least.
@@ -250,7 +254,8 @@ def _near(solids: _Solids) -> Iterator[tuple[int, int]]:
         begun = np.repeat(np.cumsum(counts[start:stop]) - counts[start:stop], counts[start:stop])
         second = first + 1 + np.arange(len(first)) - begun
         for axis in (1, 2, 0):
-            common = np.minimum(high[first, axis], high[second, axis]) - np.maximum(low[first, axis], low[second, axis])
+            begin, end = low[axis], high[axis]
+            common = np.minimum(end[first], end[second]) - np.maximum(begin[first], begin[second])
             near = common > BESIDE * np.minimum(sizes[first], sizes[second])
             first, second = first[near], second[near]
         pairs = np.sort(order[np.stack([first, second], axis=1)], axis=1)
@@ -311,7 +316,7 @@ def _crowds(solids: _Solids, shared: Sequence[tuple[int, int]]) -> Iterator[str]
 
 
 def _starts(solids: _Solids, name: str, source: Record) -> Iterator[str]:
-    trails = _core.trace_trails(_bare(solids.record, [], [source]), STARTS, 1, 1, 1.0)
+    trails = _core.trace_trails(_bare(solids.record, FaceRows.of([]), [source]), STARTS, 1, 1, 1.0)
     points = np.array([trail[0] for trail in trails if len(trail)]).reshape(-1, 3)
     near = (points[:, None] >= solids.low) & (points[:, None] <= solids.high)
     if not near.all(axis=2).any():

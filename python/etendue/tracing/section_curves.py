@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
+from etendue.scene.face_rows import FaceRows
 from etendue.tracing.section import Section
 from etendue.tracing.section_chains import chains
 
@@ -60,14 +61,14 @@ class _Face:
 
     def __init__(self, shape: dict[str, Any], frame: list[float], trims: list[Any], section: Section) -> None:
         nothing = {"wavelength": np.array([555.0]), "per_mm": np.zeros(1)}
-        part = {"shape": shape, "frame": frame, "trims": trims, "solid": None, "flip": False, "finish": 0}
+        part = {"shape": shape, "frame": frame, "trims": trims, "solid": None, "flip": False, "finish": 0, "axis": None}
         self.section = section
         self.core = _core.Scene(
             {
                 "media": [{"index": {"kind": "constant", "n": 1.0}, "absorption": nothing}],
                 "finishes": [{"kind": "fresnel"}],
                 "solids": [],
-                "faces": [part],
+                "faces": FaceRows.of([part]),
                 "sources": [],
                 "detectors": [],
             }

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.scatter.building import core_scene
 from etendue.scene import Compiled
+from etendue.scene.face_rows import FaceRows
 from etendue.tracing.section import Section
 
 Array = npt.NDArray[np.float64]
@@ -119,7 +120,8 @@ def sample_source(compiled: Compiled, source: dict[str, Any], rays: int, seed: i
     ([7.0, 7.0, 7.0, 7.0, 7.0], [0.0, 0.0, 1.0])
     """
     medium = compiled.record["media"][:1]
-    bare = {"media": medium, "finishes": [], "solids": [], "faces": [], "sources": [source], "detectors": []}
+    nothing = {"finishes": [], "solids": [], "faces": FaceRows.of([]), "detectors": []}
+    bare = {**nothing, "media": medium, "sources": [source]}
     found = _core.trace_trails(_core.Scene(bare), rays, seed, 1, 1.0)
     ends = np.array([points[[0, -1]] for points in found if len(points) > 1]).reshape(-1, 2, 3)
     along = ends[:, 1] - ends[:, 0]
