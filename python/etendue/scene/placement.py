@@ -56,6 +56,10 @@ class Frame:
         return cls(np.array([x, y, z], dtype=np.float64), np.eye(3))
 
 
+UPRIGHT = np.eye(3)
+"""The axes of what is not turned."""
+UPRIGHT.flags.writeable = False  # thousands of solids share it
+
 HERE = Frame.shifted(0.0, 0.0, 0.0)
 """The outer frame itself."""
 
@@ -118,7 +122,7 @@ class Placement(Description):
 
     def frame(self) -> Frame:
         """Local coordinates in the world."""
-        axes = np.eye(3)
+        axes = UPRIGHT
         if self.toward is not None:
             axes = _shortest_rotation(np.asarray(self.toward))
         elif self.axis is not None and self.angle is not None:
@@ -129,7 +133,7 @@ class Placement(Description):
         if self.spin:
             axes = axes @ _turn(np.array([0.0, 0.0, 1.0]), self.spin)
         # Adding 0 turns the -0 of exact quarter turns into 0.
-        return Frame(np.asarray(self.at), axes + 0.0)
+        return Frame(np.asarray(self.at), axes if axes is UPRIGHT else axes + 0.0)
 
 
 def unit(vector: npt.ArrayLike) -> Array:
