@@ -3,7 +3,8 @@
     python benchmarks/run_all.py [--only map,count] [--repeats 3] [--rays 20000000]
 
 Peers that are not installed are named and skipped: Mitsuba 3 (`mitsuba`, with LLVM, see `mitsuba_peer.py`), Radiance
-(`pyradiance`), numba, and a C compiler with OpenMP for `peers/plain.c`; for Embree see `tracer.py`. Both sides of a row are
+(`pyradiance`), numba, a C compiler with OpenMP for `peers/plain.c`, and the benchmark of the reader `tm25ray`
+(`cargo install tm25ray --example tm25_bench --features mmap`); for Embree see `tracer.py`. Both sides of a row are
 measured one after the other; each figure is the best of some tries. With repeats, the whole is done again, and the
 least and the largest ratio are printed. `taskset -c 0,1 python benchmarks/run_all.py` gives two cores to either side where
 there are more.
@@ -209,6 +210,22 @@ def files(options: argparse.Namespace, folder: Path) -> Iterator[Row]:
     yield per_second("étendue counts of equal rays", rays / ours, peer, rays / theirs, 1.0)
 
 
+def reader(options: argparse.Namespace, folder: Path) -> Iterator[Row]:
+    program = shutil.which("tm25_bench")
+    if program is None:
+        raise ImportError("no program tm25_bench")
+    path = folder / "rings.tm25ray"
+    et.write_rays(path, et.RingSource(rays=options.rays))
+    ours = options.rays / best(lambda: _core.scan(et.read_rays(path).core_source(), 1), 5)
+    told = subprocess.run([program, path, "5"], check=True, capture_output=True, text=True).stdout
+    # It turns every record into numbers, and sums one of them, on one thread.
+    for job in ("mmap + decode", "stream + decode"):
+        rates = [
+            float(line.split("M rays/s")[0].split()[-1]) for line in told.splitlines() if line.strip().startswith(job)
+        ]
+        yield per_second("decode, check and sum, one thread", ours, f"tm25ray, {job}", max(rates) * 1e6, 1.0)
+
+
 def start(_: argparse.Namespace, folder: Path) -> Iterator[Row]:
     path = folder / "small.tm25ray"
     et.write_rays(path, et.RingSource(rays=100_000))
@@ -236,6 +253,7 @@ JOBS = {
     "cavity": cavity,
     "look": look,
     "files": files,
+    "reader": reader,
     "start": start,
 }
 
