@@ -11,11 +11,12 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.instruments.beam_and_aperture import Aperture, Beam, axes_of, into_the_sample
+from etendue.quantities.vectors import lengths
 
 Array = npt.NDArray[np.float64]
 
-TOGETHER = 400_000
-"""Lines of sight that are looked at together: what they take of memory."""
+TOGETHER = 20_000
+"""Lines of sight that are looked at together: no more than the processor has near."""
 
 
 class Sight(NamedTuple):
@@ -111,7 +112,7 @@ class Bench:
             frames = np.array([axes_of(one) for one in d])
             ends = self.distance * d[:, None] + np.einsum("na,iac->inc", offsets, frames)
             off = ends[:, None] - start[None, :, None]
-            length = np.linalg.norm(off, axis=-1)
+            length = lengths(off)
             s = off / length[..., None]
             leaving = s[..., 2] * d[:, None, None, 2] > 0.0
             facing = np.einsum("ibnc,ic->ibn", s, d)

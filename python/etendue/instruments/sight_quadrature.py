@@ -53,10 +53,13 @@ def integrated_flux(
     def at(chosen: Array, beam: int, aperture: int) -> Array:
         found = np.zeros(len(chosen))
         for sight in bench.sights(chosen, theta, beam, aperture):
-            incident = np.broadcast_to(sight.incident[None, :, None], sight.scattered.shape)
-            lit = sight.weights > 0.0
-            f = np.zeros(lit.shape)
-            f[lit] = bsdf.evaluate(incident[lit], sight.scattered[lit], wavelength=wavelength)
+            lit, incident = sight.weights > 0.0, sight.incident[None, :, None]
+            if lit.all():
+                f = bsdf.evaluate(incident, sight.scattered, wavelength=wavelength)
+            else:
+                f = np.zeros(lit.shape)
+                each = np.broadcast_to(incident, sight.scattered.shape)[lit]
+                f[lit] = bsdf.evaluate(each, sight.scattered[lit], wavelength=wavelength)
             found[sight.positions] = np.einsum("ibn,ibn->i", f, sight.weights)
         return found
 

@@ -20,6 +20,7 @@ from etendue import _core
 from etendue.description.files import Files
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.bsdf_data import direction
+from etendue.quantities.vectors import lengths
 from etendue.scatter.building import built
 from etendue.scatter.scans.scans import Scans
 
@@ -52,7 +53,7 @@ def unit_vectors(name: str, values: npt.ArrayLike) -> Array:
     given = np.asarray(values, np.float64)
     if given.ndim < 1 or given.shape[-1] != 3:
         raise ArgumentError(f"{name} has shape {given.shape}; unit vectors have shape (…, 3)")
-    length = np.linalg.norm(given, axis=-1, keepdims=True)
+    length = lengths(given)[..., None]
     if not (np.abs(length - 1.0) <= UNIT).all():
         raise ArgumentError(f"{name} holds vectors that are not of length 1")
     return np.asarray(given / length)
