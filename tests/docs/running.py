@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import doctest
+import io
 import os
 import re
 import shlex
@@ -10,15 +12,21 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import warnings
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import etendue as et
+from etendue.cli import main
 from etendue.scene import compile_scene
 
 from docs.pages import ROOT, Block, blocks, name_of
 
 DOCTEST_FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+ENVIRONMENT = {"COLUMNS": "120", "NO_COLOR": "1", "PYTHONUTF8": "1"}
+"""Of a command."""
 
 
 def run_page(page: Path) -> None:
@@ -56,28 +64,53 @@ def run_python(block: Block, page: str, names: dict[str, Any]) -> None:
 
 def run_console(block: Block, page: str) -> None:
     """Run each ``$ etendue …`` or ``$ python examples/…``; what it prints must be the lines below, if there are any."""
-    environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1", "PYTHONUTF8": "1"}
     commands = re.split(r"^\$ ", block.text.replace("\\\n", " "), flags=re.MULTILINE)
     assert not commands[0].strip(), f"{page}:{block.line}: a console block begins with $"
     for text in commands[1:]:
         command, _, expected = text.partition("\n")
-        arguments = program(shlex.split(command))
-        done = subprocess.run(
-            arguments, capture_output=True, encoding="utf-8", env=environment, timeout=200, check=False
-        )
-        printed = done.stderr + done.stdout
+        status, printed = run_command(shlex.split(command))
         place = f"{page}:{block.line}: {command}"
-        assert done.returncode == 0, f"{place}\n{printed}"
+        assert status == 0, f"{place}\n{printed}"
         agrees = doctest.OutputChecker().check_output(expected, printed, DOCTEST_FLAGS)
         assert agrees or not expected.strip(), f"{place}\nprinted:\n{printed}\nshown:\n{expected}"
 
 
-def program(command: list[str]) -> list[str]:
-    """What a command line starts: the installed étendue, or an example of the project with this Python."""
-    name, first, *rest = command
-    if name == "python" and first.startswith("examples/"):
-        return [sys.executable, str(ROOT / first), *rest]
-    assert name == "etendue", f"{name!r} is not étendue's command"
-    path = shutil.which(name, path=sysconfig.get_path("scripts"))
+def run_command(command: list[str]) -> tuple[int, str]:
+    """Exit status of a command line, and what it prints: étendue, or an example of the project with this Python."""
+    name, *arguments = command
+    with patch.dict(os.environ, ENVIRONMENT):
+        if name == "etendue":
+            return run_here(arguments)
+        assert name == "python", f"{name!r} is not étendue's command"
+        assert arguments[0].startswith("examples/"), f"{arguments[0]!r} is no example"
+        return run_apart([sys.executable, str(ROOT / arguments[0]), *arguments[1:]])
+
+
+def run_apart(arguments: list[str]) -> tuple[int, str]:
+    """Start a program."""
+    done = subprocess.run(arguments, capture_output=True, encoding="utf-8", timeout=200, check=False)
+    return done.returncode, done.stderr + done.stdout
+
+
+def run_here(arguments: list[str]) -> tuple[int, str]:
+    """Do in this process what the command étendue does: a process of its own takes a second before it begins."""
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    with (
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        warnings.catch_warnings(),
+        patch.object(sys, "argv", ["etendue", *arguments]),
+    ):
+        try:
+            main()
+        except SystemExit as leaving:
+            status = int(leaving.code or 0)
+    printed = b"".join(stream.buffer.getvalue() for stream in (err, out))
+    return status, printed.decode("utf-8")
+
+
+def installed() -> str:
+    """The command étendue, beside this Python."""
+    path = shutil.which("etendue", path=sysconfig.get_path("scripts"))
     assert path, "the command etendue is not installed beside this Python"
-    return [path, first, *rest]
+    return path

@@ -12,7 +12,7 @@ from oracles.step import half_ball
 
 from docs.materials import PUBLIC, write_materials
 from docs.pages import PAGES, ROOT, blocks, name_of
-from docs.running import run_page
+from docs.running import installed, run_apart, run_command, run_page
 
 LANGUAGES = {"python", "console", "toml", "text", "sh"}
 """``python`` and ``console`` run here, ``toml`` is a scene that is compiled; ``text`` is shown only; ``sh`` installs and
@@ -46,6 +46,12 @@ def test_the_tutorial_runs_on_its_public_file(samples: Path, materials: Path) ->
 
 def test_the_lens_of_the_tutorial_is_half_a_ball() -> None:
     assert (ROOT / "examples" / "half-ball.step").read_text(encoding="ascii") == half_ball(8.0)
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["info", "no-such.ray"]])
+def test_commands_run_here_as_those_that_are_installed(arguments: list[str]) -> None:
+    """Status and words; what a page calls does not start a process."""
+    assert run_command(["etendue", *arguments]) == run_apart([installed(), *arguments])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
