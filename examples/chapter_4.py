@@ -96,9 +96,9 @@ def without_specular(finish: Finish) -> Finish:
     return {"kind": "lambertian", "reflectance": {"angle": shares["angle"], "values": rest}}
 
 
-def shares_of_the_light() -> None:
+def shares_of_the_light(rays: int) -> None:
     """What the geometry alone decides: on the edges of the holes, and on the walls."""
-    ledger = et.trace(chamber({"kind": "absorber"}), rays=2_000_000, seed=1).ledger
+    ledger = et.trace(chamber({"kind": "absorber"}), rays=rays, seed=1).ledger
     flux = 4.0 * FLUX
     edges = sum(entry.flux for name, entry in ledger.by_surface.items() if name.startswith("hole"))
     walls = sum(entry.flux for name, entry in ledger.by_surface.items() if name.startswith(("wall", "sheet.top")))
@@ -267,10 +267,10 @@ def print_material(
     print(f"\nstandard error of a pixel of the truth: {error:.0f} cd/m²")
 
 
-def print_fewer_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, rays: int) -> None:
-    """How many angles suffice for an intensity distribution and for a map (section 4.3)."""
+def print_fewer_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, rays: int, step: float) -> None:
+    """How many angles suffice for an intensity distribution and for a map (section 4.3); in steps [°], the most of them."""
     print("\nPET: tables of other numbers of scans")
-    for angles in ((45.0,), (5.0, 80.0), (5.0, 60.0, 80.0), PET_ANGLES, tuple(np.arange(5.0, 86.0, 5.0))):
+    for angles in ((45.0,), (5.0, 80.0), (5.0, 60.0, 80.0), PET_ANGLES, tuple(np.arange(5.0, 86.0, step))):
         table = finish_of(goniometer.table(PET, angles))
         c = et.compare(look(table, truth.screen, lines), truth, REGION)
         same = alike(distribution(table, rays), lid)
@@ -321,15 +321,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--full", action="store_true", help="125 × 250 pixels and 400 lines of sight for each")
     parser.add_argument("--lines", type=int, help="lines of sight per pixel; the thesis has 1000")
+    parser.add_argument("--rays", type=int, help="rays of each intensity distribution")
     parser.add_argument("--output", type=Path, default=Path("chapter-4"), help="folder for the figures")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     pixels, usual, rays = ((250, 125), 400, 4_000_000) if options.full else ((50, 25), 64, 200_000)
-    lines = options.lines or usual
+    lines, rays = options.lines or usual, options.rays or rays
     screen = et.Screen(50, 25, *pixels)
 
     print(f"chamber: {DIAMETER:g} mm × {HEIGHT:g} mm, sheet of {SHEET:g} mm, four lamps of {FLUX:g} lm")
-    shares_of_the_light()
+    shares_of_the_light(min(2_000_000, 10 * rays))
     draw_materials(options.output / "chapter-4-materials.png")
 
     materials = describe()
@@ -344,7 +345,7 @@ def main() -> None:
             far[material][name] = distribution(finish, rays)
         print_material(material, maps[material], far[material], seconds)
     pet = maps["PET"]
-    print_fewer_scans(pet["truth"], far["PET"]["truth"], lines, rays)
+    print_fewer_scans(pet["truth"], far["PET"]["truth"], lines, rays, 5.0 if options.full else 20.0)
     print_noisy_scans(pet["truth"], far["PET"]["truth"], lines, rays)
     edges = look_at_edges(screen, lines)
     rest = look(without_specular(materials["PET"]["diffuse + specular"]), screen, lines)

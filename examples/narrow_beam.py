@@ -124,11 +124,12 @@ def draw_profiles(path: Path, profiles: dict[str, tuple[Any, Any]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=int, default=100_000)
+    parser.add_argument("--pixels", type=int, default=24, help="along a side of each map")
     parser.add_argument("--full", action="store_true", help="four million rays, fine grids, 60 × 60 pixels")
     parser.add_argument("--output", type=Path, default=Path("narrow-beam"), help="folder for the figures")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    rays, pixels, lines = (4_000_000, 60, 512) if options.full else (options.rays, 24, 16)
+    rays, pixels, lines = (4_000_000, 60, 512) if options.full else (options.rays, options.pixels, 16)
 
     near_field = led.ray_file(rays)
     scenes = luminaires(near_field, full=options.full)

@@ -165,10 +165,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=int, default=50_000)
     parser.add_argument("--lines", type=int, default=4, help="lines of sight per pixel of the maps of the lamp itself")
+    parser.add_argument("--pixel", type=float, default=1.0, help="width of a pixel [mm]")
     parser.add_argument("--full", action="store_true", help="four million rays, 128 lines, 0.5 mm and 1 mm, fine grids")
     parser.add_argument("--output", type=Path, default=Path("remote-phosphor"), help="folder for the figures")
     options = parser.parse_args()
-    options.pixels = (1.0,)
+    options.pixels = (options.pixel,)
     options.output.mkdir(parents=True, exist_ok=True)
     if options.full:
         options.rays, options.lines, options.pixels = 4_000_000, 128, (0.5, 1.0)

@@ -59,7 +59,7 @@ def print_and_draw(path: Path, lines: int) -> None:
         print(
             f"film alone, {name} the prisms: at most {off.max():.4f} from the table (standard error {error.max():.4f})"
         )
-        theta = np.arange(0.0, 89.0, 1.0 if lines > 1000 else 4.0)
+        theta = np.arange(0.0, 89.0, 1.0 if lines > 1000 else 8.0)
         axes.plot(theta, transmission(theta, phi, lines)[0], color=colour, linewidth=1.2, label=f"{name} the prisms")
         axes.plot(list(table), list(table.values()), "o", color=colour, markersize=4)
     axes.set_xlabel("θ [°]")
