@@ -18,8 +18,6 @@ import pytest
 from docs.built_site import Page, is_foreign, loaded_by_style, pages_in
 from docs.pages import PAGES, ROOT, name_of, prose
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("site")]
-
 
 def part_of_site(name: str) -> ModuleType:
     """A module of docs/site, which is no package."""
