@@ -93,7 +93,8 @@ def assert_parameters_scatter_as_told(kind: str, *, seeds: int, known: bool) -> 
 @pytest.mark.parametrize("known", [True, False])
 @pytest.mark.parametrize("kind", FITTED_MODELS)
 def test_all_models_come_back(kind: str, known: bool) -> None:
-    assert_parameters_scatter_as_told(kind, seeds=16, known=known)
+    # At least 16 deviations. Parameters that are off by 5 % are so by more than two errors in each fit.
+    assert_parameters_scatter_as_told(kind, seeds=16 if kind == "lambertian" else 8, known=known)
 
 
 def test_errors_are_those_of_a_weighted_mean() -> None:
@@ -128,7 +129,7 @@ def test_shares_are_those_of_the_core(kind: str) -> None:
 def test_errors_of_shares_hold() -> None:
     """Over seeds the share at one angle misses the true one as its error says."""
     truth = bsdf_of("lambertian+abg").reflectance(33.0)
-    fits = [fit_bsdf(noisy("lambertian+abg", seed=seed), "lambertian+abg") for seed in range(40)]
+    fits = [fit_bsdf(noisy("lambertian+abg", seed=seed), "lambertian+abg") for seed in range(16)]
     values, errors = (np.array([getattr(one, name)[1] for one in fits]) for name in ("shares", "share_errors"))
     assert_agree(values=values, expected=float(truth), standard_error=errors)
 
@@ -183,7 +184,6 @@ def test_without_scipy_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> No
         fit_bsdf(noisy("lambertian", seed=1), "lambertian")
 
 
-@pytest.mark.slow
 def test_a_fit_goes_into_a_file_and_a_scene(tmp_path: Path) -> None:
     """The file holds the model itself, with the errors of its parameters; a scene takes it."""
     found = fit_bsdf(noisy("lambertian+harvey-shack", seed=6), "lambertian+harvey-shack")

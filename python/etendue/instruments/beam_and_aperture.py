@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.quadrature import gauss_legendre
 
 Array = npt.NDArray[np.float64]
 Shape = Literal["disk", "square", "ring"]
@@ -81,7 +82,7 @@ class Aperture:
 
     def nodes(self, fineness: int) -> tuple[Array, Array]:
         """Points, shape (n, 2), and weights that add up to the area: Gauss and Legendre across, evenly around."""
-        x, w = np.polynomial.legendre.leggauss(fineness)
+        x, w = gauss_legendre(fineness)
         if self.shape == "square":
             half = 0.5 * self.diameter
             u, v = np.meshgrid(x * half, x * half, indexing="ij")
@@ -188,7 +189,7 @@ class Beam:
 
     def nodes(self, fineness: int) -> tuple[Array, Array, Array]:
         """Points [mm] and tilts of rays, shape (n, 2) each, and weights that add up to 1."""
-        x, w = np.polynomial.legendre.leggauss(fineness)
+        x, w = gauss_legendre(fineness)
         part = np.sqrt(0.5 * (x + 1.0))
         weights = 0.5 * w * self._irradiance(part)
         points = _around(0.5 * self.diameter * part, 2 * fineness)
@@ -202,7 +203,7 @@ class Beam:
         return points, tilts, weights
 
     def _source(self, many: tuple[int, int]) -> tuple[Array, Array]:
-        x, w = np.polynomial.legendre.leggauss(many[0])
+        x, w = gauss_legendre(many[0])
         radius = np.tan(np.radians(0.5 * self.source_angle)) * np.sqrt(0.5 * (x + 1.0))
         return _around(radius, many[1]), np.repeat(0.5 * w / many[1], many[1])
 
@@ -220,7 +221,7 @@ class Beam:
         radii = np.maximum(radii * grown, 1e-9)
         shifts, shares = (np.zeros((1, 2)), np.ones(1)) if not self.source_angle else self._source(SOURCE)
         shifts = shifts * distance
-        t, w = np.polynomial.legendre.leggauss(CHORDS)
+        t, w = gauss_legendre(CHORDS)
         found = np.zeros(a.shape)
         for radius, part in zip(radii, parts, strict=True):
             # y = ρ sin t: half chords of the beam are smooth in t.

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import scipy_part
 from etendue.instruments.goniometer_scan import GoniometerScan
+from etendue.quantities.quadrature import gauss_legendre
 
 Array = npt.NDArray[np.float64]
 OperatorName = Literal["rings", "slice"]
@@ -205,7 +206,7 @@ def _rings(angle: Array, nodes: Array, radius: Array, blur: Array) -> Array:
     distinct, own = np.unique(np.round(angle, 9), return_inverse=True)
     reach = float(radius[-1])
     cells = int(np.ceil(2.0 * reach / h)) + 2
-    x, w = np.polynomial.legendre.leggauss(PER_STEP)
+    x, w = gauss_legendre(PER_STEP)
     first = np.maximum(np.floor((distinct - reach) / h), 0.0)
     # θ of all nodes in the cells that the blur of a position meets.
     cell = first[:, None] + np.arange(cells)
@@ -218,7 +219,7 @@ def _rings(angle: Array, nodes: Array, radius: Array, blur: Array) -> Array:
         part = (np.sin(0.5 * np.radians(reach)) ** 2 - least) / product
     part = np.where(product > 0.0, part, np.where(least < np.sin(0.5 * np.radians(reach)) ** 2, 1.0, 0.0))
     turn = 2.0 * np.arcsin(np.sqrt(np.clip(part, 0.0, 1.0)))
-    y, v = np.polynomial.legendre.leggauss(AZIMUTHS)
+    y, v = gauss_legendre(AZIMUTHS)
     around = np.zeros(theta.shape)
     for yk, vk in zip(0.5 * (y + 1.0), 0.5 * v, strict=True):
         gamma = 2.0 * np.arcsin(np.sqrt(np.clip(least + product * np.sin(0.5 * turn * yk) ** 2, 0.0, 1.0)))

@@ -13,6 +13,7 @@ from etendue.instruments.bench import TOGETHER, Sight
 from etendue.instruments.goniometer_scan import GoniometerScan
 from etendue.instruments.operators import folded
 from etendue.quantities.bsdf_data import direction
+from etendue.quantities.quadrature import gauss_legendre
 
 Array = npt.NDArray[np.float64]
 
@@ -66,7 +67,7 @@ class RoundBlur:
 
     def sights(self, arms: Array, theta: float, beam: int, aperture: int) -> Iterator[Sight]:  # noqa: ARG002 - the beam is in the blur
         """Lines about each position, weighted by the blur; all start at the middle of the spot."""
-        x, w = np.polynomial.legendre.leggauss(RADII_PER_NODE * aperture)
+        x, w = gauss_legendre(RADII_PER_NODE * aperture)
         radius = 0.5 * self.reach * (x + 1.0)
         around = AZIMUTHS_PER_NODE * aperture
         azimuth = (np.arange(around) + 0.5) * (2.0 * np.pi / around)

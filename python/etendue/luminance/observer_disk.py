@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.observer import Observer, Screen
+from etendue.quantities.quadrature import gauss_legendre
 from etendue.units import MM2_PER_M2
 
 Array = npt.NDArray[np.float64]
@@ -89,7 +90,7 @@ def disk_etendue(observer: Observer, screen: Screen, radius: float) -> Array:
     first = np.cross(away, np.eye(3)[np.argmin(np.abs(away))])
     first /= np.linalg.norm(first)
     second = np.cross(away, first)
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = gauss_legendre(NODES)
     side_x, side_y = screen.width / screen.columns, screen.height / screen.rows
     turn = (np.arange(CHORDS) + 0.5) * (2.0 * math.pi / CHORDS)
     total = np.zeros(screen.shape)

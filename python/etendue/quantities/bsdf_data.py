@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.quadrature import gauss_legendre
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -407,7 +408,7 @@ def _integral(one: BsdfSlice) -> float:
     radial = np.unique(np.concatenate([[0.0], grid.radial[grid.radial < end], _extended(grid, one), [end]]))
     azimuth = np.unique(np.concatenate([grid.azimuth, np.arange(grid.azimuth[0], grid.azimuth[0] + 361.0, 5.0)]))
     azimuth = azimuth[azimuth <= grid.azimuth[0] + 360.0]
-    x, w = np.polynomial.legendre.leggauss(NODES)
+    x, w = gauss_legendre(NODES)
     nodes, weights = (0.5 * (x + 1.0), 0.5 * w)
 
     def points(edges: Array) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
+from etendue.quantities.quadrature import gauss_legendre
 from etendue.scatter.bsdf import Bsdf
 from etendue.scatter.table import BsdfTable
 
@@ -319,7 +320,7 @@ def transmission_haze(bsdf: Bsdf) -> float:
         raise ArgumentError("haze is a part of the light that is transmitted, and nothing is")
     straight = float(bsdf.regular_transmittance(0.0))
     if bsdf.transmits:
-        x, w = np.polynomial.legendre.leggauss(4 * NODES)
+        x, w = gauss_legendre(4 * NODES)
         # Finer towards the straight direction, where lobes are narrow.
         u = 0.5 * (x + 1.0)
         theta, weight = STRAIGHT * u * u, 0.5 * w * np.radians(STRAIGHT) * 2.0 * u
@@ -436,7 +437,7 @@ def _mirrored_part(source: tuple[float, float], receptor: Receptor) -> float:
 
 def _scattered_into(bsdf: Bsdf, angle: float, source: tuple[float, float], receptor: Receptor) -> float:
     """∫ f cosθ dΩ over the aperture, averaged over the directions of the source."""
-    s, v = np.polynomial.legendre.leggauss(STEPS)
+    s, v = gauss_legendre(STEPS)
     total = 0.0
     for tilt, part in zip(0.5 * source[0] * s, v, strict=True):
         for turn, part_across in zip(0.5 * source[1] * s, v, strict=True):
@@ -453,7 +454,7 @@ def _scattered_into(bsdf: Bsdf, angle: float, source: tuple[float, float], recep
 
 def _towards(centre: float, low: float, high: float) -> tuple[Array, Array]:
     """Angles from low to high [°] that get denser towards the mirrored direction, and their weights [rad]."""
-    x, w = np.polynomial.legendre.leggauss(NODES)
+    x, w = gauss_legendre(NODES)
     u, w = 0.5 * (x + 1.0), 0.5 * w
     if not low < centre < high:
         # It lies outside: from the edge that is nearer to it.

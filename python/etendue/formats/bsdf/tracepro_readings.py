@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue.quantities.quadrature import gauss_legendre
+
 Array = npt.NDArray[np.float64]
 
 A, B, BY, G, GY = range(5)
@@ -259,7 +261,7 @@ NODES = 6
 
 
 def _gauss(edges: Array) -> tuple[Array, Array]:
-    t, w = np.polynomial.legendre.leggauss(NODES)
+    t, w = gauss_legendre(NODES)
     widths = np.diff(edges)
     return (edges[:-1, None] + widths[:, None] * 0.5 * (t + 1.0)).ravel(), (widths[:, None] * 0.5 * w).ravel()
 

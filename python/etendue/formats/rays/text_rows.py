@@ -196,9 +196,12 @@ def number(entry: str) -> float:
     >>> number("7.24e-016"), number("-1.5D+01"), number("1.#INF"), number('"2"')
     (7.24e-16, -15.0, inf, 2.0)
     """
-    entry = entry.strip('"')
     if "_" in entry:  # Python's own digit grouping, which no ray file uses
         raise ValueError(entry)
+    try:
+        return float(entry)
+    except ValueError:
+        entry = entry.strip('"')
     try:
         return float(entry)
     except ValueError:

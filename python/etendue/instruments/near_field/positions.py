@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import hat_integrals
+from etendue.quantities.quadrature import gauss_legendre
 
 Array = npt.NDArray[np.float64]
 
@@ -181,7 +182,7 @@ def _half_integrals(x: Array) -> Array:
         a[n, n - 2], a[n, n] = -1.0, 1.0
         b[n, n - 2 :] = 2.0 / h, -4.0 / h, 2.0 / h
     slopes = np.linalg.solve(a, b)
-    nodes, factors = np.polynomial.legendre.leggauss(NODES)
+    nodes, factors = gauss_legendre(NODES)
     t = 0.5 * (nodes + 1.0)
     hermite = np.stack([
         (1 + 2 * t) * (1 - t) ** 2,

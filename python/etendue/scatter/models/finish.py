@@ -31,6 +31,10 @@ class Finish(Description, Bsdf, abc.ABC):
             If a table cannot be read.
         """
 
+    def unbuilt(self, files: Files) -> Record:
+        """The same before the core was asked whether it takes it, for a mixture, which asks with all parts at once."""
+        return self.record(files)
+
     def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
         """Whether light gets through, so that a solid behind it needs a medium."""
         return False

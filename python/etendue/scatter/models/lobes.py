@@ -32,20 +32,19 @@ class Lobe(Directed, abc.ABC):
     PARAMETERS: ClassVar[tuple[str, ...]] = ()
     """Names of the numbers that the core takes."""
 
-    def record(self, files: Files) -> Record:  # noqa: ARG002 - other finishes have tables
+    def record(self, files: Files) -> Record:
         """The numbers."""
-        record: Record = {
+        return _accepted(type(self).__name__, self.unbuilt(files))
+
+    def unbuilt(self, files: Files) -> Record:  # noqa: ARG002 - other finishes have tables
+        """The numbers, whatever the core says to them."""
+        return {
             "kind": self.kind,  # type: ignore[attr-defined] # each class has one
             "transmitted": float(self.way == "transmitted"),
             "renormalised": float(self.beyond == "renormalised"),
             "aspect": self.aspect,
             **{name: getattr(self, name) for name in self.PARAMETERS},
         }
-        try:
-            built(record)
-        except ValueError as error:
-            raise ArgumentError(f"{type(self).__name__}: {error}") from None
-        return record
 
     def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
         """If it transmits."""
@@ -175,21 +174,29 @@ class CosinePower(Finish):
     about: Literal["specular", "normal"] = "specular"
     way: Literal["reflected", "transmitted"] = "reflected"
 
-    def record(self, files: Files) -> Record:  # noqa: ARG002 - other finishes have tables
+    def record(self, files: Files) -> Record:
         """The numbers."""
-        record: Record = {
+        return _accepted("CosinePower", self.unbuilt(files))
+
+    def unbuilt(self, files: Files) -> Record:  # noqa: ARG002 - other finishes have tables
+        """The numbers, whatever the core says to them."""
+        return {
             "kind": self.kind,
             "peak": self.peak,
             "exponent": self.exponent,
             "about_normal": float(self.about == "normal"),
             "transmitted": float(self.way == "transmitted"),
         }
-        try:
-            built(record)
-        except ValueError as error:
-            raise ArgumentError(f"CosinePower: {error}") from None
-        return record
 
     def lets_light_in(self, files: Files) -> bool:  # noqa: ARG002 - a file may be needed to know
         """If it transmits."""
         return self.way == "transmitted"
+
+
+def _accepted(name: str, record: Record) -> Record:
+    """A record that the core takes."""
+    try:
+        built(record)
+    except ValueError as error:
+        raise ArgumentError(f"{name}: {error}") from None
+    return record

@@ -78,11 +78,14 @@ class Mixture(Directed):
         weights = self.weights or (1.0,) * len(self.parts)
         record = {
             "kind": "sum",
-            "members": [(w, part.record(files)) for w, part in zip(weights, self.parts, strict=True)],
+            "members": [(w, part.unbuilt(files)) for w, part in zip(weights, self.parts, strict=True)],
         }
         try:
             built(record)
         except ValueError as error:
+            # A part that is wrong by itself is named.
+            for part in self.parts:
+                part.record(files)
             raise ArgumentError(f"Mixture: {error}") from None
         return record
 
