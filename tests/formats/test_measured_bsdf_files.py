@@ -159,12 +159,20 @@ def test_merl_that_was_not_measured_is_left_out(tmp_path: Path) -> None:
     assert float(np.nanmin(data.slices[3].values)) == pytest.approx(0.2, rel=1e-6)
 
 
+def hats(at: Array, nodes: int) -> Array:
+    """Weights of nodes over the unit interval, of shape (…, nodes)."""
+    return np.maximum(1.0 - np.abs((at * (nodes - 1))[..., None] - np.arange(nodes)), 0.0)
+
+
 def bilinear(table: Array, u: Array, v: Array) -> Array:
     """Over the unit square, by hats about the nodes."""
-    i, j = u * (table.shape[1] - 1), v * (table.shape[0] - 1)
-    wx = np.maximum(1.0 - np.abs(i[..., None] - np.arange(table.shape[1])), 0.0)
-    wy = np.maximum(1.0 - np.abs(j[..., None] - np.arange(table.shape[0])), 0.0)
+    wx, wy = hats(u, table.shape[1]), hats(v, table.shape[0])
     return np.asarray(np.einsum("...x,...y,yx->...", wx, wy, table))
+
+
+def means(table: Array, at: Array) -> Array:
+    """The same at each of `at` along y, its mean over all of them along x."""
+    return np.asarray(hats(at, table.shape[0]) @ table @ hats(at, table.shape[1]).mean(axis=0))
 
 
 def warped(density: Array, incident: Array, scattered: Array) -> tuple[float, float, float, float]:
@@ -174,7 +182,7 @@ def warped(density: Array, incident: Array, scattered: Array) -> tuple[float, fl
     u = math.sqrt(math.acos(half[2]) * 2.0 / math.pi)
     v = (math.atan2(half[1], half[0]) + math.pi) / (2.0 * math.pi)
     along = bilinear(density, middle, np.full(2000, v))
-    rows = bilinear(density, *np.meshgrid(middle, middle)).mean(axis=1)
+    rows = means(density, middle)
     return u, v, float(along[middle < u].sum() / along.sum()), float(rows[middle < v].sum() / rows.sum())
 
 
@@ -202,8 +210,8 @@ def test_rgl_between_measured_incidences(tmp_path: Path) -> None:
     data = read_bsdf_data(path)
     assert [round(one.theta, 3) for one in data.slices] == [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0]
     one, part = data.slices[3], 15.0 / 40.0
-    means = [bilinear(d, *np.meshgrid(*2 * [(np.arange(600) + 0.5) / 600])).mean() for d in (first, second)]
-    density = (1.0 - part) * first / means[0] + part * second / means[1]
+    levels = [means(d, (np.arange(600) + 0.5) / 600).mean() for d in (first, second)]
+    density = (1.0 - part) * first / levels[0] + part * second / levels[1]
     for s in (direction(20.0, 130.0), direction(65.0, 200.0), direction(40.0, 260.0)):
         _, _, left, below = warped(density, one.incident, s)
         known = [0.05 + 0.03 * left + 0.04 * below, 0.02 + 0.06 * left + 0.01 * below]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from pathlib import Path
 from typing import BinaryIO
@@ -97,7 +98,7 @@ def _rows(path: Path, lines: list[str], begin: int, columns: int, facts: dict[st
             values = [number(field.strip()) for field in fields]
         except ValueError:
             values = [np.nan]
-        if len(fields) != columns or not np.isfinite(values).all():
+        if len(fields) != columns or not all(map(math.isfinite, values)):
             found = f"{line.strip()[:60]!r} is not {columns} finite numbers"
             raise FormatError(path, f"line {at}", found, ADVICE)
         rows.append(values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from pathlib import Path
 from typing import BinaryIO
 
@@ -95,7 +96,7 @@ def _blocks(path: Path, lines: list[str]) -> tuple[list[Block], int]:
         except ValueError:
             values = [np.nan]
         most = (90.0, 180.0)[len(fields) == 3]
-        if len(fields) not in (2, 3) or not np.isfinite(values).all() or not 0.0 <= values[0] <= most:
+        if len(fields) not in (2, 3) or not all(map(math.isfinite, values)) or not 0.0 <= values[0] <= most:
             found = f"{line.strip()[:60]!r} is neither an incidence (θ φ) nor a direction (θ φ value)"
             raise FormatError(path, f"line {at}", found, ADVICE)
         if len(fields) == 2:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -163,7 +164,7 @@ def _numbers(data: bytes, at: int, line: int, count: int, path: Path) -> tuple[A
                 value = number(word)
             except ValueError:
                 value = np.nan
-            if not np.isfinite(value):
+            if not math.isfinite(value):
                 raise FormatError(path, f"line {at_line}", f"{word[:40]!r} is no finite number", ADVICE)
             values.append(value)
     return (np.array(values) if len(values) == count else None), end, line + text.count("\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,8 @@ def section_of(line: str) -> str:
     >>> section_of("[Side1_Data]"), section_of("Table_BSDF_Data"), section_of("300 0.55")
     ('Side1_Data', 'Table_BSDF_Data', '')
     """
+    if line[:1].isdigit():  # nearly all lines are rows of numbers
+        return ""
     word = line.strip().removeprefix("[").removesuffix("]")
     return word if word in SECTIONS or line.startswith("[") else ""
 
@@ -56,8 +59,8 @@ class Rows:
         """What rows of shares leave for scatter: neither absorbed nor mirrored nor straight on, the mean of S and P."""
         return np.asarray(1.0 - self.values[:, 4:10].reshape(-1, 3, 2).mean(axis=2).sum(axis=1))
 
-    def where(self, kept: npt.NDArray[np.bool_]) -> Rows:
-        """Some of them."""
+    def where(self, kept: npt.NDArray[np.bool_ | np.intp]) -> Rows:
+        """Some of them: whether each is kept, or the places of those that are."""
         return Rows(self.line[kept], self.values[kept])
 
 
@@ -164,7 +167,7 @@ class Lines:
                 values = [number(field) for field in fields]
             except ValueError:
                 raise self.refuse(line, "a field that is no number") from None
-            if not np.isfinite(values).all():
+            if not all(map(math.isfinite, values)):
                 raise self.refuse(line, "a field that is not finite")
             rows.append(values)
         if not rows:

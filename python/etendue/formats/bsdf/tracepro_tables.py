@@ -32,7 +32,9 @@ def blocks_of(lines: Lines, shares: Rows, begin: int, end: int) -> dict[Key, Row
     rows = lines.rows(TABLE_COLUMNS, begin, end)
     rows = once_at_the_normal(rows.where(rows.values[:, 0] == shares.values[0, 0]))
     keys, which = np.unique(rows.values[:, 1:4], axis=0, return_inverse=True)
-    blocks = {_key(key): rows.where(which.ravel() == k) for k, key in enumerate(keys)}
+    # The places of the rows of each, in their order: a look at all rows for each would take the square of the time.
+    places = np.split(np.argsort(which.ravel(), kind="stable"), np.cumsum(np.bincount(which.ravel()))[:-1])
+    blocks = {_key(key): rows.where(own) for key, own in zip(keys, places, strict=True)}
     for wavelength, theta, phi in sorted({_key(key) for key in shares.values[:, 1:4]} - set(blocks)):
         place = f"{theta:g}° of incidence, azimuth {phi:g}°, {wavelength:g} µm"
         raise FormatError(lines.path, f"line {end}", f"no table for {place}", ADVICE)
