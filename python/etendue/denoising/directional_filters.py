@@ -23,6 +23,9 @@ FIRST_WINDOW, SECOND_WINDOW = 2.0, 0.7
 ELONGATION = 1.5
 """The windows are longer along an edge, and narrower across it, by this factor."""
 
+KEPT = 1 << 16
+"""Cells of the largest plane whose factors are kept for the next image: of larger ones they take much memory."""
+
 RING_RATIO = 1.4
 """Outer over inner radius of a ring of frequencies."""
 
@@ -102,12 +105,29 @@ class _Scale:
         self.blur = np.exp(-2 * (np.pi * radius * 2**index) ** 2)
         self.multiplicity = plane.multiplicity()[:, : radius.shape[1]]
         self.plane_cells = plane.size[0] * plane.size[1]
+        self._kept: dict[tuple[int, float | None], Array] = {}
+
+    def _factors(self, direction: int, width: float | None = None) -> Array:
+        """A direction's part of each coefficient, or its window of this width."""
+        found = self._kept.get((direction, width))
+        if found is None:
+            found = self._response(direction) if width is None else self._window(direction, width)
+            if self.plane_cells <= KEPT:
+                self._kept[direction, width] = found
+        return found
+
+    def _response(self, direction: int) -> Array:
+        response: Array = self.radial * self._lobe(direction) / self.across
+        return response
 
     def _lobe(self, direction: int) -> Array:
         turn = np.pi * direction / DIRECTIONS
-        there, mirrored = (np.cos(angle - turn) ** (2 * DIRECTIONS - 2) for angle in (self.angle, -self.angle))
-        # At the highest frequency along a row both directions fall on one coefficient.
-        lobe: Array = np.sqrt(np.where(self.fx == 0.5, (there + mirrored) / 2, there))
+        power = np.cos(self.angle - turn) ** (2 * DIRECTIONS - 2)
+        if self.fx[0, -1] == 0.5:
+            # At the highest frequency along a row both directions fall on one coefficient.
+            mirrored = np.cos(-self.angle[:, -1] - turn) ** (2 * DIRECTIONS - 2)
+            power[:, -1] = (power[:, -1] + mirrored) / 2
+        lobe: Array = np.sqrt(power)
         return lobe
 
     def below(self, plane: FourierPlane) -> Array:
@@ -122,11 +142,11 @@ class _Scale:
         self, direction: int, noisy: Transform, guide: Transform | None, level: Array
     ) -> tuple[Transform, Array]:
         """One direction's coefficients, shrunk and transformed back; and the variance of what remains."""
-        response = self.radial * self._lobe(direction) / self.across
+        response = self._factors(direction)
         noise = level * (self.multiplicity * response**2).sum() / self.plane_cells
         coefficients = self.cells(noisy * response)
         reference = coefficients if guide is None else self.cells(guide * response)
-        window = self._window(direction, FIRST_WINDOW if guide is None else SECOND_WINDOW)
+        window = self._factors(direction, FIRST_WINDOW if guide is None else SECOND_WINDOW)
         energy = np.maximum(self.cells(np.fft.rfft2(reference**2) * window), 0.0)
         threshold = SIGNIFICANCE * noise
         gain = 1 - threshold / np.maximum(energy, threshold) if guide is None else energy / (energy + noise)

@@ -62,6 +62,21 @@ def hat_integrals(gamma: Array) -> Array:
     >>> round(float(hat_integrals(np.array([0.0, 40.0, 180.0])).sum()), 12)
     2.0
     """
+    before, after = hat_halves(gamma)
+    weights = np.zeros(gamma.size)
+    weights[:-1] += before
+    weights[1:] += after
+    return weights
+
+
+def hat_halves(gamma: Array) -> tuple[Array, Array]:
+    """The same over each interval between nodes by itself: of the hat of the node before it, and of the one after it.
+
+    Examples
+    --------
+    >>> [round(float(part.sum()), 12) for part in hat_halves(np.array([0.0, 90.0, 180.0]))]
+    [1.0, 1.0]
+    """
     gamma = np.radians(gamma)
     half, middle = np.diff(gamma) / 2.0, (gamma[1:] + gamma[:-1]) / 2.0
     even = np.sin(middle) * np.sin(half)
@@ -69,7 +84,4 @@ def hat_integrals(gamma: Array) -> Array:
     square = half * half
     slope = np.where(half < 0.01, -square / 3.0 * (1.0 - square / 10.0), np.cos(half) - np.sin(half) / half)
     odd = np.cos(middle) * slope
-    weights = np.zeros(gamma.size)
-    weights[:-1] += even + odd
-    weights[1:] += even - odd
-    return weights
+    return even + odd, even - odd

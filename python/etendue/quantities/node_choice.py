@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.angle_table import gaps_of, hat_integrals
+from etendue.quantities.angle_table import gaps_of, hat_halves, hat_integrals
 from etendue.quantities.intensity_nodes import Nodes, check_steps, planes_of
 from etendue.quantities.ray_stream import flux_power
 from etendue.quantities.smooth_light import Harmonics, nodes_around, parts_of
@@ -329,6 +330,13 @@ class _Tree:
         return [tuple(nodes.tolist()) for nodes in np.split(angle[order], ends)]
 
 
+@functools.lru_cache(maxsize=DEPTH["gamma"] + 1)
+def _hats(size: int) -> tuple[Array, Array]:
+    """Integrals of the hats of even steps of γ, and of those half as wide, at each node; nobody writes to them."""
+    wide, narrow = (hat_integrals(np.linspace(0.0, 180.0, n * size + 1))[::n] for n in (1, 2))
+    return wide, narrow
+
+
 def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis: str) -> Array:
     """How much the value at each node changes if all steps are halved, in standard errors; shape (rows, nodes).
 
@@ -337,7 +345,7 @@ def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis
     span = 180.0 if axis == "gamma" else TURN
     step, nodes = span / size, size + 1 if axis == "gamma" else size
     if axis == "gamma":
-        wide, narrow = (hat_integrals(np.linspace(0.0, 180.0, n * size + 1))[::n] for n in (1, 2))
+        wide, narrow = _hats(size)
     else:
         wide, narrow = np.full(nodes, step), np.full(nodes, step / 2.0)
     first = np.minimum((angle / step).astype(np.intp), size - 1)
@@ -441,10 +449,8 @@ def _stated(nodes: Nodes, values: Array) -> tuple[float, ...]:
 
 def _pieces(gamma: Array, values: Array) -> Array:
     """∫ I sin γ dγ over each interval, for I linear in it."""
-    result = np.zeros(gamma.size - 1)
-    for i in range(gamma.size - 1):
-        result[i] = values[i : i + 2] @ hat_integrals(gamma[i : i + 2])
-    return result
+    before, after = hat_halves(gamma)
+    return np.asarray(values[:-1] * before + values[1:] * after)
 
 
 def _too_wide(sample: _Sample, asked: Nodes, suited: Nodes) -> list[str]:
