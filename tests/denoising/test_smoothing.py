@@ -282,6 +282,7 @@ def test_shares_are_the_least_squares_of_the_triangle() -> None:
     assert np.array_equal(least_squares_shares(np.zeros((2, 2)), np.zeros(2)), np.zeros(2))
 
 
+@pytest.mark.slow
 def test_factors_of_errors_are_found() -> None:
     """On average over 30 draws, of which the spread tells the error of the mean: less than 1 %."""
     generator, found = np.random.default_rng(15), []

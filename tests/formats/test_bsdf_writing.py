@@ -18,6 +18,7 @@ from etendue.formats.bsdf.bsdf_format import BsdfFormat
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
 from etendue.scatter.errors import with_standard_errors
 from etendue.scatter.models.finish import Finish
+from formats.slanted import coarsen
 
 Array = npt.NDArray[np.float64]
 
@@ -174,7 +175,8 @@ def test_a_model_in_a_file_is_as_isotropic_as_it_is(tmp_path: Path, bsdf: et.Bsd
 
 
 @pytest.mark.parametrize("form", ["astm", "bird", "fred", "ssdd", "zemax"])
-def test_another_back_is_in_the_file_or_told(tmp_path: Path, form: str) -> None:
+def test_another_back_is_in_the_file_or_told(tmp_path: Path, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    coarsen(monkeypatch)
     grid = PolarGrid("cosines", np.array([0.0, 2.0]), np.array([0.0]))
     slices = [
         BsdfSlice(direction(30.0, 180.0, behind=behind), np.full(grid.shape, share / math.pi), grid=grid)

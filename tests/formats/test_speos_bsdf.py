@@ -104,7 +104,6 @@ def test_mistakes_are_told_with_their_line(tmp_path: Path, old: str, new: str, s
     assert "line" in caught.value.place
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("way", ["brdf", "btdf"])
 def test_the_same_vinyl_as_zemax_has_it(samples: Path, way: str) -> None:
     """A converter wrote the Speos file from the Zemax one, filled zeros beyond its last angle and scaled anew.

@@ -279,7 +279,6 @@ def test_a_row_that_scatters_nothing_has_no_widths(tmp_path: Path) -> None:
     assert not last.values.any()
 
 
-@pytest.mark.slow
 def test_a_narrow_streak_keeps_its_light(tmp_path: Path) -> None:
     """Narrower than a step of azimuth far out, it is widened to it: the share of a slice stays that of the formula."""
     sigma, b, g, a = 0.004, 0.05, 1.5, 0.05

@@ -192,7 +192,6 @@ def test_models_are_those_of_the_scatter_package(name: str) -> None:
     assert made.turn == pytest.approx(np.degrees(0.4))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", LOBE_MODELS)
 @pytest.mark.parametrize("aspect", [0.4, 3.0])
 def test_a_lobe_has_one_axis_along_which_it_is_narrow(name: str, aspect: float) -> None:

@@ -55,7 +55,6 @@ def test_a_power_of_the_cosine_falls_to_a_share_where_its_closed_form_does(power
     assert math.isnan(found.standard_error)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("c", [0.0, 90.0, 40.0, 220.0])
 @pytest.mark.parametrize("share", [0.5, 0.1])
 def test_a_lobe_aside_has_the_edges_that_root_finding_gives(c: float, share: float) -> None:

@@ -143,7 +143,6 @@ def test_a_stated_flux(grid: et.GriddedSource) -> None:
             grid.emitting(wrong)
 
 
-@pytest.mark.slow
 def test_the_map_of_a_scene_tells_the_factor(grid: et.GriddedSource) -> None:
     scene = et.Scene(sources=[{"name": "led", "kind": "gridded", "gridded": grid, "draws": 3000, "wavelength": 600}])
     lmap = et.luminance_map(scene, et.Observer(20, 30, 1000, target=(2, 1, 0)), et.Screen(4, 4, 2, 2), rays_per_pixel=4)

@@ -21,7 +21,6 @@ def source() -> GriddedSource:
     return GriddedSource.fit(rays, Disk(radius=FILM.radius, centre=FILM.centre), pixel=1.0, threshold=2.1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("plane", ["view", "xy"])
 def test_pixels_are_means_over_lines_of_sight(source: GriddedSource, plane: str) -> None:
     observer, screen = et.Observer(40, 130, 300, target=(1, -2, 0)), et.Screen(24, 18, 4, 3, plane=plane)  # type: ignore[arg-type]

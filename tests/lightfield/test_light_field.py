@@ -40,7 +40,6 @@ def excess(source: object, field: LightField, luminance: np.ndarray | None = Non
     return float(np.mean(np.log(truth) - np.log((1 - 1e-4) * found + 1e-4 * 1e6 / (np.pi * field.surface.area))))
 
 
-@pytest.mark.slow
 def test_flux_is_that_of_the_rays_that_were_met(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
     _, rays, field = film
     assert field.total_flux == pytest.approx(rays.total_flux - field.report.unmet_flux, rel=1e-12)
@@ -271,7 +270,6 @@ def test_bits_do_not_depend_on_threads() -> None:
     assert maps[0] == maps[1] == maps[2]
 
 
-@pytest.mark.slow
 def test_what_makes_no_sense_is_refused(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
     _, rays, field = film
     observer, screen = et.Observer(0, 0, 1000), et.Screen(2, 2, 4, 4)

@@ -194,7 +194,6 @@ def test_text_says_what_was_left_out(run: Run) -> None:
     assert "all light is theirs multiplied by" in out
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "status", "hint"),
     [

@@ -212,7 +212,6 @@ def test_a_map_through_a_filter_takes_the_spectrum_of_the_field(field: LightFiel
     assert not any("all its rays together" in note for note in without.notes)
 
 
-@pytest.mark.slow
 def test_a_map_of_a_ray_file_takes_the_spectrum_of_its_rays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The set is fitted; its lines are those of the map, and what tells them apart is named.
 

@@ -117,8 +117,8 @@ def test_error_bars_of_folded_fields_cover_the_truth() -> None:
     """Each ray stands for two: error bars that took them for independent ones would be too small by √2.
 
     Fits to twelve other seeds covered 76.4 and 96.4 %: the errors are too large for a source as smooth as this one. These
-    shares spread by 0.063 and 0.020, as those of 45 and 90 independent lines. Errors too small by √2 would cover 60 and 86 %,
-    which four fits find.
+    shares spread by 0.063 and 0.020, as those of 45 and 90 independent lines. Errors too small by √2 would cover 60
+    and 86 %, which four fits find.
     """
     source, n = LimbDarkenedDisk(), 60_000
     plane = et.Plane(z=0, width=2 * source.radius, height=2 * source.radius, centre=(0, 0))

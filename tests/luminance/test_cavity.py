@@ -81,7 +81,6 @@ def test_the_solution_loses_no_light_and_has_converged() -> None:
 # --- forwards --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_where_the_light_ends(traced: TraceResult) -> None:
     ledger = traced.ledger
     n = traced.rays_done

@@ -89,7 +89,6 @@ def inside(lmap: et.LuminanceMap, inner: float, outer: float) -> npt.NDArray[np.
     return (r + half < outer) & ((r - half > inner) | (inner == 0))
 
 
-@pytest.mark.slow
 def test_each_ring_has_its_luminance(ring_map: et.LuminanceMap) -> None:
     """303 964, 67 547 and 20 264 cd/m² (eq. 2.9), times (1 + cos α)/2; three standard errors."""
     for inner, outer, truth in ((0, 10, 303_963.55), (10, 20, 67_547.46), (20, 30, 20_264.24)):

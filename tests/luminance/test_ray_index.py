@@ -185,7 +185,7 @@ def test_refusals() -> None:
 
 def test_same_bytes_for_any_number_of_threads(tmp_path: Path) -> None:
     """Of the file, and of the map made from it."""
-    source = et.RingSource(rays=400_000, seed=5)
+    source = et.RingSource(rays=300_000, seed=5)
 
     def run(threads: int) -> tuple[str, bytes]:
         path = tmp_path / "a.etd"

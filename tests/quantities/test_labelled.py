@@ -25,7 +25,6 @@ def plain(facts: dict[str, Any], like: dict[str, Any]) -> dict[str, Any]:
     return {name: fact if isinstance(like[name], str | float) else json.loads(fact) for name, fact in facts.items()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("lmap", [make_map(), make_map().replace(flux_unit="W"), illuminance()], ids=repr)
 def test_maps_come_back(lmap: Any) -> None:
     """values, errors, rays and header of a dataset make the same map again; each value stands at its coordinates."""

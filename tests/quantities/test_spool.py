@@ -107,7 +107,6 @@ def test_memory_stays_below_the_limit_and_one_stretch() -> None:
     assert peak < 9 * n * DTYPE.itemsize
 
 
-@pytest.mark.slow
 def test_a_full_disk_is_an_os_error_and_never_a_short_file() -> None:
     """A limit on file size stands in for the disk: it strikes inside the last bytes, which a buffer may hold back."""
     script = """

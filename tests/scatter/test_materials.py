@@ -12,7 +12,6 @@ from etendue.scatter.materials import MATERIALS
 from etendue.scene.finishes import BUILT_IN
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "reflectance"),
     [

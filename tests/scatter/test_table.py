@@ -228,7 +228,6 @@ def test_what_radiates_more_than_it_receives_is_refused_with_the_angle() -> None
     assert float(told.reflectance(35.0)) == pytest.approx(1.0, abs=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.5, 0.95])
 def test_a_single_incidence_stands_for_all_with_its_share(share: float) -> None:
     """A round Gaussian of σ = 0.15 at 60° alone, a fifth of which is cut by the horizon: at 0° it is share / (2π σ²) at its

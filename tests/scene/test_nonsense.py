@@ -70,6 +70,7 @@ def test_the_scene_itself_is_sound() -> None:
     assert built(SCENE)
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.sampled_from([*Scene.model_fields, "x"]), ANYTHING, max_size=4))
 def test_any_tree_is_a_scene_or_an_error(data: dict[str, Any]) -> None:
     built(data)

@@ -351,7 +351,6 @@ def test_a_table_is_written_and_read_as_numbers(tmp_path: Path) -> None:
         table["escapd"]
 
 
-@pytest.mark.slow
 def test_a_dataset_has_the_same_numbers() -> None:
     table = et.sweep(et.Scene(sources=[DIE], surfaces=[SCREEN]), {"screen.at.2": [1, 2]}, "escaped", rays=1000)
     assert float(table.to_xarray()["escaped"].sel({"screen.at.2": 2})) == table["escaped"][1]

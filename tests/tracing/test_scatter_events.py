@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -92,9 +93,15 @@ def everything(folder: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-@pytest.fixture
-def traced(tmp_path: Path) -> et.TraceResult:
-    scene = et.Scene.from_dict(everything(tmp_path), folder=tmp_path)
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of the scene that `traced` has, with the files that it names."""
+    return tmp_path_factory.mktemp("everything")
+
+
+@pytest.fixture(scope="module")
+def traced(folder: Path) -> et.TraceResult:
+    scene = et.Scene.from_dict(everything(folder), folder=folder)
     return et.trace(scene, 150_000, seed=5)
 
 
@@ -367,22 +374,25 @@ def test_nonsense_is_refused(wrong: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
-def test_looked_at_from_a_file_in_another_place(tmp_path: Path, traced: et.TraceResult) -> None:
+def test_looked_at_from_a_file_in_another_place(tmp_path: Path, folder: Path, traced: et.TraceResult) -> None:
     """A result names the files of its scene as seen from where it is; a file that has changed is noticed."""
-    (tmp_path / "results").mkdir()
-    path = tmp_path / "results" / "result.h5"
+    (folder / "results").mkdir()
+    path = folder / "results" / "result.h5"
     traced.save(path)
     again = et.TraceResult.load(path)
     assert again.events["scatter"].rows.tobytes() == traced.events["scatter"].rows.tobytes()
     for lmap, expected in zip(et.luminance_map(again.events.only), et.luminance_map(traced.events.only), strict=True):
         np.testing.assert_array_equal(lmap.values, expected.values)
         assert lmap.header() == expected.header()
-    again.save(tmp_path / "copy.h5")
-    assert len(et.luminance_map(et.TraceResult.load(tmp_path / "copy.h5").events.only)) == 3
-    (tmp_path / "tile.obj").write_text("v 0 0 0\nv 9 0 1\nv 9 8 2\nf 1 2 3\n", encoding="utf-8")
+    again.save(folder / "copy.h5")
+    assert len(et.luminance_map(et.TraceResult.load(folder / "copy.h5").events.only)) == 3
+    # All of it somewhere else, where what others look at stays as it is.
+    shutil.copytree(folder, moved := tmp_path / "moved")
+    path = moved / "results" / "result.h5"
+    (moved / "tile.obj").write_text("v 0 0 0\nv 9 0 1\nv 9 8 2\nf 1 2 3\n", encoding="utf-8")
     with pytest.raises(ArgumentError, match="another scene, or a file that it names has changed"):
         et.luminance_map(et.TraceResult.load(path).events.only)
-    (tmp_path / "tile.obj").unlink()
+    (moved / "tile.obj").unlink()
     with pytest.raises(SceneError, match=r"tile\.obj"):
         et.luminance_map(et.TraceResult.load(path).events.only)
 
