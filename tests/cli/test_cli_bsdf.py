@@ -107,7 +107,6 @@ def test_a_model_instead_of_a_table(run: Run, scans: list[Path]) -> None:
     assert not Path("no.h5").exists()
 
 
-@pytest.mark.slow
 def test_scans_with_errors_are_told_with_errors(run: Run) -> None:
     """A flat sheet with errors of 2 %: its share is off by 2 % at most, and its model by less, with a χ² beside."""
     rows = [

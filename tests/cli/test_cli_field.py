@@ -288,7 +288,6 @@ def test_luminance_of_rays_by_their_light_field(
     np.testing.assert_array_equal(et.read_map(tmp_path / "a.npz").values, expected.values)
 
 
-@pytest.mark.slow
 def test_rays_are_fitted_unless_an_acceptance_is_given(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
 

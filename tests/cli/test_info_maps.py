@@ -25,7 +25,6 @@ def seen() -> et.LuminanceMap:
     return et.LuminanceMap(values, 0.1 * values, rays, eye, screen, provenance=LOOKED, notes=("one pixel is dead",))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("extension", MAP_EXTENSIONS)
 def test_a_luminance_map_is_told(extension: str, run: Run) -> None:
     seen().save(f"seen{extension}")

@@ -62,7 +62,6 @@ def expected(lmap: et.LuminanceMap) -> np.ndarray[Any, Any]:
     return np.round(255 * seen[..., :3])
 
 
-@pytest.mark.slow
 def test_each_frame_of_a_gif_shows_its_map_on_the_scale_of_all(tmp_path: Path) -> None:
     maps = make_maps()
     et.plot_animation(maps, tmp_path / "a.gif", scale="linear", seconds=0.2)

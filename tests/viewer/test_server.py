@@ -110,7 +110,6 @@ def test_no_other_name_no_other_page_and_no_file(visitor: Visitor, tmp_path: Pat
     assert visitor.ask("PUT", "/map", b"").status == 501
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "words"),
     [
@@ -137,7 +136,6 @@ def test_long_questions_are_not_read(visitor: Visitor) -> None:
     assert visitor.ask("GET", "/").status == 200
 
 
-@pytest.mark.slow
 def test_maps_are_those_of_the_core_bit_by_bit(visitor: Visitor, tmp_path: Path) -> None:
     visitor.enter()
     truth = et.luminance_map(FIELDS["lamp"], OBSERVER, SCREEN)

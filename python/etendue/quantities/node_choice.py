@@ -303,20 +303,32 @@ class _Tree:
         tried = [(parts, *smooth) for parts in range(math.ceil(fewest * finer), fewest - 1, -1)]
         tried.append((fewest, 0.0, np.ones_like(smooth[1])))
         for deepest in range(len(self.split), -1, -1):
+            leaves = self._leaves(deepest)
             for parts, more, least in tried:
-                rows = self._leaves(deepest, parts, more, least)
-                if len(set().union(*rows)) <= most:
+                row, angle = self._cut(leaves, parts, more, least)
+                if np.unique(angle).size <= most:
                     cut = any(flags.any() for flags in self.split[deepest:])
-                    return rows, cut or self.unresolved
-        return self._leaves(0, *tried[-1]), True
+                    return self._rows(row, angle), cut or self.unresolved
+        return self._rows(*self._cut(self._leaves(0), *tried[-1])), True
 
-    def _leaves(self, deepest: int, parts: int, finer: float, around: Counts) -> list[tuple[float, ...]]:
-        rows, angles = [], []
+    def _leaves(self, deepest: int) -> list[tuple[Counts, Counts]]:
+        """Row and number of the intervals of each level that are not halved further."""
+        found = []
         for level, exist in enumerate(self.exist[: deepest + 1]):
             row, start = np.nonzero(exist & ~self.split[level] if level < deepest else exist)
+            found.append((row, start))
+        return found
+
+    def _cut(
+        self, leaves: list[tuple[Counts, Counts]], parts: int, finer: float, around: Counts
+    ) -> tuple[Counts, Array]:
+        """Row and angle of each node, in no order."""
+        rows, angles = [], []
+        for level, (row, start) in enumerate(leaves):
+            intervals = self.exist[level].shape[1]
             # The hat of a pole is by far the smallest: one part fewer beside it.
-            polar = (start == 0) | (start == exist.shape[1] - 1) if self.poles else np.zeros_like(start, dtype=np.bool_)
-            wanted = around[row] / exist.shape[1]
+            polar = (start == 0) | (start == intervals - 1) if self.poles else np.zeros_like(start, dtype=np.bool_)
+            wanted = around[row] / intervals
             if level == 0:
                 wanted = np.maximum(wanted, self.parts[row, start] * finer)
             numbers = np.maximum(np.ceil(wanted).astype(np.intp), parts) - polar
@@ -324,7 +336,10 @@ class _Tree:
                 which = numbers == number
                 rows.append(np.repeat(row[which], number))
                 angles.append((self.step / (1 << level) * (start[which][:, None] + np.arange(number) / number)).ravel())
-        row, angle = np.concatenate(rows), np.concatenate(angles)
+        return np.concatenate(rows), np.concatenate(angles)
+
+    def _rows(self, row: Counts, angle: Array) -> list[tuple[float, ...]]:
+        """The angles of each row, in order."""
         order = np.lexsort((angle, row))
         ends = np.cumsum(np.bincount(row, minlength=len(self.exist[0])))[:-1]
         return [tuple(nodes.tolist()) for nodes in np.split(angle[order], ends)]
@@ -344,21 +359,34 @@ def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis
     """
     span = 180.0 if axis == "gamma" else TURN
     step, nodes = span / size, size + 1 if axis == "gamma" else size
+    wide: Array | float = step
+    narrow: Array | float = step / 2.0
     if axis == "gamma":
         wide, narrow = _hats(size)
-    else:
-        wide, narrow = np.full(nodes, step), np.full(nodes, step / 2.0)
-    first = np.minimum((angle / step).astype(np.intp), size - 1)
-    on = angle / step - first
-    second = (first + 1) % nodes
-    pairs = [(first, 1.0 - on, np.maximum(1.0 - 2.0 * on, 0.0)), (second, on, np.maximum(2.0 * on - 1.0, 0.0))]
+    place = angle / step
+    first = np.minimum(place.astype(np.intp), size - 1)
+    on = np.subtract(place, first, out=place)
+    second = first + 1
+    second[second == nodes] = 0
+    row = row * nodes
     sums = np.zeros((4, rows * nodes))
-    for node, hat, half in pairs:
-        index, w = row * nodes + node, weight * hat
-        for number, term in enumerate((weight * (half / narrow[node] - hat / wide[node]), w, w * w)):
-            sums[number] += np.bincount(index, term, rows * nodes)
-            if number == 0:
-                sums[3] += np.bincount(index, term * term, rows * nodes)
+    # The values of many rays are made in the same places: fresh ones take as long as what is reckoned.
+    hat, other = 1.0 - on, np.zeros(on.shape)
+    for node in (first, second):
+        if node is second:
+            hat = on
+        half = np.maximum(np.subtract(np.multiply(hat, 2.0, out=other), 1.0, out=other), 0.0, out=other)
+        half /= narrow if isinstance(narrow, float) else narrow[node]
+        half -= hat / (wide if isinstance(wide, float) else wide[node])
+        half *= weight
+        index = row + node
+        sums[0] += np.bincount(index, half, rows * nodes)
+        half *= half
+        sums[3] += np.bincount(index, half, rows * nodes)
+        w = np.multiply(weight, hat, out=half)
+        sums[1] += np.bincount(index, w, rows * nodes)
+        w *= w
+        sums[2] += np.bincount(index, w, rows * nodes)
     change, held, squares, variance = sums.reshape(4, rows, nodes)
     value = held / wide
     fewest = np.where(change > 0.0, FEW, FEWEST)
