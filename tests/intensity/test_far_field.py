@@ -140,7 +140,7 @@ def test_error_bars_cover_the_truth() -> None:
 
 @pytest.mark.slow
 def test_a_lambertian_source_as_a_function() -> None:
-    rays = et.RingSource(rays=4_000_000, seed=2)
+    rays = et.RingSource(rays=2_000_000, seed=2)
     led = et.intensity_distribution(rays, 8, 5)
     cosine = hat_means(lambda c, gamma: np.cos(np.radians(gamma)) + 0.0 * c, c=led.c, gamma=led.gamma)[0]
     # Every other plane, whose hats have no ray in common.

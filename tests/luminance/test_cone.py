@@ -47,7 +47,7 @@ def test_equals_the_equations_ray_by_ray(unequal_rays: et.RaySet, theta: float, 
 
 @pytest.fixture(scope="module")
 def quadrilateral_rays() -> et.RaySet:
-    return Quadrilateral().rays(6_000_000, seed=20)
+    return Quadrilateral().rays(2_000_000, seed=20)
 
 
 @pytest.mark.slow
