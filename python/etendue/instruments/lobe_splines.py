@@ -48,15 +48,13 @@ class Level:
         cell = np.floor(at).astype(np.intp)
         u = at - cell
         x, y = _cubic(u[:, 0]), _cubic(u[:, 1])
-        i, j = cell[:, 0] - 1 - self.low[0], cell[:, 1] - 1 - self.low[1]
-        m, n = self.number.shape
-        numbers = np.full((len(beta), 4, 4), -1, np.intp)
-        values = np.zeros((len(beta), 4, 4))
-        for a in range(4):
-            for b in range(4):
-                inside = (i + a >= 0) & (i + a < m) & (j + b >= 0) & (j + b < n)
-                numbers[inside, a, b] = self.number[i[inside] + a, j[inside] + b]
-                values[:, a, b] = x[a] * y[b]
+        # Four cells all around have no splines: what lies farther off is as far off as that.
+        around = np.pad(self.number, 4, constant_values=-1)
+        i, j = (
+            np.clip(cell[:, k] - 1 - self.low[k], -4, self.number.shape[k])[:, None] + np.arange(4, 8) for k in (0, 1)
+        )
+        numbers = around[i[:, :, None], j[:, None, :]]
+        values = np.stack(x, axis=1)[:, :, None] * np.stack(y, axis=1)[:, None, :]
         return numbers.reshape(-1, 16), values.reshape(-1, 16)
 
     def nodes(self, margin: int = 0) -> Array:
