@@ -31,11 +31,13 @@ class SlantedOnce(Slanted):
     incidences = (60.0,)
 
 
-def coarsen(patch: pytest.MonkeyPatch, step: float = 15.0) -> None:
-    """Tables with fewer azimuths, at steps in degrees: text of all of them takes seconds to write and to read."""
+def coarsen(patch: pytest.MonkeyPatch, step: float = 15.0, turn: float = 120.0) -> None:
+    """Tables with fewer azimuths, at steps in degrees: text of all of them takes seconds to write and to read.
+
+    Of the azimuths of incidence, `turn` apart, no two are mirror images of each other or stand at right angles if there are three.
+    """
     for name in ("astm", "bird", "fred", "lighttools", "speos"):
         patch.setattr(f"etendue.formats.bsdf.{name}.PHI_STEP", step)
-    # Azimuths of incidence: no two of these three are mirror images of each other or stand at right angles.
-    patch.setattr("etendue.formats.bsdf.astm.TURN", 120.0)
+    patch.setattr("etendue.formats.bsdf.astm.TURN", turn)
     for name in ("ssdd", "tracepro"):
         patch.setattr(f"etendue.formats.bsdf.{name}.AZIMUTH_STEP", step)
