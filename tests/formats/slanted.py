@@ -34,7 +34,7 @@ class SlantedOnce(Slanted):
 def coarsen(patch: pytest.MonkeyPatch, step: float = 15.0, turn: float = 120.0) -> None:
     """Tables with fewer azimuths, at steps in degrees: text of all of them takes seconds to write and to read.
 
-    Of the azimuths of incidence, `turn` apart, no two are mirror images of each other or stand at right angles if there are three.
+    Azimuths of incidence are `turn` apart: no two of three are mirror images of each other or stand at right angles.
     """
     for name in ("astm", "bird", "fred", "lighttools", "speos"):
         patch.setattr(f"etendue.formats.bsdf.{name}.PHI_STEP", step)
