@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import numpy.typing as npt
 
@@ -85,3 +87,19 @@ def hat_halves(gamma: Array) -> tuple[Array, Array]:
     slope = np.where(half < 0.01, -square / 3.0 * (1.0 - square / 10.0), np.cos(half) - np.sin(half) / half)
     odd = np.cos(middle) * slope
     return even + odd, even - odd
+
+
+@functools.lru_cache(maxsize=32)
+def even_hats(size: int) -> tuple[Array, Array]:
+    """`hat_integrals` for so many even steps of γ, and those of hats half as wide at the same nodes; nobody can write to them.
+
+    Examples
+    --------
+    >>> wide, narrow = even_hats(90)
+    >>> wide.shape, round(float((narrow[1:-1] / wide[1:-1]).max()), 3)
+    ((91,), 0.5)
+    """
+    wide, narrow = (hat_integrals(np.linspace(0.0, 180.0, n * size + 1))[::n] for n in (1, 2))
+    for values in (wide, narrow):
+        values.flags.writeable = False
+    return wide, narrow

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.angle_table import gaps_of, hat_halves, hat_integrals
+from etendue.quantities.angle_table import even_hats, gaps_of, hat_halves, hat_integrals
 from etendue.quantities.intensity_nodes import Nodes, check_steps, planes_of
 from etendue.quantities.ray_stream import flux_power
 from etendue.quantities.smooth_light import Harmonics, nodes_around, parts_of
@@ -345,13 +344,6 @@ class _Tree:
         return [tuple(nodes.tolist()) for nodes in np.split(angle[order], ends)]
 
 
-@functools.lru_cache(maxsize=DEPTH["gamma"] + 1)
-def _hats(size: int) -> tuple[Array, Array]:
-    """Integrals of the hats of even steps of γ, and of those half as wide, at each node; nobody writes to them."""
-    wide, narrow = (hat_integrals(np.linspace(0.0, 180.0, n * size + 1))[::n] for n in (1, 2))
-    return wide, narrow
-
-
 def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis: str) -> Array:
     """How much the value at each node changes if all steps are halved, in standard errors; shape (rows, nodes).
 
@@ -362,7 +354,7 @@ def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis
     wide: Array | float = step
     narrow: Array | float = step / 2.0
     if axis == "gamma":
-        wide, narrow = _hats(size)
+        wide, narrow = even_hats(size)
     place = angle / step
     first = np.minimum(place.astype(np.intp), size - 1)
     on = np.subtract(place, first, out=place)
