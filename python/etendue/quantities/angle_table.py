@@ -91,7 +91,7 @@ def hat_halves(gamma: Array) -> tuple[Array, Array]:
 
 @functools.lru_cache(maxsize=32)
 def even_hats(size: int) -> tuple[Array, Array]:
-    """`hat_integrals` for so many even steps of γ, and those of hats half as wide at the same nodes; nobody can write to them.
+    """`hat_integrals` of so many even steps of γ, and of hats half as wide at the same nodes; nobody can write to them.
 
     Examples
     --------
