@@ -185,7 +185,7 @@ def test_written_and_read_again(
     tmp_path: Path, sources: tuple[et.BsdfTable, et.BsdfTable], form: BsdfFormat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What matrices of Klems and tensor trees hold is looked at in test_bsdf_formats.py, at the normal too."""
-    coarsen(monkeypatch, 10.0, 45.0)  # the azimuths of the sources
+    coarsen(monkeypatch, 10.0)
     turned, plain = sources
     if form.name not in ISOTROPIC:
         et.write_bsdf(tmp_path / "turned", turned, form.name)

@@ -12,6 +12,7 @@ from etendue.scatter.materials import MATERIALS
 from etendue.scene.finishes import BUILT_IN
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "reflectance"),
     [
