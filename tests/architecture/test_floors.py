@@ -129,6 +129,7 @@ def test_only_the_command_line_prints() -> None:
     assert looked > 20
 
 
+@pytest.mark.slow
 def test_no_memory_is_used_before_it_is_filled() -> None:
     banned = {f"{package}.{name}" for package in ("np", "numpy") for name in ("empty", "empty_like", "ndarray")}
     seen = 0

@@ -399,3 +399,11 @@ def test_scans_that_are_none() -> None:
             DirectionalScan(*wrong)  # type: ignore[arg-type]
     with pytest.raises(ArgumentError, match="solid angle"):
         _ = DirectionalScan(up, [1.0, 1.0]).bsdf
+
+
+@pytest.mark.parametrize("name", LOBE_MODELS)
+def test_steep_lobes_are_0_far_outside(name: str) -> None:
+    """A search for the parameters comes by such places; F is 1 in the middle and falls to 0 without a warning."""
+    model = LOBE_MODELS[name]
+    values = model.shape(np.array([0.0, 1e10, 1e20]), np.array([6.0 for _ in model.extra]))
+    assert values.tolist() == [1.0, 0.0, 0.0]

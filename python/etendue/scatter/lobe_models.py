@@ -138,7 +138,9 @@ class AbgLobe(LobeModel):
 
     def shape(self, distance: Array, extra: Array) -> Array:
         """F over its largest value."""
-        return np.asarray(1.0 / (1.0 + distance ** np.exp(min(extra[0], STEEPEST))))
+        # Far outside of a steep lobe the power is beyond all numbers, and F is 0.
+        with np.errstate(over="ignore"):
+            return np.asarray(1.0 / (1.0 + distance ** np.exp(min(extra[0], STEEPEST))))
 
     def keys(self, peak: float, width: float, extra: Array) -> dict[str, Any]:
         """The keys of the finish."""
