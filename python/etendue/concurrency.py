@@ -54,6 +54,11 @@ def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Res
     case there is another: on processors that the core's threads want by then. The number is one of the whole process;
     of several threads of Python only the first sets it, until it is done.
 
+    Parameters
+    ----------
+    function : callable
+        Whatever it takes and gives, it does so afterwards.
+
     Examples
     --------
     >>> import numpy as np

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-from types import SimpleNamespace
+from pathlib import Path
 
 import pytest
-from xdist.remote import WorkerInteractor
-from xdist.scheduler import LoadGroupScheduling
 
 from oracles import workers
 
@@ -16,20 +14,31 @@ pytest_plugins = ["pytester"]
 
 @pytest.mark.parametrize(("shared", "grouped"), [("module", 2), ("function", 0)])
 def test_tests_that_share_a_fixture_stay_together(pytester: pytest.Pytester, shared: str, grouped: int) -> None:
-    """The tests of a file that ask for its fixture have one group, the other test none; and xdist sends by that group."""
+    """The tests of a file that ask for its fixture have one group, the other test none."""
     path = pytester.makepyfile(
         f"import pytest\n@pytest.fixture(scope='{shared}')\ndef field(): return 1\n"
         "def test_a(field): pass\ndef test_b(): pass\ndef test_c(field): pass\n"
     )
     items = pytester.getitems(path.read_text(encoding="utf-8"))
     workers.pytest_collection_modifyitems(items)
-    # What a worker does with all tests: the name of the group goes to the end of their names, where the scheduler looks.
-    WorkerInteractor.pytest_collection_modifyitems(None, SimpleNamespace(getvalue=lambda _: True), items)
-    scopes = [LoadGroupScheduling._split_scope(None, item.nodeid) for item in items]
-    assert len(set(scopes)) == len(items) - max(grouped - 1, 0)
     groups = [mark.args[0] for item in items for mark in item.iter_markers("xdist_group")]
     assert len(groups) == grouped
     assert len(set(groups)) <= 1
+
+
+@pytest.mark.slow
+def test_a_fixture_of_a_module_is_made_once(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By two workers who both have tests to do: as xdist and pytest work together, not as we think that they do."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(workers.__file__).parents[1]))
+    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
+    pytester.makepyfile(
+        "import pytest\n@pytest.fixture(scope='module')\ndef field():\n    print('made', file=open('made', 'a'))\n"
+        "@pytest.mark.parametrize('k', range(8))\ndef test_a(field, k): pass\n"
+        "@pytest.mark.parametrize('k', range(8))\ndef test_b(k): print('done', file=open('made', 'a'))\n"
+    )
+    found = pytester.runpytest_subprocess("-n", "2", "--dist=loadgroup", "-p", "oracles.workers")
+    found.assert_outcomes(passed=16)
+    assert sorted((pytester.path / "made").read_text(encoding="utf-8").split()) == ["done"] * 8 + ["made"]
 
 
 @pytest.mark.parametrize(("cores", "count", "threads"), [(2, 2, "1"), (16, 4, "4"), (2, 5, "1"), (None, 1, "1")])
