@@ -186,7 +186,6 @@ def warped(density: Array, incident: Array, scattered: Array) -> tuple[float, fl
     return u, v, float(along[middle < u].sum() / along.sum()), float(rows[middle < v].sum() / rows.sum())
 
 
-@pytest.mark.slow
 def test_rgl_between_measured_incidences(tmp_path: Path) -> None:
     """As Mitsuba's `measured`: densities of visible normals are normalised; they and the values are linear in the angle."""
     rng = np.random.default_rng(6)
@@ -219,7 +218,6 @@ def test_rgl_between_measured_incidences(tmp_path: Path) -> None:
         assert float(one.at(s)) == pytest.approx(expected, rel=0.01)
 
 
-@pytest.mark.slow
 def test_rgl_warp_against_a_quadrature(tmp_path: Path) -> None:
     """f cosθ = a + b x' + c y', x' and y' being the distribution functions of the density of visible normals.
 

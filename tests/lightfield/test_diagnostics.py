@@ -470,6 +470,7 @@ def test_diagnostics_are_plain_data_and_a_few_lines() -> None:
     assert diagnose(field).to_dict()["forecast"] is None
 
 
+@pytest.mark.slow
 def test_where_fits_to_more_rays_gain_nothing_the_error_bars_are_a_bound() -> None:
     """Gains of -4 ± 2 and 1 ± 2 in 10⁵: no law, no factor, and nothing at 0 on a logarithmic axis."""
     law = law_of_gains(RUNGS, np.array([-4e-5, 1.2e-5]), np.eye(2) * 2.2e-5**2, 10_000)

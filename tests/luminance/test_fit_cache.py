@@ -53,7 +53,6 @@ def forget() -> None:
     fit_cache._memory.clear()
 
 
-@pytest.mark.slow
 def test_the_map_is_the_same_from_a_fit_from_memory_from_disk_and_without_a_cache(
     folder: Path, fits: list[int]
 ) -> None:
@@ -101,7 +100,6 @@ def test_another_ray_surface_unit_or_program_is_another_fit(fits: list[int], mon
     assert len(fits) == 6
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_scene_with_a_ray_file_is_fitted_once(
     fits: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -124,7 +122,6 @@ def test_a_scene_with_a_ray_file_is_fitted_once(
     assert len(fits) == 3
 
 
-@pytest.mark.slow
 def test_a_damaged_file_is_made_anew(folder: Path, fits: list[int]) -> None:
     rays = led()
     whole = seen(rays)

@@ -336,6 +336,7 @@ def test_patches_that_differ_from_lines_are_left_out() -> None:
         assert (NOT_TAKEN in spoilt.notes) is told
 
 
+@pytest.mark.slow
 def test_what_the_comparison_leaves_open_is_in_the_errors() -> None:
     """The spread of the passes and, in common, the difference to lines that go on, or what of it these cannot tell."""
     lmap = looked_into_by_default()

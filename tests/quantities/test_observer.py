@@ -80,7 +80,6 @@ def test_view_axes_are_the_shortest_rotation_that_takes_z_to_the_observer(theta:
     )
 
 
-@pytest.mark.slow
 @fixed
 @given(thetas, angles)
 def test_axes_are_right_handed_and_orthonormal(theta: float, phi: float) -> None:

@@ -115,7 +115,6 @@ def test_errors_are_those_of_a_weighted_mean() -> None:
     assert plain.rms_residual == pytest.approx(values.std() / values.mean(), rel=1e-4)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", LOBES)
 def test_shares_are_those_of_the_core(kind: str) -> None:
     """Rings about the specular direction within the unit circle, against the quadrature of the core."""

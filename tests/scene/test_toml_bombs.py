@@ -64,6 +64,7 @@ def test_counts_that_no_memory_holds_are_named(detector: str, tmp_path: Path) ->
         et.trace(Scene.load(tmp_path / "a.toml"), rays=10)
 
 
+@pytest.mark.slow
 def test_long_texts_and_numbers_in_rows_are_no_bombs(tmp_path: Path) -> None:
     row = ", ".join(f"[{400 + i / 100}, 1.0]" for i in range(30_000))
     (tmp_path / "a.toml").write_text(f'name = """{"a.b." * 1000}"""\n{SOURCE % 1}spectrum = [{row}]\n')
