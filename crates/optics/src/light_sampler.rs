@@ -12,8 +12,8 @@ use crate::source::{Emitter, Numbers, Source};
 const EVEN: f64 = 0.1;
 
 /// Light that a line meets on a source.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SourceHit {
+#[derive(Clone, Copy, Debug)]
+pub struct SourceHit<'a> {
     /// Distance along the line \[mm\].
     pub t: f64,
     /// Luminance \[flux unit/(mm² sr)\].
@@ -22,8 +22,33 @@ pub struct SourceHit {
     pub deviation: f64,
     /// Cosine of the angle of emission, or what takes its place where the area is seen under another solid angle.
     pub cosine: f64,
-    /// Density, by area, with which [`LightSample::pick`] picks this point \[1/mm²\].
-    pub density: f64,
+    /// See [`SourceHit::density`].
+    density: PickDensity<'a>,
+}
+
+/// How densely points are picked where a line meets a source.
+#[derive(Clone, Copy, Debug)]
+enum PickDensity<'a> {
+    /// \[1/mm²\].
+    Known(f64),
+    /// At a place of a part of a light field with such an area \[mm²\].
+    At {
+        table: &'a PlaceTable,
+        place: [f64; 2],
+        area: f64,
+    },
+}
+
+impl SourceHit<'_> {
+    /// Density, by area, with which [`LightSampler::pick`] picks this point \[1/mm²\]: of light fields it is looked up only where
+    /// it is asked for.
+    #[must_use]
+    pub fn density(&self) -> f64 {
+        match self.density {
+            PickDensity::Known(density) => density,
+            PickDensity::At { table, place, area } => table.density(place) / area,
+        }
+    }
 }
 
 /// A point of a source that a connection is made to.
@@ -70,15 +95,10 @@ impl LightSampler {
             });
         };
         let field = sampler.field();
-        let fluxes: Vec<f64> = field
-            .parts
-            .iter()
-            .map(etendue_lightfield::field::PartField::flux)
-            .collect();
-        let total: f64 = fluxes.iter().sum();
-        let parts = field.parts.iter().zip(&fluxes).map(|(part, flux)| {
+        let fluxes: Vec<(f64, Vec<f64>)> = field.parts.iter().map(PartField::flux_and_places).collect();
+        let total: f64 = fluxes.iter().map(|(flux, _)| flux).sum();
+        let parts = field.parts.iter().zip(&fluxes).map(|(part, (flux, light))| {
             let [n1, n2, ..] = part.cells;
-            let light = part.flux_of_places();
             let sum: f64 = light.iter().sum();
             let even = 1.0 / light.len() as f64;
             let shares: Vec<f64> = light
@@ -118,7 +138,7 @@ impl LightSampler {
     }
 
     /// Calls `visit` for the light that travels along −`d` to `o` from points of the source at 0 < t ≤ `reach`.
-    pub fn along(&self, source: &Source, o: Vec3, d: Vec3, reach: f64, mut visit: impl FnMut(SourceHit)) {
+    pub fn along(&self, source: &Source, o: Vec3, d: Vec3, reach: f64, mut visit: impl FnMut(SourceHit<'_>)) {
         let (p, k) = (source.frame.point_to_local(o), source.frame.direction_to_local(d));
         match &source.emitter {
             Emitter::Surface(surface) => {
@@ -132,7 +152,7 @@ impl LightSampler {
                             luminance: surface.luminance(-k, cosine) * source.flux,
                             deviation: 0.0,
                             cosine,
-                            density: 1.0 / surface.area(),
+                            density: PickDensity::Known(1.0 / surface.area()),
                         });
                     }
                 });
@@ -164,7 +184,7 @@ impl LightSampler {
                         luminance: light.luminance * source.flux,
                         deviation: 0.0,
                         cosine: light.cosine,
-                        density: light.density,
+                        density: PickDensity::Known(light.density),
                     });
                 }
             }),
@@ -179,7 +199,7 @@ impl LightSampler {
         sights: Sights<'_>,
         which: &[u32],
         reader: &mut SightReader,
-        mut visit: impl FnMut(usize, SourceHit),
+        mut visit: impl FnMut(usize, SourceHit<'_>),
     ) {
         if let Emitter::Field(sampler) = &source.emitter {
             for (part, table) in sampler.field().parts.iter().zip(&self.parts) {
@@ -198,13 +218,17 @@ impl LightSampler {
 
     /// What is seen of a part of a light field.
     #[inline]
-    fn hit(&self, part: &PartField, table: &PlaceTable, seen: SightReading) -> SourceHit {
+    fn hit<'a>(&self, part: &PartField, table: &'a PlaceTable, seen: SightReading) -> SourceHit<'a> {
         SourceHit {
             t: seen.t,
             luminance: seen.reading.value * self.scale,
             deviation: seen.reading.deviation * self.scale,
             cosine: seen.cosine,
-            density: table.density(seen.place) / part.part.area(),
+            density: PickDensity::At {
+                table,
+                place: seen.place,
+                area: part.part.area(),
+            },
         }
     }
 

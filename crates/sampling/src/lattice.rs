@@ -1,5 +1,7 @@
 //! Points that fill a cube more evenly than random ones: a rank-1 lattice, as a sequence, randomly shifted.
 
+use multiversion::multiversion;
+
 use crate::philox::Stream;
 
 /// Generating vector of the lattice sequence, an embedded rule as in Cools, Kuo, Nuyens, "Constructing embedded lattice rules
@@ -19,6 +21,18 @@ pub fn lattice_point(index: u32, shift: &[f64; DIMENSIONS]) -> [f64; DIMENSIONS]
     // The radical inverse in base 2 orders the points so that every beginning is spread out.
     let phase = index.reverse_bits();
     std::array::from_fn(|k| coordinate(phase, GENERATOR[k], shift[k]))
+}
+
+/// Coordinates 0 and 1 of all points from `first` on that there is room for, moved by so much and added to a corner.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+pub fn first_two(first: u32, shift: &[f64; 4], corner: [f64; 2], out: [&mut [f64]; 2]) {
+    let [across, down] = out;
+    let places = across.iter_mut().zip(down);
+    for (index, (across, down)) in (first..).zip(places) {
+        let phase = index.reverse_bits();
+        *across = corner[0] + coordinate(phase, GENERATOR[0], shift[0]);
+        *down = corner[1] + coordinate(phase, GENERATOR[1], shift[1]);
+    }
 }
 
 #[inline(always)]
@@ -50,6 +64,16 @@ impl ShiftedPoint {
             phase: index.reverse_bits(),
             shifts,
             address,
+        }
+    }
+
+    /// Another point at the same address.
+    #[inline]
+    #[must_use]
+    pub const fn at(self, index: u32) -> Self {
+        Self {
+            phase: index.reverse_bits(),
+            ..self
         }
     }
 
@@ -133,5 +157,11 @@ mod tests {
         let (point, whole) = (ShiftedPoint::new(3, shifts, [12, 5 << 8]), lattice_point(3, &shift));
         let fours: Vec<f64> = (0..ShiftedPoint::FOURS).flat_map(|number| point.four(number)).collect();
         assert_eq!(fours, whole);
+        let (mut across, mut down) = (vec![0.0; 100], vec![0.0; 100]);
+        first_two(7, &point.shift(0), [2.0, 5.0], [&mut across, &mut down]);
+        for (index, place) in (7..).zip(across.into_iter().zip(down)) {
+            let [x, y, ..] = point.at(index).four(0);
+            assert_eq!(place, (2.0 + x, 5.0 + y));
+        }
     }
 }

@@ -67,14 +67,20 @@ impl Overlaps {
             along_axis(cells[0], factor.side(), wraps),
             along_axis(cells[1], factor.side(), false),
         ];
+        // Each row of hats along the second axis, before the rows are added up.
+        let along_row = |row: usize| {
+            let of_side = move |hats: &Vec<(usize, f64)>| hats.iter().map(|(c, w)| w * factor.node(row, *c)).sum();
+            axes[1].iter().map(move |columns| columns.each_ref().map(of_side))
+        };
+        let inner: Vec<[f64; 3]> = (0..factor.side()).flat_map(along_row).collect();
         let mut weights = vec![[0.0; 9]; cells[0] * cells[1]];
-        for (i, rows) in axes[0].iter().enumerate() {
-            for (j, columns) in axes[1].iter().enumerate() {
-                let sums = &mut weights[i * cells[1] + j];
-                for (side, sum) in sums.iter_mut().enumerate() {
-                    for (row, weight) in &rows[side / 3] {
-                        let inner: f64 = columns[side % 3].iter().map(|(c, w)| w * factor.node(*row, *c)).sum();
-                        *sum += weight * inner;
+        for (rows, weights) in axes[0].iter().zip(weights.chunks_exact_mut(cells[1])) {
+            for (side, rows) in rows.iter().enumerate() {
+                for (row, weight) in rows {
+                    for (sums, inner) in weights.iter_mut().zip(&inner[row * cells[1]..]) {
+                        for (sum, inner) in sums[3 * side..3 * side + 3].iter_mut().zip(inner) {
+                            *sum += weight * inner;
+                        }
                     }
                 }
             }
@@ -126,29 +132,46 @@ impl PartField {
     #[must_use]
     pub fn flux(&self) -> f64 {
         let [space, direction] = self.tent_masses();
-        let layers = self.layers(&direction);
-        let sum: f64 = layers.zip(&space).map(|(layer, mass)| mass * layer).sum();
-        sum * self.level * self.part.etendue()
+        self.flux_of(&space, &self.layers(&direction))
     }
 
-    /// ∫ L dU over each cell of the place, in all directions together.
+    /// ∫ L dU, and the same over each cell of the place, in all directions together.
     #[must_use]
-    pub fn flux_of_places(&self) -> Vec<f64> {
+    pub fn flux_and_places(&self) -> (f64, Vec<f64>) {
         let [space, direction] = self.overlaps();
-        let layers: Vec<f64> = self.layers(&direction.tent_masses()).collect();
+        let layers = self.layers(&direction.tent_masses());
         let scale = self.level * self.part.etendue();
         let of_place = |(place, weights): (usize, &[f64; 9])| -> f64 {
             let near = space.neighbours(place).into_iter().zip(weights);
             near.map(|(near, weight)| weight * layers[near]).sum::<f64>() * scale
         };
-        space.weights.iter().enumerate().map(of_place).collect()
+        let places = space.weights.iter().enumerate().map(of_place).collect();
+        (self.flux_of(&space.tent_masses(), &layers), places)
+    }
+
+    /// From masses of the places and what is over each.
+    fn flux_of(&self, space: &[f64], layers: &[f64]) -> f64 {
+        let sum: f64 = layers.iter().zip(space).map(|(layer, mass)| mass * layer).sum();
+        sum * self.level * self.part.etendue()
     }
 
     /// The ratio over each place, weighed by masses of the directions.
-    fn layers<'a>(&'a self, direction: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        let of_layer =
-            move |layer: &[[f32; 2]]| -> f64 { layer.iter().zip(direction).map(|(r, m)| f64::from(r[0]) * m).sum() };
-        self.ratio.chunks_exact(direction.len()).map(of_layer)
+    fn layers(&self, direction: &[f64]) -> Vec<f64> {
+        /// Places that are added up side by side: a sum by itself waits for each of its additions.
+        const SOME: usize = 8;
+        let mut layers = Vec::with_capacity(self.ratio.len() / direction.len());
+        for some in self.ratio.chunks(SOME * direction.len()) {
+            let mut places = some.chunks_exact(direction.len());
+            let places: [_; SOME] = std::array::from_fn(|_| places.next().unwrap_or_default());
+            let mut sums = [0.0; SOME];
+            for (aim, mass) in direction.iter().enumerate() {
+                for (sum, place) in sums.iter_mut().zip(places) {
+                    *sum += place.get(aim).map_or(0.0, |r| f64::from(r[0]) * mass);
+                }
+            }
+            layers.extend_from_slice(&sums[..some.len() / direction.len()]);
+        }
+        layers
     }
 
     /// Mean luminance of each cell and mean of its standard deviation; the same bits for any number of threads.
@@ -246,7 +269,9 @@ mod tests {
             );
             let directions = field.cells[2] * field.cells[3];
             let share = field.part.etendue() / value.len() as f64;
-            for (of_place, cells) in field.flux_of_places().iter().zip(value.chunks(directions)) {
+            let (whole, places) = field.flux_and_places();
+            assert!(whole.to_bits() == field.flux().to_bits());
+            for (of_place, cells) in places.iter().zip(value.chunks(directions)) {
                 let flux = cells.iter().sum::<f64>() * share;
                 assert!(
                     (of_place - flux).abs() < 1e-12 * (1.0 + flux),

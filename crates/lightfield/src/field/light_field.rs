@@ -62,9 +62,28 @@ impl PartField {
 
     /// The ratio and its standard deviation under the tents over a point.
     #[inline(always)]
-    pub(super) fn ratio_under(&self, [x, y, u, v]: &[Tent; 4]) -> [f64; 2] {
-        let corners = self.corners([x.cells, y.cells, u.cells, v.cells]);
-        weighed(&corners, [x.weights, y.weights, u.weights, v.weights])
+    pub(super) fn ratio_under(&self, tents: &[Tent; 4]) -> [f64; 2] {
+        if self.cells[3] == 1 {
+            return weighed(&self.corners(tents.map(|t| t.cells)), tents.map(|t| t.weights));
+        }
+        // What `weighed` comes to, each pair of cells in one go from the table.
+        let [_, n2, n3, n4] = self.cells;
+        let values = self.ratio.as_flattened();
+        let [x, y, u, v] = tents;
+        let mut sums = [0.0; 4];
+        for i in 0..2 {
+            for j in 0..2 {
+                for k in 0..2 {
+                    let cell = ((x.cells[i] * n2 + y.cells[j]) * n3 + u.cells[k]) * n4 + v.cells[0];
+                    let pair: [f32; 4] = next_to(values, 2 * cell);
+                    let weight = x.weights[i] * y.weights[j] * u.weights[k];
+                    for (sum, value) in sums.iter_mut().zip(pair) {
+                        *sum += weight * f64::from(value);
+                    }
+                }
+            }
+        }
+        [0, 1].map(|k| sums[k] * v.weights[0] + sums[k + 2] * v.weights[1])
     }
 
     /// Ratio and deviation of the cells of tents. Along the last axis the two cells lie beside one another.

@@ -3,6 +3,7 @@
 use etendue_geometry::RayBatch;
 use etendue_geometry::ray_batch::BLOCK;
 use etendue_math::{Frame, Vec3};
+use multiversion::multiversion;
 
 use super::light_field::{PartField, Reading};
 use super::points::Points;
@@ -50,13 +51,11 @@ impl SightReader {
                 points,
             } = self;
             batch.len = which.len();
-            for (k, i) in which.iter().enumerate() {
-                let (o, d) = sights.line(*i as usize);
-                // Light goes the other way.
-                let (p, k_back) = (frame.point_to_local(o), -frame.direction_to_local(d));
-                put(&mut batch.position, k, p);
-                put(&mut batch.direction, k, k_back);
+            for (axis, from) in sights.origin.into_iter().enumerate() {
+                gather(&mut batch.position[axis], from, which);
+                gather(&mut batch.direction[axis], sights.direction[axis], which);
             }
+            turn_back(frame, batch);
             part.part.depart(batch, left);
             carry(std::slice::from_ref(&part.part), batch, at);
             points.read(part, at, which.len());
@@ -77,10 +76,24 @@ impl SightReader {
     }
 }
 
-#[inline(always)]
-fn put(lists: &mut [Vec<f64>; 3], k: usize, v: Vec3) {
-    for (list, x) in lists.iter_mut().zip([v.x, v.y, v.z]) {
-        list[k] = x;
+/// Some entries of a list.
+fn gather(into: &mut [f64], from: &[f64], which: &[u32]) {
+    for (x, i) in into.iter_mut().zip(which) {
+        *x = from[*i as usize];
+    }
+}
+
+/// Lines of sight as the light goes, in the coordinates of a frame.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn turn_back(frame: &Frame, lines: &mut RayBatch) {
+    let n = lines.len;
+    let [px, py, pz] = lines.position.each_mut().map(|v| &mut v[..n]);
+    let [kx, ky, kz] = lines.direction.each_mut().map(|v| &mut v[..n]);
+    for i in 0..n {
+        let p = frame.point_to_local(Vec3::new(px[i], py[i], pz[i]));
+        let k = -frame.direction_to_local(Vec3::new(kx[i], ky[i], kz[i]));
+        (px[i], py[i], pz[i]) = (p.x, p.y, p.z);
+        (kx[i], ky[i], kz[i]) = (k.x, k.y, k.z);
     }
 }
 

@@ -50,7 +50,7 @@ impl PathBlock<'_> {
             return Known::Nothing;
         };
         let interaction = event.interaction();
-        let path = &mut self.paths[branch.path as usize];
+        let path = self.paths[branch.path as usize];
         let place = FacePoint {
             face: interaction.face,
             part: interaction.part,
@@ -59,9 +59,10 @@ impl PathBlock<'_> {
         };
         // What light that came through smooth surfaces does from here on is left to the light image, if there is one.
         let all = !(self.method.left == LeftOut::Caustics && branch.direct);
-        let light = self.known[path.pass].at(self.lit.scene, place, branch.travelled, path.line, all);
+        let known = &self.known[self.pass_of(&path).pass];
+        let light = known.at(self.lit.scene, place, branch.travelled, path.line as usize, all);
         let Some(light) = light else { return Known::Nothing };
-        path.sum[0] += branch.weight * light * event.leaving(parts);
+        self.paths[branch.path as usize].sum[0] += branch.weight * light * event.leaving(parts);
         parts.rest.map_or(Known::All, |rest| Known::But(&**rest))
     }
 
@@ -88,7 +89,7 @@ impl PathBlock<'_> {
             branch.density = density(self.view, d, branch.travelled, d.dot(interaction.side));
         }
         // The direction has the first numbers, which are the most evenly spread; a side is drawn only where there are two.
-        let numbers = &mut self.paths[branch.path as usize].numbers;
+        let numbers = self.numbers(branch.path);
         let (turn, height) = (numbers.draw(), numbers.draw());
         let through = chances[1] > 0.0 && numbers.draw() >= chances[0];
         // What the observer sees directly is left to rays traced forwards; the rest is looked for where they came from.
@@ -96,7 +97,7 @@ impl PathBlock<'_> {
         let guide = guide.and_then(|guide| guide.near(interaction.face, interaction.point));
         let spread = Spread { chances, guide };
         let guided = guide.and_then(|near| {
-            let numbers = &mut self.paths[branch.path as usize].numbers;
+            let numbers = self.numbers(branch.path);
             let number = numbers.draw() / SHARE;
             (number < 1.0).then(|| near.draw([number, height, turn]))
         });
@@ -131,12 +132,12 @@ impl PathBlock<'_> {
         all: bool,
     ) {
         let (scene, interaction) = (self.lit.scene, event.interaction());
-        let path = &mut self.paths[branch.path as usize];
-        let (_, _, colour) = &self.lit.lines[path.line];
+        let line = self.paths[branch.path as usize].line as usize;
+        let (_, _, colour) = &self.lit.lines[line];
         let which = if all {
             0..scene.sources.len()
         } else {
-            let number = path.numbers.draw();
+            let number = self.numbers(branch.path).draw();
             let last = scene.sources.len().saturating_sub(1);
             let pick = self.lit.shares.partition_point(|s| *s < number).min(last);
             pick..scene.sources.len().min(pick + 1)
@@ -148,7 +149,7 @@ impl PathBlock<'_> {
             let before = if number == 0 { 0.0 } else { self.lit.shares[number - 1] };
             let picked = if all { 1.0 } else { self.lit.shares[number] - before };
             let source = &scene.sources[number];
-            let Some(beacon) = sampler.pick(source, interaction.point, &mut path.numbers) else {
+            let Some(beacon) = sampler.pick(source, interaction.point, self.numbers(branch.path)) else {
                 continue;
             };
             let k = (beacon.point - interaction.point).normalized();
@@ -181,7 +182,7 @@ impl PathBlock<'_> {
         for (i, connection) in self.connections.iter().enumerate() {
             let (o, wavelength) = (
                 self.shadows.origin(i),
-                self.lit.lines[self.paths[connection.path as usize].line].1,
+                self.wavelength(connection.path),
             );
             let distance = (connection.to - o).length();
             let absorption = self.media.at(scene, connection.stack.top(), wavelength).absorption;

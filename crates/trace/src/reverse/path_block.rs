@@ -7,6 +7,8 @@ use etendue_lightfield::View;
 use etendue_lightfield::field::SightReader;
 use etendue_math::Vec3;
 use etendue_optics::source::Numbers;
+use etendue_sampling::lattice::ShiftedPoint;
+use etendue_sampling::philox::Stream;
 
 use super::method::Method;
 use crate::exitance::ExitanceCache;
@@ -49,22 +51,47 @@ pub(super) struct Branch {
     pub(super) ways: u32,
 }
 
-/// One path: its random numbers, its wavelength, and the light that it has found, with its deviation.
-pub(super) struct Path {
-    pub(super) numbers: Numbers,
-    pub(super) line: usize,
-    /// The number of its pixel.
+/// Paths of one pass through one pixel.
+pub(super) struct PixelPass {
+    /// The number of the pixel.
     pub(super) pixel: usize,
-    /// Its pass, counted from the first of those that are made.
+    /// The pass, counted from the first of those that are made.
     pub(super) pass: usize,
+    /// Whether they look for small images of sources and nothing else.
+    pub(super) aimed: bool,
+    /// The point of the first of them, and by how much the first numbers of all are moved.
+    pub(super) point: ShiftedPoint,
+    pub(super) shift: [f64; 4],
+    /// Where their further numbers are found.
+    pub(super) stream: Stream,
+    pub(super) address: u64,
+}
+
+impl PixelPass {
+    /// The numbers of a path.
+    fn numbers(&self, index: u32) -> Numbers {
+        let address = self.address.wrapping_add(u64::from(index));
+        Numbers::after(self.point.at(index), &self.shift, self.stream, address)
+    }
+}
+
+/// One path: its wavelength, and the light that it has found, with its deviation.
+#[derive(Clone, Copy)]
+pub(super) struct Path {
+    /// Place of its pixel and pass in the block.
+    pub(super) pass: u32,
+    /// Its number there.
+    pub(super) index: u32,
+    pub(super) line: u32,
+    /// How many of its random numbers its start took, and whether any were drawn since.
+    pub(super) drawn: u8,
+    pub(super) begun: bool,
+    /// Whether it met a smooth surface first, and whether it saw a diffuse one directly.
+    pub(super) met: [bool; 2],
     pub(super) sum: [f64; 2],
     /// Of the light, that which was found by chance.
     pub(super) chance: f64,
-    /// Whether it met a smooth surface first, and whether it saw a diffuse one directly.
-    pub(super) met: [bool; 2],
-    /// Whether it looks for small images of sources and nothing else.
-    pub(super) aimed: bool,
-    /// How much such an image counts, as paths of both kinds find it.
+    /// How much a small image of a source counts, as paths of both kinds find it.
     pub(super) share: f64,
 }
 
@@ -88,7 +115,10 @@ pub struct PathBlock<'a> {
     pub(super) known: &'a [ExitanceCache<'a>],
     pub(super) media: MediumCache,
     pub(super) hits: Hits,
+    pub(super) passes: Vec<PixelPass>,
     pub(super) paths: Vec<Path>,
+    /// The random numbers of paths that have drawn any since their start.
+    numbers: Vec<Numbers>,
     /// Branches that are about to take a step, and those that come out of it.
     pub(super) lines: RayBlock,
     pub(super) branches: Vec<Branch>,
@@ -117,7 +147,9 @@ impl<'a> PathBlock<'a> {
             known,
             media: MediumCache::new(lit.scene),
             hits: Hits::default(),
+            passes: Vec::new(),
             paths: Vec::with_capacity(BLOCK),
+            numbers: Vec::new(),
             lines: RayBlock::default(),
             branches: Vec::new(),
             next_lines: RayBlock::default(),
@@ -133,7 +165,36 @@ impl<'a> PathBlock<'a> {
     }
 
     pub(super) fn wavelength(&self, path: u32) -> f64 {
-        self.lit.lines[self.paths[path as usize].line].1
+        self.lit.lines[self.paths[path as usize].line as usize].1
+    }
+
+    /// The random numbers of a path. Many paths need none: theirs are not worked out.
+    pub(super) fn numbers(&mut self, path: u32) -> &mut Numbers {
+        let place = path as usize;
+        let Path {
+            pass,
+            index,
+            drawn,
+            begun,
+            ..
+        } = &mut self.paths[place];
+        if !*begun {
+            *begun = true;
+            let mut numbers = self.passes[*pass as usize].numbers(*index);
+            for _ in 0..*drawn {
+                numbers.draw();
+            }
+            if self.numbers.len() <= place {
+                self.numbers.resize(place + 1, numbers.clone());
+            }
+            self.numbers[place] = numbers;
+        }
+        &mut self.numbers[place]
+    }
+
+    /// The pixel and pass of a path.
+    pub(super) fn pass_of(&self, path: &Path) -> &PixelPass {
+        &self.passes[path.pass as usize]
     }
 
     pub(super) fn push(&mut self, interaction: &Interaction, d: Vec3, branch: Branch) {

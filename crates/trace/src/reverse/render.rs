@@ -11,13 +11,12 @@ use std::ops::Range;
 
 use etendue_geometry::surface_points::Vectors;
 use etendue_lightfield::View;
-use etendue_optics::source::Numbers;
-use etendue_sampling::lattice::ShiftedPoint;
+use etendue_sampling::lattice::{ShiftedPoint, first_two};
 use etendue_sampling::philox::Stream;
 use rayon::prelude::*;
 
 use super::method::{Method, Pixel};
-use super::path_block::{BLOCK, Branch, Path, PathBlock, Seen};
+use super::path_block::{BLOCK, Branch, Path, PathBlock, PixelPass, Seen};
 use super::smooth::Splitter;
 use crate::exitance::{ExitanceCache, ExitanceSurvey};
 use crate::glints;
@@ -147,53 +146,87 @@ impl<'a> Renderer<'a> {
         let mut begin = 0;
         while begin < total && !self.block.lit.is_stopped() {
             let end = (begin + BLOCK).min(total);
+            self.block.passes.clear();
             self.block.paths.clear();
-            let these = tasks.iter().enumerate().take(end.div_ceil(paths)).skip(begin / paths);
-            for (task, cell) in these {
+            let these = begin / paths..end.div_ceil(paths);
+            for (task, cell) in these.clone().zip(&tasks[these.clone()]) {
                 let first = task * paths;
-                let indices = begin.max(first) - first..end.min(first + paths) - first;
-                let pixel = which[cell / passes.len()] as u64;
-                #[allow(clippy::cast_possible_truncation, reason = "a number of passes")]
-                let pass = (cell % passes.len()) as u32;
-                self.aim(pixel, [passes.start + pass, pass], indices, aimed);
+                let pixel = which[cell / passes.len()];
+                #[allow(clippy::cast_possible_truncation, reason = "numbers of passes and of paths")]
+                let (made, indices) = (
+                    (cell % passes.len()) as u32,
+                    (begin.max(first) - first) as u32..(end.min(first + paths) - first) as u32,
+                );
+                self.aim(pixel, [passes.start + made, made], indices, aimed);
             }
             self.start();
             self.follow();
-            for (flat, path) in (begin..end).zip(&self.block.paths) {
-                let cell = &mut cells[tasks[flat / paths]];
-                let [smooth, diffuse] = path.met.map(|met| if met { 1.0 } else { 0.0 });
-                for (sum, value) in cell
-                    .iter_mut()
-                    .zip([path.sum[0], path.sum[1], path.chance, smooth, diffuse])
-                {
-                    *sum += value * share;
+            let mut found = &self.block.paths[..];
+            for (task, cell) in these.clone().zip(&tasks[these]) {
+                let sums = &mut cells[*cell];
+                let of_cell = end.min((task + 1) * paths) - begin.max(task * paths);
+                for path in found.split_off(..of_cell).unwrap_or_default() {
+                    let [smooth, diffuse] = path.met.map(|met| if met { 1.0 } else { 0.0 });
+                    let values = [path.sum[0], path.sum[1], path.chance, smooth, diffuse];
+                    for (sum, value) in sums.iter_mut().zip(values) {
+                        *sum += value * share;
+                    }
                 }
             }
             begin = end;
         }
     }
 
-    /// Paths through points of a pixel.
-    fn aim(&mut self, pixel: u64, [pass, made]: [u32; 2], indices: Range<usize>, aimed: bool) {
+    /// Paths through points of a pixel, or, if they are `aimed`, of small images of sources in it.
+    #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
+    fn aim(&mut self, pixel: usize, [pass, made]: [u32; 2], indices: Range<u32>, aimed: bool) {
         let Self { block, starts, .. } = self;
         let [shifts, stream] = [PURPOSE_SHIFT, PURPOSE_PATH]
             .map(|purpose| Stream::new(block.method.seed, purpose + if aimed { AIMED } else { 0 }));
-        let point = |index| ShiftedPoint::new(index, shifts, [pixel, u64::from(pass) << 8]);
-        let shift = point(0).shift(0);
-        let columns = u64::from(block.view.columns);
+        let point = ShiftedPoint::new(0, shifts, [pixel as u64, u64::from(pass) << 8]);
+        let shift = point.shift(0);
+        let columns = block.view.columns as usize;
         let corner = [(pixel % columns) as f64, (pixel / columns) as f64];
-        #[allow(clippy::cast_possible_truncation, reason = "a number of a pixel")]
-        let glints = block.method.glints.map_or(&[][..], |all| all.of_pixel(pixel as usize));
+        let glints = block.method.glints.map_or(&[][..], |all| all.of_pixel(pixel));
+        let pass = PixelPass {
+            pixel,
+            pass: made as usize,
+            aimed,
+            point,
+            shift,
+            stream,
+            address: (pixel as u64) << 44 | u64::from(pass) << 20,
+        };
+        let path = Path {
+            pass: block.passes.len() as u32,
+            index: 0,
+            line: 0,
+            drawn: 2,
+            begun: false,
+            met: [false; 2],
+            sum: [0.0; 2],
+            chance: 0.0,
+            share: 1.0,
+        };
+        block.passes.push(pass);
+        if !aimed && glints.is_empty() && block.lit.lines.len() == 1 {
+            let begin = starts.paths.len();
+            starts.paths.extend((block.paths.len() as u32..).take(indices.len()));
+            block.paths.extend(indices.clone().map(|index| Path { index, ..path }));
+            let places = starts.places.each_mut().map(|list| {
+                list.resize(begin + indices.len(), 0.0);
+                &mut list[begin..]
+            });
+            first_two(indices.start, &shift, corner, places);
+            return;
+        }
         let [evenly, about] = [false, true].map(|aimed| f64::from(paths_of(block.method, aimed)));
         let more = about / evenly;
+        let lines = &block.lit.lines;
         for index in indices {
-            #[allow(clippy::cast_possible_truncation, reason = "a number of paths")]
-            let index = index as u32;
-            let address = ((pixel << 24 | u64::from(pass)) << 20).wrapping_add(u64::from(index));
-            let mut numbers = Numbers::after(point(index), &shift, stream, address);
-            let (du, dv) = (numbers.draw(), numbers.draw());
+            let [du, dv, third, last] = point.at(index).moved(0, &shift);
             let place = if aimed {
-                glints::draw(glints, [numbers.draw(), du, dv])
+                glints::draw(glints, [third, du, dv])
             } else {
                 [corner[0] + du, corner[1] + dv]
             };
@@ -202,31 +235,21 @@ impl<'a> Renderer<'a> {
             } else {
                 1.0 / (1.0 + more * glints::density(glints, place))
             };
-            let lines = &block.lit.lines;
-            let line = if lines.len() > 1 {
-                let number = numbers.draw();
-                lines.partition_point(|l| l.0 < number).min(lines.len() - 1)
-            } else {
-                0
-            };
+            let number = if aimed { last } else { third };
+            let line = lines.partition_point(|l| l.0 < number).min(lines.len() - 1) as u32;
             // What is drawn about an image may lie in another pixel.
             if !aimed || (0..2).all(|k| (corner[k]..corner[k] + 1.0).contains(&place[k])) {
                 starts.places[0].push(place[0]);
                 starts.places[1].push(place[1]);
-                #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
                 starts.paths.push(block.paths.len() as u32);
             }
+            let drawn = 2 + u8::from(aimed) + u8::from(lines.len() > 1);
             block.paths.push(Path {
-                numbers,
+                index,
                 line,
-                #[allow(clippy::cast_possible_truncation, reason = "a number of a pixel")]
-                pixel: pixel as usize,
-                pass: made as usize,
-                sum: [0.0; 2],
-                chance: 0.0,
-                met: [false; 2],
-                aimed,
+                drawn,
                 share,
+                ..path
             });
         }
     }
@@ -239,8 +262,8 @@ impl<'a> Renderer<'a> {
             block
                 .lines
                 .extend_from(block.view.observer, &starts.directions, origin_faces);
-            block.branches.extend(starts.paths.iter().map(|path| Branch {
-                path: *path,
+            let branch = Branch {
+                path: 0,
                 stack,
                 weight: 1.0,
                 seen: Seen::Smooth,
@@ -251,7 +274,9 @@ impl<'a> Renderer<'a> {
                 direct: true,
                 density: 0.0,
                 ways: glints::STRAIGHT,
-            }));
+            };
+            let branches = starts.paths.iter().map(|path| Branch { path: *path, ..branch });
+            block.branches.extend(branches);
         }
         starts.places.iter_mut().for_each(Vec::clear);
         starts.paths.clear();

@@ -180,8 +180,8 @@ impl PathBlock<'_> {
             if branch.seen != Seen::Smooth || branch.weight <= SPLIT {
                 // One of both ways is drawn by its share of the flux; radiance carries its factor (n₁/n₂)² besides.
                 branch.drawn = true;
-                let number = self.paths[branch.path as usize].numbers.draw();
-                let mirrored = number < scratch.shares[0][k];
+                let path = branch.path;
+                let mirrored = self.numbers(path).draw() < scratch.shares[0][k];
                 let ratio = n[0] / n[1];
                 scratch.shares[0][k] = if mirrored { 1.0 } else { 0.0 };
                 scratch.shares[1][k] = if mirrored { 0.0 } else { ratio * ratio };

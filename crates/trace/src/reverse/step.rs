@@ -6,7 +6,7 @@ use etendue_lightfield::leave::Sights;
 
 use super::diffuse::Known;
 use super::method::LeftOut;
-use super::path_block::{Branch, Path, PathBlock, Seen};
+use super::path_block::{Branch, Path, PathBlock, PixelPass, Seen};
 use crate::glints::{Glints, led_on};
 use crate::interaction::interaction_of;
 use crate::scatter::{SPLIT, SurfaceEvent};
@@ -66,6 +66,7 @@ impl PathBlock<'_> {
                 lines,
                 reach,
                 branches,
+                passes,
                 paths,
                 method,
                 marks,
@@ -86,14 +87,15 @@ impl PathBlock<'_> {
             let glints = method.glints.filter(|glints| glints.has(number));
             // What is seen large in the same pixel is no small image, though seen beside one.
             let is_small = |branch: &Branch, path: &Path| {
-                let small = |glints: &&Glints| !glints.is_large(path.pixel, number, branch.ways);
-                branch.seen == Seen::Smooth && (path.aimed || path.share < 1.0) && glints.as_ref().is_some_and(small)
+                let PixelPass { pixel, aimed, .. } = passes[path.pass as usize];
+                let small = |glints: &&Glints| !glints.is_large(pixel, number, branch.ways);
+                branch.seen == Seen::Smooth && (aimed || path.share < 1.0) && glints.as_ref().is_some_and(small)
             };
             let is_caustic = |branch: &Branch| branch.seen == Seen::Caustic && branch.direct;
             let counts = |branch: &Branch| {
                 let elsewhere = is_caustic(branch) && method.left == LeftOut::Caustics;
                 let path = &paths[branch.path as usize];
-                !elsewhere && (!path.aimed || is_small(branch, path))
+                !elsewhere && (!passes[path.pass as usize].aimed || is_small(branch, path))
             };
             let numbers = (0_u32..).zip(branches.iter().zip(&*marks));
             let those = numbers.filter(|(_, (branch, mark))| **mark && counts(branch));
@@ -102,7 +104,7 @@ impl PathBlock<'_> {
                 let branch = &branches[i];
                 let path = &mut paths[branch.path as usize];
                 let shared = if is_small(branch, path) { path.share } else { 1.0 };
-                let (_, wavelength, colour) = &lit.lines[path.line];
+                let (_, wavelength, colour) = &lit.lines[path.line as usize];
                 let mut weight = branch.weight * shared * colour[number];
                 let absorption = media.at(scene, branch.stack.top(), *wavelength).absorption;
                 if absorption > 0.0 {
@@ -114,7 +116,7 @@ impl PathBlock<'_> {
                 if let Seen::Diffuse { density, all } = branch.seen {
                     let distance = branch.travelled + hit.t;
                     let picked = if all { 1.0 } else { share };
-                    let other = picked * hit.density * distance * distance / hit.cosine;
+                    let other = picked * hit.density() * distance * distance / hit.cosine;
                     weight *= density / (density + other);
                 }
                 path.sum[0] += weight * hit.luminance;
@@ -159,7 +161,7 @@ impl PathBlock<'_> {
             met[0] |= smooth != [0.0; 2];
             met[1] |= branch.direct && is_diffuse;
         }
-        let aimed = self.paths[branch.path as usize].aimed;
+        let aimed = self.pass_of(&self.paths[branch.path as usize]).aimed;
         // What scatters light that is still to be looked for.
         let (known, left) = if aimed || !is_diffuse {
             (false, None)
@@ -197,7 +199,7 @@ impl PathBlock<'_> {
         let total = mirrored + refracted + scattered;
         let alive = if known { REST * total } else { total };
         let alive = if mortal { alive.min(1.0) } else { 1.0 };
-        let number = self.paths[branch.path as usize].numbers.draw();
+        let number = self.numbers(branch.path).draw();
         if total <= 0.0 || number >= alive {
             return;
         }
