@@ -1,6 +1,7 @@
 //! Axis-aligned boxes.
 
 use etendue_math::Vec3;
+use multiversion::multiversion;
 
 /// An axis-aligned box in f64 \[mm\]. A box with a `lo` above its `hi` is empty.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,6 +148,12 @@ impl Ball {
             .then_some(Self { centre, square })
     }
 
+    /// The ball about a box; None if that has no end.
+    #[must_use]
+    pub fn about(bounds: Bounds) -> Option<Self> {
+        Self::new((bounds.lo + bounds.hi) * 0.5, 0.5 * bounds.sides().length())
+    }
+
     /// Square of its radius \[mm²\].
     #[must_use]
     pub const fn square(&self) -> f64 {
@@ -162,6 +169,21 @@ impl Ball {
         let (along, away) = (to.dot(d), to.dot(to));
         let beside = away - along * along;
         ((along >= 0.0) | (away <= self.square)) & (beside <= self.square + Self::ROUNDING * away)
+    }
+
+    /// Marks those of some rays that meet it, several at a time; others keep their marks.
+    pub fn mark(&self, origin: [&[f64]; 3], direction: [&[f64]; 3], marks: &mut [bool]) {
+        mark(*self, origin, direction, marks);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn mark(ball: Ball, origin: [&[f64]; 3], direction: [&[f64]; 3], marks: &mut [bool]) {
+    let n = marks.len();
+    let [ox, oy, oz] = origin.map(|v| &v[..n]);
+    let [dx, dy, dz] = direction.map(|v| &v[..n]);
+    for i in 0..n {
+        marks[i] |= ball.meets(Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]));
     }
 }
 

@@ -1,5 +1,6 @@
 //! Sources as they are seen: their luminance along a line, and points on them to connect to.
 
+use etendue_geometry::bounds::Ball;
 use etendue_lightfield::field::{LightField, PartField, SightReader, SightReading};
 use etendue_lightfield::leave::Sights;
 use etendue_math::Vec3;
@@ -72,6 +73,8 @@ pub struct LightSampler {
     scale: f64,
     /// For light fields: each part's share of the picks and its cells.
     parts: Vec<PlaceTable>,
+    /// For surfaces and patches: what lines of sight pass by that do not meet them.
+    ball: Option<Ball>,
 }
 
 #[derive(Clone, Debug)]
@@ -92,6 +95,7 @@ impl LightSampler {
             return (!matches!(source.emitter, Emitter::Rays { .. })).then_some(Self {
                 scale: 1.0,
                 parts: vec![],
+                ball: source.ball(),
             });
         };
         let field = sampler.field();
@@ -121,6 +125,7 @@ impl LightSampler {
         Some(Self {
             scale: source.flux / total,
             parts: parts.collect::<Option<Vec<_>>>()?,
+            ball: None,
         })
     }
 
@@ -132,7 +137,10 @@ impl LightSampler {
                     part.part.mark(&source.frame, sights, marks);
                 }
             }
-            Emitter::Surface(_) | Emitter::Patches(_) => marks.fill(true),
+            Emitter::Surface(_) | Emitter::Patches(_) => match self.ball {
+                Some(ball) => ball.mark(sights.origin, sights.direction, marks),
+                None => marks.fill(true),
+            },
             Emitter::Rays { .. } | Emitter::Point(_) | Emitter::Beam(_) => {}
         }
     }

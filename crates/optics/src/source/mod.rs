@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use etendue_geometry::Face;
-use etendue_geometry::bounds::Bounds;
+use etendue_geometry::bounds::{Ball, Bounds};
 use etendue_geometry::shape::Shape;
 use etendue_geometry::shape::sample::AreaSampler;
 use etendue_geometry::{RayBatch, RaySource};
@@ -100,22 +100,32 @@ pub struct Source {
 }
 
 impl Source {
+    /// A ball in the world that holds every point which lines of sight can meet; None if there is none, or another way to tell.
+    #[must_use]
+    pub fn ball(&self) -> Option<Ball> {
+        match &self.emitter {
+            Emitter::Surface(surface) => self.face(surface).ball(),
+            Emitter::Patches(_) => Ball::about(self.bounds()),
+            Emitter::Field(_) | Emitter::Point(_) | Emitter::Beam(_) | Emitter::Rays { .. } => None,
+        }
+    }
+
+    /// The surface of a source as a face.
+    fn face(&self, surface: &SurfaceSource) -> Face {
+        Face {
+            shape: surface.shape().0.clone(),
+            frame: self.frame,
+            trims: Vec::new(),
+            flipped: false,
+        }
+    }
+
     /// A box in the world that holds every start point; not finite for ray sets, which are not looked through for it. Of a
     /// light field it holds the places of its parts.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
-        let face = |shape: Shape| {
-            let (frame, trims) = (self.frame, Vec::new());
-            Face {
-                shape,
-                frame,
-                trims,
-                flipped: false,
-            }
-            .bounds()
-        };
         match &self.emitter {
-            Emitter::Surface(surface) => face(surface.shape().0.clone()),
+            Emitter::Surface(surface) => self.face(surface).bounds(),
             Emitter::Point(_) => Bounds::of([self.frame.origin]).widened(f64::EPSILON * self.frame.origin.length()),
             Emitter::Field(sampler) => {
                 let boxes = sampler.field().parts.iter().map(|part| {
