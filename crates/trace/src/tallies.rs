@@ -28,8 +28,8 @@ impl Tally {
     }
 
     /// Adds the contributions of a batch. Those of one ray to one cell belong together: they are not independent.
-    pub fn add(&mut self, mut contributions: Vec<Contribution>, dealing: &Dealing) {
-        contributions.sort_by_key(|(cell, unit, _)| (*cell, *unit));
+    pub fn add(&mut self, contributions: Vec<Contribution>, dealing: &Dealing) {
+        let contributions = in_order(contributions, self.cells.len());
         for same in contributions.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             let (number, unit, _) = same[0];
             let sum: f64 = same.iter().map(|(_, _, w)| w).sum();
@@ -56,6 +56,45 @@ impl Tally {
             same
         });
     }
+}
+
+/// Bits of a cell's number that contributions are dealt out by at once.
+const DIGIT: u32 = 11;
+
+/// Contributions to so many cells in the order of cells and units; those of the same cell and unit stay in theirs.
+fn in_order(mut contributions: Vec<Contribution>, cells: usize) -> Vec<Contribution> {
+    let key = |(cell, unit, _): &Contribution| (*cell, *unit);
+    let bits = cells.max(2).next_power_of_two().ilog2();
+    let passes = bits.div_ceil(DIGIT);
+    let digit = bits.div_ceil(passes);
+    if contributions.len() < 1 << digit {
+        contributions.sort_by_key(key);
+        return contributions;
+    }
+    // By the cells digit by digit, the last one first: few of one cell are left to be sorted by their units.
+    let mut dealt = contributions.clone();
+    let mut places = vec![0; 1 << digit];
+    for pass in 0..passes {
+        let digit_of = |cell: u32| (cell >> (pass * digit)) as usize & ((1 << digit) - 1);
+        places.fill(0);
+        for (cell, ..) in &contributions {
+            places[digit_of(*cell)] += 1;
+        }
+        let mut before = 0;
+        for place in &mut places {
+            before += std::mem::replace(place, before);
+        }
+        for contribution in &contributions {
+            let place = &mut places[digit_of(contribution.0)];
+            dealt[*place] = *contribution;
+            *place += 1;
+        }
+        std::mem::swap(&mut contributions, &mut dealt);
+    }
+    for of_cell in contributions.chunk_by_mut(|a, b| a.0 == b.0) {
+        of_cell.sort_by_key(key);
+    }
+    contributions
 }
 
 /// What a work unit's copies of rays add to a run.
@@ -218,6 +257,21 @@ mod tests {
     use etendue_sampling::philox::Stream;
 
     use super::*;
+
+    #[test]
+    fn contributions_come_in_the_order_of_cells_and_units_and_stay_in_their_own() {
+        let stream = Stream::new(7, 2);
+        for (number, cells) in [(0, 5), (40, 1), (3000, 2), (3000, 2049), (9000, 200_000)] {
+            let of = |i: u64| {
+                let [a, b, ..] = stream.uniforms(i, 0);
+                ((a * a * f64::from(cells)) as u32, (b * 50.0) as u64, i as f64)
+            };
+            let made: Vec<Contribution> = (0..number).map(of).collect();
+            let mut expected = made.clone();
+            expected.sort_by_key(|(cell, unit, _)| (*cell, *unit));
+            assert_eq!(in_order(made, cells as usize), expected);
+        }
+    }
 
     /// However a run is cut into work units: Σ w² is that of whole units, and none is open at the end.
     #[test]

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use etendue_math::Vec3;
+use etendue_math::trig::turns_of;
 
 use crate::mesh::Mesh;
 
@@ -179,7 +180,8 @@ impl Chart {
                 let last = edges.len() - 2;
                 let row = edges.partition_point(|e| *e <= s).saturating_sub(1).min(last);
                 let [first, around] = rows[row / 4];
-                let column = part(p.y.atan2(p.x) / (2.0 * PI) + 0.5, 4 * around);
+                // From the negative first axis on.
+                let column = part(turns_of(-p.x, -p.y), 4 * around);
                 #[allow(clippy::cast_possible_truncation, reason = "below four")]
                 in_patch(first + column / 4, (row % 4) as u32, column % 4)
             }
