@@ -180,10 +180,7 @@ impl PathBlock<'_> {
         }
         scene.face_set.nearest(&self.shadows, hits);
         for (i, connection) in self.connections.iter().enumerate() {
-            let (o, wavelength) = (
-                self.shadows.origin(i),
-                self.wavelength(connection.path),
-            );
+            let (o, wavelength) = (self.shadows.origin(i), self.wavelength(connection.path));
             let distance = (connection.to - o).length();
             let absorption = self.media.at(scene, connection.stack.top(), wavelength).absorption;
             // What lies within rounding of the end is the surface that the end lies on.
