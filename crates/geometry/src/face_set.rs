@@ -339,4 +339,4 @@ impl One {
 
 #[cfg(test)]
 #[allow(clippy::cast_possible_truncation, reason = "small numbers")]
-mod tests;
+pub(crate) mod tests;

@@ -20,6 +20,7 @@ pub mod mesh;
 pub mod origin_faces;
 mod pass;
 pub mod pass_account;
+pub mod points_on_faces;
 pub mod ray_batch;
 pub mod ray_block;
 pub mod ray_keys;

@@ -35,13 +35,13 @@ fn shapes() -> Vec<Shape> {
     ]
 }
 
-fn point(stream: Stream, i: u64, block: u64) -> Vec3 {
+pub(crate) fn point(stream: Stream, i: u64, block: u64) -> Vec3 {
     let [x, y, z, _] = stream.uniforms(i, block).map(|u| 2.0 * u - 1.0);
     Vec3::new(x, y, z)
 }
 
 /// Faces in a cube of side 2 · `range`, every third of them straight, every seventh trimmed.
-fn faces(count: u64, range: f64, away: f64) -> Vec<Face> {
+pub(crate) fn faces(count: u64, range: f64, away: f64) -> Vec<Face> {
     let (stream, shapes) = (Stream::new(3, 7), shapes());
     let turned = |i: u64| {
         let z = point(stream, i, 1).normalized();

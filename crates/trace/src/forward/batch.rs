@@ -3,6 +3,7 @@
 use etendue_geometry::RayBatch;
 use etendue_geometry::hits::Hits;
 use etendue_geometry::origin_faces::NONE;
+use etendue_geometry::points_on_faces::PointsOnFaces;
 use etendue_geometry::ray_batch::BLOCK;
 use etendue_geometry::surface_points::fill;
 use etendue_math::Vec3;
@@ -53,6 +54,8 @@ struct BatchTrace<'a> {
     sheet_rays: SheetRays,
     scattered_rays: ScatteredRays,
     interface_rays: InterfaceRays,
+    /// Where rays meet interfaces.
+    points: PointsOnFaces,
     /// Fluxes of rays that leave the scene, or are absorbed on a face.
     fluxes: Vec<f64>,
 }
@@ -119,6 +122,7 @@ impl<'a> BatchTrace<'a> {
             sheet_rays: SheetRays::default(),
             scattered_rays: ScatteredRays::default(),
             interface_rays: InterfaceRays::default(),
+            points: PointsOnFaces::default(),
             fluxes: Vec::new(),
         }
     }
@@ -304,12 +308,22 @@ impl<'a> BatchTrace<'a> {
     /// Rays that meet smooth interfaces of solids go on, mirrored or refracted.
     fn cross(&mut self, which: &[u32], now: &RayQueue, hits: &Hits, event: u32, next: &mut RayQueue) {
         self.interface_rays.make_room(which.len());
+        let faces = self.block.scene.face_set.faces();
+        self.points.find(faces, &now.lines, hits, which);
         let mut place = 0;
         for (k, i) in which.iter().enumerate() {
             let (i, block) = (*i as usize, &mut self.block);
             let who = now.who[i];
             let wavelength = block.states[who as usize].wavelength;
-            if let Some(met) = Crossed::new(block.scene, now, hits, i, wavelength, &mut block.media) {
+            if let Some(met) = Crossed::new(
+                block.scene,
+                now,
+                hits,
+                i,
+                self.points.get(k),
+                wavelength,
+                &mut block.media,
+            ) {
                 self.interface_rays.put(place, who, &met, self.numbers[0][k]);
                 place += 1;
             } else {

@@ -3,6 +3,7 @@
 //!
 //! What [`scatter`](crate::scatter) comes to there, to the same bits.
 
+use etendue_geometry::face::SurfacePoint;
 use etendue_geometry::hits::Hits;
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
@@ -33,21 +34,21 @@ pub struct Crossed {
 }
 
 impl Crossed {
-    /// Where ray `i` of a queue meets an interface of a solid by itself; None if the face is hidden there, or the ray goes on as
-    /// if nothing were there, or cannot.
+    /// Where ray `i` of a queue meets an interface of a solid by itself, at a point of it; None if the face is hidden there, or the
+    /// ray goes on as if nothing were there, or cannot.
     #[inline(always)]
     pub fn new(
         scene: &Scene,
         queue: &RayQueue,
         hits: &Hits,
         i: usize,
+        foot: SurfacePoint,
         wavelength: f64,
         media: &mut MediumCache,
     ) -> Option<Self> {
-        let (face, crossing, before) = (hits.face[i], hits.crossing(i), queue.stack[i]);
+        let (face, before) = (hits.face[i], queue.stack[i]);
         let solid = scene.roles[face as usize].solid;
         let d = queue.lines.direction(i);
-        let foot = scene.face_set.faces()[face as usize].surface_point(queue.lines.origin(i), d, &crossing);
         let front = d.dot(foot.normal) < 0.0;
         if front == before.contains(solid) {
             return None;
@@ -58,7 +59,7 @@ impl Crossed {
         let meets = n[0] > 0.0 && n[1] > 0.0 && n[0] != n[1];
         meets.then_some(Self {
             face,
-            part: crossing.part,
+            part: hits.part[i].0,
             point: foot.point,
             d,
             normal: if front { foot.normal } else { -foot.normal },
@@ -193,6 +194,7 @@ mod tests {
 
     use etendue_geometry::Face;
     use etendue_geometry::origin_faces::OriginFaces;
+    use etendue_geometry::points_on_faces::PointsOnFaces;
     use etendue_geometry::shape::{Quadric, Shape};
     use etendue_math::Frame;
     use etendue_optics::bsdf::{Bsdf, Interface};
@@ -274,11 +276,16 @@ mod tests {
         let (mut media, mut others) = (MediumCache::new(&scene), 0);
         let (mut met, mut which) = (InterfaceRays::default(), Vec::new());
         met.make_room(rays as usize);
-        for i in (0..rays as usize).filter(|i| scene.roles.len() > hits.face[*i] as usize) {
+        let those: Vec<u32> = (0..rays)
+            .filter(|i| scene.roles.len() > hits.face[*i as usize] as usize)
+            .collect();
+        let mut points = PointsOnFaces::default();
+        points.find(scene.face_set.faces(), &queue.lines, &hits, &those);
+        for (k, i) in those.iter().map(|i| *i as usize).enumerate() {
             let [number, ..] = stream.uniforms(i as u64, 1);
             // Beyond the critical angle and at grazing incidence the shares are extremes: small numbers look for these.
             let number = if i % 3 == 0 { number * 0.1 } else { number };
-            if let Some(crossed) = Crossed::new(&scene, &queue, &hits, i, 555.0, &mut media) {
+            if let Some(crossed) = Crossed::new(&scene, &queue, &hits, i, points.get(k), 555.0, &mut media) {
                 met.put(which.len(), queue.who[i], &crossed, number);
                 which.push((i, number));
             } else {
