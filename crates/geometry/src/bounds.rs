@@ -171,6 +171,20 @@ impl Ball {
         ((along >= 0.0) | (away <= self.square)) & (beside <= self.square + Self::ROUNDING * away)
     }
 
+    /// The same in single precision; None if it is too far away for that.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "what is lost is in the roundings")]
+    pub fn single(&self) -> Option<SingleBall> {
+        let Vec3 { x, y, z } = self.centre;
+        let size = round_up(x.abs() + y.abs() + z.abs());
+        let radius = round_up(self.square.sqrt());
+        (size + radius < SingleBall::MOST).then_some(SingleBall {
+            centre: [x as f32, y as f32, z as f32],
+            radius,
+            size,
+        })
+    }
+
     /// Marks those of some rays that meet it, several at a time; others keep their marks.
     pub fn mark(&self, origin: [&[f64]; 3], direction: [&[f64]; 3], marks: &mut [bool]) {
         mark(*self, origin, direction, marks);
@@ -184,6 +198,64 @@ fn mark(ball: Ball, origin: [&[f64]; 3], direction: [&[f64]; 3], marks: &mut [bo
     let [dx, dy, dz] = direction.map(|v| &v[..n]);
     for i in 0..n {
         marks[i] |= ball.meets(Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]));
+    }
+}
+
+/// A ball in single precision, for rays in single precision: it may be met by a ray that passes close by, and is met by every one
+/// that meets the ball it was made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SingleBall {
+    centre: [f32; 3],
+    radius: f32,
+    /// Sum of the amounts of the centre's coordinates.
+    size: f32,
+}
+
+/// What is to be known of a ball for rays whose start points have coordinates up to some sum.
+#[derive(Clone, Copy, Debug)]
+pub struct BallOfRays {
+    centre: [f32; 3],
+    radius: f32,
+    square: f32,
+}
+
+impl SingleBall {
+    /// Coordinates up to which numbers of single precision do not overflow \[mm\].
+    pub const MOST: f32 = 1e15;
+
+    /// What roundings make of a distance, as a share of all coordinates together: those of start point and centre, and that of
+    /// their difference.
+    const ROUNDING: f32 = 1e-6;
+
+    /// The ball for rays whose start points have coordinates that add up to so much at most.
+    #[must_use]
+    pub fn of_rays(&self, size: f32) -> BallOfRays {
+        let radius = self.radius + Self::ROUNDING * (self.size + size);
+        BallOfRays {
+            centre: self.centre,
+            radius,
+            square: radius * radius * 1.000_01,
+        }
+    }
+}
+
+impl BallOfRays {
+    /// What roundings of the unit direction, of products and of sums make of the square of a distance, as a share of that to the
+    /// start point: four times what they come to.
+    const ROUNDING: f32 = 4e-6;
+
+    /// Whether the ray from o into the unit direction d may meet the ball before `reach`.
+    #[inline(always)]
+    #[must_use]
+    pub fn meets(&self, o: [f32; 3], d: [f32; 3], reach: f32) -> bool {
+        let to = [self.centre[0] - o[0], self.centre[1] - o[1], self.centre[2] - o[2]];
+        let along = to[0] * d[0] + to[1] * d[1] + to[2] * d[2];
+        let away = to[0] * to[0] + to[1] * to[1] + to[2] * to[2];
+        let beside = away - along * along;
+        // Who is outside and meets the ball has it before itself by more than roundings come to.
+        ((along >= 0.0) | (away <= self.square))
+            & (beside <= self.square + Self::ROUNDING * away)
+            & (along - 2.0 * self.radius <= reach * 1.000_002)
     }
 }
 
@@ -207,6 +279,56 @@ pub fn round_up(v: f64) -> f32 {
 mod tests {
     use super::*;
     use etendue_sampling::philox::Stream;
+
+    #[test]
+    fn rays_that_meet_a_ball_meet_it_in_single_precision_too() {
+        let stream = Stream::new(11, 3);
+        let (mut met, mut near, mut passed) = (0, 0, [0, 0]);
+        for i in 0..200_000 {
+            let [a, b, c, d] = stream.uniforms(i, 0);
+            let direction = |u: f64, v: f64| {
+                let (height, turn) = (2.0 * u - 1.0, std::f64::consts::TAU * v);
+                let wide = (1.0 - height * height).sqrt();
+                Vec3::new(wide * turn.cos(), wide * turn.sin(), height)
+            };
+            // Radii and distances of all sizes, from a source beside the ball to one in another town.
+            let [e, f, g, h] = stream.uniforms(i, 1);
+            let radius = 10.0_f64.powf(8.0 * e - 5.0);
+            let centre = direction(a, b) * 10.0_f64.powf(9.0 * f - 3.0);
+            let away = radius * 10.0_f64.powf(6.0 * g);
+            let o = centre + direction(c, d) * if i % 3 == 0 { radius * g } else { away };
+            let to = direction(h, c);
+            let d = (centre + to * (radius * (0.9 + 0.2 * f)) - o).normalized();
+            let ball = Ball::new(centre, radius).expect("finite");
+            // By the exact equation, roundings aside: the ray passes the centre at `beside`.
+            let (along, line) = ((centre - o).dot(d), centre - o);
+            let beside = (line - d * along).length();
+            let inside = line.length() <= radius;
+            let hits = beside <= radius && (inside || along > 0.0);
+            let enters = if inside {
+                0.0
+            } else {
+                along - (radius * radius - beside * beside).max(0.0).sqrt()
+            };
+            let single = ball.single().expect("near enough");
+            let size = round_up(o.x.abs() + o.y.abs() + o.z.abs());
+            #[allow(clippy::cast_possible_truncation)]
+            let in_single = |v: Vec3| [v.x as f32, v.y as f32, v.z as f32];
+            let found = |reach: f64| single.of_rays(size).meets(in_single(o), in_single(d), round_up(reach));
+            if hits {
+                met += 1;
+                assert!(found(f64::INFINITY) && found(enters * (1.0 + 1e-9)), "{i}");
+            } else if found(f64::INFINITY) {
+                near += 1;
+            }
+            // What lies far behind the reach is left out.
+            if hits && enters > 3.0 * radius && away < 1e4 * radius && size < 1e4 * round_up(radius) {
+                passed[usize::from(found(0.2 * (enters - 2.5 * radius)))] += 1;
+            }
+        }
+        assert!(met > 50_000 && near < 80_000, "{met} {near}");
+        assert!(passed[0] > 10_000 && passed[1] == 0, "{passed:?}");
+    }
 
     #[test]
     fn unions_hold_both_and_areas_are_those_of_cuboids() {

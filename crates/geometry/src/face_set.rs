@@ -83,7 +83,7 @@ impl FaceSet {
                 set.meshes.push(index);
             } else if is_simple(&face.shape) && !trimmed {
                 let ball = if large { None } else { balls[index as usize] };
-                set.simple.push(BoundedFace { index, ball });
+                set.simple.push(BoundedFace::new(index, ball));
             } else {
                 set.others.push(index);
             }
@@ -93,8 +93,7 @@ impl FaceSet {
             set.tree = Bvh::new(&boxes, LEAF).map(|tree| {
                 let bounded = |place: &u32| {
                     let index = inner[*place as usize];
-                    let ball = balls[index as usize];
-                    BoundedFace { index, ball }
+                    BoundedFace::new(index, balls[index as usize])
                 };
                 let inner = tree.leaves().flatten().map(bounded).collect();
                 (Arc::new(tree), inner)

@@ -5,7 +5,7 @@ use std::ops::Range;
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
-use crate::bounds::Ball;
+use crate::bounds::{Ball, SingleBall, round_up};
 use crate::face::Face;
 use crate::hits::Hits;
 use crate::origin_faces::MOST_ORIGIN_FACES;
@@ -16,6 +16,9 @@ use crate::shape::{Outline, Quadric, Shape};
 /// Rays that are tried on all simple faces before the next ones are: what they need stays in the cache of first level.
 const CHUNK: usize = 256;
 
+/// Numbers of single precision in the longest vectors.
+const LANES: usize = 16;
+
 /// A face, and what rules out most rays that miss it.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundedFace {
@@ -23,33 +26,106 @@ pub struct BoundedFace {
     pub index: u32,
     /// A ball around it: only rays that meet it are tried on the face. None: all are.
     pub ball: Option<Ball>,
+    /// The same in single precision.
+    single: Option<SingleBall>,
+}
+
+impl BoundedFace {
+    /// A face and a ball around it.
+    pub fn new(index: u32, ball: Option<Ball>) -> Self {
+        let single = ball.and_then(|ball| ball.single());
+        Self { index, ball, single }
+    }
+}
+
+/// Rays in single precision, for a first look.
+struct SingleLines {
+    origin: [[f32; CHUNK]; 3],
+    direction: [[f32; CHUNK]; 3],
+    /// How far each has to be looked along: what lies behind two crossings changes nothing. Whether this is known.
+    reach: [f32; CHUNK],
+    is_reach_known: bool,
+    /// No sum of the amounts of the coordinates of a start point is larger.
+    size: f32,
+}
+
+impl SingleLines {
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation, reason = "what is lost is in the roundings")]
+    fn fill(&mut self, lines: &Lines<'_>, n: usize) {
+        for (from, to) in lines.origin.into_iter().zip(&mut self.origin) {
+            narrow(from, &mut to[..n]);
+        }
+        for (from, to) in lines.direction.into_iter().zip(&mut self.direction) {
+            narrow(from, &mut to[..n]);
+        }
+        // Side by side, so that several are compared at a time; of what is not finite nothing is known.
+        let more = |size: f64, most: f64| if size <= most { most } else { size };
+        let mut most = [0.0; LANES];
+        let [x, y, z] = lines.origin.map(|axis| axis[..n].chunks(LANES));
+        for ((x, y), z) in x.zip(y).zip(z) {
+            for (((most, x), y), z) in most.iter_mut().zip(x).zip(y).zip(z) {
+                *most = more(x.abs() + y.abs() + z.abs(), *most);
+            }
+        }
+        let most = most.into_iter().fold(0.0, more);
+        self.size = round_up(most);
+        self.is_reach_known = false;
+    }
 }
 
 /// Tries a block of rays on some faces, several rays at a time.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub fn try_simple(faces: &[Face], which: &[BoundedFace], block: &RayBlock, hits: &mut Hits) {
+    let none = [[0.0; CHUNK]; 3];
+    let mut single = SingleLines {
+        origin: none,
+        direction: none,
+        reach: [0.0; CHUNK],
+        is_reach_known: false,
+        size: 0.0,
+    };
+    let any = which.iter().any(|face| face.single.is_some());
     for start in (0..block.len()).step_by(CHUNK) {
         let rays = start..(start + CHUNK).min(block.len());
+        if any {
+            single.fill(&Lines::of(block, &rays), rays.len());
+        }
         for simple in which {
             let face = &faces[simple.index as usize];
             let frame = &face.frame;
             match &face.shape {
                 Shape::Flat(flat) => match flat.outline {
                     Outline::Annulus { inner, outer } => {
-                        sweep(frame, simple, block, hits, &rays, &Annulus { inner, outer });
+                        sweep(
+                            frame,
+                            simple,
+                            (block, &mut single),
+                            hits,
+                            &rays,
+                            &Annulus { inner, outer },
+                        );
                     }
                     Outline::Rectangle { width, height } => {
                         let half = [0.5 * width, 0.5 * height];
-                        sweep(frame, simple, block, hits, &rays, &Rectangle { half });
+                        sweep(frame, simple, (block, &mut single), hits, &rays, &Rectangle { half });
                     }
                     Outline::Whole | Outline::Polygon { .. } => {
-                        sweep(frame, simple, block, hits, &rays, &Annulus::ALL);
+                        sweep(frame, simple, (block, &mut single), hits, &rays, &Annulus::ALL);
                     }
                 },
-                Shape::Quadric(quadric) => sweep(frame, simple, block, hits, &rays, quadric),
+                Shape::Quadric(quadric) => sweep(frame, simple, (block, &mut single), hits, &rays, quadric),
                 Shape::Asphere(_) | Shape::Torus(_) | Shape::Mesh(_) => {}
             }
         }
+    }
+}
+
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, reason = "what is lost is in the roundings")]
+fn narrow(from: &[f64], to: &mut [f32]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from as f32;
     }
 }
 
@@ -86,7 +162,7 @@ impl Simple for Quadric {
 fn sweep(
     frame: &Frame,
     face: &BoundedFace,
-    block: &RayBlock,
+    block: (&RayBlock, &mut SingleLines),
     hits: &mut Hits,
     rays: &Range<usize>,
     shape: &impl Simple,
@@ -103,28 +179,47 @@ fn sweep(
 fn sweep_turned<const TURNED: bool>(
     frame: &Frame,
     face: &BoundedFace,
-    block: &RayBlock,
+    block: (&RayBlock, &mut SingleLines),
     hits: &mut Hits,
     rays: &Range<usize>,
     shape: &impl Simple,
 ) {
+    let (block, single) = block;
     let (lines, mut found) = (Lines::of(block, rays), Nearest::of(hits, rays));
-    let Some(ball) = face.ball else {
+    let Some(ball) = face.single.filter(|_| single.size < SingleBall::MOST) else {
         for i in 0..rays.len() {
             meet::<TURNED>(frame, face.index, &lines, &mut found, i, shape);
         }
+        single.is_reach_known = false;
         return;
     };
+    if !single.is_reach_known {
+        single.is_reach_known = true;
+        narrow(found.second, &mut single.reach[..rays.len()]);
+    }
     let n = rays.len();
     let mut met = [[0_u8; 8]; CHUNK / 8];
     {
-        let [ox, oy, oz] = lines.origin.map(|axis| &axis[..n]);
-        let [dx, dy, dz] = lines.direction.map(|axis| &axis[..n]);
-        let met = &mut met.as_flattened_mut()[..n];
-        for i in 0..n {
-            let (o, d) = (Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]));
-            met[i] = u8::from(ball.meets(o, d));
+        let ball = ball.of_rays(single.size);
+        // In whole vectors: there is room for more rays than there are, and what is there means nothing.
+        let [ox, oy, oz] = single.origin.each_ref().map(|axis| axis.as_chunks::<LANES>().0);
+        let [dx, dy, dz] = single.direction.each_ref().map(|axis| axis.as_chunks::<LANES>().0);
+        let reach = single.reach.as_chunks::<LANES>().0;
+        let met = met.as_flattened_mut();
+        for (group, met) in met
+            .as_chunks_mut::<LANES>()
+            .0
+            .iter_mut()
+            .enumerate()
+            .take(n.div_ceil(LANES))
+        {
+            let (ox, oy, oz, reach) = (&ox[group], &oy[group], &oz[group], &reach[group]);
+            let (dx, dy, dz) = (&dx[group], &dy[group], &dz[group]);
+            for i in 0..LANES {
+                met[i] = u8::from(ball.meets([ox[i], oy[i], oz[i]], [dx[i], dy[i], dz[i]], reach[i]));
+            }
         }
+        met[n..].fill(0);
     }
     for (word, first) in met.iter().zip((0..n).step_by(8)) {
         let mut word = u64::from_le_bytes(*word);
@@ -132,6 +227,10 @@ fn sweep_turned<const TURNED: bool>(
             let i = first + (word.trailing_zeros() >> 3) as usize;
             word &= word.wrapping_sub(1);
             meet::<TURNED>(frame, face.index, &lines, &mut found, i, shape);
+            #[allow(clippy::cast_possible_truncation, reason = "within the roundings")]
+            {
+                single.reach[i] = found.second[i] as f32;
+            }
         }
     }
 }
