@@ -64,18 +64,21 @@ def built(site: Path) -> dict[str, Page]:
     return found
 
 
+@pytest.mark.slow
 def test_every_public_name_has_an_entry(built: dict[str, Page]) -> None:
     home_of = part_of_site("reference").home_of
     anchors = [anchor for name, page in built.items() if name.startswith("reference/") for anchor in page.anchors]
     assert [name for name in et.__all__ if anchors.count(home_of(name)) != 1] == []
 
 
+@pytest.mark.slow
 def test_the_page_of_public_names_leads_to_the_entries(built: dict[str, Page]) -> None:
     home_of = part_of_site("reference").home_of
     led_to = {link.rpartition("#")[2] for link in built["api.html"].links}
     assert {home_of(name) for name in et.__all__} <= led_to
 
 
+@pytest.mark.slow
 def test_every_page_of_the_project_is_in_the_navigation(built: dict[str, Page]) -> None:
     page_at = part_of_site("hooks").page_at
     listed = {normpath(link.partition("#")[0]) for link in built["index.html"].links}
@@ -83,6 +86,7 @@ def test_every_page_of_the_project_is_in_the_navigation(built: dict[str, Page]) 
     assert [name for name, page in wanted.items() if page not in listed] == []
 
 
+@pytest.mark.slow
 def test_links_lead_to_pages_and_anchors(site: Path, built: dict[str, Page]) -> None:
     followed, broken = 0, []
     for name, page in built.items():
@@ -103,6 +107,7 @@ def test_links_lead_to_pages_and_anchors(site: Path, built: dict[str, Page]) -> 
     assert broken == []
 
 
+@pytest.mark.slow
 def test_nothing_is_loaded_from_another_host(site: Path, built: dict[str, Page]) -> None:
     fetched = [(name, address) for name, page in built.items() for address in page.fetched]
     assert len(fetched) > 5 * len(built)
@@ -112,6 +117,7 @@ def test_nothing_is_loaded_from_another_host(site: Path, built: dict[str, Page])
     assert [pair for pair in fetched if is_foreign(pair[1])] == []
 
 
+@pytest.mark.slow
 def test_equations_are_drawn_as_they_are_numbered(site: Path) -> None:
     text = prose(ROOT / "docs" / "theory.md")
     html = (site / "theory.html").read_text(encoding="utf-8")

@@ -1,8 +1,8 @@
 """A pytest plugin that keeps the marker ``slow`` honest: it lists tests without it that take long, and tests with it that do
 not; with ``--strict-times`` these fail the run.
 
-What counts is the processor time of all cases of a test together, with all threads and the processes that they started,
-but without fixtures; in seconds of the machine that CI has, by a fixed piece of work. On a machine that others share, the
+What counts is the processor time of all cases of a test together, with all threads and the processes that they started; of
+fixtures, that of those which tests with the marker ask for, and it counts for all of these in their file; in seconds of the machine that CI has, by a fixed piece of work. On a machine that others share, the
 time of one test was seen to differ by a factor of three between two runs: that is why not every run is strict. Examples in
 docstrings cannot be marked; `SLOW_EXAMPLES` names those that are slow.
 """
@@ -63,6 +63,8 @@ SLOW_EXAMPLES: frozenset[str] = frozenset(
 
 PROPERTY = "processor time [s]"
 
+FIXTURES = "processor time of fixtures [s]"
+
 
 def processor_time() -> float:
     """Seconds that this process and the ones that it waited for have worked."""
@@ -114,21 +116,27 @@ class TimeBudget:
         self.strict = strict
         self.seconds: defaultdict[str, float] = defaultdict(float)
         self.slow: dict[str, bool] = {}
+        self.fixtures: defaultdict[str, float] = defaultdict(float)
         self.wrong: list[str] = []
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Add up the cases of a test. One that did not pass says nothing."""
         if report.when == "call" and report.passed:
             test = report.nodeid.partition("@")[0].partition("[")[0]
-            self.seconds[test] += float(dict(report.user_properties)[PROPERTY])
+            times = dict(report.user_properties)
+            self.seconds[test] += float(times[PROPERTY])
             self.slow[test] = "slow" in report.keywords
+            if self.slow[test]:
+                self.fixtures[test.partition("::")[0]] += float(times[FIXTURES])
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Judge."""
         scale = slowness()
         whole = self.whole and not session.testsfailed
-        for test, seconds in sorted(self.seconds.items()):
-            if wrong := complaint(seconds / scale, slow=self.slow[test], whole=whole):
+        for test, own in sorted(self.seconds.items()):
+            slow = self.slow[test]
+            seconds = own + (self.fixtures[test.partition("::")[0]] if slow else 0.0)
+            if wrong := complaint(seconds / scale, slow=slow, whole=whole):
                 self.wrong.append(f"{test} {wrong}")
         if self.strict and self.wrong and session.exitstatus == pytest.ExitCode.OK:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
@@ -160,11 +168,21 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("slow")
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
-    """Measure a test."""
+def measured(item: pytest.Item, name: str) -> Iterator[None]:
     start = processor_time()
     try:
         yield
     finally:
-        item.user_properties.append((PROPERTY, processor_time() - start))
+        item.user_properties.append((name, processor_time() - start))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
+    """Measure the fixtures that are made for a test."""
+    yield from measured(item, FIXTURES)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Measure a test."""
+    yield from measured(item, PROPERTY)

@@ -61,7 +61,8 @@ class Visitor:
 
 def serving(exhibit: Exhibit) -> Iterator[Visitor]:
     with ViewerServer(exhibit) as server:
-        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        # A server looks now and then whether it should stop: tests do not wait for half a second.
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
         thread.start()
         yield Visitor(server)
         server.shutdown()
