@@ -64,9 +64,9 @@ struct Starts {
 }
 
 impl Plan {
-    /// None if a part has no grids, or a cell no number of 32 bits.
+    /// None if there is no part, one has no grids, or a cell has no number of 32 bits.
     fn starts(&self) -> Option<Starts> {
-        if self.grids.len() != self.parts.len() {
+        if self.grids.len() != self.parts.len() || self.parts.is_empty() {
             return None;
         }
         let (mut parts, mut total) = (Vec::with_capacity(self.parts.len()), [0_u32; 3]);
@@ -165,55 +165,141 @@ struct Found {
 struct Scratch {
     at: Coordinates,
     /// Cells along each coordinate, of 2^FINEST.
-    cells: [Vec<u32>; 4],
+    finest: [Vec<u32>; 4],
+    /// The cell of each ray in each of the three grids, and whether it has one.
+    cells: [Vec<u32>; 3],
+    counts: Vec<bool>,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
         Self {
             at: Coordinates::default(),
+            finest: std::array::from_fn(|_| vec![0; BLOCK]),
             cells: std::array::from_fn(|_| vec![0; BLOCK]),
+            counts: vec![false; BLOCK],
         }
     }
 }
 
 impl Found {
+    /// Nothing yet, with room for so many rays.
+    fn with_room(rays: usize) -> Self {
+        Self {
+            cells: std::array::from_fn(|_| Vec::with_capacity(rays)),
+            weights: Vec::with_capacity(rays),
+            ..Self::default()
+        }
+    }
+
     fn collect(&mut self, plan: &Plan, starts: &Starts, first: u64, batch: &RayBatch, scratch: &mut Scratch) {
         self.tally.add_block(batch);
-        let chances = chances(plan.seed, first, batch.len);
-        let Scratch { at, cells } = scratch;
-        carry(&plan.parts, batch, at);
-        finest_cells(&at.values, batch.len, cells);
-        let [s1, s2, a, b] = &at.values;
-        for list in &mut self.cells {
-            list.reserve(batch.len);
+        let n = batch.len;
+        let chances = chances(plan.seed, first, n);
+        carry(&plan.parts, batch, &mut scratch.at);
+        let Scratch {
+            at,
+            finest,
+            cells,
+            counts,
+        } = scratch;
+        finest_cells(&at.values, n, finest);
+        let (first_grids, others) = (plan.grids[0], &plan.grids[1..]);
+        if others.iter().all(|grids| *grids == first_grids) {
+            cells_of_all(first_grids, finest, n, cells);
+        } else {
+            cells_of_each(&plan.grids, &at.part[..n], finest, cells);
         }
-        for i in 0..batch.len {
-            let weight = batch.flux[i];
-            if weight <= 0.0 {
-                continue;
+        fold(plan, starts, (&chances, &at.part[..n]), cells);
+        let all = count_all(&batch.flux[..n], &at.part[..n], &mut counts[..n]);
+        self.leave_out(batch, &at.part[..n], all);
+        for (list, cells) in self.cells.iter_mut().zip(cells) {
+            if all {
+                list.extend_from_slice(&cells[..n]);
+            } else {
+                list.extend(chosen(&cells[..n], &counts[..n]));
             }
-            let part = at.part[i];
-            if part == Coordinates::NONE {
-                self.unmet_rays += 1;
-                self.unmet_flux += weight;
-                continue;
-            }
-            let fold = u32::from(u32::from(chances[i]) < plan.held_out);
-            let finest = cells.each_ref().map(|c| c[i]);
-            let own = cells_in(plan.grids[part as usize], finest);
-            for (k, list) in self.cells.iter_mut().enumerate() {
-                list.push(fold * starts.total[k] + starts.parts[part as usize][k] + own[k]);
-            }
-            self.weights.push(weight);
-            if u32::from(chances[i]) < plan.kept {
-                let coordinates = [s1[i], s2[i], a[i], b[i]];
+        }
+        if all {
+            self.weights.extend_from_slice(&batch.flux[..n]);
+        } else {
+            self.weights.extend(chosen(&batch.flux[..n], &counts[..n]));
+        }
+        for i in 0..n {
+            if u32::from(chances[i]) < plan.kept && counts[i] {
                 self.kept.push(HeldOutRay {
-                    part,
-                    coordinates,
-                    weight,
+                    part: at.part[i],
+                    coordinates: at.values.each_ref().map(|values| values[i]),
+                    weight: batch.flux[i],
                 });
             }
+        }
+    }
+
+    /// Notes the rays of a block that have flux and meet no part; `none`: there are none.
+    fn leave_out(&mut self, batch: &RayBatch, part: &[u32], none: bool) {
+        for (weight, part) in batch.flux.iter().zip(part).filter(|_| !none) {
+            if *weight > 0.0 && *part == Coordinates::NONE {
+                self.unmet_rays += 1;
+                self.unmet_flux += weight;
+            }
+        }
+    }
+}
+
+/// Those of some values that count.
+fn chosen<'a, T: Copy>(values: &'a [T], counts: &'a [bool]) -> impl Iterator<Item = T> + 'a {
+    values
+        .iter()
+        .zip(counts)
+        .filter_map(|(value, counts)| counts.then_some(*value))
+}
+
+/// Whether each ray has flux and meets a part; and whether all do.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn count_all(flux: &[f64], part: &[u32], counts: &mut [bool]) -> bool {
+    let mut all = true;
+    for ((counts, weight), part) in counts.iter_mut().zip(flux).zip(part) {
+        *counts = (*weight > 0.0) & (*part != Coordinates::NONE);
+        all &= *counts;
+    }
+    all
+}
+
+/// The cells in the grids of all parts together, both folds of them: those within their own grids are there already.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn fold(plan: &Plan, starts: &Starts, (chances, part): (&[u16], &[u32]), cells: &mut [Vec<u32>; 3]) {
+    for (k, cells) in cells.iter_mut().enumerate() {
+        let total = starts.total[k];
+        for (cell, chance) in cells.iter_mut().zip(chances) {
+            *cell += if u32::from(*chance) < plan.held_out { total } else { 0 };
+        }
+        // Those of the first part begin with 0.
+        if starts.parts.len() > 1 {
+            for (cell, part) in cells.iter_mut().zip(part) {
+                *cell += starts.parts.get(*part as usize).map_or(0, |starts| starts[k]);
+            }
+        }
+    }
+}
+
+/// The cells of the rays of a block in grids that are the same for all parts.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn cells_of_all(grids: PartGrids, finest: &[Vec<u32>; 4], len: usize, out: &mut [Vec<u32>; 3]) {
+    let [s1, s2, a, b] = finest.each_ref().map(|list| &list[..len]);
+    let [grid, space, direction] = out.each_mut().map(|list| &mut list[..len]);
+    for i in 0..len {
+        [grid[i], space[i], direction[i]] = cells_in(grids, [s1[i], s2[i], a[i], b[i]]);
+    }
+}
+
+/// The same where parts have grids of their own; any cell for rays that meet none.
+fn cells_of_each(grids: &[PartGrids], part: &[u32], finest: &[Vec<u32>; 4], out: &mut [Vec<u32>; 3]) {
+    for (i, part) in part.iter().enumerate() {
+        let own = grids.get(*part as usize).copied().unwrap_or(grids[0]);
+        let found = cells_in(own, finest.each_ref().map(|list| list[i]));
+        for (list, cell) in out.iter_mut().zip(found) {
+            list[i] = cell;
         }
     }
 }
@@ -221,17 +307,15 @@ impl Found {
 /// The cells of a block's coordinates, each in the finest grid.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn finest_cells(at: &[Vec<f64>; 4], len: usize, out: &mut [Vec<u32>; 4]) {
-    let cells = f64::from(FINEST).exp2();
     for (values, numbers) in at.iter().zip(out) {
-        let (values, numbers) = (&values[..len], &mut numbers[..len]);
-        for i in 0..len {
-            numbers[i] = cell(values[i], cells);
+        for (value, number) in values[..len].iter().zip(numbers) {
+            *number = cell(*value);
         }
     }
 }
 
 /// The cells of a ray in the three grids of its part.
-#[inline]
+#[inline(always)]
 fn cells_in(grids: PartGrids, finest: [u32; 4]) -> [u32; 3] {
     let joined = |axes: std::ops::Range<usize>, depths: [u32; 4]| {
         axes.fold(0_u32, |c, k| c << depths[k] | finest[k] >> (FINEST - depths[k]))
@@ -246,14 +330,13 @@ fn cells_in(grids: PartGrids, finest: [u32; 4]) -> [u32; 3] {
 
 /// The cell of a coordinate from 0 to 1, both included; any cell if it is none.
 #[inline(always)]
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "0 to 1 times at most 2^16"
-)]
-fn cell(value: f64, cells: f64) -> u32 {
-    // By way of a signed number: there are instructions for many of those at once.
-    (value * cells).min(cells - 1.0) as i32 as u32
+#[allow(clippy::cast_possible_truncation, reason = "the low bits")]
+fn cell(value: f64) -> u32 {
+    const LAST: f64 = 1.0 - 0.5 / CELLS;
+    const CELLS: f64 = (1 << FINEST) as f64;
+    // Of a number from 1 to 2 the highest bits behind the point are the cell: what a conversion does more takes longer.
+    let inside = if value < LAST { value } else { LAST };
+    ((inside + 1.0).to_bits() >> (52 - FINEST)) as u32 & ((1 << FINEST) - 1)
 }
 
 /// A number from 0 to 65 535 for each ray of a block: sixteen from one call of the generator.
@@ -296,7 +379,8 @@ pub fn count(
     };
     let mut equal = true;
     let work = |range: Range<u64>| {
-        let mut found = Found::default();
+        #[allow(clippy::cast_possible_truncation, reason = "a batch is short")]
+        let mut found = Found::with_room((range.end - range.start) as usize);
         let mut scratch = Scratch::default();
         source.for_each_block(range, |first, batch| {
             found.collect(plan, &starts, first, batch, &mut scratch);
@@ -378,6 +462,23 @@ mod tests {
     fn run(bytes: &[u8], threads: usize) -> Counts {
         let table = RayTable::new(bytes, LAYOUT).expect("valid");
         count(&table, &plan(), threads, |_| ControlFlow::Continue(())).expect("countable")
+    }
+
+    #[test]
+    fn a_coordinate_lies_in_the_cell_whose_lower_edge_it_may_be_and_one_in_the_last() {
+        let all = 1 << FINEST;
+        for k in 0..all {
+            let edge = f64::from(k) / f64::from(all);
+            assert_eq!((cell(edge), cell(edge + 1e-12)), (k, k));
+            assert_eq!(cell(edge + 0.999_999 / f64::from(all)), k);
+        }
+        assert_eq!((cell(1.0), cell(1.0 - f64::EPSILON)), (all - 1, all - 1));
+        assert!(
+            [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -3.7]
+                .map(cell)
+                .iter()
+                .all(|c| *c < all)
+        );
     }
 
     #[test]
