@@ -1,10 +1,11 @@
 """A pytest plugin that keeps the marker ``slow`` honest: it lists tests without it that take long, and tests with it that do
 not; with ``--strict-times`` these fail the run.
 
-What counts is the processor time of all cases of a test together, with all threads and the processes that they started; of
-fixtures, that of those which tests with the marker ask for, and it counts for all of these in their file; in seconds of the machine that CI has, by a fixed piece of work. On a machine that others share, the
-time of one test was seen to differ by a factor of three between two runs: that is why not every run is strict. Examples in
-docstrings cannot be marked; `SLOW_EXAMPLES` names those that are slow.
+What counts is the processor time of all cases of a test together, with all threads and the processes that they started;
+of fixtures, that of those which tests with the marker ask for, and it counts for all of these in their file. Seconds
+are those of the machine that CI has, by a fixed piece of work. On a machine that others share, the time of one test was
+seen to differ by a factor of three between two runs: that is why not every run is strict. Examples in docstrings cannot
+be marked; `SLOW_EXAMPLES` names those that are slow.
 """
 
 from __future__ import annotations

@@ -261,7 +261,8 @@ mod tests {
     #[test]
     fn contributions_come_in_the_order_of_cells_and_units_and_stay_in_their_own() {
         let stream = Stream::new(7, 2);
-        for (number, cells) in [(0, 5), (40, 1), (3000, 2), (3000, 2049), (9000, 200_000)] {
+        for (number, cells) in [(0, 5), (40, 1), (3000, 2), (3000, 2049), (9000, 200_000_u32)] {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small numbers")]
             let of = |i: u64| {
                 let [a, b, ..] = stream.uniforms(i, 0);
                 ((a * a * f64::from(cells)) as u32, (b * 50.0) as u64, i as f64)
