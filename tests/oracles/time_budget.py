@@ -56,7 +56,6 @@ SLOW_EXAMPLES: frozenset[str] = frozenset(
         "etendue.plot.near_field_picture.plot_near_field",
         "etendue.plot.report_page.plot_report",
         "etendue.plot.report_page.report_html",
-        "etendue.plot.threshold_picture.plot_threshold_sweep",
         "etendue.scatter.models.rough.RoughInterface",
     }
 )

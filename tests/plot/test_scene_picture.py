@@ -163,7 +163,6 @@ def test_drawings_of_small_and_large_scenes_are_alike(factor: float) -> None:
     plot_layout(there)
 
 
-@pytest.mark.slow
 def test_the_window_is_what_is_shown() -> None:
     layout = lay_out_scene(Scene(**LAMP), "y=0", window=(-4, 4, -1, 4))
     assert layout.views[0].window == (-4, 4, -1, 4)

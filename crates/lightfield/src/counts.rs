@@ -328,7 +328,7 @@ fn cells_in(grids: PartGrids, finest: [u32; 4]) -> [u32; 3] {
     ]
 }
 
-/// The cell of a coordinate from 0 to 1, both included; any cell if it is none.
+/// The cell of a coordinate from 0 to 1, both included; the first or the last one if it lies beyond, any if it is no number.
 #[inline(always)]
 #[allow(clippy::cast_possible_truncation, reason = "the low bits")]
 fn cell(value: f64) -> u32 {
@@ -336,6 +336,7 @@ fn cell(value: f64) -> u32 {
     const CELLS: f64 = (1 << FINEST) as f64;
     // Of a number from 1 to 2 the highest bits behind the point are the cell: what a conversion does more takes longer.
     let inside = if value < LAST { value } else { LAST };
+    let inside = if inside > 0.0 { inside } else { 0.0 };
     ((inside + 1.0).to_bits() >> (52 - FINEST)) as u32 & ((1 << FINEST) - 1)
 }
 
