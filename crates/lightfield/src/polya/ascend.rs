@@ -146,6 +146,9 @@ fn ascend_tiles(
             let (Some(of_tile), Some(side_by_side)) = (level.in_tile, level.shared) else {
                 continue;
             };
+            if problem.is_stopped() {
+                break;
+            }
             let to = to[side_by_side.range()].chunks_exact_mut(of_tile.boxes);
             for (to, from) in to.zip(edges.chunks_exact(of_edges * kinds)) {
                 to.copy_from_slice(&from[begin..begin + of_tile.boxes]);

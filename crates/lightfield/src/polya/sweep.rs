@@ -38,6 +38,11 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Whether somebody wants the rest to be left out.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
+
     /// Whether halves of any box are equal under the base measure and points are counted: then ln Γ is needed per box and not per
     /// split.
     pub fn has_equal_halves(&self) -> bool {
@@ -107,7 +112,7 @@ pub(super) fn each<T: Send>(
     work: impl Fn(&mut Scratch, T) + Sync + Send,
 ) {
     let work = |scratch: &mut Scratch, task| {
-        if !problem.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+        if !problem.is_stopped() {
             work(scratch, task);
         }
     };
