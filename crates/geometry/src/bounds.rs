@@ -331,6 +331,19 @@ mod tests {
     }
 
     #[test]
+    fn the_ball_about_a_box_holds_its_corners_and_a_box_without_end_has_none() {
+        let bounds = Bounds::of([Vec3::new(-1.0, 2.0, 30.0), Vec3::new(4.0, 2.5, 31.0)]);
+        let ball = Ball::about(bounds).expect("finite");
+        for corner in bounds.corners() {
+            let to = (corner - ball.centre).length();
+            assert!(to * to <= ball.square && ball.square < 1.001 * to * to);
+        }
+        let whole = [f64::NEG_INFINITY, f64::INFINITY].map(|v| Vec3::new(v, v, v));
+        assert_eq!(Ball::about(Bounds::of(whole)), None);
+        assert_eq!(Ball::about(Bounds::EMPTY), None);
+    }
+
+    #[test]
     fn unions_hold_both_and_areas_are_those_of_cuboids() {
         let a = Bounds::of([Vec3::new(0.0, 0.0, 0.0), Vec3::new(1.0, 2.0, 3.0)]);
         assert_eq!(a.area(), 22.0);

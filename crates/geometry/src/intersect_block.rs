@@ -42,10 +42,11 @@ impl BoundedFace {
 struct SingleLines {
     origin: [[f32; CHUNK]; 3],
     direction: [[f32; CHUNK]; 3],
-    /// How far each has to be looked along: what lies behind two crossings changes nothing. Whether this is known.
+    /// How far each has to be looked along \[mm\]: what lies behind two crossings changes nothing.
     reach: [f32; CHUNK],
+    /// Whether that is up to date.
     is_reach_known: bool,
-    /// No sum of the amounts of the coordinates of a start point is larger.
+    /// No sum of the amounts of the coordinates of a start point is larger \[mm\].
     size: f32,
 }
 

@@ -9,7 +9,7 @@ use crate::face::{Face, SurfacePoint};
 use crate::hits::Hits;
 use crate::ray_block::RayBlock;
 use crate::shape::{Quadric, Shape};
-use crate::surface_points::Vectors;
+use crate::surface_points::{Settled, Vectors};
 
 /// Rays that are worked on together: their faces stay in the cache of first level.
 const CHUNK: usize = 128;
@@ -157,9 +157,9 @@ fn settle<const TURNED: bool>(some: &Chunk, points: [&mut [f64]; 3], normals: [&
         };
         let (o, d) = (vector(&some.origin, k), vector(&some.direction, k));
         let (p, normal) = if TURNED {
-            let (p, normal) = quadric.settle(frame.point_to_local(o) + frame.direction_to_local(d) * some.t[k]);
-            (frame.point_to_world(p), frame.direction_to_world(normal))
+            quadric.surface_point(&frame, o, d, some.t[k])
         } else {
+            // The same along the axes of the world.
             let (p, normal) = quadric.settle((o - frame.origin) + d * some.t[k]);
             (frame.origin + p, normal)
         };

@@ -91,7 +91,7 @@ fn surface_points_in_planes(
 }
 
 /// A surface whose points are settled by its equation.
-trait Settled {
+pub(crate) trait Settled {
     /// The point of the surface next to o + t d, and the normal there; everything in the world.
     fn surface_point(&self, frame: &Frame, o: Vec3, d: Vec3, t: f64) -> (Vec3, Vec3);
 }

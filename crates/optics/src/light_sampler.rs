@@ -339,3 +339,81 @@ impl PlaceTable {
         self.share * self.shares[at(place[0], n1) * n2 + at(place[1], n2)] * (n1 * n2) as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use etendue_geometry::shape::{Flat, Outline, Quadric, Shape, Torus};
+    use etendue_math::Frame;
+    use etendue_sampling::philox::Stream;
+
+    use super::*;
+    use crate::source::surface::{Pattern, SurfaceSource, about};
+
+    #[test]
+    fn lines_that_see_a_surface_are_marked_and_most_others_are_not() {
+        let quadric = |[r2, z2, z1, z0]: [f64; 4], z: [f64; 2]| {
+            let r = [0.0, f64::INFINITY];
+            Shape::Quadric(Quadric { r2, z2, z1, z0, z, r })
+        };
+        let outline = |outline| Shape::Flat(Flat { outline });
+        let shapes = [
+            outline(Outline::Annulus { inner: 0.0, outer: 2.5 }),
+            outline(Outline::Rectangle {
+                width: 4.0,
+                height: 0.5,
+            }),
+            quadric([1.0, 1.0, 0.0, -4.0], [-2.0, 2.0]),
+            quadric([1.0, 0.0, 0.0, -1.0], [0.0, 3.0]),
+            Shape::Torus(Torus { major: 2.0, minor: 0.4 }),
+        ];
+        let frame = Frame {
+            origin: Vec3::new(-3.0, 2.0, 1.0),
+            x: Vec3::new(0.0, 0.6, 0.8),
+            y: Vec3::new(1.0, 0.0, 0.0),
+            z: Vec3::new(0.0, 0.8, -0.6),
+        };
+        let stream = Stream::new(3, 8);
+        let n = 20_000_usize;
+        for shape in shapes {
+            let surface = SurfaceSource::new(shape.clone(), false, Pattern::CosinePower(1.0)).expect("sound");
+            let source = Source {
+                emitter: Emitter::Surface(surface),
+                frame,
+                flux: 2.0,
+                spectrum: vec![(555.0, 1.0)],
+            };
+            let sampler = LightSampler::new(&source).expect("can be seen");
+            let (mut origin, mut direction): ([Vec<f64>; 3], [Vec<f64>; 3]) = Default::default();
+            for i in 0..n as u64 {
+                let [a, b, c, d] = stream.uniforms(i, 0);
+                let z = Vec3::new(0.0, 0.0, 1.0);
+                let o = frame.origin + about(z, 2.0 * a - 1.0, b) * (20.0 * c);
+                let k = about(z, 2.0 * d - 1.0, stream.uniforms(i, 1)[0]);
+                for (list, x) in origin.iter_mut().zip([o.x, o.y, o.z]) {
+                    list.push(x);
+                }
+                for (list, x) in direction.iter_mut().zip([k.x, k.y, k.z]) {
+                    list.push(x);
+                }
+            }
+            let reach = vec![f64::INFINITY; n];
+            let sights = Sights {
+                origin: origin.each_ref().map(Vec::as_slice),
+                direction: direction.each_ref().map(Vec::as_slice),
+                reach: &reach,
+            };
+            let mut marks = vec![false; n];
+            sampler.mark(&source, sights, &mut marks);
+            let mut seen = 0;
+            for (i, mark) in marks.iter().enumerate() {
+                let (o, d) = sights.line(i);
+                sampler.along(&source, o, d, reach[i], |_| {
+                    seen += 1;
+                    assert!(*mark, "{shape:?}: line {i}");
+                });
+            }
+            let marked = marks.iter().filter(|mark| **mark).count();
+            assert!(seen > 100 && marked < n / 2, "{shape:?}: {seen} {marked}");
+        }
+    }
+}

@@ -63,27 +63,16 @@ impl PartField {
     /// The ratio and its standard deviation under the tents over a point.
     #[inline(always)]
     pub(super) fn ratio_under(&self, tents: &[Tent; 4]) -> [f64; 2] {
+        let weights = tents.map(|t| t.weights);
         if self.cells[3] == 1 {
-            return weighed(&self.corners(tents.map(|t| t.cells)), tents.map(|t| t.weights));
+            let corners = self.corners(tents.map(|t| t.cells));
+            return weighed(|[i, j, k]| corners[i][j][k], weights);
         }
-        // What `weighed` comes to, each pair of cells in one go from the table.
+        // Each pair of cells in one go from the table.
         let [_, n2, n3, n4] = self.cells;
-        let values = self.ratio.as_flattened();
-        let [x, y, u, v] = tents;
-        let mut sums = [0.0; 4];
-        for i in 0..2 {
-            for j in 0..2 {
-                for k in 0..2 {
-                    let cell = ((x.cells[i] * n2 + y.cells[j]) * n3 + u.cells[k]) * n4 + v.cells[0];
-                    let pair: [f32; 4] = next_to(values, 2 * cell);
-                    let weight = x.weights[i] * y.weights[j] * u.weights[k];
-                    for (sum, value) in sums.iter_mut().zip(pair) {
-                        *sum += weight * f64::from(value);
-                    }
-                }
-            }
-        }
-        [0, 1].map(|k| sums[k] * v.weights[0] + sums[k + 2] * v.weights[1])
+        let (values, [x, y, u, v]) = (self.ratio.as_flattened(), tents.map(|t| t.cells));
+        let pair = |[i, j, k]: [usize; 3]| next_to(values, 2 * (((x[i] * n2 + y[j]) * n3 + u[k]) * n4 + v[0]));
+        weighed(pair, weights)
     }
 
     /// Ratio and deviation of the cells of tents. Along the last axis the two cells lie beside one another.
@@ -118,16 +107,17 @@ pub(super) fn joined(level: f64, ratio: [f64; 2], factors: [f64; 2], errors: [f6
 /// Ratio and deviation, then the same of the next cell along the last axis: for either cell of the first three axes.
 pub(super) type Corners = [[[[f32; 4]; 2]; 2]; 2];
 
-/// The sum of corners with the weights of their tents. Cells side by side err together, so that their deviations add up.
+/// The sum of corners, by the cell of the first three axes that each belongs to, with the weights of their tents. Cells side by
+/// side err together, so that their deviations add up.
 #[inline(always)]
-pub(super) fn weighed(corners: &Corners, [x, y, u, v]: [[f64; 2]; 4]) -> [f64; 2] {
+pub(super) fn weighed(corner: impl Fn([usize; 3]) -> [f32; 4], [x, y, u, v]: [[f64; 2]; 4]) -> [f64; 2] {
     let mut sums = [0.0; 4];
-    for (x, corners) in x.into_iter().zip(corners) {
-        for (y, corners) in y.into_iter().zip(corners) {
-            for (u, pair) in u.into_iter().zip(corners) {
+    for (i, x) in x.into_iter().enumerate() {
+        for (j, y) in y.into_iter().enumerate() {
+            for (k, u) in u.into_iter().enumerate() {
                 let weight = x * y * u;
-                for (sum, value) in sums.iter_mut().zip(pair) {
-                    *sum += weight * f64::from(*value);
+                for (sum, value) in sums.iter_mut().zip(corner([i, j, k])) {
+                    *sum += weight * f64::from(value);
                 }
             }
         }

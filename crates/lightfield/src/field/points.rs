@@ -119,7 +119,8 @@ fn read_some(scratch: &mut Scratch, part: &PartField, [s1, s2, a, b]: [&[f64]; 4
             let corners = part.corners([x, y, u, v]);
             let [x, y, u, v] = tents.each_ref().map(|t| t.weights(some.clone()));
             for (i, (ratio, deviation)) in ratio.iter_mut().zip(deviation).enumerate() {
-                [*ratio, *deviation] = weighed(&corners, [x[i], y[i], u[i], v[i]].map(|w| [1.0 - w, w]));
+                let weights = [x[i], y[i], u[i], v[i]].map(|w| [1.0 - w, w]);
+                [*ratio, *deviation] = weighed(|[i, j, k]| corners[i][j][k], weights);
             }
         } else {
             for (i, (ratio, deviation)) in some.zip(ratio.iter_mut().zip(deviation)) {
