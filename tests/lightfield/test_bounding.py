@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from etendue.lightfield.selection.bounding import ball_centre, cylinder_of_lines, near_rays, start_centre
+from etendue.lightfield.selection.bounding import (
+    MISSED,
+    ball_centre,
+    box_of_lines,
+    cylinder_of_lines,
+    near_rays,
+    start_centre,
+)
+from etendue.lightfield.surfaces import Box
 from oracles.bodies import Block, Body, Globe, Rod
 from scipy.optimize import minimize
 
@@ -108,3 +116,73 @@ def test_a_cylinder_of_lines_is_the_rod(start: tuple[float, float, float]) -> No
 def test_lines_along_z_have_no_cylinder() -> None:
     place = np.random.default_rng(5).uniform(-1, 1, (500, 3))
     assert cylinder_of_lines(place, np.tile([0.0, 0.0, 1.0], (500, 1)), np.zeros(3), 1) is None
+
+
+def box_cost(faces: Array, position: Array, direction: Array) -> float:
+    """ln of the area of a box, and of the lines those that its closed form says miss it."""
+    block = Block(middle=tuple(faces.mean(axis=0)), half=tuple(np.diff(faces, axis=0)[0] / 2))
+    _, met = block.exits(points=position - block.middle, directions=direction)
+    a, b, c = 2 * np.array(block.half)
+    return float(np.log(2 * (a * b + b * c + c * a)) + MISSED * np.mean(~met))
+
+
+def faces_of(box: Box) -> Array:
+    assert box.centre is not None
+    half = np.array([box.closed(name) for name in ("width", "height", "depth")]) / 2
+    return np.stack([np.array(box.centre) - half, np.array(box.centre) + half])
+
+
+@pytest.mark.parametrize(("aside", "radius"), [((0.0, 0.0, 0.0), 3.0), ((2.0, -1.0, 3.0), 7.0)])
+@pytest.mark.parametrize("body", BODIES, ids=NAMES)
+def test_a_box_of_lines_is_a_least_one(body: Body, aside: tuple[float, float, float], radius: float) -> None:
+    """No face of it can be moved for a better one."""
+    position, direction = lines(body, 10_000)
+    box = box_of_lines(position, direction, np.add(body.middle, aside), radius)
+    assert box is not None
+    faces = faces_of(box)
+    least = box_cost(faces, position, direction)
+    for side in range(2):
+        for axis in range(3):
+            for move in (-0.3, -0.03, -0.003, 0.003, 0.03, 0.3):
+                moved = faces.copy()
+                moved[side, axis] += move
+                assert box_cost(moved, position, direction) > least - 1e-4, (side, axis, move)
+
+
+def test_a_box_of_lines_that_were_recorded_from_above_alone() -> None:
+    """A hemisphere far around a lamp sees only what heads upwards: the lines that graze it tell where its bottom is."""
+    block = Block()
+    position, direction = lines(block, 100_000)
+    up = direction[:, 2] > 0.0
+    box = box_of_lines(position[up], direction[up], np.array(block.middle), 3.0)
+    assert box is not None
+    assert faces_of(box) == pytest.approx(faces_of(Box(*2 * np.array(block.half), centre=block.middle)), abs=0.01)
+
+
+def test_a_box_leaves_few_lines_far_out() -> None:
+    """One line of ten thousand would double its size; that costs more than leaving it."""
+    block = Block()
+    position, direction = lines(block)
+    position[:2] += 5.0 * np.cross(direction[:2], [1.0, 0.0, 0.0])
+    box = box_of_lines(position, direction, np.array(block.middle), 9.0)
+    assert box is not None
+    assert faces_of(box) == pytest.approx(faces_of(Box(*2 * np.array(block.half), centre=block.middle)), abs=0.03)
+
+
+def test_lines_along_the_faces_of_a_box_meet_it() -> None:
+    """Lines of a grid along each axis, which divide by 0 at the faces they lie in."""
+    grid = np.linspace(-1.0, 1.0, 21)
+    u, v = (g.ravel() for g in np.meshgrid(grid, grid))
+    o = np.zeros_like(u)
+    position = np.concatenate([np.stack(p, axis=1) for p in ((u, v, o), (o, u, v), (v, o, u))])
+    direction = (
+        np.repeat(np.eye(3)[[2, 0, 1]], len(u), axis=0) * np.where(np.arange(3 * len(u)) % 2, -1.0, 1.0)[:, None]
+    )
+    box = box_of_lines(position, direction, np.zeros(3), 1.0)
+    assert box is not None
+    assert faces_of(box) == pytest.approx(np.array([[-1.0] * 3, [1.0] * 3]), abs=1e-5)
+
+
+def test_lines_along_z_have_no_box() -> None:
+    place = np.random.default_rng(5).uniform(-1, 1, (500, 3))
+    assert box_of_lines(place, np.tile([0.0, 0.0, 1.0], (500, 1)), np.zeros(3), 2.0) is None

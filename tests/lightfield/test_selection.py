@@ -134,19 +134,17 @@ def test_a_rod_is_a_cylinder() -> None:
 
 
 @pytest.mark.slow
-def test_a_block_is_a_box_by_its_start_points_and_something_tight_by_its_lines() -> None:
+@pytest.mark.parametrize("reach", [0.0, 3.0], ids=["by its start points", "by its lines"])
+def test_a_block_is_a_box(reach: float) -> None:
     block = Block()
-    position, direction = block.rays(N, seed=1)
-    surface = choose_surface(rays_of(position, direction)).surface
+    choice = choose_surface(rays_of(*scattered(*block.rays(N, seed=1), reach)))
+    surface = choice.surface
     assert isinstance(surface, Box)
-    assert (surface.width, surface.height, surface.depth) == pytest.approx(2 * np.array(block.half), rel=1e-3)
-    assert surface.centre == pytest.approx(block.middle, abs=1e-3)
-    # No box is sized by lines; the cylinder about the block comes next, and it is tight.
-    choice = choose_surface(rays_of(*scattered(position, direction, 3.0)))
-    tight = choice.surface
-    assert isinstance(tight, Cylinder)
-    assert tight.radius == pytest.approx(np.hypot(*block.half[:2]), rel=0.01)
-    assert choice.table[0].unmet < 0.01
+    error = 0.01 if reach else 1e-3
+    assert (surface.width, surface.height, surface.depth) == pytest.approx(2 * np.array(block.half), abs=2 * error)
+    assert surface.centre == pytest.approx(block.middle, abs=error)
+    (row,) = (row for row in choice.table if row.surface == surface)
+    assert row.unmet < 1e-3
 
 
 # --- what must not matter ----------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from etendue.lightfield.selection.line_search import golden_section, round_numbe
 from etendue.lightfield.selection.scorer import WITH_IMAGES, HeldOutScore, SurfaceScorer
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
 from etendue.lightfield.selection.trial_surfaces import FLATS, TrialSurfaces
-from etendue.lightfield.surfaces import SLACK, Box, Disk, Dome, Plane, Surface
+from etendue.lightfield.surfaces import SLACK, Disk, Dome, Plane, Surface
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, checked_threads
 
@@ -92,7 +92,7 @@ def choose_surface(
     - a dome about the same centre: a window at the depth of the rectangle, and a hemisphere for what does not pass it;
     - a sphere about it;
     - a cylinder about Z: the smallest that all lines meet, or about their start points;
-    - a box about their start points.
+    - a box about their start points, or a small one that nearly all lines meet.
 
     A field of up to 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and scored on
     the others; see `SurfaceScorer`. A surface replaces a simpler one if it leads by three standard errors of the difference.
@@ -173,7 +173,7 @@ class _Search:
             sharp = focused_about(z, self.rays, trials.seed, self.scorer.threads)
             kinds += [] if sharp is None else [[sharp]]
             kinds += [trials.hemispheres(z), trials.domes(z)]
-        kinds += filter(None, [trials.spheres(), trials.cylinders(), [Box().sized_for(trials.rays)]])
+        kinds += filter(None, [trials.spheres(), trials.cylinders(), trials.boxes()])
         finalists = self.finals([self.best(kind) for kind in kinds])
         able = [f for f in finalists if f.held_out.unmet <= self.most_unmet]
         winner = able[0]

@@ -8,10 +8,10 @@ import numpy as np
 
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.pilot_sample import pilot_sample, selected_rays
-from etendue.lightfield.selection.bounding import ball_centre, cylinder_of_lines, near_rays, start_centre
+from etendue.lightfield.selection.bounding import ball_centre, box_of_lines, cylinder_of_lines, near_rays, start_centre
 from etendue.lightfield.selection.line_search import golden_section
 from etendue.lightfield.selection.settings import SelectionSettings
-from etendue.lightfield.surfaces import SLACK, Cylinder, Disk, Dome, Hemisphere, Part, Plane, Sphere, Surface
+from etendue.lightfield.surfaces import SLACK, Box, Cylinder, Disk, Dome, Hemisphere, Part, Plane, Sphere, Surface
 from etendue.quantities.ray_set import RaySet
 
 FLATS: tuple[tuple[type[Plane | Disk], bool], ...] = ((Plane, False), (Disk, False), (Plane, True), (Disk, True))
@@ -129,6 +129,11 @@ class TrialSurfaces:
         lines = cylinder_of_lines(self.position, self.direction, self.centre, self.seed)
         flat = high[2] - low[2] <= self.settings.depth_tolerance * self.radius
         return [*([] if flat else [starts.sized_for(self.rays)]), *([] if lines is None else [lines])]
+
+    def boxes(self) -> list[Surface]:
+        """About the start points, and a small one that nearly all lines meet."""
+        lines = box_of_lines(self.position, self.direction, self.centre, self.radius)
+        return [Box().sized_for(self.rays), *([] if lines is None else [lines])]
 
 
 def crossings(rays: RaySet, z: float) -> FloatArray:
