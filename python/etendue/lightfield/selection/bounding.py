@@ -187,7 +187,7 @@ def box_of_lines(position: FloatArray, direction: FloatArray, centre: FloatArray
 
 
 def _within(faces: FloatArray, position: FloatArray, direction: FloatArray, axis: int) -> FloatArray:
-    """Between which two coordinates along an axis lines pass the other two pairs of faces, shape (2, m); of those that do."""
+    """Between which two coordinates along an axis lines pass the other two pairs of faces, shape (2, m)."""
     enters, leaves = np.full((2, len(position)), [[-np.inf], [np.inf]])
     for other in range(3):
         if other != axis:
