@@ -72,10 +72,7 @@ def right(keys: dict[str, Any], rays: float, lines: int) -> tuple[np.ndarray, np
     observer = scene.observers[0]
     core = _core.Scene({**compile_scene(scene).record, "detectors": []})
     view = observer.screen.screen().core_view(observer.observer())
-    looks = [
-        1e6 * _core.look_at_scene(core, view, lines // PASSES, 1 << 41, MOST_EVENTS, "scattered", i, i + 1)[0]
-        for i in range(PASSES)
-    ]
+    looks = 1e6 * _core.look_at_scene(core, view, lines // PASSES, 1 << 41, MOST_EVENTS, "scattered", 0, PASSES)[0]
     error = np.std(looks, axis=0, ddof=1) / np.sqrt(PASSES)
     # Where no ray arrived, the image states none.
     return image.values + np.mean(looks, axis=0), np.hypot(np.nan_to_num(image.standard_error), error)

@@ -513,9 +513,9 @@ def look_at_scene(
     guide: Guide | None = None,
     glints: Glints | None = None,
 ) -> list[_Floats]:
-    """What lines of sight find, pixel by pixel, in passes ``first..last`` of `paths` paths each.
+    """What lines of sight find in each of the passes ``first..last`` of `paths` paths, each array (passes, rows, columns).
 
-    Σ mean, Σ mean of the light that drawn directions find behind smooth surfaces, Σ deviation of the sources, and Σ shares
+    Mean luminance, that of the light that drawn directions find behind smooth surfaces, deviation of the sources, and shares
     of the paths that meet a smooth surface first, and that see a diffuse one directly.
 
     `left`: light that is not looked for, because rays traced forwards find it. Caustics: what reaches a diffuse surface

@@ -141,7 +141,6 @@ def test_a_lambertian_hemisphere() -> None:
         goniometer.measure_hemisphere(paint, step=0.01)
 
 
-@pytest.mark.slow
 def test_noise_has_the_variance_it_states() -> None:
     """Poisson counts over a floor, the beam growing by 10 %: mean and χ² over 41 positions."""
     noisy = et.ScatterGoniometer(photons=1e6, dark=400.0, drift=0.1)

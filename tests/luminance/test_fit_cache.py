@@ -69,7 +69,6 @@ def test_the_map_is_the_same_from_a_fit_from_memory_from_disk_and_without_a_cach
     assert et.cache_content().fields == 1 == len(list(folder.iterdir()))
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_recalled_field_tells_the_notes_of_the_rays_as_they_are_now(fits: list[int]) -> None:
     rays = led()

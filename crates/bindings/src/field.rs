@@ -98,8 +98,9 @@ impl FieldPart<'_> {
 #[pyclass(frozen, module = "etendue._core")]
 pub struct LightField {
     field: Arc<CoreField>,
-    /// Made when it is first asked for: reading needs none.
+    /// Both made when they are first asked for: reading needs none.
     sampler: OnceLock<Option<Arc<Sampler>>>,
+    fluxes: OnceLock<Vec<f64>>,
 }
 
 impl LightField {
@@ -133,12 +134,14 @@ impl LightField {
         Ok(Self {
             field: Arc::new(CoreField { parts }),
             sampler: OnceLock::new(),
+            fluxes: OnceLock::new(),
         })
     }
 
     /// Flux of each part.
     fn flux(&self, py: Python<'_>) -> Vec<f64> {
-        py.detach(|| self.field.parts.iter().map(PartField::flux).collect())
+        let make = || self.field.parts.iter().map(PartField::flux).collect();
+        py.detach(|| self.fluxes.get_or_init(make).clone())
     }
 
     /// Mean luminance of each cell of a part, and mean of its standard deviation.

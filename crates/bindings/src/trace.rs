@@ -21,7 +21,7 @@ use etendue_trace::reverse::method::{LeftOut, Method, Pixel};
 use etendue_trace::reverse::render::render;
 use etendue_trace::tallies::{Tally, TraceSums};
 use etendue_trace::work_unit::work_unit_of;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -196,9 +196,9 @@ pub fn work_unit<'py>(
     Ok(dict)
 }
 
-/// Looks at a scene: for each pixel, row by row, the sums over passes `first..last` of the mean luminance of a pass, of the
-/// part that is found by chance, and of the sources' own deviation \[flux unit/(mm² sr)\]; and of the shares of the lines that
-/// meet a smooth surface first, and that see a diffuse one directly.
+/// Looks at a scene: for each of the passes `first..last` and each pixel, row by row, the mean luminance, the part of it that
+/// is found by chance, and the sources' own deviation \[flux unit/(mm² sr)\]; and the shares of the lines that meet a smooth
+/// surface first, and that see a diffuse one directly.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
 #[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None, shared=None, guide=None, glints=None))]
@@ -217,7 +217,7 @@ pub fn look_at_scene<'py>(
     shared: Option<f64>,
     guide: Option<&Guide>,
     glints: Option<&Glints>,
-) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
+) -> PyResult<[Bound<'py, PyArray3<f64>>; 5]> {
     let view = view.core();
     let left = match left {
         "nothing" => LeftOut::Nothing,
@@ -240,23 +240,26 @@ pub fn look_at_scene<'py>(
             render(&lit, &view, &method, survey, first..last)
         })
     })?;
-    let shape = [view.rows as usize, view.columns as usize];
+    let (passes, all_rows, all_columns) = ((first..last).len(), view.rows as usize, view.columns as usize);
     let [columns, rows] = [&image.columns, &image.rows].map(|range| range.start as usize..range.end as usize);
-    let array = |pick: fn(&Pixel) -> f64| -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let array = |pick: fn(&Pixel) -> f64| -> PyResult<Bound<'py, PyArray3<f64>>> {
         // Memory of zeros that nothing is written to costs nothing.
-        let array = PyArray2::zeros(py, shape, false);
+        let array = PyArray3::zeros(py, [passes, all_rows, all_columns], false);
         let mut all = array.readwrite();
         let all = all.as_slice_mut()?;
-        for (row, pixels) in rows.clone().zip(image.pixels.chunks(columns.len().max(1))) {
-            let start = row * shape[1] + columns.start;
-            for (value, pixel) in all[start..start + columns.len()].iter_mut().zip(pixels) {
-                *value = pick(pixel);
+        for (row, pixels) in rows.clone().zip(image.pixels.chunks((columns.len() * passes).max(1))) {
+            for pass in 0..passes {
+                let start = (pass * all_rows + row) * all_columns + columns.start;
+                let of_pass = pixels[pass..].iter().step_by(passes);
+                for (value, pixel) in all[start..start + columns.len()].iter_mut().zip(of_pass) {
+                    *value = pick(pixel);
+                }
             }
         }
         Ok(array)
     };
     Ok([
-        array(|p| p.sum)?,
+        array(|p| p.mean)?,
         array(|p| p.chance)?,
         array(|p| p.deviation)?,
         array(|p| p.met[0])?,

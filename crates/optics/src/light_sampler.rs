@@ -99,9 +99,9 @@ impl LightSampler {
             });
         };
         let field = sampler.field();
-        let fluxes: Vec<(f64, Vec<f64>)> = field.parts.iter().map(PartField::flux_and_places).collect();
+        let fluxes = sampler.fluxes();
         let total: f64 = fluxes.iter().map(|(flux, _)| flux).sum();
-        let parts = field.parts.iter().zip(&fluxes).map(|(part, (flux, light))| {
+        let parts = field.parts.iter().zip(fluxes).map(|(part, (flux, light))| {
             let [n1, n2, ..] = part.cells;
             let sum: f64 = light.iter().sum();
             let even = 1.0 / light.len() as f64;

@@ -249,12 +249,9 @@ def _rays(
         return 0
     pixels = view["columns"] * view["rows"]
     passes, paths = 4, max(1, min(4, lines // 16))
-    looks = [
-        _core.look_at_scene(
-            core, view, paths, seed, most_events, "caustics", i, i + 1, threads, None, float(pixels), *guides
-        )[0].ravel()
-        for i in range(passes)
-    ]
+    looks = _core.look_at_scene(
+        core, view, paths, seed, most_events, "caustics", 0, passes, threads, None, float(pixels), *guides
+    )[0].reshape(passes, pixels)
     # Of one ray, and of one line.
     one = sums[0] * RUN
     forward = sums[1] * (RUN * (RUN / done)) - (one / done) ** 2

@@ -42,8 +42,8 @@ MOST_SEGMENTS, SCOUTS = 100, 2000
 and where light goes to and fro for longer, rays take longer than lines.
 """
 
-Look = Callable[[int, "_core.Survey | None"], list[Array]]
-"""The sums of a pass of a map, by its number, with patches or without."""
+Look = Callable[[int, int, "_core.Survey | None"], list[list[Array]]]
+"""The sums of each of the passes ``first..last`` of a map, with patches or without."""
 
 
 def survey_notes(survey: _core.Survey) -> list[str]:
@@ -171,8 +171,9 @@ class Pilot:
     --------
     >>> import numpy as np
     >>> rng = np.random.default_rng(2)
-    >>> noisy = lambda number, survey: [rng.normal(10.0, 1.0 if survey is None else 0.25, (40, 30))]
-    >>> exact = [noisy(number, None) for number in range(PILOT)]
+    >>> one = lambda survey: [rng.normal(10.0, 1.0 if survey is None else 0.25, (40, 30))]
+    >>> noisy = lambda first, last, survey: [one(survey) for _ in range(first, last)]
+    >>> exact = noisy(0, PILOT, None)
     >>> found = Pilot.of(exact, noisy, "a survey", np.ones((40, 30)))
     >>> bool(12 < found.gain < 20), found.pays
     (True, True)
@@ -191,13 +192,13 @@ class Pilot:
         exact : list of list of ndarray
             The first `PILOT` passes of a map.
         look : callable
-            The sums of a pass, by its number, with or without patches.
+            The sums of passes, with or without patches.
         survey : Survey
             The patches.
         area : ndarray
             Apparent area of the pixels, up to a factor.
         """
-        gathered = [look(PILOT + number, survey) for number in range(PILOT)]
+        gathered = look(PILOT, 2 * PILOT, survey)
         (one, two), (three, four) = ([found[0] * area for found in passes] for passes in (exact, gathered))
         apart = np.abs(three - four).sum() * (one + two).sum()
         whole = np.abs(one - two).sum() * (three + four).sum()

@@ -29,6 +29,8 @@ class Passes:
         Apparent area of its pixels, up to a factor.
     window : pair of slices
         Rows and columns outside of which no line of sight meets anything.
+    compared : bool
+        Whether the passes are to be compared with others, block by block.
 
     Examples
     --------
@@ -43,12 +45,17 @@ class Passes:
     """
 
     def __init__(
-        self, shape: tuple[int, int], area: Array, window: tuple[slice, slice] = (slice(None), slice(None))
+        self,
+        shape: tuple[int, int],
+        area: Array,
+        window: tuple[slice, slice] = (slice(None), slice(None)),
+        *,
+        compared: bool = False,
     ) -> None:
         self.done = 0
         self.blocks: list[Array] = []
-        """The light of each pass by blocks of the map (`etendue.luminance.gathering.blocks`)."""
-        self._area, self._shape, self._window = area, shape, window
+        """The light of each pass by blocks of the map (`etendue.luminance.gathering.blocks`), if they are compared."""
+        self._area, self._shape, self._window, self._compared = area, shape, window, compared
         part = area[window].shape
         self._all = _Spread(part)
         self._chance = _Spread(part)
@@ -64,7 +71,8 @@ class Passes:
         the lines that met a smooth surface first, and that saw a diffuse one directly.
         """
         self.done += 1
-        self.blocks.append(blocks(values))
+        if self._compared:
+            self.blocks.append(blocks(values))
         values, chance, deviation, smooth, diffuse = (
             sums[self._window] for sums in (values, chance, deviation, smooth, diffuse)
         )

@@ -50,6 +50,9 @@ Array = npt.NDArray[np.float64]
 Left = Literal["nothing", "caustics", "scattered"]
 """Light that lines of sight leave to rays traced forwards."""
 
+LINES_AT_ONCE = 1 << 20
+"""Lines of sight after which progress is told, or one pass: passes that are made at once share threads and memory."""
+
 MOST_EVENTS = 10_000
 """Surfaces that a line of sight may meet."""
 
@@ -117,19 +120,21 @@ def look_at_scene(
     for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, forward.plan.glints, strict=True)):
 
         def look(
-            number: int,
+            first: int,
+            last: int,
             known: _core.Survey | None,
             view: _core._View = view,
             small: _core.Glints = small,
-        ) -> list[Array]:
+        ) -> list[list[Array]]:
             guides = forward.shared, forward.plan.guide, small
-            return _core.look_at_scene(
-                core, view, how.paths, how.seed, MOST_EVENTS, left, number, number + 1, threads, known, *guides
+            found = _core.look_at_scene(
+                core, view, how.paths, how.seed, MOST_EVENTS, left, first, last, threads, known, *guides
             )
+            return [list(sums) for sums in zip(*found, strict=True)]
 
-        def advance(lines: int = how.paths * screen.columns * screen.rows) -> None:
+        def advance(passes: int, lines: int = how.paths * screen.columns * screen.rows) -> None:
             nonlocal done
-            done += lines
+            done += passes * lines
             if progress is not None:
                 progress(done)
 
@@ -203,9 +208,9 @@ class _Eye:
     Parameters
     ----------
     look : callable
-        The sums of a pass.
+        The sums of passes.
     advance : callable
-        Called after each pass of the map.
+        Called with the number of passes that have been added to the map.
     how : PathTracing
         What was asked for.
     screen : Screen
@@ -223,7 +228,7 @@ class _Eye:
     """
 
     look: Look
-    advance: Callable[[], None]
+    advance: Callable[[int], None]
     how: PathTracing
     screen: Screen
     area: Array
@@ -243,14 +248,14 @@ class _Eye:
             passes, told = self._followed(survey), survey_notes(survey)
             if not survey.patches()[0]:
                 return passes, 0.0, told
-            others = [self.look(FIRST_CHECK + number, None)[0] for number in range(PILOT)]
+            others = [sums[0] for sums in self.look(FIRST_CHECK, FIRST_CHECK + PILOT, None)]
             seen = Comparison.of(passes.blocks, others)
             if seen is None:
                 return passes, 0.0, [*told, UNKNOWN]
             return passes, seen.bias, [*told, seen.sentence + (seen.warning if seen.differs else "")]
         if not self._may_gather() or not surveys.may_pay:
             return self._followed(None), 0.0, []
-        exact = [self.look(number, None) for number in range(PILOT)]
+        exact = self.look(0, PILOT, None)
         survey = surveys.found
         if not survey.patches()[1]:
             return self._followed(None, exact), 0.0, []
@@ -270,11 +275,15 @@ class _Eye:
 
     def _followed(self, known: _core.Survey | None, made: Sequence[list[Array]] = (), first: int = 0) -> Passes:
         """As many passes as the map needs, from number `first` on; those that are made already come before others."""
-        how, passes = self.how, Passes(self.screen.shape, self.area, self.window)
+        how, passes = self.how, Passes(self.screen.shape, self.area, self.window, compared=known is not None)
         wanted, most = how.passes, how.passes * (1 if how.until is None else MOST_TIMES)
+        at_once = max(1, LINES_AT_ONCE // (how.paths * self.screen.columns * self.screen.rows))
         while passes.done < wanted:
-            passes.add(*(made[passes.done] if passes.done < len(made) else self.look(first + passes.done, known)))
-            self.advance()
+            begin = passes.done
+            some = made[begin:] or self.look(first + begin, first + min(begin + at_once, wanted), known)
+            for sums in some:
+                passes.add(*sums)
+            self.advance(len(some))
             if passes.done == wanted:
                 if self.images is not None:
                     # Rays forwards keep their number for each line of sight.

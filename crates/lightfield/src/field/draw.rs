@@ -26,6 +26,8 @@ pub struct Sampler {
     under: Vec<[Option<UnderTents>; 2]>,
     /// Of all parts.
     flux: f64,
+    /// Of each part, and of each cell of its place.
+    fluxes: Vec<(f64, Vec<f64>)>,
 }
 
 impl Sampler {
@@ -33,7 +35,7 @@ impl Sampler {
     #[must_use]
     pub fn new(field: impl Into<Arc<LightField>>) -> Option<Self> {
         let field = field.into();
-        let (mut weights, mut starts, mut under, mut flux) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
+        let (mut weights, mut starts, mut under, mut fluxes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for part in &field.parts {
             starts.push(weights.len());
             let [n1, n2, n3, n4] = part.cells;
@@ -48,7 +50,7 @@ impl Sampler {
                     .zip(products)
                     .map(|(r, m)| scale * f64::from(r[0]) * m),
             );
-            flux += part.flux();
+            fluxes.push(part.flux_and_places());
             under.push(tables);
         }
         let cells = Alias::new(&weights)?;
@@ -57,7 +59,8 @@ impl Sampler {
             cells,
             starts,
             under,
-            flux,
+            flux: fluxes.iter().map(|(flux, _)| flux).sum(),
+            fluxes,
         })
     }
 
@@ -65,6 +68,12 @@ impl Sampler {
     #[must_use]
     pub fn field(&self) -> &LightField {
         &self.field
+    }
+
+    /// The flux of each part, and that of each cell of its place.
+    #[must_use]
+    pub fn fluxes(&self) -> &[(f64, Vec<f64>)] {
+        &self.fluxes
     }
 
     /// The part and the coordinates of ray `index`.

@@ -38,13 +38,13 @@ pub struct Method<'a> {
 /// deviation, and of the shares of the lines of sight that meet smooth and diffuse surfaces first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pixel {
-    /// Σ mean.
-    pub sum: f64,
-    /// Σ mean of the light that drawn directions bring to a source through smooth surfaces, where rays forwards cannot take it
+    /// Mean luminance of the lines.
+    pub mean: f64,
+    /// Mean of the light that drawn directions bring to a source through smooth surfaces, where rays forwards cannot take it
     /// over: rare, and bright.
     pub chance: f64,
-    /// Σ deviation.
+    /// What the sources say that their part of the mean may err by.
     pub deviation: f64,
-    /// Σ share of the lines that meet a smooth surface first, and of those that see a diffuse one directly.
+    /// Shares of the lines that meet a smooth surface first, and of those that see a diffuse one directly.
     pub met: [f64; 2],
 }

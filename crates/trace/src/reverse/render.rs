@@ -8,6 +8,7 @@
 //! Radiance grows by (n₁/n₂)² on its way from a medium of index n₂ into one of n₁.
 
 use std::ops::Range;
+use std::sync::Mutex;
 
 use etendue_geometry::surface_points::Vectors;
 use etendue_lightfield::View;
@@ -33,19 +34,20 @@ const AIMED: u64 = 1 << 32;
 /// and would not know it.
 const LEAST_AIMED: u32 = 4;
 
-/// What a map holds: the columns and rows in which lines of sight may meet anything, and the sums of their pixels, row by row.
+/// What passes of a map hold: the columns and rows in which lines of sight may meet anything, and the means of their pixels, row
+/// by row.
 #[derive(Clone, Debug)]
 pub struct Image {
     /// Columns.
     pub columns: Range<u32>,
     /// Rows.
     pub rows: Range<u32>,
-    /// Sums of the pixels in both.
+    /// Pixels in both, each pass after pass.
     pub pixels: Vec<Pixel>,
 }
 
-/// The map of `view`: for each pixel the sums over passes `passes`. Passes are independent of each other. With a survey,
-/// paths end at diffuse surfaces whose light is known.
+/// Passes of the map of `view`, which are independent of each other. With a survey, paths end at diffuse surfaces whose light
+/// is known.
 ///
 /// Runs on the threads of the current pool; the same bits for any number.
 #[must_use]
@@ -71,13 +73,21 @@ pub fn render(
                 .map(move |column| (row * view.columns + column) as usize)
         })
         .collect();
-    let mut pixels = vec![Pixel::default(); which.len()];
+    let mut pixels = vec![Pixel::default(); which.len() * passes.len()];
     let each = (passes.len() * method.paths as usize).max(1);
     let chunk = (4 * BLOCK / each).clamp(1, 1 << 12);
-    let chunks = pixels.par_chunks_mut(chunk).zip(which.par_chunks(chunk));
-    let renderer = || Renderer::new(lit, view, method, &known);
-    chunks.for_each_init(renderer, |renderer, (pixels, which)| {
+    let chunks = pixels
+        .par_chunks_mut(chunk * passes.len().max(1))
+        .zip(which.par_chunks(chunk));
+    // Their memory takes longer to fetch than a chunk takes.
+    let idle = Mutex::new(Vec::new());
+    chunks.for_each(|(pixels, which)| {
+        let taken = idle.lock().ok().and_then(|mut idle| idle.pop());
+        let mut renderer = taken.unwrap_or_else(|| Renderer::new(lit, view, method, &known));
         renderer.paint(which, passes.clone(), pixels);
+        if let Ok(mut idle) = idle.lock() {
+            idle.push(renderer);
+        }
     });
     Image { columns, rows, pixels }
 }
@@ -117,7 +127,7 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Adds the passes to pixels of some numbers.
+    /// The passes of pixels of some numbers, pixel by pixel.
     fn paint(&mut self, which: &[usize], passes: Range<u32>, pixels: &mut [Pixel]) {
         let mut cells = vec![[0.0; 5]; which.len() * passes.len()];
         let all: Vec<usize> = (0..cells.len()).collect();
@@ -128,13 +138,13 @@ impl<'a> Renderer<'a> {
             let those: Vec<usize> = all.into_iter().filter(has).collect();
             self.look(&those, which, &passes, true, &mut cells);
         }
-        for (pixel, means) in pixels.iter_mut().zip(cells.chunks(passes.len().max(1))) {
-            for [mean, deviation, chance, smooth, diffuse] in means {
-                pixel.sum += mean;
-                pixel.chance += chance;
-                pixel.deviation += deviation;
-                pixel.met = [pixel.met[0] + smooth, pixel.met[1] + diffuse];
-            }
+        for (pixel, [mean, deviation, chance, smooth, diffuse]) in pixels.iter_mut().zip(cells) {
+            *pixel = Pixel {
+                mean,
+                chance,
+                deviation,
+                met: [smooth, diffuse],
+            };
         }
     }
 
