@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from types import TracebackType
 from typing import Any, Literal, TypeAlias, TypedDict, final
 
 import numpy as np
@@ -20,6 +21,7 @@ __all__ = [
     "Scene",
     "StoredBytes",
     "Survey",
+    "TreeMemory",
     "batch_size",
     "cone_sums",
     "count_rays",
@@ -441,6 +443,16 @@ def polya_evidence(
     threads: int | None = None,
 ) -> float:
     """The logarithm of the evidence alone."""
+
+@final
+class TreeMemory:
+    """A context in which trees leave their memory to those that are grown after them, in the whole process."""
+
+    def __new__(cls) -> TreeMemory: ...
+    def __enter__(self) -> None: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None, /
+    ) -> None: ...
 
 def select_subset(start: int, stop: int, n: int, k: int, taken: int, seed: int) -> npt.NDArray[np.uint64]:
     """Indices in ``start..stop`` of a random k-subset of n, of which `taken` were taken before."""

@@ -67,6 +67,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(polya::polya_posterior, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_average, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_evidence, module)?)?;
+    module.add_class::<polya::TreeMemory>()?;
     module.add_function(wrap_pyfunction!(subset::select_subset, module)?)?;
     module.add_function(wrap_pyfunction!(subset::deal_parts, module)?)?;
     module.add_function(wrap_pyfunction!(trace::losses, module)?)?;

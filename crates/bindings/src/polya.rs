@@ -152,3 +152,26 @@ pub fn polya_evidence<'py>(
         log_evidence(&problem.grid, &data, concentration, threads.unwrap_or(0))
     })
 }
+
+/// Holds the memory of trees between them from when it is entered to when it is left.
+#[pyclass(module = "etendue._core")]
+#[derive(Default)]
+pub struct TreeMemory {
+    held: Vec<polya::HeldMemory>,
+}
+
+#[pymethods]
+impl TreeMemory {
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn __enter__(&mut self) {
+        self.held.push(polya::HeldMemory::begin());
+    }
+
+    fn __exit__(&mut self, _kind: Bound<'_, PyAny>, _error: Bound<'_, PyAny>, _traceback: Bound<'_, PyAny>) {
+        self.held.pop();
+    }
+}

@@ -35,7 +35,7 @@ from etendue.lightfield.pilot_sample import check_near_field, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Plane, Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry, refutation
-from etendue.lightfield.trees import POSITIONS
+from etendue.lightfield.trees import POSITIONS, holding_memory
 from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_seed, checked_threads
@@ -96,6 +96,7 @@ class Plan:
 
 
 @on_one_blas_thread
+@holding_memory
 def fit_light_field(
     rays: RayStream,
     surface: Surface | Literal["auto"],

@@ -12,8 +12,12 @@ from etendue.errors import ArgumentError
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, squares_hold
 
-STRETCH = 4096
-"""Rays that are read in one piece."""
+STRETCH = 256
+"""Rays that are read in one piece. Files may be written source by source, or have what is odd at their end: of each part many
+short pieces hold what is due to it."""
+
+PLACES = 0x504C_4143
+"""Seed of where in its part of the set each piece lies: a file may have a period."""
 
 LOOKED_AT = 1 << 14
 """Rays whose lines tell how large the source is."""
@@ -37,7 +41,7 @@ _SAMPLES: weakref.WeakSet[RaySet] = weakref.WeakSet()
 
 
 def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
-    """Up to `at_most` rays that carry flux, from stretches spread evenly over the set, in its own scale of flux.
+    """Up to `at_most` rays that carry flux, from pieces spread evenly over the set, in its own scale of flux.
 
     Raises
     ------
@@ -56,10 +60,15 @@ def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
         return rays
     source, n = rays.core_source(), len(rays)
     pieces = max(at_most // STRETCH, 2)
-    starts = range(0, n, STRETCH)
-    if len(starts) > pieces:
-        starts = range(0, n - STRETCH + 1, (n - STRETCH) // (pieces - 1))
-    parts = [_core.read_rays(source, start, min(start + STRETCH, n)) for start in starts[:pieces]]
+    if n <= pieces * STRETCH:
+        ends = [(0, n)] if n else []
+    else:
+        # One piece in each of as many equal parts of the set.
+        parts_begin = np.arange(pieces) * n // pieces
+        room = n // pieces - STRETCH + 1
+        starts = parts_begin + np.random.default_rng(PLACES).integers(0, room, pieces)
+        ends = [(start, start + STRETCH) for start in starts.tolist()]
+    parts = [_core.read_rays(source, start, stop) for start, stop in ends]
     if parts:
         position, direction, flux = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         carry = flux > 0

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
 from etendue import _core
 from etendue.lightfield.counting import FloatArray, Sums
+
+Result = TypeVar("Result")
+Given = ParamSpec("Given")
 
 TILE_BITS = 22
 """Halvings of a grid that one tree takes: 4 million cells, whose boxes fill some 2 GB. Larger grids are cut into tiles."""
@@ -113,6 +118,31 @@ def _coarse(values: FloatArray | None, shape: tuple[int, ...]) -> FloatArray:
     blocks = values.reshape(rows, n // rows, columns, n // columns).sum(axis=(1, 3))
     mass: FloatArray = blocks / blocks.sum()
     return mass
+
+
+def holding_memory(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    """The function, during which trees leave their memory to those that are grown after them: for work that grows many.
+
+    To fetch the memory of a tree from the system, page by page, and to clear it takes a third as long as to grow it.
+
+    Parameters
+    ----------
+    function : callable
+        Whatever it takes and gives, it does so afterwards.
+
+    Examples
+    --------
+    >>> counts = Sums(np.ones((4, 4)), None)
+    >>> holding_memory(log_evidence)(counts, Base(), 1.0, 1) == log_evidence(counts, Base(), 1.0, 1)
+    True
+    """
+
+    @functools.wraps(function)
+    def holding(*args: Given.args, **kwargs: Given.kwargs) -> Result:
+        with _core.TreeMemory():
+            return function(*args, **kwargs)
+
+    return holding
 
 
 def log_evidence(counts: Sums, base: Base, concentration: float, threads: int | None) -> float:

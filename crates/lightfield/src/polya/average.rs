@@ -49,6 +49,9 @@ pub fn average(grid: &Grid, data: &Data<'_>, c: f64, positions: &[Vec<usize>], t
                     let trees: Vec<_> = pool.install(|| some.par_iter().map(alone).collect());
                     for (steps, (moments, log_evidence)) in some.iter().zip(trees) {
                         sum.add(grid, &moments, log_evidence, share, steps);
+                        for moment in moments {
+                            workspace.keep(moment);
+                        }
                     }
                 }
             }

@@ -32,7 +32,8 @@ pub fn posterior(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> Poster
     assert!(data.fits(grid), "one entry per cell");
     ordered::beside(threads, |pool| {
         let none = vec![0; grid.depths().len()];
-        let (moments, log_evidence) = grown(grid, data, &none, c, pool, &mut Workspace::default());
+        let mut workspace = Workspace::default();
+        let (moments, log_evidence) = grown(grid, data, &none, c, pool, &mut workspace);
         let [ratio, ratio_squared] = moments.map(|moment| {
             let mut values = vec![0.0; grid.cells()];
             grid.each_row(&none, |first, begin, row| {
@@ -40,6 +41,7 @@ pub fn posterior(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> Poster
                     *v = moment[begin + place];
                 }
             });
+            workspace.keep(moment);
             values
         });
         Posterior {
@@ -79,7 +81,11 @@ pub fn log_evidence(grid: &Grid, data: &Data<'_>, c: f64, threads: usize) -> f64
     let none = vec![0; grid.depths().len()];
     ordered::beside(threads, |pool| {
         let problem = Problem::new(grid, data, &none, c);
-        ascend(&problem, data, &none, false, pool, &mut Workspace::default()).log_root
+        let mut workspace = Workspace::default();
+        let evidence = ascend(&problem, data, &none, false, pool, &mut workspace);
+        let log_root = evidence.log_root;
+        evidence.give(&mut workspace);
+        log_root
     })
 }
 

@@ -3,6 +3,7 @@
 //! Most boxes lie within tiles, and a tile is swept by one thread while all about it stays in the second cache. The boxes that are
 //! larger than tiles, a sixth or so, lie side by side level by level, and their chunks are shared among the threads.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::ThreadPool;
@@ -22,6 +23,9 @@ pub(super) struct Problem<'a> {
     /// Whether weights are unequal: then points are counted by (Σ w)²/Σ w².
     pub is_weighted: bool,
     pub stop: Option<&'a AtomicBool>,
+    /// Room that no thread uses at present.
+    #[allow(clippy::vec_box, reason = "they change hands")]
+    idle: Mutex<Vec<Box<Scratch>>>,
 }
 
 impl<'a> Problem<'a> {
@@ -35,7 +39,19 @@ impl<'a> Problem<'a> {
             base,
             is_weighted: data.squared.is_some(),
             stop: data.stop,
+            idle: Mutex::default(),
         }
+    }
+
+    /// Does something with room of its own, which is made for as many threads as ask at once: to clear it takes time.
+    fn with_room<T>(&self, work: impl FnOnce(&mut Scratch) -> T) -> T {
+        let taken = self.idle.lock().ok().and_then(|mut idle| idle.pop());
+        let mut scratch = taken.unwrap_or_else(|| Box::new(Scratch::new(self.grid.depths().len())));
+        let done = work(&mut scratch);
+        if let Ok(mut idle) = self.idle.lock() {
+            idle.push(scratch);
+        }
+        done
     }
 
     /// Whether somebody wants the rest to be left out.
@@ -103,30 +119,21 @@ impl Scratch {
     }
 }
 
-/// Runs tasks until it is stopped, side by side if that is worth it: in the pool, or on the caller's thread. The room is made once
-/// per thread, as clearing it takes time.
+/// Runs tasks until it is stopped, side by side if that is worth it: in the pool, or on the caller's thread.
 pub(super) fn each<T: Send>(
     pool: Option<&ThreadPool>,
     problem: &Problem<'_>,
     tasks: Vec<T>,
     work: impl Fn(&mut Scratch, T) + Sync + Send,
 ) {
-    let work = |scratch: &mut Scratch, task| {
+    let work = |task| {
         if !problem.is_stopped() {
-            work(scratch, task);
+            problem.with_room(|scratch| work(scratch, task));
         }
     };
-    let room = || Scratch::new(problem.grid.depths().len());
     match pool {
-        Some(pool) if tasks.len() > 8 => {
-            pool.install(|| tasks.into_par_iter().for_each_init(room, work));
-        }
-        _ => {
-            let mut scratch = room();
-            for task in tasks {
-                work(&mut scratch, task);
-            }
-        }
+        Some(pool) if tasks.len() > 8 => pool.install(|| tasks.into_par_iter().for_each(work)),
+        _ => tasks.into_iter().for_each(work),
     }
 }
 

@@ -17,6 +17,7 @@ from etendue.lightfield.selection.scorer import WITH_IMAGES, HeldOutScore, Surfa
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
 from etendue.lightfield.selection.trial_surfaces import FLATS, TrialSurfaces
 from etendue.lightfield.surfaces import SLACK, Disk, Dome, Plane, Surface
+from etendue.lightfield.trees import holding_memory
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, checked_threads
 
@@ -69,6 +70,7 @@ class SurfaceChoice:
 
 
 @on_one_blas_thread
+@holding_memory
 def choose_surface(
     rays: RayStream,
     *,
