@@ -13,8 +13,8 @@ from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, squares_hold
 
 STRETCH = 256
-"""Rays that are read in one piece. Files may be written source by source, or have what is odd at their end: of each part many
-short pieces hold what is due to it."""
+"""Rays that are read in one piece. A file may be written source by source, or have what is odd at its end: many short pieces
+hold of each part what is due to it."""
 
 PLACES = 0x504C_4143
 """Seed of where in its part of the set each piece lies: a file may have a period."""
