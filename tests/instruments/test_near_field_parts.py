@@ -151,6 +151,7 @@ def test_saturated_pixels_are_those_that_even_the_shortest_exposure_cannot_hold(
         et.Sphere(radius=2.0, centre=(0.3, -0.2, 0.5)),
         et.Hemisphere(radius=2.0, centre=(0.3, -0.2, 0.5)),
         et.Cylinder(radius=1.0, bottom=-1.0, top=2.0, centre=(0.3, -0.2)),
+        et.Cylinder(radius=1.0, bottom=-1.0, top=2.0, centre=(-0.2, 0.5), axis="x"),
         et.Box(2.0, 3.0, 1.0, (0.3, -0.2, 0.5)),
         et.Disk(radius=2.0, z=0.5, centre=(0.3, -0.2)),
         et.Plane(z=0.5, width=4.0, height=2.0, centre=(0.3, -0.2)),

@@ -113,6 +113,21 @@ def test_a_cylinder_of_lines_is_the_rod(start: tuple[float, float, float]) -> No
     assert found.centre == pytest.approx(rod.middle[:2], abs=0.01)
 
 
+@pytest.mark.parametrize(("turns", "axis"), [(1, "x"), (2, "y")])
+def test_a_cylinder_of_lines_along_another_axis_is_the_rod_turned(turns: int, axis: str) -> None:
+    """x → y → z → x: the rod about Z becomes one about X, then about Y."""
+    rod = Rod()
+    position, direction = (np.roll(v, turns, axis=1) for v in lines(rod))
+    middle = np.roll(rod.middle, turns)
+    found = cylinder_of_lines(position, direction, np.zeros(3), 1, axis)
+    assert found is not None
+    assert (found.axis, found.radius) == (axis, pytest.approx(rod.radius, rel=0.005))
+    along = "xyz".index(axis)
+    ends = middle[along] - rod.height / 2, middle[along] + rod.height / 2
+    assert (found.bottom, found.top) == pytest.approx(ends, abs=0.01)
+    assert found.centre == pytest.approx(np.delete(middle, along), abs=0.01)
+
+
 def test_lines_along_z_have_no_cylinder() -> None:
     place = np.random.default_rng(5).uniform(-1, 1, (500, 3))
     assert cylinder_of_lines(place, np.tile([0.0, 0.0, 1.0], (500, 1)), np.zeros(3), 1) is None

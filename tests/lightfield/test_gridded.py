@@ -122,6 +122,8 @@ def test_spherical_cells_are_those_of_the_oracle() -> None:
         Box(2, 3, 4, centre=(1, 1, 1)),
         Sphere(radius=2, centre=(1, 0, 0)),
         Cylinder(radius=1.5, bottom=-1, top=3, centre=(0.5, 0)),
+        Cylinder(radius=1.5, bottom=-1, top=3, centre=(0.5, 0), axis="x"),
+        Cylinder(radius=1.5, bottom=-1, top=3, centre=(0.5, 0), axis="y"),
         Dome(radius=2, z=0.3, centre=(0.2, 0.1), window=1.0),
     ],
 )
@@ -714,6 +716,8 @@ def test_the_noise_of_the_mean_luminance_is_that_of_the_rays() -> None:
         Sphere(radius=1.8, centre=(0.1, 0, 0)),
         Cylinder(radius=1.5, bottom=-1, top=1.3, centre=(0.5, 0)),
         Cylinder(radius=1.5, bottom=-1, top=1.3, ends=False),
+        Cylinder(radius=1.5, bottom=-1, top=1.3, centre=(0.5, 0), axis="x"),
+        Cylinder(radius=1.5, bottom=-1, top=1.3, centre=(0.5, 0), axis="y"),
         Dome(radius=2, z=0.3, centre=(0.2, 0.1), window=1.0),
     ],
 )

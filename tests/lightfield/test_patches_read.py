@@ -38,6 +38,7 @@ CARRIERS: dict[str, Callable[[], GriddedSource]] = {
     "disk elsewhere": lambda: made(Disk(radius=1.4, z=-0.1, centre=(0.3, -0.2))),
     "dome": lambda: made(Dome(radius=2, window=0.9), parallels=3),
     "cylinder": lambda: made(Cylinder(radius=2)),
+    "cylinder along y": lambda: made(Cylinder(radius=2, axis="y")),
     "flux stated": lambda: made(et.Plane(z=0)).emitting(7.5),
     "tables alone": lambda: made(et.Plane(z=0)).as_printed,
 }

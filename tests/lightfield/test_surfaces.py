@@ -16,6 +16,8 @@ SPECIMENS = [
     et.Sphere(radius=1.2, centre=(0, -1, 0)),
     et.Cylinder(radius=0.7, bottom=-1, top=2, centre=(0.3, 0.1)),
     et.Box(2, 3, 4, centre=(0, 1, 2)),
+    et.Cylinder(radius=0.7, bottom=-1, top=2, centre=(0.1, 0.5), axis="x"),
+    et.Cylinder(radius=0.7, bottom=-1, top=2, centre=(0.3, 0.5), axis="y"),
     et.Dome(radius=1.264, z=0.2, window=1.0, centre=(0.3, -0.2)),
 ]
 
@@ -34,6 +36,27 @@ def test_every_surface_is_tried() -> None:
 @pytest.mark.parametrize("surface", SPECIMENS, ids=lambda s: s.NAME)
 def test_the_text_of_a_surface_gives_the_surface(surface: et.Plane) -> None:
     assert et.parse_surface(surface.spec) == surface
+
+
+def test_a_cylinder_along_another_axis_is_that_along_z_turned() -> None:
+    """Rays and cylinder turned together, x → y → z → x: each line leaves the same part at the same place and direction."""
+    position, direction = bundle(4000, 7)
+    along_z = et.Cylinder(radius=0.9, bottom=-0.6, top=1.1, centre=(0.2, -0.3))
+    owner, at = _core.cross_parts([p.core() for p in along_z.parts()], position, direction)
+    assert (np.bincount(owner + 1, minlength=4) > 100).all()
+    for turns, axis, centre in ((1, "x", (0.2, -0.3)), (2, "y", (-0.3, 0.2))):
+        turned = et.Cylinder(radius=0.9, bottom=-0.6, top=1.1, centre=centre, axis=axis)
+        x, k = (np.ascontiguousarray(np.roll(v, turns, axis=1)) for v in (position, direction))
+        owner_there, there = _core.cross_parts([p.core() for p in turned.parts()], x, k)
+        np.testing.assert_array_equal(owner_there, owner)
+        np.testing.assert_allclose(there[owner >= 0], at[owner >= 0], atol=1e-12)
+
+
+def test_an_axis_that_there_is_none_is_refused_with_those_that_there_are() -> None:
+    with pytest.raises(UnknownNameError, match="axis of a cylinder"):
+        et.parse_surface("cylinder:radius=1,axis=w")
+    with pytest.raises(UnknownNameError, match="axis"):
+        et.Cylinder(radius=1, axis="Z")
 
 
 @pytest.mark.parametrize("off", [0.0, 12.3, -10_000.03, 2.5e6])
@@ -67,7 +90,7 @@ def test_axes_are_right_handed_and_coordinates_lead_back_to_the_ray(surface: et.
         assert off.max(initial=0) < 1e-9
 
 
-@pytest.mark.parametrize("surface", SPECIMENS[3:6], ids=lambda s: s.NAME)
+@pytest.mark.parametrize("surface", SPECIMENS[3:8], ids=lambda s: s.NAME)
 def test_whatever_starts_inside_a_closed_surface_leaves_it(surface: et.Sphere) -> None:
     centre = np.array([0, -1, 0]) if surface.NAME == "sphere" else np.array([0.3, 0.1, 0.5])
     rng = np.random.default_rng(2)
@@ -86,6 +109,8 @@ def test_whatever_starts_inside_a_closed_surface_leaves_it(surface: et.Sphere) -
         (et.Hemisphere(), 5e-4),
         (et.Sphere(), 5e-4),
         (et.Cylinder(), 5e-4),
+        (et.Cylinder(axis="x"), 5e-4),
+        (et.Cylinder(axis="y", centre=(0.5, 0.0)), 5e-4),
         (et.Box(), 5e-4),
         (et.Dome(), 5e-4),
     ],

@@ -265,6 +265,8 @@ def _surface(group: Node) -> Surface:
     dimensions = {
         name: group.truth(name)
         if hints[name] is bool
+        else group.text(name)
+        if hints[name] is str
         else group.numbers(name, (sizes[name],)).tolist()
         if name in sizes
         else group.number(name)

@@ -114,6 +114,8 @@ class Part:
         }
 
 
+AXES = ("x", "y", "z")
+
 WORLD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 DOWN = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
 
@@ -141,7 +143,7 @@ class Surface(abc.ABC):
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, bool) or value is None:
+            if isinstance(value, bool | str) or value is None:
                 continue
             # Whatever numbers came in, floats are compared, printed and saved.
             numbers = tuple(float(v) for v in value) if isinstance(value, Iterable) else float(value)
@@ -206,9 +208,12 @@ class Surface(abc.ABC):
         return f"{self.NAME}:" + ",".join(
             f"{f.name}={_text(getattr(self, f.name), digits, size)}"
             for f in dataclasses.fields(self)
-            if getattr(self, f.name) is not None and not (f.name == "frames" and self.closed("frames") == 0)
+            if getattr(self, f.name) is not None and getattr(self, f.name) != UNSAID.get(f.name)
         )
 
+
+UNSAID = {"frames": 0, "axis": "z"}
+"""Values that are as if nothing were said."""
 
 LENGTHS = {"width", "height", "depth", "radius", "window", "rest"}
 
@@ -218,7 +223,7 @@ MOST_FRAMES = 16
 def _text(value: Any, digits: int, size: float) -> str:
     if isinstance(value, tuple):
         return "/".join(_text(v, digits, size) for v in value)
-    if isinstance(value, bool):
+    if isinstance(value, bool | str):
         return str(value).lower()
     more = max(math.floor(math.log10(abs(value) / size)), 0) if abs(value) > size else 0
     return format(value, f".{digits + more}g")
@@ -428,28 +433,34 @@ class Sphere(Surface):
 
 @dataclasses.dataclass(frozen=True)
 class Cylinder(Surface):
-    """A cylinder about an axis along Z, closed by its ends or open.
+    """A cylinder about an axis along X, Y or Z, closed by its ends or open.
 
     Parameters
     ----------
     radius : float, optional
         [mm]; None: from the rays.
     bottom, top : float, optional
-        Heights of the ends [mm]; None: from the rays' start points.
+        Where the ends are along the axis [mm]; None: from the rays' start points.
     centre : tuple of float
-        (x, y) of the axis [mm]
+        Where the axis is [mm]: (x, y) if it is along Z, (x, z) along Y, (y, z) along X.
     ends : bool
         Whether light that leaves through the ends belongs to the surface; if not, it is counted as not met.
+    axis : str
+        ``"x"``, ``"y"`` or ``"z"``.
 
     Raises
     ------
     ArgumentError
         If a number is not finite, a length is not above 0, or the top is not above the bottom.
+    UnknownNameError
+        If there is no such axis.
 
     Examples
     --------
     >>> [part.name for part in Cylinder(radius=2, bottom=0, top=5).parts()]
     ['side', 'top', 'bottom']
+    >>> [part.centre for part in Cylinder(radius=2, bottom=0, top=5, centre=(1, 7), axis="y").parts()]
+    [(1.0, 2.5, 7.0), (1.0, 5.0, 7.0), (1.0, 0.0, 7.0)]
     """
 
     NAME = "cylinder"
@@ -458,19 +469,29 @@ class Cylinder(Surface):
     top: float | None = None
     centre: tuple[float, float] = (0.0, 0.0)
     ends: bool = True
+    axis: str = "z"
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.axis not in AXES:
+            raise UnknownNameError("axis of a cylinder", self.axis, AXES)
         if self.bottom is not None and self.top is not None and not self.top > self.bottom:
             raise ArgumentError(f"Cylinder: top {self.top:g} is not above bottom {self.bottom:g}.")
 
     def parts(self) -> tuple[Part, ...]:
         """The side, and the two ends."""
         radius, bottom, top = (self.closed(name) for name in ("radius", "bottom", "top"))
-        side = Part("side", "tube", (*self.centre, (bottom + top) / 2), WORLD, (radius, top - bottom))
+        along = AXES.index(self.axis)
+        x, y, z = (_triple(np.eye(3)[(along + 1 + k) % 3]) for k in range(3))
+        down = (x, _triple(-np.array(y) + 0.0), _triple(-np.array(z) + 0.0))
+
+        def at(height: float) -> tuple[float, float, float]:
+            return _triple(np.insert(self.centre, along, height))
+
+        side = Part("side", "tube", at((bottom + top) / 2), (x, y, z), (radius, top - bottom))
         lids = (
-            Part("top", "disk", (*self.centre, top), WORLD, (radius, 0.0)),
-            Part("bottom", "disk", (*self.centre, bottom), DOWN, (radius, 0.0)),
+            Part("top", "disk", at(top), (x, y, z), (radius, 0.0)),
+            Part("bottom", "disk", at(bottom), down, (radius, 0.0)),
         )
         return (side, *lids) if self.ends else (side,)
 
@@ -479,13 +500,14 @@ class Cylinder(Surface):
         if not self.open_dimensions:
             return self
         position, _ = _places_and_directions(rays)
-        low, high = _span(position[:, 2], None)
+        along = AXES.index(self.axis)
+        low, high = _span(position[:, along], None)
         bottom = low if self.bottom is None else self.bottom
         top = high if self.top is None else self.top
         room = max(top - bottom, np.spacing(abs(top) + abs(bottom))) * SLACK
         return dataclasses.replace(
             self,
-            radius=self.radius or _reach(np.hypot(*(position[:, :2] - self.centre).T)),
+            radius=self.radius or _reach(np.hypot(*(np.delete(position, along, axis=1) - self.centre).T)),
             bottom=bottom - room if self.bottom is None else bottom,
             top=top + room if self.top is None else top,
         )
@@ -645,7 +667,9 @@ def parse_surface(text: str) -> Surface:
     return kind(**values)
 
 
-def _value(text: str, key: str, value: str) -> float | bool | tuple[float, ...]:
+def _value(text: str, key: str, value: str) -> float | bool | str | tuple[float, ...]:
+    if key == "axis":
+        return value
     if key == "ends":
         if value not in {"true", "false"}:
             raise ArgumentError(f"surface {text!r}: ends is {value!r}; write true or false.")

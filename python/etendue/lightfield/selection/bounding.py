@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.lightfield.counting import FloatArray
-from etendue.lightfield.surfaces import SLACK, STRAY, Box, Cylinder
+from etendue.lightfield.surfaces import AXES, SLACK, STRAY, Box, Cylinder
 
 LINES = 1 << 12
 """Lines that one search for the smallest ball looks at."""
@@ -107,8 +107,10 @@ def start_centre(position: FloatArray) -> FloatArray | None:
     return found
 
 
-def cylinder_of_lines(position: FloatArray, direction: FloatArray, start: FloatArray, seed: int) -> Cylinder | None:
-    """The smallest closed cylinder about an axis along Z that all lines meet, but for the share `STRAY` on each side.
+def cylinder_of_lines(
+    position: FloatArray, direction: FloatArray, start: FloatArray, seed: int, axis: str = "z"
+) -> Cylinder | None:
+    """The smallest closed cylinder along X, Y or Z that all lines meet, but for the share `STRAY` on each side.
 
     None if they all pass one height within the tube, as those of a flat source do. A line meets the cylinder if the lower
     of the heights at which it meets the tube is not above the top, and the higher not below the bottom.
@@ -121,7 +123,12 @@ def cylinder_of_lines(position: FloatArray, direction: FloatArray, start: FloatA
         Where the search for the axis begins [mm].
     seed : int
         Of the choice of lines.
+    axis : str
+        ``"x"``, ``"y"`` or ``"z"``.
     """
+    along = AXES.index(axis)
+    if axis != "z":
+        position, direction, start = (np.roll(v, 2 - along, axis=-1) for v in (position, direction, start))
     across = np.hypot(*direction[:, :2].T)
     oblique = across > 0.0
     if not oblique.any():
@@ -136,7 +143,10 @@ def cylinder_of_lines(position: FloatArray, direction: FloatArray, start: FloatA
     half = np.sqrt(np.maximum(radius**2 - np.sum(near**2, axis=1), 0.0))
     height, climb = x[:, 2] + middle * k[:, 2] / across, half * np.abs(k[:, 2]) / across
     bottom, top = float(np.quantile(height + climb, STRAY)), float(np.quantile(height - climb, 1.0 - STRAY))
-    return Cylinder(radius, bottom, top, (float(centre[0]), float(centre[1]))) if top > bottom and radius > 0 else None
+    if not (top > bottom and radius > 0):
+        return None
+    x, y = map(float, centre)
+    return Cylinder(radius, bottom, top, (y, x) if axis == "y" else (x, y), axis=axis)
 
 
 def box_of_lines(position: FloatArray, direction: FloatArray, centre: FloatArray, radius: float) -> Box | None:

@@ -93,7 +93,7 @@ def choose_surface(
       sphere on which they start, whichever is the smaller;
     - a dome about the same centre: a window at the depth of the rectangle, and a hemisphere for what does not pass it;
     - a sphere about it;
-    - a cylinder about Z: the smallest that all lines meet, or about their start points;
+    - a cylinder along X, Y or Z: the smallest that all lines meet, or about their start points;
     - a box about their start points, or a small one that nearly all lines meet.
 
     A field of up to 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and scored on

@@ -11,7 +11,7 @@ from etendue.lightfield.pilot_sample import pilot_sample, selected_rays
 from etendue.lightfield.selection.bounding import ball_centre, box_of_lines, cylinder_of_lines, near_rays, start_centre
 from etendue.lightfield.selection.line_search import golden_section
 from etendue.lightfield.selection.settings import SelectionSettings
-from etendue.lightfield.surfaces import SLACK, Box, Cylinder, Disk, Dome, Hemisphere, Part, Plane, Sphere, Surface
+from etendue.lightfield.surfaces import AXES, SLACK, Box, Cylinder, Disk, Dome, Hemisphere, Part, Plane, Sphere, Surface
 from etendue.quantities.ray_set import RaySet
 
 FLATS: tuple[tuple[type[Plane | Disk], bool], ...] = ((Plane, False), (Disk, False), (Plane, True), (Disk, True))
@@ -123,12 +123,15 @@ class TrialSurfaces:
         return domes
 
     def cylinders(self) -> list[Surface]:
-        """About the start points, unless they are flat; and the smallest that all lines meet."""
+        """Along each axis one about the start points, unless they are flat, and the smallest that all lines meet."""
         low, high = self.position.min(axis=0), self.position.max(axis=0)
-        starts = Cylinder(centre=(float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2))
-        lines = cylinder_of_lines(self.position, self.direction, self.centre, self.seed)
-        flat = high[2] - low[2] <= self.settings.depth_tolerance * self.radius
-        return [*([] if flat else [starts.sized_for(self.rays)]), *([] if lines is None else [lines])]
+        found: list[Surface | None] = []
+        for along, axis in enumerate(AXES):
+            if high[along] - low[along] > self.settings.depth_tolerance * self.radius:
+                x, y = (float(v) for v in np.delete((low + high) / 2.0, along))
+                found.append(Cylinder(centre=(x, y), axis=axis).sized_for(self.rays))
+            found.append(cylinder_of_lines(self.position, self.direction, self.centre, self.seed, axis))
+        return [cylinder for cylinder in found if cylinder is not None]
 
     def boxes(self) -> list[Surface]:
         """About the start points, and a small one that nearly all lines meet."""
