@@ -17,6 +17,9 @@ STEPS = 200
 ROUNDS = 20
 """Times that the faces of a box are moved, all six in turn, at most: most stand still after five."""
 
+FLAT = 1e-3
+"""Least side of a box, against the radius of the ball that the lines meet, below which a rectangle does as well."""
+
 MISSED = 100.0
 """What lines cost that miss a box, against ln of its area: it may leave a hundredth of them out for being smaller by 1/e."""
 
@@ -154,7 +157,7 @@ def box_of_lines(position: FloatArray, direction: FloatArray, centre: FloatArray
 
     It minimises ln A + `MISSED` · m, where A is the area of the box and m the share of the lines that miss it. From the cube
     about a ball on, each face in turn goes where that is least while the other five stand still, until none moves: first
-    with some of the lines, then with all. None if it has no thickness, as that of parallel lines has none.
+    with some of the lines, then with all. None if it is as good as flat (`FLAT`), as that of parallel lines is.
 
     Parameters
     ----------
@@ -187,7 +190,7 @@ def box_of_lines(position: FloatArray, direction: FloatArray, centre: FloatArray
                 ends = _within(faces, position[some], direction[some], axis)
                 for side in range(2):
                     faces[side, axis], cost = _best_face(faces, ends, len(position[some]), axis, side)
-                if not faces[1, axis] > faces[0, axis]:
+                if not faces[1, axis] - faces[0, axis] > FLAT * radius:
                     return None
             if not cost < before:
                 break

@@ -125,13 +125,13 @@ class TrialSurfaces:
     def cylinders(self) -> list[Surface]:
         """Along each axis one about the start points, unless they are flat, and the smallest that all lines meet."""
         low, high = self.position.min(axis=0), self.position.max(axis=0)
-        found: list[Surface | None] = []
+        found: list[Cylinder | None] = []
         for along, axis in enumerate(AXES):
             if high[along] - low[along] > self.settings.depth_tolerance * self.radius:
                 x, y = (float(v) for v in np.delete((low + high) / 2.0, along))
                 found.append(Cylinder(centre=(x, y), axis=axis).sized_for(self.rays))
             found.append(cylinder_of_lines(self.position, self.direction, self.centre, self.seed, axis))
-        return [cylinder for cylinder in found if cylinder is not None]
+        return [dataclasses.replace(c, radius=max(c.closed("radius"), self.least)) for c in found if c is not None]
 
     def boxes(self) -> list[Surface]:
         """About the start points, and a small one that nearly all lines meet."""
