@@ -19,7 +19,7 @@ SURFACES: dict[str, Surface] = {
     "cylinder": Cylinder(radius=0.8, bottom=-0.1, top=1.7, centre=(0.2, -0.1)),
     "open cylinder": Cylinder(radius=0.8, bottom=-0.1, top=1.7, ends=False),
     "cylinder along x": Cylinder(radius=0.8, bottom=-0.1, top=1.7, centre=(0.2, -0.1), axis="x"),
-    "cylinder along y": Cylinder(radius=0.8, bottom=-0.1, top=1.7, centre=(0.2, -0.1), axis="y"),
+    "open cylinder along y": Cylinder(radius=0.8, bottom=-0.1, top=1.7, centre=(0.2, -0.1), ends=False, axis="y"),
     "box": Box(1.1, 0.7, 1 / 3, centre=(0.2, 0.3, 0.4)),
     "dome": Dome(radius=1.264, z=0.3, centre=(0.1, -0.2)),
     "dome with a window": Dome(radius=1.264, window=0.9),

@@ -647,7 +647,7 @@ def parse_surface(text: str) -> Surface:
     Examples
     --------
     >>> parse_surface("cylinder:radius=2,bottom=0,top=5,ends=false")
-    Cylinder(radius=2.0, bottom=0.0, top=5.0, centre=(0.0, 0.0), ends=False)
+    Cylinder(radius=2.0, bottom=0.0, top=5.0, centre=(0.0, 0.0), ends=False, axis='z')
     """
     name, _, rest = text.partition(":")
     kind = SURFACES.get(name.strip())
