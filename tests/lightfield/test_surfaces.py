@@ -55,8 +55,14 @@ def test_a_cylinder_along_another_axis_is_that_along_z_turned() -> None:
 def test_an_axis_that_there_is_none_is_refused_with_those_that_there_are() -> None:
     with pytest.raises(UnknownNameError, match="axis of a cylinder"):
         et.parse_surface("cylinder:radius=1,axis=w")
-    with pytest.raises(UnknownNameError, match="axis"):
-        et.Cylinder(radius=1, axis="Z")
+    for axis in ("Z", None, 2):
+        with pytest.raises(UnknownNameError, match="axis"):
+            et.Cylinder(radius=1, axis=axis)  # type: ignore[arg-type]
+
+
+def test_text_is_no_length() -> None:
+    with pytest.raises(ValueError, match="could not convert"):
+        et.Disk(radius="wide")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("off", [0.0, 12.3, -10_000.03, 2.5e6])

@@ -115,6 +115,7 @@ class Part:
 
 
 AXES = ("x", "y", "z")
+"""Along which a cylinder may lie."""
 
 WORLD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 DOWN = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
@@ -143,7 +144,7 @@ class Surface(abc.ABC):
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, bool | str) or value is None:
+            if isinstance(value, bool) or value is None or field.name == "axis":
                 continue
             # Whatever numbers came in, floats are compared, printed and saved.
             numbers = tuple(float(v) for v in value) if isinstance(value, Iterable) else float(value)
@@ -474,7 +475,7 @@ class Cylinder(Surface):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.axis not in AXES:
-            raise UnknownNameError("axis of a cylinder", self.axis, AXES)
+            raise UnknownNameError("axis of a cylinder", str(self.axis), AXES)
         if self.bottom is not None and self.top is not None and not self.top > self.bottom:
             raise ArgumentError(f"Cylinder: top {self.top:g} is not above bottom {self.bottom:g}.")
 

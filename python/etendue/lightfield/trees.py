@@ -123,7 +123,7 @@ def _coarse(values: FloatArray | None, shape: tuple[int, ...]) -> FloatArray:
 def holding_memory(function: Callable[Given, Result]) -> Callable[Given, Result]:
     """The function, during which trees leave their memory to those that are grown after them: for work that grows many.
 
-    To fetch the memory of a tree from the system, page by page, and to clear it takes a third as long as to grow it.
+    To fetch the memory of a tree of a million cells from the system, and to clear it, takes up to as long as to grow it.
 
     Parameters
     ----------
