@@ -157,7 +157,7 @@ pub fn polya_evidence<'py>(
 #[pyclass(module = "etendue._core")]
 #[derive(Default)]
 pub struct TreeMemory {
-    held: Vec<polya::HeldMemory>,
+    held: Vec<polya::TreeMemory>,
 }
 
 #[pymethods]
@@ -168,7 +168,7 @@ impl TreeMemory {
     }
 
     fn __enter__(&mut self) {
-        self.held.push(polya::HeldMemory::begin());
+        self.held.push(polya::TreeMemory::begin());
     }
 
     fn __exit__(&mut self, _kind: Bound<'_, PyAny>, _error: Bound<'_, PyAny>, _traceback: Bound<'_, PyAny>) {

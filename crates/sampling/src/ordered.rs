@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -97,9 +98,47 @@ pub fn beside<T>(threads: usize, work: impl Fn(Option<&rayon::ThreadPool>) -> T)
     done.unwrap_or_else(|_| work(None))
 }
 
+/// Room to work in that no thread uses at present: it is made for as many threads as want some at once, and used again by the
+/// next task, as to fetch and clear its memory may take longer than a task.
+#[derive(Debug)]
+pub struct Idle<T>(Mutex<Vec<Box<T>>>);
+
+impl<T> Default for Idle<T> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<T> Idle<T> {
+    /// Does a task in some room, made if there is none.
+    pub fn with(&self, make: impl FnOnce() -> T, task: impl FnOnce(&mut T)) {
+        let idle = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let taken = idle().pop();
+        let mut room = taken.unwrap_or_else(|| Box::new(make()));
+        task(&mut room);
+        idle().push(room);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn room_is_used_again_and_made_where_all_is_in_use() {
+        let (idle, count) = (Idle::default(), std::cell::Cell::new(0));
+        let make = || {
+            count.set(count.get() + 1);
+            count.get()
+        };
+        idle.with(make, |outer| {
+            assert_eq!(*outer, 1);
+            idle.with(make, |inner| assert_eq!(*inner, 2));
+        });
+        // The last one given back comes first.
+        idle.with(make, |room| assert_eq!(*room, 1));
+        assert_eq!(count.get(), 2);
+    }
 
     #[test]
     fn a_pool_has_as_many_threads_as_asked_for() {

@@ -58,9 +58,9 @@ fn held() -> MutexGuard<'static, Held> {
 /// As long as one lives, trees leave their memory to those that are grown after them, whoever grows them: for work that grows
 /// many.
 #[derive(Debug)]
-pub struct HeldMemory(());
+pub struct TreeMemory(());
 
-impl HeldMemory {
+impl TreeMemory {
     /// From now on.
     #[must_use]
     pub fn begin() -> Self {
@@ -69,7 +69,7 @@ impl HeldMemory {
     }
 }
 
-impl Drop for HeldMemory {
+impl Drop for TreeMemory {
     fn drop(&mut self) {
         held().release();
     }

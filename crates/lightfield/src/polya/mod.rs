@@ -21,7 +21,7 @@ mod kernel;
 mod posterior;
 mod sweep;
 
-pub use array::HeldMemory;
+pub use array::TreeMemory;
 pub use average::{Average, average};
 pub use data::{Data, Masses};
 pub use grid::Grid;

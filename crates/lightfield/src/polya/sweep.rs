@@ -3,9 +3,9 @@
 //! Most boxes lie within tiles, and a tile is swept by one thread while all about it stays in the second cache. The boxes that are
 //! larger than tiles, a sixth or so, lie side by side level by level, and their chunks are shared among the threads.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use etendue_sampling::ordered::Idle;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -23,9 +23,8 @@ pub(super) struct Problem<'a> {
     /// Whether weights are unequal: then points are counted by (Σ w)²/Σ w².
     pub is_weighted: bool,
     pub stop: Option<&'a AtomicBool>,
-    /// Room that no thread uses at present.
-    #[allow(clippy::vec_box, reason = "they change hands")]
-    idle: Mutex<Vec<Box<Scratch>>>,
+    /// Room for the work on chunks and tiles.
+    idle: Idle<Scratch>,
 }
 
 impl<'a> Problem<'a> {
@@ -39,19 +38,8 @@ impl<'a> Problem<'a> {
             base,
             is_weighted: data.squared.is_some(),
             stop: data.stop,
-            idle: Mutex::default(),
+            idle: Idle::default(),
         }
-    }
-
-    /// Does something with room of its own, which is made for as many threads as ask at once: to clear it takes time.
-    fn with_room<T>(&self, work: impl FnOnce(&mut Scratch) -> T) -> T {
-        let taken = self.idle.lock().ok().and_then(|mut idle| idle.pop());
-        let mut scratch = taken.unwrap_or_else(|| Box::new(Scratch::new(self.grid.depths().len())));
-        let done = work(&mut scratch);
-        if let Ok(mut idle) = self.idle.lock() {
-            idle.push(scratch);
-        }
-        done
     }
 
     /// Whether somebody wants the rest to be left out.
@@ -128,7 +116,8 @@ pub(super) fn each<T: Send>(
 ) {
     let work = |task| {
         if !problem.is_stopped() {
-            problem.with_room(|scratch| work(scratch, task));
+            let make = || Scratch::new(problem.grid.depths().len());
+            problem.idle.with(make, |scratch| work(scratch, task));
         }
     };
     match pool {

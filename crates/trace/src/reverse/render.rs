@@ -8,11 +8,11 @@
 //! Radiance grows by (n₁/n₂)² on its way from a medium of index n₂ into one of n₁.
 
 use std::ops::Range;
-use std::sync::Mutex;
 
 use etendue_geometry::surface_points::Vectors;
 use etendue_lightfield::View;
 use etendue_sampling::lattice::{ShiftedPoint, first_two};
+use etendue_sampling::ordered::Idle;
 use etendue_sampling::philox::Stream;
 use rayon::prelude::*;
 
@@ -79,15 +79,10 @@ pub fn render(
     let chunks = pixels
         .par_chunks_mut(chunk * passes.len().max(1))
         .zip(which.par_chunks(chunk));
-    // Their memory takes longer to fetch than a chunk takes.
-    let idle = Mutex::new(Vec::new());
+    let idle = Idle::default();
     chunks.for_each(|(pixels, which)| {
-        let taken = idle.lock().ok().and_then(|mut idle| idle.pop());
-        let mut renderer = taken.unwrap_or_else(|| Renderer::new(lit, view, method, &known));
-        renderer.paint(which, passes.clone(), pixels);
-        if let Ok(mut idle) = idle.lock() {
-            idle.push(renderer);
-        }
+        let make = || Renderer::new(lit, view, method, &known);
+        idle.with(make, |renderer| renderer.paint(which, passes.clone(), pixels));
     });
     Image { columns, rows, pixels }
 }
