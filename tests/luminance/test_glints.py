@@ -89,6 +89,22 @@ def glass(kind: str) -> dict[str, Any]:
     return {"sources": [{**lamp, "at": [4, 2, 30], "toward": [-0.1, -0.05, -1]}], "solids": [shapes[kind]]}
 
 
+@pytest.mark.parametrize("kind", ["ball", "torus"])
+def test_what_has_no_index_hides_no_glint(kind: str) -> None:
+    """Blocks of nothing stand around all of it, and around the lamp alone: lines of sight go on behind their faces as they
+    came, those beside them too."""
+    scene = glass(kind)
+    block = {"kind": "block", "width": 80, "height": 80, "depth": 90}
+    around = [{"shape": block, "medium": {"index": 1.0}, "at": [0, 0, z]} for z in (-30, 25)]
+    eye, screen = et.Observer(55, 20, 300, target=(1, 0.5, 9)), et.Screen(18, 14, 9, 7)
+    with_glints = []
+    for blocks in ([], around[:1], around[1:]):
+        solids = [*blocks, *scene["solids"]]
+        core = _core.Scene(compile_scene(et.Scene(sources=scene["sources"], solids=solids)).record)
+        with_glints.append(_core.Glints(core, screen.core_view(eye), MOST_EVENTS).pixels())
+    assert with_glints[0] == with_glints[1] == with_glints[2] > 0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ball", "torus"])
 def test_glints_in_glass(kind: str) -> None:

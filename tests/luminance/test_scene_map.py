@@ -10,13 +10,11 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
-from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield import fit_cache
 from etendue.luminance.methods import PathTracing
 from etendue.luminance.scene_map import look_at_scene, with_fields
 from etendue.quantities.luminance_map import LuminanceMap
-from etendue.scene import compile_scene
 from oracles.luminaires import corner
 from oracles.verdicts import LARGEST_Z, assert_agree
 
@@ -57,48 +55,6 @@ def test_what_lies_beside_a_lamp_changes_no_bit_of_its_image() -> None:
 
 
 # --- without noise ---------------------------------------------------------------------------------------------------
-
-
-def test_interfaces_many_at_a_time_are_as_one_by_one() -> None:
-    """A tinted prism whose corners state the normals of its sides is crossed branch by branch, one that states none many
-    branches at a time. Four events of an index of 2.5 leave no branch so weak that it is drawn."""
-    vertices = [[0, 0, 0], [5, 0, 0], [0, 4, 0], [0.5, 0, 6], [5, 1, 6], [0, 4, 5.5]]
-    triangles = [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]]
-    lamp = {"kind": "surface", "shape": {"kind": "rectangle", "width": 9, "height": 5}, "flux": 7, "exponent": 2,
-            "at": [1, 2, -2]}  # fmt: skip
-    view = et.Screen(9, 8, 24, 20).core_view(et.Observer(25, 200, 60, target=(2, 1.5, 3)))
-    maps = []
-    for stated in ({}, {"crease_angle": 0.01}):
-        body = {"kind": "mesh", "vertices": vertices, "triangles": triangles, **stated}
-        solid = {"shape": body, "medium": "glass", "rotation": [10, 20, 30], "at": [0.1, 0.2, 0.3]}
-        media = {"glass": {"index": 2.5, "absorption": 0.02}}
-        core = _core.Scene(compile_scene(et.Scene(sources=[lamp], solids=[solid], media=media)).record)
-        maps.append(_core.look_at_scene(core, view, 16, 3, 4, "nothing", 0, 2)[0])
-    through = maps[0] > 0
-    assert through.mean() > 0.3
-    np.testing.assert_allclose(maps[0], maps[1], rtol=1e-9, atol=1e-12 * maps[0].max())
-
-
-LENS = {"kind": "lens", "radius": 4, "thickness": 2.5, "front": {"radius_of_curvature": 8, "conic": -0.6},
-        "back": {"radius_of_curvature": -20}}  # fmt: skip
-FURNACE: dict[str, dict[str, Any]] = {
-    "ball": {"shape": {"kind": "ball", "radius": 3}, "medium": "BK7"},
-    "lens": {"shape": LENS, "medium": "PMMA"},
-    "block": {"shape": {"kind": "block", "width": 4, "height": 3, "depth": 2}, "medium": "PC"},
-    "dome": {"shape": {"kind": "dome", "radius": 3}, "medium": "silicone"},
-    "rod": {"shape": {"kind": "rod", "radius": 2, "height": 4}, "medium": "PC"},
-}
-
-
-@pytest.mark.parametrize("body", FURNACE)
-def test_furnace(body: str) -> None:
-    """V9: L ≡ 1 around any lossless optic, seen from a slant and turned: every pixel is 1 without noise, but for branches of
-    less than 1e-4 that are drawn by chance."""
-    solid = {**FURNACE[body], "rotation": [20, -35, 50], "at": [0.2, -0.3, 0.1]}
-    lmap = seen(et.Observer(35, 20, 40), et.Screen(8, 8, 12, 12), sources=[sky()], solids=[solid])
-    off = np.abs(lmap.values / 1e6 - 1)
-    assert (off <= 6 * lmap.standard_error / 1e6 + 1e-9).all()
-    assert off.max() < 2e-3
 
 
 def test_a_mirror_shows_the_surround() -> None:

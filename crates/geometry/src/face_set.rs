@@ -168,12 +168,18 @@ impl FaceSet {
         }
     }
 
-    /// Tries faces on one ray: those that no block is tried on, and those in the tree.
+    /// Tries the faces on one ray that no block is tried on, though they are in no tree.
     #[inline(always)]
-    fn try_one(&self, o: Vec3, d: Vec3, origin_faces: &OriginFaces, one: &mut One, stack: &mut Stack) {
+    fn try_others(&self, o: Vec3, d: Vec3, origin_faces: &OriginFaces, one: &mut One) {
         for &index in &self.others {
             self.try_face(index, o, d, origin_faces, one);
         }
+    }
+
+    /// Tries faces on one ray: those that no block is tried on, and those in the tree.
+    #[inline(always)]
+    fn try_one(&self, o: Vec3, d: Vec3, origin_faces: &OriginFaces, one: &mut One, stack: &mut Stack) {
+        self.try_others(o, d, origin_faces, one);
         if let Some((tree, faces)) = &self.tree {
             let probe = Probe::new(o, d, 0.0);
             let mut walk = Walk::new(tree, &probe, stack);
@@ -225,7 +231,11 @@ impl FaceSet {
         {
             self.try_face(index, o, d, origin_faces, &mut one);
         }
-        self.try_one(o, d, origin_faces, &mut one, &mut Stack::lend());
+        if self.tree.is_none() {
+            self.try_others(o, d, origin_faces, &mut one);
+        } else {
+            self.try_one(o, d, origin_faces, &mut one, &mut Stack::lend());
+        }
         let (part, uv) = one.part;
         (one.face != NONE).then_some((one.face, Crossing { t: one.t, part, uv }, one.second))
     }

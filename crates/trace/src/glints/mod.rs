@@ -5,9 +5,10 @@
 //! again go where they are: those of both kinds share the light by the balance heuristic `[Veach1995]`. Whatever was not
 //! found, or not rightly, is left to the lines that are spread evenly: no light is lost or counted twice.
 //!
-//! `image`: the place of an image; `targets`: points of sources; `passing`: how lines of sight pass them; `search`: chains of
-//! smooth surfaces that end on a source; `pixels`: the images in each pixel.
+//! `image`: the place of an image; `targets`: points of sources; `passing`: how lines of sight pass them; `chain`: lines of
+//! sight at smooth surfaces; `search`: chains of these that end on a source; `pixels`: the images in each pixel.
 
+mod chain;
 mod image;
 mod passing;
 mod pixels;

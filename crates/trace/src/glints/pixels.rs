@@ -11,7 +11,7 @@ use super::targets::targets;
 use crate::lit_scene::LitScene;
 
 /// Starts of the search over all pixels: more per pixel where these are few.
-const STARTS: usize = 1 << 15;
+const STARTS: usize = 1 << 14;
 
 /// Starts in one pixel, at most.
 const MOST_STARTS: usize = 16;
@@ -64,7 +64,13 @@ impl Glints {
         };
         let pixels = view.pixels();
         let [columns, rows] = lit.window(view);
-        let beside = |range: Range<u32>, n: u32| range.start.saturating_sub(BESIDE)..(range.end + BESIDE).min(n);
+        let starts = (STARTS / pixels.max(1)).clamp(1, MOST_STARTS);
+        let side = tile_side(starts);
+        // Whole tiles, that lie where they do in any window.
+        let beside = |range: Range<u32>, n: u32| {
+            let from = range.start.saturating_sub(BESIDE) / side * side;
+            from..((range.end + BESIDE).div_ceil(side) * side).min(n)
+        };
         let (columns, rows) = (beside(columns, view.columns), beside(rows, view.rows));
         let pixels_of = |rows: Range<u32>, columns: Range<u32>| -> Vec<usize> {
             let of_row = |row: u32| {
@@ -75,7 +81,6 @@ impl Glints {
             rows.flat_map(of_row).collect()
         };
         let window = pixels_of(rows.clone(), columns.clone());
-        let starts = (STARTS / pixels.max(1)).clamp(1, MOST_STARTS);
         let [first, caught] = window
             .par_iter()
             .filter(|pixel| *pixel % FIRST_LOOK == 0)
@@ -92,7 +97,6 @@ impl Glints {
         if first == 0 && 2 * caught > starts * pixels.div_ceil(FIRST_LOOK) {
             search.spend_little();
         }
-        let side = tile_side(starts);
         let cut = |range: &Range<u32>| {
             let range = range.clone();
             range

@@ -10,6 +10,7 @@ use etendue_lightfield::View;
 use etendue_math::Vec3;
 use etendue_sampling::lattice::{DIMENSIONS, lattice_point};
 
+use super::chain::{Chain, interactions, straight, turn, turned};
 use super::image::Found;
 use super::passing::{
     BESIDE, Line, Pair, Square, WIDEST, determinant, image, passing, spread_on_screen, times, widths,
@@ -19,7 +20,7 @@ use crate::interaction::{Interaction, first_interaction};
 use crate::lit_scene::LitScene;
 use crate::medium_cache::MediumCache;
 use crate::ray_start::place;
-use crate::scatter::{SPLIT, SurfaceEvent};
+use crate::scatter::SPLIT;
 use crate::scene::Scene;
 use crate::solid_stack::SolidStack;
 
@@ -47,6 +48,12 @@ const STEPS: u32 = 20;
 /// Steps beyond an edge that are taken back, at most: an image that lies there is none.
 const EDGES: u32 = 4;
 
+/// From how far away an image is approached, in pixels: a point of it that is not the nearest to the start may lie farther away.
+const FAR: f64 = 2.0 * NEAR;
+
+/// Steps that come no nearer, at most: not half way, or half a pixel. Other starts lie where lines move more evenly.
+const SLIPS: u32 = 1;
+
 /// The lesser width of a whole source from which on no image of it is looked for, in pixels.
 const LARGE: f64 = 4.0 * WIDEST;
 
@@ -67,14 +74,6 @@ pub type Sight = (usize, Vec<bool>);
 
 /// What comes of the starts in a pixel: images, wherever they are, and what most of the starts see without a search.
 pub type FromPixel = (Vec<Found>, Vec<Sight>);
-
-/// A chain of smooth surfaces from a start: the line there and those beside it.
-#[derive(Clone)]
-struct Chain {
-    lines: [Line; 3],
-    weight: f64,
-    ways: Vec<bool>,
-}
 
 /// What is needed to look for images.
 #[derive(Clone)]
@@ -247,18 +246,16 @@ impl<'a> Search<'a> {
                 if interactions >= MOST_MEETINGS || events > self.most_events as usize {
                     return;
                 }
-                let Some(shares) = self.shares(&chain.lines[0], &met[0], wavelength) else {
-                    chain.lines = met.map(|met| Line {
-                        o: met.point,
-                        d: chain.lines[0].d,
-                        stack: met.after,
-                        origin_faces: met.origin_faces,
-                    });
+                let Ok(at) = turn(self.scene, &chain.lines, &met, wavelength, &mut self.media) else {
+                    break;
+                };
+                let Some(at) = at else {
+                    chain.lines = straight(&chain.lines, &met);
                     continue;
                 };
-                for (transmitted, share) in [(false, shares[0]), (true, shares[1])] {
-                    let weight = chain.weight * share;
-                    let lines = (weight > SPLIT).then(|| self.turned(&chain.lines, &met, transmitted, wavelength));
+                for (transmitted, factor) in [(false, at[0].factors[0]), (true, at[0].factors[1])] {
+                    let weight = chain.weight * factor;
+                    let lines = (weight > SPLIT).then(|| turned(&at, transmitted));
                     if let Some(lines) = lines.flatten() {
                         let mut ways = chain.ways.clone();
                         ways.push(transmitted);
@@ -280,61 +277,10 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// What three lines meet; None if it is nothing, or not the same.
+    /// What three lines meet; None if it is nothing, or not the same, or nothing more is to be met.
     fn interactions(&mut self, lines: &[Line; 3]) -> Option<[Interaction; 3]> {
         self.left = self.left.checked_sub(1)?;
-        let next = |line: &Line| {
-            first_interaction(
-                self.scene,
-                line.o,
-                line.d,
-                &line.origin_faces,
-                f64::INFINITY,
-                line.stack,
-            )
-        };
-        let first = next(&lines[0]).ok()??;
-        let same = |line: &Line| {
-            let met = next(line).ok()??;
-            (met.face == first.face && met.finish == first.finish && met.after == first.after).then_some(met)
-        };
-        Some([first, same(&lines[1])?, same(&lines[2])?])
-    }
-
-    /// What of the radiance is mirrored and refracted; None if the line goes on as if nothing were there.
-    fn shares(&mut self, line: &Line, met: &Interaction, wavelength: f64) -> Option<Pair> {
-        let event = SurfaceEvent::new(self.scene, met, line.d, wavelength, &mut self.media);
-        Some(event.ok()??.seen().0)
-    }
-
-    /// Three lines beyond a smooth surface; None if one of them cannot go there.
-    fn turned(
-        &mut self,
-        lines: &[Line; 3],
-        met: &[Interaction; 3],
-        transmitted: bool,
-        wavelength: f64,
-    ) -> Option<[Line; 3]> {
-        let mut result = *lines;
-        for (line, met) in result.iter_mut().zip(met) {
-            let event = SurfaceEvent::new(self.scene, met, line.d, wavelength, &mut self.media).ok()??;
-            let (smooth, shares) = event.seen();
-            if smooth[usize::from(transmitted)] <= 0.0 {
-                return None;
-            }
-            let (d, stack) = if transmitted {
-                event.refracted(shares.refraction)
-            } else {
-                event.mirrored()
-            };
-            *line = Line {
-                o: met.point,
-                d,
-                stack,
-                origin_faces: met.origin_faces,
-            };
-        }
-        Some(result)
+        interactions(self.scene, lines)
     }
 
     /// The lines from a place along known ways.
@@ -347,22 +293,27 @@ impl<'a> Search<'a> {
                 return None;
             }
             let met = self.interactions(&lines)?;
-            if self.shares(&lines[0], &met[0], wavelength).is_some() {
-                lines = self.turned(&lines, &met, ways[done], wavelength)?;
+            if let Some(at) = turn(self.scene, &lines, &met, wavelength, &mut self.media).ok()? {
+                lines = turned(&at, ways[done])?;
                 done += 1;
             } else {
-                let before = lines;
-                for ((line, met), before) in lines.iter_mut().zip(met).zip(before) {
-                    *line = Line {
-                        o: met.point,
-                        d: before.d,
-                        stack: met.after,
-                        origin_faces: met.origin_faces,
-                    };
-                }
+                lines = straight(&lines, &met);
             }
         }
         Some(lines)
+    }
+
+    /// How far lines go before they are turned or end.
+    fn reach(&mut self, mut lines: [Line; 3], wavelength: f64) -> f64 {
+        let mut reach = 0.0;
+        while let Some(met) = self.interactions(&lines) {
+            reach += met[0].t;
+            let Ok(None) = turn(self.scene, &lines, &met, wavelength, &mut self.media) else {
+                return reach;
+            };
+            lines = straight(&lines, &met);
+        }
+        f64::INFINITY
     }
 
     /// Looks for images of a source near to a start.
@@ -386,24 +337,22 @@ impl<'a> Search<'a> {
         }
         let norm = inverse.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
         let step = times(&inverse, middle.off);
-        if step[0].hypot(step[1]) > NEAR + norm * target.radius {
+        if square(step) > (NEAR + norm * target.radius).powi(2) {
             return;
         }
         // Whatever is far larger than a pixel is no small image.
         if widths(&spread_on_screen(&inverse, &middle.axes, &target.spread)).1 > LARGE {
             return;
         }
-        let distance = |point: &Vec3| {
+        let distance2 = |point: &Vec3| {
             let passing = passing(&chain.lines, *point);
-            passing.inverse().map_or(f64::INFINITY, |inverse| {
-                let step = times(&inverse, passing.off);
-                step[0].hypot(step[1])
-            })
+            let inverse = passing.inverse();
+            inverse.map_or(f64::INFINITY, |inverse| square(times(&inverse, passing.off)))
         };
         let nearest = (0..target.points.len())
-            .map(|k| (distance(&target.points[k]), k))
+            .map(|k| (distance2(&target.points[k]), k))
             .fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a });
-        if nearest.0 > NEAR {
+        if nearest.0 > NEAR * NEAR {
             return;
         }
         let sight = (target.source, chain.ways.clone());
@@ -413,8 +362,7 @@ impl<'a> Search<'a> {
         }
         let before = found.len();
         for k in [nearest.1, number % target.points.len()] {
-            let Some((place, inverse, axes)) = self.approach(target.points[k], at, &chain.ways, target, wavelength)
-            else {
+            let Some((place, inverse, axes)) = self.approach(target.points[k], at, chain, target, wavelength) else {
                 continue;
             };
             let whole = spread_on_screen(&inverse, &axes, &target.spread);
@@ -455,15 +403,20 @@ impl<'a> Search<'a> {
         &mut self,
         point: Vec3,
         start: Pair,
-        ways: &[bool],
+        chain: &Chain,
         target: &Target,
         wavelength: f64,
     ) -> Option<(Pair, Square, [Vec3; 2])> {
         let (mut at, mut last) = (start, start);
         let close = 1e-3 * (target.spread[0][0] + target.spread[1][1] + target.spread[2][2]).sqrt();
-        let mut edges = 0;
+        let (mut edges, mut slips, mut distance) = (0, 0, f64::INFINITY);
         for step in 0..STEPS {
-            let Some(lines) = self.follow(at, ways, wavelength) else {
+            let there = if step == 0 {
+                Some(chain.lines)
+            } else {
+                self.follow(at, &chain.ways, wavelength)
+            };
+            let Some(lines) = there else {
                 edges += 1;
                 if edges == EDGES || self.left == 0 {
                     return None;
@@ -475,20 +428,21 @@ impl<'a> Search<'a> {
             let passing = passing(&lines, point);
             let inverse = passing.inverse()?;
             let mut way = times(&inverse, passing.off);
-            if passing.off[0].hypot(passing.off[1]) < close {
+            if square(passing.off) < close * close {
                 if self.left == 0 {
                     return None;
                 }
                 // Another surface may stand before it.
-                let reach = self.interactions(&lines).map_or(f64::INFINITY, |met| met[0].t);
+                let reach = self.reach(lines, wavelength);
                 let there = passing.along > 0.0 && passing.along <= reach * (1.0 + HIDDEN);
                 return there.then_some(([at[0] - way[0], at[1] - way[1]], inverse, passing.axes));
             }
-            let length = way[0].hypot(way[1]);
-            if length > f64::from(STEPS - step) {
-                // Farther away than the steps reach that are left.
+            let length = square(way).sqrt();
+            slips += u32::from(length > (0.5 * distance).max(distance - 0.5));
+            if length > FAR || slips > SLIPS {
                 return None;
             }
+            distance = length;
             if length > 1.0 {
                 way = way.map(|x| x / length);
             }
@@ -501,6 +455,11 @@ impl<'a> Search<'a> {
         }
         None
     }
+}
+
+/// The square of a length.
+fn square([x, y]: Pair) -> f64 {
+    x * x + y * y
 }
 
 /// What was seen from more than half of so many starts.

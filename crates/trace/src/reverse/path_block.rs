@@ -49,7 +49,28 @@ pub(super) struct Branch {
     pub(super) density: f64,
     /// Its ways through smooth surfaces from the observer (see [`led_on`](crate::glints::led_on)).
     pub(super) ways: u32,
+    /// On one of 2^`thinned` lines of sight it is followed, for all of them.
+    pub(super) thinned: u8,
 }
+
+impl Branch {
+    /// On one of 2^`thinned` lines of sight instead of as many as before.
+    #[inline(always)]
+    pub(super) fn thinned_to(self, thinned: u8) -> Self {
+        let times = f64::from(1_u32 << (thinned - self.thinned));
+        Self {
+            weight: self.weight * times,
+            thinned,
+            ..self
+        }
+    }
+}
+
+/// A way that carries less of the light than this is followed on fewer lines of sight.
+const WEAK: f64 = 0.25;
+
+/// Of the lines of a pass through a pixel as many are left as this, at least: their mean errs little, and so do errors of it.
+const LEFT: u32 = 8;
 
 /// Paths of one pass through one pixel.
 pub(super) struct PixelPass {
@@ -62,6 +83,8 @@ pub(super) struct PixelPass {
     /// The point of the first of them, and by how much the first numbers of all are moved.
     pub(super) point: ShiftedPoint,
     pub(super) shift: [f64; 4],
+    /// Where among them those begin on which weak ways are followed: as a share of all, times 2³².
+    pub(super) turn: u32,
     /// Where their further numbers are found.
     pub(super) stream: Stream,
     pub(super) address: u64,
@@ -192,9 +215,44 @@ impl<'a> PathBlock<'a> {
         &mut self.numbers[place]
     }
 
+    /// On one of how many lines of sight a way is followed that carries `share` of a branch's light, as a power of two; None if
+    /// not on this one. The weight grows as they become fewer.
+    ///
+    /// What a weak way brings errs little, measured by all light: so on one line in 2, 4, 8 … if it carries less than 1/4, 1/16,
+    /// 1/64 … Those lines follow each other, so that they are spread evenly over their pixel as well; each is one of them with
+    /// that probability, and a way that is weak twice is followed on some of the lines on which the first one is.
+    ///
+    /// On all of them where they look for small images of sources, or go on from diffuse surfaces to where smooth ones focus
+    /// light: what is found rarely must not be found on fewer lines, and count for more there.
+    #[inline(always)]
+    pub(super) fn followed(&self, branch: &Branch, share: f64) -> Option<u8> {
+        let path = &self.paths[branch.path as usize];
+        let pass = self.pass_of(path);
+        if share >= WEAK || pass.aimed || self.method.guide.is_some() {
+            return (share > 0.0).then_some(branch.thinned);
+        }
+        // By the exponent of two: 1/4, 1/16 … halve the lines once more.
+        let halvings = 1022_u64.saturating_sub(share.to_bits() >> 52) / 2;
+        let most = (self.method.paths / LEFT).max(1).ilog2();
+        #[allow(clippy::cast_possible_truncation, reason = "below 32; a number of 32 bits")]
+        let (thinned, place) = (
+            (u64::from(branch.thinned) + halvings).min(u64::from(most)) as u8,
+            ((u64::from(path.index) << 32) / u64::from(self.method.paths)) as u32,
+        );
+        let among = u64::from(place.wrapping_add(pass.turn)) << thinned < 1 << 32;
+        (share > 0.0 && among).then_some(thinned)
+    }
+
     /// The pixel and pass of a path.
     pub(super) fn pass_of(&self, path: &Path) -> &PixelPass {
         &self.passes[path.pass as usize]
+    }
+
+    /// A branch goes on a way through a smooth surface that carries `share` of its light, if it is followed there.
+    pub(super) fn push_if_followed(&mut self, interaction: &Interaction, d: Vec3, branch: Branch, share: f64) {
+        if let Some(thinned) = self.followed(&branch, share) {
+            self.push(interaction, d, branch.thinned_to(thinned));
+        }
     }
 
     pub(super) fn push(&mut self, interaction: &Interaction, d: Vec3, branch: Branch) {

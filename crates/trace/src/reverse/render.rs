@@ -1,8 +1,8 @@
 //! From the observer to the sources.
 //!
-//! A path starts at the observer, through a point of the pixel. While it meets smooth surfaces only, all its branches are followed:
-//! that part of the image has no noise but that of the places within the pixel and of sources that err. At a diffuse surface
-//! one direction is drawn, and points of the sources are connected to; a direction that both could find is shared out
+//! A path starts at the observer, through a point of the pixel. While it meets smooth surfaces only, all its branches are followed,
+//! weak ones on some of many paths: that part of the image has hardly any noise but that of the places within the pixel and of
+//! sources that err. At a diffuse surface one direction is drawn, and points of the sources are connected to; a direction that both could find is shared out
 //! between them by the balance heuristic `[Veach1995]`.
 //!
 //! Radiance grows by (n₁/n₂)² on its way from a medium of index n₂ into one of n₁.
@@ -23,9 +23,10 @@ use crate::exitance::{ExitanceCache, ExitanceSurvey};
 use crate::glints;
 use crate::lit_scene::LitScene;
 
-/// The purposes under which shifts of lattices and events of paths are drawn (see [`Stream::new`]).
+/// The purposes under which shifts of lattices, the lines with weak ways and events of paths are drawn (see [`Stream::new`]).
 const PURPOSE_SHIFT: u64 = 0x5348_4946;
 const PURPOSE_PATH: u64 = 0x5041_5448;
+const PURPOSE_TURN: u64 = 0x5455_524E;
 
 /// What is added to a purpose for the paths that look for small images of sources.
 const AIMED: u64 = 1 << 32;
@@ -186,7 +187,7 @@ impl<'a> Renderer<'a> {
     #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
     fn aim(&mut self, pixel: usize, [pass, made]: [u32; 2], indices: Range<u32>, aimed: bool) {
         let Self { block, starts, .. } = self;
-        let [shifts, stream] = [PURPOSE_SHIFT, PURPOSE_PATH]
+        let [shifts, turns, stream] = [PURPOSE_SHIFT, PURPOSE_TURN, PURPOSE_PATH]
             .map(|purpose| Stream::new(block.method.seed, purpose + if aimed { AIMED } else { 0 }));
         let point = ShiftedPoint::new(0, shifts, [pixel as u64, u64::from(pass) << 8]);
         let shift = point.shift(0);
@@ -199,6 +200,7 @@ impl<'a> Renderer<'a> {
             aimed,
             point,
             shift,
+            turn: turns.words(pixel as u64 | u64::from(pass) << 40)[0] as u32,
             stream,
             address: (pixel as u64) << 44 | u64::from(pass) << 20,
         };
@@ -279,6 +281,7 @@ impl<'a> Renderer<'a> {
                 direct: true,
                 density: 0.0,
                 ways: glints::STRAIGHT,
+                thinned: 0,
             };
             let branches = starts.paths.iter().map(|path| Branch { path: *path, ..branch });
             block.branches.extend(branches);

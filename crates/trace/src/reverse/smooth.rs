@@ -96,13 +96,15 @@ struct SplitScratch {
     part: Vec<u32>,
     points: Vectors,
     normals: Vectors,
-    /// Where they come along and where they are mirrored to.
-    mirrored: Vectors,
-    refracted: Vectors,
-    /// Shares of the radiance that go on mirrored and refracted; NaN where the normal contradicts what the line is in.
+    /// Where they come along.
+    directions: Vectors,
+    /// Where they are mirrored to, each in its turn, and then where they are refracted to.
+    ways: Vectors,
+    /// Shares of the flux that go on mirrored and refracted; NaN where the normal contradicts what the line is in.
     shares: [Vec<f64>; 2],
-    /// Those of them that go on.
+    /// Those of them that go on, and on which of the ways.
     going: Vec<u32>,
+    on: Vec<u32>,
     sorted: [Vectors; 2],
 }
 
@@ -147,69 +149,84 @@ impl PathBlock<'_> {
             fill(list, sides().map(|sides| sides.n[side]));
         }
         gather(&mut scratch.points, &self.lines.origin, &scratch.which);
-        gather(&mut scratch.mirrored, &self.lines.direction, &scratch.which);
+        gather(&mut scratch.directions, &self.lines.direction, &scratch.which);
         let surface = &self.lit.scene.face_set.faces()[number];
         surface_points(
             surface,
             &mut scratch.points,
-            &scratch.mirrored,
+            &scratch.directions,
             &scratch.t,
             &scratch.part,
             &mut scratch.normals,
         );
         refract_all(scratch);
+        self.send_on(hits, scratch);
+        let [points, ways] = &mut scratch.sorted;
+        gather(points, &scratch.points, &scratch.going);
+        gather(ways, &scratch.ways, &scratch.on);
+        let [o, d] = [points, ways].map(|lists| lists.each_ref().map(|list| &list[..]));
+        #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
+        let face = number as u32;
+        self.next_lines
+            .extend(o, d, face, scratch.going.iter().map(|k| scratch.part[*k as usize]));
+    }
+
+    /// Branches at an interface go on mirrored and refracted, or on one of both ways.
+    fn send_on(&mut self, hits: &Hits, scratch: &mut SplitScratch) {
+        scratch.going.clear();
+        scratch.on.clear();
+        let all = scratch.which.len();
         for (k, i) in scratch.which.iter().enumerate() {
-            if scratch.shares[0][k].is_nan() {
+            let mut shares = [scratch.shares[0][k], scratch.shares[1][k]];
+            if shares[0].is_nan() {
                 self.step(hits, *i as usize);
                 continue;
             }
-            let branch = &mut self.branches[*i as usize];
+            let mut branch = self.branches[*i as usize];
             if branch.seen == Seen::Smooth {
                 self.paths[branch.path as usize].met[0] = true;
             }
             branch.events += 1;
             branch.travelled += scratch.t[k];
             branch.direct &= branch.scatters > 0;
-            let Sides { n, absorption, .. } = scratch.kinds[scratch.kind[k] as usize];
-            if absorption > 0.0 {
-                branch.weight *= (-absorption * scratch.t[k]).exp();
+            let sides = &scratch.kinds[scratch.kind[k] as usize];
+            if sides.absorption > 0.0 {
+                branch.weight *= (-sides.absorption * scratch.t[k]).exp();
             }
             if branch.seen != Seen::Smooth {
                 branch.seen = Seen::Caustic;
             }
             if branch.seen != Seen::Smooth || branch.weight <= SPLIT {
-                // One of both ways is drawn by its share of the flux; radiance carries its factor (n₁/n₂)² besides.
+                // One of both ways is drawn by its share of the flux.
                 branch.drawn = true;
-                let path = branch.path;
-                let mirrored = self.numbers(path).draw() < scratch.shares[0][k];
-                let ratio = n[0] / n[1];
-                scratch.shares[0][k] = if mirrored { 1.0 } else { 0.0 };
-                scratch.shares[1][k] = if mirrored { 0.0 } else { ratio * ratio };
+                let mirrored = self.numbers(branch.path).draw() < shares[0];
+                shares = if mirrored { [1.0, 0.0] } else { [0.0, 1.0] };
             }
-        }
-        for (transmitted, directions) in [(false, &scratch.mirrored), (true, &scratch.refracted)] {
-            let shares = &scratch.shares[usize::from(transmitted)];
-            scratch.going.clear();
-            for (k, i) in scratch.which.iter().enumerate() {
-                let mut branch = self.branches[*i as usize];
-                branch.weight *= shares[k];
-                branch.ways = led_on(branch.ways, transmitted);
-                let sides = &scratch.kinds[scratch.kind[k] as usize];
-                branch.stack = if transmitted { sides.after } else { sides.before };
-                if branch.weight > 0.0 {
+            let ratio = sides.n[0] / sides.n[1];
+            for (transmitted, share) in [(false, shares[0]), (true, shares[1])] {
+                let Some(thinned) = self.followed(&branch, share) else {
+                    continue;
+                };
+                // Radiance carries its factor (n₁/n₂)² besides.
+                let (factor, stack) = if transmitted {
+                    (share * (ratio * ratio), sides.after)
+                } else {
+                    (share, sides.before)
+                };
+                let on = Branch {
+                    weight: branch.weight * factor,
+                    ways: led_on(branch.ways, transmitted),
+                    stack,
+                    ..branch
+                };
+                if on.weight > 0.0 {
+                    self.next.push(on.thinned_to(thinned));
                     #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
-                    scratch.going.push(k as u32);
-                    self.next.push(branch);
+                    let place = (k as u32, (k + usize::from(transmitted) * all) as u32);
+                    scratch.going.push(place.0);
+                    scratch.on.push(place.1);
                 }
             }
-            let [points, ways] = &mut scratch.sorted;
-            gather(points, &scratch.points, &scratch.going);
-            gather(ways, directions, &scratch.going);
-            let [o, d] = [points, ways].map(|lists| lists.each_ref().map(|list| &list[..]));
-            #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
-            let face = number as u32;
-            self.next_lines
-                .extend(o, d, face, scratch.going.iter().map(|k| scratch.part[*k as usize]));
         }
     }
 
@@ -253,11 +270,14 @@ impl PathBlock<'_> {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn refract_all(scratch: &mut SplitScratch) {
     let n = scratch.t.len();
-    for list in scratch.refracted.iter_mut().chain(&mut scratch.shares) {
+    for list in &mut scratch.ways {
+        list.resize(2 * n, 0.0);
+    }
+    for list in &mut scratch.shares {
         list.resize(n, 0.0);
     }
-    let [dx, dy, dz] = scratch.mirrored.each_mut().map(|v| &mut v[..n]);
-    let [rx, ry, rz] = scratch.refracted.each_mut().map(|v| &mut v[..n]);
+    let [dx, dy, dz] = scratch.directions.each_ref().map(|v| &v[..n]);
+    let [(mx, rx), (my, ry), (mz, rz)] = scratch.ways.each_mut().map(|v| v[..2 * n].split_at_mut(n));
     let [back, through] = scratch.shares.each_mut().map(|v| &mut v[..n]);
     let [nx, ny, nz] = scratch.normals.each_ref().map(|v| &v[..n]);
     let [n1, n2] = scratch.n.each_ref().map(|v| &v[..n]);
@@ -267,18 +287,13 @@ fn refract_all(scratch: &mut SplitScratch) {
         let side = Vec3::new(nx[k], ny[k], nz[k]) * sign[k];
         let height = -d.dot(side);
         let cosine = if height < 1.0 { height } else { 1.0 };
-        let ratio = n1[k] / n2[k];
         let f = fresnel(cosine, n1[k], n2[k]);
         let mirrored = reflect(d, side, cosine);
-        let refracted = refract(d, side, cosine, ratio, f.cosine);
-        (dx[k], dy[k], dz[k]) = (mirrored.x, mirrored.y, mirrored.z);
+        let refracted = refract(d, side, cosine, n1[k] / n2[k], f.cosine);
+        (mx[k], my[k], mz[k]) = (mirrored.x, mirrored.y, mirrored.z);
         (rx[k], ry[k], rz[k]) = (refracted.x, refracted.y, refracted.z);
         let agrees = (height > 0.0) | ((height == 0.0) & (sign[k] < 0.0));
         back[k] = if agrees { f.reflectance } else { f64::NAN };
-        through[k] = if agrees {
-            (1.0 - f.reflectance) * (ratio * ratio)
-        } else {
-            f64::NAN
-        };
+        through[k] = 1.0 - f.reflectance;
     }
 }

@@ -138,7 +138,8 @@ impl PathBlock<'_> {
         } else {
             Seen::Caustic
         };
-        let go = |block: &mut Self, transmitted: bool, weight: f64, drawn: bool| {
+        // One of the ways on, which all are followed; or the one that was drawn.
+        let go = |block: &mut Self, transmitted: bool, weight: f64, share: Option<f64>| {
             let (d, stack) = if transmitted {
                 event.refracted(shares.refraction)
             } else {
@@ -148,12 +149,12 @@ impl PathBlock<'_> {
                 stack,
                 weight,
                 seen,
-                drawn: branch.drawn || drawn,
+                drawn: branch.drawn || share.is_none(),
                 ways: led_on(branch.ways, transmitted),
                 direct: branch.direct && branch.scatters > 0,
                 ..*branch
             };
-            block.push(event.interaction(), d, branch);
+            block.push_if_followed(event.interaction(), d, branch, share.unwrap_or(1.0));
         };
         let is_diffuse = facts.is_diffuse();
         if branch.seen == Seen::Smooth {
@@ -174,10 +175,11 @@ impl PathBlock<'_> {
         };
         // Chains of smooth surfaces branch; everything else is drawn.
         if branch.seen == Seen::Smooth && branch.weight > SPLIT {
-            for (transmitted, share) in [(false, smooth[0]), (true, smooth[1])] {
-                if share > 0.0 {
-                    go(self, transmitted, branch.weight * share, false);
-                }
+            for (transmitted, factor, share) in [
+                (false, smooth[0], shares.specular[0]),
+                (true, smooth[1], shares.specular[1]),
+            ] {
+                go(self, transmitted, branch.weight * factor, Some(share));
             }
             if let Some(left) = &left {
                 self.scatter(branch, left, 1.0);
@@ -206,9 +208,9 @@ impl PathBlock<'_> {
         let number = number * total / alive;
         let boost = total / alive;
         if number < mirrored {
-            go(self, false, branch.weight * boost, true);
+            go(self, false, branch.weight * boost, None);
         } else if number < mirrored + refracted {
-            go(self, true, branch.weight * smooth[1] / refracted * boost, true);
+            go(self, true, branch.weight * smooth[1] / refracted * boost, None);
         } else if let Some(left) = &left {
             self.scatter(branch, left, boost / scattered);
         }
