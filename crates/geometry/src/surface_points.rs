@@ -15,10 +15,24 @@ pub fn fill<T>(list: &mut Vec<T>, values: impl Iterator<Item = T>) {
     list.extend(values);
 }
 
+/// Puts some numbers of many into a list in place of what it held: at once, if they lie one behind the other.
+pub fn choose(into: &mut Vec<f64>, from: &[f64], which: &[u32]) {
+    if let (Some(first), true) = (
+        which.first(),
+        which.windows(2).all(|pair| pair[1] == pair[0].wrapping_add(1)),
+    ) {
+        let first = *first as usize;
+        into.clear();
+        into.extend_from_slice(&from[first..first + which.len()]);
+    } else {
+        fill(into, which.iter().map(|i| from[*i as usize]));
+    }
+}
+
 /// Puts some vectors of many into lists in place of what those held.
 pub fn gather(into: &mut Vectors, from: &Vectors, which: &[u32]) {
     for (list, values) in into.iter_mut().zip(from) {
-        fill(list, which.iter().map(|i| values[*i as usize]));
+        choose(list, values, which);
     }
 }
 

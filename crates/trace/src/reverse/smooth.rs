@@ -5,7 +5,7 @@
 use etendue_geometry::hits::Hits;
 use etendue_geometry::origin_faces::NONE;
 use etendue_geometry::ray_block::RayBlock;
-use etendue_geometry::surface_points::{Vectors, fill, gather, surface_points};
+use etendue_geometry::surface_points::{Vectors, choose, fill, gather, surface_points};
 use etendue_math::Vec3;
 use etendue_optics::fresnel::{fresnel, reflect, refract};
 use multiversion::multiversion;
@@ -96,15 +96,14 @@ struct SplitScratch {
     part: Vec<u32>,
     points: Vectors,
     normals: Vectors,
-    /// Where they come along.
-    directions: Vectors,
-    /// Where they are mirrored to, each in its turn, and then where they are refracted to.
-    ways: Vectors,
+    /// Where they come along and where they are mirrored to.
+    mirrored: Vectors,
+    refracted: Vectors,
     /// Shares of the flux that go on mirrored and refracted; NaN where the normal contradicts what the line is in.
     shares: [Vec<f64>; 2],
-    /// Those of them that go on, and on which of the ways.
-    going: Vec<u32>,
-    on: Vec<u32>,
+    /// Those of them that go on either way, and what is known of them there.
+    going: [Vec<u32>; 2],
+    branches: [Vec<Branch>; 2],
     sorted: [Vectors; 2],
 }
 
@@ -140,42 +139,47 @@ impl PathBlock<'_> {
     /// Splits branches at an interface of a solid.
     fn split(&mut self, number: usize, which: &[u32], hits: &Hits, scratch: &mut SplitScratch) {
         self.look_around(self.lit.scene.roles[number].solid, which, hits, scratch);
-        let indices = || scratch.which.iter().map(|i| *i as usize);
-        fill(&mut scratch.t, indices().map(|i| hits.t[i]));
-        fill(&mut scratch.part, indices().map(|i| hits.part[i].0));
-        let sides = || scratch.kind.iter().map(|kind| &scratch.kinds[*kind as usize]);
-        fill(&mut scratch.sign, sides().map(|sides| sides.sign));
-        for (side, list) in scratch.n.iter_mut().enumerate() {
-            fill(list, sides().map(|sides| sides.n[side]));
-        }
+        choose(&mut scratch.t, &hits.t, &scratch.which);
+        fill(
+            &mut scratch.part,
+            scratch.which.iter().map(|i| hits.part[*i as usize].0),
+        );
+        let write = |list: &mut Vec<f64>, value: fn(&Sides) -> f64| match &scratch.kinds[..] {
+            [all] => fill(list, std::iter::repeat_n(value(all), scratch.which.len())),
+            kinds => fill(list, scratch.kind.iter().map(|kind| value(&kinds[*kind as usize]))),
+        };
+        write(&mut scratch.sign, |sides| sides.sign);
+        write(&mut scratch.n[0], |sides| sides.n[0]);
+        write(&mut scratch.n[1], |sides| sides.n[1]);
         gather(&mut scratch.points, &self.lines.origin, &scratch.which);
-        gather(&mut scratch.directions, &self.lines.direction, &scratch.which);
+        gather(&mut scratch.mirrored, &self.lines.direction, &scratch.which);
         let surface = &self.lit.scene.face_set.faces()[number];
         surface_points(
             surface,
             &mut scratch.points,
-            &scratch.directions,
+            &scratch.mirrored,
             &scratch.t,
             &scratch.part,
             &mut scratch.normals,
         );
         refract_all(scratch);
         self.send_on(hits, scratch);
-        let [points, ways] = &mut scratch.sorted;
-        gather(points, &scratch.points, &scratch.going);
-        gather(ways, &scratch.ways, &scratch.on);
-        let [o, d] = [points, ways].map(|lists| lists.each_ref().map(|list| &list[..]));
-        #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
-        let face = number as u32;
-        self.next_lines
-            .extend(o, d, face, scratch.going.iter().map(|k| scratch.part[*k as usize]));
+        for (way, directions) in [(1, &scratch.refracted), (0, &scratch.mirrored)] {
+            self.next.append(&mut scratch.branches[way]);
+            let [points, ways] = &mut scratch.sorted;
+            gather(points, &scratch.points, &scratch.going[way]);
+            gather(ways, directions, &scratch.going[way]);
+            let [o, d] = [points, ways].map(|lists| lists.each_ref().map(|list| &list[..]));
+            #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 faces")]
+            let face = number as u32;
+            let parts = scratch.going[way].iter().map(|k| scratch.part[*k as usize]);
+            self.next_lines.extend(o, d, face, parts);
+        }
     }
 
     /// Branches at an interface go on mirrored and refracted, or on one of both ways.
     fn send_on(&mut self, hits: &Hits, scratch: &mut SplitScratch) {
-        scratch.going.clear();
-        scratch.on.clear();
-        let all = scratch.which.len();
+        scratch.going.iter_mut().for_each(Vec::clear);
         for (k, i) in scratch.which.iter().enumerate() {
             let mut shares = [scratch.shares[0][k], scratch.shares[1][k]];
             if shares[0].is_nan() {
@@ -220,11 +224,9 @@ impl PathBlock<'_> {
                     ..branch
                 };
                 if on.weight > 0.0 {
-                    self.next.push(on.thinned_to(thinned));
+                    scratch.branches[usize::from(transmitted)].push(on.thinned_to(thinned));
                     #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
-                    let place = (k as u32, (k + usize::from(transmitted) * all) as u32);
-                    scratch.going.push(place.0);
-                    scratch.on.push(place.1);
+                    scratch.going[usize::from(transmitted)].push(k as u32);
                 }
             }
         }
@@ -242,7 +244,10 @@ impl PathBlock<'_> {
         for i in which {
             let branch = &self.branches[*i as usize];
             let (stack, wavelength) = (branch.stack, self.wavelength(branch.path));
-            let known = seen.iter().find(|known| known.0 == stack && known.1 == wavelength);
+            let known = seen
+                .iter()
+                .rev()
+                .find(|known| known.0 == stack && known.1 == wavelength);
             let kind = if let Some((.., kind)) = known {
                 *kind
             } else {
@@ -270,14 +275,11 @@ impl PathBlock<'_> {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn refract_all(scratch: &mut SplitScratch) {
     let n = scratch.t.len();
-    for list in &mut scratch.ways {
-        list.resize(2 * n, 0.0);
-    }
-    for list in &mut scratch.shares {
+    for list in scratch.refracted.iter_mut().chain(&mut scratch.shares) {
         list.resize(n, 0.0);
     }
-    let [dx, dy, dz] = scratch.directions.each_ref().map(|v| &v[..n]);
-    let [(mx, rx), (my, ry), (mz, rz)] = scratch.ways.each_mut().map(|v| v[..2 * n].split_at_mut(n));
+    let [dx, dy, dz] = scratch.mirrored.each_mut().map(|v| &mut v[..n]);
+    let [rx, ry, rz] = scratch.refracted.each_mut().map(|v| &mut v[..n]);
     let [back, through] = scratch.shares.each_mut().map(|v| &mut v[..n]);
     let [nx, ny, nz] = scratch.normals.each_ref().map(|v| &v[..n]);
     let [n1, n2] = scratch.n.each_ref().map(|v| &v[..n]);
@@ -290,7 +292,7 @@ fn refract_all(scratch: &mut SplitScratch) {
         let f = fresnel(cosine, n1[k], n2[k]);
         let mirrored = reflect(d, side, cosine);
         let refracted = refract(d, side, cosine, n1[k] / n2[k], f.cosine);
-        (mx[k], my[k], mz[k]) = (mirrored.x, mirrored.y, mirrored.z);
+        (dx[k], dy[k], dz[k]) = (mirrored.x, mirrored.y, mirrored.z);
         (rx[k], ry[k], rz[k]) = (refracted.x, refracted.y, refracted.z);
         let agrees = (height > 0.0) | ((height == 0.0) & (sign[k] < 0.0));
         back[k] = if agrees { f.reflectance } else { f64::NAN };
