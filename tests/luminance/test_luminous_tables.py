@@ -120,7 +120,6 @@ def test_a_lit_paper_is_the_same_both_ways() -> None:
     forwards_and_backwards_agree(surfaces=[PAPER], lamp=lamp(spin=30), rays=300_000)
 
 
-@pytest.mark.slow
 def test_light_behind_a_lens_is_the_same_both_ways() -> None:
     """A lens below paper throws the light of a lopsided lamp on it: lines of sight meet the lamp through paper and lens."""
     lens = {
