@@ -176,10 +176,9 @@ impl FaceSet {
         }
     }
 
-    /// Tries faces on one ray: those that no block is tried on, and those in the tree.
+    /// Tries the faces in the tree on one ray.
     #[inline(always)]
-    fn try_one(&self, o: Vec3, d: Vec3, origin_faces: &OriginFaces, one: &mut One, stack: &mut Stack) {
-        self.try_others(o, d, origin_faces, one);
+    fn try_tree(&self, o: Vec3, d: Vec3, origin_faces: &OriginFaces, one: &mut One, stack: &mut Stack) {
         if let Some((tree, faces)) = &self.tree {
             let probe = Probe::new(o, d, 0.0);
             let mut walk = Walk::new(tree, &probe, stack);
@@ -231,10 +230,9 @@ impl FaceSet {
         {
             self.try_face(index, o, d, origin_faces, &mut one);
         }
-        if self.tree.is_none() {
-            self.try_others(o, d, origin_faces, &mut one);
-        } else {
-            self.try_one(o, d, origin_faces, &mut one, &mut Stack::lend());
+        self.try_others(o, d, origin_faces, &mut one);
+        if self.tree.is_some() {
+            self.try_tree(o, d, origin_faces, &mut one, &mut Stack::lend());
         }
         let (part, uv) = one.part;
         (one.face != NONE).then_some((one.face, Crossing { t: one.t, part, uv }, one.second))
@@ -279,13 +277,9 @@ fn try_one_by_one(set: &FaceSet, rays: &RayBlock, hits: &mut Hits, stack: &mut S
             face: hits.face[i],
             part: hits.part[i],
         };
-        set.try_one(
-            rays.origin(i),
-            rays.direction(i),
-            &rays.origin_faces(i),
-            &mut one,
-            stack,
-        );
+        let (o, d, origin_faces) = (rays.origin(i), rays.direction(i), rays.origin_faces(i));
+        set.try_others(o, d, &origin_faces, &mut one);
+        set.try_tree(o, d, &origin_faces, &mut one, stack);
         (hits.t[i], hits.second[i], hits.face[i], hits.part[i]) = (one.t, one.second, one.face, one.part);
     }
 }

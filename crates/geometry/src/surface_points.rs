@@ -150,3 +150,27 @@ fn surface_points_on<S: Settled>(
         (nx[i], ny[i], nz[i]) = (sign * normal.x, sign * normal.y, sign * normal.z);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_chosen_in_the_order_in_which_they_are_asked_for() {
+        let from: Vec<f64> = (0..9).map(|k| f64::from(k) + 0.5).collect();
+        for which in [
+            &[][..],
+            &[4],
+            &[2, 3, 4, 5],
+            &[5, 4, 3],
+            &[2, 4, 3, 5],
+            &[1, 1, 2],
+            &[0, 8],
+        ] {
+            let mut into = vec![7.0; 3];
+            choose(&mut into, &from, which);
+            let expected: Vec<f64> = which.iter().map(|k| f64::from(*k) + 0.5).collect();
+            assert_eq!(into, expected);
+        }
+    }
+}
