@@ -37,9 +37,10 @@ FEWEST = 50
 KNOWN_POSITIONS = FINE_POSITIONS[:4]
 """Positions over which the margins of the known field are averaged: so few that they are less smooth than an estimate."""
 
-IN_COMMON = 0.5
+IN_COMMON = 0.2
 """Share of the variance of errors that no averaging takes away. The edges of the known field lie between cells; those of the
-truth, which do not, err on one side over many cells."""
+truth, which do not, err on one side over many cells. Of sources of known luminance (`benchmarks/error_bars.py`), shares from
+0.1 to 0.3 cover large pixels about as well as small ones."""
 
 DARK = 1e-12
 """Share of the largest mean below which cells are all as dark."""
@@ -96,7 +97,7 @@ def calibrate(
     retried = _masses(again, drawn.grid, threads)
     errors = _shown(again, threads) - known
     factors, tried = _factors(retried, np.abs(errors) / np.maximum(retried.deviation, _tiny(known)), own)
-    left = _left(errors, retried.deviation * tried, known, known.shape[0] // 2)
+    left = _left(errors, retried.deviation * tried, known, known.shape[0] // 2, in_common_below=known.shape[0])
     # What a cell is off by, as a share of what it shows, is what the ratio is off by.
     shown = _shown(found, threads)
     relative = np.divide(own.deviation * factors, shown, out=np.zeros_like(shown), where=shown > 0)
@@ -132,13 +133,17 @@ def _within(
     shown, true = _shape(again.mean, cells), _shape(known, cells)
     errors = np.divide(shown - true, shown, out=np.zeros_like(shown), where=shown > 0) * again.mean
     factors, tried = _factors(again, np.abs(errors) / np.maximum(again.deviation, _tiny(again.mean)), found)
-    left = _left(errors, again.deviation * tried, again.mean, n // max(cells) // 2)
+    # Over a whole cell these errors add up to nothing, over one and two halves of its neighbours to little.
+    per_cell = n // max(cells)
+    off_the_cells = (max(per_cell // 3, 1),) * 2
+    moved = (np.roll(values, off_the_cells, (0, 1)) for values in (errors, again.deviation * tried, again.mean))
+    left = _left(*moved, n // 2, in_common_below=per_cell)
     variance = (
         np.divide(found.deviation * factors, found.mean, out=np.zeros_like(found.mean), where=found.mean > 0) ** 2
     )
     side = min(n, FINEST_ERRORS)
     averaged = variance.reshape(side, n // side, side, n // side).mean(axis=(1, 3))
-    return np.sqrt(averaged), left
+    return np.sqrt(averaged), left[(n // side).bit_length() - 1 :]
 
 
 def _shape(density: FloatArray, cells: tuple[int, ...]) -> FloatArray:
@@ -150,8 +155,13 @@ def _shape(density: FloatArray, cells: tuple[int, ...]) -> FloatArray:
     return shape
 
 
-def _left(errors: FloatArray, deviation: FloatArray, mean: FloatArray, largest: int) -> tuple[float, ...]:
-    """What is left of calibrated deviations where errors are averaged over 1, 2, 4, … cells along the first two axes."""
+def _left(
+    errors: FloatArray, deviation: FloatArray, mean: FloatArray, largest: int, *, in_common_below: int
+) -> tuple[float, ...]:
+    """What is left of calibrated deviations where errors are averaged over 1, 2, 4, … cells along the first two axes.
+
+    Squares of fewer cells along a side than `in_common_below` have errors that no averaging takes away.
+    """
     left, side = [1.0], 2
     first = _width(np.sort(np.abs(errors / np.maximum(deviation, _tiny(mean)))[mean > BRIGHT * mean.max()]))
     while side <= min(largest, *(n // 2 for n in mean.shape[:2])):
@@ -160,7 +170,8 @@ def _left(errors: FloatArray, deviation: FloatArray, mean: FloatArray, largest: 
         share = (
             min(_width(np.sort(np.abs(e[lit]) / np.maximum(d[lit], _tiny(mean)))) / first, 1.0) if first > 0 else 1.0
         )
-        left.append(min(math.sqrt(IN_COMMON + (1.0 - IN_COMMON) * share**2), left[-1]))
+        in_common = IN_COMMON if side < in_common_below else 0.0
+        left.append(min(math.sqrt(in_common + (1.0 - in_common) * share**2), left[-1]))
         side *= 2
     return tuple(left)
 

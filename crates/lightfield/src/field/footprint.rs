@@ -128,9 +128,9 @@ pub fn add_small(field: &PartField, footprint: &Footprint, view: &View, map: &mu
         for (i, pixel) in pixels[..batch.len].iter().enumerate() {
             if *pixel != usize::MAX && at.part[i] != Coordinates::NONE {
                 let own = seen.entry(*pixel).or_default();
-                let place = [at.values[0][i], at.values[1][i]];
+                let coordinates = at.values.each_ref().map(|values| values[i]);
                 let deviations = [0, 1, 2].map(|kind| read.deviations[kind][i]);
-                own.sums.add(field.part.wraps(), place, read.value[i], deviations);
+                own.sums.add(field.part.wraps(), coordinates, read.value[i], deviations);
                 own.squares += read.value[i] * read.value[i];
                 own.halves[i % 2] += read.value[i];
             }

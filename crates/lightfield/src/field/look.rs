@@ -266,13 +266,13 @@ fn average(
     let share = 1.0 / points as f64;
     let [of_cells, by_place, by_direction] = &read.deviations;
     let wraps = part.part.wraps();
-    let [s1, s2, ..] = &at.values;
     for (pixel, start) in pixels.iter_mut().zip((0..).step_by(points)) {
         let mut sums = PixelSums::default();
         for i in start..start + points {
             if at.part[i] != Coordinates::NONE {
                 let deviations = [of_cells[i], by_place[i], by_direction[i]];
-                sums.add(wraps, [s1[i], s2[i]], read.value[i], deviations);
+                let coordinates = at.values.each_ref().map(|values| values[i]);
+                sums.add(wraps, coordinates, read.value[i], deviations);
                 total[i] += read.value[i];
             }
         }

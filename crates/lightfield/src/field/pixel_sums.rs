@@ -9,22 +9,22 @@ pub struct PixelSums {
     /// Sum of the luminances.
     pub value: f64,
     deviations: [f64; 3],
-    /// Where the first point is, and how far the others lie from it: sums and sums of squares.
-    first: [f64; 2],
-    away: [f64; 2],
-    squares: [f64; 2],
+    /// The coordinates of the first point, and how far those of the others lie from them: sums and sums of squares.
+    first: [f64; 4],
+    away: [f64; 4],
+    squares: [f64; 4],
 }
 
 impl PixelSums {
-    /// Adds a point at a place of the part: its luminance, and its deviations as [`super::points::Points`] holds them.
+    /// Adds a point of the part: its luminance, and its deviations as [`super::points::Points`] holds them.
     #[inline(always)]
-    pub fn add(&mut self, wraps: bool, place: [f64; 2], value: f64, deviations: [f64; 3]) {
+    pub fn add(&mut self, wraps: bool, coordinates: [f64; 4], value: f64, deviations: [f64; 3]) {
         if self.points == 0.0 {
-            self.first = place;
+            self.first = coordinates;
         }
         self.points += 1.0;
         self.value += value;
-        for (axis, at) in place.iter().enumerate() {
+        for (axis, at) in coordinates.iter().enumerate() {
             let mut away = at - self.first[axis];
             if wraps && axis == 0 {
                 away -= away.round();
@@ -37,8 +37,10 @@ impl PixelSums {
         }
     }
 
-    /// Standard deviation of the sum of values: what is left of each kind of error on the area of places that the points
-    /// spread over. A pixel sees a part along nearly one direction, in which all its points err together.
+    /// Standard deviation of the sum of values: what is left of each kind of error on the area that the points spread over.
+    ///
+    /// That is one of places; on a curved part the direction, too, goes from cell to cell with the place. Within the cells of
+    /// directions all points err together, as a pixel sees a part along nearly one.
     #[must_use]
     pub fn deviation(&self, part: &PartField) -> f64 {
         if self.points == 0.0 {
@@ -49,10 +51,12 @@ impl PixelSums {
             let mean = self.away[axis] / self.points;
             (12.0 * (self.squares[axis] / self.points - mean * mean).max(0.0)).sqrt()
         };
-        let area = side(0) * side(1);
-        let of_cells = part.errors.cells.left(area * (part.cells[0] * part.cells[1]) as f64);
+        let sides: [f64; 4] = std::array::from_fn(side);
+        let in_cells = |axis: usize| sides[axis] * part.cells[axis] as f64;
+        let of_cells = [0, 1].map(|axis| in_cells(axis).hypot(in_cells(axis + 2)));
+        let of_cells = part.errors.cells.left(of_cells[0] * of_cells[1]);
         let fine = part.errors.space.side() as f64;
-        let within = part.errors.within.left(area * fine * fine);
+        let within = part.errors.within.left(sides[0] * sides[1] * fine * fine);
         let [cells, place, direction] = self.deviations;
         (cells * of_cells).hypot(place * within).hypot(direction)
     }
