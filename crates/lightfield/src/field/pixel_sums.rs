@@ -70,3 +70,41 @@ impl PixelSums {
 pub fn lattice_error(points: f64, variance: f64) -> f64 {
     0.4 * variance.max(0.0).sqrt() / (points.sqrt() * points.sqrt().sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::errors::Averaging;
+    use crate::field::light_field::tests::rough;
+
+    /// The deviation of the mean of even points on a square of so many cells of places, or of directions, or of both.
+    fn over(part: &PartField, cells: [f64; 2], deviations: [f64; 3]) -> f64 {
+        let (mut sums, side) = (PixelSums::default(), 64);
+        let extent: [f64; 4] = std::array::from_fn(|axis| cells[axis / 2] / part.cells[axis] as f64);
+        for i in 0..side * side {
+            let share = [i % side, i / side].map(|k| (f64::from(k) + 0.5) / f64::from(side));
+            let at = std::array::from_fn(|axis| 0.1 + extent[axis] * share[axis % 2]);
+            sums.add(part.part.wraps(), at, 1.0, deviations);
+        }
+        sums.deviation(part) / f64::from(side * side)
+    }
+
+    #[test]
+    fn errors_go_out_over_places_and_over_directions() {
+        let mut part = rough(0);
+        part.errors.cells = Averaging::new(vec![1.0, 0.5, 0.25]).expect("sound");
+        let [cells, direction] = [[0.3, 0.0, 0.0], [0.0, 0.0, 0.2]];
+        for (extent, left) in [
+            ([0.5, 0.0], 1.0),
+            ([2.0, 0.0], 0.5),
+            ([0.0, 2.0], 0.5),
+            ([4.0, 0.0], 0.25),
+            ([2.0 * 2.0_f64.sqrt(), 2.0 * 2.0_f64.sqrt()], 0.25),
+        ] {
+            // A lattice of 64 points along a side spreads by a little less than the side.
+            let found = over(&part, extent, cells);
+            assert!((found - 0.3 * left).abs() < 1e-3 * found, "{extent:?}: {found}");
+            assert!((over(&part, extent, direction) - 0.2).abs() < 1e-12);
+        }
+    }
+}
