@@ -8,7 +8,7 @@ use std::ops::{ControlFlow, Range};
 
 use etendue_geometry::ray_batch::BLOCK;
 use etendue_geometry::{PassAccount, RayBatch, RaySource};
-use etendue_sampling::ordered;
+use etendue_sampling::ordered::{self, Idle};
 use etendue_sampling::philox::Stream;
 use multiversion::multiversion;
 
@@ -183,13 +183,22 @@ impl Default for Scratch {
 }
 
 impl Found {
-    /// Nothing yet, with room for so many rays.
-    fn with_room(rays: usize) -> Self {
+    /// Nothing yet, with room for the rays of a batch.
+    fn with_room() -> Self {
+        const ROOM: usize = ordered::BATCH as usize;
         Self {
-            cells: std::array::from_fn(|_| Vec::with_capacity(rays)),
-            weights: Vec::with_capacity(rays),
+            cells: std::array::from_fn(|_| Vec::with_capacity(ROOM)),
+            weights: Vec::with_capacity(ROOM),
             ..Self::default()
         }
+    }
+
+    /// Forgets what it has found, not the room for it.
+    fn clear(&mut self) {
+        self.cells.iter_mut().for_each(Vec::clear);
+        self.weights.clear();
+        self.kept.clear();
+        (self.tally, self.unmet_rays, self.unmet_flux) = Default::default();
     }
 
     fn collect(&mut self, plan: &Plan, starts: &Starts, first: u64, batch: &RayBatch, scratch: &mut Scratch) {
@@ -379,20 +388,19 @@ pub fn count(
         tally: PassAccount::default(),
     };
     let mut equal = true;
+    let (lists, places) = (Idle::<Found>::default(), Idle::<Scratch>::default());
     let work = |range: Range<u64>| {
-        #[allow(clippy::cast_possible_truncation, reason = "a batch is short")]
-        let mut found = Found::with_room((range.end - range.start) as usize);
-        let mut scratch = Scratch::default();
-        source.for_each_block(range, |first, batch| {
-            found.collect(plan, &starts, first, batch, &mut scratch);
+        let mut found = lists.take(Found::with_room);
+        places.with(Scratch::default, |scratch| {
+            source.for_each_block(range, |first, batch| found.collect(plan, &starts, first, batch, scratch));
         });
         found
     };
-    let merge = |found: Found| {
+    let merge = |mut found: Box<Found>| {
         counts.tally.merge(&found.tally);
         counts.unmet_rays += found.unmet_rays;
         counts.unmet_flux += found.unmet_flux;
-        counts.kept.extend(found.kept);
+        counts.kept.append(&mut found.kept);
         if let Some(first) = found.weights.first() {
             let weight = *counts.weight.get_or_insert(*first);
             let many = counts.tally.rays > u64::from(u32::MAX);
@@ -409,6 +417,8 @@ pub fn count(
         {
             sums.add(cells, &found.weights);
         }
+        found.clear();
+        lists.give_back(found);
     };
     ordered::run(threads, source.len(), work, merge, progress);
     if !equal {

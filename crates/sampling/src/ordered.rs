@@ -111,12 +111,22 @@ impl<T> Default for Idle<T> {
 
 impl<T> Idle<T> {
     /// Does a task in some room, made if there is none.
-    pub fn with(&self, make: impl FnOnce() -> T, task: impl FnOnce(&mut T)) {
-        let idle = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let taken = idle().pop();
-        let mut room = taken.unwrap_or_else(|| Box::new(make()));
-        task(&mut room);
-        idle().push(room);
+    pub fn with<R>(&self, make: impl FnOnce() -> T, task: impl FnOnce(&mut T) -> R) -> R {
+        let mut room = self.take(make);
+        let done = task(&mut room);
+        self.give_back(room);
+        done
+    }
+
+    /// Some room to keep for a while, made if there is none.
+    pub fn take(&self, make: impl FnOnce() -> T) -> Box<T> {
+        let taken = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        taken.unwrap_or_else(|| Box::new(make()))
+    }
+
+    /// Room that is no longer needed.
+    pub fn give_back(&self, room: Box<T>) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(room);
     }
 }
 

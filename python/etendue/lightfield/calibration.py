@@ -136,8 +136,10 @@ def _within(
     # Over a whole cell these errors add up to nothing, over one and two halves of its neighbours to little.
     per_cell = n // max(cells)
     off_the_cells = (max(per_cell // 3, 1),) * 2
-    moved = (np.roll(values, off_the_cells, (0, 1)) for values in (errors, again.deviation * tried, again.mean))
-    left = _left(*moved, n // 2, in_common_below=per_cell)
+    off, deviation, mean = (
+        np.roll(values, off_the_cells, (0, 1)) for values in (errors, again.deviation * tried, again.mean)
+    )
+    left = _left(off, deviation, mean, n // 2, in_common_below=per_cell)
     variance = (
         np.divide(found.deviation * factors, found.mean, out=np.zeros_like(found.mean), where=found.mean > 0) ** 2
     )
