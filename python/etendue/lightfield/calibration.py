@@ -26,7 +26,7 @@ from etendue.lightfield.symmetry import order, sum_of_images
 from etendue.lightfield.trees import ELSEWHERE, Base, Tree, grow, grow_moved
 
 STRATA = 12
-"""Classes by either feature: about 7000 of a million cells in each."""
+"""Classes by either feature: about 7000 of a million cells in each. Those of both are told apart by eight bits."""
 
 ONE_SIGMA, TWO_SIGMA = 0.6827, 0.9545
 """Shares of a normal distribution within one and two standard deviations."""
@@ -95,12 +95,11 @@ def calibrate(
     again = grow_part(drawn, found.chart, found.recipe, images, found.concentration, threads, symmetry)
     step()
     retried = _masses(again, drawn.grid, threads)
-    errors = _shown(again, threads) - known
+    errors = retried.mean - known
     factors, tried = _factors(retried, np.abs(errors) / np.maximum(retried.deviation, _tiny(known)), own)
     left = _left(errors, retried.deviation * tried, known, known.shape[0] // 2, in_common_below=known.shape[0])
     # What a cell is off by, as a share of what it shows, is what the ratio is off by.
-    shown = _shown(found, threads)
-    relative = np.divide(own.deviation * factors, shown, out=np.zeros_like(shown), where=shown > 0)
+    relative = np.divide(own.deviation * factors, own.mean, out=np.zeros_like(own.mean), where=own.mean > 0)
     tree = dataclasses.replace(found.tree, deviation=relative * found.tree.ratio)
     if not _uses_images(found):
         return tree, FineErrors(cells_left=left)
@@ -276,13 +275,14 @@ def _factors(tried: Masses, errors: FloatArray, found: Masses) -> tuple[FloatArr
     features = tried.features()
     edges = [np.quantile(f, np.linspace(0, 1, STRATA + 1)[1:-1]) for f in features]
     classes, targets = _classes(features, edges), _classes(found.features(), edges)
-    order = np.lexsort((errors.ravel(), classes))
-    ranked, bounds = errors.ravel()[order], np.searchsorted(classes[order], np.arange(STRATA**2 + 1))
-    everywhere = _width(np.sort(ranked))
-    table = np.full(STRATA**2, everywhere)
+    order = np.argsort(classes, kind="stable")
+    sorted_by_class, bounds = errors.ravel()[order], np.searchsorted(classes[order], np.arange(STRATA**2 + 1))
+    table = np.full(STRATA**2, np.nan)
     for index, (start, stop) in enumerate(itertools.pairwise(bounds)):
         if stop - start >= FEWEST:
-            table[index] = _width(ranked[start:stop])
+            table[index] = _width(np.sort(sorted_by_class[start:stop]))
+    if np.isnan(table).any():
+        table[np.isnan(table)] = _width(np.sort(sorted_by_class))
     factors: FloatArray = table[targets].reshape(found.mean.shape)
     own: FloatArray = table[classes].reshape(tried.mean.shape)
     return factors, own
@@ -299,9 +299,14 @@ def _width(ranked: FloatArray) -> float:
     return float(ranked[np.argmax(once / 5.0 + twice / 3.0 >= 0.0)])
 
 
-def _classes(features: tuple[FloatArray, FloatArray], edges: list[FloatArray]) -> npt.NDArray[np.intp]:
-    rows, columns = (np.searchsorted(e, f) for e, f in zip(edges, features, strict=True))
-    return rows * STRATA + columns
+def _classes(features: tuple[FloatArray, FloatArray], edges: list[FloatArray]) -> npt.NDArray[np.uint8]:
+    """The class of each cell; so few are sorted digit by digit."""
+    classes = np.zeros(features[0].shape, np.uint8)
+    # Counting the edges below is several times as fast as to search among so few.
+    for step, f, rising in zip((STRATA, 1), features, edges, strict=True):
+        for edge in rising:
+            classes += np.uint8(step) * (f > edge)
+    return classes
 
 
 def _around(values: FloatArray) -> FloatArray:
