@@ -62,7 +62,12 @@ pub(super) struct Integrals<'a> {
     grid: &'a Grid,
     /// ∫ f r dr from 0, azimuth by azimuth, at each radial coordinate.
     sums: Vec<f64>,
+    /// Sines and cosines at the nodes of the circle: of few parts between two azimuths, of many.
+    circle: [Vec<(f64, f64)>; 2],
 }
+
+/// Gauss and Legendre's nodes and weights on the unit interval.
+const NODES: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
 
 /// Farthest |β − β₀|.
 const END: f64 = 2.0;
@@ -439,10 +444,24 @@ impl Grid {
             };
             (0..n).map(&mut step).collect::<Vec<f64>>()
         };
+        let circle = [false, true].map(|finer| {
+            let parts = self.parts(finer);
+            let part = move |part: usize| NODES.map(|(node, _)| (part as f64 + node) / parts as f64);
+            (0..self.azimuths)
+                .flat_map(|j| (0..parts).flat_map(part).map(move |v| (j as f64 + v) / self.azimuths as f64))
+                .map(sin_cos_turns)
+                .collect()
+        });
         Integrals {
             grid: self,
             sums: (0..self.rows).flat_map(along).collect(),
+            circle,
         }
+    }
+
+    /// Parts of a circle between two azimuths: at most 5° each; finer towards grazing incidence, where it is all on one side.
+    fn parts(&self, finer: bool) -> usize {
+        72_usize.div_ceil(self.azimuths) * if finer { 4 } else { 1 }
     }
 }
 
@@ -456,17 +475,16 @@ impl Integrals<'_> {
 
     /// The integral over the unit circle about −β₀.
     pub(super) fn integral(&self, sine: f64) -> f64 {
-        // Gauss and Legendre, in parts of at most 5°; finer towards grazing incidence, where the circle is all on one side.
-        const NODES: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
-        let parts = 72_usize.div_ceil(self.grid.azimuths) * if sine > 0.9 { 4 } else { 1 };
+        let finer = sine > 0.9;
+        let parts = self.grid.parts(finer);
         let mut sum = 0.0;
+        let mut circle = self.circle[usize::from(finer)].iter();
         for j in 0..self.grid.azimuths {
             let k = self.grid.after(j);
             for part in 0..parts {
-                for (node, weight) in NODES {
+                for ((node, weight), (s, c)) in NODES.into_iter().zip(&mut circle) {
                     let v = (part as f64 + node) / parts as f64;
-                    let (s, c) = sin_cos_turns((j as f64 + v) / self.grid.azimuths as f64);
-                    let r = rim(sine, s, c).min(END);
+                    let r = rim(sine, *s, *c).min(END);
                     let i = self.grid.below(r);
                     let (near, far) = (self.up_to(j, i, r), self.up_to(k, i, r));
                     sum += weight / parts as f64 * (near + v * (far - near));
