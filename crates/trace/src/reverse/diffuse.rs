@@ -8,7 +8,7 @@ use etendue_optics::bsdf::{Bsdf, Outward};
 use super::method::LeftOut;
 use super::path_block::{Branch, Connection, PathBlock, Seen};
 use crate::exitance_cells::FacePoint;
-use crate::guide::{Near, SHARE};
+use crate::guide::{self, Near};
 use crate::mis::density;
 use crate::scatter::{Incoming, SurfaceEvent};
 use crate::transmittance::transmittance;
@@ -28,8 +28,8 @@ pub(super) enum Known<'a> {
 struct Spread<'a> {
     /// Shares of those that go on on this side of the surface and on the other one, as its BSDF draws them.
     chances: [f64; 2],
-    /// Directions that light is known to come from.
-    guide: Option<Near<'a>>,
+    /// Directions that light is known to come from, and the share of paths that go on in one of those.
+    guide: Option<(Near<'a>, f64)>,
 }
 
 impl Spread<'_> {
@@ -39,7 +39,7 @@ impl Spread<'_> {
         let drawn = self.chances[usize::from(light.transmitted)] * of_side;
         self.guide
             .as_ref()
-            .map_or(drawn, |near| (1.0 - SHARE) * drawn + SHARE * near.density(k))
+            .map_or(drawn, |(near, share)| (1.0 - share) * drawn + share * near.density(k))
     }
 }
 
@@ -95,10 +95,11 @@ impl PathBlock<'_> {
         // What the observer sees directly is left to rays traced forwards; the rest is looked for where they came from.
         let guide = self.method.guide.filter(|_| !branch.direct);
         let guide = guide.and_then(|guide| guide.near(interaction.face, interaction.point));
+        let guide = guide.map(|near| (near, guide::share(branch.scatters)));
         let spread = Spread { chances, guide };
-        let guided = guide.and_then(|near| {
+        let guided = guide.and_then(|(near, share)| {
             let numbers = self.numbers(branch.path);
-            let number = numbers.draw() / SHARE;
+            let number = numbers.draw() / share;
             (number < 1.0).then(|| near.draw([number, height, turn]))
         });
         self.reach_out(&branch, (event, &outward), &spread, all);
