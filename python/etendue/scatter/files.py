@@ -35,7 +35,10 @@ MOST_WAVELENGTHS = 41
 """At which a model is tabled: spectra measured at each nanometre would make files of gigabytes."""
 
 COARSE = 0.01
-"""Share of the light by which a table may be off without a word: what readers let pass, see `BsdfTable`."""
+"""Part of a slice's share by which its table may be off without a word."""
+
+FAINT = 1e-5
+"""Share of the light by which it may be as well."""
 
 
 def read_bsdf(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> BsdfTable:
@@ -231,8 +234,8 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
     if asked.reflects and asked.transmits and len(kept) == 1:
         lost.append(f"the file holds {'transmitted' if True in kept else 'reflected'} light only")
     lost.append("the values are a table made for this format")
-    lost += _too_coarse(bsdf, data)
-    return data, tuple(lost)
+    data, coarse = _scaled(bsdf, data)
+    return data, (*lost, *coarse)
 
 
 def _as_it_is(bsdf: Bsdf) -> Iterator[BsdfData]:
@@ -271,9 +274,12 @@ def _colours(asked: _Asked, data: BsdfData) -> list[str]:
     return []
 
 
-def _too_coarse(bsdf: Bsdf, data: BsdfData) -> list[str]:
-    """What is to be said of a table whose directions are too far apart for the lobe: where it is farthest off."""
-    worst, said = COARSE, []
+def _scaled(bsdf: Bsdf, data: BsdfData) -> tuple[BsdfData, list[str]]:
+    """The table with the shares that the BSDF has, and what is to be said of it: where it was farthest off.
+
+    Where its directions are too far apart for the lobe, they hold another share of the light, or more than is received.
+    """
+    worst, said, slices = 0.0, [], []
     for one in data.slices:
         side: Side = "front" if one.front else "back"
         wavelength = WAVELENGTH if one.wavelength is None else one.wavelength
@@ -283,8 +289,18 @@ def _too_coarse(bsdf: Bsdf, data: BsdfData) -> list[str]:
         total, regular = (float(way(one.theta, one.phi, side, wavelength=wavelength)) for way in ways)
         share = total - regular
         found = one.integral()
-        if abs(found - share) > worst:
-            worst = abs(found - share)
+        off = abs(found - share)
+        if off <= max(COARSE * share, FAINT):
+            slices.append(one)
+            continue
+        # Of a lobe that falls between the directions there is nothing to scale.
+        factor = share / found if found > FAINT and share > FAINT else 1.0
+        error = None if one.standard_error is None else one.standard_error * factor
+        stated = None if one.stated is None else one.stated * factor
+        slices.append(dataclasses.replace(one, values=one.values * factor, standard_error=error, stated=stated))
+        if off > worst:
+            worst = off
             told = f"at {one.theta:g}° of incidence they add up to {found:.3g} of the light, in truth {share:.3g}"
             said = [f"the directions of the table are too far apart for the lobe: {told}"]
-    return said
+            said[0] += "; values are scaled to that" if factor != 1.0 else ""
+    return dataclasses.replace(data, slices=tuple(slices)), said

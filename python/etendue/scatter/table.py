@@ -11,15 +11,21 @@ import numpy as np
 
 from etendue.description.files import Files
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid
 from etendue.quantities.report import Complaint
-from etendue.scatter.balance import MOST, balanced
+from etendue.scatter.balance import CLOSE, MOST, balanced
 from etendue.scatter.bsdf import Bsdf as Bsdf  # noqa: PLC0414 - handed on to `etendue`
 from etendue.scatter.bsdf import Side
 from etendue.scatter.building import built
 from etendue.scatter.members import components_of, members_of, same_when_turned
 from etendue.scatter.scans.interpolations import tabulated
 from etendue.scatter.scans.scans import Scans
+
+EXTRAPOLATED = 0.02
+"""Part of what a slice scatters that may lie beyond its directions without a word: Lambertian light beyond 82°."""
+
+FAINT = 1e-4
+"""Share of the light that may as well."""
 
 
 class BsdfTable(Bsdf):
@@ -158,5 +164,36 @@ def _told(data: BsdfData) -> Iterable[Complaint]:
         elif lifted > share * MOST:
             found = f"values below 0 become 0, and the others are scaled by {share / lifted:.3g} to the same share"
             yield Complaint("warning", place, found)
-        if share > 1.0:
+        if share > 1.0 + CLOSE:
             yield Complaint("warning", place, f"{way} {share:.6g} of the light; scaled to 1")
+    if data.slices:
+        yield from _beyond(data)
+
+
+def _beyond(data: BsdfData) -> Iterable[Complaint]:
+    """What of the light is in no value, where that is most of it."""
+    beyond = [_extrapolated(one) for one in data.slices]
+    told = [k for k, one in enumerate(data.slices) if beyond[k] > max(EXTRAPOLATED * one.integral(), FAINT)]
+    if told:
+        worst = max(told, key=beyond.__getitem__)
+        one, more = data.slices[worst], len(told) - 1
+        share, way = one.integral(), "transmits" if one.transmitted else "reflects"
+        also = f" (and {more} more slice{'s' if more > 1 else ''})" if more else ""
+        yield Complaint(
+            "warning",
+            f"{one.theta:g}° of incidence{also}",
+            f"of the {share:.4g} of the light that the table {way}, {beyond[worst]:.4g} lies beyond the directions of its "
+            "values, where f is taken for that of the last: the share is as uncertain as that",
+        )
+
+
+def _extrapolated(one: BsdfSlice) -> float:
+    """What a slice on a grid scatters beyond its last values: its integral less that of the same values, 0 behind them."""
+    if one.grid is None:
+        return 0.0
+    unknown = np.isnan(one.values)
+    behind = np.logical_and.accumulate(unknown[:, ::-1], axis=1)[:, ::-1]
+    radial = np.append(one.grid.radial, one.grid.radial[-1] + 1e-6)
+    values = np.pad(np.where(behind, 0.0, one.values), ((0, 0), (0, 1)))
+    grid = PolarGrid(one.grid.frame, radial, one.grid.azimuth)
+    return one.integral() - dataclasses.replace(one, grid=grid, values=values, standard_error=None).integral()
