@@ -75,6 +75,28 @@ def test_a_lobe_aside_has_the_edges_that_root_finding_gives(c: float, share: flo
     assert found.angle == found.right - found.left
 
 
+@pytest.mark.parametrize("c", [0.0, 40.0, 90.0])
+@pytest.mark.parametrize("share", [0.5, 0.1])
+def test_light_upwards_is_as_wide_as_the_same_light_downwards(c: float, share: float) -> None:
+    """A lobe without symmetry mirrored in the horizon, over 0 to 180°: the circle over γ = 0 would be nearly all of 360°."""
+    planes, gamma = np.arange(0.0, 360.0, 7.5), np.arange(0.0, 181.0, 2.0)
+    below = table(lobe, c=planes, gamma=gamma)
+    error = 5.0 + 0.02 * below.values
+    down, up = (et.Intensity(planes, gamma, below.values[:, ::way], standard_error=error[:, ::way]) for way in (1, -1))
+    expected, found = (beam_angle(intensity, c, share) for intensity in (down, up))
+    assert found.angle == pytest.approx(expected.angle, rel=1e-9)
+    assert found.standard_error == pytest.approx(expected.standard_error, rel=1e-6)
+    assert 0.0 < found.standard_error < 5.0
+    assert found.right == pytest.approx(math.copysign(180.0, expected.right) - expected.right)
+    assert found.left == pytest.approx(math.copysign(180.0, expected.left) - expected.left)
+
+
+def test_light_both_ways_goes_all_around() -> None:
+    gamma = np.arange(0.0, 181.0)
+    both = et.Intensity([0], gamma, [np.abs(np.cos(np.radians(gamma)))])
+    assert beam_angle(both).angle == 360.0
+
+
 def test_a_dark_middle_is_inside_the_beam() -> None:
     wings = et.Intensity([0], [0, 20, 40, 60, 80, 90], [[10.0, 10, 60, 100, 20, 0]])
     # From 100 at 60° to 20 at 80°: 50 at 72.5°.

@@ -230,3 +230,83 @@ def test_what_the_format_cannot_hold(led: Intensity, message: str, tmp_path: Pat
     with pytest.raises(ArgumentError, match=message):
         write_intensity(tmp_path / "a.ldt", led)
     assert not list(tmp_path.iterdir())
+
+
+def header(path: Path, count: int = 42) -> list[str]:
+    return path.read_text(encoding="latin-1").splitlines()[:count]
+
+
+def test_what_a_file_says_comes_back(read, tmp_path: Path) -> None:
+    """Lines 2 and 13 to 32, but fluxes and ratios, are those of the file that was read."""
+    stated = {13: 470, 14: 0, 15: 220, 16: 350, 17: 60, 18: 51, 19: 0, 20: 51, 21: 0, 25: 15}
+    rows = ldt(1, [0], [0, 90], [100, 50], lines=stated)
+    notes = write_intensity(tmp_path / "b.ldt", read(rows))
+    lines = header(tmp_path / "b.ldt")
+    kept = [2, *range(13, 22), *range(24, 33)]
+    assert [lines[n - 1] for n in kept] == [rows[n - 1] for n in kept]
+    assert lines[29:31] == ["3000 K", "80"]
+    assert notes == ("the direct ratios are not kept: 0 was written, since étendue does not compute them",)
+    write_intensity(tmp_path / "c.ldt", read(rows), rotate=90)
+    assert header(tmp_path / "c.ldt")[12:21] == ["470", "0", "220", "60", "350", "0", "51", "0", "51"]
+
+
+def test_ratios_of_nothing_are_not_missed(read, tmp_path: Path) -> None:
+    rows = ldt(1, [0], [0, 90], [100, 50], lines=dict.fromkeys(range(33, 43), 0))
+    assert write_intensity(tmp_path / "b.ldt", read(rows)) == ()
+
+
+def test_a_conversion_factor_is_not_kept_and_that_is_told(read, tmp_path: Path) -> None:
+    led = read(ldt(1, [0], [0, 90], [100, 50], lines={24: 0.9}))
+    told = write_intensity(tmp_path / "b.ldt", led)
+    assert "the conversion factor of 0.9 was not applied and is not kept" in told[0]
+    again = read_intensity(tmp_path / "b.ldt")
+    assert np.allclose(again.values, led.values)
+    assert not any("conversion" in str(c) for c in again.complaints)
+
+
+def test_a_turned_rectangle_is_told(read, tmp_path: Path) -> None:
+    told = write_intensity(tmp_path / "b.ldt", read(ldt(1, [0], [0, 90], [100, 50])), rotate=45)
+    assert "(box, 50 × 1100 × 4 mm) stands turned by 45° from the planes C" in told[0]
+    assert header(tmp_path / "b.ldt")[12:17] == ["1200", "60", "80", "1100", "50"]
+
+
+def test_a_turned_housing_is_told_where_it_is_written(tmp_path: Path) -> None:
+    led = lid("both").replace(luminaire={"housing_x": 300.0, "housing_y": 100.0})
+    (told,) = write_intensity(tmp_path / "b.ldt", led, rotate=45)
+    assert told.startswith("the luminaire stands turned by 45°")
+    (told,) = write_intensity(tmp_path / "b.ies", led, rotate=45)
+    assert "size of the luminaire" in told
+
+
+def test_what_ies_files_have_no_place_for_is_told(read, tmp_path: Path) -> None:
+    sets = ((2, "LED", 500, "3000 K", "80", 12), (3, "big", 800, "", "", 20))
+    led = read(ldt(1, [0], [0, 90], [100, 50], sets=sets, lines={24: 0.9, 25: 15}))
+    told = "\n".join(write_intensity(tmp_path / "b.ies", led))
+    for what in (
+        "a linear one",
+        "size of the luminaire",
+        "heights",
+        "colour",
+        "lamp sets",
+        "tilt",
+        "conversion factor",
+        "direct ratios",
+    ):
+        assert what in told
+
+
+@pytest.mark.parametrize("name", ["luminance__sample_01", "luminance__sample_03", "py__sample5", "py__sample6"])
+def test_real_files_keep_sizes_and_colours(samples: Path, tmp_path: Path, name: str) -> None:
+    path = samples / "intensity" / f"eulumdat-{name}.ldt"
+    told = write_intensity(tmp_path / "b.ldt", read_intensity(path))
+    given, found = header(path), header(tmp_path / "b.ldt")
+    assert [float(v) for v in found[12:21]] == [float(v) for v in given[12:21]]
+    assert found[29:31] == given[29:31]
+    assert any("direct ratios" in note for note in told) == (float(given[40]) > 0)
+    assert any("luminaire ('œ' became '?')" in note for note in told) == (name == "py__sample6")
+
+
+def test_a_housing_that_is_not_known_is_as_round_as_the_opening(tmp_path: Path) -> None:
+    disk = {"opening_shape": "circle", "opening_x": 300.0, "opening_y": 300.0}
+    write_intensity(tmp_path / "b.ldt", lid("both").replace(luminaire=disk))
+    assert header(tmp_path / "b.ldt")[12:17] == ["300", "0", "0", "300", "0"]

@@ -161,3 +161,13 @@ def test_other_archives_are_none(tmp_path: Path) -> None:
     assert detect_intensity_format(tmp_path / "a.zip") is None
     with pytest.raises(UnsupportedFormatError, match="a ZIP archive"):
         detect_format(tmp_path / "a.zip")
+
+
+@pytest.mark.parametrize(("stated", "count"), [("ldc/ies", 0), ("LDC/IES", 0), ("ldc/eulumdat", 1), ("ldc/iesxml", 1)])
+def test_a_type_of_content_that_is_another_is_told(read: Read, tmp_path: Path, stated: str, count: int) -> None:
+    xml = product({"f": (stated, "localFileName", "led.ies")}, {"p": "f"})
+    led = read(archive({"product.xml": xml, "ldc/led.ies": ies_of(lid("none"), tmp_path)}))
+    assert led.provenance.format == "lm63"
+    found = [str(c) for c in led.complaints]
+    assert len(found) == count
+    assert all(f"contentType is {stated!r}, and ldc/led.ies is IES LM-63; it was read as that" in c for c in found)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.intensity import Intensity
+from etendue.quantities.intensity import UNTURNED, Intensity
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.intensity import TERMS, flux_by_quadrature, interpolator, lid
@@ -121,8 +121,55 @@ def test_turning_keeps_errors_beside_values_and_facts_in_place() -> None:
     assert np.array_equal(turned.standard_error, turned.values / 7)
     assert turned.luminaire == facts | {"opening_x": 2.0, "opening_y": 5.0}
     assert table.rotated_about_axis(-180).luminaire == facts
-    assert table.rotated_about_axis(30).luminaire == {"lamp": "L"}
+    assert table.rotated_about_axis(30).luminaire == facts | {"extents_turned": 30}
     assert turned.provenance.steps == ("turned by 90° about the axis",)
+
+
+@pytest.mark.parametrize("first", [45, 30, -77, 90.0004, 360.0])
+def test_turns_of_extents_add_up(first: float) -> None:
+    """Two turns are one by their sum, for the opening as for the planes; a whole circle in all changes nothing."""
+    heights = (51.0, 1.0, 2.0, 3.0)
+    facts = {"opening_shape": "box", "opening_x": 5.0, "opening_y": 2.0, "opening_heights": heights}
+    table = UNEVEN.replace(luminaire=facts)
+    quarter = table.rotated_about_axis(first).rotated_about_axis(90 - first).luminaire
+    assert quarter == facts | {"opening_x": 2.0, "opening_y": 5.0, "opening_heights": (3.0, 51.0, 1.0, 2.0)}
+    assert table.rotated_about_axis(first).rotated_about_axis(360 - first).luminaire == facts
+    assert table.mirrored().luminaire["opening_heights"] == (51.0, 3.0, 2.0, 1.0)
+    mirrored = table.rotated_about_axis(first).mirrored().luminaire
+    assert mirrored == table.mirrored().rotated_about_axis(-first).luminaire
+
+
+def test_what_counts_as_a_quarter_and_what_as_round() -> None:
+    box = UNEVEN.replace(luminaire={"opening_shape": "box", "opening_x": 5.0, "opening_y": 5.0})
+    assert "extents_turned" not in box.rotated_about_axis(89.9995).luminaire
+    assert box.rotated_about_axis(89.99).luminaire["extents_turned"] == pytest.approx(-0.01)
+    disk = UNEVEN.replace(luminaire={"opening_shape": "circle", "opening_x": 5.0, "opening_y": 5.0})
+    assert disk.rotated_about_axis(45).luminaire == disk.luminaire
+    ellipse = UNEVEN.replace(luminaire={"opening_shape": "ellipse", "opening_x": 5.0, "opening_y": 4.0})
+    assert ellipse.rotated_about_axis(45).luminaire["extents_turned"] == 45
+    housing = {"housing_x": 3.0, "housing_y": 3.0}
+    assert "extents_turned" in UNEVEN.replace(luminaire=housing).rotated_about_axis(45).luminaire
+    assert (
+        "extents_turned"
+        not in UNEVEN.replace(luminaire=housing | {"housing_round": True}).rotated_about_axis(45).luminaire
+    )
+
+
+def test_a_lying_cylinder_turns_along() -> None:
+    facts = {"opening_shape": "cylinder along length", "opening_x": 5.0, "opening_y": 1.0, "opening_z": 1.0}
+    turned = UNEVEN.replace(luminaire=facts).rotated_about_axis(90)
+    across = {"opening_shape": "cylinder along width", "opening_x": 1.0, "opening_y": 5.0, "opening_z": 1.0}
+    assert turned.luminaire == across
+    assert turned.rotated_about_axis(-90).luminaire == facts
+
+
+def test_nothing_was_turned_is_said_only_where_it_is_true() -> None:
+    table = UNEVEN.replace(notes=(f"C is the file's; {UNTURNED}", "something else"))
+    assert not table.planes_moved
+    assert table.scaled(2).notes == table.notes
+    for moved in (table.rotated_about_axis(45), table.mirrored()):
+        assert moved.notes == ("something else",)
+        assert moved.planes_moved
 
 
 def test_mirrored() -> None:

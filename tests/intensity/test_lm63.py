@@ -195,7 +195,11 @@ def test_tilt_is_kept_and_not_applied(read, tmp_path: Path) -> None:
     include = read(ies(tilt="TILT=INCLUDE\n1\n3\n0 45 90\n1.0 .95 .9"))
     assert include.luminaire["tilt"] == {"geometry": 1, "angles": [0, 45, 90], "factors": [1, 0.95, 0.9]}
     assert include.values.tolist() == [[10, 6, 1]]
-    assert not include.complaints
+    (told,) = map(str, include.complaints)
+    assert "1 at 0°, 0.95 at 45°, 0.9 at 90°, were not applied" in told
+    assert not read(ies(tilt="TILT=INCLUDE\n1\n3\n0 45 90\n1 1 1")).complaints
+    many = read(ies(tilt=f"TILT=INCLUDE\n1\n91\n{' '.join(map(str, range(91)))}\n1 {'0.5 ' * 90}"))
+    assert "0.5 at 10°, …, 0.5 at 90°, were not" in str(many.complaints[0])
     (tmp_path / "lamp.tlt").write_text("2 2\n0 90\n0.9 0.8\n")
     beside = read(ies(tilt="TILT=C:\\data\\lamp.tlt"))
     assert beside.luminaire["tilt"]["factors"] == [0.9, 0.8]
@@ -275,3 +279,107 @@ def test_what_is_written_is_the_edition_of_2002(tmp_path: Path) -> None:
     assert lines[at + 4] == "0 15 30 45 60 75 90"
     write_intensity(tmp_path / "b.ies", lid("C90-C270"))
     assert " 25 1 2 0 0 0" in (tmp_path / "b.ies").read_text(encoding="ascii")  # 0 to 360: 90 to 270 is not in 2002
+
+
+# --- what is written of a file that was read ---------------------------------------------------------------------------
+
+TRUE = (
+    "[NEARFIELD] 0.5 1\n[DISTRIBUTION] Type III\n[LAMPCAT] L-1\n[SEARCH] {a}\n[_COLOR] 4000 K\n[OTHER] first\n"
+    "[OTHER] second\n[MANUFAC] another"
+)
+
+
+def keywords_of(path: Path) -> list[tuple[str, str]]:
+    return list(read_intensity(path).luminaire["keywords"])
+
+
+def test_keywords_that_stay_true_are_kept(read, tmp_path: Path) -> None:
+    """IES to IES: every line but those of facts comes back, in its order, and nothing is told."""
+    led = read(ies(keywords=f"[TEST] t\n[MANUFAC] m\n{TRUE}"))
+    assert write_intensity(tmp_path / "b.ies", led) == ()
+    given = [pair for pair in led.luminaire["keywords"] if pair not in {("TEST", "t"), ("MANUFAC", "m")}]
+    found = keywords_of(tmp_path / "b.ies")
+    assert [pair for pair in found if pair in given] == given
+    assert read_intensity(tmp_path / "b.ies").luminaire["manufacturer"] == "m"
+    again = read_intensity(tmp_path / "b.ies")
+    assert write_intensity(tmp_path / "c.ies", again) == ()
+    assert [pair for pair in keywords_of(tmp_path / "c.ies") if pair in given] == given
+
+
+def test_keywords_that_cannot_be_kept_are_named(read, tmp_path: Path) -> None:
+    led = read(ies(keywords=f"[TEST] t\n[MANUFAC] m\n[FOO] x\n[BLOCK]\n[_Ä] y\n{TRUE}\na label"))
+    (told,) = write_intensity(tmp_path / "b.ies", led)
+    assert told.endswith("are not kept: [FOO], [BLOCK], [_Ä]")
+    assert ("OTHER", "a label") in keywords_of(tmp_path / "b.ies")
+    (told,) = write_intensity(tmp_path / "b.ies", led, rotate=90)
+    assert told.endswith("are not kept: [FOO], [BLOCK], [_Ä], [DISTRIBUTION]")
+    told = "\n".join(write_intensity(tmp_path / "b.ldt", led))
+    assert "without a line of their own are not kept: [FOO], [BLOCK], [_Ä], [NEARFIELD], [DISTRIBUTION]" in told
+
+
+@pytest.mark.parametrize(("unit", "per_mw"), [("mW/sr", 1.0), ("W/sr", 1e-3), ("cd", 1.0)])
+def test_a_stated_flux_is_kept_where_the_table_has_it(read, tmp_path: Path, unit: str, per_mw: float) -> None:
+    """Watts are written as milliwatts, whatever the unit before; a flux that the table has not is named."""
+    unstated = read(ies(keywords=f"[_INTENSITYUNITS] {unit}"))
+    flux = unstated.flux * (per_mw * 1e3 if unstated.flux_unit == "W" else 1.0)
+    led = read(ies(keywords=f"[_INTENSITYUNITS] {unit}\n[_TOTALLUMINAIRELUMENS] {1.02 * flux:.6g}"))
+    assert write_intensity(tmp_path / "b.ies", led) == ()
+    again = read_intensity(tmp_path / "b.ies")
+    assert again.luminaire["stated_flux"] == pytest.approx(1.02 * led.flux, rel=1e-5)
+    assert not again.complaints
+    (told,) = write_intensity(tmp_path / "c.ies", led.scaled(2))
+    assert told.endswith("[_TOTALLUMINAIRELUMENS]")
+    assert "stated_flux" not in read_intensity(tmp_path / "c.ies").luminaire
+
+
+def test_keywords_of_real_files(samples: Path, tmp_path: Path) -> None:
+    """B1 states 91.6 mW before its multiplier of 1.32: untrue of the table, and named."""
+    led = read_intensity(samples / "intensity" / "guv-calcs__B1_module.ies")
+    (told,) = write_intensity(tmp_path / "b.ies", led)
+    assert told.endswith("are not kept: [_TOTALLUMINAIRELUMENS]")
+    found = dict(keywords_of(tmp_path / "b.ies"))
+    for keyword in ("NEARFIELD", "DISTRIBUTION", "_RADIATIONTYPE"):
+        assert found[keyword].split() == dict(led.luminaire["keywords"])[keyword].split()
+
+
+def test_a_turned_file_says_so_and_nothing_else(read, tmp_path: Path) -> None:
+    led = read(ies(head="1 -1 1 3 1 1 2 0.5 1.2 0.1"))
+    (told,) = write_intensity(tmp_path / "b.ies", led, rotate=45)
+    assert "(box, 1200 × 500 × 100 mm) stands turned by 45° from the planes C" in told
+    text = " ".join((tmp_path / "b.ies").read_text("ascii").replace("[MORE]", "").split())
+    assert "turned by 45 deg about the axis" in text
+    assert "nothing was turned" not in text
+    again = read_intensity(tmp_path / "b.ies").luminaire
+    assert [again[f"opening_{axis}"] for axis in "xyz"] == pytest.approx([1200, 500, 100])
+    assert write_intensity(tmp_path / "c.ies", led, rotate=90.0002) == ()
+    quarter = read_intensity(tmp_path / "c.ies").luminaire
+    assert [quarter[f"opening_{axis}"] for axis in "xyz"] == pytest.approx([500, 1200, 100])
+
+
+@pytest.mark.parametrize("turn", [45.0, 90.0])
+def test_what_an_untouched_copy_said_is_not_said_of_a_turned_one(read, tmp_path: Path, turn: float) -> None:
+    write_intensity(tmp_path / "b.ies", read(ies()))
+    assert "nothing was turned or mirrored" in " ".join((tmp_path / "b.ies").read_text("ascii").split())
+    write_intensity(tmp_path / "c.ies", read_intensity(tmp_path / "b.ies"), rotate=turn)
+    assert "nothing was turned" not in (tmp_path / "c.ies").read_text("ascii")
+
+
+def test_letters_that_a_file_does_not_have_are_told(tmp_path: Path) -> None:
+    facts = {"manufacturer": "Łódź", "luminaire": "1½ × ½ — 90°", "lamp": "LED ± 5 %"}
+    led = lid("both").replace(luminaire=facts)
+    (told,) = write_intensity(tmp_path / "b.ies", led)
+    assert told.startswith("texts changed, since the format has ASCII letters only: ")
+    assert "manufacturer ('Ł' became '?', 'ó' became 'o', 'ź' became 'z'); luminaire ('½' became '1/2'" in told
+    assert "lamp" not in told
+    again = read_intensity(tmp_path / "b.ies").luminaire
+    assert (again["manufacturer"], again["luminaire"]) == ("?odz", "1 1/2 x 1/2 - 90 deg")
+    (told,) = write_intensity(tmp_path / "b.ldt", led)
+    assert told.endswith("Latin-1 letters only: manufacturer ('Ł' became '?', 'ź' became 'z')")
+    assert read_intensity(tmp_path / "b.ldt").luminaire["luminaire"] == "1½ × ½ - 90°"
+    (told,) = write_intensity(tmp_path / "b.ldt", lid("both").replace(luminaire={"luminaire": "x" * 500}))
+    assert "luminaire (cut to 78 of 500 characters)" in told
+    (told,) = write_intensity(tmp_path / "b.ldt", lid("both").replace(luminaire={"lamp": "\x96 5 W"}))
+    assert r"lamp ('\x96' became ' ')" in told
+    composed = lid("both").replace(luminaire={"luminaire": "Gro\u0308\xdfe\xa0½"})
+    assert write_intensity(tmp_path / "b.ldt", composed) == ()
+    assert read_intensity(tmp_path / "b.ldt").luminaire["luminaire"] == "Größe ½"

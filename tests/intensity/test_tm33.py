@@ -297,3 +297,62 @@ def test_planes_are_counted_as_in_ies_files(read: Read, tmp_path: Path) -> None:
     led = read(tm33_of(lid("none")))
     assert not any("rotate" in note for note in write_intensity(tmp_path / "a.ies", led))
     assert any("rotate=90 turns" in note for note in write_intensity(tmp_path / "a.ldt", led))
+
+
+# --- what the file says twice, or beside its table -----------------------------------------------------------------------
+
+
+def flux_of(values: np.ndarray) -> float:
+    return Intensity([0], GAMMA, values).flux
+
+
+def test_strangers_beside_the_table_are_told(read: Read) -> None:
+    content = emitter(h=[0], v=GAMMA, values=some(1, 4))
+    more = "<Multiplier>2</Multiplier><Foo/><IllumData/></LuminousData>"
+    led = read(tm33(content.replace("</LuminousData>", more)))
+    text = told(led)
+    assert "Multiplier: no element of the format here; it was ignored" in text
+    assert "Foo: no element of the format here; it was ignored" in text
+    assert "IllumData: not kept" in text
+    assert np.array_equal(led.values, some(1, 4))
+
+
+@pytest.mark.parametrize(("factor", "count"), [("0.8", 1), ("1", 0), ("much", 1)])
+def test_a_ballast_factor_is_not_applied_and_told(read: Read, factor: str, count: int) -> None:
+    content = emitter(h=[0], v=GAMMA, values=some(1, 4), before=f"<BallastFactor>{factor}</BallastFactor>")
+    led = read(tm33(content))
+    assert np.array_equal(led.values, some(1, 4))
+    assert told(led).count("BallastFactor") == count
+
+
+def test_multipliers_that_differ_are_refused(read: Read) -> None:
+    def content(first: str, second: str) -> bytes:
+        two = f"<Multiplier>{first}</Multiplier><Multiplier>{second}</Multiplier>"
+        return tm33(emitter(h=[0], v=GAMMA, values=some(1, 4), table=two))
+
+    led = read(content("2", "2.0"))
+    assert np.array_equal(led.values, 2 * some(1, 4))
+    assert "Multiplier: 2 stands there 2 times; it was applied once" in told(led)
+    for second in ("3", "x"):
+        with pytest.raises(FormatError, match=f"there are 2, and they differ: 2, {second}"):
+            read(content("2", second))
+
+
+def test_a_number_of_emitters_that_disagrees_is_told(read: Read) -> None:
+    """One of a kind that counts seven, or seven of one kind: either way of counting is right."""
+    one = tm33(emitter(h=[0], v=GAMMA, values=some(1, 4)))
+    text = told(read(one.replace(b"<NumEmitter>1<", b"<NumEmitter>7<")))
+    assert "NumEmitter: it says 7, the file has 1" in text
+    seven = tm33(emitter(h=[0], v=GAMMA, values=some(1, 4), number=7))
+    assert "NumEmitter" not in told(read(seven))
+    assert "NumEmitter" not in told(read(seven.replace(b"<NumEmitter>1<", b"<NumEmitter>7<")))
+    assert "NumEmitter: 'x' is no number" in told(read(one.replace(b"<NumEmitter>1<", b"<NumEmitter>x<")))
+
+
+@pytest.mark.parametrize(("share", "disagrees"), [(1.04, False), (0.3, True)])
+def test_measured_lumens_that_the_table_has_not_are_told(read: Read, share: float, disagrees: bool) -> None:
+    stated = share * flux_of(some(1, 4))
+    content = emitter(h=[0], v=GAMMA, values=some(1, 4), before=f"<MeasuredLumens>{stated:.9g}</MeasuredLumens>")
+    led = read(tm33(content))
+    assert ("MeasuredLumens: it says" in told(led)) == disagrees
+    assert led.luminaire["stated_flux"] == pytest.approx(stated)

@@ -111,9 +111,18 @@ def test_one_of_several_photometries(run: Run) -> None:
 def test_a_file_of_tm33(run: Run) -> None:
     Path("a.xml").write_bytes(tm33_of(lid("C0-C180")))
     status, out, err = run("a.xml", "-o", "a.ldt", "--rotate", 90)
-    assert (status, err) == (0, "")
+    assert status == 0
+    assert err.count("\n") == 1
+    assert "a.ldt: texts changed" in err
+    assert "manufacturer ('Ł' became '?'); catalogue number ('№' became 'No')" in err
     assert "manufacturer: Łampa & Söhne" in out
     assert et.read_intensity("a.ldt").symmetry(1e-4) == "C90-C270"
+
+
+def test_a_turned_table_is_not_said_to_be_unturned(run: Run) -> None:
+    et.write_intensity("a.ies", lid("none"))
+    assert "nothing was turned or mirrored" in run("a.ies")[1]
+    assert "nothing was turned" not in run("a.ies", "--rotate", 45)[1]
 
 
 @pytest.mark.usefixtures("led")

@@ -295,3 +295,18 @@ def test_bad_planes_are_told() -> None:
 def test_pixels_of_patches_need_a_flat_plane(rays: et.RaySet) -> None:
     with pytest.raises(et.ArgumentError, match="without focus and frames"):
         et.GriddedSource.fit(rays, SMALL, pixel=0.5, threshold=5)
+
+
+@pytest.mark.slow
+def test_a_narrow_beam_that_leans_is_focused() -> None:
+    """All rays beyond 60° from the normal: the narrowest place was looked for among those within, and there are none."""
+    rng = np.random.default_rng(1)
+    a = rng.normal(0, np.radians(0.3), (3_000, 2))
+    along = np.stack([a[:, 0], a[:, 1], np.sqrt(1 - (a**2).sum(axis=1))], axis=1)
+    t = np.radians(63)
+    turned = along @ np.array([[np.cos(t), 0, -np.sin(t)], [0, 1, 0], [np.sin(t), 0, np.cos(t)]])
+    place = np.c_[rng.uniform(-1, 1, (len(a), 2)), np.zeros(len(a))]
+    plane = focused(et.Plane(z=0), et.RaySet(place, turned, np.full(len(a), 1.0)))
+    parts = [part.core() for part in plane.parts()]
+    assert np.mean(_core.cross_parts(parts, place, turned)[0] < 0) < 1e-3
+    assert all(1.9 < side < 4.2 for side in plane.parts()[0].size)

@@ -84,10 +84,10 @@ def test_weak_ways_that_are_followed_on_some_lines_are_missed_by_none(body: str)
 
 @pytest.mark.slow
 def test_many_scatters_behind_glass_are_no_rare_finds() -> None:
-    """A white sphere, ρ = 0.95, whose inner side glows evenly, with a ball of glass in it: L = L₀ + ρ Φ/(π A (1 − ρ)) everywhere.
+    """A white sphere, ρ = 0.95, whose inner side glows evenly, with a ball of glass in it: L = L₀ + ρ Φ/(π A (1 − ρ)).
 
-    Half of the directions drawn by what rays forwards tell, at every scatter, had weights that multiplied without an end: maps
-    were dark by a tenth, with errors of a fiftieth, and a pixel was three times too bright now and then.
+    Half of the directions drawn by what rays forwards tell, at every scatter, had weights that multiplied without an end:
+    maps were dark by a tenth, with errors of a fiftieth, and a pixel was three times too bright now and then.
     """
     radius, rho, flux = 10.0, 0.95, 1000.0
     inner = 0.999 * radius

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError
 from etendue.lightfield.field_rays import FieldRays
-from etendue.luminance.framing import centre_of_light, framed, framed_screens, light_towards
+from etendue.luminance.framing import centre_of_light, framed, framed_screens, light_towards, missed_notes
 from etendue.luminance.opening import open_source
 from oracles.light_fields import make_field
 from scipy import stats
@@ -160,3 +160,34 @@ def test_scenes_of_nothing_but_measured_sources_are_framed_by_their_light(tmp_pa
     opened = open_source(folder)
     assert isinstance(opened, et.Scene)
     assert opened.sources[0].kind == "gridded"
+
+
+def test_an_observer_within_the_source_is_told_no_share() -> None:
+    """A thousandth of a millimetre above a square of 2 mm all pixels are lit; few rays or none head for there."""
+    rays = lamp()
+    near = [et.Observer(10, 0, distance, target=(4, 3, 7)) for distance in (1e-3, 0.1)]
+    for observer in near:
+        screen = et.Screen(observer.distance / 2, observer.distance / 2, 4, 4)
+        assert missed_notes(rays, observer, screen) == ()
+    assert missed_notes(rays, et.Observer(10, 0, 2000, target=(4, 3, 7)), et.Screen(0.1, 0.1, 4, 4))
+
+
+def test_a_dark_map_of_a_field_names_the_rays_that_it_leaves_out() -> None:
+    """Two disks, of which the lower one shines down with 10⁻⁴ of the flux: where the field is that of the upper one, the
+    view from below says what is missing."""
+    rng = np.random.default_rng(3)
+    u = rng.random((20_000, 4))
+    r, sine = np.sqrt(u[:, 0]), np.sqrt(u[:, 2])
+    turn, azimuth = 2 * np.pi * u[:, 1], 2 * np.pi * u[:, 3]
+    down = np.arange(len(u)) % 2 == 1
+    away = np.where(down, -1.0, 1.0)
+    place = np.stack([r * np.cos(turn), r * np.sin(turn), np.where(down, -1.0, 0.0)], axis=1)
+    direction = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), away * np.sqrt(1 - sine**2)], axis=1)
+    rays = et.RaySet(place, direction, np.where(down, 1e-6, 1e-2))
+    field = et.LightField.fit(rays, et.Disk(radius=1), depths=(2, 2, 2, 2))
+    lmap = et.luminance_map(field, et.Observer(150, 0, 1000, target=(0, 0, -1)), et.Screen(1, 1, 4, 4))
+    (told,) = [note for note in lmap.notes if note.startswith("the map is dark")]
+    assert "10,000 rays (0.01 % of the flux)" in told
+    assert not any(
+        "dark" in note for note in et.luminance_map(field, et.Observer(10, 0, 1000), et.Screen(1, 1, 4, 4)).notes
+    )

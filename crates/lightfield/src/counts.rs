@@ -185,6 +185,7 @@ impl Default for Scratch {
 impl Found {
     /// Nothing yet, with room for the rays of a batch.
     fn with_room() -> Self {
+        #[allow(clippy::cast_possible_truncation, reason = "a batch is short")]
         const ROOM: usize = ordered::BATCH as usize;
         Self {
             cells: std::array::from_fn(|_| Vec::with_capacity(ROOM)),
@@ -392,7 +393,9 @@ pub fn count(
     let work = |range: Range<u64>| {
         let mut found = lists.take(Found::with_room);
         places.with(Scratch::default, |scratch| {
-            source.for_each_block(range, |first, batch| found.collect(plan, &starts, first, batch, scratch));
+            source.for_each_block(range, |first, batch| {
+                found.collect(plan, &starts, first, batch, scratch);
+            });
         });
         found
     };

@@ -256,7 +256,8 @@ def _focus(rays: _Rays) -> Focus | None:
 
 def _waist(rays: _Rays) -> tuple[_View, float]:
     """Where the bundle is narrowest: the square about it, and its height above the plane [mm]."""
-    narrow = np.flatnonzero(rays.lean < 0.5)
+    # Rays near the normal tell the height best; of a beam that leans there may be none within 60°.
+    narrow = np.flatnonzero(rays.lean <= max(0.5, float(np.median(rays.lean))))
     narrow = narrow[np.argsort(rays.number[narrow])]
     narrow = narrow[:: max(len(narrow) // WAIST_RAYS, 1)]
     own_place, own_slope = rays.place[narrow], rays.slope[narrow]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from etendue.errors import ArgumentError
-from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, dead_note
 
 
 def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
@@ -66,7 +66,7 @@ def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
     rays = np.where(unknown, -1, np.sum([m.rays for m in maps], axis=0))
     notes = (
         f"mean of {n} independent maps" + ("" if unknown.any() else f", {rays.sum():,} rays in all"),
-        f"{int(dead.sum()):,} of {dead.size:,} pixels are dead (no ray): NaN",
+        dead_note(dead),
     )
     sources = tuple(m.provenance for m in maps)
     return dataclasses.replace(

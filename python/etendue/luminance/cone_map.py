@@ -14,7 +14,7 @@ from etendue.luminance.cone import ConeEstimate, ConeView, cone_estimates
 from etendue.luminance.methods import Cone
 from etendue.luminance.observer_disk import check_disk, widest_angle
 from etendue.quantities.distinct_rays import DistinctRays
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.luminance_map import LuminanceMap, dead_note
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import Progress, RayStream, Tally
 
@@ -82,7 +82,7 @@ def _map(
     )
     notes = [
         f"{counts.sum():,} of {tally.rays:,} rays {within} through the screen",
-        f"{int(dead.sum()):,} of {dead.size:,} pixels are dead (no ray): NaN",
+        dead_note(dead),
     ]
     if isinstance(rays, RayIndex):
         notes.append(f"by the index: {estimate.looked:,} rays were looked at, and no other can be seen")

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from etendue.denoising.smoothing import smooth_counts
 from etendue.errors import ArgumentError
 from etendue.luminance.filters import TOGETHER, pixels_err_together
-from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, notes_that_stay
 
 Array = npt.NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None
         )
     etendue = lmap.screen.cosine(lmap.observer)  # relative: constant factors cancel
     smooth = smooth_counts(*_poisson_sums(lmap, etendue), etendue, shifts=shifts, threads=threads)
-    error, notes = smooth.standard_error / etendue, (*lmap.notes, *smooth.notes)
+    error, notes = smooth.standard_error / etendue, (*notes_that_stay(lmap), *smooth.notes)
     if pixels_err_together(lmap):
         error = np.fmax(error, lmap.standard_error)
         notes = (*notes, TOGETHER)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, notes_that_stay
 from etendue.quantities.powers_of_ten import counted, rounded
 
 Array = npt.NDArray[np.float64]
@@ -137,7 +137,7 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
         filtered = _filter_linearly(stack, row_weights, column_weights, power)
     label = f"{kind} {rows}×{columns}" + (f", γ = {gamma:g}" if chosen.selective else "")
     result = filtered.put_into(lmap, f"filter {label}", power)
-    return result.replace(notes=(*lmap.notes, *_report(lmap, result, label, chosen)))
+    return result.replace(notes=(*notes_that_stay(lmap), *_report(lmap, result, label, chosen)))
 
 
 def pixels_err_together(lmap: LuminanceMap) -> bool:

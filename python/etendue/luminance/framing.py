@@ -222,11 +222,17 @@ def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
 
 
 def missed_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str, ...]:
-    """What is to be said of a screen that does not show nine tenths of the light towards its observer."""
+    """What is to be said of a screen that does not show nine tenths of the light towards its observer.
+
+    Nothing from within the source: there the light comes from all sides, and no screen shows most of it.
+    """
+    middle = centre_of_light(rays)
+    from_middle = np.linalg.norm(rays.position - np.asarray(middle), axis=1)
+    if np.linalg.norm(observer.position - np.asarray(middle)) < _quantile(from_middle, rays.flux):
+        return ()
     light = light_towards(rays, observer, screen)
     if light.share(screen) >= 1.0 - MOST_MISSED:
         return ()
-    middle = centre_of_light(rays)
     there = dataclasses.replace(observer, target=middle)
     if not (light.flux.any() and light_towards(rays, there, screen).flux.any()):
         return ("of the rays that were looked at none heads for the observer: from there the source is dark",)

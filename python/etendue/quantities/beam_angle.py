@@ -48,7 +48,8 @@ class BeamAngle:
     standard_error : float
         [°]; NaN where no error of the intensity is known.
     left, right : float
-        γ of the edges [°]; negative in the half plane C + 180°.
+        γ of the edges [°]; negative in the half plane C + 180°. If the light is about γ = 180°, the angle lies on that
+        side: 360° less what is between the edges over γ = 0.
 
     Examples
     --------
@@ -84,8 +85,9 @@ def beam_angle(
 ) -> BeamAngle:
     """The angle that holds all directions of a plane whose intensity is above a share of the largest.
 
-    With a share of 50 % it is the beam angle, with 10 % the field angle. It is measured from edge to edge, so that a
-    distribution with a dark middle has the angle of its outer edges.
+    It goes over γ = 0, or over γ = 180° where there is light above the share in that direction and not at γ = 0. With a
+    share of 50 % it is the beam angle, with 10 % the field angle. It is measured from edge to edge, so that a distribution
+    with a dark middle has the angle of its outer edges.
 
     In noise, an edge is where the outermost value stands that is above the limit by three standard errors, plus the angle
     beyond it that is above the limit: there, noise lifts as much light over the limit as it pushes below.
@@ -139,11 +141,15 @@ def beam_angle(
     plane = float(np.mod(c, 360.0))
     plane -= 180.0 if plane >= 180.0 else 0.0
     curve = _signed(intensity, plane)
+    upwards = _lit(curve, 180.0) >= share * top > _lit(curve, 0.0)
+    if upwards:
+        curve = _from_above(curve)
     left, right = (
         float(edge[0]) for edge in _edges(curve.gamma, curve.values[None], curve.errors, np.array([share * top]))
     )
-    error = _angle_error(intensity, plane, curve, share * top, share * top_error)
-    return BeamAngle(plane, share, right - left, error, left, right)
+    error = _angle_error(intensity, plane, curve, (share * top, share * top_error), upwards)
+    ends = [math.copysign(180.0, edge) - edge for edge in (left, right)] if upwards else [left, right]
+    return BeamAngle(plane, share, right - left, error, *ends)
 
 
 def cut_off_angle(intensity: Intensity, share: float = CUT_OFF) -> float:
@@ -212,6 +218,21 @@ def _signed(intensity: Intensity, plane: float) -> _Curve:
     )
 
 
+def _lit(curve: _Curve, gamma: float) -> float:
+    """The largest value at an angle from the axis, in both half planes; 0 beside the table."""
+    return float(curve.values[np.abs(curve.gamma) == gamma].max(initial=0.0))
+
+
+def _from_above(curve: _Curve) -> _Curve:
+    """The same plane by the angle from γ = 180°."""
+    # One half of the values is of either half plane.
+    middle = len(curve.gamma) // 2
+    left, right = np.arange(middle), np.arange(middle, len(curve.gamma))
+    order = np.concatenate([left[::-1], right[::-1]])
+    gamma = np.concatenate([-180.0 - curve.gamma[left[::-1]], 180.0 - curve.gamma[right[::-1]]])
+    return _Curve(gamma, curve.values[order], curve.errors[order])
+
+
 def _plane_errors(intensity: Intensity, c: Sequence[float]) -> Array:
     """Standard errors of the half planes, which need not be nodes: those of the two beside them are independent."""
     first, second, share = intensity.between_planes(np.asarray(c, dtype=np.float64))
@@ -241,8 +262,11 @@ def _edges(gamma: Array, values: Array, errors: Array, limits: Array) -> tuple[A
     return np.where(none, np.nan, left), np.where(none, np.nan, right)
 
 
-def _angle_error(intensity: Intensity, plane: float, curve: _Curve, limit: float, limit_error: float) -> float:
+def _angle_error(
+    intensity: Intensity, plane: float, curve: _Curve, limit_and_error: tuple[float, float], upwards: bool
+) -> float:
     """Standard error of the angle between the edges [°]."""
+    limit, limit_error = limit_and_error
     if np.isnan(curve.errors).any():
         return math.nan
     off = limit_error if math.isfinite(limit_error) else 0.0
@@ -263,7 +287,8 @@ def _angle_error(intensity: Intensity, plane: float, curve: _Curve, limit: float
     right, other = math.cos(turn) * white[..., 1:] + math.sin(turn) * white[..., :-1]
     # What both half planes have in common stands at the same |γ|; the first draw is that of the right one.
     mirror = np.stack([np.interp(-gamma, gamma, row) for row in right])
-    alike = np.where(gamma < 0.0, np.interp(-gamma, intensity.gamma, _alike(intensity, plane)), 0.0)
+    from_axis = 180.0 + gamma if upwards else -gamma
+    alike = np.where(gamma < 0.0, np.interp(from_axis, intensity.gamma, _alike(intensity, plane)), 0.0)
     noise = errors * (alike * mirror + np.sqrt(1.0 - alike**2) * np.where(gamma < 0.0, other, right))
     drawn = _widths(
         curve._replace(gamma=gamma, values=curve.values[nodes], errors=errors),

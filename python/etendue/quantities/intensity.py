@@ -46,12 +46,30 @@ LUMINAIRE_FACTS: dict[str, str] = {
     "housing_x": "extent of the luminaire along C0-C180 [mm]",
     "housing_y": "extent of the luminaire along C90-C270 [mm]",
     "housing_z": "extent of the luminaire along the axis [mm]",
+    "housing_round": "whether the luminaire is round, if a file says so",
+    "opening_heights": "height of the luminous opening at C0, C90, C180, C270 [mm], where they differ",
+    "extents_turned": "angle by which opening and luminaire stand turned from these axes, towards C90 [°], if they do",
     "lamp_sets": "every lamp set of an EULUMDAT file, one mapping each",
+    "measurement_tilt": "tilt of the luminaire when it was measured [°], of an EULUMDAT file; nothing was turned back",
+    "conversion_factor": "for intensities, of an EULUMDAT file, if it is not 1; not applied",
+    "direct_ratios": "ten of an EULUMDAT file, if it has any",
     "tilt": "lamp factors over the tilt of the luminaire, of an IES file; not applied",
     "spectrum": "`Spectrum` of all its light, if a file tells it",
     "keywords": "every keyword line of an IES file, as pairs",
 }
 """What may be known of the luminaire beside its intensity, with its meaning."""
+
+UNTURNED = "nothing was turned or mirrored"
+"""How notes on the direction of planes end that hold until somebody turns them."""
+
+TURNED, MIRRORED = "turned by", "mirrored:"
+"""How the steps of a provenance begin that changed where the planes are."""
+
+OTHER_WAY = {"cylinder along length": "cylinder along width", "cylinder along width": "cylinder along length"}
+"""Shapes of openings that a quarter of a turn gives another name."""
+
+QUARTER_TURN = 1e-3
+"""Degrees within which a turn is one by a multiple of 90° for extents: over a metre they move by less than 0.02 mm."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -399,14 +417,13 @@ class Intensity(InNotebook):
         Parameters
         ----------
         angle : float
-            [°], from +X towards +Y. Extents along x and y in `luminaire` change places for odd multiples of 90°, and are
-            dropped for what is no multiple.
+            [°], from +X towards +Y. Extents along x and y in `luminaire` change places for odd multiples of 90°. What is
+            left to the nearest multiple stands in ``luminaire["extents_turned"]``, unless all that is known is round.
         """
         if not np.isfinite(angle):
             raise ArgumentError(f"Intensity: cannot be turned by {angle}°.")
-        return self._with_planes_at(
-            self.c + angle, f"turned by {angle:.9g}° about the axis", _turned(self.luminaire, angle)
-        )
+        step = f"{TURNED} {angle:.9g}° about the axis"
+        return self._with_planes_at(self.c + angle, step, _turned(self.luminaire, angle))
 
     def mirrored(self) -> Intensity:
         """The mirror image in the plane C0-C180: what was at C is at -C.
@@ -414,11 +431,17 @@ class Intensity(InNotebook):
         Luminaire files count C counter-clockwise *from above*, looking against a z axis from which the light goes away;
         étendue counts it about the direction in which sources emit. This is what leads from one to the other.
         """
-        return self._with_planes_at(-self.c, "mirrored: C became -C", self.luminaire)
+        return self._with_planes_at(-self.c, f"{MIRRORED} C became -C", _mirrored(self.luminaire))
+
+    @property
+    def planes_moved(self) -> bool:
+        """Whether somebody turned or mirrored the planes since they were read or made."""
+        return any(step.startswith((TURNED, MIRRORED)) for step in self.provenance.steps)
 
     def _with_planes_at(self, c: Array, step: str, luminaire: Mapping[str, Any]) -> Intensity:
+        notes = tuple(note for note in self.notes if not note.endswith(UNTURNED))
         if self.c.size == 1:
-            return self.replace(provenance=self.provenance.then(step), luminaire=luminaire)
+            return self.replace(provenance=self.provenance.then(step), luminaire=luminaire, notes=notes)
         turned = np.mod(c, 360.0)
         turned[turned == 360.0] = 0.0  # the remainder of -1e-20 is rounded up to the divisor
         order = np.argsort(turned)
@@ -428,6 +451,7 @@ class Intensity(InNotebook):
             standard_error=self.standard_error[order],
             luminaire=luminaire,
             provenance=self.provenance.then(step),
+            notes=notes,
         )
 
 
@@ -439,14 +463,38 @@ def _finite(name: str, numbers: npt.ArrayLike) -> Array:
 
 
 def _turned(facts: Mapping[str, Any], angle: float) -> dict[str, Any]:
-    """Extents along x and y after a turn about the axis."""
-    quarters = round(angle / 90.0)
+    """Extents after a turn about the axis: to the nearest quarter, and what is left as `extents_turned`."""
     result = dict(facts)
+    whole = angle + float(result.pop("extents_turned", 0.0))
+    quarters = round(whole / 90.0)
     for what in ("opening", "housing"):
-        x, y = result.pop(f"{what}_x", None), result.pop(f"{what}_y", None)
-        if abs(angle - 90.0 * quarters) < ROUNDING or x == y:
-            x, y = (y, x) if quarters % 2 else (x, y)
-            result |= {f"{what}_{axis}": extent for axis, extent in (("x", x), ("y", y)) if extent is not None}
-        elif what == "opening":
-            result.pop("opening_shape", None)
+        x, y = (result.pop(f"{what}_{axis}", None) for axis in ("yx" if quarters % 2 else "xy"))
+        result |= {f"{what}_{axis}": extent for axis, extent in (("x", x), ("y", y)) if extent is not None}
+    if quarters % 2 and result.get("opening_shape") in OTHER_WAY:
+        result["opening_shape"] = OTHER_WAY[result["opening_shape"]]
+    if "opening_heights" in result:
+        result["opening_heights"] = tuple(result["opening_heights"][(k - quarters) % 4] for k in range(4))
+    left = whole - 90.0 * quarters
+    if abs(left) > QUARTER_TURN and (has_corners(facts, "opening") or has_corners(facts, "housing")):
+        result["extents_turned"] = left
     return result
+
+
+def has_corners(facts: Mapping[str, Any], what: Literal["opening", "housing"]) -> bool:
+    """Whether the extents of the luminous opening or the housing are known, and a turn about the axis changes them.
+
+    Examples
+    --------
+    >>> has_corners({"opening_shape": "circle", "opening_x": 80.0, "opening_y": 80.0}, "opening")
+    False
+    """
+    x, y = (facts.get(f"{what}_{axis}", 0.0) for axis in "xy")
+    box = facts.get("opening_shape") in {"rectangle", "box"} or "opening_heights" in facts
+    return bool(x or y) and (x != y or (box if what == "opening" else not facts.get("housing_round")))
+
+
+def _mirrored(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Extents of the mirror image in the plane C0-C180: C90 and C270 change places."""
+    heights = facts.get("opening_heights", ())
+    result = dict(facts) | ({"opening_heights": tuple(heights[k] for k in (0, 3, 2, 1))} if heights else {})
+    return result | ({"extents_turned": -facts["extents_turned"]} if "extents_turned" in facts else {})

@@ -93,6 +93,33 @@ class LuminanceMap(PixelMap):
         return {"observer": observer_from_dict(header["observer"]), "screen": Screen(**header["screen"])}
 
 
+DEAD = " pixels are dead (no ray): NaN"
+"""How the note on dead pixels ends."""
+
+
+def dead_note(dead: npt.NDArray[np.bool_]) -> str:
+    """How many pixels are dead.
+
+    Examples
+    --------
+    >>> dead_note(np.array([True, False, False]))
+    '1 of 3 pixels are dead (no ray): NaN'
+    """
+    return f"{int(dead.sum()):,} of {dead.size:,}{DEAD}"
+
+
+def notes_that_stay(lmap: LuminanceMap) -> tuple[str, ...]:
+    """The notes of a map that are true of it smoothed: how many pixels were dead is not.
+
+    Examples
+    --------
+    >>> lmap = LuminanceMap([[np.nan]], [[np.nan]], [[0]], Observer(0, 0, 1000), Screen(1, 1, 1, 1))
+    >>> notes_that_stay(lmap.replace(notes=("7 rays", dead_note(np.isnan(lmap.values)))))
+    ('7 rays',)
+    """
+    return tuple(note for note in lmap.notes if not note.endswith(DEAD))
+
+
 def check_luminance_map(given: object, asker: str) -> None:
     """Refuse what is no map of luminance, such as one of illuminance.
 

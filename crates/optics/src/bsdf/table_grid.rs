@@ -448,7 +448,11 @@ impl Grid {
             let parts = self.parts(finer);
             let part = move |part: usize| NODES.map(|(node, _)| (part as f64 + node) / parts as f64);
             (0..self.azimuths)
-                .flat_map(|j| (0..parts).flat_map(part).map(move |v| (j as f64 + v) / self.azimuths as f64))
+                .flat_map(|j| {
+                    (0..parts)
+                        .flat_map(part)
+                        .map(move |v| (j as f64 + v) / self.azimuths as f64)
+                })
                 .map(sin_cos_turns)
                 .collect()
         });

@@ -12,13 +12,13 @@ from etendue.formats.head import Head, file_provenance
 from etendue.formats.intensity.eulumdat_writer import write
 from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_lines, scaled
 from etendue.formats.intensity.symmetry import Array, unfolded
-from etendue.quantities.intensity import Intensity, Symmetry
+from etendue.quantities.intensity import UNTURNED, Intensity, Symmetry
 from etendue.quantities.report import Complaint, Severity
 from etendue.units import LUMENS_PER_KILOLUMEN
 
 ORIENTATION = (
     "C planes are the file's own: in EULUMDAT C0 lies across a linear luminaire, 90° after that of IES files; "
-    "nothing was turned or mirrored"
+    f"{UNTURNED}"
 )
 
 ISYM: dict[int, Symmetry] = {0: "none", 1: "rotational", 2: "C0-C180", 3: "C90-C270", 4: "both"}
@@ -209,10 +209,13 @@ class _Reader:
         for what, first in (("housing", 13), ("opening", 16)):
             # The length lies along C90-C270; a width of 0 marks a circle.
             length, width = (self.aside(first + n, f"{what} size") for n in range(2))
-            heights = range(18, 22) if what == "opening" else range(15, 16)
-            height = max(self.aside(n, f"{what} height") for n in heights)
+            heights = [self.aside(n, f"{what} height") for n in (range(18, 22) if what == "opening" else (15,))]
+            height = max(heights)
             facts |= {f"{what}_x": width or length, f"{what}_y": length, f"{what}_z": height}
-            if what == "opening":
+            if what == "housing":
+                facts |= {"housing_round": True} if length and not width else {}
+            else:
+                facts |= {"opening_heights": tuple(heights)} if min(heights) < height else {}
                 round_, flat = width == 0.0, height == 0.0
                 shapes = {
                     (True, True): "circle",
@@ -221,7 +224,16 @@ class _Reader:
                     (False, False): "box",
                 }
                 facts["opening_shape"] = shapes[round_, flat] if length else "point"
-        return facts
+        return facts | self._of_the_measurement(len(sets))
+
+    def _of_the_measurement(self, sets: int) -> dict[str, Any]:
+        """Conversion factor, tilt and direct ratios, where they say something."""
+        first = 27 + 6 * sets
+        ratios = tuple(self.aside(n, "direct ratio") for n in range(first, first + 10))
+        conversion, tilt = self.aside(24, "conversion factor"), self.aside(25, "tilt")
+        facts: dict[str, Any] = {"direct_ratios": ratios} if any(ratios) else {}
+        facts |= {"conversion_factor": conversion} if conversion not in (0.0, 1.0) else {}
+        return facts | ({"measurement_tilt": tilt} if tilt else {})
 
     # --- what is said twice --------------------------------------------------------------------------------------------
 
@@ -238,11 +250,10 @@ class _Reader:
         if sets > 1:
             found = f"{sets} lamp sets; the intensity is that with the first, of {flux:g} lm"
             self.complain("note", "line 26", f"{found}; scale it by the ratio of fluxes for another")
-        conversion = self.aside(24, "conversion factor")
-        if conversion not in (0.0, 1.0):
+        conversion, tilt = (result.luminaire.get(fact) for fact in ("conversion_factor", "measurement_tilt"))
+        if conversion is not None:
             self.complain("warning", "line 24", f"the conversion factor is {conversion:g}; it was not applied")
-        tilt = self.aside(25, "tilt")
-        if tilt:
+        if tilt is not None:
             self.complain(
                 "note", "line 25", f"the luminaire was measured at a tilt of {tilt:g}°; nothing was turned back"
             )

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from etendue.errors import ArgumentError
-from etendue.formats.intensity.intensity_format import decimal, figures, fitted, general_losses
+from etendue.formats.intensity.intensity_format import (
+    Texts,
+    decimal,
+    figures,
+    general_losses,
+    keywords_lost,
+    turned_extents,
+)
+from etendue.formats.intensity.lm63_writer import further_keywords
 from etendue.formats.intensity.symmetry import Array, folded, unfolded, whole_hemispheres
 from etendue.quantities.intensity import Intensity, Symmetry
 from etendue.units import LUMENS_PER_KILOLUMEN
@@ -46,26 +54,27 @@ def write(intensity: Intensity, path: Path) -> tuple[str, ...]:
             f"{whole.gamma.size}. Use fewer, or write an .ies file."
         )
     facts = whole.luminaire
+    texts = Texts("latin-1", "Latin-1", TEXT)
     lamp_flux = float(facts.get("lamp_flux", 0.0))
     absolute = not lamp_flux > 0.0
     lamp_flux = flux if absolute else lamp_flux
     table = values * (LUMENS_PER_KILOLUMEN / lamp_flux)
     lines = [
-        *_identity(intensity, whole.gamma, symmetry, planes),
+        *_identity(texts, intensity, whole.gamma, symmetry, planes),
         *_sizes(facts),
         *(decimal(n, DIGITS) for n in (100.0 * _downward(whole) / flux, 100.0 * flux / lamp_flux)),
-        *("1", "0", "1"),
+        *("1", decimal(float(facts.get("measurement_tilt", 0.0)), DIGITS), "1"),
         str(-1 if absolute else max(1, int(facts.get("lamps", 1)))),
-        _text(facts.get("lamp", "")),
+        texts.of("lamp", facts.get("lamp", "")),
         decimal(lamp_flux, 9),
-        *("", ""),
+        *_colour(texts, facts),
         decimal(float(facts.get("input_power", 0.0)), DIGITS),
         *["0"] * 10,
         *(decimal(angle, 9) for angle in (*planes, *whole.gamma)),
         *(decimal(value, DIGITS) for value in table.ravel()),
     ]
     path.write_bytes("".join(f"{line}\r\n" for line in lines).encode("latin-1"))
-    return (*notes, *general_losses(intensity), *_losses(facts))
+    return (*notes, *general_losses(intensity), *_losses(facts), *texts.losses())
 
 
 def _planes(whole: Intensity, symmetry: Symmetry) -> Array:
@@ -80,11 +89,15 @@ def _stored(whole: Intensity, symmetry: Symmetry) -> Array:
     return values[::-1] if symmetry == "C90-C270" else values
 
 
-def _identity(intensity: Intensity, gamma: Array, symmetry: Symmetry, planes: Array) -> Iterator[str]:
+def _identity(texts: Texts, intensity: Intensity, gamma: Array, symmetry: Symmetry, planes: Array) -> Iterator[str]:
     """Lines 1 to 12."""
     facts, provenance = intensity.luminaire, intensity.provenance
-    kind = 1 if symmetry == "rotational" else 2 if facts.get("linear") else 3
-    yield _text(facts.get("manufacturer") or provenance.software)
+    kind = 2 if facts.get("linear") else 1 if symmetry == "rotational" else 3
+
+    def text(fact: str, otherwise: str) -> str:
+        return texts.of(fact.replace("_", " "), facts[fact]) if facts.get(fact) else texts.own(otherwise)
+
+    yield text("manufacturer", provenance.software)
     yield str(kind)
     yield str(NUMBER_OF_SYMMETRY[symmetry])
     for angles, whole_turn in ((planes, True), (gamma, False)):
@@ -92,11 +105,18 @@ def _identity(intensity: Intensity, gamma: Array, symmetry: Symmetry, planes: Ar
         yield decimal(_step(angles, whole_turn), 9)
     # What is to be said about a table with errors stands where the report on its measurement is named.
     peak = [*figures(intensity)][:1]
-    yield _text(facts.get("test_report") or "; ".join(peak + [*intensity.notes][: len(peak)]))
-    yield _text(facts.get("luminaire") or provenance.source)
-    yield _text(facts.get("catalogue_number", ""))
-    yield _text(provenance.source)
-    yield _text(facts.get("issue_date", ""))
+    yield text("test_report", "; ".join(peak + [*intensity.notes][: len(peak)]))
+    yield text("luminaire", provenance.source)
+    yield text("catalogue_number", "")
+    yield texts.of("file name", provenance.source)
+    yield text("issue_date", "")
+
+
+def _colour(texts: Texts, facts: Mapping[str, Any]) -> Iterator[str]:
+    """Colour and colour rendering of the lamp set that the intensity is stated with, as its file spells them."""
+    first = (*facts.get("lamp_sets", ()), {})[0]
+    for field in ("colour", "colour_rendering"):
+        yield texts.of(f"{field.replace('_', ' ')} of the lamps", first.get(field, ""))
 
 
 def _step(angles: Array, whole_turn: bool) -> float:
@@ -106,24 +126,43 @@ def _step(angles: Array, whole_turn: bool) -> float:
 
 
 def _sizes(facts: Mapping[str, Any]) -> Iterator[str]:
-    """Lines 13 to 21 [mm]: length along C90-C270, width along C0-C180, 0 for a circle."""
+    """Lines 13 to 21 [mm]: length along C90-C270, width along C0-C180, 0 for what is round."""
     known = facts.get("opening_shape") in SHAPES
     opening = {axis: float(facts.get(f"opening_{axis}", 0.0)) if known else 0.0 for axis in "xyz"}
     housing = {axis: float(facts.get(f"housing_{axis}", opening[axis])) for axis in "xyz"}
-    round_ = facts.get("opening_shape") in {"circle", "vertical cylinder"} and opening["x"] == opening["y"]
-    for size in (housing["y"], housing["x"], housing["z"], opening["y"], 0.0 if round_ else opening["x"]):
-        yield decimal(size, DIGITS)
-    yield from [decimal(opening["z"], DIGITS)] * 4
+    round_ = facts.get("opening_shape") in {"circle", "vertical cylinder"}
+    # What is not known of the housing is taken from the opening, its shape too.
+    housing_round = facts.get("housing_round", round_ and not {"housing_x", "housing_y"} & set(facts))
+    for extents, is_round in ((housing, housing_round), (opening, round_)):
+        yield decimal(extents["y"], DIGITS)
+        yield decimal(0.0 if is_round and extents["x"] == extents["y"] else extents["x"], DIGITS)
+        if extents is housing:
+            yield decimal(extents["z"], DIGITS)
+    for height in _heights(facts, opening["z"]):
+        yield decimal(height, DIGITS)
+
+
+def _heights(facts: Mapping[str, Any], highest: float) -> Sequence[float]:
+    """Of the luminous opening at C0, C90, C180 and C270 [mm]; the same ones unless a file told them apart."""
+    heights: Sequence[float] = facts.get("opening_heights", ())
+    return heights if len(heights) == 4 and max(heights) == highest else [highest] * 4
 
 
 def _losses(facts: Mapping[str, Any]) -> Iterator[str]:
     shape = facts.get("opening_shape", "point")
     if shape not in SHAPES:
         yield f"the luminous opening, {shape!r}, is none that EULUMDAT knows"
+    yield from turned_extents(facts, housing=True)
     if len(facts.get("lamp_sets", ())) > 1:
         yield "of several lamp sets only the one that the intensity is stated with was written"
-    if "keywords" in facts:
-        yield "keywords of the IES file without a line of their own are not kept"
+    if "conversion_factor" in facts:
+        found = f"the conversion factor of {facts['conversion_factor']:g} was not applied"
+        yield f"{found} and is not kept: 1 was written, since the intensities hold as they are"
+    if "direct_ratios" in facts:
+        yield "the direct ratios are not kept: 0 was written, since étendue does not compute them"
+    lost = [keyword for keyword, _ in further_keywords(facts) if keyword != "_INTENSITYUNITS"]
+    laboratory = ["TESTLAB"] if facts.get("laboratory") and "keywords" in facts else []
+    yield from keywords_lost([*laboratory, *lost], "without a line of their own")
 
 
 def _downward(intensity: Intensity) -> float:
@@ -135,7 +174,3 @@ def _downward(intensity: Intensity) -> float:
     edge = intensity.at(intensity.c, 90.0)[:, None]
     values = np.concatenate([intensity.values[:, : below.size], edge], axis=1)
     return Intensity(intensity.c, np.append(below, 90.0), values).flux
-
-
-def _text(value: object) -> str:
-    return fitted(str(value).replace("γ", "gamma"), "latin-1", TEXT).strip()

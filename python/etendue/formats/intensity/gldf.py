@@ -23,6 +23,9 @@ PRODUCT = "product.xml"
 INNER = (lm63.FORMAT, eulumdat.FORMAT, tm33.FORMAT)
 """Formats of the files that a photometry may name, found by content as everywhere."""
 
+CONTENT = {"ldc/eulumdat": "eulumdat", "ldc/ies": "lm63", "ldc/iesxml": "tm33"}
+"""Formats by the type of content that a container states."""
+
 MOST_PRODUCT_BYTES = 1 << 24
 LISTED = 20
 """Choices that a message names."""
@@ -178,12 +181,12 @@ class _Reader:
                 "étendue fetches nothing; download that file and give it instead.",
             )  # fmt: skip
         member = self._member(file)
-        result = self._of_member(member)
+        result = self._of_member(member, file)
         turn = element.words("Rotation-G0")
         notes = list(result.notes)
         if turn not in ("", "0"):
             notes.append(
-                f"the container says that this photometry is turned by {turn[:20]} (Rotation-G0); nothing was turned"
+                f"the container says that this photometry is turned by {turn[:20]} (Rotation-G0), which was not applied"
             )
         notes.append(
             f"photometry {name} of the container, {member}; geometry, pictures and sensors in it were not read"
@@ -217,7 +220,7 @@ class _Reader:
         found = f"it names {file.name[:100]!r}, which is not in the folder {folder}/ of the archive"
         raise FormatError(self.path, file.place, found, "Ask for a complete container.")
 
-    def _of_member(self, member: str) -> Intensity:
+    def _of_member(self, member: str, file: _File) -> Intensity:
         """The distribution of a file in the archive; its readers take files, so it becomes one, under a name of ours."""
         data = self.archive.read(member, MOST_BYTES)
         with TemporaryDirectory(prefix="etendue-") as folder:
@@ -228,6 +231,9 @@ class _Reader:
             if found is None:
                 known = ", ".join(inner.title for inner in INNER)
                 raise FormatError(self.path, member, "this is no intensity distribution", f"Known formats: {known}.")
+            if CONTENT.get(file.content.strip().lower()) != found.name:
+                said = f"contentType is {file.content[:40]!r}, and {member} is {found.title}; it was read as that"
+                self.complaints.append(Complaint("warning", file.place, said))
             try:
                 return found.read(path)
             except FormatError as error:

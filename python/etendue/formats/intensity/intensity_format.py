@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable, Iterator
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from etendue.errors import FormatError
 from etendue.formats.encodings import decoded
 from etendue.formats.head import Head
 from etendue.formats.intensity.symmetry import Array
-from etendue.quantities.intensity import Intensity
+from etendue.quantities.intensity import Intensity, has_corners
 from etendue.quantities.measured import measured, measured_peak
 
 MOST_BYTES = 1 << 27
@@ -23,6 +25,15 @@ LARGEST_INTENSITY = 1e35
 """cd or W/sr: the sun has 3e27 cd. What is larger is a slip, and sums and squares of it may leave the numbers."""
 
 DAMAGED = "The file is damaged or cut short; ask for it again."
+
+SPELT_OUT = {
+    "γ": "gamma", "°": " deg", "±": "+/-", "√": "sqrt", "Σ": "sum", "×": "x", "−": "-", "–": "-", "—": "-", "’": "'",
+    "“": '"', "”": '"', "„": '"',
+}  # fmt: skip
+"""Signs that an encoding may not have, and what says the same."""
+
+MOST_LETTERS = 8
+"""Letters that a sentence about a text names."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 
@@ -118,10 +129,87 @@ def decimal(value: float, digits: int) -> str:
     return np.format_float_positional(value, precision=digits, unique=False, fractional=False, trim="-")
 
 
-def fitted(text: str, encoding: str, length: int) -> str:
-    """One line of printable text that an encoding and a format have room for; ``?`` where a letter does not exist."""
-    printable = "".join(letter if letter.isprintable() else " " for letter in text)
-    return printable.encode(encoding, errors="replace").decode(encoding)[:length]
+class Texts:
+    """Texts on their way into a file, and what of them the format has no letters or no room for.
+
+    Parameters
+    ----------
+    encoding : str
+        What the format is written in.
+    letters : str
+        How people call its letters.
+    length : int
+        Characters that a text may have.
+    """
+
+    def __init__(self, encoding: str, letters: str, length: int) -> None:
+        self.encoding, self.letters, self.length = encoding, letters, length
+        self.changed: list[str] = []
+
+    def own(self, text: str) -> str:
+        """A text of étendue's own, which loses nothing that anybody else wrote."""
+        return self._encodable(text)[0][: self.length].strip()
+
+    def of(self, field: str, text: object) -> str:
+        """A text of the user or of a file, as a line of the written one has it: printable letters of the encoding."""
+        whole, lost = self._encodable(str(text).strip())
+        said = [f"{letter!r} became {there!r}" for letter, there in [*lost.items()][:MOST_LETTERS]]
+        said += ["…"] if len(lost) > MOST_LETTERS else []
+        said += [f"cut to {self.length} of {len(whole)} characters"] if len(whole) > self.length else []
+        if said:
+            self.changed.append(f"{field} ({', '.join(said)})")
+        return whole[: self.length].strip()
+
+    def losses(self) -> Iterator[str]:
+        """One sentence that names every field that changed; none if none did."""
+        if self.changed:
+            yield f"texts changed, since the format has {self.letters} letters only: {'; '.join(self.changed)}"
+
+    def _encodable(self, text: str) -> tuple[str, dict[str, str]]:
+        """The text in letters of the encoding, and which ones became others: without accents, or else a question mark."""
+        written, lost = "", {}
+        for letter in unicodedata.normalize("NFC", text):
+            there = letter if letter.isprintable() else " "
+            if not (letter.isprintable() or letter.isspace()):
+                lost[letter] = there
+            elif not self._has(there):
+                there = SPELT_OUT.get(letter, "")
+                if not there:
+                    there = lost[letter] = self._alike(letter)
+                # 1½ is not 11/2.
+                there = f" {there}" if "/" in there and written[-1:].isdigit() else there
+            written += there
+        return written.strip(), lost
+
+    def _alike(self, letter: str) -> str:
+        """The letters of the encoding that are most like one that it does not have."""
+        parts = unicodedata.normalize("NFKD", letter).replace("\N{FRACTION SLASH}", "/")
+        return "".join(part if self._has(part) else "?" for part in parts if not unicodedata.combining(part))
+
+    def _has(self, letter: str) -> bool:
+        try:
+            letter.encode(self.encoding)
+        except UnicodeEncodeError:
+            return False
+        return True
+
+
+def keywords_lost(keywords: Iterable[str], why: str) -> Iterator[str]:
+    """One sentence about keywords of an IES file that a writer leaves out; none if it leaves out none."""
+    names = [f"[{keyword}]" if keyword else "lines without a keyword" for keyword in dict.fromkeys(keywords)]
+    if names:
+        yield f"keywords of the IES file {why} are not kept: {', '.join(names)}"
+
+
+def turned_extents(facts: Mapping[str, Any], *, housing: bool) -> Iterator[str]:
+    """One sentence if what is written, the luminous opening or a housing too, stands turned, which no format can state."""
+    turn = float(facts.get("extents_turned", 0.0))
+    opening = has_corners(facts, "opening")
+    if turn and (opening or (housing and has_corners(facts, "housing"))):
+        size = " × ".join(f"{facts.get(f'opening_{axis}', 0.0):g}" for axis in "xyz")
+        what = f"the luminous opening ({facts.get('opening_shape')}, {size} mm)" if opening else "the luminaire"
+        found = f"{what} stands turned by {turn:.9g}° from the planes C, which the format cannot state"
+        yield f"{found}; it was written as if it stood along them"
 
 
 def figures(intensity: Intensity) -> Iterator[str]:

@@ -22,37 +22,28 @@ from etendue.formats.intensity.intensity_format import (
     read_lines,
     scaled,
 )
-from etendue.formats.intensity.lm63_writer import write
+from etendue.formats.intensity.lm63_writer import FACT_BY_KEYWORD, write
 from etendue.formats.intensity.opening import opening_facts
 from etendue.formats.intensity.symmetry import Array, from_sector
-from etendue.quantities.intensity import Intensity
+from etendue.quantities.intensity import UNTURNED, Intensity
 from etendue.quantities.report import Complaint, Severity
 from etendue.units import INTENSITY_UNIT, WATTS_PER_FILE_UNIT, FluxUnit
 
 PHOTOMETRIC_TYPES: dict[int, Literal["A", "B", "C"]] = {1: "C", 2: "B", 3: "A"}
 EDITIONS = (1986, 1991, 1995, 2002, 2019)
+FACTORS_TOLD = 12
+"""Lamp factors that a complaint lists."""
+
 LARGEST_LENGTH = 1e6
 """Metres or feet; millimetres that a file calls metres are less."""
 
-ORIENTATION = (
-    "C planes are the file's own: in IES files C0 lies along the luminaire's length; nothing was turned or mirrored"
-)
+ORIENTATION = f"C planes are the file's own: in IES files C0 lies along the luminaire's length; {UNTURNED}"
 
 _TILT = re.compile(r"\s*TILT\s*=\s*(.*?)\s*", re.IGNORECASE)
 _TAG = re.compile(r"\s*IES(?:NA)?\s*:?\s*(?:LM-63-)?(\d{4}|\d{2})\b", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"(?<![^\s])([+-]?\d+),(\d+(?:[eEdD][+-]?\d+)?)(?![^\s])", re.ASCII)
 """A word of its own; a list such as ``0,45,90`` is none."""
 _KEYWORD = re.compile(r"\s*\[\s*([^\]]*?)\s*\]\s*(.*?)\s*")
-
-FACT_BY_KEYWORD = {
-    "MANUFAC": "manufacturer",
-    "LUMINAIRE": "luminaire",
-    "LUMCAT": "catalogue_number",
-    "LAMP": "lamp",
-    "TEST": "test_report",
-    "TESTLAB": "laboratory",
-    "ISSUEDATE": "issue_date",
-}
 
 
 def recognise(head: Head) -> bool:
@@ -207,6 +198,11 @@ class _Reader:
         angles, factors = words.numbers(count, "tilt angles"), words.numbers(count, "tilt factors")
         if factors[0] != 1.0:
             self.complain("note", "TILT=", f"the lamp factor at {angles[0]:g}° is {factors[0]:g}; it was not applied")
+        if (factors[1:] != 1.0).any():
+            told = [f"{factor:g} at {angle:g}°" for angle, factor in zip(angles, factors, strict=True)]
+            told = told if len(told) <= FACTORS_TOLD else [*told[: FACTORS_TOLD - 1], "…", told[-1]]
+            found = f"lamp factors over tilt, {', '.join(told)}, were not applied: they act on a tilted luminaire"
+            self.complain("note", "TILT=", found)
         return {"tilt": {"geometry": geometry, "angles": angles.tolist(), "factors": factors.tolist()}}
 
     # --- numbers -------------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from etendue.formats.intensity.goniometer import in_c_gamma
 from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_bytes, scaled
 from etendue.formats.intensity.symmetry import Array, from_sector, sum_of
 from etendue.formats.xml_tree import Element, parse_xml
-from etendue.quantities.intensity import Intensity
+from etendue.quantities.intensity import UNTURNED, Intensity
 from etendue.quantities.report import Complaint, Severity
 from etendue.quantities.spectrum import Spectrum
 from etendue.units import INTENSITY_UNIT, MM_PER_LENGTH_UNIT, FluxUnit
@@ -32,10 +32,8 @@ ROOTS = {
 
 _ROOT = re.compile(rf"<(?:[\w.-]+:)?({'|'.join(sorted(ROOTS, key=len, reverse=True))})[\s>/]")
 
-ORIENTATION = "C planes are the file's own: C0 lies along the luminaire's length, as in IES files; nothing was turned"
-ORIENTATION_CIE = (
-    "C planes are the file's own, counted as CIE does: C0 lies across a linear luminaire; nothing was turned"
-)
+ORIENTATION = f"C planes are the file's own: C0 lies along the luminaire's length, as in IES files; {UNTURNED}"
+ORIENTATION_CIE = f"C planes are the file's own, counted as CIE does: C0 lies across a linear luminaire; {UNTURNED}"
 LARGEST_LUMINAIRE = 100.0
 """Metres; what is larger was written in millimetres, and its unit is not certain."""
 
@@ -69,6 +67,7 @@ KNOWN = {
         "MeasuredLumens", "PowerFactor", "Quantity", "RatedLumens", "Regulatory", "SPRatio", "SpectralData",
         "SpectralDistribution",
     },
+    "data": NOT_KEPT | {element for names in DATA.values() for element in names[1:]} | {"MaxWavelength", "MinWavelength"},
     "table": {
         "Absolute", "AbsolutePhotometry", "HorizontalAngles", "IntData", "IntensityData", "Metric", "Multiplier",
         "NumberHorz", "NumberMeasured", "NumberVert", "PhotometryType", "Symm", "Units", "VerticalAngles",
@@ -109,6 +108,7 @@ class _Reader:
             self.complain("note", self.root.place, ROOTS[self.root.name])
         self._name_strangers(self.root, "root")
         self.emitters = self.root.all("Emitter")
+        self._check_number()
         if not self.emitters:
             raise FormatError(path, self.root.place, "the file has no Emitter", DAMAGED)
 
@@ -121,6 +121,15 @@ class _Reader:
             if child.name not in seen:
                 seen.add(child.name)
                 self.complain("warning", child.place, "no element of the format here; it was ignored")
+
+    def _check_number(self) -> None:
+        """Whether there are as many emitters as the luminaire is said to have, whether it counts all of a kind or not."""
+        luminaire = self.root.first("Luminaire")
+        stated = self._aside(luminaire, "NumEmitter") if luminaire is not None else None
+        each = [number(emitter.words("Quantity")) for emitter in self.emitters]
+        if luminaire is not None and stated not in (None, len(each), sum(1.0 if n is None else n for n in each)):
+            found = f"it says {stated:g}, the file has {len(each)}; the emitters of the file were taken"
+            self.complain("warning", f"{luminaire.place}, NumEmitter", found)
 
     # --- which table -----------------------------------------------------------------------------------------------------
 
@@ -205,16 +214,18 @@ class _Reader:
                 self.path, table.place, "photon intensity, in micromoles per second and steradian",
                 "étendue knows lumens and watts; ask for luminous or radiant intensity.",
             )  # fmt: skip
+        data = emitter.first(DATA[quantity][0])
+        inner = data.children if data is not None else []
         self._name_strangers(emitter, "emitter")
+        if data is not None:
+            self._name_strangers(data, "data")
         self._name_strangers(table, "table")
-        for child in emitter.children:
+        for child in (*emitter.children, *inner):
             if child.name in NOT_KEPT:
                 self.complain("note", child.place, "not kept: a distribution of intensity has no place for it")
         unit: FluxUnit = "lm" if quantity == "luminous" else "W"
         horizontal, vertical, values = self._grid(table)
-        factor = 1.0 if table.first("Multiplier") is None else self._value(table, "Multiplier")
-        if not factor > 0.0:
-            raise FormatError(self.path, f"{table.place}, Multiplier", f"found {factor:g}", DAMAGED)
+        factor = self._multiplier(table)
         values = scaled(self.path, table.place, values, factor)
         if (values < 0.0).any():
             self.complain("warning", table.place, f"{int((values < 0.0).sum())} intensities are below 0")
@@ -229,6 +240,20 @@ class _Reader:
             notes=notes,
         )
         return self._with_flux(result, emitter, table, quantity)
+
+    def _multiplier(self, table: Element) -> float:
+        """What multiplies the table: one number, however often it stands there."""
+        texts = [" ".join(element.text.split()) for element in table.all("Multiplier")]
+        place = f"{table.place}, Multiplier"
+        if len({number(text) for text in texts}) > 1:
+            found = f"there are {len(texts)}, and they differ: {', '.join(text[:20] for text in texts[:5])}"
+            raise FormatError(self.path, place, found, "Which one holds is not certain; ask for a file with one.")
+        factor = self._value(table, "Multiplier") if texts else 1.0
+        if not factor > 0.0:
+            raise FormatError(self.path, place, f"found {factor:g}", DAMAGED)
+        if len(texts) > 1:
+            self.complain("warning", place, f"{factor:g} stands there {len(texts)} times; it was applied once")
+        return factor
 
     def _grid(self, table: Element) -> tuple[Array, Array, Array]:
         """Angles and values of shape (n_h, n_v), from one element for each direction in any order."""
@@ -414,21 +439,28 @@ class _Reader:
         """The fluxes that are stated, and whether the table agrees."""
         facts = dict(intensity.luminaire)
         data, _, flux = DATA[quantity]
-        stated = self._aside(emitter, data, flux)
-        if stated is not None and stated > 0.0:
-            facts["stated_flux"] = stated
+        told = {flux: self._aside(emitter, data, flux)}
+        told |= {"MeasuredLumens": self._aside(emitter, "MeasuredLumens")} if quantity == "luminous" else {}
+        for name, stated in told.items():
+            if stated is None or not stated > 0.0:
+                continue
+            facts.setdefault("stated_flux", stated)
             if abs(intensity.flux - stated) > 0.05 * stated:
                 unit = intensity.flux_unit
                 found = f"it says {stated:.6g} {unit}, the table integrates to {intensity.flux:.6g} {unit}"
-                self.complain("warning", f"{emitter.place}, {flux}", f"{found}; the table was taken")
+                self.complain("warning", f"{emitter.place}, {name}", f"{found}; the table was taken")
+        ballast = self._aside(emitter, "BallastFactor")
+        if ballast not in (None, 1.0):
+            found = f"it is {ballast:g}; it was not applied, since it is not certain that the table lacks it"
+            self.complain("warning", f"{emitter.place}, BallastFactor", found)
         rated = self._aside(emitter, "RatedLumens")
         relative = table.words("AbsolutePhotometry").lower() in ("false", "0") or table.words("Absolute").lower() in (
             "false",
             "0",
         )
         if relative:
-            told = "relative photometry: the values were taken as they are, for the rated lumens"
-            self.complain("note", table.place, f"{told} {rated:g}" if rated else told)
+            taken = "relative photometry: the values were taken as they are, for the rated lumens"
+            self.complain("note", table.place, f"{taken} {rated:g}" if rated else taken)
         if rated is not None and rated > 0.0 and quantity == "luminous":
             facts["lamp_flux"] = rated
             if intensity.flux > 1.05 * rated:
