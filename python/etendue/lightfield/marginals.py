@@ -15,7 +15,8 @@ SWEEPS = 2
 """Times that both marginals are set. Each sweep spoils the other one by ever less."""
 
 LARGEST_FACTOR = 50.0
-"""By which the density at a place or a direction may change in one step: what is dark in the tree stays finite."""
+"""By which the density at a place or a direction may change in one step, against the mean of the image or what is brighter in it:
+what is dark in the tree stays finite."""
 
 
 def scaled(part: PartField, images: Base, wraps: bool) -> PartField:
@@ -103,9 +104,10 @@ def _nodes(image: FloatArray) -> FloatArray:
 
 def _set(wanted: FloatArray, found: FloatArray) -> FloatArray:
     """The factor that makes the marginal found the one wanted."""
-    level = wanted.mean() / max(float(found.mean()), np.finfo(np.float64).tiny)
-    most = level * LARGEST_FACTOR
-    factor = np.divide(wanted, found, out=np.full_like(wanted, most), where=found > wanted / most)
+    mean = max(float(found.mean()), np.finfo(np.float64).tiny)
+    # A narrow beam is hundreds of times as bright as the mean of all directions.
+    most = np.maximum(wanted, wanted.mean()) * (LARGEST_FACTOR / mean)
+    factor = np.divide(wanted, found, out=most.copy(), where=found > wanted / most)
     return np.where(wanted > 0, factor, 0.0)
 
 
