@@ -15,8 +15,8 @@ SWEEPS = 2
 """Times that both marginals are set. Each sweep spoils the other one by ever less."""
 
 LARGEST_FACTOR = 50.0
-"""By which the density at a place or a direction may change in one step, against the mean of the image or what is brighter in it:
-what is dark in the tree stays finite."""
+"""By which the density at a place or a direction may change in one step, against the mean of the image or what is brighter
+in it: what is dark in the tree stays finite."""
 
 
 def scaled(part: PartField, images: Base, wraps: bool) -> PartField:
