@@ -256,3 +256,14 @@ def test_mistakes_are_told_and_nothing_is_written(run: Run, scans: list[Path]) -
     missing = run("bsdf", "info", "pet.h5")
     assert missing.status == 1
     assert not Path("pet.h5").exists()
+
+
+def test_scans_of_more_light_than_is_received_are_refused_with_their_file(run: Run) -> None:
+    """f = 1.2/π from all sides: 1.2 of the light."""
+    rows = [f"{i},180,{s},{p},{1.2 / math.pi}" for i in (10, 50) for s in range(0, 90, 5) for p in (0, 90, 180, 270)]
+    Path("bright.csv").write_text("theta_i,phi_i,theta_s,phi_s,bsdf\n" + "\n".join(rows) + "\n")
+    outcome = run("bsdf", "fit", "bright.csv", "-o", "bright.h5")
+    assert outcome.status == 1
+    assert "bright.csv: at 10° of incidence" in outcome.err
+    assert "--reflectance" in outcome.err
+    assert not Path("bright.h5").exists()

@@ -449,6 +449,8 @@ def test_stages_in_two_files(tmp_path: Path) -> None:
         ("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0\n", "4 fields; the columns are 5"),
         ("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0,nan\n", "no finite number"),
         ("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0,-1\n", "a value of -1"),
+        ("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,30,0,1\n95,180,30,0,1\n", "row 2, theta_i: an angle of 95°"),
+        ("theta_i,phi_i,theta_s,phi_s,bsdf\n30,180,190,0,1\n", "row 1, theta_s: an angle of 190°"),
     ],
 )
 def test_mistakes_in_files_are_told(tmp_path: Path, text: str, said: str) -> None:

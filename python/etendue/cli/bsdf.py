@@ -12,6 +12,7 @@ import typer
 
 from etendue.cli.guard import guarded
 from etendue.cli.terminal import check_folder, complain, one_of, print_json, say
+from etendue.errors import ArgumentError
 from etendue.formats.bsdf import BSDF_FORMATS
 from etendue.plot import plot_bsdf
 from etendue.quantities.bsdf_data import BsdfSlice
@@ -252,7 +253,8 @@ def fit(
     if fitted is not None:
         _fit_model(scans, fitted, output, json=json)
     else:
-        _fit_table(scans, chosen or AUTOMATIC, output, json=json)
+        named = ", ".join(file.name for file in files)
+        _fit_table(scans, named, chosen or AUTOMATIC, output, json=json)
 
 
 def _fit_model(scans: Scans, model: str, output: Path, *, json: bool) -> None:
@@ -279,8 +281,12 @@ def _fit_model(scans: Scans, model: str, output: Path, *, json: bool) -> None:
     say(f"{output}: {found.kind} fitted to {scans.values.size} values at {len(scans.thetas)} incidences")
 
 
-def _fit_table(scans: Scans, method: str, output: Path, *, json: bool) -> None:
-    table = BsdfTable.from_scans(scans, method)
+def _fit_table(scans: Scans, named: str, method: str, output: Path, *, json: bool) -> None:
+    try:
+        table = BsdfTable.from_scans(scans, method)
+    except ArgumentError as error:
+        advice = "values are f in 1/sr, the cosine not included; --reflectance scales them to an integrating sphere"
+        raise ArgumentError(f"{named}: {error}; {advice}") from error
     notes = list(write_bsdf(output, table))
     shares = [
         {

@@ -83,6 +83,7 @@ def read_scans(
         columns = read_columns(Path(path), (DIRECTIONS, STAGES))
         error = columns.get(ERROR)
         if DIRECTIONS[0] in columns:
+            _check_angles(Path(path), columns)
             i = direction(columns["theta_i"], columns["phi_i"])
             s = direction(columns["theta_s"], columns["phi_s"])
             f = columns["bsdf"]
@@ -112,6 +113,20 @@ def read_scans(
         reflectance,
         transmittance,
     )
+
+
+def _check_angles(path: Path, columns: dict[str, Array]) -> None:
+    """Refuse light that does not meet the front, and angles from the normal that there are not."""
+    for name, last, advice in (
+        ("theta_i", 90.0, "θ of the incident light is counted from the normal of the side that it meets: below 90°."),
+        ("theta_s", 180.0, "θ of the detector is up to 90°, of transmitted light up to 180°."),
+    ):
+        theta = columns[name]
+        # A negative angle is on the other side of the normal.
+        wrong = (np.abs(theta) > last) | ((np.abs(theta) == 90.0) & (name == "theta_i"))
+        if wrong.any():
+            at = int(np.argmax(wrong))
+            raise FormatError(path, f"row {at + 1}, {name}", f"an angle of {theta[at]:g}°", advice)
 
 
 def _workbook(path: Path, blank: Path | None) -> tuple[Array, Array, Array]:
