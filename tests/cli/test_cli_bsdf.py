@@ -258,6 +258,7 @@ def test_mistakes_are_told_and_nothing_is_written(run: Run, scans: list[Path]) -
     assert not Path("pet.h5").exists()
 
 
+@pytest.mark.slow
 def test_scans_of_more_light_than_is_received_are_refused_with_their_file(run: Run) -> None:
     """f = 1.2/π from all sides: 1.2 of the light."""
     rows = [f"{i},180,{s},{p},{1.2 / math.pi}" for i in (10, 50) for s in range(0, 90, 5) for p in (0, 90, 180, 270)]

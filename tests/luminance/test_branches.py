@@ -107,3 +107,20 @@ def test_many_scatters_behind_glass_are_no_rare_finds() -> None:
         error = math.sqrt(float((lmap.standard_error**2).sum())) / lmap.values.size
         off.append((float(lmap.values.mean()) - true) / error)
     assert sum(z * z for z in off) < chi2.isf(SIGNIFICANCE, len(off)), off
+
+
+@pytest.mark.slow
+def test_lines_that_are_given_up_are_told() -> None:
+    """A mirror of the reflectance R around an even glow: L₀ (1 − R^(n + 1))/(1 − R) is seen over n surfaces."""
+    glow = {"kind": "surface", "shape": {"kind": "sphere", "radius": 9.99}, "side": "back", "flux": 1000}
+    for reflectance in (0.99, 0.9999):
+        mirror = {"shape": {"kind": "sphere", "radius": 10}, "finish": {"kind": "mirror", "reflectance": reflectance}}
+        scene = et.Scene(sources=[glow], surfaces=[mirror])
+        observer = et.Observer(30, 20, 8, target=(0.3, 0.2, -1))
+        lmap = et.luminance_map(scene, observer, et.Screen(5, 5, 2, 2), rays_per_pixel=16)
+        told = [note for note in lmap.notes if "given up" in note]
+        left = reflectance**10_000
+        assert bool(told) == (left > 1e-4)
+        own = 1000 / (math.pi * 4e-6 * math.pi * 9.99**2)
+        np.testing.assert_allclose(lmap.values, own * (1 - reflectance**10_001) / (1 - reflectance), rtol=1e-3)
+        assert not told or f"had {left:.2g} of the weight" in told[0]

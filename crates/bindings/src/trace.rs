@@ -196,9 +196,20 @@ pub fn work_unit<'py>(
     Ok(dict)
 }
 
+/// Of each pass and pixel, five numbers; and one of all together.
+type Looks<'py> = (
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray3<f64>>,
+    f64,
+);
+
 /// Looks at a scene: for each of the passes `first..last` and each pixel, row by row, the mean luminance, the part of it that
 /// is found by chance, and the sources' own deviation \[flux unit/(mm² sr)\]; and the shares of the lines that meet a smooth
-/// surface first, and that see a diffuse one directly.
+/// surface first, and that see a diffuse one directly. Beside them the sum over passes and pixels of the mean weight that
+/// lines still had when they were given up, having met as many surfaces as they may.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
 #[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None, shared=None, guide=None, glints=None))]
@@ -217,7 +228,7 @@ pub fn look_at_scene<'py>(
     shared: Option<f64>,
     guide: Option<&Guide>,
     glints: Option<&Glints>,
-) -> PyResult<[Bound<'py, PyArray3<f64>>; 5]> {
+) -> PyResult<Looks<'py>> {
     let view = view.core();
     let left = match left {
         "nothing" => LeftOut::Nothing,
@@ -258,13 +269,15 @@ pub fn look_at_scene<'py>(
         }
         Ok(array)
     };
-    Ok([
+    let given_up = image.pixels.iter().map(|p| p.given_up).sum();
+    Ok((
         array(|p| p.mean)?,
         array(|p| p.chance)?,
         array(|p| p.deviation)?,
         array(|p| p.met[0])?,
         array(|p| p.met[1])?,
-    ])
+        given_up,
+    ))
 }
 
 /// Where the first `rays` rays of a run of as many start, turn and end: one (k, 3) array each \[mm\]; a ray that escapes ends

@@ -56,6 +56,9 @@ LINES_AT_ONCE = 1 << 20
 MOST_EVENTS = 10_000
 """Surfaces that a line of sight may meet."""
 
+GIVEN_UP = 1e-4
+"""Share of the weight of all lines that may be given up without a word."""
+
 
 class SeenScene:
     """A scene that is ready to be looked at, from one observer or from many, one after the other.
@@ -118,6 +121,7 @@ def look_at_scene(
     surveys = _Surveys(core, compiled.record, how.seed, threads)
     maps, done = [], 0
     for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, forward.plan.glints, strict=True)):
+        given_up = 0.0
 
         def look(
             first: int,
@@ -126,10 +130,12 @@ def look_at_scene(
             view: _core._View = view,
             small: _core.Glints = small,
         ) -> list[list[Array]]:
+            nonlocal given_up
             guides = forward.shared, forward.plan.guide, small
-            found = _core.look_at_scene(
+            *found, weight = _core.look_at_scene(
                 core, view, how.paths, how.seed, MOST_EVENTS, left, first, last, threads, known, *guides
             )
+            given_up = max(given_up, weight / ((last - first) * view["columns"] * view["rows"]))
             return [list(sums) for sums in zip(*found, strict=True)]
 
         def advance(passes: int, lines: int = how.paths * screen.columns * screen.rows) -> None:
@@ -159,6 +165,11 @@ def look_at_scene(
         values, error = passes.total(image)
         if not values.any():
             told.append("the map is dark")
+        if given_up > GIVEN_UP:
+            told.append(
+                f"lines of sight that met {MOST_EVENTS:,} surfaces were given up; they had {given_up:.2g} of the weight of "
+                "all lines left: the map is too low by what they would still have seen, and no error says so"
+            )
         if image is not None:
             told.append(image.note)
         if images is not None:

@@ -47,4 +47,6 @@ pub struct Pixel {
     pub deviation: f64,
     /// Shares of the lines that meet a smooth surface first, and of those that see a diffuse one directly.
     pub met: [f64; 2],
+    /// Mean weight that lines still had when they had met as many surfaces as they may and were given up.
+    pub given_up: f64,
 }

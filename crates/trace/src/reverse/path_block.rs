@@ -114,6 +114,8 @@ pub(super) struct Path {
     pub(super) sum: [f64; 2],
     /// Of the light, that which was found by chance.
     pub(super) chance: f64,
+    /// Weight of its branches that met more surfaces than they may.
+    pub(super) given_up: f64,
     /// How much a small image of a source counts, as paths of both kinds find it.
     pub(super) share: f64,
 }

@@ -125,7 +125,7 @@ impl<'a> Renderer<'a> {
 
     /// The passes of pixels of some numbers, pixel by pixel.
     fn paint(&mut self, which: &[usize], passes: Range<u32>, pixels: &mut [Pixel]) {
-        let mut cells = vec![[0.0; 5]; which.len() * passes.len()];
+        let mut cells = vec![[0.0; 6]; which.len() * passes.len()];
         let all: Vec<usize> = (0..cells.len()).collect();
         self.look(&all, which, &passes, false, &mut cells);
         // Once more those with small images of sources.
@@ -134,18 +134,19 @@ impl<'a> Renderer<'a> {
             let those: Vec<usize> = all.into_iter().filter(has).collect();
             self.look(&those, which, &passes, true, &mut cells);
         }
-        for (pixel, [mean, deviation, chance, smooth, diffuse]) in pixels.iter_mut().zip(cells) {
+        for (pixel, [mean, deviation, chance, smooth, diffuse, given_up]) in pixels.iter_mut().zip(cells) {
             *pixel = Pixel {
                 mean,
                 chance,
                 deviation,
                 met: [smooth, diffuse],
+                given_up,
             };
         }
     }
 
     /// Adds the paths of some cells, each a pass of a pixel.
-    fn look(&mut self, tasks: &[usize], which: &[usize], passes: &Range<u32>, aimed: bool, cells: &mut [[f64; 5]]) {
+    fn look(&mut self, tasks: &[usize], which: &[usize], passes: &Range<u32>, aimed: bool, cells: &mut [[f64; 6]]) {
         let paths = paths_of(self.block.method, aimed) as usize;
         let share = 1.0 / f64::from(self.block.method.paths);
         let total = tasks.len() * paths;
@@ -173,7 +174,7 @@ impl<'a> Renderer<'a> {
                 let of_cell = end.min((task + 1) * paths) - begin.max(task * paths);
                 for path in found.split_off(..of_cell).unwrap_or_default() {
                     let [smooth, diffuse] = path.met.map(|met| if met { 1.0 } else { 0.0 });
-                    let values = [path.sum[0], path.sum[1], path.chance, smooth, diffuse];
+                    let values = [path.sum[0], path.sum[1], path.chance, smooth, diffuse, path.given_up];
                     for (sum, value) in sums.iter_mut().zip(values) {
                         *sum += value * share;
                     }
@@ -213,6 +214,7 @@ impl<'a> Renderer<'a> {
             met: [false; 2],
             sum: [0.0; 2],
             chance: 0.0,
+            given_up: 0.0,
             share: 1.0,
         };
         block.passes.push(pass);

@@ -37,7 +37,11 @@ impl PathBlock<'_> {
         if absorption > 0.0 {
             branch.weight *= (-absorption * interaction.t).exp();
         }
-        if branch.events > self.method.most_events || branch.weight == 0.0 {
+        if branch.events > self.method.most_events {
+            self.paths[branch.path as usize].given_up += branch.weight;
+            return;
+        }
+        if branch.weight == 0.0 {
             return;
         }
         match SurfaceEvent::new(scene, &interaction, d, wavelength, &mut self.media) {
