@@ -156,7 +156,7 @@ def _of_eulumdat(facts: Mapping[str, Any]) -> Iterator[str]:
 def _keywords(texts: Texts, intensity: Intensity, kept: Iterable[tuple[str, str]]) -> Iterator[str]:
     """The required keywords, those that are known, those of the file before, and where the numbers come from."""
     facts, provenance = intensity.luminaire, intensity.provenance
-    fallback = {"TEST": "none", "TESTLAB": provenance.software, "ISSUEDATE": "unknown", "MANUFAC": "unknown"}
+    fallback = {"TEST": "none", "TESTLAB": texts.own(provenance.software), "ISSUEDATE": "unknown", "MANUFAC": "unknown"}
     for keyword, fact in FACT_BY_KEYWORD.items():
         text = texts.of(fact.replace("_", " "), facts.get(fact, "")) or fallback.get(keyword, "")
         if text:
@@ -166,7 +166,7 @@ def _keywords(texts: Texts, intensity: Intensity, kept: Iterable[tuple[str, str]
     for keyword, text in kept:
         yield from _entry(keyword, texts.of(f"[{keyword}]", text))
     source = texts.of("file name", provenance.source)
-    yield from _entry("OTHER", f"from {source} ({provenance.format}) by {provenance.software}")
+    yield from _entry("OTHER", texts.own(f"from {source} ({provenance.format}) by {provenance.software}"))
     for step in (*provenance.steps, *turned_extents(facts, housing=False), *figures(intensity), *intensity.notes):
         yield from _entry("OTHER", texts.own(step))
 
