@@ -18,7 +18,8 @@ from typing import Any
 import etendue as et
 import numpy as np
 from etendue import _core
-from etendue.luminance.scene_map import MOST_EVENTS, PASSES
+from etendue.luminance.methods import PASSES
+from etendue.luminance.scene_map import MOST_EVENTS
 from etendue.scene import compile_scene
 
 LAMBERTIAN = {"kind": "lambertian", "reflectance": 0.8}
