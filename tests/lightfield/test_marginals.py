@@ -29,8 +29,8 @@ def test_the_marginals_of_a_scaled_field_are_the_images_of_a_narrow_beam_too(wid
     assert direction.max() > (700 if width < 0.1 else 2)
     # Factors hold for the values at nodes, between which they are linear: those of a beam of three nodes rise at its peak.
     nodes = 2.0 * direction - _mean_of_tents(direction)
-    np.testing.assert_allclose(over_direction[bright], nodes[bright], rtol=2e-3)
-    np.testing.assert_allclose(over_place.mean(axis=1), (place / place.mean()).mean(axis=1), rtol=2e-2)
+    np.testing.assert_allclose(over_direction[bright], nodes[bright], rtol=1e-6)
+    np.testing.assert_allclose(over_place.mean(axis=1), (place / place.mean()).mean(axis=1), rtol=2e-4)
 
 
 def _mean_of_tents(values: np.ndarray) -> np.ndarray:

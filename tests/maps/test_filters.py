@@ -319,3 +319,15 @@ def test_the_rings_of_the_thesis(name: str | None, ncc: float, nrmse_thesis: flo
     assert mean[0] == pytest.approx(ncc, abs=0.011)
     assert mean[1] == pytest.approx(nrmse_thesis, rel=0.04)
     assert mean[2:] == pytest.approx(zone_errors, rel=0.06, abs=0.06)
+
+
+def test_a_smoothed_map_does_not_count_the_pixels_that_were_dead_before() -> None:
+    """The cone's note is true of its own map; what a filter leaves dead, the filter's note says."""
+    observer, screen = Observer(0, 0, 150), Screen(70, 70, 16, 16)
+    noisy = et.luminance_map(et.RingSource(rays=200_000), observer, screen, method="cone")
+    dead = int(np.isnan(noisy.values).sum())
+    assert f"{dead} of 256 pixels are dead (no ray): NaN" in noisy.notes
+    assert dead > 0
+    for smooth in (filter_map(noisy, "average", 5), et.denoise_map(noisy)):
+        assert not any("(no ray): NaN" in note for note in smooth.notes)
+        assert set(smooth.notes) >= {note for note in noisy.notes if "dead" not in note}

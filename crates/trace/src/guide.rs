@@ -35,7 +35,7 @@ const FEWEST: usize = 8;
 
 /// Share of the directions that are drawn from the density, where there is one, after so many diffuse scatters.
 ///
-/// A direction that is not drawn so weighs 1/(1 − share) more. If the shares did not fall, these weights would multiply from one
+/// A direction that is not drawn so weighs 1/(1 − share) times as much. If the shares did not fall, these weights would multiply from one
 /// scatter to the next: at half each, the square of what a path in a white cavity brings would grow by 2ρ², without an end for a
 /// reflectance ρ above 0.71. The product of all 1/(1 − 1/(2 k²)) is √2 π/2 / sin(π/√2) = 2.79; and that the shares do not fall
 /// faster leaves the light that is found at later scatters its sum of squares, Σ 2 k² ρ^(2k).

@@ -107,7 +107,7 @@ def _set(wanted: FloatArray, found: FloatArray) -> FloatArray:
     mean = max(float(found.mean()), np.finfo(np.float64).tiny)
     # A narrow beam is hundreds of times as bright as the mean of all directions.
     most = np.maximum(wanted, wanted.mean()) * (LARGEST_FACTOR / mean)
-    factor = np.divide(wanted, found, out=most.copy(), where=found > wanted / most)
+    factor = np.divide(wanted, found, out=most, where=found > wanted / most)
     return np.where(wanted > 0, factor, 0.0)
 
 
