@@ -2,9 +2,9 @@
 //!
 //! A line of sight that is scattered diffusely finds a lamp behind a lens by chance only. Rays traced forwards, which arrived
 //! at the diffuse surface from there, say where to look: as in `[Jensen1995]`, a direction is drawn from a density about those
-//! in which the nearest of them arrived. At the first diffuse surface half of the directions are drawn so, half by the cosine law,
-//! and fewer from one to the next (see [`share`]): whatever the rays tell, no light is lost, and none weighs more than three
-//! times of what it would without them, however often it is scattered.
+//! in which the nearest of them arrived. At the first diffuse surface half of the directions are drawn so, half by the cosine
+//! law, and fewer from one to the next (see [`share`]): whatever the rays tell, no light is lost, and none weighs more than
+//! three times of what it would without them, however often it is scattered.
 //!
 //! Light comes in families: what a ball focuses and what it mirrors arrive at one place from different sides, one of them
 //! hundreds of times more often. Each family has arrivals of its own to go by, and a share of the directions by the root
@@ -35,10 +35,10 @@ const FEWEST: usize = 8;
 
 /// Share of the directions that are drawn from the density, where there is one, after so many diffuse scatters.
 ///
-/// A direction that is not drawn so weighs 1/(1 − share) times as much. If the shares did not fall, these weights would multiply from one
-/// scatter to the next: at half each, the square of what a path in a white cavity brings would grow by 2ρ², without an end for a
-/// reflectance ρ above 0.71. The product of all 1/(1 − 1/(2 k²)) is √2 π/2 / sin(π/√2) = 2.79; and that the shares do not fall
-/// faster leaves the light that is found at later scatters its sum of squares, Σ 2 k² ρ^(2k).
+/// A direction that is not drawn so weighs 1/(1 − share) times as much. If the shares did not fall, these weights would
+/// multiply from one scatter to the next: at half each, the square of what a path in a white cavity brings would grow by 2ρ²,
+/// without an end for a reflectance ρ above 0.71. The product of all 1/(1 − 1/(2 k²)) is √2 π/2 / sin(π/√2) = 2.79; and that
+/// the shares do not fall faster leaves the light that is found at later scatters its sum of squares, Σ 2 k² ρ^(2k).
 #[must_use]
 pub fn share(scatters: u32) -> f64 {
     let number = f64::from(scatters) + 1.0;
