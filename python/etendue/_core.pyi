@@ -72,6 +72,7 @@ class Bsdf:
 class _Tally(TypedDict):
     rays: int
     defects: list[int]
+    dark: int
     flux: float
     flux_squared: float
     norm_error: float

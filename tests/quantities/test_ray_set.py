@@ -235,10 +235,11 @@ def test_a_header_without_a_usable_total_contradicts_nothing(stated: Any) -> Non
 
 
 def test_rays_without_any_flux_cannot_share_a_total() -> None:
-    rays = RaySet(np.zeros((2, 3)), np.ones((2, 3)), [0.0, 0.0]).with_total_flux(5.0)
-    assert rays.total_flux == 0.0
-    assert rays.flux.tolist() == [0.0, 0.0]
-    assert rays.flux_scale == 0.0
+    dark = RaySet(np.zeros((2, 3)), np.ones((2, 3)), [0.0, 0.0])
+    with pytest.raises(ArgumentError, match="its rays carry no flux, so 5 lm cannot be shared in proportion to it"):
+        dark.with_total_flux(5.0)
+    with pytest.raises(ArgumentError, match="carry no flux"):
+        dark.with_total_flux(5.0, "W")
 
 
 # --- complaints ------------------------------------------------------------------------------------------------------

@@ -231,3 +231,82 @@ def test_a_solid_that_no_light_enters_needs_no_medium() -> None:
     assert compile_scene(Scene(solids=[block])).record["solids"] == [{"medium": 0}]
     with pytest.raises(SceneError, match=r"solids\[0\].medium: is missing"):
         compile_scene(Scene(solids=[{**block, "finishes": {"top": "interface"}}]))
+
+
+def absorbed(scene: dict[str, Any], name: str) -> float:
+    """Of 1 lm, by a surface or a medium of this name."""
+    ledger = et.trace(et.Scene(**scene), 20_000).ledger
+    return {**ledger.by_surface, **ledger.by_medium}[name].flux
+
+
+def beam(x: float) -> dict[str, Any]:
+    return {"kind": "beam", "shape": {"kind": "disk", "radius": 1}, "flux": 1, "at": [x, 0, 50], "toward": [0, 0, -1]}
+
+
+def plate(name: str, x: float, finish: Any) -> dict[str, Any]:
+    return {"name": name, "shape": {"kind": "disk", "radius": 5}, "at": [x, 0, 0], "finish": finish}
+
+
+def grey(reflectance: float) -> dict[str, Any]:
+    return {"kind": "lambertian", "reflectance": reflectance}
+
+
+@pytest.mark.parametrize("named", ["dark.finish", "paint"])
+def test_a_finish_without_a_name_is_never_that_of_another(named: str) -> None:
+    """Names are free: one that looks like what a finish without a name is called does not take its place."""
+    surfaces = [plate("bright", 0, named), plate("dark", 100, grey(0.1))]
+    scene = {"sources": [beam(0), beam(100)], "finishes": {named: grey(0.9)}, "surfaces": surfaces}
+    # Binomial, 10 000 rays each: five standard deviations.
+    assert absorbed(scene, "bright") == pytest.approx(0.1, abs=0.015)
+    assert absorbed(scene, "dark") == pytest.approx(0.9, abs=0.015)
+
+
+def test_faces_and_surfaces_with_finishes_of_their_own() -> None:
+    """The face `top` of the solid `x` and the surface `x.top` are two things."""
+    block = {"name": "x", "shape": {"kind": "block", "width": 10, "height": 10, "depth": 5}, "medium": "BK7",
+             "finishes": {"top": grey(0.9)}}  # fmt: skip
+    scene = {"sources": [beam(100)], "solids": [block], "surfaces": [plate("x.top", 100, grey(0.1))]}
+    ledger = et.trace(et.Scene(**scene), 20_000).ledger
+    assert ledger.absorbed.flux == pytest.approx(0.9, abs=0.011)
+
+
+@pytest.mark.parametrize("named", ["clear.medium", "ink"])
+def test_a_medium_without_a_name_is_never_that_of_another(named: str) -> None:
+    """Beer and Lambert: 5 mm of ink absorb 1 - exp(-0.5), the clear block beside it nothing."""
+    blocks = [
+        {
+            "name": name,
+            "shape": {"kind": "block", "width": 10, "height": 10, "depth": 5},
+            "at": [x, 0, 0],
+            "medium": medium,
+        }
+        for name, x, medium in (("inked", 0, named), ("clear", 100, {"index": 1.0}))
+    ]
+    scene = et.Scene(sources=[beam(0), beam(100)], media={named: {"index": 1.0, "absorption": 0.1}}, solids=blocks)
+    # Binomial, 10 000 rays of 1e-4 lm each.
+    assert et.trace(scene, 20_000).ledger.absorbed.flux == pytest.approx(1 - np.exp(-0.5), abs=0.025)
+
+
+TWO_WAYS = {"angle": [0, 90], "wavelength": [450, 650], "values": [[0.9, 0.5], [0.7, 0.3]]}
+
+
+@pytest.mark.parametrize(
+    ("finish", "share"),
+    [
+        ({"kind": "mirror", "reflectance": TWO_WAYS}, 0.7),
+        ({"kind": "lambertian", "reflectance": TWO_WAYS}, 0.7),
+        ({"kind": "rough-metal", "reflectance": TWO_WAYS, "roughness": 0.05}, 0.7),
+    ],
+)
+@pytest.mark.parametrize("where", ["surface", "face"])
+def test_tables_over_two_variables_where_they_are_used(where: str, finish: dict[str, Any], share: float) -> None:
+    """A table of angle and wavelength may stand in the surface itself: halfway between two colours it has their mean."""
+    if where == "surface":
+        scene["surfaces"] = [plate("s", 0, finish)]
+    else:
+        block = {"kind": "block", "width": 10, "height": 10, "depth": 5}
+        scene["solids"] = [
+            {"shape": block, "at": [0, 0, -5], "medium": "BK7", "finish": "absorber", "finishes": {"top": finish}}
+        ]
+    # Binomial: 20 000 rays, five standard deviations.
+    assert et.trace(et.Scene(**scene), 20_000).ledger.absorbed.flux == pytest.approx(1 - share, abs=0.017)

@@ -166,17 +166,31 @@ def test_lumens_that_nobody_sees_are_told(keys: dict[str, Any], *, told: bool) -
 
 
 def test_a_spectrum_as_lines() -> None:
-    """Trapezoids around the nodes; in lumens every node counts with V(λ), and the mean wavelength is that integral's."""
-    nodes = np.array([400.0, 500.0, 550.0, 700.0, 900.0])
+    """Lines by the nanometre: whatever is smooth in wavelength is weighted by them as by the integral over the spectrum."""
+    nodes = np.array([400.0, 500.3, 550.0, 700.0, 900.0])
     weight = np.array([1.0, 2.0, 4.0, 1.0, 1.0])
-    wavelength, shares = et.Spectrum(nodes, weight).lines("W")
-    widths = np.array([50.0, 75.0, 100.0, 175.0, 100.0])
-    assert shares == pytest.approx(weight * widths / (weight * widths).sum())
-    assert wavelength.tolist() == nodes.tolist()
-    wavelength, shares = et.Spectrum(nodes, weight).lines("lm")
-    bright = weight * widths * photopic_efficiency(nodes)
-    assert wavelength.tolist() == nodes[:4].tolist()  # V is 0 at 900 nm
-    assert shares == pytest.approx((bright / bright.sum())[:4])
+    fine = np.linspace(400, 900, 500 * 64 + 1)
+    for unit, seen in (("W", np.ones_like(fine)), ("lm", photopic_efficiency(fine))):
+        wavelength, shares = et.Spectrum(nodes, weight).lines(unit)  # type: ignore[arg-type]
+        assert np.diff(wavelength).max() < 1.0 + 1e-9
+        assert shares.sum() == pytest.approx(1.0, rel=1e-12)
+        light = np.interp(fine, nodes, weight) * seen
+        for function in (lambda x: x, lambda x: 1.5 + 5e3 / x**2, lambda x: np.exp(-(((x - 460) / 20) ** 2))):
+            expected = np.trapezoid(light * function(fine), fine) / np.trapezoid(light, fine)
+            assert shares @ function(wavelength) == pytest.approx(expected, rel=1e-4)
+    spectrum = et.Spectrum(nodes, weight)
+    wavelength, shares = spectrum.lines("W")
+    assert 683.0 * shares @ photopic_efficiency(wavelength) == pytest.approx(spectrum.luminous_efficacy, rel=3e-5)
+
+
+def test_lines_of_spectra_of_any_extent() -> None:
+    """Fine tables are left as they are, wide ones have some thousand lines, and one pair is one line."""
+    fine = np.arange(400.0, 700.1, 0.5)
+    assert et.Spectrum(fine, np.ones(fine.size)).lines("W")[0].tolist() == fine.tolist()
+    wavelength, shares = et.Spectrum([1.0, 1e6], [1.0, 1.0]).lines("W")
+    assert 4000 < wavelength.size < 4200
+    assert wavelength @ shares == pytest.approx(5e5, rel=1e-3)
+    assert [part.tolist() for part in et.Spectrum([555.0], [2.0]).lines("lm")] == [[555.0], [1.0]]
 
 
 # --- tables and surfaces -----------------------------------------------------------------------------------------------

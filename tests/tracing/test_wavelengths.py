@@ -283,17 +283,14 @@ def test_rays_with_a_spectrum_each_draw_from_their_own() -> None:
     seen = result.rays["out"]
     assert seen.wavelength is not None
     which = np.rint(seen.position[:, 0]).astype(int)
-    # Shares of the lines at the nodes, by the trapezoidal rule.
-    for own, lines in ((1, {450.0: 1.0}), (2, {540.0: 1 / 6, 560.0: 1 / 2, 600.0: 1 / 3})):
+    # Lines by the nanometre, by the trapezoidal rule: a triangle of area 100 whose ends have none, and 60 nm of even light.
+    triangle = {445.0: 15 / 100, 450.0: 55 / 100, 455.0: 85 / 100}
+    for own, low, high, shares in ((1, 441, 459, triangle), (2, 540, 600, {540.0: 0.5 / 60, 560.0: 20.5 / 60})):
         found, flux = seen.wavelength[which == own], n * seen.flux[which == own]
-        assert set(found.tolist()) == set(lines)
-        for line, share in lines.items():
-            hits, rays = float(flux[found == line].sum()), len(found)
-            if share < 1.0:
-                assert_drawn_with(share=share, hits=hits, rays=rays)
-            else:
-                assert hits == pytest.approx(rays, rel=1e-6)
-    assert set(seen.wavelength[which == 7].tolist()) <= {450.0, 540.0, 560.0, 600.0}
+        assert set(found.tolist()) == set(range(low, high + 1))
+        for last, share in shares.items():
+            assert_drawn_with(share=share, hits=float(flux[found <= last].sum()), rays=len(found))
+    assert set(seen.wavelength[which == 7].tolist()) <= {*range(441, 460), *range(540, 601)}
     lost = int((index == 7).sum())
     assert any(f"{lost:,} rays" in note and "no wavelength" in note for note in result.notes)
 

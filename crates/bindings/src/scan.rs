@@ -15,6 +15,7 @@ pub fn account_dict<'py>(py: Python<'py>, tally: &PassAccount) -> PyResult<Bound
     let dict = PyDict::new(py);
     dict.set_item("rays", tally.rays)?;
     dict.set_item("defects", tally.defects)?;
+    dict.set_item("dark", tally.dark)?;
     dict.set_item("flux", tally.flux)?;
     dict.set_item("flux_squared", tally.flux_squared)?;
     dict.set_item("norm_error", tally.norm_error)?;

@@ -11,6 +11,8 @@ pub struct PassAccount {
     pub rays: u64,
     /// Rays that cannot be used, by [`Defect`].
     pub defects: [u64; Defect::COUNT],
+    /// Usable rays without flux.
+    pub dark: u64,
     /// Σ w over the usable rays, in file order by batches \[flux unit\].
     pub flux: f64,
     /// Σ w².
@@ -28,6 +30,8 @@ impl PassAccount {
             .iter_mut()
             .zip(batch.defects)
             .for_each(|(total, count)| *total += count);
+        // Rays that cannot be used have no flux left.
+        self.dark += zeros(&batch.flux[..batch.len]) - batch.defects.iter().sum::<u64>();
         let [flux, squared] = flux_sums(&batch.flux[..batch.len]);
         self.flux += flux;
         self.flux_squared += squared;
@@ -41,9 +45,16 @@ impl PassAccount {
             .iter_mut()
             .zip(other.defects)
             .for_each(|(total, count)| *total += count);
+        self.dark += other.dark;
         self.flux += other.flux;
         self.flux_squared += other.flux_squared;
     }
+}
+
+/// How many are 0.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn zeros(flux: &[f64]) -> u64 {
+    flux.iter().map(|w| u64::from(*w == 0.0)).sum()
 }
 
 /// Σ w and Σ w² of a block, lane by lane, and these one after another: the same bits on every instruction set.

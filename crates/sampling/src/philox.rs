@@ -65,11 +65,18 @@ impl Stream {
         philox4x64([index, block, 0, 0], self.key).map(unit_open)
     }
 
+    /// Four independent 64-bit words at `index`, block `block`.
+    #[inline]
+    #[must_use]
+    pub fn block(self, index: u64, block: u64) -> [u64; 4] {
+        philox4x64([index, block, 0, 0], self.key)
+    }
+
     /// Four independent 64-bit words at `index`.
     #[inline]
     #[must_use]
     pub fn words(self, index: u64) -> [u64; 4] {
-        philox4x64([index, 0, 0, 0], self.key)
+        self.block(index, 0)
     }
 
     /// A 64-bit word at `index`.

@@ -63,12 +63,17 @@ def convert(
     notes = (*assumed, *losses)
     complaints = [str(c) for c in rays.complaints]
     if json:
-        facts = {"output": output, "rays": len(rays), "total_flux": rays.total_flux, "flux_unit": rays.flux_unit}
+        facts = {
+            "output": output,
+            "rays": rays.tally.usable,
+            "total_flux": rays.total_flux,
+            "flux_unit": rays.flux_unit,
+        }
         print_json(facts | {"complaints": complaints, "notes": list(notes)})
         return
     for line in (*complaints, *(f"note: {note}" for note in notes)):
         complain(line)
-    say(f"{output}: {len(rays):,} rays, {counted(rays.total_flux, rays.flux_unit)}")
+    say(f"{output}: {rays.tally.usable:,} rays, {counted(rays.total_flux, rays.flux_unit)}")
 
 
 def _unit(stated: str | None, fluxes: list[str | None], sets: list[RaySet]) -> FluxUnit | None:

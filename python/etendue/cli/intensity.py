@@ -89,8 +89,10 @@ def intensity(
                 result = intensity_distribution(source, c_planes, gamma_step, progress=progress)
         complaints = complaints_of(source)
     else:
-        given = {"--c-planes": c_planes, "--gamma-step": gamma_step, "--flux": flux, "--unit": unit}
-        _refuse(file, "ray files and light fields", given)
+        _refuse(file, "ray files", {"--flux": flux})
+        _refuse(
+            file, "ray files and light fields", {"--c-planes": c_planes, "--gamma-step": gamma_step, "--unit": unit}
+        )
         result = read_intensity(file, photometry)
         complaints = [str(c) for c in result.complaints]
     shown = result.mirrored() if mirror else result
@@ -117,7 +119,7 @@ def _refuse(file: Path, kinds: str, given: Mapping[str, object]) -> None:
     """Refuse options that belong to other kinds of files."""
     needless = [option for option, value in given.items() if value is not None]
     if needless:
-        raise typer.BadParameter(f"{', '.join(needless)}: for {kinds}, and {file} is neither")
+        raise typer.BadParameter(f"{', '.join(needless)}: for {kinds}, and {file} is none of these")
 
 
 def _source(file: Path, flux: str | None, unit: str | None) -> RaySet | LightField:

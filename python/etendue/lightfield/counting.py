@@ -241,7 +241,7 @@ def count_rays(
         folds=folds,
         some_held_out=HeldOutRays(raw["kept_part"], raw["kept"], raw["kept_weight"]),
         flux_per_weight=scale * (1.0 if raw["weight"] is None else raw["weight"]),
-        rays=tally.rays - tally.unusable,
+        rays=tally.lit,
         unmet_rays=raw["unmet_rays"],
         unmet_flux=raw["unmet_flux"] * scale,
         tally=tally,

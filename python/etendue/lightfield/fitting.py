@@ -217,8 +217,10 @@ def make_plan(
     those of a plane, whose frames are found and not stated.
     """
     some = pilot_sample(rays, PILOT_RAYS)
-    bits = default_bits(len(rays))
     first_look = count_rays(some, surface, PartGrids((1, 1, 1, 1), (1, 1)), seed=seed, threads=threads)
+    # Rays without flux and those that cannot be used make no grid finer.
+    lit = round(len(rays) * (first_look.rays / len(some)))
+    bits = default_bits(lit)
     shares = np.array([part.grid.rays for part in first_look["all"]]) / first_look.rays
     few = (shares < FEW * shares.max()) & (depths is None or isinstance(surface, Plane))
 
@@ -230,11 +232,11 @@ def make_plan(
 
     def counted(own: Depths) -> EtendueCounts:
         step()
-        return count_rays(some, surface, grids(len(some), own, PILOT_FINEST), seed=seed, threads=threads)
+        return count_rays(some, surface, grids(first_look.rays, own, PILOT_FINEST), seed=seed, threads=threads)
 
     if depths:
         trial = counted(depths)
-        return Plan(grids(len(rays), depths), choose_concentrations(trial, _pilot_images(trial, threads), threads))
+        return Plan(grids(lit, depths), choose_concentrations(trial, _pilot_images(trial, threads), threads))
     chosen = _search(counted, min(bits, FEWEST_BITS), 0, threads)
     while chosen.bits < min(bits, MOST_PILOT_BITS):
         if not _leads(_finer_score(counted, chosen, threads), chosen.score):
@@ -242,7 +244,7 @@ def make_plan(
         chosen = _search(counted, chosen.bits + 4, chosen.lend, threads)
     if chosen.bits == MOST_PILOT_BITS:
         chosen = dataclasses.replace(chosen, bits=bits)
-    return Plan(grids(len(rays), _depths(chosen.bits, chosen.lend)), chosen.concentrations, chosen.recipes)
+    return Plan(grids(lit, _depths(chosen.bits, chosen.lend)), chosen.concentrations, chosen.recipes)
 
 
 @dataclasses.dataclass(frozen=True)

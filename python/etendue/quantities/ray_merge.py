@@ -46,6 +46,8 @@ def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | 
         name
         for name in sets[0].columns
         if name not in ("wavelength", "spectrum_index")
+        # Additional columns mean what their labels say.
+        and (name != "additional" or len({_labels(rays) for rays in sets}) == 1)
         and all(name in rays.columns for rays in sets)
         and len({rays.records.dtype[name].shape for rays in sets}) == 1
     ]
@@ -84,7 +86,7 @@ def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | 
         wavelength_scale=1.0,
         spectra=tuple(s for rays in sets for s in rays.spectra) if indexed else (),
         single_wavelength=single,
-        header={},
+        header=_header(sets),
         copies=max(rays.meaning.copies for rays in sets),
         complaints=(
             *(_placed(told, rays) for rays in sets for told in (*rays.complaints, *_losses(rays, dtype, single))),
@@ -112,6 +114,24 @@ def _column(rays: RayRecords, name: str, batch: RayBatch, otherwise: float | Non
     if name not in rays.columns:
         return np.full(len(batch.flux), otherwise)
     return rays.column(name, slice(batch.start, batch.start + BATCH))[batch.usable]
+
+
+def _labels(rays: RayRecords) -> tuple[str, ...]:
+    return tuple(map(str, rays.header.get("additional_labels", ())))
+
+
+def _header(sets: Sequence[RayRecords]) -> dict[str, Any]:
+    """What all headers say alike in words: who made the set and how, not what a file of it would be like."""
+    first, *others = (rays.header for rays in sets)
+
+    def words(value: object) -> bool:
+        return isinstance(value, str) or (isinstance(value, tuple) and all(isinstance(part, str) for part in value))
+
+    return {
+        name: value
+        for name, value in first.items()
+        if words(value) and all(other.get(name) == value for other in others)
+    }
 
 
 def _losses(rays: RayRecords, dtype: np.dtype[Any], single: float | None) -> list[Complaint]:

@@ -112,9 +112,14 @@ def with_total_flux(rays: Rays, flux: float, unit: FluxUnit | None = None) -> Ra
             )
         ),
     }
-    if unit == rays.flux_unit:
-        return rays.replace(**changes)
-    return without(rays, *FLUX_COLUMNS).replace(**changes)
+    same = unit == rays.flux_unit
+    given = (rays if same else without(rays, *FLUX_COLUMNS)).replace(**changes)
+    # Asked of the new set: the old one would warn of the total that is overruled.
+    if given.tally.flux == 0.0:
+        raise ArgumentError(
+            f"{rays.provenance.source}: its rays carry no flux, so {flux:.9g} {unit} cannot be shared in proportion to it."
+        )
+    return given
 
 
 def scaled(rays: Rays, factor: float) -> Rays:

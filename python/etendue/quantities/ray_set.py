@@ -173,7 +173,7 @@ class RaySet(RayRecords, InNotebook):
         Raises
         ------
         ArgumentError
-            If `flux` is not finite or not above 0.
+            If `flux` is not finite or not above 0, or the rays carry none.
 
         Examples
         --------

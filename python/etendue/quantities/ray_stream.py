@@ -80,6 +80,8 @@ class Tally:
         Σ w and Σ w² over the usable rays as stored, [flux unit as stored].
     norm_error : float
         Largest ``| |k| - 1 |`` of the stored directions.
+    dark : int
+        Usable rays without flux.
     """
 
     rays: int
@@ -89,18 +91,29 @@ class Tally:
     flux: float
     flux_squared: float
     norm_error: float
+    dark: int = 0
 
     @classmethod
     def from_core(cls, data: Mapping[str, Any]) -> Tally:
         """From the dictionary that the core returns."""
         not_finite, no_direction, negative_flux = data["defects"]
-        sums = {name: data[name] for name in ("rays", "flux", "flux_squared", "norm_error")}
+        sums = {name: data[name] for name in ("rays", "dark", "flux", "flux_squared", "norm_error")}
         return cls(not_finite=not_finite, no_direction=no_direction, negative_flux=negative_flux, **sums)
 
     @property
     def unusable(self) -> int:
         """Rays that cannot be used."""
         return self.not_finite + self.no_direction + self.negative_flux
+
+    @property
+    def usable(self) -> int:
+        """Rays that can be used."""
+        return self.rays - self.unusable
+
+    @property
+    def lit(self) -> int:
+        """Rays that carry flux."""
+        return self.usable - self.dark
 
     @property
     def effective_rays(self) -> float:

@@ -110,6 +110,9 @@ def without_spectrum(rays: Rays) -> Rays:
 def with_spectrum(rays: Rays, spectrum: Spectrum) -> Rays:
     """The same rays with one spectrum for all, in place of whatever was known of their spectra and wavelengths."""
     step = "spectrum given by the user"
+    # The ratio of the two totals in the header was that of another spectrum.
+    other = "luminous_flux" if rays.flux_unit == "W" else "radiant_flux"
+    header = {name: value for name, value in rays.header.items() if name != other}
     return without(rays, "wavelength", "spectrum_index").replace(
-        spectra=(spectrum,), single_wavelength=None, provenance=rays.provenance.then(step)
+        spectra=(spectrum,), single_wavelength=None, header=header, provenance=rays.provenance.then(step)
     )

@@ -197,16 +197,17 @@ class _Compiler:
     def _medium(self, place: str, owner: str, given: Medium | str) -> int:
         """Number of a medium, which is written down when it is first met."""
         if isinstance(given, str):
-            key, name = ("media", given), given
+            key, name, stated_at = ("media", given), given, f"media.{given}" if given in self.scene.media else place
             medium = self.scene.media.get(given) or (MEDIA[given].medium if given in MEDIA else None)
             if medium is None:
                 self.mistakes.append((place, str(UnknownNameError("medium", given, [*self.scene.media, *MEDIA]))))
                 return 0
         else:
-            key, name, medium = ("media", f"{owner}.medium"), f"{owner}.medium", given
+            # Known by its place: a name made of the owner's may be that of another one.
+            key, name, medium, stated_at = ("medium at", place), f"{owner}.medium", given, place
         if key not in self.numbers:
             self.numbers[key] = len(self.rows["media"])
-            with self._at(f"media.{name}" if given in self.scene.media else place):
+            with self._at(stated_at):
                 self.rows["media"].append(medium.record(self.files))
                 self.names["media"].append(name)
                 self.media.append((place, name, medium))
@@ -217,18 +218,21 @@ class _Compiler:
         if isinstance(given, str):
             if given in self.named_finishes:
                 return self.named_finishes[given]
-            name = given
+            key, name, stated_at = (
+                ("finishes", given),
+                given,
+                f"finishes.{given}" if given in self.scene.finishes else place,
+            )
             finish = self.scene.finishes.get(given) or BUILT_IN.get(given)
             if finish is None:
                 known = [*self.scene.finishes, *BUILT_IN]
                 self.mistakes.append((place, str(UnknownNameError("finish", given, known))))
                 return 0, False, None
         else:
-            name, finish = f"{owner}.finish", given
-        key = ("finishes", name)
+            key, name, finish, stated_at = ("finish at", place), f"{owner}.finish", given, place
         if key not in self.numbers:
             self.numbers[key] = len(self.rows["finishes"])
-            with self._at(f"finishes.{name}" if given in self.scene.finishes else place):
+            with self._at(stated_at):
                 record = finish.record(self.files)
                 self.rows["finishes"].append(record)
                 # An axis that changes nothing would cost time at each surface that a ray meets.

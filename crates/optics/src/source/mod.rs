@@ -3,6 +3,7 @@
 mod intensity_table;
 pub mod numbers;
 pub mod patches;
+mod record_order;
 mod rings;
 
 pub mod surface;
@@ -18,6 +19,8 @@ use etendue_geometry::{RayBatch, RaySource};
 use etendue_lightfield::field::draw::{FieldRays, Sampler};
 use etendue_math::{Frame, Vec3};
 use etendue_sampling::philox::{Pairs, Stream, fill_fours};
+
+use self::record_order::RecordOrder;
 
 pub use intensity_table::IntensityTable;
 pub use numbers::Numbers;
@@ -186,8 +189,8 @@ impl Source {
     /// the flux of the source. Where the records of a set tell the colours of their rays, the colours of the batch are their
     /// wavelengths \[nm\]; else there are none, and [`Source::wavelength`] has them.
     ///
-    /// A set of n rays is gone through once: ray i of `count` is ray ⌊i n/count⌋ of the set, in an order that mixes the file,
-    /// with n/count of its flux.
+    /// A set of n rays is gone through once: ray i of `count` is the one in place ⌊i n/count⌋ of a random order
+    /// ([`RecordOrder`]), with n/count of its flux.
     pub fn emit(
         &self,
         source: u64,
@@ -205,7 +208,7 @@ impl Source {
                 spectra,
             } => {
                 let first = range.start;
-                resample(sets[*set], range, count, batch);
+                RecordOrder::new(sets[*set].len(), *set, seed).resample(sets[*set], range, count, batch);
                 if !coloured {
                     batch.colour.clear();
                 }
@@ -276,99 +279,6 @@ impl Source {
                 batch.position[axis][i] = x;
                 batch.direction[axis][i] = k;
             }
-        }
-    }
-}
-
-/// Records that stay together when a set is gone through.
-const CHUNK: u64 = 256;
-
-/// Record number `i` of a set of `n` in the order in which it is gone through: chunks of records in steps of the golden
-/// section, so that every beginning of a run is spread over the whole file, however that is ordered.
-fn scattered(i: u64, n: u64) -> u64 {
-    let chunks = n / CHUNK;
-    let chunk = i / CHUNK;
-    if chunk >= chunks {
-        return i;
-    }
-    // A step that shares no factor with the number of chunks visits each of them once.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "below the number of chunks"
-    )]
-    let golden = (chunks as f64 * 0.618_033_988_749_895) as u64;
-    let common = |mut a: u64, mut b: u64| {
-        while b != 0 {
-            (a, b) = (b, a % b);
-        }
-        a
-    };
-    let step = (golden..golden + chunks)
-        .find(|step| common(*step, chunks) == 1)
-        .unwrap_or(1);
-    #[allow(clippy::cast_possible_truncation, reason = "below the number of chunks")]
-    let place = (u128::from(chunk) * u128::from(step) % u128::from(chunks)) as u64;
-    place * CHUNK + i % CHUNK
-}
-
-/// Rays ⌊i n/count⌋ of a set for i in `range`, counted in the order of [`scattered`].
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "quotients are below the set's length; ranges are at most a block"
-)]
-fn resample(set: &dyn RaySource, range: Range<u64>, count: u64, batch: &mut RayBatch) {
-    let n = set.len();
-    let len = (range.end - range.start) as usize;
-    let mut part = RayBatch::default();
-    batch.len = len;
-    batch.colour.clear();
-    batch.defects = Default::default();
-    batch.norm_error = 0.0;
-    let number = |i: u64| (u128::from(i) * u128::from(n) / u128::from(count)) as u64;
-    let (mut slot, mut i) = (0, range.start);
-    while i < range.end {
-        // The stretch of one chunk that these rays lie in.
-        let first = number(i);
-        let last = (first / CHUNK + 1) * CHUNK;
-        let mut end = i + 1;
-        while end < range.end && number(end) < last {
-            end += 1;
-        }
-        let begin = scattered(first, n);
-        let width = number(end - 1) - first + 1;
-        set.fill(begin..begin + width, &mut part);
-        for k in i..end {
-            let at = (number(k) - first) as usize;
-            for axis in 0..3 {
-                batch.position[axis][slot] = part.position[axis][at];
-                batch.direction[axis][slot] = part.direction[axis][at];
-            }
-            batch.flux[slot] = part.flux[at];
-            batch.colour.extend(part.colour.get(at));
-            slot += 1;
-        }
-        batch.norm_error = batch.norm_error.max(part.norm_error);
-        i = end;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    #[allow(clippy::cast_possible_truncation, reason = "small numbers")]
-    fn every_record_is_gone_through_once_and_every_beginning_is_spread_out() {
-        for n in [1, 255, 256, 1000, 100_000, 256 * 377] {
-            let mut seen: Vec<u64> = (0..n).map(|i| scattered(i, n)).collect();
-            if n > 10_000 {
-                // The mean of the first tenth is near the middle of the file.
-                let mean = seen[..n as usize / 10].iter().map(|r| *r as f64).sum::<f64>() / (n as f64 / 10.0);
-                assert!((mean / n as f64 - 0.5).abs() < 0.05, "{n}: {mean}");
-            }
-            seen.sort_unstable();
-            assert!(seen.into_iter().eq(0..n));
         }
     }
 }

@@ -42,7 +42,7 @@ def ray_facts(rays: RaySet, path: str | Path, progress: Progress | None = None) 
     moments = rays.moments(progress)
     focus = rays.virtual_focus
     low, high = moments.flux_range
-    known = len(rays) > rays.tally.unusable
+    known = rays.tally.usable > 0
     distinct, complaints = DistinctRays.of(rays, join=False), rays.complaints
     # A set that tells of copies itself tells enough.
     if distinct.told is not None and rays.meaning.copies <= 1.0:
@@ -52,7 +52,7 @@ def ray_facts(rays: RaySet, path: str | Path, progress: Progress | None = None) 
         "format": rays.provenance.format,
         "title": next((one.title for one in RAY_FORMATS if one.name == rays.provenance.format), rays.provenance.format),
         "rays": len(rays),
-        "usable_rays": len(rays) - rays.tally.unusable,
+        "usable_rays": rays.tally.usable,
         "flux_unit": rays.flux_unit,
         "total_flux": rays.total_flux,
         "header_flux": rays.header.get("total_flux"),

@@ -204,7 +204,7 @@ def write_index(
 
 def _usable(tally: Tally) -> Tally:
     """The account of the rays that are left when those that cannot be used are gone."""
-    return dataclasses.replace(tally, rays=tally.rays - tally.unusable, not_finite=0, no_direction=0, negative_flux=0)
+    return dataclasses.replace(tally, rays=tally.usable, not_finite=0, no_direction=0, negative_flux=0)
 
 
 def _meaning(rays: RayStream, counted: Counted) -> RaySetMeaning:

@@ -28,7 +28,7 @@ def usable_rays(rays: RayStream) -> int:
         If there are none.
     """
     tally = rays.tally if isinstance(rays, RaySet) else rays.pass_over()
-    count = tally.rays - tally.unusable
+    count = tally.usable
     if count == 0:
         raise ArgumentError(
             f"{rays.provenance.source}: not one of {len(rays):,} rays is usable; there is nothing to write."
