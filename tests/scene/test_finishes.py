@@ -301,6 +301,7 @@ TWO_WAYS = {"angle": [0, 90], "wavelength": [450, 650], "values": [[0.9, 0.5], [
 @pytest.mark.parametrize("where", ["surface", "face"])
 def test_tables_over_two_variables_where_they_are_used(where: str, finish: dict[str, Any], share: float) -> None:
     """A table of angle and wavelength may stand in the surface itself: halfway between two colours it has their mean."""
+    scene: dict[str, Any] = {"sources": [{**beam(0), "wavelength": 550}]}
     if where == "surface":
         scene["surfaces"] = [plate("s", 0, finish)]
     else:
