@@ -38,6 +38,7 @@ SLOW_EXAMPLES: frozenset[str] = frozenset(
         "etendue.instruments.near_field.goniophotometer.NearFieldGoniophotometer",
         "etendue.instruments.near_field.run.NearFieldRun",
         "etendue.lightfield.characteristic.characteristic_curve",
+        "etendue.lightfield.close_lines.crowding",
         "etendue.lightfield.diagnostics.diagnose",
         "etendue.lightfield.etendue_density.EtendueDensity.in_unit",
         "etendue.lightfield.far_field.field_intensity",

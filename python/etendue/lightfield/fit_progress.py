@@ -41,6 +41,7 @@ class FitProgress:
         self._stages = {name: cost for name, cost in STAGES.items() if automatic or name != "surface"}
         self._whole = sum(self._stages.values()) + rays
         self._before, self._own, self._done = 0.0, 0.0, 0.0
+        self._most = 0.0
 
     def begin(self, stage: str) -> None:
         """A stage begins; those before it have ended."""
@@ -65,4 +66,6 @@ class FitProgress:
 
     def _tell(self, done: float) -> None:
         if self._progress is not None:
-            self._progress(int(self._rays * done / self._whole))
+            # Of several fits those after the first count as nothing.
+            self._most = max(self._most, done)
+            self._progress(int(self._rays * self._most / self._whole))

@@ -25,6 +25,7 @@ from etendue.lightfield.candidate import (
     grow_candidates,
     score_densities,
 )
+from etendue.lightfield.close_lines import TOLD, blurred_share, crowding, told_of_blur
 from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, PartGrids, count_rays
 from etendue.lightfield.etendue_density import EtendueDensity, FitReport
 from etendue.lightfield.expected_loss import loss_of_gamma
@@ -76,6 +77,13 @@ LEAD = 3.0
 """Standard errors by which the score of a finer grid must lead a coarser one's to be taken."""
 
 
+MOST_TRIED = 2
+"""Surfaces that are tried in place of one that blurs some of the light: each takes as long as the first."""
+
+LESS_BLURRED = 0.5
+"""Share of the light blurred by another surface, against the chosen one, below which it is taken instead."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Plan:
     """What was chosen before all rays are counted.
@@ -118,19 +126,53 @@ def fit_light_field(
     given, distinct = rays, DistinctRays.of(rays)
     rays, repeated = distinct.rays, _told_of_copies(distinct)
     notes: tuple[str, ...] = ()
+    others: tuple[Surface, ...] = ()
     if isinstance(surface, str):
         if surface != "auto":
             raise ArgumentError(f"surface is {surface!r}; give a Surface, or 'auto'. For text there is parse_surface.")
         told.begin("surface")
         choice = choose_surface(rays, seed=seed, threads=threads, step=told.step)
-        surface, notes = choice.surface, choice.notes
+        surface, notes, others = choice.surface, choice.notes, choice.others
         # The search has tried a focus, and has taken it or not.
     else:
         told.begin("focus")
         surface = focused(surface, rays, seed, threads) if isinstance(surface, Plane) else surface.sized_for(rays)
+
+    def fitted(surface: Surface) -> tuple[EtendueDensity, FloatArray]:
+        field = _fit_on(rays, surface, symmetry, depths, max_resolution, seed, threads, told)
+        return field, crowding(rays, field)
+
+    field, crowded = fitted(surface)
+    if others and blurred_share(crowded) >= TOLD:
+        # Scores are means over all light: a surface that blurs some of it far too much may have the best one.
+        tried = min((fitted(surface) for surface in others[:MOST_TRIED]), key=lambda tried: blurred_share(tried[1]))
+        now, before = blurred_share(tried[1]), blurred_share(crowded)
+        if now < LESS_BLURRED * before:
+            field, crowded = tried
+            notes = (
+                *notes,
+                f"{field.surface.told} in its place, which blurs {now:.0%} of the light and not {before:.0%}",
+            )
+    spectrum = given.total_spectrum(threads=threads)
+    told.end()
+    notes = (*notes, *field.notes, *told_of_blur(field.surface, crowded), *repeated, *notes_of_rays(given))
+    return field.replace(notes=notes, spectrum=spectrum)
+
+
+def _fit_on(
+    rays: RayStream,
+    surface: Surface,
+    symmetry: str,
+    depths: Depths | None,
+    max_resolution: float | None,
+    seed: int,
+    threads: int | None,
+    told: FitProgress,
+) -> EtendueDensity:
+    """The field on one surface."""
     told.begin("grid")
     plan = make_plan(rays, surface, depths, seed, threads, finest_for(surface, max_resolution), told.step)
-    notes = (*notes, *not_so_fine(surface, max_resolution, plan.grids[0].fine[0]))
+    notes = tuple(not_so_fine(surface, max_resolution, plan.grids[0].fine[0]))
     counts = count_rays(rays, surface, plan.grids, seed=seed, threads=threads, progress=told.counted)
     if symmetry == "auto":
         symmetry = proven_symmetry(counts)
@@ -141,9 +183,7 @@ def fit_light_field(
     if symmetry != "none":
         counts = fold(counts, symmetry)
     field = fit_counts(rays, counts, plan, seed, threads, told)
-    spectrum = given.total_spectrum(threads=threads)
-    told.end()
-    return field.replace(notes=(*notes, *field.notes, *repeated, *notes_of_rays(given)), spectrum=spectrum)
+    return field.replace(notes=(*notes, *field.notes))
 
 
 def _told_of_copies(distinct: DistinctRays) -> tuple[str, ...]:

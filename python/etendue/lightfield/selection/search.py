@@ -61,12 +61,15 @@ class SurfaceChoice:
         cannot be told from it. The lowest and highest that were tried, if none is worse; None if no depth was sought.
     notes : tuple of str
         The choice in words.
+    others : tuple of Surface
+        The others that take up the light, the best score first.
     """
 
     surface: Surface
     table: tuple[SurfaceScore, ...]
     depths: tuple[float, float] | None
     notes: tuple[str, ...]
+    others: tuple[Surface, ...] = ()
 
 
 @on_one_blas_thread
@@ -98,7 +101,8 @@ def choose_surface(
 
     A field of up to 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and scored on
     the others; see `SurfaceScorer`. A surface replaces a simpler one if it leads by three standard errors of the difference.
-    None is chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off.
+    None is chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off. If the field then turns
+    out to blur where some of the light comes from, `LightField.fit` tries the next ones.
 
     Parameters
     ----------
@@ -183,7 +187,9 @@ class _Search:
             if challenger.held_out.leads(winner.held_out, self.settings):
                 winner = challenger
         table = _table(finalists, winner)
-        return SurfaceChoice(winner.surface, table, depths, tuple(self.notes(winner, table, depths)))
+        others = sorted((f for f in able if f is not winner), key=lambda f: -f.mean)
+        notes = tuple(self.notes(winner, table, depths))
+        return SurfaceChoice(winner.surface, table, depths, notes, tuple(f.surface for f in others))
 
     def best(self, kind: Sequence[Surface]) -> Surface:
         """Of surfaces of one kind the best; of those that meet enough of the flux, if there are any."""
