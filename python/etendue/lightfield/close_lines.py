@@ -86,12 +86,25 @@ def crowding(rays: RayStream, field: EtendueDensity) -> FloatArray:
 
 
 def blurred_share(ratio: FloatArray) -> float:
-    """Share of the light that comes from where a field blurs it, of the ratios that `crowding` finds; 0 of none."""
+    """Share of the light that comes from where a field blurs it, of the ratios that `crowding` finds; 0 of none.
+
+    Examples
+    --------
+    >>> blurred_share(np.array([0.9, 1.1, 3.0, 1.0])), blurred_share(np.zeros(0))
+    (0.25, 0.0)
+    """
     return float((ratio > BLURRED).mean()) if len(ratio) else 0.0
 
 
 def told_of_blur(surface: Surface, ratio: FloatArray) -> Iterator[str]:
-    """What is to be said of a field on a surface that blurs where some of the light comes from."""
+    """What is to be said of a field on a surface that blurs where some of the light comes from.
+
+    Examples
+    --------
+    >>> from etendue.lightfield.surfaces import Disk
+    >>> list(told_of_blur(Disk(radius=30), np.array([0.9, 1.1, 3.0, 1.0])))  # doctest: +ELLIPSIS
+    ['lines that carry some 25% of the light pass each other 3 times as closely as this light field has them: ...']
+    """
     share = blurred_share(ratio)
     if share < TOLD:
         return
