@@ -101,8 +101,8 @@ def choose_surface(
 
     A field of up to 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and scored on
     the others; see `SurfaceScorer`. A surface replaces a simpler one if it leads by three standard errors of the difference.
-    None is chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off. If the field then turns
-    out to blur where some of the light comes from, `LightField.fit` tries the next ones.
+    None is chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off. If the field then
+    turns out to blur where some of the light comes from, `LightField.fit` tries the next ones.
 
     Parameters
     ----------
