@@ -31,6 +31,10 @@ FLOOR = 1e-3
 MIXED_IN = 1e-4
 """Least share of the even density in every score, so that one cell that is wrongly dark cannot decide it."""
 
+UNFLATTENED = 0.05
+"""Standard deviation of the Gauss function by which what a tree flattens in a lobe is smoothed, in sides of the square of
+directions. Of 0.02, 0.05 and 0.1 it predicts smooth lobes best, and no source worse than without."""
+
 FINE_POSITIONS = even_positions((3, 5))
 """Positions of the fine grids over which images are averaged."""
 
@@ -79,11 +83,14 @@ def images_of(
     symmetry: str = "none",
     positions: Sequence[Position] = FINE_POSITIONS,
     like: Images | None = None,
+    *,
+    unflattened: bool = True,
 ) -> Images:
     """Densities over the place and over the direction: what the fine counts tell, each by itself.
 
-    Either is a tree of its own, averaged over positions of the fine grid. Where the part has a hole, nothing is left. The
-    concentrations are those of greatest evidence, or those of other images of the same light.
+    Either is a tree of its own, averaged over positions of the fine grid; what that takes from the top of a smooth lobe of
+    directions is put back, unless it shall not be. Where the part has a hole, nothing is left. The concentrations are those
+    of greatest evidence, or those of other images of the same light.
     """
     if counts.space.rays == 0:
         return Images()
@@ -99,7 +106,26 @@ def images_of(
     of_place, of_turn = known or (concentration(counts.space), concentration(counts.direction))
     (space, of_space), (direction, of_direction) = density(counts.space, of_place), density(counts.direction, of_turn)
     inside = space * _outside(len(space), chart.hole)
+    if unflattened:
+        # The tree of what the found image brings on average is flatter than it by about as much as it is than the light:
+        # twicing, [Tukey1977]_.
+        expected = Sums(direction * (counts.direction.rays / direction.size), None)
+        flatter, _ = density(expected, of_turn)
+        factor = _smooth_ratio(direction, flatter)
+        direction, of_direction = direction * factor, of_direction * factor
+        level = direction.mean()
+        direction, of_direction = direction / level, of_direction / level
     return Images(inside, direction, of_space, of_direction, (of_place, of_turn))
+
+
+def _smooth_ratio(density: FloatArray, other: FloatArray) -> FloatArray:
+    """The ratio of two densities over direction, its logarithm averaged around each direction by what light there is."""
+    n = len(density)
+    steps = np.arange(n)
+    kernel = np.exp(-0.5 * ((steps[:, None] - steps) / (UNFLATTENED * n)) ** 2)
+    light = kernel @ density @ kernel.T
+    ratio: FloatArray = np.exp(kernel @ (density * np.log(density / other)) @ kernel.T / light)
+    return ratio
 
 
 def _outside(n: int, hole: float) -> FloatArray:

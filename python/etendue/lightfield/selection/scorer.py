@@ -234,7 +234,7 @@ class SurfaceScorer:
                     for c, axes in zip(cells, (slice(0, 2), slice(2, 4)), strict=True)
                 )
                 counts = PartCounts(space, space, direction)
-                images[index] = images_of(counts, part, 1, positions=IMAGE_POSITIONS, like=first)
+                images[index] = images_of(counts, part, 1, positions=IMAGE_POSITIONS, like=first, unflattened=False)
                 first = first or images[index]
         return found
 
