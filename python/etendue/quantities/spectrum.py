@@ -107,7 +107,7 @@ class Spectrum:
         [0.25, 0.5, 0.25]
         >>> wavelength, shares = Spectrum([450, 650], [1, 1]).lines("lm")
         >>> wavelength.size, round(float(wavelength @ shares))
-        (201, 560)
+        (201, 559)
         """
         wavelength = self._refined()
         weight = np.interp(wavelength, self.wavelength, self.weight)
