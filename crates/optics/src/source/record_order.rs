@@ -124,7 +124,7 @@ impl RecordOrder {
         let (known, order) = &mut self.mixed[level];
         if *known != stretch {
             *known = stretch;
-            let address = (level as u64) << LEVEL_BITS | stretch;
+            let address = ((level as u64) << LEVEL_BITS) | stretch;
             order.clear();
             order.extend((0..members).map(|member| member as u8));
             // Durstenfeld's shuffle; of a word either half is a number.
@@ -136,7 +136,7 @@ impl RecordOrder {
                     spare = Some(word << 32);
                     word
                 });
-                order.swap(k as usize, scale(half >> 32 << 32, k + 1) as usize);
+                order.swap(k as usize, scale((half >> 32) << 32, k + 1) as usize);
             }
         }
         u64::from(order[i as usize])
@@ -146,7 +146,7 @@ impl RecordOrder {
 /// A word as a whole number below n.
 #[allow(clippy::cast_possible_truncation, reason = "below n")]
 fn scale(word: u64, n: u64) -> u64 {
-    (u128::from(word) * u128::from(n) >> 64) as u64
+    ((u128::from(word) * u128::from(n)) >> 64) as u64
 }
 
 /// A step that shares no factor with the number of chunks, so that each of them is met once, near their golden section.
