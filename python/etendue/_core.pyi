@@ -78,7 +78,6 @@ class _Tally(TypedDict):
     norm_error: float
 
 class _Moments(TypedDict):
-    zero_flux: int
     flux_range: list[float]
     bounds: list[list[float]]
     weighted_position: list[float]

@@ -36,6 +36,26 @@ def test_distances_are_those_between_lines() -> None:
     assert _distances(p, k, q, m) == pytest.approx(expected, rel=1e-10)
 
 
+def test_parallel_lines_are_as_far_apart_as_they_are() -> None:
+    """Along the same or the opposite direction, |(q - p) × k|; beside them one that crosses."""
+    k = np.array([[0.6, 0.0, 0.8]])
+    p, q = np.array([[1.0, 2.0, 3.0]]), np.array([[4.0, -1.0, 2.0], [0.0, 5.0, 1.0], [1.0, 2.0, 9.0]])
+    found = _distances(p, k, q, np.array([[0.6, 0.0, 0.8], [-0.6, 0.0, -0.8], [1.0, 0.0, 0.0]]))
+    expected = [*np.linalg.norm(np.cross(q[:2] - p, k), axis=1), 0.0]
+    assert found == pytest.approx(np.array([expected]), abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_beam_of_parallel_rays_is_not_taken_for_blur() -> None:
+    """All lines of a collimated beam are parallel; those of its field are not quite, and pass each other no less closely."""
+    rng = np.random.default_rng(8)
+    position = np.column_stack([rng.uniform(-1, 1, (4000, 2)), np.zeros(4000)])
+    beam = et.RaySet(position, np.tile([0.0, 0.0, 1.0], (4000, 1)), np.ones(4000))
+    field = et.LightField.fit(beam, et.Plane(z=0, width=2, height=2), depths=(3, 3, 3, 3))
+    assert np.median(crowding(beam, field)) < BLURRED
+    assert not told(field)
+
+
 HEIGHTS = (0.0, 5.0)
 
 

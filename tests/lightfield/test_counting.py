@@ -100,3 +100,18 @@ def test_what_cannot_be_counted_is_refused() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert count_rays(broken, et.Disk(radius=1), PartGrids((1, 1, 1, 1))).rays == 1
+
+
+def test_rays_without_flux_change_nothing() -> None:
+    """As many dark rays behind the others: the same field with the same errors, and the same number of rays."""
+    lit = rays_of(6000)
+    position, direction = np.tile(lit.position, (2, 1)), np.concatenate([lit.direction, -lit.direction])
+    both = et.RaySet(position, direction, np.append(lit.flux, np.zeros(6000)))
+    fields = [
+        et.LightField.fit(rays, et.Plane(z=0, width=9, height=9, centre=(0, 0)), depths=(3, 3, 2, 2))
+        for rays in (lit, both)
+    ]
+    assert [field.report.rays for field in fields] == [6000, 6000]
+    for one, other in zip(fields[0].parts, fields[1].parts, strict=True):
+        assert one.ratio.tobytes() == other.ratio.tobytes()
+        assert one.deviation.tobytes() == other.deviation.tobytes()

@@ -151,9 +151,15 @@ def test_the_sums_leave_out_rays_that_cannot_be_used_and_count_them_by_reason() 
 
 def test_rays_without_flux_are_counted_apart() -> None:
     rays = RaySet(np.zeros((5, 3)), np.ones((5, 3)), [0.0, 2.0, 0.0, 3.0, 0.0])
-    assert rays.moments().zero_flux == 3
     assert rays.moments().flux_range == (0.0, 3.0)
-    assert rays.tally.unusable == 0
+    tally = rays.tally
+    assert (tally.dark, tally.unusable, tally.usable, tally.lit) == (3, 0, 5, 2)
+    # Rays that cannot be used are not counted as dark ones, too: the third has no direction, the last a negative flux.
+    direction = np.ones((5, 3))
+    direction[2] = 0.0
+    with pytest.warns(RayFileWarning, match="are left out"):
+        tally = RaySet(np.zeros((5, 3)), direction, [0.0, 2.0, 0.0, 3.0, -1.0]).tally
+    assert (tally.dark, tally.unusable, tally.usable, tally.lit) == (1, 2, 3, 2)
 
 
 def test_no_rays_sum_to_nothing() -> None:

@@ -35,7 +35,6 @@ pub fn scan<'py>(
         interruptible(py, threads, progress, |threads, tick| core_scan(source, threads, tick))
     })?;
     let moments = PyDict::new(py);
-    moments.set_item("zero_flux", scan.zero_flux)?;
     moments.set_item("flux_range", scan.flux_range)?;
     moments.set_item("bounds", scan.bounds)?;
     moments.set_item("weighted_position", scan.weighted_position)?;

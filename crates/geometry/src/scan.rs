@@ -14,8 +14,6 @@ use crate::source::RaySource;
 pub struct Scan {
     /// The flux account.
     pub tally: PassAccount,
-    /// Usable rays that carry no flux.
-    pub zero_flux: u64,
     /// Smallest and largest flux of a usable ray.
     pub flux_range: [f64; 2],
     /// Smallest and largest coordinate on each axis \[mm\].
@@ -34,7 +32,6 @@ impl Default for Scan {
     fn default() -> Self {
         Self {
             tally: PassAccount::default(),
-            zero_flux: 0,
             flux_range: [f64::INFINITY, f64::NEG_INFINITY],
             bounds: [[f64::INFINITY, f64::NEG_INFINITY]; 3],
             weighted_position: [0.0; 3],
@@ -57,7 +54,6 @@ impl Sums for Scan {
             &batch.flux[..n],
             batch.defects == [0; Defect::COUNT],
         );
-        self.zero_flux += found.zeros.iter().sum::<u64>();
         let ranges = self.bounds.iter_mut().chain(std::iter::once(&mut self.flux_range));
         for ((range, low), high) in ranges.zip(found.low).zip(found.high) {
             widen_by(
@@ -75,7 +71,6 @@ impl Sums for Scan {
 
     fn merge(&mut self, other: &Self) {
         self.tally.merge(&other.tally);
-        self.zero_flux += other.zero_flux;
         for (range, o) in
             std::iter::once((&mut self.flux_range, other.flux_range)).chain(self.bounds.iter_mut().zip(other.bounds))
         {
@@ -105,8 +100,6 @@ struct Lanes {
     low: [Lane<f64>; 4],
     /// Largest ones.
     high: [Lane<f64>; 4],
-    /// Usable rays without flux.
-    zeros: Lane<u64>,
 }
 
 /// Lanes that are summed at a time: so few that their sums stay in registers.
@@ -239,7 +232,6 @@ fn lanes(position: [&[f64]; 3], direction: [&[f64]; 3], flux: &[f64], all: bool)
         sums: [[0.0; LANES]; 15],
         low: [[f64::INFINITY; LANES]; 4],
         high: [[f64::NEG_INFINITY; LANES]; 4],
-        zeros: [0; LANES],
     };
     for g in 0..LANES / GROUP {
         let own = g * GROUP..(g + 1) * GROUP;
@@ -274,24 +266,6 @@ fn lanes(position: [&[f64]; 3], direction: [&[f64]; 3], flux: &[f64], all: bool)
             found.low[k][own.clone()].copy_from_slice(&low);
             found.high[k][own.clone()].copy_from_slice(&high);
         }
-        let mut zeros = [0; GROUP];
-        let mut add = |[x, y, z, w]: [&Group<f64>; 4]| {
-            for lane in 0..GROUP {
-                zeros[lane] += u64::from(is_usable([x[lane], y[lane], z[lane]]) & (w[lane] == 0.0));
-            }
-        };
-        if !all {
-            rows.whole(g, [KX, KY, KZ, W], &mut add);
-        }
-        add([KX, KY, KZ, W].map(|array| of_group(&rows.last[array], g)));
-        if all {
-            rows.whole(g, [W], |[w]| {
-                for (zeros, w) in zeros.iter_mut().zip(w) {
-                    *zeros += u64::from(*w == 0.0);
-                }
-            });
-        }
-        found.zeros[own].copy_from_slice(&zeros);
     }
     found
 }
@@ -375,7 +349,7 @@ mod tests {
         // 3: not a number; 4: no direction; 8: negative flux. That z is 0 at 7 is no defect.
         assert_eq!(scanned.tally.defects, [1, 1, 1]);
         assert_eq!(scanned.bounds, [[3.0, 13.0], [-12.0, -2.0], [5.0, 5.0]]);
-        assert_eq!((scanned.flux_range, scanned.zero_flux), ([0.0, 8.0], 3));
+        assert_eq!((scanned.flux_range, scanned.tally.dark), ([0.0, 8.0], 3));
         let used = [0, 1, 2, 5, 6, 7, 9, 10].map(ray);
         let first: f64 = used.iter().map(|r| r[6] * r[0]).sum();
         assert!((scanned.weighted_position[0] / first - 1.0).abs() < 1e-14);

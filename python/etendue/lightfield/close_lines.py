@@ -48,8 +48,17 @@ SEED = 0x434C_4F53
 def crowding(rays: RayStream, field: EtendueDensity) -> FloatArray:
     """How many more lines of the rays than of the field pass close to some lines of the rays: one ratio for each of these.
 
-    The lines are drawn from the rays by their flux. Close is what about `NEAREST` of the rays are; too few rays to tell give
-    none.
+    The lines are drawn from the rays by their flux. Close is what about `NEAREST` of the rays are.
+
+    Returns
+    -------
+    array, shape (lines,)
+        Up to `ASKED` ratios; none of fewer rays than `FEWEST_LINES` equal ones and those lines.
+
+    Raises
+    ------
+    ArgumentError
+        If the rays have no position or carry no flux.
 
     Examples
     --------
@@ -122,8 +131,21 @@ def told_of_blur(surface: Surface, ratio: FloatArray) -> Iterator[str]:
 
 
 def _distances(origin: FloatArray, along: FloatArray, origins: FloatArray, directions: FloatArray) -> FloatArray:
-    """Of each of some lines from each of others: |(q - p)·(k × m)|/|k × m|."""
+    """Of each of some lines from each of others [mm], shape (lines, others).
+
+    |(q - p)·(k × m)|/|k × m|; of parallel lines |(q - p) × k|.
+
+    Parameters
+    ----------
+    origin, along : array, shape (lines, 3)
+        A point of each line [mm] and its unit vector, p and k.
+    origins, directions : array, shape (others, 3)
+        Of the others, q and m.
+    """
     triple = along @ np.cross(directions, origins).T + np.cross(along, origin) @ directions.T
-    sine = np.sqrt(np.maximum(1.0 - (along @ directions.T) ** 2, LEAST_SINE**2))
-    apart: FloatArray = np.abs(triple) / sine
+    square = 1.0 - (along @ directions.T) ** 2
+    apart: FloatArray = np.abs(triple) / np.sqrt(np.maximum(square, LEAST_SINE**2))
+    parallel = np.nonzero(square <= LEAST_SINE**2)
+    between = origins[parallel[1]] - origin[parallel[0]]
+    apart[parallel] = np.linalg.norm(np.cross(between, along[parallel[0]]), axis=1)
     return apart

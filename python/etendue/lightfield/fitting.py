@@ -32,7 +32,7 @@ from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.fit_progress import FitProgress, Step
 from etendue.lightfield.focusing import focused
 from etendue.lightfield.narrow_beams import told_of_narrow_beams
-from etendue.lightfield.pilot_sample import check_near_field, pilot_sample
+from etendue.lightfield.pilot_sample import check_near_field, lit_rays, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Plane, Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry, refutation
@@ -78,7 +78,7 @@ LEAD = 3.0
 
 
 MOST_TRIED = 2
-"""Surfaces that are tried in place of one that blurs some of the light: each takes as long as the first."""
+"""Surfaces that are tried in place of one that blurs some of the light, until one is taken: each takes as long as it."""
 
 LESS_BLURRED = 0.5
 """Share of the light blurred by another surface, against the chosen one, below which it is taken instead."""
@@ -145,14 +145,13 @@ def fit_light_field(
     field, crowded = fitted(surface)
     if others and blurred_share(crowded) >= TOLD:
         # Scores are means over all light: a surface that blurs some of it far too much may have the best one.
-        tried = min((fitted(surface) for surface in others[:MOST_TRIED]), key=lambda tried: blurred_share(tried[1]))
-        now, before = blurred_share(tried[1]), blurred_share(crowded)
-        if now < LESS_BLURRED * before:
-            field, crowded = tried
-            notes = (
-                *notes,
-                f"{field.surface.told} in its place, which blurs {now:.0%} of the light and not {before:.0%}",
-            )
+        before = blurred_share(crowded)
+        tries = ((*fitted(other), other.told) for other in others[:MOST_TRIED])
+        better = next((found for found in tries if blurred_share(found[1]) < LESS_BLURRED * before), None)
+        if better is not None:
+            field, crowded, name = better
+            now = blurred_share(crowded)
+            notes = (*notes, f"{name} in its place, which blurs {now:.0%} of the light and not {before:.0%}")
     spectrum = given.total_spectrum(threads=threads)
     told.end()
     notes = (*notes, *field.notes, *told_of_blur(field.surface, crowded), *repeated, *notes_of_rays(given))
@@ -259,7 +258,7 @@ def make_plan(
     some = pilot_sample(rays, PILOT_RAYS)
     first_look = count_rays(some, surface, PartGrids((1, 1, 1, 1), (1, 1)), seed=seed, threads=threads)
     # Rays without flux and those that cannot be used make no grid finer.
-    lit = round(len(rays) * (first_look.rays / len(some)))
+    lit = lit_rays(rays, some)
     bits = default_bits(lit)
     shares = np.array([part.grid.rays for part in first_look["all"]]) / first_look.rays
     few = (shares < FEW * shares.max()) & (depths is None or isinstance(surface, Plane))

@@ -36,8 +36,9 @@ ALMOST_ALL = 0.999
 """Share of the lines that must pass the point; the others are strays."""
 
 
-_SAMPLES: weakref.WeakSet[RaySet] = weakref.WeakSet()
-"""Pilot samples that exist, and selections from them: all of their rays carry flux, and none need be read again."""
+_SAMPLES: weakref.WeakKeyDictionary[RaySet, float] = weakref.WeakKeyDictionary()
+"""Pilot samples that exist, and selections from them: all of their rays carry flux, and none need be read again. Beside each
+stands what share of the rays that were read for it carry flux."""
 
 
 def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
@@ -76,9 +77,21 @@ def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
             _check_squares(flux[carry], rays)
             kept = (position[carry], direction[carry], flux[carry])
             sample = RaySet(*kept, flux_unit=rays.flux_unit, provenance=rays.provenance)
-            _SAMPLES.add(sample)
+            _SAMPLES[sample] = float(carry.mean())
             return sample
     raise ArgumentError("these rays carry no flux, so no light field can be fitted to them.")
+
+
+def lit_rays(rays: RayStream, sample: RaySet) -> int:
+    """About how many rays of a set carry flux, by a pilot sample of it: all of them exactly, if it read all.
+
+    Examples
+    --------
+    >>> rays = RaySet([[0, 0, 0]] * 3, [[0, 0, 1]] * 3, [1.0, 0.0, 2.0])
+    >>> lit_rays(rays, pilot_sample(rays, 1000))
+    2
+    """
+    return len(rays) if sample is rays else round(len(rays) * _SAMPLES[sample])
 
 
 def _check_squares(flux: npt.NDArray[np.float64], rays: RayStream) -> None:
@@ -104,7 +117,7 @@ def selected_rays(rays: RaySet, which: npt.NDArray[np.bool_]) -> RaySet:
     at = np.flatnonzero(which)
     selected = RaySet(rays.position[at], rays.direction[at], rays.flux[at], flux_unit=rays.flux_unit)
     if rays in _SAMPLES and len(at):
-        _SAMPLES.add(selected)
+        _SAMPLES[selected] = 1.0
     return selected
 
 

@@ -48,7 +48,6 @@ FLUX_TOLERANCE = 1e-3
 class Moments:
     """What a full pass over a ray set tells beside the tally; see `RaySet.moments`."""
 
-    zero_flux: int
     flux_range: tuple[float, float]
     bounds: FloatArray
     weighted_position: FloatArray
@@ -319,9 +318,9 @@ class RayRecords(RayStream):
         if self._moments is None:
             tally, moments = _core.scan(self.core_source(), checked_threads(threads), progress)
             self.accept_tally(Tally.from_core(tally))
-            arrays = {k: np.array(v) for k, v in moments.items() if k not in ("zero_flux", "flux_range")}
+            arrays = {k: np.array(v) for k, v in moments.items() if k != "flux_range"}
             low, high = moments["flux_range"]
-            self._moments = Moments(moments["zero_flux"], (low, high), **arrays)
+            self._moments = Moments((low, high), **arrays)
         return self._moments
 
     def repeats(self) -> Repeats:

@@ -189,7 +189,7 @@ mod tests {
     }
 
     /// Of records in a period, each has its share among those that are taken, with the error of a draw without replacement,
-    /// whatever share is taken. Six standard deviations; 216 comparisons.
+    /// whatever share is taken. Six standard deviations, for fewer than a hundred comparisons.
     #[test]
     fn no_period_of_the_file_shows_in_what_is_taken() {
         for n in [300_u64, 100_000, 256 * 256 * 3] {
