@@ -127,6 +127,13 @@ def test_version(run: Run) -> None:
     assert run("--version") == Outcome(0, f"etendue {version()}\n", "")
 
 
+def test_the_package_runs_as_a_module() -> None:
+    out = subprocess.run(
+        [sys.executable, "-m", "etendue", "--version"], check=True, capture_output=True, text=True, timeout=60
+    ).stdout
+    assert out == f"etendue {version()}\n"
+
+
 def test_no_verb_shows_the_help(run: Run) -> None:
     outcome = run()
     assert outcome.status == 2
