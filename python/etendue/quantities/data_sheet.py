@@ -80,7 +80,7 @@ class DataSheet:
             found.append(f"CIE flux code {code}")
         unit = "cd/klm" if math.isfinite(self.per_klm) else ("cd" if self.flux_unit == "lm" else "W/sr")
         largest = ", ".join(f"{gamma:.0f}° on {value:.4g}" for gamma, value in self.glare)
-        return [*found, f"largest intensity from γ = {largest} {unit}"]
+        return [*found, f"largest intensity up to the horizontal, from γ = {largest} {unit}"]
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data; what is not known is None."""
