@@ -45,6 +45,12 @@ class Opal:
         return np.select([sides > 0.0, sides < 0.0], [0.2 / math.pi, 0.1 / math.pi], 0.0)
 
 
+def test_formats_of_reflected_light_say_that_they_lose_a_film(tmp_path: Path) -> None:
+    """Of a film that transmits alone nothing is left."""
+    film = et.bsdf.Gaussian(peak=5.0, sigma=0.15, way="transmitted")
+    assert "the file holds reflected light only" in et.write_bsdf(tmp_path / "film.json", film)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("form", WRITTEN, ids=lambda form: form.name)
 def test_wavelengths_are_in_the_file_or_it_is_told_which_one_is(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import FormatError
 from etendue.formats.bsdf import read_bsdf_data
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
 
 HEAD = """# by hand
 Symmetry {symmetry}
@@ -43,6 +44,17 @@ DataEnd
 """
 
 ALL_AROUND = HEAD.format(symmetry="Asymmetric", content="Monochrome", azimuths="4\n0 90 180 270") + BLOCKS
+
+
+@pytest.mark.parametrize("front", [True, False])
+def test_light_that_meets_one_side_alone_stays_on_it(tmp_path: Path, front: bool) -> None:
+    grid = PolarGrid("normal", np.arange(0.0, 91.0, 5.0), np.arange(0.0, 360.0, 15.0))
+    lit = BsdfSlice(light_from(20.0, 180.0, behind=not front), np.full(grid.shape, 0.3 / np.pi), grid=grid)
+    path = tmp_path / "one_side.mes"
+    et.write_bsdf(path, et.BsdfTable(BsdfData((lit,), both_sides=False)), format="lighttools")
+    read = et.read_bsdf(path)
+    found = [float(read.reflectance(20.0, side=side)) for side in ("front", "back")]
+    assert found == pytest.approx([0.3, 0.0] if front else [0.0, 0.3], abs=1e-3)
 
 
 def test_light_comes_from_azimuth_90(tmp_path: Path) -> None:

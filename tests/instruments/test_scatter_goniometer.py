@@ -127,6 +127,68 @@ def test_light_that_is_mirrored_arrives_too() -> None:
     assert (np.abs(traced.flux - exact.flux) < LARGEST_Z * np.sqrt(exact.flux / 4e4) + 2e-5).all()
 
 
+@pytest.mark.parametrize("way", ["reflected", "transmitted"])
+def test_light_in_one_direction_has_the_share_of_its_wavelength(way: str) -> None:
+    """The whole beam falls into the aperture: shares by wavelength, those at 450 and 650 nm exactly."""
+    shares = {"wavelength": [450.0, 650.0], "values": [0.2, 0.8]}
+    mirror = (
+        et.bsdf.Mixed(specular_reflectance=shares)
+        if way == "reflected"
+        else et.bsdf.Mixed(specular_transmittance=shares)
+    )
+    for wavelength, share in ((450.0, 0.2), (600.0, 0.65), (650.0, 0.8)):
+        goniometer = et.ScatterGoniometer(14, 25, 886, wavelength=wavelength)
+        scan = goniometer.measure(mirror, 30.0, step=1.0, span=1.0, method="quadrature")
+        assert scan.way == way
+        assert float(scan.flux[1]) == pytest.approx(share, abs=1e-6)
+
+
+def test_detectors_beyond_the_sample_measure_nothing() -> None:
+    """Across the plane of incidence too: at 120° the detector would see what is transmitted."""
+    film = et.bsdf.Mixed(diffuse_reflectance=0.3, diffuse_transmittance=0.6)
+    for way, share in (("reflected", 0.3), ("transmitted", 0.6)):
+        scan = et.ScatterGoniometer(14, 25, 886).measure(
+            film, 30.0, step=30.0, span=160.0, plane="cross-plane", method="quadrature", way=way
+        )
+        assert scan.angle.tolist() == [-60.0, -30.0, 0.0, 30.0, 60.0]
+        assert scan.bsdf * math.pi == pytest.approx(np.full(5, share), rel=1e-2)
+
+
+def test_noise_below_zero_is_no_table() -> None:
+    scan = GoniometerScan([-10.0, 0.0, 10.0], [0.1, -0.02, 0.1], solid_angle=1e-3)
+    with pytest.raises(ArgumentError, match=r"at 0° the BSDF is -20, below 0 as noise"):
+        scan.scans()
+    with pytest.raises(ArgumentError, match="incidence is 120°"):
+        GoniometerScan([0.0], [1.0], incidence=120.0)
+
+
+HEAD = "theta_i,phi_i,theta_s,phi_s,bsdf\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (HEAD + "0,180,10,0,1\n0,180,30,0,.5\n0,180,160,0,.2\n", "reflected and transmitted light"),
+        (HEAD + "0,180,10,0,1\n0,180,20,45,.5\n", "outside the plane of incidence"),
+        ("# way = transmitted\n" + HEAD + "20,180,10,0,1\n20,180,30,0,.5\n", "directions are of reflected light"),
+        ("# incidence = nan\nangle,flux\n0,1\n", "0 to below 90°"),
+    ],
+)
+def test_scans_of_several_things_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "scan.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(FormatError, match=told):
+        read_goniometer_scan(path)
+
+
+def test_a_plane_of_light_along_the_normal_may_have_any_azimuth(tmp_path: Path) -> None:
+    path = tmp_path / "scan.csv"
+    path.write_text(HEAD + "0,0,20,30,.5\n0,0,0,30,1\n0,0,10,210,.7\n", encoding="utf-8")
+    scan = read_goniometer_scan(path)
+    assert sorted(np.abs(scan.angle).tolist()) == [0.0, 10.0, 20.0]
+    assert scan.angle[0] * scan.angle[-1] < 0.0
+
+
 def test_a_lambertian_hemisphere() -> None:
     """F is ρ/π wherever the detector stands; a transmitting sample is seen from behind alone."""
     goniometer = et.ScatterGoniometer(14, 100, 500)

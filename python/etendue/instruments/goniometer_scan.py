@@ -130,6 +130,8 @@ class GoniometerScan:
             raise ArgumentError(f"angles increase; after {self.angle[at]:g}° comes {self.angle[at + 1]:g}°")
         if self.standard_error is not None and (self.standard_error < 0.0).any():
             raise ArgumentError("standard errors are not negative")
+        if not 0.0 <= self.incidence < 90.0:
+            raise ArgumentError(f"incidence is {self.incidence:g}°; light meets a sample at 0 to below 90°")
         if self.way not in get_args(Way):
             raise UnknownNameError("way", self.way, get_args(Way))
         if self.plane not in get_args(Plane):
@@ -220,10 +222,16 @@ class GoniometerScan:
         Raises
         ------
         ArgumentError
-            If it is a scan without a sample, or the solid angle is not known.
+            If it is a scan without a sample, the solid angle is not known, or a value is below 0.
         """
         if not self.sample:
             raise ArgumentError("scans for tables are of light that a sample scatters; this one is of the beam alone")
+        if (self.bsdf < 0.0).any():
+            at = int(np.argmin(self.bsdf))
+            raise ArgumentError(
+                f"at {self.angle[at]:g}° the BSDF is {self.bsdf[at]:.3g}, below 0 as noise about a dark level may be: "
+                "tables and models take none below 0. Count longer there, or take the mean of neighbouring positions"
+            )
         incident = np.tile(light_from(self.incidence, 180.0), (self.angle.size, 1))
         scattered = detector_directions(self.angle, self.incidence, self.plane, behind=self.way == "transmitted")
         return Scans(incident, scattered, self.bsdf, self.bsdf_error)
@@ -298,16 +306,26 @@ def read_goniometer_scan(path: str | os.PathLike[str]) -> GoniometerScan:
             )
         # Light goes on to the azimuth opposite to where it comes from.
         turned = np.radians(columns["phi_s"] - columns["phi_i"])
-        if incidence > 0.0 and (np.abs(np.sin(turned)) > 1e-6).any() and (columns["theta_s"] > 0.0).any():
+        theta = np.where(columns["theta_s"] > 90.0, 180.0 - columns["theta_s"], columns["theta_s"])
+        # Light along the normal has no plane of incidence: the first direction says which plane it is.
+        oblique = np.abs(theta) > 0.0
+        if incidence == 0.0 and oblique.any():
+            turned = turned - turned[oblique][0]
+        if (np.abs(np.sin(turned[oblique])) > 1e-6).any():
             raise FormatError(
                 path, "column phi_s", "directions outside the plane of incidence", "Give one plane alone."
             )
-        theta = np.where(columns["theta_s"] > 90.0, 180.0 - columns["theta_s"], columns["theta_s"])
         behind = bool((columns["theta_s"] > 90.0).all())
+        if not behind and (columns["theta_s"] > 90.0).any():
+            raise FormatError(
+                path, "column theta_s", "reflected and transmitted light", "A scan is of one: split the file."
+            )
+        if known.get("way", way := "transmitted" if behind else "reflected") != way:
+            raise FormatError(path, "# way", f"{known['way']}, but the directions are of {way} light", "Mend the line.")
         angle = -np.sign(np.cos(turned) + (theta == 0.0)) * theta
         flux = columns["bsdf"] * np.cos(np.radians(theta))
         error = columns[ERROR] * np.cos(np.radians(theta)) if ERROR in columns else None
-        known = {"solid_angle": 1.0, "way": "transmitted" if behind else "reflected"} | known | {"incidence": incidence}
+        known = {"solid_angle": 1.0, "way": way} | known | {"incidence": incidence}
     else:
         angle, flux, error = columns["angle"], columns["flux"], columns.get(ERROR)
     order = np.argsort(angle, kind="stable")
@@ -332,6 +350,8 @@ def known_of(path: Path, remarks: Mapping[str, str]) -> dict[str, object]:
                 found[key] = float(remarks[key])
             except ValueError:
                 raise FormatError(path, f"# {key}", f"{remarks[key][:40]!r} is no number", "Mend the line.") from None
+            if key == "incidence" and not 0.0 <= float(remarks[key]) < 90.0:
+                raise FormatError(path, f"# {key}", f"{remarks[key][:40]}°", "Light meets a sample at 0 to below 90°.")
     for key, choices in (("way", get_args(Way)), ("plane", get_args(Plane)), ("sample", ("yes", "no"))):
         if key in remarks:
             if remarks[key] not in choices:

@@ -242,8 +242,8 @@ class ScatterGoniometer:
         way = _way(bsdf, way)
         _require_incidence(theta)
         angle = even_angles(theta if plane == "in-plane" else 0.0, step, span)
-        if plane == "in-plane":
-            angle = angle[np.abs(angle) < 90.0]
+        # Beyond, the detector stands on the other side of the sample.
+        angle = angle[np.abs(angle) < 90.0]
         behind = way == "transmitted"
         arms = detector_directions(angle, theta, plane, behind=behind)
         flux, error = self._flux(bsdf, arms, theta, rays, seed, method, behind=behind, fresh=fresh)

@@ -72,6 +72,7 @@ def integrated_flux(
             # Two coarse ones may agree by chance.
             unsure = np.maximum(fine, coarse) > 0.1 * RESOLVED * fine.max()
         coarse[unsure], fine[unsure] = fine[unsure], at(arms[unsure], *nodes)
-    straight = float(np.asarray(bsdf.regular_transmittance(theta) if behind else bsdf.regular_reflectance(theta)))
+    regular = bsdf.regular_transmittance if behind else bsdf.regular_reflectance
+    straight = float(regular(theta, wavelength=wavelength))
     bare = straight * bench.bare(arms, direction(theta, 0.0, behind=behind)) if straight > 0.0 else 0.0
     return fine + bare, np.abs(fine - coarse)

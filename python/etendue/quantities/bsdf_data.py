@@ -283,6 +283,10 @@ class BsdfSlice:
             raise ArgumentError("projected solid angles have the shape of the values")
         if self.standard_error is not None and self.standard_error.shape != self.values.shape:
             raise ArgumentError("standard errors have the shape of the values")
+        if self.standard_error is not None and (self.standard_error < 0.0).any():
+            raise ArgumentError("standard errors are not below 0, or NaN where none is known")
+        if self.wavelength is not None and not 0.0 < self.wavelength < math.inf:
+            raise ArgumentError(f"the wavelength of a slice is {self.wavelength} nm; give a length above 0, or None")
 
     @property
     def theta(self) -> float:

@@ -231,7 +231,7 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
     if not asked.both_sides and len({one.front for one in data.slices}) == 1:
         lost.append("only light that meets the front is in the file, and reads as that of both sides")
     kept = {one.transmitted for one in data.slices}
-    if asked.reflects and asked.transmits and len(kept) == 1:
+    if kept != {way for way, is_there in ((False, asked.reflects), (True, asked.transmits)) if is_there}:
         lost.append(f"the file holds {'transmitted' if True in kept else 'reflected'} light only")
     lost.append("the values are a table made for this format")
     data, coarse = _scaled(bsdf, data)

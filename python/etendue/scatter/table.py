@@ -11,7 +11,8 @@ import numpy as np
 
 from etendue.description.files import Files
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid
+from etendue.quantities.bsdf_data import NORMAL, BsdfData, BsdfSlice, PolarGrid
+from etendue.quantities.mirror_images import unfolded, unlike_its_image
 from etendue.quantities.report import Complaint
 from etendue.scatter.balance import CLOSE, MOST, balanced
 from etendue.scatter.bsdf import Bsdf as Bsdf  # noqa: PLC0414 - handed on to `etendue`
@@ -26,6 +27,9 @@ EXTRAPOLATED = 0.02
 
 FAINT = 1e-4
 """Share of the light that may as well."""
+
+UNLIKE = 0.1
+"""Part of its light by which a slice may differ from its mirror image without a word, if it is said to be that."""
 
 
 class BsdfTable(Bsdf):
@@ -42,7 +46,8 @@ class BsdfTable(Bsdf):
     Raises
     ------
     ArgumentError
-        If there is nothing in it, or more than 101 % of the light leaves, in both ways and by components together.
+        If there is nothing in it, light of one direction is in several slices, or more than 101 % of the light leaves, in
+        both ways and by components together.
 
     Examples
     --------
@@ -57,6 +62,9 @@ class BsdfTable(Bsdf):
     def __init__(self, data: BsdfData) -> None:
         if not data.slices and not data.components:
             raise ArgumentError("a BSDF has slices or components; these data hold neither")
+        _require_one_of_each(data)
+        if data.mirrored:
+            data = dataclasses.replace(data, slices=tuple(map(unfolded, data.slices)))
         self.data = data
         told = tuple(_told(data))
         self._balanced, self._weight, more = balanced(data, [share_of(one) for one in data.slices])
@@ -133,6 +141,21 @@ class BsdfTable(Bsdf):
 Bsdf.table = BsdfTable
 
 
+def _require_one_of_each(data: BsdfData) -> None:
+    """Refuse several slices of the same light, of which one alone would count."""
+    known: dict[tuple[object, ...], BsdfSlice] = {}
+    for one in data.slices:
+        if one.theta < NORMAL:
+            continue
+        phi = 0.0 if data.isotropic else round(one.phi, 6) % 360.0
+        other = known.setdefault((one.front, one.transmitted, one.wavelength, round(one.theta, 6), phi), one)
+        if other is not one:
+            raise ArgumentError(
+                f"there are two slices of light at {one.theta:g}° of incidence, from azimuths {other.phi:g}° and "
+                f"{one.phi:g}°{', of an isotropic sample' if data.isotropic else ''}: give one, or their mean"
+            )
+
+
 def share_of(one: BsdfSlice) -> float:
     """What a slice scatters of the flux: its integral, no less than 0 and no more than 1.
 
@@ -168,6 +191,14 @@ def _told(data: BsdfData) -> Iterable[Complaint]:
             yield Complaint("warning", place, f"{way} {share:.6g} of the light; scaled to 1")
     if data.slices:
         yield from _beyond(data)
+    unlike = max(((unlike_its_image(one), one.theta) for one in data.slices), default=(0.0, 0.0))
+    if data.mirrored and unlike[0] > UNLIKE:
+        yield Complaint(
+            "warning",
+            f"{unlike[1]:g}° of incidence",
+            f"both sides of the plane of incidence differ by {unlike[0]:.0%} of the light, and are made equal, as the data "
+            "are said to be mirrored; with mirrored=False they stay as they are",
+        )
 
 
 def _beyond(data: BsdfData) -> Iterable[Complaint]:

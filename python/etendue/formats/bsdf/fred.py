@@ -16,6 +16,7 @@ from etendue.formats.bsdf.points import doubts, slice_of
 from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
+from etendue.quantities.mirror_images import unfolded
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
@@ -130,12 +131,8 @@ def _slices(path: Path, block: Block, scale: float, complaints: list[Complaint],
             raise FormatError(
                 path, f"{theta:g}° of incidence", "directions that make no grid", "Export a grid of θ and φ."
             )
-        if mirrored and one.grid.frame == "normal":
-            azimuth = one.grid.azimuth
-            inner = (azimuth - turn > 0.0) & (azimuth - turn < 180.0)
-            azimuth = np.concatenate([azimuth, 2.0 * turn + 360.0 - azimuth[inner][::-1]])
-            values = np.concatenate([one.values, one.values[inner][::-1]])
-            one = BsdfSlice(incident, values, transmitted, grid=PolarGrid("normal", one.grid.radial, azimuth))
+        if mirrored:
+            one = unfolded(one)
         complaints += doubts(one)
         found.append(one)
     return found

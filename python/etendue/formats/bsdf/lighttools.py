@@ -162,8 +162,10 @@ def _slice(
 
 
 def fits(data: BsdfData) -> bool:
-    """Whether the slices are tables about the normal on one grid."""
+    """Whether the slices are tables about the normal on one grid, of both sides unless these are alike."""
     first = data.slices[0].grid if data.slices else None
+    if not data.both_sides and len({one.front for one in data.slices}) == 1:
+        return False
     if first is None or data.components or first.frame != "normal" or first.radial[-1] > RIGHT_ANGLE:
         return False
     return all(

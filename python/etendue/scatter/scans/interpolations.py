@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -28,6 +29,12 @@ RADIAL, AZIMUTHS = 100, 36
 
 TURNED = 0.1
 """Azimuths of incidence that differ by less are one [°]."""
+
+SMOOTHED = 2000
+"""Values of an incidence up to which `smooth` is taken for scans: its time and memory grow with their square."""
+
+TESTED = 500
+"""Values that `smooth` finds its width by."""
 
 SPARSE = 5.0
 """Values on each azimuth that was measured, on average, below which they are none: by chance 72 azimuths hold a few each."""
@@ -181,11 +188,12 @@ def specular_centred(incident: Array, measured: Array, values: Array, wanted: Ar
         if not own.any():
             # The mirror image in the plane of incidence.
             own = ~centre & (apart(a, -azimuth) < ON_ARM)
-        order = np.argsort(r[own])
-        x, y = r[own][order], values[own][order]
+        # A direction that was measured several times counts once.
+        x, place = np.unique(np.round(r[own], 6), return_inverse=True)
+        y = np.bincount(place.ravel(), values[own]) / np.bincount(place.ravel())
         start = [(0.0, peak if peak is not None else float(y[0]))]
         edge = horizon(incident, azimuth)
-        inner = x < edge - 1e-9
+        inner = x < edge - 1e-6
         points = [*start, *zip(x[inner].tolist(), y[inner].tolist(), strict=True), (edge, 0.0)]
         curves.append(np.array(points).T)
     at_r, at_a = frame.coordinates(wanted, incident, transmitted=False)
@@ -216,9 +224,12 @@ def smooth(incident: Array, measured: Array, values: Array, wanted: Array) -> tu
     The width along the distance is that which predicts each value best from all others; along the azimuth it bridges the
     largest gap between the scans. The standard error is that by which the others miss a value, averaged in the same way: of
     the shape between the scans, and of the noise of one value, which is more than that of their mean.
+
+    Logarithms of noisy values are too low on average, and zeros have none. So what is found is multiplied by the mean of the
+    measured values over what is found where they were measured, with the same weights.
     """
     _require_light(values)
-    least = max(1e-3 * float(values[values > 0.0].min()), 1e-300)
+    least = max(0.5 * float(values[values > 0.0].min()), 1e-300)
     logs = np.log(np.maximum(values, least))
     planes = [harvey_shack.coordinates(incident, one) for one in (measured, wanted)]
     scale = max(float(np.quantile(planes[0][0][planes[0][0] > 0.0], 0.25)), SMALLEST)
@@ -242,23 +253,31 @@ def smooth(incident: Array, measured: Array, values: Array, wanted: Array) -> tu
         slope = ((w * (x - mean[:, None])) @ logs) / spread
         return w @ logs + slope * (at_x - mean), w
 
+    def missed_by_others(chosen: npt.NDArray[np.intp], width: float) -> Array | None:
+        """What the others miss of some of the values; None if one has no others near it."""
+        log = weights(x[chosen], a[chosen], width)
+        log[np.arange(chosen.size), chosen] = -np.inf
+        if not np.isfinite(log.max(axis=1)).all():
+            return None
+        return np.asarray(logs[chosen] - line(log, x[chosen], width)[0])
+
+    every = np.arange(x.size)
+    tested = every[:: math.ceil(x.size / TESTED)]
     best = None
     for width in np.geomspace(0.03, 1.5, 14):
-        log = weights(x, a, float(width))
-        np.fill_diagonal(log, -np.inf)
-        if not np.isfinite(log.max(axis=1)).all():
-            continue
-        predicted, _ = line(log, x, float(width))
-        missed = logs - predicted
-        score = float(np.mean(missed**2))
-        if best is None or score < best[0]:
-            best = (score, float(width), missed)
-    if best is None:
+        trial = missed_by_others(tested, float(width))
+        score = math.inf if trial is None else float(np.mean(trial**2))
+        if math.isfinite(score) and (best is None or score < best[0]):
+            best = (score, float(width))
+    missed = None if best is None else missed_by_others(every, best[1])
+    if best is None or missed is None:
         raise ArgumentError("too few values to smooth")
-    _, width, missed = best
+    width = best[1]
+    there, _ = line(weights(x, a, width), x, width)
+    ratio = values / np.exp(np.minimum(there, logs.max()))
     found, w = line(weights(at_x, at_a, width), at_x, width)
     f = np.exp(np.minimum(found, logs.max()))
-    return f, f * np.sqrt(w @ missed**2)
+    return f * (w @ ratio), f * np.sqrt(w @ missed**2)
 
 
 METHODS: dict[str, Interpolation] = {
@@ -282,8 +301,9 @@ LOGARITHMIC = ("radial-basis", "smooth")
 def suited(scans: Scans) -> tuple[str, str]:
     """The method for scans of which nothing else is known, and why it is not the usual one.
 
-    Scans through the specular direction are left to the scheme that is made for them. Of a scan of one side alone f is
-    taken over the distance from that direction; scattered values are interpolated between all their neighbours.
+    Between scans through the specular direction lobes are round in |β − β₀|, as `smooth` takes them: those that are round in
+    the angle from that direction, as of the second scheme of the thesis, would hold up to 1/cos θ times the light that was
+    measured in the plane of incidence. Scattered values are interpolated between all their neighbours.
 
     Parameters
     ----------
@@ -293,7 +313,7 @@ def suited(scans: Scans) -> tuple[str, str]:
     Returns
     -------
     str, str
-        One of `METHODS`, and the reason; "specular-centred" has none.
+        One of `METHODS`, and the reason; "smooth" has none if there are scans on two sides.
 
     Raises
     ------
@@ -307,7 +327,7 @@ def suited(scans: Scans) -> tuple[str, str]:
     >>> suited(Scans(np.tile([0.0, 0.0, 1.0], (400, 1)), to, np.full(400, 0.25)))[0]
     'natural-neighbours'
     """
-    counts, scattered = [], False
+    counts, most, scattered = [], 0, False
     for incident, own in scans.by_incidence():
         r, a = beside(scans, incident, own)
         if r.size < 2:
@@ -316,6 +336,7 @@ def suited(scans: Scans) -> tuple[str, str]:
         measured = sum(bool((apart(a, each) < ON_ARM).any()) for each in azimuths)
         scattered |= len(azimuths) > MOST_ARMS or r.size < SPARSE * measured
         counts.append(len(azimuths))
+        most = max(most, r.size)
     if scattered:
         why = f"the values lie at {max(counts)} azimuths about the specular direction, and make no scans through it"
         return "natural-neighbours", why
@@ -324,7 +345,11 @@ def suited(scans: Scans) -> tuple[str, str]:
             "smooth",
             "the values lie at one azimuth about the specular direction; f counts as the same at the others",
         )
-    return "specular-centred", ""
+    if most > SMOOTHED:
+        return "specular-centred", f"there are {most:,} values of one incidence, too many for `smooth`"
+    if not (scans.values > 0.0).any():
+        return "specular-centred", "no value is above 0"
+    return "smooth", ""
 
 
 def _workable(scans: Scans) -> list[str]:
@@ -429,9 +454,11 @@ def _slices(
         except ArgumentError as mistake:
             others = [name for name in _workable(scans) if name != method]
             raise ArgumentError(f"{method}: {mistake}. Methods that take these scans: {', '.join(others)}") from None
-        if error is None and scans.standard_error is not None and method in LINEAR:
+        of_values = None if scans.standard_error is None else scans.standard_error[own]
+        if of_values is not None and (method in LINEAR or (method == "smooth" and of_values.any())):
             # No less than that of a mean: as if all values that count for a place erred together.
-            error, _ = METHODS[method](incident, scans.scattered[own], scans.standard_error[own], at[there])
+            together, _ = METHODS[method](incident, scans.scattered[own], of_values, at[there])
+            error = together if error is None else np.maximum(error, together)
         values, errors = np.full(grid.shape, np.nan), None
         values[there] = np.maximum(f, 0.0)
         if error is not None:
