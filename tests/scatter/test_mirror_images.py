@@ -22,6 +22,7 @@ def table(azimuth: np.ndarray, *, turn: float = 0.0, isotropic: bool = True, **m
     return et.BsdfTable(BsdfData(tuple(slices), isotropic=isotropic, **more))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [0.0, 35.0])
 @pytest.mark.parametrize("first", [0.0, 180.0])
 def test_half_a_grid_is_that_of_the_whole_sample(first: float, turn: float) -> None:

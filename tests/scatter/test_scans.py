@@ -245,6 +245,20 @@ def test_the_light_of_a_round_lobe_is_that_of_its_closed_form(planes: tuple[floa
 
 
 @pytest.mark.slow
+def test_lobes_that_fall_by_decades_beside_the_scans_hold_their_light() -> None:
+    """An oblong lobe without a floor, 2πσ²·3·P of the light: logarithms between its scans miss it by decades."""
+    lobe = et.bsdf.Gaussian(peak=5.0, sigma=0.05, aspect=3.0)
+    incident = direction(20.0, 180.0)
+    r = np.concatenate([np.arange(0.0, 10.0, 0.5), np.arange(10.0, 150.0, 2.0)])
+    at = PolarGrid("specular", r, np.arange(0.0, 360.0, 45.0)).directions(incident, transmitted=False)
+    to = at[~np.isnan(at[..., 0])]
+    to = to[to[:, 2] > 0.05]
+    scans = Scans(np.tile(incident, (len(to), 1)), to, lobe.evaluate(np.tile(incident, (len(to), 1)), to))
+    (one,) = tabulated(scans, "smooth").slices
+    assert one.integral() == pytest.approx(2 * math.pi * 0.05**2 * 3.0 * 5.0, rel=0.15)
+
+
+@pytest.mark.slow
 def test_the_order_of_values_that_were_measured_twice_does_not_matter() -> None:
     once = in_plane(f=0.1)
     again = np.full(once.values.size, 0.3)

@@ -226,7 +226,8 @@ def smooth(incident: Array, measured: Array, values: Array, wanted: Array) -> tu
     the shape between the scans, and of the noise of one value, which is more than that of their mean.
 
     Logarithms of noisy values are too low on average, and zeros have none. So what is found is multiplied by the mean of the
-    measured values over what is found where they were measured, with the same weights.
+    measured values over the mean of what is found where they were measured, with the same weights: not by the mean of their
+    ratios, which has no bound where values are decades above what is found.
     """
     _require_light(values)
     least = max(0.5 * float(values[values > 0.0].min()), 1e-300)
@@ -274,10 +275,10 @@ def smooth(incident: Array, measured: Array, values: Array, wanted: Array) -> tu
         raise ArgumentError("too few values to smooth")
     width = best[1]
     there, _ = line(weights(x, a, width), x, width)
-    ratio = values / np.exp(np.minimum(there, logs.max()))
+    smoothed = np.exp(np.minimum(there, logs.max()))
     found, w = line(weights(at_x, at_a, width), at_x, width)
     f = np.exp(np.minimum(found, logs.max()))
-    return f * (w @ ratio), f * np.sqrt(w @ missed**2)
+    return f * (w @ values) / (w @ smoothed), f * np.sqrt(w @ missed**2)
 
 
 METHODS: dict[str, Interpolation] = {
