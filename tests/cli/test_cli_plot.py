@@ -63,6 +63,21 @@ def test_regions_in_figures(run: Run, maps: tuple[Path, Path]) -> None:
     assert second["minimum"] == 30.0
 
 
+def test_the_error_of_a_region_is_that_of_its_pixels_together_or_apart(run: Run, tmp_path: Path) -> None:
+    """Of rays that were counted, 4 pixels of 10 ± 2 have a mean of 10 ± 1; those of a light field err together: 10 ± 2."""
+    for name, rays in (("cone", 25), ("field", -1)):
+        lmap = et.LuminanceMap(
+            np.full((2, 2), 10.0),
+            np.full((2, 2), 2.0),
+            np.full((2, 2), rays),
+            et.Observer(0, 0, 1000),
+            et.Screen(2, 2, 2, 2),
+        )
+        lmap.save(tmp_path / f"{name}.npz")
+        out = run("plot", f"{name}.npz", "-o", "a.png", "--region", "-1,1,-1,1").out
+        assert f"region 1: mean {'10.0 ± 1.0' if rays > 0 else '10.0 ± 2.0'} cd/m²" in out
+
+
 def test_an_intensity_distribution_is_drawn_as_one(run: Run, tmp_path: Path) -> None:
     table = et.Intensity([0.0, 90.0], np.linspace(0, 90, 10), [[1000.0 - 10 * k for k in range(10)]] * 2)
     et.write_intensity(tmp_path / "lamp.ies", table)

@@ -196,6 +196,10 @@ def test_luminance_of_a_scene_for_another_observer(run: Run, tmp_path: Path) -> 
     ("arguments", "text"),
     [
         (["lamp.toml", "--samples", "3", "-o", "{observer}.npz"], "--samples"),
+        (["lamp.toml", "--pixels", "5,5", "--roll", "5", "-o", "{observer}.npz"], "--roll, --pixels: for an observer"),
+        (["lamp.toml", "--distance", "5", "-o", "{observer}.npz"], "--distance"),
+        (["lamp.toml", "--target", "0,0,1", "--up", "0,1,0", "-o", "{observer}.npz"], "--target, --up"),
+        (["lamp.toml", "--plane", "xy", "-o", "{observer}.npz"], "--plane"),
         (["lamp.toml", "--method", "cone", "-o", "{observer}.npz"], "--method"),
         (["lamp.toml", "--unit", "W", "-o", "{observer}.npz"], "--unit"),
         (["lamp.toml", "--observer", "3,4", "--plane", "xy", "-o", "a.npz"], "--size"),

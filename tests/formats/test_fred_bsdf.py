@@ -6,11 +6,12 @@ import itertools
 import math
 from pathlib import Path
 
+import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import FormatError
 from etendue.formats.bsdf import read_bsdf_data
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
 
 HAND = """type bsdf_data
 format angles=deg bsdf=value scale=0.5
@@ -25,6 +26,18 @@ format angles=deg bsdf=value scale=0.5
 140 0 0.3
 140 180 0.1
 """
+
+
+def test_transmitted_light_along_the_surface_stays_transmitted(tmp_path: Path) -> None:
+    """A table that is written as it is, with a row at 90°: that row had been read as all that is reflected."""
+    grid = PolarGrid("normal", np.linspace(0.0, 90.0, 19), np.arange(0.0, 360.0, 30.0))
+    values = np.full(grid.shape, 0.45 / math.pi)
+    slices = tuple(BsdfSlice(light_from(theta, 180.0), values, True, grid=grid) for theta in (0.0, 30.0, 60.0))
+    path = tmp_path / "opal.dat"
+    et.write_bsdf(path, et.BsdfTable(BsdfData(slices)), format="fred")
+    read = et.read_bsdf(path)
+    assert read.reflectance([0.0, 30.0, 60.0]).tolist() == [0.0] * 3
+    assert read.transmittance([0.0, 30.0, 60.0]) == pytest.approx(np.full(3, 0.45), abs=1e-6)
 
 
 def test_a_table_made_by_hand(tmp_path: Path) -> None:

@@ -34,6 +34,7 @@ from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.patch_folder import is_patch_folder
 from etendue.lightfield.light_field import LightField
 from etendue.luminance.estimate import Acceptance, luminance_map
+from etendue.luminance.filters import pixels_err_together
 from etendue.luminance.framing import centre_of_light, framed_screens, probe
 from etendue.luminance.methods import (
     METHOD_NAMES,
@@ -63,6 +64,9 @@ from etendue.tracing.storage import is_result_file
 Source = RaySet | LightField | Scene | ScatterEvents
 
 SPELLING = Spelling(option=lambda name: f"--{name.replace('_', '-')}", method=lambda kind: f"--method {kind.NAME}")
+
+DISTANCE, PIXELS = 1000.0, "128,128"
+"""Of observers and screens that are stated on the command line, unless they say otherwise [mm; columns, rows]."""
 
 
 def luminance(
@@ -107,7 +111,7 @@ def luminance(
             show_default=False,
         ),
     ] = None,
-    distance: Annotated[float, typer.Option("--distance", help="Distance from target to observer in mm.")] = 1000.0,
+    distance: Annotated[float, typer.Option("--distance", help="Distance from target to observer in mm.")] = DISTANCE,
     target: Annotated[
         str | None,
         typer.Option(
@@ -123,7 +127,7 @@ def luminance(
     ] = None,
     roll: Annotated[float, typer.Option("--roll", help="Tilt of the observer's head to its left in °.")] = 0.0,
     region: Regions = None,
-    pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows of the map.", metavar="C,R")] = "128,128",
+    pixels: Annotated[str, typer.Option("--pixels", help="Columns and rows of the map.", metavar="C,R")] = PIXELS,
     plane: Annotated[
         str, typer.Option("--plane", help="Plane of the screen: view (facing the observer) or xy (fixed).")
     ] = "view",
@@ -238,9 +242,14 @@ def luminance(
     own = looked.scene if isinstance(looked, ScatterEvents) else scene
     own_observers = own is not None and observer is None and size is None and orbit is None
     if own is not None and own_observers:
-        who = [(keys.name, keys.observer()) for keys in own.observers]
-        if not who:
-            raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
+        who = _observers_of(own, file)
+        view = {
+            "--distance": (distance, DISTANCE),
+            "--target": (target, None),
+            "--up": (up, None),
+            "--roll": (roll, 0.0),
+        }
+        _refuse_view(view | {"--pixels": (pixels, PIXELS), "--plane": (plane, "view")}, file)
     else:
         upright = None if up is None else _three(up, "--up", "0,0,1")
         who = [("", Observer(theta, phi, distance, up=upright, roll=roll)) for theta, phi in angles(observer)]
@@ -407,6 +416,19 @@ def _three(text: str, option: str, example: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def _observers_of(scene: Scene, file: Path) -> list[tuple[str, Observer]]:
+    """Those that a scene has, with their names."""
+    if not scene.observers:
+        raise ArgumentError(f"{file}: the scene has no observers; give --observer and --size.")
+    return [(keys.name, keys.observer()) for keys in scene.observers]
+
+
+def _refuse_view(options: Mapping[str, tuple[object, object]], file: Path) -> None:
+    """Refuse what says how to look, option by option beside its default, where the observers of a scene look."""
+    changed = {name: value for name, (value, default) in options.items() if value != default}
+    _refuse(changed, f"for an observer that is stated with --observer; those of {file} have their own")
+
+
 def _refuse(options: Mapping[str, object], why: str) -> None:
     needless = [option for option, value in options.items() if value is not None]
     if needless:
@@ -483,8 +505,9 @@ def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = (), *, notes: b
         say(f"  {lmap.relative_error.sentence(facts['quantity'])}")
     for number, region in enumerate(regions, 1):
         found = region_statistics(lmap, region)
+        mean_error = found.mean_error if pixels_err_together(lmap) else found.mean_error_apart
         say(
-            f"  region {number}: mean {measured(found.mean, found.mean_error, found.unit)}, "
+            f"  region {number}: mean {measured(found.mean, mean_error, found.unit)}, "
             f"minimum {counted(found.minimum, found.unit)}, maximum {counted(found.maximum, found.unit)}, "
             f"minimum over mean {found.uniformity:.3g}"
             + (f"; {found.dead_pixels} of {found.pixels} pixels are dead and count as 0" if found.dead_pixels else "")

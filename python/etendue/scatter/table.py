@@ -191,8 +191,9 @@ def _told(data: BsdfData) -> Iterable[Complaint]:
             yield Complaint("warning", place, f"{way} {share:.6g} of the light; scaled to 1")
     if data.slices:
         yield from _beyond(data)
-    unlike = max(((unlike_its_image(one), one.theta) for one in data.slices), default=(0.0, 0.0))
-    if data.mirrored and unlike[0] > UNLIKE:
+    mirrored = data.slices if data.mirrored else ()
+    unlike = max(((unlike_its_image(one), one.theta) for one in mirrored), default=(0.0, 0.0))
+    if unlike[0] > UNLIKE:
         yield Complaint(
             "warning",
             f"{unlike[1]:g}° of incidence",

@@ -28,6 +28,9 @@ MISSING = "---"
 """In place of a value that was not measured."""
 
 THETA = np.concatenate([np.arange(0.0, 80.0, 2.0), np.arange(80.0, 90.5, 1.0)])
+ALONG = 1e-7
+"""Angle that stands for light along the surface, which is reflected or transmitted [°]."""
+
 PHI_STEP, TURN = 5.0, 45.0
 """Directions of tables that are made to be written [°]."""
 
@@ -164,7 +167,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
         for turn, theta in itertools.product(turns if is_there else (), bsdf.incidences):
             incident = light_from(theta, (180.0 + turn) % 360.0)
             grid = PolarGrid("normal", radial, np.arange(0.0, 360.0, PHI_STEP) + turn)
-            scattered = direction(np.minimum(radial, 90.0 - 1e-7)[None, :], grid.azimuth[:, None], behind=transmitted)
+            scattered = direction(np.minimum(radial, 90.0 - ALONG)[None, :], grid.azimuth[:, None], behind=transmitted)
             slices.append(BsdfSlice(incident, bsdf.evaluate(incident, scattered), transmitted, grid=grid))
     return BsdfData(tuple(slices), isotropic=bsdf.isotropic, mirrored=False, name=bsdf.name)
 
@@ -180,7 +183,8 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         for one in slices:
             grid = one.grid
             assert grid is not None  # noqa: S101 - `fits` says so
-            polar = 180.0 - grid.radial if one.transmitted else grid.radial
+            # Along the surface light counts as reflected.
+            polar = 180.0 - np.minimum(grid.radial, 90.0 - ALONG) if one.transmitted else grid.radial
             for (i, r), (k, a) in itertools.product(enumerate(polar), enumerate(grid.azimuth)):
                 lines.append(f"{r:.12g}\t{a:.9g}\t{one.values[k, i]:.9g}")
     stream.write(("\n".join(lines) + "\n").encode("ascii"))
