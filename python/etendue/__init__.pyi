@@ -38,12 +38,13 @@ from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, parse_surface
 from etendue.luminance.combination import combine_maps
-from etendue.luminance.comparison import Region, compare, cross_section
+from etendue.luminance.comparison import compare, cross_section
 from etendue.luminance.denoising import denoise_map
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.filters import filter_map
 from etendue.luminance.methods import Cone, FromField, PathTracing
-from etendue.luminance.regions import PolygonRegion, RegionStatistics, region_statistics
+from etendue.luminance.region_statistics import RegionStatistics, region_statistics
+from etendue.luminance.regions import PolygonRegion, Region
 from etendue.luminance.source_report import SourceReport, report_source
 from etendue.plot import (
     draw_scene,

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.luminance.combination import combine_maps
-from etendue.luminance.comparison import Region, compare, cross_section
+from etendue.luminance.comparison import compare, cross_section
 from etendue.luminance.denoising import denoise_map
 from etendue.luminance.filters import filter_map
+from etendue.luminance.regions import Region
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen

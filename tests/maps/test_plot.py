@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.luminance.comparison import Region, compare, cross_section
+from etendue.luminance.comparison import compare, cross_section
+from etendue.luminance.regions import Region
 from etendue.plot import plot_comparison, plot_cross_sections, plot_map, style
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen

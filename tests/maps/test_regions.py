@@ -8,8 +8,9 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
-from etendue.luminance.comparison import Region, compare
-from etendue.luminance.regions import PolygonRegion, parse_region, region_statistics
+from etendue.luminance.comparison import compare
+from etendue.luminance.region_statistics import region_statistics
+from etendue.luminance.regions import PolygonRegion, Region, parse_region
 from etendue.plot import plot_comparison, plot_map, style
 from etendue.plot.colour_scale import choose_scale
 from etendue.quantities.luminance_map import LuminanceMap
@@ -31,6 +32,48 @@ def test_a_polygon_holds_the_pixels_of_its_area() -> None:
     assert arrow.mask(screen).sum() * screen.pixel_area == pytest.approx(arrow.area, rel=2e-3)
     box = PolygonRegion([(-1.003, -2.003), (3.003, -2.003), (3.003, 0.503), (-1.003, 0.503)])
     np.testing.assert_array_equal(box.mask(screen), Region(-1.003, 3.003, -2.003, 0.503).mask(screen))
+
+
+def test_a_rectangle_is_its_polygon_whichever_way_it_is_told() -> None:
+    """Limits on pixel centres, off them, in either sense, and mirrored: both kinds hold the same pixels, and the mirror
+    image of a region the mirrored ones."""
+    rng = np.random.default_rng(3)
+    screen = Screen(9, 7, 9, 7)
+    for _ in range(200):
+        limits = rng.integers(-8, 9, 4) / 2.0 if rng.random() < 0.5 else rng.uniform(-4, 4, 4)
+        (left, right), (bottom, top) = sorted(limits[:2]), sorted(limits[2:])
+        if not (left < right and bottom < top):
+            continue
+        try:
+            expected = Region(left, right, bottom, top).mask(screen)
+        except ArgumentError:
+            continue
+        corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
+        for order in (corners, corners[::-1], corners[2:] + corners[:2]):
+            np.testing.assert_array_equal(PolygonRegion(order).mask(screen), expected)
+        mirrored = PolygonRegion([(-x, y) for x, y in corners]).mask(screen)
+        np.testing.assert_array_equal(mirrored, expected[:, ::-1])
+    triangle = PolygonRegion([(-3, -2), (3, -2), (0, 1)]).mask(screen)
+    np.testing.assert_array_equal(triangle, triangle[:, ::-1])
+    assert triangle.sum() == 7 + 5 + 3 + 1
+
+
+def test_loops_of_either_sense_hold_pixels() -> None:
+    """A bow tie, whose two loops have the signed area 0: pixels of one fall on those of the other by the mirror."""
+    tie = PolygonRegion([(-4, -3), (4, 3), (4, -3), (-4, 3)])
+    inside = tie.mask(Screen(10, 8, 1000, 800))
+    assert tie.area == 0.0
+    assert inside.sum() * 1e-4 == pytest.approx(24.0, rel=5e-3)
+    np.testing.assert_array_equal(inside, inside[:, ::-1])
+
+
+def test_what_a_region_has_beyond_the_screen_is_told() -> None:
+    lmap = make_map([[1, 2, 3, 4], [5, 6, 7, 8]])
+    assert region_statistics(lmap, Region(-2, 2, -1, 1)).notes == ()
+    (note,) = region_statistics(lmap, PolygonRegion([(0, -3.5), (0, 1), (2.25, 1)])).notes
+    assert "0.25 mm beyond its right, 2.5 mm beyond its bottom" in note
+    words = "".join(text.get_text() for text in plot_map(lmap, regions=[Region(0, 9, 0, 1)]).texts)
+    assert "cut at the edge of the screen" in words
 
 
 def test_statistics_are_those_of_the_pixels_in_the_region() -> None:

@@ -7,10 +7,12 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.terminal import check_outputs, numbers, one_of, print_json, say
+from etendue.cli.stated import refuse
+from etendue.cli.terminal import check_outputs, one_of, print_json, say
 from etendue.formats.maps import PICTURE_EXTENSIONS, read_map
-from etendue.luminance.comparison import DEAD_RULES, Region, cross_section
+from etendue.luminance.comparison import DEAD_RULES, cross_section
 from etendue.luminance.comparison import compare as compare_maps
+from etendue.luminance.regions import parse_region
 from etendue.plot import plot_comparison, plot_cross_sections
 from etendue.plot.colour_scale import SCALES
 from etendue.plot.comparison_picture import DIFFERENCES
@@ -56,9 +58,13 @@ def compare(
     if (section_output is None) != (section_x is None and section_y is None):
         raise typer.BadParameter("--section-output goes with --section-x or --section-y")
     check_outputs([p for p in (output, section_output) if p], PICTURE_EXTENSIONS)
+    if output is None:
+        refuse(["difference"], "for the picture of the difference; add -o picture.png, or leave it out")
+    if output is None and section_output is None:
+        refuse(["scale"], "for pictures; add -o or --section-output, or leave it out")
     limits = None
     if region is not None:
-        limits = Region(*numbers(region, 4, "--region", "-5,5,-2,2"))
+        limits = parse_region(region)
     a, b = read_map(test), read_map(reference)
     result = compare_maps(a, b, region=limits, dead=rule, ignore_geometry=ignore_geometry)
     if output is not None:

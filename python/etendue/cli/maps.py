@@ -1,15 +1,136 @@
-"""Maps of luminance and of illuminance, as ``etendue info`` tells them."""
+"""Maps of luminance and of illuminance, as the verbs write them and tell them in figures."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
-from etendue.cli.luminance import print_map, summary
+import numpy as np
+
 from etendue.cli.terminal import say
+from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.formats.maps.map_format import AnyMap
+from etendue.luminance.filters import pixels_err_together
+from etendue.luminance.region_statistics import region_statistics
+from etendue.luminance.regions import AnyRegion, parse_region
+from etendue.plot.colour_scale import Scale
+from etendue.plot.map_picture import plot_map
+from etendue.plot.region_marks import check_number
+from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.measured import measured
+from etendue.quantities.observer import Screen
 from etendue.quantities.powers_of_ten import counted
+
+
+def parsed_regions(texts: Sequence[str] | None, outputs: Iterable[Path]) -> list[AnyRegion]:
+    """The regions that an option states, as many as a picture among the outputs has room for.
+
+    Raises
+    ------
+    ArgumentError
+        If one is none, or there are more than a picture has room for.
+    """
+    regions = [parse_region(text) for text in texts or []]
+    if any(path.suffix.lower() in PICTURE_EXTENSIONS for path in outputs):
+        check_number(regions)
+    return regions
+
+
+def check_regions(regions: Sequence[AnyRegion], screens: Iterable[Screen]) -> None:
+    """Refuse, before any map is worked out, regions that hold no pixel of one of the screens.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+    """
+    for screen in dict.fromkeys(screens):
+        for region in regions:
+            region.mask(screen)
+
+
+def write_map(
+    lmap: LuminanceMap, paths: list[Path], scale: Scale = "auto", regions: Sequence[AnyRegion] = ()
+) -> list[str]:
+    """Write a map to files, and draw it, by extension; returns what the formats could not express."""
+    drawn = [path for path in paths if path.suffix.lower() in PICTURE_EXTENSIONS]
+    # A picture may be refused for what the map turns out to be, e.g. dark in a region: the map itself is kept.
+    notes = [f"{path}: {note}" for path in paths if path not in drawn for note in lmap.save(path)]
+    for path in drawn:
+        plot_map(lmap, path, scale, regions=regions)
+    return notes
+
+
+def summary(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> dict[str, Any]:
+    """A map in figures, as plain data [unit of the map]."""
+    live = ~np.isnan(lmap.values)
+    values = lmap.values[live]
+    error = lmap.relative_error
+    return {
+        "quantity": lmap.quantity,
+        "unit": lmap.unit,
+        "observer": lmap.header()["observer"],
+        "screen": lmap.header()["screen"],
+        "mean_of_live_pixels": float(values.mean()) if live.any() else None,
+        "maximum": float(values.max()) if live.any() else None,
+        "intensity": lmap.intensity,
+        "relative_error": None if error is None else dataclasses.asdict(error),
+        "rays": int(lmap.rays[lmap.rays > 0].sum()) if (lmap.rays >= 0).any() else None,
+        "dead_pixels": lmap.dead_pixels,
+        "pixels": lmap.values.size,
+        "regions": [region_statistics(lmap, region).to_dict() for region in regions],
+        "notes": list(lmap.notes),
+    }
+
+
+def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = (), *, notes: bool = True) -> None:
+    """A map in figures, for people, with its notes or without."""
+    facts = summary(lmap)
+    where = lmap.observer
+    say(f"{facts['quantity']} from θ = {where.theta:g}°, φ = {where.phi:g}°, {where.distance:g} mm")
+    if facts["maximum"] is not None:
+        error = lmap.standard_error.flat[np.nanargmax(lmap.values)]
+        say(
+            f"  mean of live pixels {counted(facts['mean_of_live_pixels'], lmap.unit)}, "
+            f"maximum {measured(facts['maximum'], error, lmap.unit)}"
+        )
+        unit = "cd" if lmap.flux_unit == "lm" else "W/sr"
+        say(f"  intensity towards the observer {counted(facts['intensity'], unit)}")
+    if lmap.relative_error is not None:
+        say(f"  {lmap.relative_error.sentence(facts['quantity'])}")
+    _print_regions(lmap, regions)
+    for note in lmap.notes if notes else ():
+        say(f"  {note}")
+
+
+def _print_regions(lmap: AnyMap, regions: Sequence[AnyRegion]) -> None:
+    for number, region in enumerate(regions, 1):
+        found = region_statistics(lmap, region)
+        mean_error = found.mean_error if pixels_err_together(lmap) else found.mean_error_apart
+        say(
+            f"  region {number}: mean {measured(found.mean, mean_error, found.unit)}, "
+            f"minimum {counted(found.minimum, found.unit)}, maximum {counted(found.maximum, found.unit)}, "
+            f"minimum over mean {found.uniformity:.3g}"
+            + (f"; {found.dead_pixels} of {found.pixels} pixels are dead and count as 0" if found.dead_pixels else "")
+        )
+
+
+def print_illuminance(found: IlluminanceMap, regions: Sequence[AnyRegion] = ()) -> None:
+    """A map of illuminance in figures, for people, with its notes."""
+    x, y, z = found.centre
+    say(f"{found.quantity} around ({x:g}, {y:g}, {z:g}) mm")
+    say(
+        f"  mean {counted(found.mean, found.unit)}, least/mean {found.uniformity:.3f}, "
+        f"flux {counted(found.flux, found.flux_unit)}"
+    )
+    if found.relative_error is not None:
+        say(f"  {found.relative_error.sentence(found.quantity)}")
+    _print_regions(found, regions)
+    for note in found.notes:
+        say(f"  {note}")
 
 
 def describe_map(found: AnyMap) -> dict[str, Any]:
@@ -41,13 +162,4 @@ def print_map_file(found: AnyMap) -> None:
     if isinstance(found, LuminanceMap):
         print_map(found)
         return
-    x, y, z = found.centre
-    say(f"{found.quantity} around ({x:g}, {y:g}, {z:g}) mm")
-    say(
-        f"  mean {counted(found.mean, found.unit)}, least/mean {found.uniformity:.3f}, "
-        f"flux {counted(found.flux, found.flux_unit)}"
-    )
-    if found.relative_error is not None:
-        say(f"  {found.relative_error.sentence(found.quantity)}")
-    for note in found.notes:
-        say(f"  {note}")
+    print_illuminance(found)

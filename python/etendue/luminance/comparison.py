@@ -11,80 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.luminance.regions import AnyRegion, Mask
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
-from etendue.quantities.observer import Screen
 from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.printable import printable
 from etendue.units import MM2_PER_M2
 
 Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 DeadRule = Literal["zero", "exclude"]
 DEAD_RULES: tuple[DeadRule, ...] = get_args(DeadRule)
 
 SAME_GEOMETRY = 1e-6
 """Relative difference up to which two lengths count as equal: numbers that passed through a text or float32 header."""
-
-ON_THE_EDGE = 1e-9
-"""Share of a pixel by which a pixel centre may lie outside a region and still belong to it: rounding."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Region:
-    """A rectangle on the screen; it holds the pixels whose centres lie inside or on its edge.
-
-    Parameters
-    ----------
-    left, right : float
-        Limits along the screen's right axis, from the target [mm].
-    bottom, top : float
-        Limits along the screen's up axis, from the target [mm].
-
-    Raises
-    ------
-    ArgumentError
-        If a limit is not finite or the rectangle is empty.
-
-    Examples
-    --------
-    >>> Region(left=-1, right=0, bottom=-2, top=2).mask(Screen(4, 2, 4, 2)).astype(int).tolist()
-    [[0, 1, 0, 0], [0, 1, 0, 0]]
-    """
-
-    left: float
-    right: float
-    bottom: float
-    top: float
-
-    def __post_init__(self) -> None:
-        if not all(map(math.isfinite, dataclasses.astuple(self))):
-            raise ArgumentError(f"{self._told}: give four finite limits in mm.")
-        if not (self.left < self.right and self.bottom < self.top):
-            raise ArgumentError(f"{self._told}: left must be below right and bottom below top (x right, y up, in mm).")
-
-    @property
-    def _told(self) -> str:
-        """The region as the command line takes it."""
-        return f"region {self.left:g},{self.right:g},{self.bottom:g},{self.top:g}"
-
-    def mask(self, screen: Screen) -> Mask:
-        """Pixels of `screen` in the region, shape (rows, columns).
-
-        Raises
-        ------
-        ArgumentError
-            If no pixel centre lies in the region.
-        """
-        slack_x = ON_THE_EDGE * screen.width / screen.columns
-        slack_y = ON_THE_EDGE * screen.height / screen.rows
-        columns = (screen.x >= self.left - slack_x) & (screen.x <= self.right + slack_x)
-        rows = (screen.y >= self.bottom - slack_y) & (screen.y <= self.top + slack_y)
-        if not (columns.any() and rows.any()):
-            raise ArgumentError(
-                f"{self._told}: no pixel centre lies in it. The screen spans x = ±{screen.width / 2:g} mm and "
-                f"y = ±{screen.height / 2:g} mm in {screen.columns} × {screen.rows} pixels."
-            )
-        return np.logical_and.outer(rows, columns)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -155,7 +93,7 @@ class Comparison:
         The maps.
     compared : array of bool, shape (rows, columns)
         The pixels compared.
-    region : Region or None
+    region : Region, PolygonRegion or None
         Where they were compared; None for the whole screen.
     notes : tuple of str
         What could not be computed, and why.
@@ -173,7 +111,7 @@ class Comparison:
     test: LuminanceMap
     reference: LuminanceMap
     compared: Mask
-    region: Region | None = None
+    region: AnyRegion | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -259,7 +197,7 @@ def _defined(number: float) -> float | None:
 def compare(
     test: LuminanceMap,
     reference: LuminanceMap,
-    region: Region | None = None,
+    region: AnyRegion | None = None,
     dead: DeadRule = "zero",
     *,
     ignore_geometry: bool = False,
@@ -272,7 +210,7 @@ def compare(
         The map to be judged, Ls (the simulated one in the thesis).
     reference : LuminanceMap
         The map it is judged by, Lm (the measured one in the thesis).
-    region : Region, optional
+    region : Region or PolygonRegion, optional
         Where to compare; the whole screen if not given.
     dead : {"zero", "exclude"}
         ``"zero"``: a dead pixel counts as 0, as in the thesis. ``"exclude"``: a pixel that is dead in either map is

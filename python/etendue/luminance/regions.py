@@ -1,4 +1,4 @@
-"""Parts of a map in figures: rectangles and polygons on the screen, their mean with its error, extremes and uniformity."""
+"""Parts of a screen: rectangles and polygons, and the pixels that they hold."""
 
 from __future__ import annotations
 
@@ -6,27 +6,87 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
-from etendue.luminance.comparison import DEAD_RULES, ON_THE_EDGE, DeadRule, Region
-from etendue.quantities.illuminance_map import IlluminanceMap
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.errors import ArgumentError
 from etendue.quantities.observer import Screen
 
 Mask = npt.NDArray[np.bool_]
 Corner = tuple[float, float]
 
-PERCENTILES = (5.0, 50.0, 95.0)
-"""That are stated [%]."""
+ON_THE_EDGE = 1e-9
+"""Share of a pixel by which a pixel centre may lie outside a region and still belong to it: rounding."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Region:
+    """A rectangle on the screen; it holds the pixels whose centres lie inside or on its edge.
+
+    Parameters
+    ----------
+    left, right : float
+        Limits along the screen's right axis, from the target [mm].
+    bottom, top : float
+        Limits along the screen's up axis, from the target [mm].
+
+    Raises
+    ------
+    ArgumentError
+        If a limit is not finite or the rectangle is empty.
+
+    Examples
+    --------
+    >>> Region(left=-1, right=0, bottom=-2, top=2).mask(Screen(4, 2, 4, 2)).astype(int).tolist()
+    [[0, 1, 0, 0], [0, 1, 0, 0]]
+    """
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    def __post_init__(self) -> None:
+        if not all(map(math.isfinite, dataclasses.astuple(self))):
+            raise ArgumentError(f"{self._told}: give four finite limits in mm.")
+        if not (self.left < self.right and self.bottom < self.top):
+            raise ArgumentError(f"{self._told}: left must be below right and bottom below top (x right, y up, in mm).")
+
+    @property
+    def corners(self) -> tuple[tuple[float, float], ...]:
+        """Of the rectangle, counter-clockwise from the lower left one [mm]."""
+        left, right, bottom, top = self.left, self.right, self.bottom, self.top
+        return (left, bottom), (right, bottom), (right, top), (left, top)
+
+    @property
+    def _told(self) -> str:
+        """The region as the command line takes it."""
+        return f"region {self.left:g},{self.right:g},{self.bottom:g},{self.top:g}"
+
+    def mask(self, screen: Screen) -> Mask:
+        """Pixels of `screen` in the region, shape (rows, columns).
+
+        Raises
+        ------
+        ArgumentError
+            If no pixel centre lies in the region.
+        """
+        slack_x = ON_THE_EDGE * screen.width / screen.columns
+        slack_y = ON_THE_EDGE * screen.height / screen.rows
+        columns = (screen.x >= self.left - slack_x) & (screen.x <= self.right + slack_x)
+        rows = (screen.y >= self.bottom - slack_y) & (screen.y <= self.top + slack_y)
+        if not (columns.any() and rows.any()):
+            raise ArgumentError(
+                f"{self._told}: no pixel centre lies in it. The screen spans x = ±{screen.width / 2:g} mm and "
+                f"y = ±{screen.height / 2:g} mm in {screen.columns} × {screen.rows} pixels."
+            )
+        return np.logical_and.outer(rows, columns)
 
 
 @dataclasses.dataclass(frozen=True)
 class PolygonRegion:
-    """A polygon on the screen; it holds the pixels whose centres lie inside (even-odd rule).
+    """A polygon on the screen; it holds the pixels whose centres lie inside (even-odd rule) or on its edge.
 
     Parameters
     ----------
@@ -36,7 +96,7 @@ class PolygonRegion:
     Raises
     ------
     ArgumentError
-        If there are fewer than three corners, one is not finite, or they span no area.
+        If there are fewer than three corners, one is not a pair of finite numbers, or they lie on one line.
 
     Examples
     --------
@@ -54,12 +114,15 @@ class PolygonRegion:
                 f"region {_told(self.corners)}: give three or more corners with finite coordinates in mm."
             )
         object.__setattr__(self, "corners", corners)
-        if self.area == 0.0:
-            raise ArgumentError(f"region {_told(corners)}: the corners span no area.")
+        # A polygon that crosses itself spans area also where that of its loops cancels in `area`.
+        (x, y), width = corners[0], np.ptp(corners, axis=0).max()
+        off = [abs((a - x) * (d - y) - (c - x) * (b - y)) for (a, b), (c, d) in self._edges()]
+        if not max(off) > ON_THE_EDGE * width * width:
+            raise ArgumentError(f"region {_told(corners)}: the corners lie on one line and span no area.")
 
     @property
     def area(self) -> float:
-        """Of a polygon that does not cross itself [mm²]: the shoelace formula."""
+        """Of a polygon that does not cross itself [mm²], by the shoelace formula: loops of either sense cancel."""
         return abs(sum(a * d - c * b for (a, b), (c, d) in self._edges())) / 2.0
 
     def _edges(self) -> Sequence[tuple[Corner, Corner]]:
@@ -74,14 +137,19 @@ class PolygonRegion:
             If no pixel centre lies in the region.
         """
         x, y = screen.x[None, :], screen.y[:, None]
-        inside = np.zeros(screen.shape, dtype=np.bool_)
-        slack = ON_THE_EDGE * screen.width / screen.columns
+        inside, on_edge = np.zeros(screen.shape, dtype=np.bool_), np.zeros(screen.shape, dtype=np.bool_)
+        slack = ON_THE_EDGE * min(screen.width / screen.columns, screen.height / screen.rows)
         for (a, b), (c, d) in self._edges():
-            if b == d:
+            length = math.hypot(c - a, d - b)
+            if length == 0.0:
                 continue
-            # A ray to the right of the pixel's centre crosses the edge.
-            crosses = ((b <= y) & (y < d)) | ((d <= y) & (y < b))
-            inside ^= crosses & (x <= a + (y - b) * (c - a) / (d - b) + slack)
+            along = (((x - a) * (c - a) + (y - b) * (d - b)) / length).clip(0.0, length) / length
+            on_edge |= np.hypot(x - a - along * (c - a), y - b - along * (d - b)) <= slack
+            if b != d:
+                # A ray to the right of the pixel's centre crosses the edge.
+                crosses = ((b <= y) & (y < d)) | ((d <= y) & (y < b))
+                inside ^= crosses & (x < a + (y - b) * (c - a) / (d - b))
+        inside |= on_edge
         if not inside.any():
             raise ArgumentError(
                 f"region {_told(self.corners)}: no pixel centre lies in it. The screen spans ±{screen.width / 2:g} mm "
@@ -95,132 +163,6 @@ AnyRegion = Region | PolygonRegion
 
 def _told(corners: Sequence[Corner]) -> str:
     return ",".join("/".join(f"{coordinate:g}" for coordinate in corner) for corner in corners)
-
-
-@dataclasses.dataclass(frozen=True, repr=False)
-class RegionStatistics:
-    """A region of a map in figures; made by `region_statistics`.
-
-    Parameters
-    ----------
-    mean, minimum, maximum : float
-        Of the pixels counted, in `unit`.
-    mean_error : float
-        Standard error of the mean if all pixels err together: the mean of their errors, which no correlation exceeds.
-        Pixels of light fields and of smoothed maps are like that. NaN where that of a pixel is not known; cells of
-        illuminance that no ray reached count as 0 ± 0.
-    mean_error_apart : float
-        The same if each pixel errs by itself, as those do that count rays: the root of the sum of squares over their number.
-    percentiles : tuple of pairs
-        Share [%] and value: the linear interpolation between ranked pixels.
-    uniformity : float
-        Minimum over mean; NaN where the mean is not above 0.
-    uniformity_of_extremes : float
-        Minimum over maximum; NaN where the maximum is not above 0.
-    area : float
-        Of all pixels in the region [mm²].
-    pixels, dead_pixels : int
-        How many pixels there are, and how many of them are dead.
-    quantity, unit : str
-        Of the map.
-
-    Examples
-    --------
-    >>> from etendue.quantities.observer import Observer
-    >>> lmap = LuminanceMap([[1.0, 3.0]], [[0.3] * 2], [[9] * 2], Observer(0, 0, 1000), Screen(2, 1, 2, 1))
-    >>> region_statistics(lmap, Region(-1, 1, -1, 1))
-    <RegionStatistics: mean 2 cd/m², 1 to 3, of 2 pixels>
-    """
-
-    mean: float
-    mean_error: float
-    mean_error_apart: float
-    minimum: float
-    maximum: float
-    percentiles: tuple[tuple[float, float], ...]
-    uniformity: float
-    uniformity_of_extremes: float
-    area: float
-    pixels: int
-    dead_pixels: int
-    quantity: str
-    unit: str
-
-    def __repr__(self) -> str:
-        """Mean and extremes."""
-        values = f"mean {self.mean:.4g} {self.unit}, {self.minimum:.4g} to {self.maximum:.4g}"
-        return f"<RegionStatistics: {values}, of {self.pixels} pixels>"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; undefined numbers are None."""
-        found = dataclasses.asdict(self)
-        found = {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in found.items()}
-        return found | {"percentiles": {f"{share:g}": value for share, value in self.percentiles}}
-
-
-def region_statistics(
-    lmap: LuminanceMap | IlluminanceMap,
-    region: AnyRegion,
-    percentiles: Sequence[float] = PERCENTILES,
-    dead: DeadRule = "zero",
-) -> RegionStatistics:
-    """Mean, extremes, percentiles and uniformity of a part of a map.
-
-    Parameters
-    ----------
-    lmap : LuminanceMap or IlluminanceMap
-        With its standard errors.
-    region : Region or PolygonRegion
-        On the screen of the map.
-    percentiles : sequence of float
-        Which ones [%], 0 to 100.
-    dead : {"zero", "exclude"}
-        ``"zero"``: a dead pixel counts as 0 ± 0, so that the mean is not biased: where rays are few, those pixels that one
-        of them reached are too bright on average. ``"exclude"``: it is left out, where it is dead for want of a measurement.
-
-    Raises
-    ------
-    ArgumentError
-        If no pixel centre, or no live pixel, lies in the region, or a percentile is out of its range.
-    UnknownNameError
-        If there is no such rule for dead pixels.
-
-    Examples
-    --------
-    >>> from etendue.quantities.observer import Observer
-    >>> lmap = LuminanceMap([[1.0, 2, 3, 4]], [[0.3] * 4], [[9] * 4], Observer(0, 0, 1000), Screen(4, 1, 4, 1))
-    >>> found = region_statistics(lmap, Region(-1, 2, -1, 1))
-    >>> found.mean, round(found.mean_error, 3), round(found.mean_error_apart, 3), round(found.uniformity, 3)
-    (3.0, 0.3, 0.173, 0.667)
-    """
-    if not all(0.0 <= share <= 100.0 for share in percentiles):
-        raise ArgumentError(f"region_statistics: percentiles are {tuple(percentiles)}; give numbers from 0 to 100.")
-    if dead not in DEAD_RULES:
-        raise UnknownNameError("rule for dead pixels", dead, DEAD_RULES)
-    inside = region.mask(lmap.screen)
-    live = inside & ~np.isnan(lmap.values)
-    # A cell of illuminance that no ray reached is 0, of unknown error: it counts as a dead pixel does.
-    lit = live & ~((lmap.values == 0.0) & (lmap.rays == 0))
-    if not live.any():
-        raise ArgumentError(f"region_statistics: all {int(inside.sum())} pixels in {region} are dead.")
-    counted = inside if dead == "zero" else live
-    values, errors = (np.where(lit, array, 0.0)[counted] for array in (lmap.values, lmap.standard_error))
-    mean, low, high = float(values.mean()), float(values.min()), float(values.max())
-    return RegionStatistics(
-        mean=mean,
-        mean_error=float(errors.mean()),
-        mean_error_apart=float(np.sqrt((errors**2).sum()) / errors.size),
-        minimum=low,
-        maximum=high,
-        percentiles=tuple((float(share), float(np.percentile(values, share))) for share in percentiles),
-        uniformity=low / mean if mean > 0.0 else math.nan,
-        uniformity_of_extremes=low / high if high > 0.0 else math.nan,
-        area=float(inside.sum()) * lmap.screen.pixel_area,
-        pixels=int(inside.sum()),
-        dead_pixels=int((inside & ~live).sum()),
-        quantity=lmap.quantity,
-        unit=lmap.unit,
-    )
 
 
 def parse_region(text: str) -> AnyRegion:

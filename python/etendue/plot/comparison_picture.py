@@ -236,12 +236,11 @@ def _draw_panels(
 
 def _outline(axes: Axes, comparison: Comparison) -> None:
     """The region compared."""
-    from matplotlib.patches import Rectangle
+    from matplotlib.patches import Polygon
 
     region = comparison.region
     if region is not None:
-        size = (region.right - region.left, region.top - region.bottom)
-        axes.add_patch(Rectangle((region.left, region.bottom), *size, fill=False, edgecolor="white", linewidth=1.0))
+        axes.add_patch(Polygon(np.array(region.corners), closed=True, fill=False, edgecolor="white", linewidth=1.0))
 
 
 def _figures(comparison: Comparison, labels: tuple[str, str], why: str) -> list[str]:

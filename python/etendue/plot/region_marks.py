@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.luminance.comparison import Region
-from etendue.luminance.regions import AnyRegion, RegionStatistics, region_statistics
+from etendue.luminance.region_statistics import RegionStatistics, region_statistics
+from etendue.luminance.regions import AnyRegion
 from etendue.plot import style
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
@@ -34,6 +34,20 @@ class Mark(NamedTuple):
     line: str
 
 
+def check_number(regions: Sequence[AnyRegion]) -> None:
+    """Refuse more regions than a picture has room for.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+    """
+    if len(regions) > MOST_REGIONS:
+        raise ArgumentError(
+            f"plot: {len(regions)} regions; a picture has room for {MOST_REGIONS}. Draw them in several."
+        )
+
+
 def marks_of(lmap: LuminanceMap | IlluminanceMap, regions: Sequence[AnyRegion]) -> list[Mark]:
     """Regions with their numbers and figures.
 
@@ -42,17 +56,15 @@ def marks_of(lmap: LuminanceMap | IlluminanceMap, regions: Sequence[AnyRegion]) 
     ArgumentError
         If there are more than a picture has room for, or one holds no live pixel.
     """
-    if len(regions) > MOST_REGIONS:
-        raise ArgumentError(
-            f"plot: {len(regions)} regions; a picture has room for {MOST_REGIONS}. Draw them in several."
-        )
+    check_number(regions)
     found = []
     for number, region in enumerate(regions, start=1):
         figures = region_statistics(lmap, region)
         facts = [*_facts(number, figures)]
         if figures.dead_pixels:
             facts.append(f"{figures.dead_pixels} of {figures.pixels} pixels are dead and count as 0")
-        found.append(Mark(number, _outline(region), style.SEPARATOR.join(facts)))
+        facts += ["cut at the edge of the screen"] * bool(figures.notes)
+        found.append(Mark(number, np.array(region.corners), style.SEPARATOR.join(facts)))
     return found
 
 
@@ -72,13 +84,6 @@ def _facts(number: int, figures: RegionStatistics) -> Iterator[str]:
     yield f"max {told(figures.maximum)}"
     yield f"min/mean {style.plain(figures.uniformity)}"
     yield ", ".join(f"{share:g} %: {told(value)}" for share, value in figures.percentiles)
-
-
-def _outline(region: AnyRegion) -> Array:
-    if isinstance(region, Region):
-        left, right, bottom, top = region.left, region.right, region.bottom, region.top
-        return np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
-    return np.array(region.corners)
 
 
 def draw_marks(axes: Axes, marks: Sequence[Mark]) -> None:

@@ -1,0 +1,169 @@
+"""Parts of a map in figures: their mean with its error, extremes, percentiles and uniformity."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from etendue.errors import ArgumentError, UnknownNameError
+from etendue.luminance.comparison import DEAD_RULES, DeadRule
+from etendue.luminance.regions import ON_THE_EDGE, AnyRegion
+from etendue.quantities.illuminance_map import IlluminanceMap
+from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.observer import Screen
+
+PERCENTILES = (5.0, 50.0, 95.0)
+"""That are stated [%]."""
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class RegionStatistics:
+    """A region of a map in figures; made by `region_statistics`.
+
+    Parameters
+    ----------
+    mean, minimum, maximum : float
+        Of the pixels counted, in `unit`.
+    mean_error : float
+        Standard error of the mean if all pixels err together: the mean of their errors, which no correlation exceeds.
+        Pixels of light fields and of smoothed maps are like that. NaN where that of a pixel is not known; cells of
+        illuminance that no ray reached count as 0 ± 0.
+    mean_error_apart : float
+        The same if each pixel errs by itself, as those do that count rays: the root of the sum of squares over their number.
+    percentiles : tuple of pairs
+        Share [%] and value: the linear interpolation between ranked pixels.
+    uniformity : float
+        Minimum over mean; NaN where the mean is not above 0.
+    uniformity_of_extremes : float
+        Minimum over maximum; NaN where the maximum is not above 0.
+    area : float
+        Of all pixels in the region [mm²].
+    pixels, dead_pixels : int
+        How many pixels there are, and how many of them are dead.
+    quantity, unit : str
+        Of the map.
+    notes : tuple of str
+        How far the region reaches beyond the screen, where it does.
+
+    Examples
+    --------
+    >>> from etendue.luminance.regions import Region
+    >>> from etendue.quantities.observer import Observer
+    >>> lmap = LuminanceMap([[1.0, 3.0]], [[0.3] * 2], [[9] * 2], Observer(0, 0, 1000), Screen(2, 1, 2, 1))
+    >>> region_statistics(lmap, Region(-1, 1, -1, 1))
+    <RegionStatistics: mean 2 cd/m², 1 to 3, of 2 pixels>
+    """
+
+    mean: float
+    mean_error: float
+    mean_error_apart: float
+    minimum: float
+    maximum: float
+    percentiles: tuple[tuple[float, float], ...]
+    uniformity: float
+    uniformity_of_extremes: float
+    area: float
+    pixels: int
+    dead_pixels: int
+    quantity: str
+    unit: str
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Mean and extremes."""
+        values = f"mean {self.mean:.4g} {self.unit}, {self.minimum:.4g} to {self.maximum:.4g}"
+        return f"<RegionStatistics: {values}, of {self.pixels} pixels>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; undefined numbers are None."""
+        found = dataclasses.asdict(self)
+        found = {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in found.items()}
+        shares = {f"{share:g}": value for share, value in self.percentiles}
+        return found | {"percentiles": shares, "notes": list(self.notes)}
+
+
+def region_statistics(
+    lmap: LuminanceMap | IlluminanceMap,
+    region: AnyRegion,
+    percentiles: Sequence[float] = PERCENTILES,
+    dead: DeadRule = "zero",
+) -> RegionStatistics:
+    """Mean, extremes, percentiles and uniformity of a part of a map.
+
+    Parameters
+    ----------
+    lmap : LuminanceMap or IlluminanceMap
+        With its standard errors.
+    region : Region or PolygonRegion
+        On the screen of the map.
+    percentiles : sequence of float
+        Which ones [%], 0 to 100.
+    dead : {"zero", "exclude"}
+        ``"zero"``: a dead pixel counts as 0 ± 0, so that the mean is not biased: where rays are few, those pixels that one
+        of them reached are too bright on average. ``"exclude"``: it is left out, where it is dead for want of a measurement.
+
+    Raises
+    ------
+    ArgumentError
+        If no pixel centre, or no live pixel, lies in the region, or a percentile is out of its range.
+    UnknownNameError
+        If there is no such rule for dead pixels.
+
+    Examples
+    --------
+    >>> from etendue.luminance.regions import Region
+    >>> from etendue.quantities.observer import Observer
+    >>> lmap = LuminanceMap([[1.0, 2, 3, 4]], [[0.3] * 4], [[9] * 4], Observer(0, 0, 1000), Screen(4, 1, 4, 1))
+    >>> found = region_statistics(lmap, Region(-1, 2, -1, 1))
+    >>> found.mean, round(found.mean_error, 3), round(found.mean_error_apart, 3), round(found.uniformity, 3)
+    (3.0, 0.3, 0.173, 0.667)
+    """
+    if not all(0.0 <= share <= 100.0 for share in percentiles):
+        raise ArgumentError(f"region_statistics: percentiles are {tuple(percentiles)}; give numbers from 0 to 100.")
+    if dead not in DEAD_RULES:
+        raise UnknownNameError("rule for dead pixels", dead, DEAD_RULES)
+    inside = region.mask(lmap.screen)
+    live = inside & ~np.isnan(lmap.values)
+    # A cell of illuminance that no ray reached is 0, of unknown error: it counts as a dead pixel does.
+    lit = live & ~((lmap.values == 0.0) & (lmap.rays == 0))
+    if not live.any():
+        raise ArgumentError(f"region_statistics: all {int(inside.sum())} pixels in {region} are dead.")
+    counted = inside if dead == "zero" else live
+    values, errors = (np.where(lit, array, 0.0)[counted] for array in (lmap.values, lmap.standard_error))
+    mean, low, high = float(values.mean()), float(values.min()), float(values.max())
+    return RegionStatistics(
+        mean=mean,
+        mean_error=float(errors.mean()),
+        mean_error_apart=float(np.sqrt((errors**2).sum()) / errors.size),
+        minimum=low,
+        maximum=high,
+        percentiles=tuple((float(share), float(np.percentile(values, share))) for share in percentiles),
+        uniformity=low / mean if mean > 0.0 else math.nan,
+        uniformity_of_extremes=low / high if high > 0.0 else math.nan,
+        area=float(inside.sum()) * lmap.screen.pixel_area,
+        pixels=int(inside.sum()),
+        dead_pixels=int((inside & ~live).sum()),
+        quantity=lmap.quantity,
+        unit=lmap.unit,
+        notes=_beyond(region, lmap.screen),
+    )
+
+
+def _beyond(region: AnyRegion, screen: Screen) -> tuple[str, ...]:
+    """How far a region reaches beyond the screen, if it does."""
+    x, y = np.array(region.corners).T
+    reach = {
+        "left": -screen.width / 2.0 - x.min(),
+        "right": x.max() - screen.width / 2.0,
+        "bottom": -screen.height / 2.0 - y.min(),
+        "top": y.max() - screen.height / 2.0,
+    }
+    rounding = ON_THE_EDGE * max(screen.width, screen.height)
+    sides = [f"{far:.3g} mm beyond its {side}" for side, far in reach.items() if far > rounding]
+    if not sides:
+        return ()
+    return (f"the region reaches out of the screen, {', '.join(sides)}: only what lies on the screen is counted",)
